@@ -33,11 +33,11 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
     for motion in motions:
         image = eight_bits(draw_frame(motion, stage, best, *STILL_SIZE))
         written.append(write_png(folder / f"{motion.engine}.png", image))
-    said = missing_extra(film.format)
-    if film.format != "png" and not said:
+    missing_format = missing_extra(film.format)
+    if film.format != "png" and not missing_format:
         frames = _with_progress(page.frames(), film.frames, progress)
         written.append(write(folder / f"film.{film.format}", frames, film.frames_per_second))
-    table = [difference_sentence(motions), ", ".join(path.name for path in written), said]
+    table = [difference_sentence(motions), ", ".join(path.name for path in written), missing_format]
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -48,10 +48,10 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def _with_progress(frames: Iterator[np.ndarray], count: int, progress: Progress) -> Iterator[np.ndarray]:
+def _with_progress(frames: Iterator[np.ndarray], frame_count: int, progress: Progress) -> Iterator[np.ndarray]:
     """Yield the frames; each one advances the progress bar."""
     for k, frame in enumerate(frames):
-        progress(f"frame {k + 1} of {count}", RUN_SHARE + (1.0 - RUN_SHARE) * k / count)
+        progress(f"frame {k + 1} of {frame_count}", RUN_SHARE + (1.0 - RUN_SHARE) * k / frame_count)
         yield frame
 
 

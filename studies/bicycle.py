@@ -23,7 +23,11 @@ def run(scene: BicycleScene, engines: tuple[str, ...], folder: Path, progress: P
     write_table(
         folder / "eigenvalues.csv",
         {"speed": ("m/s", speeds)}
-        | {f"{part} {i + 1}": ("1/s", getattr(values[:, i], part)) for i in range(4) for part in ("real", "imag")},
+        | {
+            f"{component} {i + 1}": ("1/s", getattr(values[:, i], component))
+            for i in range(4)
+            for component in ("real", "imag")
+        },
     )
     for i, engine in enumerate(engines):
         progress(engine, i / len(engines))
@@ -34,8 +38,10 @@ def run(scene: BicycleScene, engines: tuple[str, ...], folder: Path, progress: P
     if runs:
         progress("figure", 1.0)
         step = min(len(result.times) for result in runs.values())
-        alike = {e: r if len(r.times) == step else r.every(float(r.times[-1]) / (step - 1)) for e, r in runs.items()}
-        join_results(alike, "engine").save(folder / "runs.nc")
+        decimated = {
+            e: r if len(r.times) == step else r.every(float(r.times[-1]) / (step - 1)) for e, r in runs.items()
+        }
+        join_results(decimated, "engine").save(folder / "runs.nc")
         figure(scene, speeds, values, runs, folder / "bicycle.png")
     return {
         "scene": scene.title,
@@ -55,14 +61,14 @@ def eigenvalues(scene: BicycleScene) -> tuple[np.ndarray, np.ndarray]:
 
 def _answer_of_run(scene: BicycleScene, runs: dict[str, Result]) -> dict[str, Any]:
     bicycle = scene.whipple
-    said: dict[str, Any] = {
+    figures: dict[str, Any] = {
         "weave speed without control [m/s]": bicycle.weave_speed,
         "capsize speed without control [m/s]": bicycle.capsize_speed,
     }
     for engine, result in runs.items():
-        said[f"largest lean, {engine} [rad]"] = float(np.abs(result["lean"]).max())
-        said[f"energy unaccounted for, {engine}"] = result.detail.unaccounted()
-    return said
+        figures[f"largest lean, {engine} [rad]"] = float(np.abs(result["lean"]).max())
+        figures[f"energy unaccounted for, {engine}"] = result.detail.unaccounted()
+    return figures
 
 
 def _line(engine: str, result: Result) -> str:
@@ -74,8 +80,8 @@ def _line(engine: str, result: Result) -> str:
 def figure(scene: BicycleScene, speeds: np.ndarray, values: np.ndarray, runs: dict[str, Result], path: Path) -> Path:
     """Plot the eigenvalues over speed, and lean and steer angle over time."""
     drawn, axes = panels(4, 2, 2.4)
-    for axis, part in ((axes[0], values.real), (axes[1], values.imag)):
-        axis.plot(speeds, part, ".", ms=2.0, color=DARK)
+    for axis, components in ((axes[0], values.real), (axes[1], values.imag)):
+        axis.plot(speeds, components, ".", ms=2.0, color=DARK)
         axis.axhline(0.0, lw=0.6, color="k")
         axis.set_xlabel("speed [m/s]")
     axes[0].set(ylabel="real part [1/s]", title="Eigenvalues: what grows is above 0", ylim=(-12.0, 7.0))

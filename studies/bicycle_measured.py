@@ -45,62 +45,75 @@ def observed_and_predicted(
     folder: str | Path,
     choose: Sequence[float] = (),
     bicycle: Whipple | None = None,
-    base: Control = EXPERIMENT_FEEDBACK,
+    base_control: Control = EXPERIMENT_FEEDBACK,
 ) -> BicycleObservations:
     """Choose suspects from the measurements at the speeds ``choose`` (m/s, all by default), and predict weave at the
     other speeds; raises InputError."""
-    seen, bicycle = observations(folder), bicycle or load_bicycle("steer_by_wire")
-    speeds = [observation.speed for observation in seen]
+    all_observations, bicycle = observations(folder), bicycle or load_bicycle("steer_by_wire")
+    speeds = [observation.speed for observation in all_observations]
     for speed in choose:
         if speed not in speeds:
             raise InputError(folder, "speeds", speed, f"no windows at this speed; there are {speeds} m/s")
-    choice = ranked_suspects(bicycle, base, [o for o in seen if not choose or o.speed in choose])
+    choice = ranked_suspects(bicycle, base_control, [o for o in all_observations if not choose or o.speed in choose])
     predictions = {}
-    for observation in seen:
+    for observation in all_observations:
         if choose and observation.speed not in choose:
-            by = choice
-        elif choose or len(seen) < 4:
+            choice_without_it = choice
+        elif choose or len(all_observations) < 4:
             continue
         else:
-            by = ranked_suspects(bicycle, base, [o for o in seen if o is not observation])
-        mean, _ = averaged_weave(bicycle, base, by, observation)
-        predictions[observation.speed] = mean, forecast_deviations(bicycle, base, by, observation)
-    return BicycleObservations(seen, choice, predictions)
+            choice_without_it = ranked_suspects(
+                bicycle, base_control, [o for o in all_observations if o is not observation]
+            )
+        mean, _ = averaged_weave(bicycle, base_control, choice_without_it, observation)
+        predictions[observation.speed] = (
+            mean,
+            forecast_deviations(bicycle, base_control, choice_without_it, observation),
+        )
+    return BicycleObservations(all_observations, choice, predictions)
 
 
-def observation_lines(answer: BicycleObservations, bicycle: Whipple, base: Control = EXPERIMENT_FEEDBACK) -> list[str]:
+def observation_lines(
+    bicycle_observations: BicycleObservations, bicycle: Whipple, base_control: Control = EXPERIMENT_FEEDBACK
+) -> list[str]:
     """Text of the measured and predicted weave."""
-    told = ["speed    windows  damping [1/s]             nothing fitted    frequency [rad/s]         nothing fitted"]
-    for seen in answer.observations:
-        mean, deviation, model = seen.mean, seen.deviation, predicted_weave(bicycle, base, seen)
-        each = [
+    lines = ["speed    windows  damping [1/s]             nothing fitted    frequency [rad/s]         nothing fitted"]
+    for observation in bicycle_observations.observations:
+        mean, deviation, model = (
+            observation.mean,
+            observation.deviation,
+            predicted_weave(bicycle, base_control, observation),
+        )
+        cells = [
             f"{sign * mean[i]:6.2f} +- {deviation[i]:4.2f}{sign * model[i]:17.2f} ({model[i] / mean[i] - 1.0:+5.0%})"
             for i, sign in ((0, -1.0), (1, 1.0))
         ]
-        told.append(f"{seen.speed:4.2f} m/s {len(seen.weave):5d}   {'    '.join(each)}")
-    choice, best = answer.choice, answer.choice.best_subset
-    told += ["", f"best of {len(choice.subset_fits)} subsets (inflation of chi^2: {choice.variance_inflation:.2f}):"]
+        lines.append(f"{observation.speed:4.2f} m/s {len(observation.weave):5d}   {'    '.join(cells)}")
+    choice, best = bicycle_observations.choice, bicycle_observations.choice.best_subset
+    lines += ["", f"best of {len(choice.subset_fits)} subsets (inflation of chi^2: {choice.variance_inflation:.2f}):"]
     errors = np.sqrt(choice.variance_inflation * np.diag(best.covariance))
     for name, value, error in zip(best.names, best.values, errors, strict=True):
-        told.append(f"  {name:<14}{value:8.3f} +- {error:.3f} {UNIT_OF_SUSPECT.get(name, '')}")
-    told += ["", "suspect        weight of all subsets with it    F and p of leaving it out of the fullest"]
+        lines.append(f"  {name:<14}{value:8.3f} +- {error:.3f} {UNIT_OF_SUSPECT.get(name, '')}")
+    lines += ["", "suspect        weight of all subsets with it    F and p of leaving it out of the fullest"]
     for name in SUSPECTED_PARAMETERS:
         calls = f"{choice.calls[name][0]:8.1f}, p = {choice.calls[name][1]:.2g}" if name in choice.calls else ""
         why = "no measured number depends on it" if name in choice.undetermined_parameters else calls
-        told.append(f"  {name:<14}{choice.importance(name):8.3f}{'':20}{why}")
+        lines.append(f"  {name:<14}{choice.importance(name):8.3f}{'':20}{why}")
     for name, (ratio, chance) in choice.calls.items():
         if name not in SUSPECTED_PARAMETERS:
-            told.append(f"  {name:<42}{ratio:8.1f}, p = {chance:.2g}")
-    for one, other, correlation in choice.hard_to_tell_apart():
-        told.append(f"  {one} and {other} are hard to tell apart: their estimates correlate by {correlation:+.3f}")
-    told += ["", "predicted without their own speed, in standard deviations:"]
-    for speed, (mean, gap) in answer.predictions.items():
+            lines.append(f"  {name:<42}{ratio:8.1f}, p = {chance:.2g}")
+    for first_name, second_name, correlation in choice.hard_to_tell_apart():
+        lines.append(
+            f"  {first_name} and {second_name} are hard to tell apart: their estimates correlate by {correlation:+.3f}"
+        )
+    lines += ["", "predicted without their own speed, in standard deviations:"]
+    for speed, (mean, gap) in bicycle_observations.predictions.items():
         verdict = "within 2" if np.abs(gap).max() <= 2.0 else "NOT within 2"
-        told.append(
+        lines.append(
             f"  {speed:4.2f} m/s  damping {-mean[0]:.2f} 1/s ({gap[0]:+.2f}), frequency {mean[1]:.2f} rad/s "
             f"({gap[1]:+.2f}): {verdict}"
         )
-    return told
+    return lines
 
 
 def main(
@@ -110,7 +123,7 @@ def main(
 ) -> None:
     """Measure weave in recordings, and choose among the suspects."""
     try:
-        whipple = load_bicycle(bicycle, file="--bicycle", place="")
+        whipple = load_bicycle(bicycle, file="--bicycle", key_path="")
         print("\n".join(observation_lines(observed_and_predicted(folder, choose or (), whipple), whipple)))
     except InputError as error:
         raise SystemExit(f"twinrig: {error}") from None

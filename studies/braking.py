@@ -36,7 +36,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
 
     options = read(Options, scene.options, scene.file, "options")
     failed, table, answer = dict[str, str](), list[str](), dict[str, dict[str, Any]]()
-    every = dict[str, Result]()
+    all_stops = dict[str, Result]()
     engines = engines_of(scene, engines)
     for i, name in enumerate(scene.procedures):
         results = dict[str, Result]()
@@ -50,10 +50,10 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
                 results[engine] = result
                 result.save(folder / (f"{name}.nc" if len(engines) == 1 else f"{name}_{engine}.nc"))
         if not results:
-            if not any(place.startswith(f"{name}, ") for place in failed):
+            if not any(run_name.startswith(f"{name}, ") for run_name in failed):
                 table.append(f"  {name}: stands within two samples of {scene.run.sample:g} s: it has no figures")
             continue
-        every |= {name if len(engines) == 1 else f"{name}, {engine}": stop for engine, stop in results.items()}
+        all_stops |= {name if len(engines) == 1 else f"{name}, {engine}": stop for engine, stop in results.items()}
         stop = Stop(next(iter(results.values())).detail)
         radius = plane_of(scene).radius
         measured, rims = measured_of(scene, name, radius.size), stop.path.turning * radius
@@ -81,8 +81,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
             + measurement_end_line(measured, stop)
             + comparison_lines(results)
         )
-    told = {"failed": failed, "results": every, "answer": answer, "table": table}
-    return {"scene": scene.title, "folder": str(folder), **told}
+    summary = {"failed": failed, "results": all_stops, "answer": answer, "table": table}
+    return {"scene": scene.title, "folder": str(folder), **summary}
 
 
 def rim_speed_differences(
@@ -118,8 +118,8 @@ def comparison_lines(results: dict[str, Result]) -> list[str]:
 
 def figures_lines(name: str, stop: Stop, figures: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
     """Text for one procedure: a table of figures for the vehicle, and a table with a column per wheel."""
-    rest = f"still {stop.speed[-1]:.2f} m/s; all figures are those until then"
-    unfinished = "" if stop.path.ended_at_rest else f": not stopped by {stop.times[-1]:g} s, {rest}"
+    remaining_text = f"still {stop.speed[-1]:.2f} m/s; all figures are those until then"
+    unfinished = "" if stop.path.ended_at_rest else f": not stopped by {stop.times[-1]:g} s, {remaining_text}"
     rows = [f"  {name.replace('_', ' ')}{unfinished}"]
     rows += [f"    {stop.path.clock}"] if stop.path.clock else []
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]

@@ -88,8 +88,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             scale *= PUBLISHED_FIGURES["deceleration"] / means["deceleration"].mean
             steer *= PUBLISHED_FIGURES["aside"] / means["aside"].mean
         progress("as fitted", options.rounds / (options.rounds + 2))
-        last = fitted_scene(scene, options, scale, steer)
-        scatters = _means_of_stops(last, options, options.last, pool, options.seed + 1)
+        fitted = fitted_scene(scene, options, scale, steer)
+        scatters = _means_of_stops(fitted, options, options.last, pool, options.seed + 1)
     columns = zip(QUANTITIES_OF_ROUND.items(), np.array(steps).T, strict=True)
     rounds = {name: Channel("round", values, unit) for (name, unit), values in columns}
     by_rounds = of_chance(result(scene, rounds, {}, engine="reference"), statistical_errors(means), options.runs)
@@ -97,9 +97,9 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     heads = (f"{name} [{unit}]" if unit else name for name, unit in QUANTITIES_OF_ROUND.items())
     rows = [",".join(heads), *(",".join(f"{value:.9g}" for value in step) for step in steps)]
     write_whole(folder / "calibration.csv", "\n".join(rows) + "\n")
-    stop = drive(last, procedure=options.procedure, error=scene.error)
+    stop = drive(fitted, procedure=options.procedure, error=scene.error)
     stop.save(folder / "calibration.nc")
-    stop_figure(last, options.procedure, {"as fitted": stop}, folder / "calibration.png")
+    stop_figure(fitted, options.procedure, {"as fitted": stop}, folder / "calibration.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -110,13 +110,15 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def fitted_scene(scene: BrakingScene, options: Options, scale: float, steer: float) -> BrakingScene:
+def fitted_scene(scene: BrakingScene, options: Options, friction_scale: float, steer: float) -> BrakingScene:
     """The scene with another friction and steer angle; raises RunFailed if the fit has left the possible range of
     these."""
-    if not (0.05 < scale < 2.0 and steer < 1.0):
-        raise RunFailed("calibration", f"the fit diverges: friction times {scale:.3g}, steer angle {steer:.3g} rad")
+    if not (0.05 < friction_scale < 2.0 and steer < 1.0):
+        raise RunFailed(
+            "calibration", f"the fit diverges: friction times {friction_scale:.3g}, steer angle {steer:.3g} rad"
+        )
     procedure = scene.procedures[options.procedure].model_copy(update={"steer": steer})
-    tyres = scene.tyres.model_copy(update={"scale": {**scene.tyres.scale, options.surface: scale}})
+    tyres = scene.tyres.model_copy(update={"scale": {**scene.tyres.scale, options.surface: friction_scale}})
     return scene.model_copy(update={"tyres": tyres, "procedures": {**scene.procedures, options.procedure: procedure}})
 
 
@@ -135,16 +137,16 @@ def _means_of_stops(
     return {key: scatter_of(stops[key]) for key in PAPER_VALUES}
 
 
-def table(options: Options, scale: float, steer: float, scatters: dict[str, Scatter]) -> list[str]:
+def table(options: Options, friction_scale: float, steer: float, scatters: dict[str, Scatter]) -> list[str]:
     """Lines with the fitted parameters, and with each figure next to the paper's value."""
     lines = [
-        f"  calibration: friction of {options.surface} times {scale:.4f}, steer angle {steer:.5f} rad",
+        f"  calibration: friction of {options.surface} times {friction_scale:.4f}, steer angle {steer:.5f} rad",
         f"  means of {options.last} stops, +- the scatter of one",
         f"    {'':<34}{'here':>18}   {'paper, simulated':<36}{'paper, measured':<18}",
     ]
-    for key, (label, simulated, measured, how) in PAPER_VALUES.items():
-        here = f"{scatters[key].mean:.3f} +- {scatters[key].deviation:.3f}"
-        lines.append(f"    {label:<34}{here:>18}   {simulated:<36}{measured:<18}{how}")
+    for key, (label, simulated, measured, kind_of_value) in PAPER_VALUES.items():
+        simulated_here = f"{scatters[key].mean:.3f} +- {scatters[key].deviation:.3f}"
+        lines.append(f"    {label:<34}{simulated_here:>18}   {simulated:<36}{measured:<18}{kind_of_value}")
     return lines
 
 

@@ -72,12 +72,12 @@ def scenes_of_runs(scene: BrakingScene) -> dict[tuple[str, str, str], BrakingSce
 
 
 def _single_procedure(
-    scene: BrakingScene, surface: str, right: str, name: str, controller: ControllerTable
+    scene: BrakingScene, surface: str, right_surface: str, name: str, controller: ControllerTable
 ) -> BrakingScene:
     """The scene with one procedure on one surface under one controller."""
     procedure = scene.procedures[name]
     if procedure.kind == "split":
-        procedure = procedure.model_copy(update={"right": right})
+        procedure = procedure.model_copy(update={"right": right_surface})
     return scene.model_copy(
         update={
             "road": RoadTable(stretches=[Stretch(left=surface)]),
@@ -90,19 +90,19 @@ def _single_procedure(
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Raise InputError for options of a controller or a surface that are impossible."""
     check_reference(scene, engines)
-    for alone in scenes_of_runs(scene).values():
-        check_scene(alone, ("reference",))
+    for single_scene in scenes_of_runs(scene).values():
+        check_scene(single_scene, ("reference",))
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Drive all; saves ``controllers.nc``, ``controllers.csv`` and ``controllers.png``."""
-    every, answer, failed, estimated = scenes_of_runs(scene), list[dict[str, Any]](), dict[str, str](), False
+    scenes, answer, failed, estimated = scenes_of_runs(scene), list[dict[str, Any]](), dict[str, str](), False
     results = dict[str, Result]()
-    for i, (labels, alone) in enumerate(every.items()):
+    for i, (labels, single_scene) in enumerate(scenes.items()):
         name = ", ".join(labels)
-        progress(name, i / len(every))
+        progress(name, i / len(scenes))
         try:
-            results[name] = drive(alone, error=scene.error)
+            results[name] = drive(single_scene, error=scene.error)
             stop = Stop(results[name].detail)
         except RunFailed as error:
             failed[name] = str(error)
@@ -110,15 +110,15 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         if not stop.path.ended_at_rest:
             failed[name] = f"not stopped by {stop.times[-1]:g} s"
             continue
-        values, estimated = stop.of_vehicle(), estimated or not alone.controller.true_speed
+        values, estimated = stop.of_vehicle(), estimated or not single_scene.controller.true_speed
         shown = {head: values[quantity] for head, quantity in SHOWN_QUANTITIES.items()}
         answer.append(
             dict(zip(LABEL_COLUMNS, labels, strict=True)) | shown | {LOCKED_COLUMN: float(stop.locks().time.max())}
         )
     _save_stops(scene, answer, folder, results)
     _figure(scene, answer, folder / "controllers.png", results)
-    told = {"results": results, "answer": answer, "table": table(answer) + [ESTIMATED_SPEED_NOTE] * estimated}
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, **told}
+    summary = {"results": results, "answer": answer, "table": table(answer) + [ESTIMATED_SPEED_NOTE] * estimated}
+    return {"scene": scene.title, "folder": str(folder), "failed": failed, **summary}
 
 
 def table(stops: list[dict[str, Any]]) -> list[str]:
@@ -141,8 +141,8 @@ def _save_stops(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, 
         head.partition(" [")[0].replace("/", " by "): Channel("stop", column, head.partition(" [")[2][:-1])
         for head, column in columns.items()
     }
-    whole = result(scene, channels, texts, engine="reference")
-    (joined_result(whole, results) if results else whole).save(folder / "controllers.nc")
+    stops_result = result(scene, channels, texts, engine="reference")
+    (joined_result(stops_result, results) if results else stops_result).save(folder / "controllers.nc")
     rows = [(*(stop[name] for name in LABEL_COLUMNS), *(f"{stop[head]:.17g}" for head in heads)) for stop in stops]
     write_whole(folder / "controllers.csv", "".join(",".join(row) + "\n" for row in [(*LABEL_COLUMNS, *heads), *rows]))
 
@@ -157,7 +157,7 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, result
 
     options = read(Options, scene.options, scene.file, "options")
     surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stops)) for name in LABEL_COLUMNS)
-    names, each = list(scene.procedures), len(options.controllers)
+    names, controllers_per_group = list(scene.procedures), len(options.controllers)
     figure, axes = subplots(
         len(PANEL_TITLES), max(len(surfaces), 1), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharey="row"
     )
@@ -177,8 +177,8 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, result
                     heights,
                     width * 0.95,
                     label=" + ".join(map(plain_name, kind.split(" + "))),
-                    color=f"C{k % each}",
-                    alpha=1.0 if k < each else 0.5,
+                    color=f"C{k % controllers_per_group}",
+                    alpha=1.0 if k < controllers_per_group else 0.5,
                 )
             axis.set_xticks(range(len(names)), [plain_name(name).replace(" ", "\n") for name in names])
             axis.set(
@@ -186,7 +186,7 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, result
                 ylabel=quantity if column == 0 else "",
             )
     if stops:
-        legend_below(figure, axes[0, 0], columns=max(len(kinds) // each, 1))
+        legend_below(figure, axes[0, 0], columns=max(len(kinds) // controllers_per_group, 1))
     add_heading(figure, scene.title, results)
     save(figure, file)
 

@@ -67,7 +67,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     ensembles, results, blocks = [], dict[str, Result](), Blocks(RUNS_PER_BLOCK)
     progress("loading", 0.0)  # compiles what is not compiled yet, once and not in every worker
     scenes = [build(table, scene.file, Path(scene.folder)) for table in tables]
-    singles = [drive(each, procedure=options.procedure, error=scene.error) for each in scenes]
+    singles = [drive(scene_of_ensemble, procedure=options.procedure, error=scene.error) for scene_of_ensemble in scenes]
     with Crew.of(scene).at_work(blocks.count(options.runs), *places_of(scene)) as pool:
         for i, table in enumerate(tables):
             job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i)
@@ -79,9 +79,11 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             ensembles.append(run_paths(job, options.runs, store, pool, blocks, tell))
     units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in KEPT_QUANTITIES.items()}}
     scatters = [{key: scatter_of(arrays[key]) for key in KEPT_QUANTITIES} for arrays in ensembles]
-    for name, each, single, arrays, means in zip(options.names, scenes, singles, ensembles, scatters, strict=False):
+    for name, scene_of_ensemble, single, arrays, means in zip(
+        options.names, scenes, singles, ensembles, scatters, strict=False
+    ):
         channels = {key: Channel("stop", arrays[key], unit) for key, unit in units.items()}
-        stops = joined_result(result(each, channels, {}, engine="reference"), {"one stop": single})
+        stops = joined_result(result(scene_of_ensemble, channels, {}, engine="reference"), {"one stop": single})
         results[name] = of_chance(stops, statistical_errors(means), options.runs)
         stops.save(folder / f"{name}.nc")
         stops.save_table(folder / f"{name}.csv")
@@ -154,11 +156,11 @@ def _figure(
         lw=0.9,
         label="by the square of the speed alone",
     )
-    said = f"; Welch's test of the means: p = {tests['distance'].p_value:.2g}" if tests else ""
+    test_text = f"; Welch's test of the means: p = {tests['distance'].p_value:.2g}" if tests else ""
     histogram.set(xlabel="stopping distance [m]", ylabel="stops [-]", title="Stopping distances and their means")
     cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="More scatters than the speed")
     legend_below(figure, histogram, cloud, columns=2)
-    add_heading(figure, f"{scene.title}: {options.runs} stops each{said}", results)
+    add_heading(figure, f"{scene.title}: {options.runs} stops each{test_text}", results)
     save(figure, folder / "ensemble.png")
 
 

@@ -43,16 +43,16 @@ def stop_figure(
     """Plot the stop of the first engine over time: speeds, slips, pressures, torques; and the path from above. Lateral
     motion is added if there is any; body roll and pitch and wheel loads if the vehicle has a suspension."""
     procedure, stop = scene.procedures[name], Stop(next(iter(results.values())).detail)
-    aside, lean = _moves_aside(stop), stop.lean
+    leaves_straight, lean = _moves_aside(stop), stop.lean
     rows: list[Any] = [["speeds", "slips"], ["pressures", "torques"]]
-    rows += ([["angles", "across"]] if aside else []) + ([["lean", "loads"]] if lean is not None else [])
+    rows += ([["angles", "across"]] if leaves_straight else []) + ([["lean", "loads"]] if lean is not None else [])
     figure, axes = subplot_mosaic([*rows, ["road", "road"]], figsize=(COLUMN_WIDTH, 2.3 * (len(rows) + 1) + 0.4))
     _speeds(axes["speeds"], stop, stop.path.turning * plane_of(scene).radius, measured_pressures)
     slips = np.where(stop.speed[:-1, None] > SLOWEST_SLIP_SPEED, stop.path.reports.slip, np.nan)
     _wheels(axes["slips"], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
     _wheels(axes["pressures"], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
     _wheels(axes["torques"], stop.times, stop.path.torques / 1e3, "Torque of each brake", "torque [kN m]")
-    if aside:
+    if leaves_straight:
         _plot_angles(axes["angles"], stop)
         axes["across"].plot(stop.times[1:], stop.across, color=DARK, lw=0.8)
         axes["across"].set(xlabel="time [s]", ylabel="acceleration [m/s²]", title="Lateral acceleration")
@@ -70,7 +70,7 @@ def stop_figure(
     add_heading(
         figure,
         f"{scene.title}: {plain_name(name)} from {procedure.speed:g} m/s, "
-        f"{READER_SPELLINGS.get(told := controller_text(scene).replace('{procedure}', name), told)}; {ended}",
+        f"{READER_SPELLINGS.get(spelling := controller_text(scene).replace('{procedure}', name), spelling)}; {ended}",
         results,
     )
     return save(figure, file)
@@ -97,8 +97,8 @@ STRAIGHT_LIMIT = 0.05
 def _moves_aside(stop: Stop) -> bool:
     """Whether yaw, side slip or lateral acceleration during the stop is large enough to be drawn."""
     moving = stop.speed > SLOWEST_SLIP_SPEED
-    turned = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.across
-    return any(np.abs(values).max(initial=0.0) > STRAIGHT_LIMIT for values in turned)
+    sideways = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.across
+    return any(np.abs(values).max(initial=0.0) > STRAIGHT_LIMIT for values in sideways)
 
 
 def _speeds(axis: Axes, stop: Stop, rims: np.ndarray, measured_pressures: MeasuredPressures | None) -> None:
@@ -171,9 +171,15 @@ def on_ground(unit: int, corners: np.ndarray, positions: np.ndarray, plane: Plan
 
 
 def _box_outline(front: float, rear: float) -> np.ndarray:
-    ahead, behind = front + OUTLINE_OVERHANG, rear - OUTLINE_OVERHANG
+    front_end, behind = front + OUTLINE_OVERHANG, rear - OUTLINE_OVERHANG
     return np.array(
-        [[ahead, HALF_WIDTH], [ahead, -HALF_WIDTH], [behind, -HALF_WIDTH], [behind, HALF_WIDTH], [ahead, HALF_WIDTH]]
+        [
+            [front_end, HALF_WIDTH],
+            [front_end, -HALF_WIDTH],
+            [behind, -HALF_WIDTH],
+            [behind, HALF_WIDTH],
+            [front_end, HALF_WIDTH],
+        ]
     )
 
 
@@ -183,23 +189,25 @@ def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: Stop)
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
     plane, drawn = plane_of(scene), unit_outlines(scene)
     behind_it = -float(plane.reach[-1, :-1].sum())
-    first, last = x.min() - 6.0 - behind_it, x.max() + 6.0
-    lacking = max(0.2 * (last - first) - (high - low), 0.0) / 2.0  # one scale both ways, in an axis of the usual shape
+    first, largest_x = x.min() - 6.0 - behind_it, x.max() + 6.0
+    lacking = (
+        max(0.2 * (largest_x - first) - (high - low), 0.0) / 2.0
+    )  # one scale both ways, in an axis of the usual shape
     low, high = low - lacking, high + lacking
-    told = set[str]()
-    starts = [first] + [s.x for s in scene.road.stretches[1:]] + [last]
+    surfaces_named = set[str]()
+    starts = [first] + [s.x for s in scene.road.stretches[1:]] + [largest_x]
     for stretch, begin, end in zip(scene.road.stretches, starts[:-1], starts[1:], strict=True):
         left, right = surfaces_of_stretch(scene.procedures[name], stretch)
         for surface, bottom, top in ((left, scene.road.line, high), (right, low, scene.road.line)):
             axis.fill_between(
-                [max(begin, first), min(end, last)],
+                [max(begin, first), min(end, largest_x)],
                 bottom,
                 top,
                 color=GROUND_COLOURS.get(surface, OTHER_SURFACE),
                 lw=0,
-                label=None if surface in told else surface,
+                label=None if surface in surfaces_named else surface,
             )
-            told.add(surface)
+            surfaces_named.add(surface)
     axis.plot(x, y, color=DARK, label="centre of mass")
     units = stop.units
     for i in np.searchsorted(stop.way, np.linspace(0.0, stop.way[-1], 6 - len(drawn) // 2)).clip(0, len(x) - 1):
@@ -209,7 +217,7 @@ def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: Stop)
         xlabel="x [m]",
         ylabel="y [m]",
         title="Path on the road, from above",
-        xlim=(first, last),
+        xlim=(first, largest_x),
         ylim=(low, high),
         aspect="equal",
     )

@@ -77,28 +77,32 @@ def check(scene: Any, engines: tuple[str, ...]) -> None:
     """Refuse scenes without runs in time, and scenes beside that make no choice."""
     system_of(scene)
     for name in read(Options, scene.options, scene.file, "options").beside:
-        other = load_scene(name, None)
-        if other.tolerance is None:
+        other_scene = load_scene(name, None)
+        if other_scene.tolerance is None:
             raise InputError(scene.file, "options.beside", name, 'asks for no choice: it has no effects = "auto"')
 
 
 def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Choose effects of the scenes; saves ``SYSTEM.csv`` for each scene, and a figure."""
     check(scene, engines)
-    beside = [load_scene(name, None) for name in scene.options.get("beside", [])]
-    return save_choices([scene, *beside], engines, folder, progress)
+    further_scenes = [load_scene(name, None) for name in scene.options.get("beside", [])]
+    return save_choices([scene, *further_scenes], engines, folder, progress)
 
 
 def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Choices of scenes, the first by one of these engines, saved and drawn."""
     scene, choices = scenes[0], list[SceneChoice]()
-    for i, each in enumerate(scenes):
-        progress(each.title, i / len(scenes))
-        linear, asked = has_closed_form(each), engines if each is scene else ()
-        plan_of(each).check(each, () if linear else (engine_of(each, asked),))
-        said = partial(_pass_progress, progress, f"{each.title}, of at most {RUN_BUDGET} runs", i, len(scenes))
-        choices.append(_linear_ride_choice(each) if linear else choice_of_scene(each, asked, said))
-        _save_effect_table(choices[-1], folder / f"{i + 1}_{each.system.replace('-', '_')}.csv")
+    for i, chosen_scene in enumerate(scenes):
+        progress(chosen_scene.title, i / len(scenes))
+        linear, engines_asked = has_closed_form(chosen_scene), engines if chosen_scene is scene else ()
+        plan_of(chosen_scene).check(chosen_scene, () if linear else (engine_of(chosen_scene, engines_asked),))
+        report_share = partial(
+            _pass_progress, progress, f"{chosen_scene.title}, of at most {RUN_BUDGET} runs", i, len(scenes)
+        )
+        choices.append(
+            _linear_ride_choice(chosen_scene) if linear else choice_of_scene(chosen_scene, engines_asked, report_share)
+        )
+        _save_effect_table(choices[-1], folder / f"{i + 1}_{chosen_scene.system.replace('-', '_')}.csv")
     progress("figure", 1.0)
     choice_figure(choices, folder / "choice.png")
     return {
@@ -171,18 +175,18 @@ def choice_of_scene(
 ) -> SceneChoice:
     """The choice for a scene in one engine."""
     engine = engine_of(scene, engines)
-    with Crew.of(scene, usual=1).at_work(PAIRS_IN_ADVANCE, *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *places_of(scene)) as pool:
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
-        choice, none = chooser.choose(), chooser.work(frozenset())
+        choice, full_work = chooser.choose(), chooser.work(frozenset())
     results = chooser.whole.variants.stated(frozenset(choice.left_out), choice.times) if scene.error else []
-    alone = [
+    single_effects = [
         SingleEffect(
-            effect, chooser.teller.predicted_change(frozenset([effect])), none / chooser.work(frozenset([effect]))
+            effect, chooser.teller.predicted_change(frozenset([effect])), full_work / chooser.work(frozenset([effect]))
         )
         for effect in chooser.effects
     ]
     return SceneChoice(
-        scene, engine, choice, alone, chooser.change_if_left_out_too(frozenset(choice.left_out)), {}, results
+        scene, engine, choice, single_effects, chooser.change_if_left_out_too(frozenset(choice.left_out)), {}, results
     )
 
 
@@ -198,32 +202,34 @@ def _linear_ride_choice(scene: Any) -> SceneChoice:
         linear = chooser.choose()
         singles = {effect: frozenset([effect]) for effect in chooser.effects}
         calls = chooser.cost(frozenset()).calls
-        alone = [
-            SingleEffect(effect.name, abs(chooser.predicted_changes(each)), calls / chooser.cost(each).calls)
-            for effect, each in singles.items()
+        single_effects = [
+            SingleEffect(
+                effect.name, abs(chooser.predicted_changes(effect_set)), calls / chooser.cost(effect_set).calls
+            )
+            for effect, effect_set in singles.items()
         ]
         further = {
             effect.name: change for effect, change in chooser.change_if_left_out_too(frozenset(linear.left_out)).items()
         }
         watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
-    before, after = round(linear.cost_before.calls), round(linear.cost_after.calls)
+    calls_before, calls_after = round(linear.cost_before.calls), round(linear.cost_after.calls)
     work = tuple(cost.work for cost in (linear.cost_before, linear.cost_before, linear.cost_after))
     choice = Choice(
-        tuple(each.name for each in linear.candidates),
-        tuple(each.name for each in linear.left_out),
+        tuple(effect_set.name for effect_set in linear.candidates),
+        tuple(effect_set.name for effect_set in linear.left_out),
         1,
         abs(linear.predicted_change),
         0.0 * linear.predicted_change,
         abs(linear.confirmed_change),
         0.0 * linear.predicted_change,
         linear.within_tolerance,
-        (before, before, after),
+        (calls_before, calls_before, calls_after),
         work,
         linear.confirmations,
         0,
         0.0,
     )
-    return SceneChoice(scene, "closed form", choice, alone, further, watts)
+    return SceneChoice(scene, "closed form", choice, single_effects, further, watts)
 
 
 def _answer_of_choice(answered: SceneChoice) -> dict[str, Any]:
@@ -248,7 +254,7 @@ def _answer_of_choice(answered: SceneChoice) -> dict[str, Any]:
         "confirmations": choice.confirmations,
         "would matter no more above": answered.further_tolerances,
         "would break an assumption": {
-            name: [asdict(each) for each in barred] for name, barred in choice.assumptions_barring.items()
+            name: [asdict(breach) for breach in barred] for name, barred in choice.assumptions_barring.items()
         },
     }
 
@@ -262,59 +268,59 @@ def _save_effect_table(choice: SceneChoice, path: Path) -> None:
         writer.writerow(["effect", "left out", *heads, "times less work alone [-]", "would break"])
         for effect in choice.single_effects:
             values = map(repr, effect.changes.tolist())
-            broken = "; ".join(each.says for each in choice.choice.assumptions_barring.get(effect.effect, ()))
+            broken = "; ".join(breach.says for breach in choice.choice.assumptions_barring.get(effect.effect, ()))
             writer.writerow(
                 [effect.effect, effect.effect in choice.choice.left_out, *values, repr(effect.work_ratio), broken]
             )
 
 
-def percent_text(value: float) -> str:
+def percent_text(relative_change: float) -> str:
     """A relative change as text."""
-    digits = ".2g" if abs(value) < 0.1 else ",.0f"
-    return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
+    digits = ".2g" if abs(relative_change) < 0.1 else ",.0f"
+    return f"{100 * relative_change:{digits}} %" if np.isfinite(relative_change) else "without end"
 
 
-def _change_text(change: float, beside: float) -> str:
-    return percent_text(change) + (f" +- {percent_text(beside)}" if beside else "")
+def _change_text(relative_change: float, beside: float) -> str:
+    return percent_text(relative_change) + (f" +- {percent_text(beside)}" if beside else "")
 
 
-def _why_it_stays(change: float, scene_choice: SceneChoice) -> str:
+def _why_it_stays(relative_change: float, scene_choice: SceneChoice) -> str:
     """Text on why an effect stays: how much the quantities would change if it were left out as well."""
     if (
-        change > PREDICTION_SHARE * scene_choice.scene.tolerance
+        relative_change > PREDICTION_SHARE * scene_choice.scene.tolerance
         or scene_choice.activity_of_element
         or scene_choice.choice.ended_early
     ):
-        return f"would matter no more at a tolerance above {percent_text(change)}"
+        return f"would matter no more at a tolerance above {percent_text(relative_change)}"
     return (
-        f"stays at {percent_text(change)}: steps would have to be shorter for it to go, or whole runs did "
+        f"stays at {percent_text(relative_change)}: steps would have to be shorter for it to go, or whole runs did "
         "not confirm it"
     )
 
 
-def choice_lines(scene_choice: SceneChoice, named: bool) -> list[str]:
+def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
     """Text of the choice."""
     choice, scene = scene_choice.choice, scene_choice.scene
     rows = [
-        f"  {scene.title} ({scene.system}, {scene_choice.engine})" if named else f"  by {scene_choice.engine}",
+        f"  {scene.title} ({scene.system}, {scene_choice.engine})" if with_title else f"  by {scene_choice.engine}",
         f"    left out: {', '.join(choice.left_out) or 'nothing'}",
         f"    stay: {', '.join(scene_choice.staying_effects) or 'nothing'}",
     ]
     for i, name in enumerate(scene.quantities):
-        kept = "kept" if choice.confirmed_change[i] + choice.statistical_error[i] <= scene.tolerance else "NOT KEPT"
+        verdict = "kept" if choice.confirmed_change[i] + choice.statistical_error[i] <= scene.tolerance else "NOT KEPT"
         rows.append(
             f"    {name}: {_change_text(choice.predicted_change[i], choice.prediction_remainder[i])} predicted, "
             f"{_change_text(choice.confirmed_change[i], choice.statistical_error[i])} confirmed, tolerance "
-            f"{100 * scene.tolerance:g} %: {kept}"
+            f"{100 * scene.tolerance:g} %: {verdict}"
         )
-    before, step, after = choice.calls
-    saved = f"{before:,} -> {after:,}, {before / after:.3g} times fewer"
+    calls_before, step, calls_after = choice.calls
+    saved = f"{calls_before:,} -> {calls_after:,}, {calls_before / calls_after:.3g} times fewer"
     if scene_choice.activity_of_element:
         rows.append(f"    calls per second of motion {saved}")
     else:
         faster = choice.seconds[0] / choice.seconds[2]
         rows.append(
-            f"    calls {saved}, by steps {choice.times} times as long; {before / step:.3g} times by longer "
+            f"    calls {saved}, by steps {choice.times} times as long; {calls_before / step:.3g} times by longer "
             f"steps with all effects; CPU seconds {faster:.3g} times fewer, once"
         )
     rows += [
@@ -322,9 +328,9 @@ def choice_lines(scene_choice: SceneChoice, named: bool) -> list[str]:
         for name, change in sorted(scene_choice.further_tolerances.items(), key=lambda item: item[1])
     ]
     rows += [
-        f"    {name} stays; without it an assumption would be broken: {each.fact()}"
+        f"    {name} stays; without it an assumption would be broken: {breach.fact()}"
         for name, breaches in choice.assumptions_barring.items()
-        for each in breaches
+        for breach in breaches
     ]
     if choice.ended_early:
         rows.append(f"    the search ended at the calls of {RUN_BUDGET} runs of the scene: larger sets were not tried")
@@ -401,8 +407,8 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
         row for row, effect in zip(y, shown, strict=True) if effect.effect in scene_choice.choice.assumptions_barring
     ]
     if barred:
-        place = np.full(len(barred), HIGHEST_CHANGE)
-        axis.plot(place, barred, "x", color=REJECTED_COLOUR, ms=7, mew=1.6, label="would break an assumption")
+        highest = np.full(len(barred), HIGHEST_CHANGE)
+        axis.plot(highest, barred, "x", color=REJECTED_COLOUR, ms=7, mew=1.6, label="would break an assumption")
     axis.axvline(100 * scene_choice.scene.tolerance, color=DARK, ls="--", lw=1, label="tolerance")
     axis.axvspan(
         100 * scene_choice.scene.tolerance, 1.5 * HIGHEST_CHANGE, color=PALE, alpha=0.25, lw=0, label="matters alone"
@@ -415,9 +421,9 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
         yticklabels=[_effect_and_whether_gone(scene_choice, effect) for effect in shown],
         xlabel="change by leaving out this effect alone [%] (at the ends: beyond)",
     )
-    before, _, after = scene_choice.choice.calls
+    calls_before, _, calls_after = scene_choice.choice.calls
     axis.set_title(
-        f"{scene_choice.scene.system}: {before / after:.3g} times fewer calls "
+        f"{scene_choice.scene.system}: {calls_before / calls_after:.3g} times fewer calls "
         f"at {100 * scene_choice.scene.tolerance:g} %, without the effects named 'left out'"
     )
     axis.legend(fontsize=SMALL_TEXT, loc="upper left", bbox_to_anchor=(1.0, 1.0))

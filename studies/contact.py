@@ -93,8 +93,8 @@ def _table(scene: ContactScene, forces: Result) -> list[str]:
     return [*lines, loss + "; errors are of the force, that of Mz has both together" * bool(rolls.errors)]
 
 
-def _errors_text(error: Error, limit: float) -> str:
-    cells, theory = (_percent_text(part, limit) for part in (error.cells, error.theory))
+def _errors_text(error: Error, friction_limit: float) -> str:
+    cells, theory = (_percent_text(error_part, friction_limit) for error_part in (error.cells, error.theory))
     return f"   {cells:>6}{theory:>8}{error.moment:>9.2g}"
 
 
@@ -111,8 +111,8 @@ def theory_text(method: Method) -> str:
     return THEORY_NAMES[method.name] + ("" if method.name == "linear" else f", {method.cells} cells along each axis")
 
 
-def _percent_text(error: float, limit: float) -> str:
-    return f"{100 * error / limit:.2f}" if limit > 0 else "0"
+def _percent_text(error: float, friction_limit: float) -> str:
+    return f"{100 * error / friction_limit:.2f}" if friction_limit > 0 else "0"
 
 
 def _lines_of_touches(scene: ContactScene) -> list[str]:
@@ -130,23 +130,25 @@ def _draw_figures(scene: ContactScene, forces: Result, folder: Path) -> None:
     from studies.contact_figures import contact_figure, sweep_figure
 
     rolls: ContactResults = forces.detail
-    motion, last, sweep = rolls.motions[-1], rolls.rolled[-1], scene.sweep
-    if last.fields:
+    motion, last_rolled, sweep = rolls.motions[-1], rolls.rolled[-1], scene.sweep
+    if last_rolled.fields:
         title = (
             f"{scene.title}\n"
             f"ξx = {motion[0]:.3g}, ξy = {motion[1]:.3g}, spin = {motion[2]:.3g} 1/m\n"
-            f"Fx = {1e-3 * last.fx:.2f} kN, Fy = {1e-3 * last.fy:.2f} kN, Mz = {last.mz:.1f} N m "
+            f"Fx = {1e-3 * last_rolled.fx:.2f} kN, Fy = {1e-3 * last_rolled.fy:.2f} kN, Mz = {last_rolled.mz:.1f} N m "
             f"by {THEORY_NAMES[scene.method.name]}"
         )
         friction = rolls.contact.friction
-        contact_figure(list(last.fields), friction, title, _pressure(rolls.contact), forces, folder / "contact.png")
+        contact_figure(
+            list(last_rolled.fields), friction, title, _pressure(rolls.contact), forces, folder / "contact.png"
+        )
     if sweep is not None:
-        others = "".join(
+        note_on_others = "".join(
             f"; {symbol} = {value:.3g}{unit}"
             for (symbol, unit), (name, value) in zip(CREEPAGE_SYMBOLS, scene.creepage, strict=True)
             if value and name != sweep.of
         )
-        title = f"{scene.title}\nForces by {theory_text(scene.method)}{others}"
+        title = f"{scene.title}\nForces by {theory_text(scene.method)}{note_on_others}"
         sweep_figure(sweep, forces, _exact_checks(scene, rolls), title, folder / "forces.png")
 
 

@@ -62,9 +62,12 @@ def contact_figure(
     save(figure, path)
 
 
-def _cell_corners(f: Fields) -> list[Array]:
+def _cell_corners(fields_on_cells: Fields) -> list[Array]:
     """Corners of every cell inside, (4, 2) in mm."""
-    x, y, dx, dy = (MILLIMETRES_PER_METRE * getattr(f, name)[f.inside] for name in ("x", "y", "dx", "dy"))
+    x, y, dx, dy = (
+        MILLIMETRES_PER_METRE * getattr(fields_on_cells, name)[fields_on_cells.inside]
+        for name in ("x", "y", "dx", "dy")
+    )
     corners = [(x + i * dx / 2, y + j * dy / 2) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     return list(np.array(corners).transpose(2, 0, 1))
 
@@ -106,19 +109,22 @@ def _draw_tractions(axis: Any, patches: list[Fields], friction: float, spacing: 
     axis.set_title("Traction on the wheel,\nand where it sticks and slips")
 
 
-def _arrow_data(f: Fields, spacing: float) -> Array:
+def _arrow_data(fields_on_cells: Fields, spacing: float) -> Array:
     """Positions and tractions (4, n) at evenly spaced points, which lie in some rows of cells and are interpolated
     along them."""
-    arrows, lines = list[Array](), f.y[:, 0]
-    step = max(1, round(spacing / float(f.dy[0, 0])))
+    arrows, lines = list[Array](), fields_on_cells.y[:, 0]
+    step = max(1, round(spacing / float(fields_on_cells.dy[0, 0])))
     for row in range(len(lines) // 2 % step, len(lines), step):
-        inside = np.flatnonzero(f.inside[row])
-        inside = inside[np.argsort(f.x[row, inside])]
-        if inside.size:
-            x = f.x[row, inside]
-            at = np.arange(np.ceil(x[0] / spacing), np.floor(x[-1] / spacing) + 1) * spacing
-            values = (np.interp(at, x, traction[row, inside]) for traction in (f.px, f.py))
-            arrows.append(np.array([at, np.full_like(at, lines[row]), *values]))
+        cells_inside = np.flatnonzero(fields_on_cells.inside[row])
+        cells_inside = cells_inside[np.argsort(fields_on_cells.x[row, cells_inside])]
+        if cells_inside.size:
+            x = fields_on_cells.x[row, cells_inside]
+            arrow_positions = np.arange(np.ceil(x[0] / spacing), np.floor(x[-1] / spacing) + 1) * spacing
+            values = (
+                np.interp(arrow_positions, x, traction[row, cells_inside])
+                for traction in (fields_on_cells.px, fields_on_cells.py)
+            )
+            arrows.append(np.array([arrow_positions, np.full_like(arrow_positions, lines[row]), *values]))
     return np.concatenate(arrows, axis=1)
 
 
@@ -134,16 +140,19 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     values, body = (1.0 if sweep.of == "spin" else 100.0) * sweep.values(), forces.detail.contact
     limit = 1e-3 * body.friction * body.pressing.load
-    stated, none = "error_of_cells" in forces.data, 0.0 * values
-    error = 1e-3 * (forces["error_of_cells"] + forces["error_of_theory"]) if stated else none
-    turned = forces["moment_error_of_cells"] + forces["moment_error_of_theory"] if stated else none
-    for axis, name, label, scale, off, most in (
+    stated, no_error = "error_of_cells" in forces.data, 0.0 * values
+    error = 1e-3 * (forces["error_of_cells"] + forces["error_of_theory"]) if stated else no_error
+    moment_error = forces["moment_error_of_cells"] + forces["moment_error_of_theory"] if stated else no_error
+    for axis, name, label, scale, error_band, force_bound in (
         (left, "fx", "Fx", 1e-3, error, limit),
         (left, "fy", "Fy", 1e-3, error, limit),
-        (right, "mz", None, 1.0, turned, np.inf),
+        (right, "mz", None, 1.0, moment_error, np.inf),
     ):
         colour, force = FORCE_COLOURS[name], scale * forces[name]
-        low, high = np.clip(force - off, -most, most), np.clip(force + off, -most, most)
+        low, high = (
+            np.clip(force - error_band, -force_bound, force_bound),
+            np.clip(force + error_band, -force_bound, force_bound),
+        )
         axis.fill_between(values, low, high, color=colour, alpha=0.18, linewidth=0)
         axis.plot(values, force, color=colour, linewidth=1.6, label=label)
         exact = [scale * getattr(check, name) for check in checks.values()]
@@ -195,13 +204,13 @@ def price_figure(price: Result, title: str) -> Figure:
             _plot_theory(axes[0], name, line, [point.cells**2 for point in line], bar=True)
             micros = [1e6 * point.seconds for point in line]
             _plot_theory(axes[1 if name.startswith("FASTSIM") else 2], name, line, micros)
-    for axis, above, label in zip(
+    for axis, panel_title, label in zip(
         axes,
         ("By cells; bar: to 95 of 100 contacts", "FASTSIM by time", "Other theories by time"),
         ("cells in the contact area [-]", "time of an evaluation [µs]", "time of an evaluation [µs]"),
         strict=True,
     ):
-        axis.set(xscale="log", yscale="log", xlabel=label, title=above)
+        axis.set(xscale="log", yscale="log", xlabel=label, title=panel_title)
         for target in ERROR_TARGETS:
             axis.axhline(100 * target, color=DARK, linewidth=0.6, linestyle=":")
     axes[0].set_yticks([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50], ["0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50"])
@@ -212,13 +221,13 @@ def price_figure(price: Result, title: str) -> Figure:
     return figure
 
 
-def _plot_theory(axis: Any, name: str, points: list[TheoryPoint], along: list[float], bar: bool = False) -> None:
+def _plot_theory(axis: Any, name: str, points: list[TheoryPoint], x_values: list[float], bar: bool = False) -> None:
     """Plot the mean error (%) of one theory. An optional bar at its largest number of cells reaches up to the error
     that 95 of 100 contacts do not exceed."""
     colour, marker = THEORY_STYLES[name]
-    mean, most = (100 * np.array([getattr(point, key) for point in points]) for key in ("mean", "most"))
+    mean, largest_errors = (100 * np.array([getattr(point, key) for point in points]) for key in ("mean", "most"))
     label = name if mean[0] < LARGEST_ERROR else f"{name}: {mean[0]:.0f} %"
-    axis.plot(along, mean, color=colour, marker=marker, linewidth=1.3, markersize=4.5, label=label)
+    axis.plot(x_values, mean, color=colour, marker=marker, linewidth=1.3, markersize=4.5, label=label)
     if bar:
-        axis.plot([along[-1]] * 2, [mean[-1], most[-1]], color=colour, linewidth=0.8)
-        axis.plot(along[-1], most[-1], "_", color=colour, markersize=5)
+        axis.plot([x_values[-1]] * 2, [mean[-1], largest_errors[-1]], color=colour, linewidth=0.8)
+        axis.plot(x_values[-1], largest_errors[-1], "_", color=colour, markersize=5)

@@ -65,10 +65,10 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def _table(points: list[TheoryPoint], count: int, uncertain: float) -> list[str]:
+def _table(points: list[TheoryPoint], contact_count: int, uncertain: float) -> list[str]:
     """Table of all theories and numbers of cells, then the cheapest for each target error."""
     return [
-        f"  error of the tangential force in % of mu N over {count} contacts (exact ones known to "
+        f"  error of the tangential force in % of mu N over {contact_count} contacts (exact ones known to "
         f"{100 * uncertain:.2g} %)",
         f"    {'':<28}{'cells':>6}{'mean':>8}{'95 of 100':>11}{'largest':>9}   time of contacts",
         *(
@@ -77,7 +77,7 @@ def _table(points: list[TheoryPoint], count: int, uncertain: float) -> list[str]
             for point in points
         ),
         "  cheapest that meets      in the mean; in 95 of 100 contacts",
-        *(f"    {target:>6}  {mean};  {most}" for target, mean, most in cheapest_lines(points)),
+        *(f"    {target:>6}  {mean};  {largest_cheapest}" for target, mean, largest_cheapest in cheapest_lines(points)),
     ]
 
 

@@ -49,11 +49,11 @@ def summary_lines(rows: int, wrong: int, name: str, seconds: float, errors: bool
         return [f"  no rows in {name}"]
     sound = ", all of them sound" if rows > 1 else ", sound"
     state = f"; {wrong:,} of them wrong, see their status" if wrong else sound
-    each = f", {duration(seconds / rows)} a row" if rows > 1 else ""
+    row_time_text = f", {duration(seconds / rows)} a row" if rows > 1 else ""
     twice = " twice for the error of cells" if errors else ""
     return [
         f"  {rows:,} row{'s' * (rows > 1)} of {name}{state}",
-        f"  {duration(seconds)}{each}, once: reading, forces{twice}, writing",
+        f"  {duration(seconds)}{row_time_text}, once: reading, forces{twice}, writing",
     ]
 
 

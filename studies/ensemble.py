@@ -82,8 +82,8 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     """All paths in the reference, the first ones in the other engines; saves ``ensemble.nc``, table and figure."""
     options = check(scene, engines)
     measured, period = measure(scene, scene.error), 1.0 / options.sampling_rate
-    times = options.rows * np.arange(round(scene.run.duration / options.rows) + 1)
-    true = measured.states[np.rint(times / scene.run.step).astype(int)]
+    row_times = options.rows * np.arange(round(scene.run.duration / options.rows) + 1)
+    true = measured.states[np.rint(row_times / scene.run.step).astype(int)]
     statistics = PathStatistics(true, max(options.saved, options.engine_paths))
 
     def tell(finished: Done) -> None:
@@ -95,26 +95,28 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         noise = {"deviation": options.noise_fraction * largest, "seed": options.seed}
         noisy = follower_builder(scene, Path(name))({}, {"force_noise": noise})
         first = run_away(noisy, "reference", scene.error)
-        asked = (noisy, times, measured["pitch"], options.threshold)
-        for block in each_block(noise_paths(*asked), options.paths, folder / BLOCKS_FOLDER, pool, cut, tell):
+        path_arguments = (noisy, row_times, measured["pitch"], options.threshold)
+        for block in each_block(noise_paths(*path_arguments), options.paths, folder / BLOCKS_FOLDER, pool, cut, tell):
             statistics.add(block)
         gaps = {}
         for engine in (engine for engine in engines if engine != "reference"):
             progress(f"{engine}: {options.engine_paths} of the same paths", 1.0)
             if engine == "mujoco":
-                repeated = run_paths(mujoco_threads(*asked, crew.workers), options.engine_paths)
+                repeated = run_paths(mujoco_threads(*path_arguments, crew.workers), options.engine_paths)
             else:
-                repeated = run_paths(noise_paths(*asked, engine), options.engine_paths, executor=pool, blocks=Blocks(1))
-            gaps[engine] = largest_difference(statistics.first, repeated, times)
+                repeated = run_paths(
+                    noise_paths(*path_arguments, engine), options.engine_paths, executor=pool, blocks=Blocks(1)
+                )
+            gaps[engine] = largest_difference(statistics.first, repeated, row_times)
     write_measurement(measured, folder, period)
-    rows = _deviation_rows(options, times, statistics)
-    channels, axes = _result_channels(times, statistics, options.saved)
+    rows = _deviation_rows(options, row_times, statistics)
+    channels, axes = _result_channels(row_times, statistics, options.saved)
     saved = result(noisy, channels, axes, engine="reference", threshold=options.threshold)
     _with_errors(saved, first, rows, options, statistics).save(folder / "ensemble.nc")
     table = text(options, scene, rows, statistics, gaps)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     results = {"measurement": measured, "all paths": saved}
-    _figure(times, statistics, options, results, folder)
+    _figure(row_times, statistics, options, results, folder)
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -191,7 +193,7 @@ def _deviation_rows(options: Options, times: np.ndarray, statistics: PathStatist
     names, rows = ("time", "pitch", "pitch error", "heave", "heave error"), []
     for time in options.times:
         row = round(time / options.rows)
-        pitch, heave = (statistics.moments.deviation(row, place) for place in (PITCH_STATE, HEAVE_STATE))
+        pitch, heave = (statistics.moments.deviation(row, state) for state in (PITCH_STATE, HEAVE_STATE))
         figures = (float(times[row]), *pitch, *heave)
         rows.append(dict(zip(names, figures, strict=True)))
     return rows
@@ -220,13 +222,13 @@ def text(
         differ = (
             f"{options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state before drift-off"
         )
-        none = "not compared, as every path drifts off before the first saved row"
-        lines.append(f"  {engine}: {none if math.isnan(worst) else differ}")
+        not_compared = "not compared, as every path drifts off before the first saved row"
+        lines.append(f"  {engine}: {not_compared if math.isnan(worst) else differ}")
     return lines
 
 
-def _time_text(value: float) -> str:
-    return f"{value:.2f}" if np.isfinite(value) else "never"
+def _time_text(seconds: float) -> str:
+    return f"{seconds:.2f}" if np.isfinite(seconds) else "never"
 
 
 def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, results: Results, folder: Path) -> None:
@@ -241,8 +243,8 @@ def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, res
         options.threshold, color=DARK, linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"
     )
     fan.legend(loc="lower right")
-    there = np.isfinite(statistics.drift_off.values)
-    drifted, counts = statistics.drift_off.values[there], statistics.drift_off.counts[there]
+    has_drifted = np.isfinite(statistics.drift_off.values)
+    drifted, counts = statistics.drift_off.values[has_drifted], statistics.drift_off.counts[has_drifted]
     histogram.hist(drifted, bins=40, weights=counts, color=BLUE, alpha=0.6)
     for level, style in zip(PITCH_QUANTILES, (":", "-", ":"), strict=True):
         value = statistics.drift_off.quantile(level)[0]

@@ -25,15 +25,19 @@ Knots = list[list[float]]
 def random_controls() -> dict[str, Knots]:
     """Random steer, brake and drive inputs, as values at given times."""
     random = np.random.default_rng(SEED)
-    steer, drive, brake, at, side = [[0.5, 0.0]], [[0.5, 120.0]], [[0.5, 0.0]], 0.5, 1.0
-    while at < DURATION - 4.0:
+    steer, drive, brake, time, side = [[0.5, 0.0]], [[0.5, 120.0]], [[0.5, 0.0]], 0.5, 1.0
+    while time < DURATION - 4.0:
         angle = side * random.uniform(0.015, 0.055)
         rise, hold = random.uniform(0.4, 1.0), random.uniform(0.6, 2.0)
-        steer += [[at + rise, angle], [at + rise + hold, angle], [at + 2.0 * rise + hold, 0.0]]
+        steer += [[time + rise, angle], [time + rise + hold, angle], [time + 2.0 * rise + hold, 0.0]]
         pull, stop = random.uniform(150.0, 700.0), random.choice([0.0, 0.0, 400.0, 700.0])
-        drive += [[at + rise, 250.0], [at + rise + hold, 250.0 if stop == 0.0 else 0.0], [at + 2.0 * rise + hold, pull]]
-        brake += [[at + rise, 0.0], [at + rise + 0.5 * hold, stop], [at + rise + hold, 0.0]]
-        at, side = at + 2.0 * rise + hold + random.uniform(0.2, 0.8), side * random.choice([-1.0, -1.0, 1.0])
+        drive += [
+            [time + rise, 250.0],
+            [time + rise + hold, 250.0 if stop == 0.0 else 0.0],
+            [time + 2.0 * rise + hold, pull],
+        ]
+        brake += [[time + rise, 0.0], [time + rise + 0.5 * hold, stop], [time + rise + hold, 0.0]]
+        time, side = time + 2.0 * rise + hold + random.uniform(0.2, 0.8), side * random.choice([-1.0, -1.0, 1.0])
     return {"steer": steer, "drive": drive, "brake": brake}
 
 
@@ -46,21 +50,21 @@ def simulated_drive() -> Drive:
 
 def measured_columns(drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
     """Columns (unit, values) of the drive, as a logger in the car would write them."""
-    every = round(1.0 / (SAMPLING_RATE * float(drive.run.times[1] - drive.run.times[0])))
-    ahead, aside, yaw = drive.velocity().T
+    stride = round(1.0 / (SAMPLING_RATE * float(drive.run.times[1] - drive.run.times[0])))
+    forward_speed, lateral_speed, yaw = drive.velocity().T
     random = np.random.default_rng(SEED + 1)
     front = drive["steer"][:, 0]
     channels = {
         "yaw rate": ("rad/s", yaw),
         "lateral acceleration": ("m/s^2", drive.lateral_acceleration()),
-        "side slip": ("rad", np.arctan2(aside, ahead)),
+        "side slip": ("rad", np.arctan2(lateral_speed, forward_speed)),
     }
     noisy = {
-        name: (unit, values[::every] + NOISE_DEVIATIONS[name] * random.standard_normal(len(values[::every])))
+        name: (unit, values[::stride] + NOISE_DEVIATIONS[name] * random.standard_normal(len(values[::stride])))
         for name, (unit, values) in channels.items()
     }
-    plain = {"time": ("s", drive.run.times), "steer": ("rad", front), "speed": ("m/s", ahead)}
-    return {name: (unit, values[::every]) for name, (unit, values) in plain.items()} | noisy
+    plain = {"time": ("s", drive.run.times), "steer": ("rad", front), "speed": ("m/s", forward_speed)}
+    return {name: (unit, values[::stride]) for name, (unit, values) in plain.items()} | noisy
 
 
 def save(path: Path) -> None:

@@ -52,9 +52,9 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
 
 
 def _answer_of_drive(runs: dict[str, Result]) -> dict[str, float]:
-    first, *others = runs.values()
+    first, *other_runs = runs.values()
     drive = first.detail
-    said = {
+    figures = {
         "largest yaw rate [rad/s]": np.abs(drive.velocity()[:, 2]).max(),
         "largest lateral acceleration [m/s^2]": np.abs(drive.lateral_acceleration()).max(),
         "least wheel load [N]": first["load"].min(),
@@ -62,16 +62,16 @@ def _answer_of_drive(runs: dict[str, Result]) -> dict[str, float]:
         "last speed [m/s]": drive.velocity()[-1, 0],
         "largest power of a contact [W]": first["power"].max(),
     }
-    if others:
-        said[DIFFERENCE_TITLE] = max(
-            np.abs(first[key] - run[key]).max() for run in others for key in ("positions", "rates")
+    if other_runs:
+        figures[DIFFERENCE_TITLE] = max(
+            np.abs(first[key] - run[key]).max() for run in other_runs for key in ("positions", "rates")
         )
-    return {key: float(value) for key, value in said.items()}
+    return {key: float(value) for key, value in figures.items()}
 
 
-def _line(name: str, answer: dict[str, float]) -> str:
-    yaw, lateral, load, used = list(answer.values())[:4]
-    gap = f"{answer[DIFFERENCE_TITLE]:>10.1e}" if DIFFERENCE_TITLE in answer else ""
+def _line(name: str, figures: dict[str, float]) -> str:
+    yaw, lateral, load, used = list(figures.values())[:4]
+    gap = f"{figures[DIFFERENCE_TITLE]:>10.1e}" if DIFFERENCE_TITLE in figures else ""
     return f"    {name:<16}{yaw:>6.3f} rad/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %{gap}"
 
 

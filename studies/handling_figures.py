@@ -78,8 +78,8 @@ def _plot_friction_circle(axis: Axes, drive: Drive) -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axis.plot(np.cos(turn), np.sin(turn), color=DARK, lw=0.8)
     bound = np.where(drive["load"] > 0.0, drive.grip(), 1.0)
-    for i, (side, ahead) in enumerate(zip((drive["fy"] / bound).T, (drive["fx"] / bound).T, strict=True)):
-        axis.plot(side, ahead, **_tyre_style(i), lw=0.9)
+    for i, (side, longitudinal) in enumerate(zip((drive["fy"] / bound).T, (drive["fx"] / bound).T, strict=True)):
+        axis.plot(side, longitudinal, **_tyre_style(i), lw=0.9)
     axis.set(
         xlabel="side force / μN [-]",
         ylabel="force ahead / μN [-]",

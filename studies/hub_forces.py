@@ -45,13 +45,13 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
 
 def _table(scene: HubScene, comparison: Comparison) -> list[str]:
     known, tilt = comparison.truth is not None, comparison.measurement.tilt
-    off = "largest error" if known else "largest difference"
+    error_heading = "largest error" if known else "largest difference"
     damage = "damage / true damage" if known else "damage / that with the filter"
     lines = [
         f"  forces in the frame {scene.forces.frame!r}; innovations squared {tilt.normalised_innovation:.2f} times",
         f"  {'':<18}{'roll':>9}{'pitch':>9}{'heading':>9}{'x':>8}{'y':>8}{'z':>8}{'drift-off':>11}"
         f"{'moments rms':>16}   {damage}",
-        f"  {off:<18}{'[mrad]':>9}{'[mrad]':>9}{'[mrad]':>9}{'[m]':>8}{'[m]':>8}{'[m]':>8}{'[s]':>11}"
+        f"  {error_heading:<18}{'[mrad]':>9}{'[mrad]':>9}{'[mrad]':>9}{'[m]':>8}{'[m]':>8}{'[m]':>8}{'[s]':>11}"
         f"{'[N m]':>16}   least, most",
     ]
     for name, path in comparison.runs.items():
@@ -90,10 +90,10 @@ def save(comparison: Comparison, folder: Path) -> None:
         measurement.angles,
     )
     runs = comparison.results
-    angles, places = list(MOTION_CHANNELS)[:3], list(MOTION_CHANNELS)[3:]
+    angles, position_names = list(MOTION_CHANNELS)[:3], list(MOTION_CHANNELS)[3:]
     columns = {
         f"{name}: {channel}": (MOTION_CHANNELS[channel][1], path[channel])
-        for channels in (angles, places)
+        for channels in (angles, position_names)
         for name, path in runs.items()
         for channel in channels
     }

@@ -28,8 +28,8 @@ METHOD_LABELS = {"filter": "Kalman filter of roll and pitch", "prescribed": "rol
 def _drawn_runs(comparison: Comparison) -> list[tuple[str, str, str]]:
     """Name, label and colour of each run to draw. Of the free runs, which look alike, only the last is drawn."""
     free = [(name, "free") for name in comparison.runs if name.startswith("free")][-1:]
-    rest = [(name, label) for name, label in METHOD_LABELS.items() if name in comparison.runs]
-    return [(name, label, METHOD_COLOURS[name.split(",")[0]]) for name, label in (*free, *rest)]
+    stabilised = [(name, label) for name, label in METHOD_LABELS.items() if name in comparison.runs]
+    return [(name, label, METHOD_COLOURS[name.split(",")[0]]) for name, label in (*free, *stabilised)]
 
 
 def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
@@ -59,13 +59,16 @@ def damage_figure(comparison: Comparison, title: str, path: Path) -> None:
     shown, values = _drawn_runs(comparison), list[float]()
     for k, (run, label, colour) in enumerate(shown):
         ratios = comparison.damages(comparison.runs[run]["section_force"])
-        places = np.arange(len(ratios)) + (k - (len(shown) - 1) / 2) * 0.26
-        axis.plot(places, [*ratios.values()], "os^"[k % 3], color=colour, label=label, markersize=4)
+        x_positions = np.arange(len(ratios)) + (k - (len(shown) - 1) / 2) * 0.26
+        axis.plot(x_positions, [*ratios.values()], "os^"[k % 3], color=colour, label=label, markersize=4)
         values += ratios.values()
     axis.axhline(1.0, color=DARK, linewidth=0.8)
     axis.set_xticks(range(len(ratios)), [*ratios], rotation=90)
-    least, most = min(0.9, *values), max(1.1, *values)
-    low, high = least * (0.8 if least > 0.5 else 0.1), most * (1.25 if most < 2.0 else 10.0)
+    least_ratio, largest_ratio = min(0.9, *values), max(1.1, *values)
+    low, high = (
+        least_ratio * (0.8 if least_ratio > 0.5 else 0.1),
+        largest_ratio * (1.25 if largest_ratio < 2.0 else 10.0),
+    )
     about_one(axis, "y", [tick for tick in DAMAGE_TICKS if low <= tick <= high])
     axis.set_ylim(low, high)
     axis.set_ylabel("damage / true damage [-]" if comparison.truth else "damage / that with the filter [-]")

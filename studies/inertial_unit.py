@@ -132,11 +132,13 @@ def _errors_of_grades(scene: Scene, paths: UnitPaths, options: Options, curve: C
     """For each grade, the largest angle error (rad) over the longest drive. Also the damage error that the share
     KEEPING_SHARE of its units does not exceed, with its standard error."""
     angles = [angle_errors(paths, options, grade) for grade in range(len(options.grades))]
-    worst = [np.abs(damage_errors(curve, each)).max(axis=1) for each in angles]
-    kept = [quantile_with_interval(each, KEEPING_SHARE) for each in worst]
+    worst = [np.abs(damage_errors(curve, errors_of_grade)).max(axis=1) for errors_of_grade in angles]
+    bounds_of_grades = [quantile_with_interval(errors_of_grade, KEEPING_SHARE) for errors_of_grade in worst]
     channels = {
-        "angle_error": Channel("grade", [float(np.abs(each).max()) for each in angles], "rad", "largest angle error"),
-        "damage_error": Channel("grade", [middle for middle, _, _ in kept], "", "damage error"),
+        "angle_error": Channel(
+            "grade", [float(np.abs(errors_of_grade).max()) for errors_of_grade in angles], "rad", "largest angle error"
+        ),
+        "damage_error": Channel("grade", [middle for middle, _, _ in bounds_of_grades], "", "damage error"),
     }
     units = labelled(scene, channels, {"grade": Channel("grade", options.grades, "deg/h")})
     says, remedy = "the angle errors are small ones", "take finer grades, or shorter drives"
@@ -155,7 +157,7 @@ def _errors_of_grades(scene: Scene, paths: UnitPaths, options: Options, curve: C
     )
     chances = {
         f"damage error at {grade:g} deg/h": by_chance((high - low) / (2 * ERRORS_95), middle, "", options.samples)
-        for grade, (middle, low, high) in zip(options.grades, kept, strict=True)
+        for grade, (middle, low, high) in zip(options.grades, bounds_of_grades, strict=True)
     }
     return of_chance(units, chances, options.samples)
 
@@ -181,7 +183,8 @@ def _row_of_grade(
         "angle by law": float(angle_law(np.array(float(end)), options, grade)),
         "angle measured": float(np.degrees(np.mean(angles[:, -1] ** 2) ** 0.5)),
         "damage error": {
-            name: [float(np.quantile(errors, part)) for part in (0.5, KEEPING_SHARE)] for name, errors in worst.items()
+            name: [float(np.quantile(errors, level)) for level in (0.5, KEEPING_SHARE)]
+            for name, errors in worst.items()
         },
     }
 
@@ -234,11 +237,11 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Result
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, legend_below, subplots
 
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
-    times = np.geomspace(options.durations[0], options.durations[-1], 60)
+    duration_minutes = np.geomspace(options.durations[0], options.durations[-1], 60)
     for i, grade in enumerate(options.grades):
         of_grade = [row for row in rows if row["grade"] == grade]
         minutes = [row["minutes"] for row in of_grade]
-        axes[0].loglog(times, angle_law(60 * times, options, i), color=f"C{i}")
+        axes[0].loglog(duration_minutes, angle_law(60 * duration_minutes, options, i), color=f"C{i}")
         axes[0].loglog(minutes, [row["angle measured"] for row in of_grade], "o", color=f"C{i}", markersize=4)
         error = [100 * next(iter(row["damage error"].values()))[1] for row in of_grade]
         axes[1].loglog(minutes, error, "o-", color=f"C{i}", markersize=4, label=f"{grade:g} deg/h")

@@ -82,8 +82,8 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     }
 
 
-def _report_progress(progress: Progress, scene: WheelRailScene, k: int, shift: float, share: float) -> None:
-    progress(f"{[*scene.cases][k]} at {shift:g} mm", (k + share) / len(scene.cases))
+def _report_progress(progress: Progress, scene: WheelRailScene, k: int, lateral_shift: float, share: float) -> None:
+    progress(f"{[*scene.cases][k]} at {lateral_shift:g} mm", (k + share) / len(scene.cases))
 
 
 def _save_tables(name: str, result: Result, folder: Path) -> None:
@@ -135,17 +135,21 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
     save(drawn, path)
 
 
-def _table(placed: list[WheelsetPlacement]) -> list[str]:
+def _table(placements: list[WheelsetPlacement]) -> list[str]:
     """Table with a line per contact patch, the positions at which a wheel has several patches, and the first flange
     contact."""
     heads = (
         f"    {'shift':>6} {'wheel':<5}{'rail':>8}{'wheel':>8}{'angle':>7}{'N':>8}{'peak':>7}{'area':>7}{'a':>6}"
         f"{'b':>6}{'Fx':>7}{'Fy':>7}{'dr':>8}"
     )
-    each = [(position, wheel) for position in placed for wheel in WHEEL_NAMES]
-    several = [f"{1e3 * laid.shift:g} ({wheel})" for laid, wheel in each if len(getattr(laid, wheel)) > 1]
-    flange = [laid.shift for laid, wheel in each if patches_by_force(laid, wheel)[0].angle < -FLANGE_ANGLE]
-    lines = [heads, *(line for position in map(position_quantities, placed) for line in _patch_lines(position))]
+    wheels_of_positions = [(position, wheel) for position in placements for wheel in WHEEL_NAMES]
+    several = [
+        f"{1e3 * laid.shift:g} ({wheel})" for laid, wheel in wheels_of_positions if len(getattr(laid, wheel)) > 1
+    ]
+    flange = [
+        laid.shift for laid, wheel in wheels_of_positions if patches_by_force(laid, wheel)[0].angle < -FLANGE_ANGLE
+    ]
+    lines = [heads, *(line for position in map(position_quantities, placements) for line in _patch_lines(position))]
     if several:
         lines.append(f"    several patches on one wheel at, in mm: {', '.join(several)}")
     if flange:

@@ -151,53 +151,64 @@ def _sensor_array(scene: Scene, positions: dict[str, tuple[float, float, float]]
         raise InputError(scene.file, SENSORS_KEY, error.value, error.allowed) from None
 
 
-def _measured_readings(scene: Scene, options: Options, p: Parameters) -> Source:
+def _measured_readings(scene: Scene, options: Options, parameters: Parameters) -> Source:
     """Readings of the user's file, columns in the order of the scene's sensors."""
     assert options.file is not None
-    return _from_file(options.file, scene.path(options.file, "options.file"), p)
+    return _from_file(options.file, scene.path(options.file, "options.file"), parameters)
 
 
-def _from_file(name: str, path: Path, p: Parameters) -> Source:
-    values, period = read_time_series(path, dict.fromkeys(chain(*channels_of_sensors(p)), ACCELERATIONS))
+def _from_file(name: str, path: Path, parameters: Parameters) -> Source:
+    values, period = read_time_series(path, dict.fromkeys(chain(*channels_of_sensors(parameters)), ACCELERATIONS))
     return Source(name, values.reshape(len(values), -1, 3), period)
 
 
 def _run(scene: Scene, engine: str, folder: Path) -> Source:
     """One engine's run; its readings go through a file as measured ones do."""
     p = scene.effects["accelerometers"]
-    made = simulate(scene, engine, error=scene.error)
+    computed = simulate(scene, engine, error=scene.error)
     path = folder / f"{engine} readings.csv"
-    write(made, {channel: channel for channel in chain(*channels_of_sensors(p))}, p.sampling_rate, path)
+    write(computed, {channel: channel for channel in chain(*channels_of_sensors(p))}, p.sampling_rate, path)
     source = _from_file(engine, path, p)
-    rows = np.searchsorted(made.times, source.period * (np.arange(len(source.readings)) - 1e-3))
+    rows = np.searchsorted(computed.times, source.period * (np.arange(len(source.readings)) - 1e-3))
     wanted = {name: channel for name, (channel, _) in COMPARED_CHANNELS.items()} | {"heave rate": "z3_rate"}
-    source.truth = {name: made[channel][rows] for name, channel in wanted.items()}
-    source.run = made
-    source.gyro = made["gyro"][rows] if "gyro" in made.data else None
+    source.truth = {name: computed[channel][rows] for name, channel in wanted.items()}
+    source.run = computed
+    source.gyro = computed["gyro"][rows] if "gyro" in computed.data else None
     return source
 
 
-def _recover_motions(source: Source, array: SensorArray, options: Options, p: Parameters) -> None:
+def _recover_motions(readings_source: Source, array: SensorArray, options: Options, parameters: Parameters) -> None:
     """Recover the motion by every method. A suspect sensor, whose readings do not fit a rigid body, is used by the
     first method only."""
-    source.quality = fit_quality(array, source.readings, p.deviation)
-    suspect, readings = source.quality.suspect, source.readings
-    moved = partial(recovered_motion, period=source.period, start=source.start, zeroed=options.zeroed)
+    readings_source.quality = fit_quality(array, readings_source.readings, parameters.deviation)
+    suspect, readings = readings_source.quality.suspect, readings_source.readings
+    recover = partial(
+        recovered_motion, sample_period=readings_source.period, start_state=readings_source.start, zeroed=options.zeroed
+    )
     if suspect:
-        source.recovered_motions["all sensors, integrated"] = moved(array, readings)
+        readings_source.recovered_motions["all sensors, integrated"] = recover(array, readings)
         readings = readings[:, [name != suspect for name in array.names]]
-        array = sensor_array({name: place for name, place in p.positions().items() if name != suspect})
-    source.recovered_motions["integrated"] = moved(array, readings)
-    if p.deviation > 0:
-        held, _ = filter_rates(
-            spin_from_readings(array, readings), source.period, np.array(source.start.rates), p.deviation
+        array = sensor_array(
+            {name: sensor_position for name, sensor_position in parameters.positions().items() if name != suspect}
         )
-        source.recovered_motions["rates held by w w^T"] = moved(array, readings, rates=held)
-    if source.gyro is not None:
-        turning = source.gyro[:, None] * [0.0, 1.0, 0.0]  # it reads the pitch rate; the vehicle does nothing else
-        source.recovered_motions["rates from the gyro"] = moved(array, readings, rates=turning)
+    readings_source.recovered_motions["integrated"] = recover(array, readings)
+    if parameters.deviation > 0:
+        filtered_rates, _ = filter_rates(
+            spin_from_readings(array, readings),
+            readings_source.period,
+            np.array(readings_source.start.rates),
+            parameters.deviation,
+        )
+        readings_source.recovered_motions["rates held by w w^T"] = recover(array, readings, rates=filtered_rates)
+    if readings_source.gyro is not None:
+        turning = readings_source.gyro[:, None] * [
+            0.0,
+            1.0,
+            0.0,
+        ]  # it reads the pitch rate; the vehicle does nothing else
+        readings_source.recovered_motions["rates from the gyro"] = recover(array, readings, rates=turning)
     cut_offs = CutOffs(options.turning_cut_off, options.position_cut_off)
-    source.recovered_motions["high-passed"] = moved(array, readings, cut_offs=cut_offs)
+    readings_source.recovered_motions["high-passed"] = recover(array, readings, cut_offs=cut_offs)
 
 
 def _compared_values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
@@ -205,62 +216,73 @@ def _compared_values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
     return {"pitch": motion.angles()[:, 1], "rate": motion.rates[:, 1], "heave": motion.position[:, 2]}
 
 
-def _save_motions(scene: Scene, source: Source, folder: Path, options: Options) -> Result:
+def _save_motions(scene: Scene, readings_source: Source, folder: Path, options: Options) -> Result:
     """Save the recovered pitch, pitch rate and heave: a CSV file per method, and one result with all methods, which is
     returned."""
-    stem, ways = (
-        Path(source.name).stem,
-        {way: _compared_values(moved) for way, moved in source.recovered_motions.items()},
+    stem, values_of_methods = (
+        Path(readings_source.name).stem,
+        {method_name: _compared_values(motion) for method_name, motion in readings_source.recovered_motions.items()},
     )
-    for way, moved_values in ways.items():
+    for method_name, moved_values in values_of_methods.items():
         columns = {name: (COMPARED_CHANNELS[name][1], values) for name, values in moved_values.items()}
-        write_time_series(folder / f"{stem}, {way}.csv", columns, source.period)
+        write_time_series(folder / f"{stem}, {method_name}.csv", columns, readings_source.period)
     channels = {
-        name: Channel(("way", "time"), [moved_values[name] for moved_values in ways.values()], unit)
+        name: Channel(("way", "time"), [moved_values[name] for moved_values in values_of_methods.values()], unit)
         for name, (_, unit) in COMPARED_CHANNELS.items()
     }
-    times = source.period * np.arange(len(source.readings))
-    axes = {"way": Channel("way", list(ways)), "time": Channel("time", times, "s")}
-    saved = result(scene, channels, axes, engine=source.name)
-    assert source.quality is not None
-    record = Record(source.quality, source.readings, source.period, not source.truth and not options.zeroed)
-    with_assumptions(saved, assumptions(record, source.recovered_motions["integrated"]))
+    reading_times = readings_source.period * np.arange(len(readings_source.readings))
+    axes = {"way": Channel("way", list(values_of_methods)), "time": Channel("time", reading_times, "s")}
+    saved = result(scene, channels, axes, engine=readings_source.name)
+    assert readings_source.quality is not None
+    record = Record(
+        readings_source.quality,
+        readings_source.readings,
+        readings_source.period,
+        not readings_source.truth and not options.zeroed,
+    )
+    with_assumptions(saved, assumptions(record, readings_source.recovered_motions["integrated"]))
     if scene.error:
-        beside = "the table has the error of each way beside the run" if source.truth else "no truth is known"
-        not_estimated(saved, f"noise and mounts err most, and {beside}")
+        truth_text = (
+            "the table has the error of each way beside the run" if readings_source.truth else "no truth is known"
+        )
+        not_estimated(saved, f"noise and mounts err most, and {truth_text}")
     saved.save(folder / f"{stem} moved_values.nc")
     return saved
 
 
-def _numbers_of_ways(source: Source) -> dict[str, Any]:
+def _numbers_of_ways(readings_source: Source) -> dict[str, Any]:
     """Plain numbers of the recovered motion. They hold the share of misfit in the readings, the suspect sensor, and the
     largest and rms error of each method; without a true motion, the largest and rms value in place of errors."""
-    assert source.quality is not None
-    ways = {}
-    for way, moved in source.recovered_motions.items():
-        errors = {name: values - source.truth.get(name, 0.0) for name, values in _compared_values(moved).items()}
-        ways[way] = {name: [float(np.abs(error).max()), root_mean_square(error)] for name, error in errors.items()}
-    told = {name: getattr(source.quality, name) for name in ("share", "rigid", "suspect")}
-    return {"source": source.name, **told, "ways": ways}
+    assert readings_source.quality is not None
+    errors_of_methods = {}
+    for method_name, motion in readings_source.recovered_motions.items():
+        errors = {
+            name: values - readings_source.truth.get(name, 0.0) for name, values in _compared_values(motion).items()
+        }
+        errors_of_methods[method_name] = {
+            name: [float(np.abs(error).max()), root_mean_square(error)] for name, error in errors.items()
+        }
+    quality_facts = {name: getattr(readings_source.quality, name) for name in ("share", "rigid", "suspect")}
+    return {"source": readings_source.name, **quality_facts, "ways": errors_of_methods}
 
 
-def _screen_lines(source: Source, p: Parameters) -> list[str]:
+def _screen_lines(readings_source: Source, parameters: Parameters) -> list[str]:
     """Lines for the screen: the verdict on the readings, then the largest and rms error (or size) for each method."""
-    assert source.quality is not None
-    numbers, kind = _numbers_of_ways(source), "error" if source.truth else "size"
+    assert readings_source.quality is not None
+    numbers, kind = _numbers_of_ways(readings_source), "error" if readings_source.truth else "size"
     head = f"largest {kind} (rms)"
     lines = [
-        f"  {source.name}",
-        f"    {_rigidity_text(source.quality)}",
+        f"  {readings_source.name}",
+        f"    {_rigidity_text(readings_source.quality)}",
         f"    {head:<28}{'pitch [mrad]':>20}{'rate [rad/s]':>20}{'heave [m]':>20}",
     ]
-    for way, errors in numbers["ways"].items():
+    for method_name, errors in numbers["ways"].items():
         cells = [
             f"{scale * errors[name][0]:.3g} ({scale * errors[name][1]:.2g})"
             for name, scale in (("pitch", 1e3), ("rate", 1.0), ("heave", 1.0))
         ]
-        lines.append(f"    {way:<28}{cells[0]:>20}{cells[1]:>20}{cells[2]:>20}")
-    if p.deviation == 0:
+        lines.append(f"    {method_name:<28}{cells[0]:>20}{cells[1]:>20}{cells[2]:>20}")
+    if parameters.deviation == 0:
         lines.append("    rates held by w w^T: not made, as the scene states no noise (deviation) to weigh it with")
     return lines
 
@@ -300,59 +322,79 @@ def _closing_lines(options: Options) -> list[str]:
     ]
 
 
-def _figure(source: Source, results: Results, path: Path) -> None:
+def _figure(readings_source: Source, results: Results, path: Path) -> None:
     """Plot pitch and heave for one source of readings, the error of each method where the true motion is known, and the
     misfit of the readings from rigid-body motion."""
     from models.drawing.figures import COLUMN_WIDTH, GREY, add_heading, legend_below, save, subplot_mosaic
 
-    assert source.quality is not None
-    times = source.period * np.arange(len(source.readings))
+    assert readings_source.quality is not None
+    reading_times = readings_source.period * np.arange(len(readings_source.readings))
     rows: list[Any] = [
         ["pitch", "heave"],
-        *([["pitch error", "heave error"]] if source.truth else []),
+        *([["pitch error", "heave error"]] if readings_source.truth else []),
         ["misfit", "misfit"],
     ]
     figure, axes = subplot_mosaic(rows, figsize=(COLUMN_WIDTH, 2.0 * len(rows) + 0.8), sharex=True)
     for axis in axes.values():
         axis.xaxis.set_tick_params(labelbottom=True)
-    ways = {way: _compared_values(motion) for way, motion in source.recovered_motions.items()}
+    motions = {
+        method_name: _compared_values(motion) for method_name, motion in readings_source.recovered_motions.items()
+    }
     for name, label, scale in (("pitch", "Pitch, nose up [mrad]", 1e3), ("heave", "Heave, down [m]", 1.0)):
         _plot_motions(
-            axes[name], times, {way: scale * motion[name] for way, motion in ways.items()}, label, source, name
+            axes[name],
+            reading_times,
+            {method_name: scale * motion[name] for method_name, motion in motions.items()},
+            label,
+            readings_source,
+            name,
         )
-        if source.truth:
-            errors = {way: scale * np.abs(motion[name] - source.truth[name]) for way, motion in ways.items()}
+        if readings_source.truth:
+            errors = {
+                method_name: scale * np.abs(motion[name] - readings_source.truth[name])
+                for method_name, motion in motions.items()
+            }
             _plot_errors(
-                axes[f"{name} error"], times, errors, f"Largest error of the {name} so far {label[label.index('[') :]}"
+                axes[f"{name} error"],
+                reading_times,
+                errors,
+                f"Largest error of the {name} so far {label[label.index('[') :]}",
             )
-    axes["misfit"].plot(times, source.quality.misfit, color=GREY, linewidth=0.4)
-    axes["misfit"].set_title(f"Readings that no rigid motion explains, {100 * source.quality.share:.2g} % [m/s²]")
+    axes["misfit"].plot(reading_times, readings_source.quality.misfit, color=GREY, linewidth=0.4)
+    axes["misfit"].set_title(
+        f"Readings that no rigid motion explains, {100 * readings_source.quality.share:.2g} % [m/s²]"
+    )
     axes["misfit"].set_xlabel("time [s]")
-    legend_below(figure, axes["pitch error" if source.truth else "pitch"], columns=3)
-    add_heading(figure, f"Pitch and heave from accelerometers, {source.name}: what each way errs by", results)
+    legend_below(figure, axes["pitch error" if readings_source.truth else "pitch"], columns=3)
+    add_heading(figure, f"Pitch and heave from accelerometers, {readings_source.name}: what each way errs by", results)
     save(figure, path)
 
 
 def _plot_motions(
-    axis: Any, times: np.ndarray, ways: dict[str, np.ndarray], title: str, source: Source, name: str
+    axis: Any,
+    times: np.ndarray,
+    values_of_methods: dict[str, np.ndarray],
+    title: str,
+    readings_source: Source,
+    name: str,
 ) -> None:
     """Plot the true motion where it is known, since good methods would only cover it; else the motion by each
     method."""
     from models.drawing.figures import TRUTH_COLOUR
 
-    if source.truth:
-        axis.plot(times, (1e3 if name == "pitch" else 1.0) * source.truth[name], color=TRUTH_COLOUR)
+    if readings_source.truth:
+        axis.plot(times, (1e3 if name == "pitch" else 1.0) * readings_source.truth[name], color=TRUTH_COLOUR)
         axis.set_title(f"True {title[0].lower()}{title[1:]}")
         return
-    for way, values in ways.items():
-        axis.plot(times, values, linewidth=0.9, label=way)
+    for method_name, values in values_of_methods.items():
+        axis.plot(times, values, linewidth=0.9, label=method_name)
     axis.set_title(title)
 
 
 def _plot_errors(axis: Any, times: np.ndarray, errors: dict[str, np.ndarray], title: str) -> None:
     """Plot the largest error of each method up to every time, on a logarithmic scale."""
-    for way, error in errors.items():
-        axis.semilogy(times[1:], np.maximum.accumulate(error)[1:], label=way)
+    for method_name, error in errors.items():
+        axis.semilogy(times[1:], np.maximum.accumulate(error)[1:], label=method_name)
     axis.set_title(title)
 
 

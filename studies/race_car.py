@@ -82,15 +82,18 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     chosen = identified_vehicle(
         first, second, Search(options.asked(), list(AIMED_ERRORS), options.low_pass, options.blocks), progress
     )
-    others = {name: identified_simpler(first, second, options, name, progress) for name in SIMPLER_VEHICLES}
-    draw(chosen, others, scene.title, folder / "race_car.png")
+    simpler = {name: identified_simpler(first, second, options, name, progress) for name in SIMPLER_VEHICLES}
+    draw(chosen, simpler, scene.title, folder / "race_car.png")
     solved = chosen.uncertainty.fit
-    predicted = SceneModel(second, [each.name for each in solved.problem.parameters], "").result(solved.values)
+    predicted = SceneModel(second, [identified_one.name for identified_one in solved.problem.parameters], "").result(
+        solved.values
+    )
     predicted.save(folder / "predicted.nc")
     answer = error_ratios(chosen)
     answer["identified"] = as_dict(chosen.uncertainty)
     answer["simpler vehicles"] = {
-        name: dict(zip(AIMED_ERRORS, each.bands.relative_error(), strict=True)) for name, each in others.items()
+        name: dict(zip(AIMED_ERRORS, identified_one.bands.relative_error(), strict=True))
+        for name, identified_one in simpler.items()
     }
     answer["residuals"] = residual_correlations(chosen)
     return {
@@ -101,7 +104,7 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
         "results": {"prediction": predicted},
         "table": [
             *identification_lines(chosen.uncertainty),
-            *_result_lines(chosen, others),
+            *_result_lines(chosen, simpler),
             *_unmet_aims(answer["residuals"]),
         ],
     }
@@ -113,25 +116,27 @@ def identification_and_test_scenes(
     """Scenes of the section of the drive for identification and of the section for prediction; their measured drives
     are files in ``folder``."""
     if not options.measurement:
-        whole, path = scene, scene.path(scene.drive.file, "drive.file")
+        full_scene, path = scene, scene.path(scene.drive.file, "drive.file")
     else:
         path = write_plain_table(_data_file(scene, options.measurement, "options.measurement"), folder / "measured.csv")
-        whole = _scene_with_car(scene, path, RACE_CAR)
+        full_scene = _scene_with_car(scene, path, RACE_CAR)
     if options.prediction:
-        other = write_plain_table(_data_file(scene, options.prediction, "options.prediction"), folder / "predicted.csv")
-        return whole, _scene_with_car(scene, other, RACE_CAR)
+        prediction_file = write_plain_table(
+            _data_file(scene, options.prediction, "options.prediction"), folder / "predicted.csv"
+        )
+        return full_scene, _scene_with_car(scene, prediction_file, RACE_CAR)
     from models.measured.drive import read_drive
 
-    times = read_drive(path).times
-    middle = float(times[round(options.share * len(times))])
-    ends = [float(times[0]), middle], [middle, float(times[-1])]
-    return tuple(_scene_of_section(whole, end) for end in ends)  # type: ignore[return-value]
+    drive_times = read_drive(path).times
+    middle = float(drive_times[round(options.share * len(drive_times))])
+    ends = [float(drive_times[0]), middle], [middle, float(drive_times[-1])]
+    return tuple(_scene_of_section(full_scene, end) for end in ends)  # type: ignore[return-value]
 
 
-def _data_file(scene: SingleTrackScene, name: str, place: str) -> Path:
+def _data_file(scene: SingleTrackScene, name: str, key_path: str) -> Path:
     """Path of a file in the folder TWINRIG_DATA if it is there; else the path that the scene resolves the name to."""
     data = os.environ.get("TWINRIG_DATA", "")
-    return Path(data) / name if data and (Path(data) / name).is_file() else scene.path(name, place)
+    return Path(data) / name if data and (Path(data) / name).is_file() else scene.path(name, key_path)
 
 
 def _scene_with_car(scene: SingleTrackScene, path: Path, car: dict[str, Any]) -> SingleTrackScene:
@@ -145,17 +150,17 @@ def _scene_of_section(scene: SingleTrackScene, ends: list[float]) -> SingleTrack
 
 
 def identified_simpler(
-    first: SingleTrackScene, second: SingleTrackScene, options: Options, name: str, progress: Progress
+    first_scene: SingleTrackScene, second_scene: SingleTrackScene, options: Options, name: str, progress: Progress
 ) -> Identified:
     """Identify and predict with a simpler vehicle: some of its parameters are fixed, and fewer are identified."""
-    holds, kept = SIMPLER_VEHICLES[name]
-    parameters = [text for text in options.asked() if any(word in text for word in kept)]
-    few = Search(parameters, list(AIMED_ERRORS), options.low_pass, blocks=2)
+    holds, kept_words = SIMPLER_VEHICLES[name]
+    parameters = [text for text in options.asked() if any(word in text for word in kept_words)]
+    simpler_search = Search(parameters, list(AIMED_ERRORS), options.low_pass, blocks=2)
 
     def tell(text: str, share: float) -> None:
         progress(f"{name}: {text}", 0.95)
 
-    return identified_vehicle(_with_values(first, holds), _with_values(second, holds), few, tell)
+    return identified_vehicle(_with_values(first_scene, holds), _with_values(second_scene, holds), simpler_search, tell)
 
 
 def _with_values(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrackScene:
@@ -174,7 +179,7 @@ def error_ratios(identified: Identified) -> dict[str, Any]:
     samples; half-width of the bands to the error."""
     sizes = np.array([channel.size for channel in identified.uncertainty.fit.problem.channels])
     crossed = np.sqrt(np.mean(identified.cross_validation_errors**2, axis=1)) / sizes
-    inside, width, relative = (
+    share_inside, width, relative = (
         identified.bands.share_inside(),
         identified.bands.width(),
         identified.bands.relative_error(),
@@ -182,7 +187,7 @@ def error_ratios(identified: Identified) -> dict[str, Any]:
     return {
         name: {
             "error": float(relative[k]),
-            "inside": float(inside[k]),
+            "inside": float(share_inside[k]),
             "half-width by error": float(width[k]),
             "error between parts": float(crossed[k]),
         }
@@ -190,15 +195,17 @@ def error_ratios(identified: Identified) -> dict[str, Any]:
     }
 
 
-def _result_lines(chosen: Identified, identified: dict[str, Identified]) -> list[str]:
+def _result_lines(identified_full: Identified, identified: dict[str, Identified]) -> list[str]:
     table = [f"  {'prediction':<26}{'error':>9}{'aim':>8}{'inside 95 %':>13}{'half-width':>12}{'parts':>9}"]
-    for name, each in error_ratios(chosen).items():
+    for name, identified_one in error_ratios(identified_full).items():
         table.append(
-            f"  {name:<26}{each['error']:>9.1%}{AIMED_ERRORS[name]:>8.0%}{each['inside']:>13.1%}"
-            f"{each['half-width by error']:>12.2f}{each['error between parts']:>9.1%}"
+            f"  {name:<26}{identified_one['error']:>9.1%}{AIMED_ERRORS[name]:>8.0%}{identified_one['inside']:>13.1%}"
+            f"{identified_one['half-width by error']:>12.2f}{identified_one['error between parts']:>9.1%}"
         )
-    for name, each in identified.items():
-        errors = ", ".join(f"{n} {e:.1%}" for n, e in zip(AIMED_ERRORS, each.bands.relative_error(), strict=True))
+    for name, identified_one in identified.items():
+        errors = ", ".join(
+            f"{n} {e:.1%}" for n, e in zip(AIMED_ERRORS, identified_one.bands.relative_error(), strict=True)
+        )
         table.append(f"  {name}: {errors}")
     return table
 
@@ -209,29 +216,31 @@ def residual_correlations(identified: Identified) -> dict[str, dict[str, float]]
     problem = identified.uncertainty.fit.problem
     model = problem.model.result(identified.uncertainty.fit.values)  # type: ignore[attr-defined]
     clock = problem.clock.times
-    lateral, ahead = (np.interp(clock, model.times, model[n]) for n in ("lateral acceleration", "forward acceleration"))
+    lateral, forward_acceleration = (
+        np.interp(clock, model.times, model[n]) for n in ("lateral acceleration", "forward acceleration")
+    )
     speed = np.interp(clock, model.times, model.detail.speed)
     causes: dict[str, tuple[Callable[[np.ndarray], np.ndarray], np.ndarray]] = {
         "magnitude with |lateral acceleration|": (np.abs, np.abs(lateral)),
         "magnitude with speed": (np.abs, speed),
-        "magnitude with braking": (np.abs, -np.minimum(ahead, 0.0)),
+        "magnitude with braking": (np.abs, -np.minimum(forward_acceleration, 0.0)),
         "itself with lateral acceleration": (np.asarray, lateral),
         "itself with |lateral acceleration|": (np.asarray, np.abs(lateral)),
-        "itself with lateral x forward acceleration": (np.asarray, lateral * ahead),
+        "itself with lateral x forward acceleration": (np.asarray, lateral * forward_acceleration),
         "itself with time x lateral acceleration": (np.asarray, lateral * (clock - clock.mean())),
     }
     return {
-        name: {cause: float(np.corrcoef(of(row), values)[0, 1]) for cause, (of, values) in causes.items()}
+        name: {cause: float(np.corrcoef(transform(row), values)[0, 1]) for cause, (transform, values) in causes.items()}
         for name, row in zip(AIMED_ERRORS, identified.cross_validation_errors, strict=True)
     }
 
 
 def _unmet_aims(residuals: dict[str, dict[str, float]]) -> list[str]:
-    def told(causes: dict[str, float]) -> str:
-        most = sorted(causes, key=lambda cause: -abs(causes[cause]))[:2]
-        return ", ".join(f"{cause} {causes[cause]:+.2f}" for cause in most)
+    def causes_text(causes: dict[str, float]) -> str:
+        strongest = sorted(causes, key=lambda cause: -abs(causes[cause]))[:2]
+        return ", ".join(f"{cause} {causes[cause]:+.2f}" for cause in strongest)
 
-    return [f"  residual of {name} goes with: {told(causes)}" for name, causes in residuals.items()]
+    return [f"  residual of {name} goes with: {causes_text(causes)}" for name, causes in residuals.items()]
 
 
 if __name__ == "__main__":

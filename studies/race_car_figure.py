@@ -14,28 +14,34 @@ SECONDS_SHOWN = 60.0
 """s of the prediction that are shown."""
 
 
-def draw(chosen: "Identified", identified: dict[str, "Identified"], title: str, path: Path) -> Path:
+def draw(identified_full: "Identified", identified: dict[str, "Identified"], title: str, path: Path) -> Path:
     """Plot channels over time with their prediction bands, and below them the errors of all vehicles."""
-    problem = chosen.bands.problem
-    times = problem.clock.times
-    shown = times <= times[0] + SECONDS_SHOWN
+    problem = identified_full.bands.problem
+    clock_times = problem.clock.times
+    shown = clock_times <= clock_times[0] + SECONDS_SHOWN
     figure, axes = subplots(len(problem.channels) + 1, 1, figsize=(8.0, 9.6))
     for axis, channel, row, half in zip(
-        axes, problem.channels, chosen.bands.predicted, chosen.bands.half_width, strict=False
+        axes, problem.channels, identified_full.bands.predicted, identified_full.bands.half_width, strict=False
     ):
         low, high = row - half, row + half
         axis.fill_between(
-            times[shown], low[shown], high[shown], color=SKY, alpha=0.5, linewidth=0, label="band of 95 %"
+            clock_times[shown], low[shown], high[shown], color=SKY, alpha=0.5, linewidth=0, label="band of 95 %"
         )
-        axis.plot(times[shown], row[shown], color=VERMILION, linewidth=0.9, label="predicted")
-        axis.plot(times[shown], channel.values[shown], color=DARK, linewidth=0.9, label="measured")
+        axis.plot(clock_times[shown], row[shown], color=VERMILION, linewidth=0.9, label="predicted")
+        axis.plot(clock_times[shown], channel.values[shown], color=DARK, linewidth=0.9, label="measured")
         unit = channel.unit.replace("^2", "²")
         axis.set(title=channel.name.capitalize(), ylabel=f"[{unit}]", xlabel="time [s]")
     names = [channel.name for channel in problem.channels]
-    vehicles = {"chosen": chosen, **identified}
-    for i, (name, each) in enumerate(vehicles.items()):
-        at = np.arange(len(names)) + 0.25 * i
-        axes[-1].bar(at, 100.0 * each.bands.relative_error(), 0.22, color=(BLUE, VERMILION, SKY)[i % 3], label=name)
+    vehicles = {"chosen": identified_full, **identified}
+    for i, (name, identified_vehicle) in enumerate(vehicles.items()):
+        bar_positions = np.arange(len(names)) + 0.25 * i
+        axes[-1].bar(
+            bar_positions,
+            100.0 * identified_vehicle.bands.relative_error(),
+            0.22,
+            color=(BLUE, VERMILION, SKY)[i % 3],
+            label=name,
+        )
     axes[-1].set_xticks(np.arange(len(names)) + 0.25, names)
     axes[-1].set(ylabel="error [% of rms]", title="What simpler vehicles lose")
     axes[-1].legend()

@@ -80,7 +80,7 @@ def _lines_of_findings(examination: Examination) -> list[str]:
     ]
     notes = sum(finding.weight == "note" for finding in examination.findings)
     lines.append(f"  {notes} notes say what was looked at and found good, or could not be looked at: see the page")
-    lines += [f"  {what} of the free run: {trust}" for what, trust in examination.trust]
+    lines += [f"  {subject} of the free run: {trust}" for subject, trust in examination.trust]
     for name, outcome in examination.runs.items():
         end = examination.failed.get(name, "to the end")
         lines.append(f"  {name} run: {outcome.period * (outcome.done - 1):.6g} s, {end}")

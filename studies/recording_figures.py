@@ -74,11 +74,13 @@ def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
     )
 
 
-def _save_titled(drawn: Any, title: str, path: Path, legend: Any = None, place: str = "outside upper right") -> Path:
+def _save_titled(
+    drawn: Any, title: str, path: Path, legend: Any = None, legend_position: str = "outside upper right"
+) -> Path:
     """Add a title and the legend of one axis to a figure, and save it."""
     if legend is not None:
-        columns = 3 if "lower" in place else 2
-        drawn.legend(*legend.get_legend_handles_labels(), loc=place, ncols=columns)
+        columns = 3 if "lower" in legend_position else 2
+        drawn.legend(*legend.get_legend_handles_labels(), loc=legend_position, ncols=columns)
     add_heading(drawn, title)
     return save(drawn, path)
 
@@ -88,13 +90,13 @@ def _plot_signals(finding: Finding, evidence: Evidence, signals: tuple[Signal, .
     recording, marked, shown = evidence.recording, finding.times, signals[:SHOWN_SIGNALS]
     begin = max(marked[0] - MARKED_SECONDS, 0.0) if marked else 0.0
     end = min(marked[1] + MARKED_SECONDS if marked else UNMARKED_SECONDS, recording.duration)
-    first, last = round(begin / recording.period), round(end / recording.period) + 1
-    every = max((last - first) // MOST_SAMPLES, 1)
-    times = recording.period * np.arange(first, last)[::every]
+    first_sample, last_sample = round(begin / recording.period), round(end / recording.period) + 1
+    stride = max((last_sample - first_sample) // MOST_SAMPLES, 1)
+    sample_times = recording.period * np.arange(first_sample, last_sample)[::stride]
     drawn, axes = subplots(len(shown), 1, figsize=(COLUMN_WIDTH, 1.2 + 1.5 * len(shown)), sharex=True, squeeze=False)
     for axis, signal in zip(axes[:, 0], shown, strict=True):
-        values = recording.columns.read(signal.name, first, last - first)[::every]
-        axis.plot(times[: len(values)], values, color=QUIET_COLOUR, lw=0.8)
+        values = recording.columns.read(signal.name, first_sample, last_sample - first_sample)[::stride]
+        axis.plot(sample_times[: len(values)], values, color=QUIET_COLOUR, lw=0.8)
         axis.set_ylabel(f"{signal.name} [{UNIT_OF_QUANTITY[signal.quantity]}]")
         if finding.check == "gravity" and signal.component == "z":
             axis.axhline(GRAVITY if signal.gravity else 0.0, color=LOUD_COLOUR, ls="--", label="expected mean")
@@ -119,11 +121,14 @@ def _plot_mean_forces(evidence: Evidence, path: Path) -> Path:
     hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical()
     means = np.array([evidence.mean(vertical[hub]) for hub in hubs])
     drawn, axis = subplots(figsize=(COLUMN_WIDTH, 3.4))
-    at = np.arange(len(hubs))
-    axis.bar(at - 0.2, loads, 0.38, color=PALE, label="static load by the vehicle file")
-    bars = axis.bar(at + 0.2, means, 0.38, color=LOUD_COLOUR, label="mean of the recording")
-    axis.bar_label(bars, [f"{part:+.2%}" if abs(part) < 0.5 else f"x {part + 1:.3g}" for part in means / loads - 1])
-    axis.set_xticks(at, [f"{hub}\n{vertical[hub].name}" for hub in hubs])
+    bar_positions = np.arange(len(hubs))
+    axis.bar(bar_positions - 0.2, loads, 0.38, color=PALE, label="static load by the vehicle file")
+    bars = axis.bar(bar_positions + 0.2, means, 0.38, color=LOUD_COLOUR, label="mean of the recording")
+    axis.bar_label(
+        bars,
+        [f"{deviation:+.2%}" if abs(deviation) < 0.5 else f"x {deviation + 1:.3g}" for deviation in means / loads - 1],
+    )
+    axis.set_xticks(bar_positions, [f"{hub}\n{vertical[hub].name}" for hub in hubs])
     axis.set_ylabel("vertical force [N]")
     if np.abs(means).max() > 10 * loads.max():
         axis.set_yscale("symlog", linthresh=float(loads.max()))
@@ -136,23 +141,25 @@ def _plot_ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path
     wrong factor as a constant magnitude."""
     agreement = evidence.agreement
     assert agreement is not None
-    for before in evidence.faults[: evidence.faults.index(fault)]:  # the agreement in which this one was found
-        agreement = agreement.without(before)
-    among = agreement.inputs if fault.signals[0] in agreement.inputs else agreement.outputs
-    group = SignalGroup(fault.name, among is agreement.inputs, tuple(among.index(s) for s in fault.signals))
-    line, size = ((agreement.weights * part).sum(axis=1) for part in agreement.share(group))
+    for earlier_fault in evidence.faults[: evidence.faults.index(fault)]:  # the agreement in which this one was found
+        agreement = agreement.without(earlier_fault)
+    group_channels = agreement.inputs if fault.signals[0] in agreement.inputs else agreement.outputs
+    group = SignalGroup(
+        fault.name, group_channels is agreement.inputs, tuple(group_channels.index(s) for s in fault.signals)
+    )
+    line, size = ((agreement.weights * part_of_weights).sum(axis=1) for part_of_weights in agreement.share(group))
     f, ratio, sure = agreement.frequencies, size / line if group.forces else line / size, size / size.max()
     late, factor = (fault.size, 1.0) if fault.kind == "late" else (0.0, fault.size)
-    told = f"{1e3 * fault.size:+.2f} ms" if fault.kind == "late" else f"factor {fault.size:.4g}"
+    size_text = f"{1e3 * fault.size:+.2f} ms" if fault.kind == "late" else f"factor {fault.size:.4g}"
     expected = factor * np.exp(-2j * np.pi * f * late)
-    turned = -360 * f * late + (180.0 if factor < 0 else 0.0)
+    phase = -360 * f * late + (180.0 if factor < 0 else 0.0)
     drawn, axes = subplots(2, 1, figsize=(COLUMN_WIDTH, 4.6), sharex=True)
-    for axis, measured, said, level in (
+    for axis, measured, predicted_values, level in (
         (axes[0], np.abs(ratio), np.abs(expected), 1.0),
-        (axes[1], np.degrees(np.angle(ratio / expected)) + turned, turned, 0.0),
+        (axes[1], np.degrees(np.angle(ratio / expected)) + phase, phase, 0.0),
     ):
         axis.scatter(f, measured, s=4 + 40 * sure, color=QUIET_COLOUR, label="measured; larger: surer")
-        axis.plot(f, said, color=LOUD_COLOUR, label=told)
+        axis.plot(f, predicted_values, color=LOUD_COLOUR, label=size_text)
         axis.axhline(level, color=PALE, ls=":", label="as it should be")
     axes[0].set_ylabel("size [-]")
     axes[1].set_ylabel("phase [deg]")
@@ -169,12 +176,16 @@ def _plot_exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> P
     assert agreement is not None
     names = [s.name for s in agreement.outputs]
     drawn, axis = subplots(figsize=(COLUMN_WIDTH, 1.4 + 0.24 * len(names)))
-    at = np.arange(len(names))
-    axis.barh(at - 0.2, 100 * agreement.unexplained, 0.38, color=LOUD_COLOUR, label="as mapped")
+    bar_positions = np.arange(len(names))
+    axis.barh(bar_positions - 0.2, 100 * agreement.unexplained, 0.38, color=LOUD_COLOUR, label="as mapped")
     axis.barh(
-        at + 0.2, 100 * agreement.without(fault).unexplained, 0.38, color=QUIET_COLOUR, label=f"{fault.name} exchanged"
+        bar_positions + 0.2,
+        100 * agreement.without(fault).unexplained,
+        0.38,
+        color=QUIET_COLOUR,
+        label=f"{fault.name} exchanged",
     )
-    axis.set_yticks(at, names)
+    axis.set_yticks(bar_positions, names)
     axis.invert_yaxis()
     axis.set_xlabel("what the hub forces leave unexplained of each reading [%]")
     return _save_titled(drawn, "Exchanged hubs", path, axis)
@@ -212,15 +223,15 @@ def thinned_curve(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
     parts = values[: rows * width].reshape(rows, width)
     empty = ~np.isfinite(parts).any(axis=1)
     safe = np.where(np.isfinite(parts) | empty[:, None], parts, np.nanmean(values))
-    both = np.column_stack([safe.min(axis=1), safe.max(axis=1)])
-    both[empty] = np.nan
-    return np.repeat(times[: rows * width : width], 2), both.ravel()
+    extremes = np.column_stack([safe.min(axis=1), safe.max(axis=1)])
+    extremes[empty] = np.nan
+    return np.repeat(times[: rows * width : width], 2), extremes.ravel()
 
 
-def _panels_over_time(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
+def _panels_over_time(rows: int, height: float, **options_of_panels: Any) -> tuple[Any, np.ndarray]:
     """Figure with rows of panels over time."""
-    drawn, panels = subplots(rows, figsize=(COLUMN_WIDTH, height), squeeze=False, **more)
-    for panel in panels[-1] if more.get("sharex") else panels.flat:
+    drawn, panels = subplots(rows, figsize=(COLUMN_WIDTH, height), squeeze=False, **options_of_panels)
+    for panel in panels[-1] if options_of_panels.get("sharex") else panels.flat:
         panel.set_xlabel("time [s]")
     return drawn, panels
 
@@ -229,12 +240,12 @@ def inputs_figure(examination: Examination, path: Path) -> Path:
     """Plot the forces at all hubs along each axis over time."""
     recording, axes = examination.recording, [a for a in "zxy" if examination.recording.find("force", component=a)]
     drawn, panels = _panels_over_time(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
-    times = recording.period * np.arange(recording.count)
+    sample_times = recording.period * np.arange(recording.count)
     for panel, axis in zip(panels[:, 0], axes, strict=True):
         for i, hub in enumerate(examination.rig.hubs):
             for signal in (s for s in recording.find("force", hub, axis) if not s.check):
                 panel.plot(
-                    *thinned_curve(times, recording.samples(signal) / 1e3),
+                    *thinned_curve(sample_times, recording.samples(signal) / 1e3),
                     color=WHEEL_COLOURS[i % len(WHEEL_COLOURS)],
                     label=hub,
                     lw=0.7,
@@ -251,14 +262,14 @@ def drift_figure(examination: Examination, path: Path) -> Path:
     drawn, panels = _panels_over_time(len(angles), 2.0 * len(angles) + 0.6, sharex=True)
     for panel, angle in zip(panels[:, 0], angles, strict=True):
         curves = _angles_of_runs(examination, angle)
-        for name, (times, values) in curves.items():
+        for name, (times_of_run, values) in curves.items():
             label, colour = RUN_STYLES[name]
-            panel.plot(*thinned_curve(times, np.degrees(values)), color=colour, label=label, lw=1.0)
+            panel.plot(*thinned_curve(times_of_run, np.degrees(values)), color=colour, label=label, lw=1.0)
         if examination.drift is not None and examination.chosen_run != FREE_RUN and examination.chosen_run in curves:
-            about = np.interp(examination.drift.times, *curves[examination.chosen_run])
+            chosen_angles = np.interp(examination.drift.times, *curves[examination.chosen_run])
             spread = examination.drift.deviations[:, ("roll", "pitch").index(angle)]
             label = "free run as predicted, 1 standard deviation"
-            bounds = np.degrees(about - spread), np.degrees(about + spread)
+            bounds = np.degrees(chosen_angles - spread), np.degrees(chosen_angles + spread)
             panel.fill_between(examination.drift.times, *bounds, color=LOUD_COLOUR, alpha=0.15, lw=0, label=label)
         panel.set_title(f"{angle} of the {examination.rig.chassis} [degrees]")
         low, high = panel.get_ylim()
@@ -280,18 +291,20 @@ def _angles_of_runs(examination: Examination, angle: str) -> dict[str, tuple[np.
     return curves
 
 
-def forces_figure(run: SectionOutcome, answers: Sequence[SectionChannel], path: Path, name: str = "") -> Path:
+def forces_figure(run: SectionOutcome, section_channels: Sequence[SectionChannel], path: Path, name: str = "") -> Path:
     """Plot up to six section forces over the complete recording, and each for two seconds about its largest range."""
-    times, colour = run.period * np.arange(run.done), RUN_STYLES.get(name, RUN_STYLES["kalman"])[1]
-    drawn, panels = _panels_over_time(len(answers), 1.7 * len(answers) + 0.5, columns=2, width_ratios=(2.4, 1))
-    for (left, right), answer in zip(panels, answers, strict=True):
+    sample_times, colour = run.period * np.arange(run.done), RUN_STYLES.get(name, RUN_STYLES["kalman"])[1]
+    drawn, panels = _panels_over_time(
+        len(section_channels), 1.7 * len(section_channels) + 0.5, columns=2, width_ratios=(2.4, 1)
+    )
+    for (left, right), answer in zip(panels, section_channels, strict=True):
         values, unit, scale = run.samples(answer), f"k{answer.unit}", 1e-3
         if np.abs(values).max() < 1e3:
             unit, scale = answer.unit, 1.0
-        left.plot(*thinned_curve(times, scale * values), color=colour, lw=0.7)
+        left.plot(*thinned_curve(sample_times, scale * values), color=colour, lw=0.7)
         left.set_title(f"{answer.name} [{unit}]")
-        near = np.abs(times - times[int(np.argmax(np.abs(values - values.mean())))]) <= 1.0
-        right.plot(times[near], scale * values[near], color=colour)
+        near = np.abs(sample_times - sample_times[int(np.argmax(np.abs(values - values.mean())))]) <= 1.0
+        right.plot(sample_times[near], scale * values[near], color=colour)
         right.set_title(f"Two seconds about its peak [{unit}]", fontsize=8)
     return save(drawn, path)
 
@@ -302,14 +315,14 @@ def counting_figure(counted: dict[SectionChannel, CountedLoad], path: Path) -> P
     for colour, (answer, counts) in zip(WHEEL_COLOURS, counted.items(), strict=False):
         left.plot(np.maximum(counts.crossings, 0.5), 1e-3 * counts.levels, drawstyle="steps-mid", color=colour)
         right.plot(np.maximum(counts.pairs_of_range, 0.25), 1e-3 * counts.ranges, color=colour, label=answer.name)
-    for panel, title, what in (
+    for panel, title, quantity_name in (
         (left, "level crossings, upwards", "level"),
         (right, "range pairs of at least", "range"),
     ):
         panel.set_title(title)
         panel.set_xscale("log")
         panel.set_xlabel("number [-]")
-        panel.set_ylabel(f"{what} [kN, kN m]")
+        panel.set_ylabel(f"{quantity_name} [kN, kN m]")
     drawn.legend(loc="outside upper right", ncols=3)
     return save(drawn, path)
 
@@ -320,16 +333,18 @@ def overlay_figure(
     """Plot measured channels that were not inputs of the run against the computed ones: over the whole time, and for
     two seconds about the largest error."""
     drawn, panels = _panels_over_time(len(compared), 1.7 * len(compared) + 0.7, columns=2, width_ratios=(2.4, 1))
-    for (left, right), each in zip(panels, compared, strict=True):
-        times, measured, computed = paired_channels(examination.recording, run, each.signal, each.answer)
-        near = np.abs(times - times[int(np.nanargmax(np.abs(computed - measured)))]) <= 1.0
+    for (left, right), comparison in zip(panels, compared, strict=True):
+        common_times, measured, computed = paired_channels(
+            examination.recording, run, comparison.signal, comparison.answer
+        )
+        near = np.abs(common_times - common_times[int(np.nanargmax(np.abs(computed - measured)))]) <= 1.0
         for values, colour, width, label in (
             (measured, PALE, 2.6, "measured"),
             (computed, RUN_STYLES[examination.chosen_run][1], 0.8, "computed"),
         ):
-            left.plot(*thinned_curve(times, values), color=colour, lw=width, label=label)
-            right.plot(times[near], values[near], color=colour, lw=width)
-        left.set_title(f"{each.signal.name} [{each.answer.unit}]")
-        right.set_title(f"About the largest error [{each.answer.unit}]", fontsize=8)
+            left.plot(*thinned_curve(common_times, values), color=colour, lw=width, label=label)
+            right.plot(common_times[near], values[near], color=colour, lw=width)
+        left.set_title(f"{comparison.signal.name} [{comparison.answer.unit}]")
+        right.set_title(f"About the largest error [{comparison.answer.unit}]", fontsize=8)
     drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     return save(drawn, path)

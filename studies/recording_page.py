@@ -58,17 +58,17 @@ def page_text(examination: Examination, folder: Path, result: Result) -> str:
         weights=[finding.weight for finding in examination.findings],
         used=[(signal, examination.put_in(signal)) for signal in examination.recording.signals],
         effects={
-            finding: f" {each}."
-            for each in examination.consequences
-            if each.section_force
-            for finding in [each.finding]
+            finding: f" {consequence}."
+            for consequence in examination.consequences
+            if consequence.section_force
+            for finding in [consequence.finding]
         },
         figures=_page_figures(examination, folder),
         limits={"disagrees": LARGEST_DISAGREEMENT, "force": FORCE_LIMITS, "damage": DAMAGE_LIMITS},
         forces=_forces(examination, examination.outcome, folder) if examination.outcome is not None else None,
         sizes=[
-            math.sqrt(sum(band.measured**2 for band in each.bands)) or math.inf
-            for each in examination.channel_comparisons
+            math.sqrt(sum(band.measured**2 for band in consequence.bands)) or math.inf
+            for consequence in examination.channel_comparisons
         ],
         files=[
             (source, examination.scene.path(source.file, f"files.{i}.file"))
@@ -94,7 +94,7 @@ def _page_figures(examination: Examination, folder: Path) -> dict[str, Any]:
         figures["drift"] = draw.drift_figure(examination, folder / "drift.png")
     if examination.outcome is not None and examination.channel_comparisons:
         shown = [
-            each for each in examination.channel_comparisons if each.signal.check
+            comparison for comparison in examination.channel_comparisons if comparison.signal.check
         ] or examination.channel_comparisons
         figures["checks"] = draw.overlay_figure(
             examination, examination.outcome, shown[:FORCES_DRAWN], folder / "checks.png"
@@ -110,7 +110,7 @@ def _forces(examination: Examination, outcome: SectionOutcome, folder: Path) -> 
         for answer, counts in examination.counted.items()
         if counts.largest_load - counts.smallest_load > NEGLIGIBLE_CHANGE
     }
-    first, inside = list(moving)[:FORCES_DRAWN], set(examination.rig.places.connectors)
+    first, connectors = list(moving)[:FORCES_DRAWN], set(examination.rig.places.connectors)
     return {
         "slope": WOEHLER_SLOPE,
         "true": errors_of_run(outcome, examination.virtual, WOEHLER_SLOPE).damage
@@ -120,7 +120,8 @@ def _forces(examination: Examination, outcome: SectionOutcome, folder: Path) -> 
         "still": len(examination.counted) - len(moving),
         "first": len(first),
         "parts": [
-            {a: counts for a, counts in moving.items() if (a.section in inside) is part} for part in (True, False)
+            {a: counts for a, counts in moving.items() if (a.section in connectors) is is_connector}
+            for is_connector in (True, False)
         ],
         "forces": draw.forces_figure(outcome, first, folder / "forces.png", examination.chosen_run),
         "counting": draw.counting_figure({answer: moving[answer] for answer in first}, folder / "counting.png"),

@@ -74,7 +74,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     options = read(Options, scene.options, scene.file, "options")
     assert scene.speeds is not None
     vehicle, speeds = vehicle_of(scene), scene.speeds.all()
-    there, speed = wheels(vehicle), options.speed or float(speeds[len(speeds) // 2])
+    wheel_positions, speed = wheels(vehicle), options.speed or float(speeds[len(speeds) // 2])
     engines = ("reference",) if vehicle.limits and len(engines) > 1 else engines  # no other has rigid springs
     roads = _correlations(scene, vehicle)
     results = {}
@@ -87,19 +87,21 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     top = Heading(scene.title, results)
     _save_deviations(results, folder)
     _save_system(scene, linear, speed, folder)
-    if along := _with_points_along_body(vehicle):
+    if vehicle_with_points := _with_points_along_body(vehicle):
         plain = scene.model_copy(update={"weighting": {}})
-        at = run_scene(plain, "reference", vehicle=along, points=SweepPoints([speed], roads)).detail
-        places = [output.point[0] for output in along.outputs if isinstance(output, PointOutput)]
-        along_figure(places, at, first, vehicle, speed, top, folder / "body_acceleration.png")
+        sweep_of_points = run_scene(
+            plain, "reference", vehicle=vehicle_with_points, points=SweepPoints([speed], roads)
+        ).detail
+        point_positions = [output.point[0] for output in vehicle_with_points.outputs if isinstance(output, PointOutput)]
+        along_figure(point_positions, sweep_of_points, first, vehicle, speed, top, folder / "body_acceleration.png")
     kinds = [output.kind for output in vehicle.outputs] + ["acceleration"] * len(scene.weighting)
     panels = list(zip(kinds, first.units, strict=True))
     outputs_figure(first, panels, static_loads(vehicle), top, folder / "over_speed.png")
-    spectra_figure(linear, excitation_of(scene, there), speed, top, folder / "spectra.png")
+    spectra_figure(linear, excitation_of(scene, wheel_positions), speed, top, folder / "spectra.png")
     fitted = fitted_road(scene) if scene.road.file else None
-    road, y = road_of(scene, there), half_track_of(scene, there)
+    road, y = road_of(scene, wheel_positions), half_track_of(scene, wheel_positions)
     road_figure(road, y, fitted, top, folder / "road.png")
-    texts = (road.label(y), *noise_sharing_text(scene, there), *(fitted.notes if fitted else ()))
+    texts = (road.label(y), *noise_sharing_text(scene, wheel_positions), *(fitted.notes if fitted else ()))
     notes = [*(f"  question: {text}" for text in frequency_doubts(vehicle)), *(f"  road: {text}" for text in texts)]
     return {
         "scene": scene.title,
@@ -129,8 +131,10 @@ def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
     if not bodies or len(vehicle.axles) < 2:
         return None
     body = max(bodies, key=lambda body: body.mass)
-    places = np.linspace(vehicle.axles[-1] - OVERHANG_LENGTH, vehicle.axles[0] + OVERHANG_LENGTH, POINTS_ALONG_BODY)
-    points = [(float(x), 0.0, body.position[2]) for x in places]
+    point_positions = np.linspace(
+        vehicle.axles[-1] - OVERHANG_LENGTH, vehicle.axles[0] + OVERHANG_LENGTH, POINTS_ALONG_BODY
+    )
+    points = [(float(x), 0.0, body.position[2]) for x in point_positions]
     outputs = [PointOutput(f"x = {p[0]:.2f} m", "acceleration", body.name, p, (0.0, 0.0, 1.0)) for p in points]
     return replace(vehicle, outputs=tuple(outputs))
 
@@ -138,9 +142,9 @@ def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
 def _save_deviations(results: Mapping[str, Result], folder: Path) -> None:
     """Save the standard deviations of every engine over case, speed and output; the last speed is that of the
     tables."""
-    whole = join_results(results, "engine")
+    joined = join_results(results, "engine")
     saved = derived_result(
-        Result(whole.data.isel(speed=slice(-1))), results, "the Lyapunov equation of nudged matrices"
+        Result(joined.data.isel(speed=slice(-1))), results, "the Lyapunov equation of nudged matrices"
     )
     saved.save(folder / "deviations.nc")
     write_whole(folder / "deviations.csv", saved.data["deviation"].drop_vars("unit").to_dataframe().to_csv())
@@ -176,26 +180,29 @@ def _table(
 ) -> list[str]:
     """Table of each output's standard deviation at one speed, and how much it changes on roads with simpler
     correlation."""
-    (name, first), *others = sweeps.items()
+    (name, first), *other_sweeps = sweeps.items()
     width = max(map(len, first.outputs))
     heads = "".join(f"{case:>20}" for case in (*first.cases[1:], ISOTROPIC_ROAD))
     lines = [f"  at {speed:g} m/s, standard deviations; then what other roads make of them", " " * (width + 24) + heads]
-    alike = isotropic_change(scene, vehicle, speed)
-    at, told = first.deviation[:, -1], list(zip(first.outputs, first.units, first.status[0, -1], strict=True))
-    for i, (output, unit, status) in enumerate(told):
-        value = _value_without_rounding(at[:, i])
-        changes = (*at[1:, i], value * (1 + alike.get(output, np.nan)))
-        columns = "".join(f"{_change_text(other, value):>20}" for other in changes)
+    isotropic_changes = isotropic_change(scene, vehicle, speed)
+    deviations_at_speed, output_rows = (
+        first.deviation[:, -1],
+        list(zip(first.outputs, first.units, first.status[0, -1], strict=True)),
+    )
+    for i, (output, unit, status) in enumerate(output_rows):
+        value = _value_without_rounding(deviations_at_speed[:, i])
+        changes = (*deviations_at_speed[1:, i], value * (1 + isotropic_changes.get(output, np.nan)))
+        columns = "".join(f"{_change_text(other_value, value):>20}" for other_value in changes)
         lines.append(f"    {output:<{width}}{_text(value, unit, status):>20}{columns}")
-    reasons = zip(told, first.reason[0, -1], strict=True)
+    reasons = zip(output_rows, first.reason[0, -1], strict=True)
     lines += [f"  {output} [{unit}]: {reason}" for (output, unit, status), reason in reasons if status != "finite"]
-    deviations = dict(zip(first.outputs, at[0].tolist(), strict=True))
+    deviations = dict(zip(first.outputs, deviations_at_speed[0].tolist(), strict=True))
     lines += _travel_lines(vehicle, deviations, options.free_travel) + _loads(vehicle, deviations)
-    for engine, other in others:
-        same = "" if (other.status == first.status).all() else "; but what is finite differs"
+    for engine, other_value in other_sweeps:
+        status_note = "" if (other_value.status == first.status).all() else "; but what is finite differs"
         lines.append(
-            f"  {engine}'s own linear vehicle: standard deviations within {largest_gap(other, first):.1e} "
-            f"(of the largest) of {name}'s{same}"
+            f"  {engine}'s own linear vehicle: standard deviations within {largest_gap(other_value, first):.1e} "
+            f"(of the largest) of {name}'s{status_note}"
         )
     return lines
 
@@ -207,17 +214,17 @@ def _value_without_rounding(deviations: np.ndarray) -> float:
     return float(deviations[0]) if deviations[0] > max(NEGLIGIBLE_OUTPUT * largest, ROUNDING_DEVIATION) else 0.0
 
 
-def _text(value: float, unit: str, status: str) -> str:
+def _text(deviation: float, unit: str, status: str) -> str:
     """Text of a standard deviation with its unit (mm for lengths), or its status if it is not finite."""
     if status != "finite":
         return status
-    return f"{1e3 * value:.3g} mm" if unit == "m" else f"{value:.4g} {unit}"
+    return f"{1e3 * deviation:.3g} mm" if unit == "m" else f"{deviation:.4g} {unit}"
 
 
-def _change_text(other: float, value: float) -> str:
+def _change_text(other_value: float, deviation: float) -> str:
     return (
-        f"{100 * (other / value - 1):+.1f} %"
-        if np.isfinite(other) and NEGLIGIBLE_OUTPUT * other < value < np.inf
+        f"{100 * (other_value / deviation - 1):+.1f} %"
+        if np.isfinite(other_value) and NEGLIGIBLE_OUTPUT * other_value < deviation < np.inf
         else "-"
     )
 

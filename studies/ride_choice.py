@@ -53,10 +53,10 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     if goes_in_time(scene):
         opened(scene)
     elif scene.options:
-        place, value = next(iter(scene.options.items()))
+        option_name, value = next(iter(scene.options.items()))
         raise InputError(
             scene.file,
-            f"options.{place}",
+            f"options.{option_name}",
             value,
             "is read where springs are bent, and effects chosen by runs; for this vehicle there is a closed form",
         )
@@ -74,21 +74,21 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         choice = chooser.choose()
         progress("single effects", 0.7)
         further = chooser.change_if_left_out_too(frozenset(choice.left_out))
-        alone = [_effect_alone(chooser, effect) for effect in chooser.effects]
+        single_effects = [_effect_alone(chooser, effect) for effect in chooser.effects]
         watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
         write(chooser.rest(frozenset(choice.left_out)), folder)
     progress("what is left", 0.9)
     results = _deviation_results(scene, chooser.rest(frozenset(choice.left_out)))
-    _save_effect_table(scene, alone, choice, watts, (results, chooser.counts), folder)
-    choice_figure(scene, alone, choice, watts, results, folder / "choice.png")
+    _save_effect_table(scene, single_effects, choice, watts, (results, chooser.counts), folder)
+    choice_figure(scene, single_effects, choice, watts, results, folder / "choice.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
         "results": results,
         "answer": _answer_of_choice(scene, choice, further),
-        "table": _table(scene, choice, alone, further),
+        "table": _table(scene, choice, single_effects, further),
     }
 
 
@@ -109,7 +109,7 @@ def _effect_alone(chooser: Chooser, effect: Effect) -> EffectAlone:
     )
 
 
-def _answer_of_choice(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) -> dict[str, Any]:
+def _answer_of_choice(scene: RideScene, choice: RideChoice, change_by_effect: dict[Effect, float]) -> dict[str, Any]:
     """Plain values of a ride's choice: its effects, their changes and the saving."""
     columns = {
         "predicted": choice.predicted_change,
@@ -131,7 +131,7 @@ def _answer_of_choice(scene: RideScene, choice: RideChoice, further: dict[Effect
         "calls": [choice.cost_before.calls, choice.cost_after.calls],
         "said": list(choice.said),
         "confirmations": choice.confirmations,
-        "would matter no more above": {effect.name: change for effect, change in further.items()},
+        "would matter no more above": {effect.name: change for effect, change in change_by_effect.items()},
     }
 
 
@@ -148,14 +148,19 @@ def _save_effect_table(
     import pandas as pd
 
     results, counts = runs
-    told: dict[str, Any] = {"left out": [each.effect in choice.left_out for each in single_effects]}
+    columns: dict[str, Any] = {"left out": [single.effect in choice.left_out for single in single_effects]}
     changes = {
-        part: np.array([getattr(each, f"{part}_change") for each in single_effects]).reshape(-1, len(scene.quantities))
-        for part in ("predicted", "confirmed")
+        stage: np.array([getattr(single, f"{stage}_change") for single in single_effects]).reshape(
+            -1, len(scene.quantities)
+        )
+        for stage in ("predicted", "confirmed")
     }
-    effects, why = [each.effect.name for each in single_effects], [each.refusal_reason for each in single_effects]
-    channels = {part: Channel(("effect", "quantity"), values, "1") for part, values in changes.items()}
-    channels |= {"left_out": Channel("effect", told["left out"]), "not_alone_because": Channel("effect", why)}
+    effects, why = (
+        [single.effect.name for single in single_effects],
+        [single.refusal_reason for single in single_effects],
+    )
+    channels = {stage: Channel(("effect", "quantity"), values, "1") for stage, values in changes.items()}
+    channels |= {"left_out": Channel("effect", columns["left out"]), "not_alone_because": Channel("effect", why)}
     axes = {"effect": effects, "quantity": list(scene.quantities), "element": list(watts)}
     saved = result(
         scene,
@@ -165,12 +170,12 @@ def _save_effect_table(
         counts={"confirmations": choice.confirmations} | counts,
     )
     derived_result(saved, results, "deviations of the whole scene and of what is left").save(folder / "choice.nc")
-    told |= {
-        f"{name}, {part} [-]": values[:, i]
+    columns |= {
+        f"{name}, {stage} [-]": values[:, i]
         for i, name in enumerate(scene.quantities)
-        for part, values in changes.items()
+        for stage, values in changes.items()
     }
-    table = pd.DataFrame(told | {"not alone because": why}, pd.Index(effects, name="effect"))
+    table = pd.DataFrame(columns | {"not alone because": why}, pd.Index(effects, name="effect"))
     write_whole(folder / "effects.csv", table.to_csv(na_rep="nan"))
     activities = saved.data["activity"].to_pandas().rename("activity [W]")
     write_whole(folder / "activity.csv", activities.to_csv(na_rep="nan"))
@@ -188,18 +193,22 @@ def choice_figure(
     of each element."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, save, subplots
 
-    names = [each.effect.name + ("  [left out]" if each.effect in choice.left_out else "") for each in single_effects]
+    names = [
+        single.effect.name + ("  [left out]" if single.effect in choice.left_out else "") for single in single_effects
+    ]
     heights = 1.6 + 0.26 * (len(names) + 1), 0.7 + 0.2 * ELEMENTS_DRAWN
-    figure, (above, below) = subplots(2, 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.4), height_ratios=heights)
+    figure, (changes_axis, activity_axis) = subplots(
+        2, 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.4), height_ratios=heights
+    )
     y = np.arange(len(names) + 1)[::-1]
     for i, name in enumerate(scene.quantities):
         shift = 0.16 * (i - (len(scene.quantities) - 1) / 2)
-        for part, marker, size in (("confirmed", "o", 5), ("predicted", "x", 6)):
-            changes = 100 * abs(np.array([getattr(row, f"{part}_change")[i] for row in (*single_effects, choice)]))
+        for stage, marker, size in (("confirmed", "o", 5), ("predicted", "x", 6)):
+            changes = 100 * abs(np.array([getattr(row, f"{stage}_change")[i] for row in (*single_effects, choice)]))
             shown = np.clip(np.nan_to_num(changes, posinf=HIGHEST_CHANGE), LOWEST_CHANGE, HIGHEST_CHANGE)
-            above.plot(shown, y + shift, marker, color=f"C{i}", label=f"{name}, {part}", ms=size)
-    above.axvline(100 * (scene.tolerance or 0), color=DARK, ls="--", label="tolerance")
-    above.set(
+            changes_axis.plot(shown, y + shift, marker, color=f"C{i}", label=f"{name}, {stage}", ms=size)
+    changes_axis.axvline(100 * (scene.tolerance or 0), color=DARK, ls="--", label="tolerance")
+    changes_axis.set(
         xscale="log",
         xlim=(LOWEST_CHANGE / 1.5, HIGHEST_CHANGE * 1.5),
         yticks=y,
@@ -207,8 +216,8 @@ def choice_figure(
         xlabel="change of the standard deviation [%], worst speed (at the ends: beyond)",
         title="What leaving out an effect changes",
     )
-    above.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    _plot_activity(below, watts)
+    changes_axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    _plot_activity(activity_axis, watts)
     add_heading(figure, scene.title, results)
     save(figure, path)
 
@@ -227,14 +236,14 @@ def _plot_activity(axis: Any, watts: dict[str, float]) -> None:
     axis.set(title="Energy activity: blind to the question", xlabel=f"share of the mean power [%]{note}")
 
 
-def percent_text(value: float) -> str:
+def percent_text(relative_change: float) -> str:
     """A relative change as text, in per cent."""
-    digits = "+.2g" if abs(value) < 0.1 else "+,.0f"
-    return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
+    digits = "+.2g" if abs(relative_change) < 0.1 else "+,.0f"
+    return f"{100 * relative_change:{digits}} %" if np.isfinite(relative_change) else "without end"
 
 
 def _table(
-    scene: RideScene, choice: RideChoice, single_effects: list[EffectAlone], further: dict[Effect, float]
+    scene: RideScene, choice: RideChoice, single_effects: list[EffectAlone], change_by_effect: dict[Effect, float]
 ) -> list[str]:
     """Text of the choice."""
     tolerance = f"{100 * (scene.tolerance or 0):g} %"
@@ -243,7 +252,7 @@ def _table(
     stay = [effect.name for effect in choice.candidates if effect not in choice.left_out]
     lines += [f"  stays: {', '.join(stay) or 'nothing'}", *(f"    {why}" for why in choice.said)]
     for i, name in enumerate(scene.quantities if choice.left_out else ()):
-        told = map(
+        change_texts = map(
             percent_text,
             (
                 choice.predicted_change[i],
@@ -254,7 +263,7 @@ def _table(
         )
         lines.append(
             "  {}: {} predicted, {} confirmed; {} at the worst speed of the range, {} there with parameters "
-            "5 % off; tolerance {}".format(name, *told, tolerance)
+            "5 % off; tolerance {}".format(name, *change_texts, tolerance)
         )
     lines += saving_lines(choice, tolerance)
     lines += ["  alone, what leaving it out changes (confirmed):"]
@@ -263,7 +272,7 @@ def _table(
         + (f" ({single.refusal_reason})" if single.refusal_reason else "")
         for single in single_effects
     ]
-    for effect, change in sorted(further.items(), key=lambda item: item[1]):
+    for effect, change in sorted(change_by_effect.items(), key=lambda item: item[1]):
         idle = "  {} could go, too ({:.3g} %), but saves no calls, or does not hold nearby"
         matters = "  {} would matter no more at a tolerance above {:.3g} %"
         lines.append((idle if change <= (scene.tolerance or 0) else matters).format(effect.name, 100 * change))
@@ -273,10 +282,10 @@ def _table(
 
 def saving_lines(choice: RideChoice, tolerance: str) -> list[str]:
     """Text on steps and calls at equal accuracy before and after the choice."""
-    before, after = choice.cost_before, choice.cost_after
+    cost_before, cost_after = choice.cost_before, choice.cost_after
     lines = [
-        f"  a run confirms {1e3 * before.step:.3g} ms as the longest step of the classical Runge-Kutta method "
-        f"that keeps standard deviations within {tolerance} of the exact ones: {before.calls:.4g} calls per "
+        f"  a run confirms {1e3 * cost_before.step:.3g} ms as the longest step of the classical Runge-Kutta method "
+        f"that keeps standard deviations within {tolerance} of the exact ones: {cost_before.calls:.4g} calls per "
         f"second of motion (stable up to {1e3 * choice.stable_steps[0]:.3g} ms)"
     ]
     if not choice.left_out:
@@ -284,9 +293,10 @@ def saving_lines(choice: RideChoice, tolerance: str) -> list[str]:
     return [
         *lines,
         "  without what is left out, changes and steps together keep the same in steps of "
-        f"{1e3 * after.step:.3g} ms: {after.calls:.4g} calls, {before.calls / after.calls:.3g} times fewer at "
-        f"equal accuracy (stable up to {1e3 * choice.stable_steps[1]:.3g} ms); states {before.states} "
-        f"-> {after.states}",
+        f"{1e3 * cost_after.step:.3g} ms: {cost_after.calls:.4g} calls, "
+        f"{cost_before.calls / cost_after.calls:.3g} times fewer at "
+        f"equal accuracy (stable up to {1e3 * choice.stable_steps[1]:.3g} ms); states {cost_before.states} "
+        f"-> {cost_after.states}",
         f"  {SCENE_FILE_NAME} beside the results runs what is left",
     ]
 

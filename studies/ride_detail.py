@@ -58,8 +58,8 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     names = {output.name for output in full.outputs}
     for i, vehicle in enumerate(simpler):
         if not names & {output.name for output in vehicle.outputs}:
-            place, name = f"options.simpler.{i}", _options(scene).simpler[i]
-            raise InputError(scene.file, place, name, "has no output of the same name as the scene's vehicle")
+            key_path, name = f"options.simpler.{i}", _options(scene).simpler[i]
+            raise InputError(scene.file, key_path, name, "has no output of the same name as the scene's vehicle")
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:

@@ -49,18 +49,18 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     progress(f"drive, linear vehicle of {engine}, and each speed by itself", 0.1)
     result = run_scene(scene, engine, error=scene.error)
     result.save(folder / "drive.nc")
-    drive, alone, units = result.detail, result["quasi_stationary"], result["unit"].tolist()
+    drive, quasi_stationary, units = result.detail, result["quasi_stationary"], result["unit"].tolist()
     kinds = {output.name: (output.kind, unit) for output, unit in zip(vehicle.outputs, units, strict=False)}
     shown = [name for name, (kind, _) in kinds.items() if kind in ("acceleration", "tyre force")]
     shown = _options(scene).outputs or shown or list(kinds)
-    drive_figure(drive, alone, shown, kinds, Heading(scene.title, {engine: result}), folder / "drive.png")
+    drive_figure(drive, quasi_stationary, shown, kinds, Heading(scene.title, {engine: result}), folder / "drive.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
         "results": {engine: result},
-        "answer": _answer_of_drive(drive, alone),
-        "table": [f"  linear vehicle of {engine}", *_table(drive, alone, units)],
+        "answer": _answer_of_drive(drive, quasi_stationary),
+        "table": [f"  linear vehicle of {engine}", *_table(drive, quasi_stationary, units)],
     }
 
 

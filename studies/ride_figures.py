@@ -52,14 +52,26 @@ class Heading(NamedTuple):
 
 
 def along_figure(
-    places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, heading: Heading, path: Path
+    point_positions: Sequence[float],
+    sweep_of_points: Sweep,
+    over: Sweep,
+    vehicle: SpatialVehicle,
+    speed: float,
+    heading: Heading,
+    path: Path,
 ) -> None:
     """Plot the standard deviation of the body's vertical acceleration in each case of road correlation: left along the
     body at one speed, right over speed for the output nearest to the middle of the axles."""
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     name = _middle_acceleration(vehicle)
-    for i, case in enumerate(at.cases):
-        left.plot(places, at.deviation[i, 0], CORRELATION_STYLES[i], color=CORRELATION_COLOURS[i], label=case)
+    for i, case in enumerate(sweep_of_points.cases):
+        left.plot(
+            point_positions,
+            sweep_of_points.deviation[i, 0],
+            CORRELATION_STYLES[i],
+            color=CORRELATION_COLOURS[i],
+            label=case,
+        )
         if name:
             right.plot(over.speeds[:-1], over.of(case, name)[:-1], CORRELATION_STYLES[i], color=CORRELATION_COLOURS[i])
     for x in vehicle.axles:
@@ -86,16 +98,16 @@ NO_FINITE_VARIANCE = "\n(no finite variance)"
 
 
 def outputs_figure(
-    swept: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], heading: Heading, path: Path
+    swept: Sweep, kind_and_unit: Sequence[tuple[str, str]], static: Mapping[str, float], heading: Heading, path: Path
 ) -> None:
     """Plot the standard deviations of the outputs over speed in the scene's own case, with a panel for each kind and
-    unit in ``kinds``."""
-    groups = list(dict.fromkeys(kinds))
+    unit in ``kind_and_unit``."""
+    groups = list(dict.fromkeys(kind_and_unit))
     figure, axes = panels(len(groups), min(2, len(groups)), 3.4)
     for axis, (kind, si) in zip(axes, groups, strict=True):
         unit, factor = _shown_unit(si)
-        what = "deviation / static load [-]" if kind == "tyre force" else f"standard deviation [{unit}]"
-        names = [name for name, unit_of in zip(swept.outputs, kinds, strict=True) if unit_of == (kind, si)]
+        axis_label = "deviation / static load [-]" if kind == "tyre force" else f"standard deviation [{unit}]"
+        names = [name for name, unit_of in zip(swept.outputs, kind_and_unit, strict=True) if unit_of == (kind, si)]
         curves = {name: factor * swept.of(swept.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
         for label, values in _distinct_curves(curves).items():
             axis.plot(
@@ -103,7 +115,7 @@ def outputs_figure(
             )
         if not np.isfinite(list(curves.values())).any():
             axis.set(xlim=(0, swept.speeds.max()), yticks=[])
-        axis.set(xlabel="speed [m/s]", ylabel=what, ylim=(0, None), title=kind.capitalize())
+        axis.set(xlabel="speed [m/s]", ylabel=axis_label, ylim=(0, None), title=kind.capitalize())
         _say_where_none(axis)
         _name_below(axis)
     _save_figure(figure, heading, ": standard deviations over speed", path)
@@ -148,8 +160,8 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
     """One-sided spectra of the accelerations and tyre forces over frequency at one speed; no figure where all is 0."""
     frequency = np.geomspace(0.1, 100.0, 800)
     densities = one_sided(linear, excitation, speed, frequency)
-    moved = {output.kind for i, output in enumerate(linear.outputs) if densities[:, i].any()}
-    shown = [kind for kind in ("acceleration", "tyre force") if kind in moved]
+    moving_kinds = {output.kind for i, output in enumerate(linear.outputs) if densities[:, i].any()}
+    shown = [kind for kind in ("acceleration", "tyre force") if kind in moving_kinds]
     if not shown:
         return
     figure, axes = subplots(1, len(shown), figsize=(COLUMN_WIDTH, 4.2), squeeze=False)
@@ -178,8 +190,10 @@ def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading
     left.loglog(wavenumber, road.spectrum(wavenumber, y), "k", label="mean and roll process")
     right.semilogx(wavenumber, road.coherency(wavenumber, y, -y), "k", label="mean and roll process")
     if road.mean.cutoff is None:
-        alike = isotropic_like(road, y)
-        right.semilogx(wavenumber, alike.coherency(wavenumber, 2 * y), "k--", label="isotropic, same track spectrum")
+        isotropic_road = isotropic_like(road, y)
+        right.semilogx(
+            wavenumber, isotropic_road.coherency(wavenumber, 2 * y), "k--", label="isotropic, same track spectrum"
+        )
     left.set(xlabel="wavenumber [rad/m]", ylabel="two-sided density [m³]", title="Spectrum of the left track")
     right.set(xlabel="wavenumber [rad/m]", ylabel="coherency [-]", ylim=(0, 1.05), title="Left and right track")
     legend_below(figure, left, right, columns=3)
@@ -215,8 +229,8 @@ def detail_figure(
     axis.set_yticks(range(len(names)), names)
     axis.grid(visible=False)
     figure.colorbar(picture, label="error [%]", extend="both")
-    what = "largest error of each standard deviation [%], and the time of one covariance"
-    _save_figure(figure, heading, f"\n{what.capitalize()}", path)
+    what_is_shown = "largest error of each standard deviation [%], and the time of one covariance"
+    _save_figure(figure, heading, f"\n{what_is_shown.capitalize()}", path)
 
 
 def _signed_text(percent: float) -> str:
@@ -228,22 +242,22 @@ def drive_figure(
     varied: VaryingSpeed,
     quasi_stationary: np.ndarray,
     drawn_outputs: Sequence[str],
-    kinds: Mapping[str, tuple[str, str]],
+    kind_and_unit: Mapping[str, tuple[str, str]],
     heading: Heading,
     path: Path,
 ) -> None:
     """Plot the standard deviations along a drive (dashed: each speed taken by itself), with a panel of the speed below
     them."""
-    groups = list(dict.fromkeys(kinds[name] for name in drawn_outputs))
+    groups = list(dict.fromkeys(kind_and_unit[name] for name in drawn_outputs))
     heights = [3.0] * len(groups) + [1.3]
     figure, axes = subplots(
         len(heights), 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.8), sharex=True, height_ratios=heights, squeeze=False
     )
     for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
-        columns = {name: varied.names.index(name) for name in drawn_outputs if kinds[name] == (kind, unit)}
+        columns = {name: varied.names.index(name) for name in drawn_outputs if kind_and_unit[name] == (kind, unit)}
         pairs = {name: np.concatenate([varied.deviation[:, i], quasi_stationary[:, i]]) for name, i in columns.items()}
-        for label, both in _distinct_curves(pairs).items():
-            exact, quasi = np.split(both, 2)
+        for label, both_curves in _distinct_curves(pairs).items():
+            exact, quasi = np.split(both_curves, 2)
             if not np.isfinite(exact).all():  # what is left at standstill is rounding
                 axis.plot([], label=label + NO_FINITE_VARIANCE)
                 continue
@@ -260,23 +274,34 @@ MOST_OUTPUTS = 12
 """Outputs that a figure shows."""
 
 
-def nonlinear_figure(answer: Nonlinear, heading: Heading, path: Path) -> None:
+def nonlinear_figure(nonlinear: Nonlinear, heading: Heading, path: Path) -> None:
     """Plot each output's standard deviation over speed by small motion, statistical linearisation and Monte Carlo. Open
     marks: statistical linearisation is no longer good by its own measure."""
-    outputs = answer.shown.vehicle.outputs
+    outputs = nonlinear.shown.vehicle.outputs
     figure, axes = _few_panels(min(len(outputs), MOST_OUTPUTS))
-    left = answer.of("left_out")
+    left = nonlinear.of("left_out")
     for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
         unit, factor = _shown_unit(output.unit)
         axis.plot(
-            answer.speeds, factor * answer.small_motion[:, i], "--", color=GREY, label="slopes at rest (small motion)"
+            nonlinear.speeds,
+            factor * nonlinear.small_motion[:, i],
+            "--",
+            color=GREY,
+            label="slopes at rest (small motion)",
         )
-        told = "statistical linearisation" + (", tyres on the road" if answer.tyres_may_lift else "")
-        deviation, poor = factor * answer.deviation[:, i], left[:, i] > ERROR_GRADES[-1][0]
-        axis.plot(answer.speeds, deviation, color=CORRELATION_COLOURS[1], label=told)
-        told = "no longer good by its own measure"
-        axis.plot(answer.speeds[poor], deviation[poor], "o", color=CORRELATION_COLOURS[1], fillstyle="none", label=told)
-        for j, (speed, copies) in enumerate(answer.copies.items()):
+        curve_label = "statistical linearisation" + (", tyres on the road" if nonlinear.tyres_may_lift else "")
+        deviation, poor = factor * nonlinear.deviation[:, i], left[:, i] > ERROR_GRADES[-1][0]
+        axis.plot(nonlinear.speeds, deviation, color=CORRELATION_COLOURS[1], label=curve_label)
+        curve_label = "no longer good by its own measure"
+        axis.plot(
+            nonlinear.speeds[poor],
+            deviation[poor],
+            "o",
+            color=CORRELATION_COLOURS[1],
+            fillstyle="none",
+            label=curve_label,
+        )
+        for j, (speed, copies) in enumerate(nonlinear.copies.items()):
             spread = copies.error[i] / copies.deviation[i]  # two standard errors of the deviation
             axis.errorbar(
                 [speed],
@@ -286,7 +311,9 @@ def nonlinear_figure(answer: Nonlinear, heading: Heading, path: Path) -> None:
                 color=VERMILION,
                 markersize=4,
                 capsize=3,
-                label="" if j else "Monte Carlo, 2 standard errors" + (", tyres lift" if answer.tyres_may_lift else ""),
+                label=""
+                if j
+                else "Monte Carlo, 2 standard errors" + (", tyres lift" if nonlinear.tyres_may_lift else ""),
             )
         axis.set(
             xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=output.name.capitalize()
@@ -317,9 +344,9 @@ def engine_spectra_figure(
     _save_figure(figure, heading, f"\nSpectra at {speed:g} m/s", path)
 
 
-def _few_panels(count: int) -> tuple[Figure, list[Axes]]:
+def _few_panels(panel_count: int) -> tuple[Figure, list[Axes]]:
     """Figure with two or three small panels side by side."""
-    figure, axes = panels(count, 2 if count in (1, 2, 4) else 3, 2.6)
+    figure, axes = panels(panel_count, 2 if panel_count in (1, 2, 4) else 3, 2.6)
     figure.set_figheight(figure.get_figheight() + 0.8)  # for title and legend
     return figure, axes
 

@@ -38,8 +38,8 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     if not in_time_only(vehicle):
         allowed = "has neither curves nor friction, nor tyres that lift: use ride, which is exact for it"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
-    for name, by in scene.weighting.items():
-        raise InputError(scene.file, f"weighting.{name}", by, "is not read by this study: leave it out")
+    for name, weighting_name in scene.weighting.items():
+        raise InputError(scene.file, f"weighting.{name}", weighting_name, "is not read by this study: leave it out")
     check_rates(vehicle, excitation_of(scene, wheels(vehicle)), scene.file)
     options = _options(scene)
     for i, speed in enumerate(options.beside):
@@ -89,64 +89,74 @@ def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _answer_of_ride(answer: Nonlinear) -> dict[str, Any]:
+def _answer_of_ride(nonlinear: Nonlinear) -> dict[str, Any]:
     """Standard deviation and mean (SI) of each output at all speeds; None in place of a value that is not finite. For
     tyres that lift they are those of the Monte Carlo copies, at the copies' speeds."""
-    copies = list(answer.copies.values())
-    out: dict[str, Any] = {"speed": list(answer.copies) if answer.tyres_may_lift else answer.speeds.tolist()}
-    for key, on_road in (("deviation", answer.deviation), ("mean", answer.of("mean"))):
-        values = np.array([getattr(each, key) for each in copies]) if answer.tyres_may_lift else on_road
-        out[key] = {
+    copies = list(nonlinear.copies.values())
+    table: dict[str, Any] = {"speed": list(nonlinear.copies) if nonlinear.tyres_may_lift else nonlinear.speeds.tolist()}
+    for key, on_road in (("deviation", nonlinear.deviation), ("mean", nonlinear.of("mean"))):
+        values = (
+            np.array([getattr(copies_at_speed, key) for copies_at_speed in copies])
+            if nonlinear.tyres_may_lift
+            else on_road
+        )
+        table[key] = {
             name: [float(value) if np.isfinite(value) else None for value in values[:, i]]
-            for i, name in enumerate(answer.shown.covariance.names)
+            for i, name in enumerate(nonlinear.shown.covariance.names)
         }
-    return out
+    return table
 
 
-def _table(answer: Nonlinear, speed: float) -> list[str]:
+def _table(nonlinear: Nonlinear, speed: float) -> list[str]:
     """Text on the equivalent gains of the springs at one speed, and on the Monte Carlo copies with the errors of both
     linear vehicles relative to them."""
-    lines, shown = [f"  at {speed:g} m/s"], answer.shown
+    lines, shown = [f"  at {speed:g} m/s"], nonlinear.shown
     for name, spring in shown.springs.items():
         k, c = spring.equivalent_gains
         lines.append(
             f"    {name}: {k:.5g} N/m and {c:.5g} N s/m stand for it; its travel has the mean "
             f"{1e3 * spring.travel:+.2f} mm and the deviation {1e3 * spring.deviation:.3g} mm"
         )
-    if not answer.tyres_may_lift:
+    if not nonlinear.tyres_may_lift:
         lines += [f"    {sentence}" for sentence in shown.sentences]
     lines.append(f"    gains found in {len(shown.gain_changes)} iterations, to {shown.fixed_point_distance:.0e}")
-    for beside, copies in answer.copies.items():
+    for speed_of_copies, copies in nonlinear.copies.items():
         lines.append(
-            f"  at {beside:g} m/s beside {len(copies.moments[0])} copies of {copies.duration:.0f} s: "
+            f"  at {speed_of_copies:g} m/s beside {len(copies.moments[0])} copies of {copies.duration:.0f} s: "
             "deviations and means, kurtosis (3 if Gaussian)"
         )
         width = max(map(len, copies.names))
         for i, name in enumerate(copies.names):
             deviation = f"{copies.deviation[i]:>10.4g} ± {50 * copies.error[i] / copies.variance[i]:.1f} %"
             mean = f"mean {copies.mean[i]:+.3g} ± {copies.mean_error[i]:.1g}, {copies.kurtosis[i]:.1f}"
-            lines.append(f"    {name:<{width}}{deviation}{_errors_at_speed(answer, beside, i)}   {mean}")
+            lines.append(f"    {name:<{width}}{deviation}{_errors_at_speed(nonlinear, speed_of_copies, i)}   {mean}")
     return lines
 
 
-def _errors_at_speed(answer: Nonlinear, speed: float, i: int) -> str:
+def _errors_at_speed(nonlinear: Nonlinear, speed: float, i: int) -> str:
     """Text on the errors of small motion and of statistical linearisation, if the speed is one of the sweep's."""
-    at = np.flatnonzero(np.isclose(answer.speeds, speed))
-    if not len(at):
+    matching = np.flatnonzero(np.isclose(nonlinear.speeds, speed))
+    if not len(matching):
         return ""
-    true = answer.copies[speed].deviation[i]
-    small, replaced = (100 * (values[at[0], i] / true - 1) for values in (answer.small_motion, answer.deviation))
+    true = nonlinear.copies[speed].deviation[i]
+    small, replaced = (
+        100 * (values[matching[0], i] / true - 1) for values in (nonlinear.small_motion, nonlinear.deviation)
+    )
     return f"   small motion {small:+.1f} %, statistical linearisation {replaced:+.1f} %"
 
 
-def _lift_off_shares(vehicle: SpatialVehicle, answer: Nonlinear, runs: dict[str, Ride]) -> list[str]:
+def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: Nonlinear, runs: dict[str, Ride]) -> list[str]:
     """Lines on two shares of time for each tyre. One is for how long a tyre bound to the road would pull, by a Gaussian
     law; the other for how long it is in the air in the engines' runs. Empty if no tyre lifts."""
     from scipy.special import ndtr
 
     if not vehicle.lifts:
         return []
-    loads, names, most = preloads(vehicle).tyres, answer.shown.covariance.names, answer.deviation.max(axis=0)
+    loads, names, largest_deviations = (
+        preloads(vehicle).tyres,
+        nonlinear.shown.covariance.names,
+        nonlinear.deviation.max(axis=0),
+    )
     lines = [
         "  tyres lift in copies and engines; small motion and statistical linearisation keep them on the road and "
         "are no answer where a tyre would pull"
@@ -155,21 +165,21 @@ def _lift_off_shares(vehicle: SpatialVehicle, answer: Nonlinear, runs: dict[str,
         shares = [
             f"{engine} {100 * np.mean(run.of(spec.name) <= -loads[spec.tyre]):.2g} %" for engine, run in runs.items()
         ]
-        pulls = float(ndtr(-loads[spec.tyre] / most[names.index(spec.name)]))
-        told = f"; in the air {', '.join(shares)}" if shares else ""
+        pulls = float(ndtr(-loads[spec.tyre] / largest_deviations[names.index(spec.name)]))
+        air_text = f"; in the air {', '.join(shares)}" if shares else ""
         lines.append(
             f"    {spec.name}: {loads[spec.tyre]:.4g} N at rest; on the road it would pull for up to "
-            f"{100 * pulls:.2g} % of the time{told}"
+            f"{100 * pulls:.2g} % of the time{air_text}"
         )
     return lines
 
 
-def _time_table(runs: dict[str, Ride], answer: Nonlinear, road: Excitation, speed: float) -> list[str]:
+def _time_table(runs: dict[str, Ride], nonlinear: Nonlinear, road: Excitation, speed: float) -> list[str]:
     """Table of the engines' standard deviations next to those of statistical linearisation, and of the difference
     between the engines."""
     if not runs:
         return []
-    shown, (first, *others) = answer.shown, runs.items()
+    shown, (first, *other_runs) = nonlinear.shown, runs.items()
     length = float(first[1].times[-1])
     errors = standard_errors(shown.vehicle, road, speed, length)[1] / shown.covariance.variance / 2
     lines = [f"  in time at {speed:g} m/s, {length:.3g} s of one road: deviation, beside statistical linearisation"]
@@ -177,11 +187,12 @@ def _time_table(runs: dict[str, Ride], answer: Nonlinear, road: Excitation, spee
         for i, name in enumerate(run.names):
             value = run.outputs[:, i].std()
             if np.isfinite(value):
-                off = 100 * (value / shown.covariance.deviation[i] - 1)
+                difference_percent = 100 * (value / shown.covariance.deviation[i] - 1)
                 lines.append(
-                    f"    {engine:<8} {name}: {value:.4g}, {off:+.1f} % (one path scatters by {100 * errors[i]:.1f} %)"
+                    f"    {engine:<8} {name}: {value:.4g}, {difference_percent:+.1f} % (one path scatters by "
+                    f"{100 * errors[i]:.1f} %)"
                 )
-    for engine, run in others:
+    for engine, run in other_runs:
         gap = np.abs(run.run.positions - first[1].run.positions).max()
         lines.append(f"    {engine} and {first[0]}: positions within {gap:.1e} m or rad on the same road")
     return lines

@@ -35,7 +35,9 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     if results:
         _figure(scene, results, folder / "states.png")
     texts = {engine: result.data.attrs.get("beside reference") for engine, result in results.items()}
-    beside = [f"  {engine}: {text}" for engine, text in texts.items() if text]  # of engines from outside the tree
+    outside_engines = [
+        f"  {engine}: {text}" for engine, text in texts.items() if text
+    ]  # of engines from outside the tree
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -44,13 +46,13 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "results": results,
         "largest difference of states": differences_of_engines(results),
         "doubts": list(assembly.doubts),
-        "table": [*trust_line(assembly), *doubt_lines(assembly), *beside],
+        "table": [*trust_line(assembly), *doubt_lines(assembly), *outside_engines],
     }
 
 
 def _line(result: Result) -> dict[str, Any]:
-    told = {name: result.data.attrs[name] for name in ("integrator", "step", "seconds")}
-    return {**told, "counts": result.counts(), "channels": channel_summary(result)}
+    attributes = {name: result.data.attrs[name] for name in ("integrator", "step", "seconds")}
+    return {**attributes, "counts": result.counts(), "channels": channel_summary(result)}
 
 
 def differences_of_engines(results: dict[str, Result]) -> dict[str, float]:
@@ -104,8 +106,8 @@ def _differences(axis: Any, results: dict[str, Result]) -> None:
     """Plot the difference of each run from the first one over time, on a logarithmic scale."""
     from models.drawing.figures import COLOURS, LABELS
 
-    (base, first), *others = results.items()
-    for engine, result in others:
+    (base, first), *other_results = results.items()
+    for engine, result in other_results:
         if same_times(result, first):
             gap = np.abs(result.states - first.states).max(axis=1)
             axis.semilogy(

@@ -44,16 +44,16 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
 AXLE_NAMES = ("front", "rear")
 
 
-def measured_channels(scene: SingleTrackScene, driven: Result) -> dict[str, np.ndarray]:
+def measured_channels(scene: SingleTrackScene, computed_drive: Result) -> dict[str, np.ndarray]:
     """Measured values (n,) of the channels that the file of the drive contains, at the times of the computed drive and
     in its units."""
     source = open_source(scene.path(scene.drive.file, "drive.file"))
     known = [name for name in SHOWN_CHANNELS if name in {channel.name for channel in source.channels}]
-    curves = {name: channel_curve(source, name, driven.data[name].attrs["units"]) for name in known}
-    return {name: np.interp(driven.times, *every) for name, every in curves.items()}
+    curves = {name: channel_curve(source, name, computed_drive.data[name].attrs["units"]) for name in known}
+    return {name: np.interp(computed_drive.times, *time_and_values) for name, time_and_values in curves.items()}
 
 
-def figure(driven: Result, beside: Mapping[str, np.ndarray], title: str, path: Path) -> Path:
+def figure(computed_drive: Result, beside: Mapping[str, np.ndarray], title: str, path: Path) -> Path:
     """Plot the steer angle and three channels over time. For each axle, plot its slip angle over time, and the ratio of
     side force to load over slip angle.
 
@@ -65,18 +65,18 @@ def figure(driven: Result, beside: Mapping[str, np.ndarray], title: str, path: P
     curves = {"wheels steer": "rad", **SHOWN_CHANNELS}
     for axis, (name, unit) in zip(axes, curves.items(), strict=False):
         if name in beside:
-            axis.plot(driven.times, beside[name], color=MEASURED_COLOUR, linewidth=2.0, label="measured")
-        axis.plot(driven.times, driven[name], color=DARK, linewidth=0.8, label="computed")
+            axis.plot(computed_drive.times, beside[name], color=MEASURED_COLOUR, linewidth=2.0, label="measured")
+        axis.plot(computed_drive.times, computed_drive[name], color=DARK, linewidth=0.8, label="computed")
         axis.set(ylabel=f"[{unit}]", title=PANEL_TITLES.get(name, name.capitalize()), xlabel="time [s]")
-    used = {axle: driven[f"side force {axle}"] / driven[f"load {axle}"] for axle in AXLE_NAMES}
+    used = {axle: computed_drive[f"side force {axle}"] / computed_drive[f"load {axle}"] for axle in AXLE_NAMES}
     for axle, colour, size in zip(AXLE_NAMES, (BLUE, VERMILION), (4.0, 1.5), strict=True):
-        axes[4].plot(driven[f"slip angle {axle}"], used[axle], ".", color=colour, markersize=size, label=axle)
-        axes[5].plot(driven.times, driven[f"slip angle {axle}"], color=colour, linewidth=0.8)
+        axes[4].plot(computed_drive[f"slip angle {axle}"], used[axle], ".", color=colour, markersize=size, label=axle)
+        axes[5].plot(computed_drive.times, computed_drive[f"slip angle {axle}"], color=colour, linewidth=0.8)
     axes[4].set(xlabel="slip angle [rad]", ylabel="[-]", title="Side force / load of each axle")
     axes[5].set(xlabel="time [s]", ylabel="[rad]", title="Slip angle of each axle")
     axes[4].legend(markerscale=3.0)
     legend_below(drawing, *axes[:4])
-    add_heading(drawing, title, {"drive": driven})
+    add_heading(drawing, title, {"drive": computed_drive})
     return save(drawing, path)
 
 

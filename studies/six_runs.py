@@ -55,11 +55,11 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     progress("figures", 1.0)
     if not failed:
         _draw_figures(measured, runs[engines[0]], folder)
-    told = {f"{engine}: {name}": result for engine in engines for name, result in runs[engine].items()}
+    results_by_name = {f"{engine}: {name}": result for engine in engines for name, result in runs[engine].items()}
     return {
         "scene": scene.title,
         "folder": str(folder),
-        "results": {"measurement": measured, **told},
+        "results": {"measurement": measured, **results_by_name},
         "sampling rate": options.sampling_rate,
         "noise deviation": deviation,
         "rows": rows,
@@ -88,11 +88,11 @@ def text(rows: list[dict[str, Any]], engines: tuple[str, ...], options: Options,
         first, paper = lines[0], PUBLISHED_DRIFT.get(name, "")
         if "moment max" in first:
             cells = " ".join(f"{line['moment max']:>9.1f}" for line in lines)
-            more = f"{first['moment rms']:>9.1f}   {first['inertia max'] / 1e3:>9.1f}"
+            further_cells = f"{first['moment rms']:>9.1f}   {first['inertia max'] / 1e3:>9.1f}"
         else:
-            times = ("never" if line["drift-off"] is None else f"{line['drift-off']:.2f}" for line in lines)
-            cells, more = " ".join(f"{time:>9}" for time in times), f"{first['heave error']:>9.1e}"
-        (guided if "moment max" in first else free).append(f"  {name:<20} {cells}   {more}   {paper}".rstrip())
+            drift_off_texts = ("never" if line["drift-off"] is None else f"{line['drift-off']:.2f}" for line in lines)
+            cells, further_cells = " ".join(f"{time:>9}" for time in drift_off_texts), f"{first['heave error']:>9.1e}"
+        (guided if "moment max" in first else free).append(f"  {name:<20} {cells}   {further_cells}   {paper}".rstrip())
     names = " ".join(f"{engine:>9}" for engine in engines)
     return [
         f"  Sampled at {options.sampling_rate:g} Hz, linear in between; noise {deviation:.1f} N.",
@@ -140,12 +140,12 @@ def _figure_measurement(measured_run: Result) -> Any:
     middle = round(float(measured_run.times[-1]) / 2, 1)
     detail = (measured_run.times >= middle) & (measured_run.times <= middle + 1)
     panels = ((("zeta1", "zeta2"), "Road under the wheels, up [m]", -1.0), (("f1", "f2"), "Wheel force [kN]", 1e-3))
-    for (whole, part), (channels, label, scale) in zip(axes, panels, strict=True):
+    for (whole_axis, detail_axis), (channels, label, scale) in zip(axes, panels, strict=True):
         for channel, name in zip(channels, ("front", "rear"), strict=True):
-            whole.plot(measured_run.times, scale * measured_run[channel], label=name, linewidth=0.7)
-            part.plot(measured_run.times[detail], scale * measured_run[channel][detail], label=name)
-        whole.set_title(label)
-        part.set_title("Detail " + label[label.index("[") :])
+            whole_axis.plot(measured_run.times, scale * measured_run[channel], label=name, linewidth=0.7)
+            detail_axis.plot(measured_run.times[detail], scale * measured_run[channel][detail], label=name)
+        whole_axis.set_title(label)
+        detail_axis.set_title("Detail " + label[label.index("[") :])
     legend_below(figure, axes[0, 0])
     for axis in axes[1]:
         axis.set_xlabel("time [s]")

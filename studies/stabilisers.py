@@ -33,7 +33,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     sweep = {bench.road: bench.sweep() for bench in benches}
     table = text(rows, benches, options)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
-    with whole_file(folder / "score.csv") as part, part.open("w", newline="") as file:
+    with whole_file(folder / "score.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
@@ -77,11 +77,11 @@ def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
     for engine, road in dict.fromkeys((row["engine"], row["road"]) for row in rows):
         of_engine = [row for row in rows if (row["engine"], row["road"]) == (engine, road)]
         bench = next(bench for bench in benches if bench.road == road)
-        where = "the road" if road == "road" else f"a grade of {options.grade:g} rad"
+        road_text = "the road" if road == "road" else f"a grade of {options.grade:g} rad"
         free = next(row["seconds"] for row in of_engine if row["method"] == "free")
         lines += [
             "",
-            f"  {engine} on {where}: force noise {bench.deviation:.1f} N; predicted beforehand: a free run "
+            f"  {engine} on {road_text}: force noise {bench.deviation:.1f} N; predicted beforehand: a free run "
             f"can be trusted for {bench.trusted:.1f} s, springs hold from {bench.holding:.0f} N m/rad on",
         ]
         lines += [HEADING_LINE, UNITS_LINE]
@@ -109,9 +109,17 @@ def _line(row: Row, free: float) -> str:
     )
 
 
-def _ratio_text(value: float | None) -> str:
+def _ratio_text(damage_ratio: float | None) -> str:
     """Text of a damage ratio in at most six characters; "-" for a tumbled run, which has none."""
-    return "-" if value is None else f"{value:.3f}" if value < 10 else f"{value:.1f}" if value < 1e3 else f"{value:.0e}"
+    return (
+        "-"
+        if damage_ratio is None
+        else f"{damage_ratio:.3f}"
+        if damage_ratio < 10
+        else f"{damage_ratio:.1f}"
+        if damage_ratio < 1e3
+        else f"{damage_ratio:.0e}"
+    )
 
 
 if __name__ == "__main__":

@@ -71,23 +71,25 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     options = check(scene, engines)
     base, measured, largest = _forces(scene, options, folder)
     deviation, assembly = options.noise_fraction * largest, assembly_of_scene(base)
-    other = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
+    other_parameters = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
     progress("predictions", 0.1)
     curves = {
         "noise": noise(assembly, deviation),
         "interpolation": interpolation(assembly),
-        "inertia": model_error_curve(assembly, other),
+        "inertia": model_error_curve(assembly, other_parameters),
         "rounding": rounding_error_curve(assembly),
     }
     runs = {}
     if measured is not None:
         progress("runs", 0.2)
         clean = run_away(base, engines[0])
-        wrong = run_away(changed_scene(base, vehicle={"override": {**base.vehicle.override, "I": other.I}}), engines[0])
+        wrong = run_away(
+            changed_scene(base, vehicle={"override": {**base.vehicle.override, "I": other_parameters.I}}), engines[0]
+        )
         runs = {"interpolation": _error(clean, measured["pitch"]), "inertia": _error(wrong, clean["pitch"])}
     progress("noise paths", 0.4)
     quiet = run_away(base, "reference", scene.error)
-    spread = _ensemble_of_paths(base, quiet, deviation, options, engines[0], Crew.of(scene, usual=1))
+    spread = _ensemble_of_paths(base, quiet, deviation, options, engines[0], Crew.of(scene, default_workers=1))
     rows = _drift_off_rows(curves, runs, spread, options)
     table = _text(rows, options, deviation, pitch_error_growth(assembly).rate, base, curves)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
@@ -136,45 +138,45 @@ def _error(run: Result, pitch: np.ndarray) -> GrowthCurve:
 
 
 def _ensemble_of_paths(
-    base: Scene, quiet: Result, deviation: float, options: Options, engine: str, crew: Crew
+    base_scene: Scene, quiet_run: Result, deviation: float, options: Options, engine: str, worker_crew: Crew
 ) -> dict[str, np.ndarray]:
     """Run the noise paths; return their drift-off times (paths,) and their pitch errors (paths, rows) relative to the
-    run without noise, ``quiet``.
+    run without noise, ``quiet_run``.
 
     The errors are nan from where a path left all bounds.
     """
-    noisy = changed_scene(base, effects={"force_noise": {"deviation": deviation, "seed": options.seed}})
-    rows = np.arange(0, len(quiet.times), max(1, round(ROW_SPACING / base.run.step)))
-    times, true = quiet.times[rows], quiet["pitch"]
-    with crew.at_work(Blocks().count(options.paths)) as pool:
-        paths = run_paths(noise_paths(noisy, times, true, options.angle, engine), options.paths, executor=pool)
+    noisy = changed_scene(base_scene, effects={"force_noise": {"deviation": deviation, "seed": options.seed}})
+    rows = np.arange(0, len(quiet_run.times), max(1, round(ROW_SPACING / base_scene.run.step)))
+    row_times, true = quiet_run.times[rows], quiet_run["pitch"]
+    with worker_crew.at_work(Blocks().count(options.paths)) as pool:
+        paths = run_paths(noise_paths(noisy, row_times, true, options.angle, engine), options.paths, executor=pool)
     errors = np.abs(paths["states"][:, :, 3] - true[rows])
-    return {"times": times, "drift_off": paths["drift_off"], "errors": errors}
+    return {"times": row_times, "drift_off": paths["drift_off"], "errors": errors}
 
 
-def _with_errors(result: Result, quiet: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
+def _with_errors(result: Result, quiet_run: Result, drift_off_times: dict[str, np.ndarray], options: Options) -> Result:
     """The result with two errors: the step error, estimated on the run without noise, and the standard error of the
     median."""
-    result.data.attrs["error"] = quiet.data.attrs["error"]
+    result.data.attrs["error"] = quiet_run.data.attrs["error"]
     with_assumptions(result, [small_errors(options.angle)])
-    middle, low, high = quantile_with_interval(spread["drift_off"], 0.5)
+    middle, low, high = quantile_with_interval(drift_off_times["drift_off"], 0.5)
     if not math.isfinite(high):
         return result
     error = by_chance((high - low) / (2.0 * ERRORS_95), middle, "s", options.paths)
     return of_chance(result, {"median drift-off by noise": error}, options.paths)
 
 
-def _saved_paths(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray]) -> Result:
+def _saved_paths(scene: Scene, rows: list[Row], drift_off_times: dict[str, np.ndarray]) -> Result:
     """Channels of the drift-off times by source, and of the noise paths."""
     drift_off = {
         name: Channel("source", [np.nan if row[name] is None else row[name] for row in rows], "s", f"drift-off, {name}")
         for name in ("predicted", "measured")
     }
     paths = {
-        "drift_off": Channel("path", spread["drift_off"], "s", "drift-off, infinite if never"),
-        "error": Channel(("path", "time"), spread["errors"], "rad", "pitch error"),
+        "drift_off": Channel("path", drift_off_times["drift_off"], "s", "drift-off, infinite if never"),
+        "error": Channel(("path", "time"), drift_off_times["errors"], "rad", "pitch error"),
     }
-    axes = {"source": Channel("source", list(SOURCE_NAMES)), "time": Channel("time", spread["times"], "s")}
+    axes = {"source": Channel("source", list(SOURCE_NAMES)), "time": Channel("time", drift_off_times["times"], "s")}
     return result(scene, drift_off | paths, axes)
 
 
@@ -194,8 +196,8 @@ def _drift_off_rows(
     for name, curve in curves.items():
         measured, quartiles = runs[name].passing_time(options.angle) if name in runs else None, None
         if name == "noise":
-            times = [quantile_with_interval(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
-            measured, *quartiles = [time if math.isfinite(time) else None for time in times]
+            drift_off_times = [quantile_with_interval(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
+            measured, *quartiles = [time if math.isfinite(time) else None for time in drift_off_times]
         rows.append(
             {
                 "source": name,
@@ -208,7 +210,7 @@ def _drift_off_rows(
 
 
 def _text(
-    rows: list[Row], options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
+    rows: list[Row], options: Options, deviation: float, rate: float, base_scene: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
     """Lines for the terminal: predicted and measured drift-off times, and what a longer trustworthy run would
     require."""
@@ -226,7 +228,7 @@ def _text(
         if rate
         else f"  trusted {until}; a tilt error does not grow exponentially"
     )
-    return lines + _remedy_lines(options, deviation, rate, base, curves)
+    return lines + _remedy_lines(options, deviation, rate, base_scene, curves)
 
 
 def _drift_off_text(time: float | None) -> str:
@@ -243,16 +245,16 @@ def _measured_text(row: Row) -> str:
 
 
 def _remedy_lines(
-    options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
+    options: Options, deviation: float, rate: float, base_scene: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
     """Lines on what noise, sampling rate and known inertia a trustworthy run of the wanted length would need,
     extrapolated by the growth rate of errors."""
-    forces = assembly_of_scene(base).input
+    forces = assembly_of_scene(base_scene).input
     assert forces is not None and forces.period is not None
     lines = [f"  for {options.wanted:g} s it would take:"]
     for name in ("noise", "interpolation", "inertia"):
         excess = _size_at_time(curves[name], options, rate)
-        order = ORDER_OF_RULE[base.effects["wheel_forces"].interpolation]
+        order = ORDER_OF_RULE[base_scene.effects["wheel_forces"].interpolation]
         takes = {
             "noise": f"noise of {deviation / excess:.2g} N instead of {deviation:.3g} N on each sample",
             "interpolation": f"samples at {excess ** (1 / order) / forces.period:.3g} Hz instead of "
@@ -281,7 +283,7 @@ def _size_at_time(curve: GrowthCurve, options: Options, rate: float) -> float:
 def _figure(
     curves: dict[str, GrowthCurve],
     runs: dict[str, GrowthCurve],
-    spread: dict[str, np.ndarray],
+    drift_off_times: dict[str, np.ndarray],
     options: Options,
     results: Results,
     path: Path,
@@ -292,9 +294,9 @@ def _figure(
 
     colours = {"noise": BLUE, "interpolation": VERMILION, "inertia": GREEN, "rounding": GREY}
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.8))
-    axis.semilogy(spread["times"], spread["errors"][:20].T, color=BLUE, alpha=0.15, linewidth=0.6)
-    middle = np.median(spread["errors"], axis=0)
-    axis.semilogy(spread["times"], middle, color=BLUE, label="noise: median of the paths (20 of them thin)")
+    axis.semilogy(drift_off_times["times"], drift_off_times["errors"][:20].T, color=BLUE, alpha=0.15, linewidth=0.6)
+    middle = np.median(drift_off_times["errors"], axis=0)
+    axis.semilogy(drift_off_times["times"], middle, color=BLUE, label="noise: median of the paths (20 of them thin)")
     for name, curve in runs.items():
         axis.semilogy(curve.times[::50], curve.size[::50], color=colours[name], linewidth=0.9, label=f"{name}: run")
     for name, curve in curves.items():

@@ -28,19 +28,22 @@ def page_text(twins: Twins) -> str:
     return environment.get_template(PAGE_TEMPLATE).render(
         twins=twins,
         title=" and ".join(twins.names),
-        verdicts=[verdict_sentence(each) for each in twins.examined],
-        tables=[_element_rows(list(elements_of_model(each.file.twin.model).values())) for each in twins.examined],
-        hashes=[sha256(each.file.document.path.read_bytes()).hexdigest() for each in twins.examined],
+        verdicts=[verdict_sentence(examined_file) for examined_file in twins.examined],
+        tables=[
+            _element_rows(list(elements_of_model(examined_file.file.twin.model).values()))
+            for examined_file in twins.examined
+        ],
+        hashes=[sha256(examined_file.file.document.path.read_bytes()).hexdigest() for examined_file in twins.examined],
         command=" ".join(sys.argv),
         versions={name: version(name) for name in ("twinrig", "mujoco", "exudyn", "numpy")},
         python=platform.python_version(),
     )
 
 
-def _element_rows(listed: list[Element]) -> list[dict[str, Any]]:
+def _element_rows(elements: list[Element]) -> list[dict[str, Any]]:
     """Nonzero elements, with their values as text."""
     return [
-        {"kind": each.kind, "owner": each.owner, "unit": each.unit, "value": value_text(each.value)}
-        for each in listed
-        if each.is_nonzero and not (is_word(each.value) and each.value[0] == "on")
+        {"kind": element.kind, "owner": element.owner, "unit": element.unit, "value": value_text(element.value)}
+        for element in elements
+        if element.is_nonzero and not (is_word(element.value) and element.value[0] == "on")
     ]

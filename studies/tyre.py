@@ -62,13 +62,16 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def friction_lines(answer: dict[str, dict[str, float]], load: float) -> list[str]:
+def friction_lines(figures_by_tyre: dict[str, dict[str, float]], load: float) -> list[str]:
     """Table of the friction figures under a load (N), with a column per tyre."""
-    width = max(12, *(len(name) + 2 for name in answer))
-    rows = [f"  {'mu under ' + format(load / 1e3, '.4g') + ' kN':<22}" + "".join(f"{name:>{width}}" for name in answer)]
-    keys = next(iter(answer.values()))
+    width = max(12, *(len(name) + 2 for name in figures_by_tyre))
+    rows = [
+        f"  {'mu under ' + format(load / 1e3, '.4g') + ' kN':<22}"
+        + "".join(f"{name:>{width}}" for name in figures_by_tyre)
+    ]
+    keys = next(iter(figures_by_tyre.values()))
     return rows + [
-        f"  {key:<22}" + "".join(f"{figures[key]:>{width}.4g}" for figures in answer.values()) for key in keys
+        f"  {key:<22}" + "".join(f"{figures[key]:>{width}.4g}" for figures in figures_by_tyre.values()) for key in keys
     ]
 
 

@@ -76,9 +76,9 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
 def _results(paths: Paths) -> dict[str, Result]:
     """Results of all paths, named by engine and speed."""
     return {
-        f"{engine}, {at}": path
+        f"{engine}, {speed_text}": path
         for engine, paths_of_engine in paths.items()
-        for at, path in at_speeds(paths_of_engine).items()
+        for speed_text, path in at_speeds(paths_of_engine).items()
     }
 
 
@@ -138,9 +138,9 @@ def _stability_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]
     ]
 
 
-def _speed(critical: float | None, why: str, first: float | None = None) -> str:
+def _speed(critical: float | None, reason: str, first: float | None = None) -> str:
     if critical is None:
-        return f"none: the wheelset {why}"
+        return f"none: the wheelset {reason}"
     return f"{critical:>14.9g} m/s" + (f" {critical / first - 1:+.0e} from the first" if first else "")
 
 
@@ -148,13 +148,13 @@ def _path_lines(scene: WheelsetScene, paths: Paths) -> list[str]:
     """Lines on how each path ends, how far the engines' paths differ, and the energy balance."""
     if not paths:
         return []
-    (name, first), *others = paths.items()
+    (name, first), *other_paths = paths.items()
     lines = [f"  paths, by {name}, with {scene.contact.law}"]
     for speed, path in first.items():
         motion, power = path.detail, path["power"]
         gaps = {
             engine: np.abs(paths_of_engine[speed].detail.states - motion.states).max()
-            for engine, paths_of_engine in others
+            for engine, paths_of_engine in other_paths
         }
         book = energy_ledger(equations_of(scene, "reference", speed), motion)
         lines += [

@@ -34,18 +34,19 @@ SHOWN_SECONDS = 1.0
 """Seconds of creep forces that are drawn, the last ones."""
 
 
-def _note(axis: Axes, text: str, point: tuple[float, float], shift: tuple[float, float], **style: Any) -> None:
-    """Write text beside a point of the plot; the text's right end is shifted from the point by ``shift`` (printer's
-    points)."""
-    axis.annotate(text, point, shift, textcoords="offset points", ha="right", **style)
+def _note(axis: Axes, text: str, point: tuple[float, float], text_offset: tuple[float, float], **style: Any) -> None:
+    """Write text beside a point of the plot; the text's right end is shifted from the point by ``text_offset``
+    (printer's points).
+    """
+    axis.annotate(text, point, text_offset, textcoords="offset points", ha="right", **style)
 
 
 def _wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[np.ndarray]]]:
     """For each wheel: its name, its colour, and a sum (n,) over its contact patches for each of the named
     quantities."""
-    each = contacts.shape[1] // 2
-    yield "right wheel", BLUE, [contacts[name][:, :each].sum(axis=1) for name in names]
-    yield "left wheel", VERMILION, [contacts[name][:, each:].sum(axis=1) for name in names]
+    patches_per_wheel = contacts.shape[1] // 2
+    yield "right wheel", BLUE, [contacts[name][:, :patches_per_wheel].sum(axis=1) for name in names]
+    yield "left wheel", VERMILION, [contacts[name][:, patches_per_wheel:].sum(axis=1) for name in names]
 
 
 def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
@@ -74,14 +75,14 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
         fontsize=SMALL_TEXT,
     )
     for i in np.unique(np.linspace(0, len(first.speeds) - 1, 6).astype(int)):
-        at = first.hunting[i]
-        if np.isfinite(at):
-            place = at.real, at.imag / (2.0 * np.pi)
+        eigenvalue = first.hunting[i]
+        if np.isfinite(eigenvalue):
+            mark_position = eigenvalue.real, eigenvalue.imag / (2.0 * np.pi)
             clear = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
             _note(
                 right,
                 f"{first.speeds[i]:g} m/s",
-                place,
+                mark_position,
                 (-8, 0),
                 va="center",
                 fontsize=SMALL_TEXT,
@@ -111,9 +112,11 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
     for column, (speed, path_then) in zip(axes.T, first.items(), strict=True):
         for i, (engine, motions) in enumerate(paths.items()):
             states, colour = motions[speed].states, COLOURS[engine]
-            every = slice(40 * (1 + i), None, 150) if i else slice(None)
+            drawn_rows = slice(40 * (1 + i), None, 150) if i else slice(None)
             mark = ENGINE_MARKS[engine] if i else "-"
-            column[0].plot(path_then.times[every], 1e3 * states[every, Y], mark, color=colour, label=LABELS[engine])
+            column[0].plot(
+                path_then.times[drawn_rows], 1e3 * states[drawn_rows, Y], mark, color=colour, label=LABELS[engine]
+            )
             if i:
                 gap = np.maximum(np.abs(states - path_then.states).max(axis=1), 1e-17)
                 column[1].semilogy(path_then.times, gap, color=colour, linewidth=0.7)
@@ -121,8 +124,12 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
         column[0].set(ylabel="lateral displacement [mm]", title=f"{speed:g} m/s")
         column[-1].set_xlabel("time [s]")
     legend_below(figure, axes[0, 0])
-    told = {f"{engine}, {at}": run for engine, path_then in results.items() for at, run in at_speeds(path_then).items()}
-    add_heading(figure, f"{title}: the same path in every implementation", told)
+    runs_by_name = {
+        f"{engine}, {speed_of_path}": run
+        for engine, path_then in results.items()
+        for speed_of_path, run in at_speeds(path_then).items()
+    }
+    add_heading(figure, f"{title}: the same path in every implementation", runs_by_name)
     save(figure, path)
 
 
@@ -131,18 +138,18 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
     paths: dict[float, Motion] = {speed: result.detail for speed, result in results.items()}
     figure, axes = subplots(3, len(paths), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharex="col")
     for k, (speed, course) in enumerate(paths.items()):
-        last = course.times >= course.times[-1] - SHOWN_SECONDS
-        for side, colour, sums in _wheels(course.contacts[last], "fx", "fy", "power"):
+        is_last_second = course.times >= course.times[-1] - SHOWN_SECONDS
+        for side, colour, sums in _wheels(course.contacts[is_last_second], "fx", "fy", "power"):
             for axis, values in zip(axes[:, k], sums, strict=True):
-                axis.plot(course.times[last], values, color=colour, label=side)
+                axis.plot(course.times[is_last_second], values, color=colour, label=side)
         axes[0, k].set(ylabel="along the track [N]", title=f"{speed:g} m/s")
         axes[1, k].set(ylabel="across the track [N]")
         axes[2, k].set(ylabel="power [W]", xlabel="time [s]")
         axes[2, k].axhline(0.0, color="0.6", linewidth=0.8)
     legend_below(figure, axes[0, 0])
     largest = max(float(course.contacts["power"].max()) for course in paths.values())
-    told = f"Creep forces on the wheels and their power, at any time {largest:.3g} W or less"
-    add_heading(figure, f"{title}\n{told}", at_speeds(results))
+    subtitle = f"Creep forces on the wheels and their power, at any time {largest:.3g} W or less"
+    add_heading(figure, f"{title}\n{subtitle}", at_speeds(results))
     save(figure, path)
 
 
@@ -190,8 +197,8 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
         )
     first = next(iter(cycles.values()))
     around = first.path()
-    for side, colour, (along, across) in _wheels(around.contacts, "fx", "fy"):
-        for force, name, line in ((along, "along", "-"), (across, "across", "--")):
+    for side, colour, (force_along, across) in _wheels(around.contacts, "fx", "fy"):
+        for force, name, line in ((force_along, "along", "-"), (across, "across", "--")):
             right.plot(around.times, 1e-3 * force, line, color=colour, label=f"{side}, {name}")
     left.set(
         xlabel="lateral displacement [mm]",

@@ -23,7 +23,7 @@ def test_a_car_of_other_springs_is_another_one(monkeypatch: pytest.MonkeyPatch) 
 
     def softer(own: Handling) -> np.ndarray:
         numbers = numbers_of(own)
-        numbers[hand_built_handling.HEAD + 5] *= 0.999  # strut of the first wheel
+        numbers[hand_built_handling.HEAD_LENGTH + 5] *= 0.999  # strut of the first wheel
         return numbers
 
     monkeypatch.setattr(hand_built_handling, "numbers_of", softer)

@@ -14,7 +14,7 @@ from validation.price.problems.braking_stop import (
     FULL_STEPS,
     LITERAL,
     OWN_METHOD,
-    QUICK,
+    QUICK_SUBSTEPS,
     RK4,
     BrakingStop,
     ReplayedController,
@@ -66,4 +66,4 @@ def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(
 
 def test_a_step_is_the_longest_that_divides_a_sample(short):
     assert short.setting("reference", OWN_METHOD, 1.2e-3).value == pytest.approx(5.5e-3 / 5)
-    assert all(set(QUICK[method]) <= set(FULL_STEPS[method]) for method in FULL_STEPS)
+    assert all(set(QUICK_SUBSTEPS[method]) <= set(FULL_STEPS[method]) for method in FULL_STEPS)

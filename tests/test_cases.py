@@ -30,11 +30,11 @@ WHOLE = ("absent", "contact_coefficients", "measured_formats")
 ELSEWHERE = ("planted_faults",)
 """Cases that another test file measures in full, on the same machine: tests/test_planted_faults.py."""
 FEWER = {
-    "price": {"ROUNDS": {True: 1, False: 5}},
-    "effect_prices": {"ROUNDS": {True: 7, False: 20}},
+    "price": {"TIMING_ROUNDS": {True: 1, False: 5}},
+    "effect_prices": {"RATIO_ROUNDS": {True: 7, False: 20}},
     "ensemble": {"LARGE_ENSEMBLE_PATHS": 2000},
     "kalman": {"SAMPLES": 8},
-    "stated_errors": {"COUNT": 36},
+    "stated_errors": {"SAMPLES_OF_ALL": 36},
     "recommendation": {"SCENES": {"pitch-plane": 44, "braking": 4, "wheelset": 2, "handling": 1}},
     "braking_limits": {"STOPS": {True: 3, False: 100}},
     "choice_linear": {"SCENES_DRAWN": 24},

@@ -150,9 +150,9 @@ def test_what_has_no_wave_is_refused(y, dr, amplitude, said):
 
 def test_one_of_several_waves_is_chosen():
     dr = Y**3 / 50.0 - Y  # two wells, about +-7
-    right, left = (equivalent_conicity(Y, dr, 0.5, guess=near) for near in (7.0, -7.0))
+    right, left = (equivalent_conicity(Y, dr, 0.5, centre_guess=near) for near in (7.0, -7.0))
     assert right == pytest.approx(left, rel=1e-9)
-    assert klingel_wave(RollingRadiusTable(Y, dr), 0.5, guess=7.0).centre > 6.5
+    assert klingel_wave(RollingRadiusTable(Y, dr), 0.5, centre_guess=7.0).centre > 6.5
 
 
 def test_repeated_rows_change_nothing():

@@ -107,7 +107,7 @@ def test_the_moment_reaches_the_limit_of_friction_and_no_more():
 @pytest.mark.parametrize("growing", [True, False])
 @pytest.mark.parametrize("kind", ["blended", "one", "three"])
 def test_derivatives_are_those_of_the_march(kind, growing):
-    given = case.creepages(tuple(case.KINDS), (0.2, 2.0))
+    given = case.creepages(tuple(case.CREEPAGE_KINDS), (0.2, 2.0))
     own = derivatives(RollingEllipse(**given), PAIR, flexibilities=kind, growing=growing).slopes[..., 3] * case.LOAD
     ends = []
     for share in (1e-6, -1e-6):

@@ -185,7 +185,7 @@ def test_a_foreign_mujoco_callback_is_noticed(place):
 def test_an_interrupt_in_exudyn_is_an_interrupt(monkeypatch):
     """Exudyn turns every exception of a callback into its own; a user who stops a study means all of it."""
     base = setups.vehicle()
-    forces = setups.static_forces(base, 102, 1e-3, held=False)
+    forces = setups.static_forces(base, 102, 1e-3, is_held=False)
 
     def reader(self, column, scale):
         def read(mbs, t, load):

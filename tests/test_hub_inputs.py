@@ -129,7 +129,7 @@ def test_an_engine_is_not_asked_for_what_it_lacks():
 def shaken_rows() -> HubInputs:
     """Forces that change at every half step of ``settings``."""
     rows = 2 * settings().steps + 1
-    rest, one = static_forces(r19(), rows), random_wrenches(r19(), "hub", guide=False)
+    rest, one = static_forces(r19(), rows), random_wrenches(r19(), "hub", has_guide=False)
     return replace(rest, hubs=rest.hubs + np.arange(rows)[:, None] * (one.hubs[0] - rest.hubs[0]) * SOLVER_TOLERANCE)
 
 

@@ -64,7 +64,7 @@ def test_recorded_car():
     if path is None:
         pytest.skip(f"needs {recording.RECORDING_FILE} in the folder that TWINRIG_DATA names")
     own = recording.read(path)
-    seen = rotation_vector(unit.error_rotation(own.pose[20:], own.pose[:-20])) / (20 * recording.PERIOD)
+    seen = rotation_vector(unit.error_rotation(own.pose[20:], own.pose[:-20])) / (20 * recording.SAMPLE_PERIOD)
     read = np.einsum("nij,nj->ni", rotation_matrix(own.pose[10:-10]), own.rates[10:-10])
     smooth = np.column_stack([np.convolve(read[:, i], np.ones(20) / 20, "same") for i in range(3)])
     assert all(np.corrcoef(seen[20:-20, i], smooth[20:-20, i])[0, 1] > 0.9 for i in range(3))

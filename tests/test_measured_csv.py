@@ -28,7 +28,7 @@ from validation.measured.measured_files.csv_forms import (
     iso,
     stamps,
 )
-from validation.measured.measured_files.odd import TIMES, OddFile, difference, read, usual
+from validation.measured.measured_files.odd import SAMPLE_TIMES, OddFile, difference, read, usual
 
 PLAIN = Form().times
 FORMS = st.builds(
@@ -146,7 +146,7 @@ def test_stamps_keep_their_zone_and_their_day(tmp_path):
     path = Form(times=stamps(lambda stamp: iso(stamp) + "+01:00")).make(tmp_path)
     assert open_source(path).start.isoformat() == "2026-03-02T09:30:00+01:00"
     found = read(open_source(Form(times=stamps(clock)).make(tmp_path)))
-    assert np.abs(found["Fz"][0] - TIMES).max() <= 1e-16 and open_source(path).channels[0].unit == "N"
+    assert np.abs(found["Fz"][0] - SAMPLE_TIMES).max() <= 1e-16 and open_source(path).channels[0].unit == "N"
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from validation.cases import measured_formats as case
 from validation.measured.measured_files import csv as csv_files
 from validation.measured.measured_files import mdf4 as mdf4_files
 from validation.measured.measured_files import tdms as tdms_files
-from validation.measured.measured_files.odd import FX, FZ, TIMES, CutSweep, read, two_rates, usual, written
+from validation.measured.measured_files.odd import FX, FZ, SAMPLE_TIMES, CutSweep, read, two_rates, usual, written
 
 EXTENSIONS = (".csv", ".mf4", ".rsp", ".tdms")
 
@@ -279,7 +279,7 @@ def test_the_usual_file_is_what_the_truth_says(tmp_path):
     for extension in EXTENSIONS:
         found = read(open_source(written(tmp_path / f"a{extension}")))
         assert set(found) == set(usual()) and np.array_equal(found["Fz"][1], FZ) and np.array_equal(found["Fx"][1], FX)
-        assert np.allclose(found["Fz"][0], TIMES, atol=1e-12)
+        assert np.allclose(found["Fz"][0], SAMPLE_TIMES, atol=1e-12)
 
 
 @pytest.mark.full

@@ -379,7 +379,7 @@ def test_a_new_effect_changes_what_a_price_list_compares(system, new_file):
 
 
 def test_a_new_effect_has_a_price_there_and_absent(new_file, monkeypatch):
-    monkeypatch.setattr(effects, "ROUNDS", 3)
+    monkeypatch.setattr(effects, "TIMING_ROUNDS", 3)
     new_file("contact", NEW["contact"].name, NEW["contact"].text)
     for scene in (bare_scene("contact"), with_effects(bare_scene("contact"), "soft_bodies")):
         price = next(price for price in price_list(scene).prices if price.name == "soft_bodies")

@@ -137,7 +137,7 @@ def test_a_quantity_that_one_sample_makes_up_is_refused():
 
 
 def test_prices_of_a_ride_on_bent_springs_say_what_chance_may_add(monkeypatch):
-    monkeypatch.setattr(effects, "ROUNDS", 3)
+    monkeypatch.setattr(effects, "TIMING_ROUNDS", 3)
     found = price_list(quarter_car())
     prices = {price.name: price for price in found.prices}
     before, after = prices["friction"].counts

@@ -81,7 +81,7 @@ def test_height_is_grid_plus_reference_line_plus_banking(tmp_path):
     path, z = tmp_path / "banked.crg", np.zeros((21, 3))
     z[:, 2] = 0.3
     grid_file(path, z=z, slope=0.1, banking=0.05, z_start=2.0, u_start=7.0)
-    road = read_opencrg(path, "centre", offset=0.5)
+    road = read_opencrg(path, "centre", lateral_offset=0.5)
     expected = -(2.0 + 0.1 * road.station + 0.05 * 0.5 + 0.15)
     np.testing.assert_allclose(road.points[1], expected, atol=1e-12)
     assert (road.start, road.end) == (0.0, pytest.approx(1.0))

@@ -199,7 +199,7 @@ def test_a_finite_road_is_never_left_in_silence(s):
         (lambda: study_road(-1.0), "gd"),
         (lambda: iso8608_road("I"), "'I'.*allowed: A, B"),
         (lambda: iso8608_road("a"), "must be a class"),
-        (lambda: iso8608_road("A", level="onesided"), "did you mean 'one-sided'"),
+        (lambda: iso8608_road("A", level_convention="onesided"), "did you mean 'one-sided'"),
         (lambda: iso8608_road("A", -1), "seed"),
         (lambda: iso8608_road("A", n_min=2.0, n_max=1.0), "n_min"),
         (lambda: iso8608_road("A", waves=0), "waves"),
@@ -220,7 +220,7 @@ def test_profiles_cannot_be_changed():
 @pytest.mark.grounds("published")
 @pytest.mark.parametrize(("level", "factor"), [("one-sided", 1.0), ("two-sided", 2.0)])
 def test_power_of_a_class_is_the_integral_of_its_density(level, factor):
-    road = iso8608_road("C", 3, n_min=0.05, n_max=1.5, waves=40, level=level)
+    road = iso8608_road("C", 3, n_min=0.05, n_max=1.5, waves=40, level_convention=level)
     band = 256e-6 * 0.1**2 * (1 / 0.05 - 1 / 1.5) * factor  # class C: 256e-6 m^3, one-sided
     assert (road.amplitude**2).sum() / 2 == pytest.approx(band, rel=1e-13)  # exact bin by bin, see roughness
     # the same from samples: over 4 km the mean products of different waves are below 1 / (pi L dn) = 2 %

@@ -20,7 +20,7 @@ from models.systems.hub_forces.run import measure
 from models.systems.hub_forces.tilt_filter import Deviations, estimate
 from models.vehicles.parameters import asymmetric_twin
 from models.vehicles.vehicle_file import load_vehicle
-from validation.absence.hub_forces import BARE_SCENE, HUBS, ON_ROAD, PERIOD, STEP, STEPS, write
+from validation.absence.hub_forces import BARE_SCENE, HUBS, ON_ROAD, SAMPLE_PERIOD, STEP, STEPS, write
 from validation.spatial.cars import r19
 from validation.spatial.hub_inputs import centres_of_mass
 
@@ -156,10 +156,10 @@ def test_hub_forces_of_a_file_move_the_centre_of_mass_as_they_would_a_point(engi
     """Four forces up, 4 kN and 500 N u^2 by the time u (1 at the end) at the samples, lines between them."""
     write(tmp_path)
     result = run(of_table(BARE_SCENE, "s.toml", tmp_path), engine, method="none")
-    samples = 4.0 * (4e3 + 500.0 * np.linspace(0.0, 1.0, round(STEPS * STEP / PERIOD) + 1) ** 2)
+    samples = 4.0 * (4e3 + 500.0 * np.linspace(0.0, 1.0, round(STEPS * STEP / SAMPLE_PERIOD) + 1) ** 2)
     time, dense = STEP * STEPS, 4001
     fine = np.linspace(0.0, time, dense)
-    acceleration = np.interp(fine, PERIOD * np.arange(len(samples)), samples) / CUT_MASS - GRAVITY
+    acceleration = np.interp(fine, SAMPLE_PERIOD * np.arange(len(samples)), samples) / CUT_MASS - GRAVITY
     rise = np.trapezoid((time - fine) * acceleration, fine)
     path = centres_of_mass(CUT, result.detail.positions[[0, -1]])
     assert path[1] - path[0] == pytest.approx([0.0, 0.0, rise], abs=1e-6 * abs(rise))
@@ -170,11 +170,11 @@ def test_hub_forces_of_a_file_move_the_centre_of_mass_as_they_would_a_point(engi
 def test_angles_of_a_file_are_those_of_the_run_that_is_held_to_them(tmp_path):
     """Roll and pitch that stay: a low-pass leaves them as they are."""
     write(tmp_path)
-    still = np.ones(round(STEPS * STEP / PERIOD) + 1)
+    still = np.ones(round(STEPS * STEP / SAMPLE_PERIOD) + 1)
     units = {"roll": "rad", "pitch": "rad", "roll_rate": "rad/s", "pitch_rate": "rad/s"}
     held = {"roll": 0.02, "pitch": -0.01, "roll_rate": 0.0, "pitch_rate": 0.0}
     columns = {name: (unit, held[name] * still) for name, unit in units.items()}
-    write_time_series(tmp_path / "angles.csv", columns, PERIOD)
+    write_time_series(tmp_path / "angles.csv", columns, SAMPLE_PERIOD)
     result = run(of_table(BARE_SCENE, "s.toml", tmp_path), "reference", method="prescribed")
     assert result["roll"] == pytest.approx(0.02, rel=1e-9) and result["pitch"] == pytest.approx(-0.01, rel=1e-9)
 

@@ -271,7 +271,7 @@ def test_all_systems_that_have_samples_are_found_and_shown(monkeypatch, tmp_path
     fake = type("Fake", (), {"samples": staticmethod(lambda count, seed: drawn[modules["ride"]][:count])})
     monkeypatch.setattr(stated_errors, "import_module", lambda name: fake)
     monkeypatch.setattr(stated_errors, "SYSTEMS", modules)
-    monkeypatch.setattr(stated_errors, "QUICK", {"ride": 3})
+    monkeypatch.setattr(stated_errors, "QUICK_SAMPLES", {"ride": 3})
     rows, data = stated_errors.measure(True, tmp_path)
     assert {row.id for row in rows} >= {"stated_errors.silent", "stated_errors.ride.near", "stated_errors.cost"}
     saved = json.loads(json.dumps(data))

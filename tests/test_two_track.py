@@ -124,7 +124,7 @@ def test_measured_tracks_are_heights_up_and_keep_their_sides(tmp_path):
     left, right = np.sin(s), 0.5 * np.cos(3 * s)
     rows = "\n".join(f"{a:.17g}, {b:.17g}, {c:.17g}" for a, b, c in zip(s, left, right, strict=True))
     (tmp_path / "road.csv").write_text("s [m], left [m], right [m]\n" + rows + "\n")
-    tracks = read_tracks(tmp_path / "road.csv", 1.4, first=1.0, last=10.0)
+    tracks = read_tracks(tmp_path / "road.csv", 1.4, first_station=1.0, last_station=10.0)
     assert np.abs(tracks.left - left[10:101]).max() < 1e-12 and np.abs(tracks.right - right[10:101]).max() < 1e-12
     assert tracks.half_track == 0.7 and tracks.length == pytest.approx(9.0)
 

@@ -74,7 +74,9 @@ def test_the_road_keeps_its_variance_and_the_vehicle_comes_to_rest():
 def test_the_road_is_cut_where_an_axle_passes_the_place_of_a_stop():
     vehicle, road = ride("half_car")
     halt = SpeedProfile((0.0, 0.3, 0.8, 1.3), (10.0, 0.0, 0.0, 15.0))  # the rear axle is there at 1.2 s
-    coarse, fine = (varying_speed(vehicle, road, halt, instants=(1.25,), reach=reach) for reach in (1.0, 0.2))
+    coarse, fine = (
+        varying_speed(vehicle, road, halt, instants=(1.25,), largest_rate_times_step=reach) for reach in (1.0, 0.2)
+    )
     # seen: 5e-11; 1e-8 if cells did not shrink towards that place, 5e-4 if they ran across it
     assert coarse.at([1.25])[0] == pytest.approx(fine.at([1.25])[0], rel=1e-9)
 

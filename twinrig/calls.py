@@ -94,15 +94,15 @@ def _options(scene: Any) -> Mapping[str, Any]:
     return signature(import_module(f"{SYSTEMS[scene.system].package}.run").run).parameters
 
 
-def _check_how(scene: Any, how: Mapping[str, Any], options: Mapping[str, Any]) -> None:
+def _check_how(scene: Any, run_options: Mapping[str, Any], options: Mapping[str, Any]) -> None:
     """Refuse options that the run of this system does not have, and drives that the scene does not have."""
     names = (*(name for name in options if name not in ("scene", "engine", "error")), "engine", "error", "set")
-    for name in how:
+    for name in run_options:
         if name not in names:
             raise InputError("run", name, None, f"is no option of a run of {scene.system}", names)
     option, table = PARTS.get(scene.system, ("", ""))
-    if how.get(option) is not None and how[option] not in getattr(scene, table):
-        raise InputError(scene.file, option, how[option], f"is not among {table}", tuple(getattr(scene, table)))
+    if run_options.get(option) is not None and run_options[option] not in getattr(scene, table):
+        raise InputError(scene.file, option, run_options[option], f"is not among {table}", tuple(getattr(scene, table)))
 
 
 def _engines(scene: Any, requested_engine: str, optional: bool) -> tuple[str, tuple[str, ...]]:
@@ -172,30 +172,38 @@ def compare(first: "Result | str | Path", second: "Result | str | Path", shift: 
         from studies.command.against_measurement import overlay_of_run
 
         laid = overlay_of_run(_result(first), second, shift)
-        values = {"shift": laid.shift.seconds, "channels": {each.name: each.values() for each in laid.matches}}
+        values = {
+            "shift": laid.shift.seconds,
+            "channels": {compared.name: compared.values() for compared in laid.matches},
+        }
         return Report((f"{second} over {_name(first, 'the run')}", *laid.lines()), values, laid)
     if shift is not None:
         raise InputError("compare", "shift", shift, "belongs to a comparison of a run with a measurement")
     names = (_name(first, "the first"), _name(second, "the second"))
     differences, notes = compare_runs(_result(first), _result(second), names)
-    values = {each.name: {key: getattr(each, key) for key in ("largest", "rms", "at", "share")} for each in differences}
+    values = {
+        compared.name: {key: getattr(compared, key) for key in ("largest", "rms", "at", "share")}
+        for compared in differences
+    }
     return Report((f"{names[1]} less {names[0]}", *comparison_lines(differences, notes)), values, differences)
 
 
-def _result(given: Any) -> "Result":
+def _result(run_or_path: Any) -> "Result":
     from models.core.result import Result as SavedResult
 
-    if isinstance(given, SavedResult):
-        return given  # type: ignore[return-value]
-    if isinstance(given, str | Path) and Path(given).suffix == ".nc":
-        return read(given)
-    raise InputError("compare", "", str(given), "is no result: give what twinrig.run returns, or a saved file (.nc)")
+    if isinstance(run_or_path, SavedResult):
+        return run_or_path  # type: ignore[return-value]
+    if isinstance(run_or_path, str | Path) and Path(run_or_path).suffix == ".nc":
+        return read(run_or_path)
+    raise InputError(
+        "compare", "", str(run_or_path), "is no result: give what twinrig.run returns, or a saved file (.nc)"
+    )
 
 
-def _name(given: Any, otherwise: str) -> str:
-    if isinstance(given, str | Path):
-        return str(given)
-    engine = getattr(given, "data", None) is not None and given.data.attrs.get("engine")
+def _name(run_or_path: Any, otherwise: str) -> str:
+    if isinstance(run_or_path, str | Path):
+        return str(run_or_path)
+    engine = getattr(run_or_path, "data", None) is not None and run_or_path.data.attrs.get("engine")
     return f"{otherwise} ({engine})" if engine else otherwise
 
 
@@ -262,20 +270,20 @@ def choose(
     engines = engines_of(engine, loaded.system, "engine")
     with _as_library(loaded), TemporaryDirectory() as temporary:
         study = checked_study(loaded, engines)
-        kept = _new_folder(folder, "choice") if folder is not None else Path(temporary)
+        result_folder = _new_folder(folder, "choice") if folder is not None else Path(temporary)
         with progress_bar(loaded.title, loaded.system) as progress:
-            summary = summary_with_errors(study.run(loaded, engines, kept, progress))
+            summary = summary_with_errors(study.run(loaded, engines, result_folder, progress))
     return Report((loaded.title, *summary["table"]), summary)
 
 
 def _choosing(scene: "Scene", quantities: "list[str] | None", tolerance: float | None) -> "Scene":
     """The scene with its study changed to the one that makes a choice of effects, and with these quantities and
     tolerance."""
-    asked = {"quantities": quantities, "tolerance": tolerance}
-    changes: dict[str, Any] = {key: value for key, value in asked.items() if value is not None}
+    choice_keys = {"quantities": quantities, "tolerance": tolerance}
+    changes: dict[str, Any] = {key: value for key, value in choice_keys.items() if value is not None}
     study = scene.checked.CHOOSING
     if scene.checked.study != study:
-        for key, value in asked.items():
+        for key, value in choice_keys.items():
             if value is None:
                 raise InputError("choose", key, None, "is missing: this scene asks for no choice, so give both")
         changes |= {"study": study, **({"options": None} if "options" in scene.table else {})}
@@ -296,8 +304,8 @@ def export(scene: AnyScene, engine: str, file: str | Path | None = None, *, set:
 
     loaded = load(scene, set).checked
     with _as_library(loaded, out="file"), progress_bar("building the vehicle", loaded.system):
-        told = write(loaded, engine, None if file is None else Path(file))
-    return Report(tuple(export_lines(loaded.title, told)), told)
+        exported = write(loaded, engine, None if file is None else Path(file))
+    return Report(tuple(export_lines(loaded.title, exported)), exported)
 
 
 def validate(quick: bool = False, folder: str | Path | None = None) -> "Report":
@@ -309,11 +317,11 @@ def validate(quick: bool = False, folder: str | Path | None = None) -> "Report":
     from twinrig.report import Report
     from validation.run import validate as run_all
 
-    kept = _new_folder(folder, "validate-quick" if quick else "validate")
+    report_folder = _new_folder(folder, "validate-quick" if quick else "validate")
     with redirect_stdout(io.StringIO()) as printed:
-        failed = run_all(kept, quick, f"twinrig.validate(quick={quick})")
-    values = json.loads((kept / "results.json").read_text(encoding="utf-8"))
-    return Report(tuple(printed.getvalue().splitlines()), {"folder": str(kept), "results": values}, failed)
+        failed = run_all(report_folder, quick, f"twinrig.validate(quick={quick})")
+    values = json.loads((report_folder / "results.json").read_text(encoding="utf-8"))
+    return Report(tuple(printed.getvalue().splitlines()), {"folder": str(report_folder), "results": values}, failed)
 
 
 def _new_folder(requested_folder: str | Path | None, name: str) -> Path:

@@ -60,17 +60,17 @@ class Result(saved.Result):
 
     def _state_lines(self) -> list[str]:
         """Status, counts, doubts about the run and its input, error and broken assumptions."""
-        said = self.data.attrs
-        counts = ", ".join(f"{count} {name}" for name, count in json.loads(said.get("counts", "{}")).items())
-        seconds = f"{said['seconds']:.3f} s" if said.get("seconds") else ""
-        parts = "; ".join(part for part in (str(said.get("status", "")), counts, seconds) if part)
-        texts = json.loads(said.get("doubts", "[]"))
-        queries = [query for query in json.loads(said.get("queries", "[]")) if query["text"] not in texts]
+        attributes = self.data.attrs
+        counts = ", ".join(f"{count} {name}" for name, count in json.loads(attributes.get("counts", "{}")).items())
+        seconds = f"{attributes['seconds']:.3f} s" if attributes.get("seconds") else ""
+        parts = "; ".join(text_part for text_part in (str(attributes.get("status", "")), counts, seconds) if text_part)
+        texts = json.loads(attributes.get("doubts", "[]"))
+        queries = [query for query in json.loads(attributes.get("queries", "[]")) if query["text"] not in texts]
         doubts = [f"  in doubt: {text}" for text in texts] + [
             f"  {query['weight']}: {query['text']}" for query in queries
         ]
-        place = dict.fromkeys(str(said.get(key, "")) for key in ("system", "engine"))
-        return [f"  {' '.join(filter(None, place))}: {parts}", *doubts, *message_lines({self._label: self})]
+        system_and_engine = dict.fromkeys(str(attributes.get(key, "")) for key in ("system", "engine"))
+        return [f"  {' '.join(filter(None, system_and_engine))}: {parts}", *doubts, *message_lines({self._label: self})]
 
     def _rows(self) -> list[tuple[str, str, str, str, str, str]]:
         """Name, unit, axes, least, largest and meaning of each channel."""
@@ -87,16 +87,16 @@ class Result(saved.Result):
         rows = [heads, *self._rows()]
         widths = [max(len(row[i]) for row in rows[: SHOWN + 1]) for i in range(len(heads))]
         table = ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows[: SHOWN + 1]]
-        more = [row[0] for row in rows[SHOWN + 1 :]]
-        rest = [f"  and {len(more)} more: {', '.join(more)}"] if more else []
-        return "\n".join([str(self.data.attrs.get("title", "")), *self._state_lines(), *table, *rest])
+        names_not_shown = [row[0] for row in rows[SHOWN + 1 :]]
+        omitted_line = [f"  and {len(names_not_shown)} more: {', '.join(names_not_shown)}"] if names_not_shown else []
+        return "\n".join([str(self.data.attrs.get("title", "")), *self._state_lines(), *table, *omitted_line])
 
     def _repr_html_(self) -> str:
         title = escape(str(self.data.attrs.get("title", "")))
-        said = "<br>".join(escape(line.strip()) for line in self._state_lines())
+        state_html = "<br>".join(escape(line.strip()) for line in self._state_lines())
         heads = "".join(f"<th>{head}</th>" for head in ("channel", "unit", "axes", "least", "largest", "meaning"))
         rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in self._rows())
-        return f"<p><b>{title}</b><br>{said}</p><table><tr>{heads}</tr>{rows}</table>"
+        return f"<p><b>{title}</b><br>{state_html}</p><table><tr>{heads}</tr>{rows}</table>"
 
     def plot(self, *channels: str, axes: "Axes | None" = None) -> "Axes":
         """Draw channels of one unit over their axis, a line for each row of what has several; returns the axes.
@@ -112,17 +112,17 @@ class Result(saved.Result):
         curves = dict(channels_of(self.data.reset_coords()[list(channels)]))
         kinds = {(curve.unit, curve.over) for curve in curves.values()}
         if len(kinds) != 1:
-            told = " and ".join(sorted(f"{unit or '-'} over {over}" for unit, over in kinds)) or "text"
-            raise InputError("", "plot", ", ".join(channels), f"holds {told}: plot numbers of one unit at a time")
+            kinds_text = " and ".join(sorted(f"{unit or '-'} over {axis_name}" for unit, axis_name in kinds)) or "text"
+            raise InputError("", "plot", ", ".join(channels), f"holds {kinds_text}: plot numbers of one unit at a time")
         if axes is None:
             from matplotlib import pyplot
 
             axes = pyplot.subplots(layout="constrained")[1]
         for name, curve in curves.items():
             axes.plot(curve.grid, curve.values, "o" if len(curve.grid) == 1 else "-", label=name)
-        ((unit, over),) = kinds
+        ((unit, axis_name),) = kinds
         meaning = str(self.data[channels[0]].attrs.get("long_name", "")) if len(channels) == 1 else ""
-        axes.set(xlabel=over, ylabel=f"{meaning or ', '.join(channels)} [{unit or '-'}]")
+        axes.set(xlabel=axis_name, ylabel=f"{meaning or ', '.join(channels)} [{unit or '-'}]")
         self._head(axes)
         if len(curves) > 1:
             axes.legend()

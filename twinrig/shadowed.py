@@ -22,14 +22,14 @@ def check() -> None:
 
 
 def _check() -> None:
-    beside = Path(__file__).resolve().parents[1]
+    tree = Path(__file__).resolve().parents[1]
     for name in PACKAGES:
         spec = find_spec(name)
-        place = Path(spec.origin).resolve() if spec is not None and spec.origin else None
-        if place is None:
-            raise ImportError(f"twinrig needs its package {name!r} in {beside}, which is not on Python's path")
-        if place != beside / name / "__init__.py":
-            hides = place.parent if place.name == "__init__.py" else place
+        package_path = Path(spec.origin).resolve() if spec is not None and spec.origin else None
+        if package_path is None:
+            raise ImportError(f"twinrig needs its package {name!r} in {tree}, which is not on Python's path")
+        if package_path != tree / name / "__init__.py":
+            hides = package_path.parent if package_path.name == "__init__.py" else package_path
             raise ImportError(
                 f"{hides} hides twinrig's package {name!r}: rename it, or start Python in another folder", name=name
             )

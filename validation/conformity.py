@@ -110,13 +110,19 @@ def _conformity_rows(name: str, folder: Path) -> Iterator[Row]:
 
 
 def _error_row(
-    id: str, quantity: str, unit: str, bound: float, why: str, error: Callable[[], float], second: Independence
+    id: str,
+    quantity: str,
+    unit: str,
+    bound: float,
+    tolerance_reason: str,
+    error: Callable[[], float],
+    independence: Independence,
 ) -> Row:
     """Row of an error. If the check cannot be carried out, the row is failed and holds the message of the exception."""
     try:
-        return Observed(id, SYSTEM, quantity, error(), unit).at_most(bound, why, second)
+        return Observed(id, SYSTEM, quantity, error(), unit).at_most(bound, tolerance_reason, independence)
     except (InputError, RunFailed) as reason:
-        return Row(id, SYSTEM, quantity, None, unit, 0.0, bound, why, second, "failed", str(reason))
+        return Row(id, SYSTEM, quantity, None, unit, 0.0, bound, tolerance_reason, independence, "failed", str(reason))
 
 
 def _settings_of_engine(name: str, step: float = STEP) -> Settings:
@@ -229,7 +235,7 @@ def _momentum_error(name: str, assembly: Assembly, settings: Settings) -> float:
     return checks.momentum_gap(checks.engine(name), assembly, settings)
 
 
-def _order(name: str, second: Independence) -> Row:
+def _order(name: str, independence: Independence) -> Row:
     """Row: observed order of a fixed-step method; for an adaptive one, that a tighter tolerance gives a smaller
     error."""
     road = assembly_of_scene(road_scene(duration=DURATION))
@@ -241,7 +247,7 @@ def _order(name: str, second: Independence) -> Row:
             0.1,
             "a method that keeps a tolerance is the more exact the tighter it is",
             partial(_tightened_error, name, road),
-            second,
+            independence,
         )
     declared, why = CATALOGUE[name][name].order, "one halving; the band leaves room for the next term of the error"
 
@@ -250,7 +256,9 @@ def _order(name: str, second: Independence) -> Row:
         errors = [checks.state_gap(_run(name, road, _settings_of_engine(name, step)), truth) for step in ORDER_STEPS]
         return 0.0 if errors[0] < ROUNDING_ERROR else abs(float(np.log2(errors[0] / errors[1])) - declared)
 
-    return _error_row("conformity.order", f"observed order less the declared {declared}", "", 0.35, why, gap, second)
+    return _error_row(
+        "conformity.order", f"observed order less the declared {declared}", "", 0.35, why, gap, independence
+    )
 
 
 def _tightened_error(name: str, road: Assembly) -> float:

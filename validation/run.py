@@ -85,7 +85,7 @@ class Cases:
     def facts(self) -> Saved:
         """Facts on which rows depend: the cases, quick or full share, code version, and the available measured
         files."""
-        root, here = data_folder(), Path(__file__).parent
+        root, validation_folder = data_folder(), Path(__file__).parent
         sizes = (
             {str(path.relative_to(root)): path.stat().st_size for path in sorted(root.rglob("*")) if path.is_file()}
             if root
@@ -95,8 +95,8 @@ class Cases:
             "cases": list(self.names),
             "quick": self.quick,
             "measured files": sizes,
-            "code of validation": checksum_of_sources(here),
-            "code of studies": checksum_of_sources(here.parent / "studies"),
+            "code of validation": checksum_of_sources(validation_folder),
+            "code of studies": checksum_of_sources(validation_folder.parent / "studies"),
         }
 
 
@@ -104,11 +104,13 @@ def _array_of_record(records: list[Saved]) -> Arrays:
     return {"record": np.array([json.dumps(record) for record in records])}
 
 
-def measured_cases(job: Cases, pool: Executor | None, progress: Callable[[int], None], alone: bool = False) -> Outcomes:
+def measured_cases(
+    job: Cases, pool: Executor | None, progress: Callable[[int], None], runs_alone: bool = False
+) -> Outcomes:
     """Rows and computing times (s) of all cases; cases that an earlier, interrupted run finished are read, not measured
     again.
 
-    alone : one after the other; progress : told how many are done. A case that breaks, or whose process dies
+    runs_alone : one after the other; progress : told how many are done. A case that breaks, or whose process dies
     again and again, is a failed row and is measured again by the next go. Raises InputError for a folder of another
     version or share, RunFailed for a full disk.
     """
@@ -119,11 +121,13 @@ def measured_cases(job: Cases, pool: Executor | None, progress: Callable[[int], 
         )
 
     store, blocks = (
-        job.folder / FINISHED_CASES / ("alone" if alone else "together"),
-        Blocks(1, 1) if alone else Blocks(1),
+        job.folder / FINISHED_CASES / ("alone" if runs_alone else "together"),
+        Blocks(1, 1) if runs_alone else Blocks(1),
     )
-    told = run_paths(job, len(job.names), store, pool, blocks, lambda done: progress(done.done), lost)["record"]
-    records = (json.loads(str(each)) for each in told)
+    record_texts = run_paths(
+        job, len(job.names), store, pool, blocks, lambda progress_count: progress(progress_count.done), lost
+    )["record"]
+    records = (json.loads(str(record_text)) for record_text in record_texts)
     return {
         name: ([Row(**row) for row in record["rows"]], record["seconds"])
         for name, record in zip(job.names, records, strict=True)
@@ -148,14 +152,14 @@ def validate(
     crew : measures the cases that need not be alone; its workers see the folder, too. earlier : ``changes.read`` of a
     report. resumed : the folder may hold cases that have ended; the time of them all together is then not known.
     """
-    start, begun = time.perf_counter(), datetime.now(UTC)
+    start, start_date = time.perf_counter(), datetime.now(UTC)
     (folder / "data").mkdir(exist_ok=True)
     with exclusive_folder(folder), (crew or Crew.given()).at_work(len(CASES), folder) as pool:
         outcomes = _outcomes_of_cases(pool, quick, folder)
         rows = [row for name in CASES for row in outcomes[name][0]]
         seconds = {name: outcomes[name][1] for name in CASES}
         wall = None if resumed else time.perf_counter() - start
-        source = {**provenance(command), "date": f"{begun:%Y-%m-%d %H:%M} UTC", "data": _data_text()}
+        source = {**provenance(command), "date": f"{start_date:%Y-%m-%d %H:%M} UTC", "data": _data_text()}
         save(
             folder,
             rows,
@@ -187,14 +191,21 @@ def _outcomes_of_cases(pool: Executor | None, quick: bool, folder: Path) -> Outc
     from rich.console import Console
     from rich.progress import Progress
 
-    alone = CASES_ALONE[quick]
-    together = tuple(sorted((name for name in CASES if name not in alone), key=_last_duration, reverse=True))
+    names_alone = CASES_ALONE[quick]
+    together = tuple(sorted((name for name in CASES if name not in names_alone), key=_last_duration, reverse=True))
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("validate", total=len(CASES))
-        here = folder.resolve()
-        first = measured_cases(Cases(together, quick, here), pool, lambda done: bar.update(task, completed=done))
+        resolved_folder = folder.resolve()
+        first = measured_cases(
+            Cases(together, quick, resolved_folder),
+            pool,
+            lambda progress_count: bar.update(task, completed=progress_count),
+        )
         return first | measured_cases(
-            Cases(alone, quick, here), pool, lambda done: bar.update(task, completed=len(together) + done), alone=True
+            Cases(names_alone, quick, resolved_folder),
+            pool,
+            lambda progress_count: bar.update(task, completed=len(together) + progress_count),
+            runs_alone=True,
         )
 
 
@@ -234,15 +245,15 @@ def seeds_of_rows() -> dict[str, int]:
     return {name: module.SEED for name, module in drawn.items() if hasattr(module, "SEED")}
 
 
-def save(folder: Path, rows: list[Row], source: Saved, earlier_report: Saved | None = None) -> None:
+def save(folder: Path, rows: list[Row], report_source: Saved, earlier_report: Saved | None = None) -> None:
     """Write results.json and results.csv, and print what changed since an earlier report."""
     table = [row.as_dict() for row in rows]
-    content: Saved = {"provenance": source, "rows": table}
+    content: Saved = {"provenance": report_source, "rows": table}
     if earlier_report is not None:
-        content["against"] = comparison_with_earlier(earlier_report, table, source)
+        content["against"] = comparison_with_earlier(earlier_report, table, report_source)
         print("\n".join(change_lines(content["against"])))
     write_whole(folder / "results.json", json.dumps(content, indent=1).encode())
-    with whole_file(folder / "results.csv") as part, part.open("w", newline="") as file:
+    with whole_file(folder / "results.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(Row.__dataclass_fields__))
         writer.writeheader()
         writer.writerows(table)
@@ -251,10 +262,10 @@ def save(folder: Path, rows: list[Row], source: Saved, earlier_report: Saved | N
 def say(rows: list[Row], seconds: float | None, page: Path) -> int:
     """Print the number of rows by status, and each row that failed, missed its aim or was not run; returns the number
     of failed rows."""
-    of = {status: [row for row in rows if row.status == status] for status in STATUSES}
-    counts = ", ".join(f"{len(of[status])} {status}" for status in reversed(STATUSES))
+    rows_of_status = {status: [row for row in rows if row.status == status] for status in STATUSES}
+    counts = ", ".join(f"{len(rows_of_status[status])} {status}" for status in reversed(STATUSES))
     print(f"{len(rows)} rows: {counts}{'' if seconds is None else f'; {seconds:.0f} s'}")
-    for row in (*of["failed"], *of["missed"], *of["not run"]):
+    for row in (*rows_of_status["failed"], *rows_of_status["missed"], *rows_of_status["not run"]):
         print(f"  {row.status}: {row.id}: {row.quantity}: {row.reason}")
     print(f"report: {page}")
-    return len(of["failed"])
+    return len(rows_of_status["failed"])

@@ -60,8 +60,8 @@ class PricedModel:
     @cached_property
     def columns(self) -> list[int]:
         """Indices of the coordinates that make up the quantity."""
-        places = named_coordinates(self.twin)
-        return [i for name, i in places.items() if self.quantity in (ALL_COORDINATES, name)]
+        index_by_name = named_coordinates(self.twin)
+        return [i for name, i in index_by_name.items() if self.quantity in (ALL_COORDINATES, name)]
 
     @property
     def unit(self) -> str:
@@ -111,20 +111,20 @@ class PricedModel:
         calls = steps * CALLS_PER_STEP.get(setting.method, 1)
         return setting.value * np.arange(steps + 1), path, calls
 
-    def _path(self, setting: Setting, start: tuple[np.ndarray, np.ndarray], steps: int) -> np.ndarray:
+    def _path(self, setting: Setting, start_state: tuple[np.ndarray, np.ndarray], steps: int) -> np.ndarray:
         """Values (steps + 1, k) of the quantity along a run."""
         twin, step = self.twin, setting.value
         if setting.engine == "mujoco":
-            states = file_path(twin, start, (steps, step), setting.method)
+            states = file_path(twin, start_state, (steps, step), setting.method)
             return twin.coordinates.positions(states)[:, self.columns]
         if setting.engine == "exudyn":
             from models.engines.free_vehicle_exudyn import FreeExudyn
 
-            path: np.ndarray = FreeExudyn(twin.driven).march(*start, steps, step, setting.method)[:, self.columns]
+            path: np.ndarray = FreeExudyn(twin.driven).march(*start_state, steps, step, setting.method)[:, self.columns]
             return path
-        return self._exact(start, steps, step)
+        return self._exact(start_state, steps, step)
 
-    def _exact(self, start: tuple[np.ndarray, np.ndarray], steps: int, step: float) -> np.ndarray:
+    def _exact(self, start_state: tuple[np.ndarray, np.ndarray], steps: int, step: float) -> np.ndarray:
         tree, n = plain_tree(self.twin), self.twin.size
 
         def rates(t: float, state: np.ndarray) -> np.ndarray:
@@ -132,19 +132,19 @@ class PricedModel:
 
         times = step * np.arange(steps + 1)
         span, rows = (0.0, float(times[-1])), times[:: max(1, steps // 200)]
-        done = solve_ivp(
+        solved = solve_ivp(
             rates,
             span,
-            np.concatenate(start),
+            np.concatenate(start_state),
             REFERENCE_METHOD,
             rows,
             dense_output=True,
             rtol=REFERENCE_TOLERANCE,
             atol=REFERENCE_TOLERANCE,
         )
-        if not done.success:
-            raise RunFailed("reference", done.message)
-        states: np.ndarray = done.sol(times).T
+        if not solved.success:
+            raise RunFailed("reference", solved.message)
+        states: np.ndarray = solved.sol(times).T
         return states[:, self.columns]
 
     def answer(self, solution: Any) -> PricedRun:
@@ -166,13 +166,14 @@ def recommended_settings(twin: TwinModel, tolerance: float, quantity: str | None
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in rad or m")
     if twin.driven.tied or twin.driven.frictions:
-        said = "has no price here: dry friction and constraints are soft in MuJoCo and rigid elsewhere"
-        raise InputError("--tolerance", "", tolerance, said)
-    places = named_coordinates(twin)
-    if not places:
+        refusal = "has no price here: dry friction and constraints are soft in MuJoCo and rigid elsewhere"
+        raise InputError("--tolerance", "", tolerance, refusal)
+    index_by_name = named_coordinates(twin)
+    if not index_by_name:
         raise InputError(twin.name, "", None, "has no hinge and no slide whose coordinate could be held to a tolerance")
     return recommend(
-        PricedModel(twin, checked_quantity(quantity or ALL_COORDINATES, {ALL_COORDINATES: None, **places})), tolerance
+        PricedModel(twin, checked_quantity(quantity or ALL_COORDINATES, {ALL_COORDINATES: None, **index_by_name})),
+        tolerance,
     )
 
 

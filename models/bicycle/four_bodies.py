@@ -40,16 +40,16 @@ class Ride:
 def four_bodies(b: Whipple) -> SpatialVehicle:
     """The bicycle's bodies in tree order, in the design position with the steering axis upright."""
     sine, cosine = math.sin(b.tilt), math.cos(b.tilt)
-    turned = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+    rotation = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
     origin = np.array([0.0, 0.0, b.rear_wheel.radius])
 
     def place(x: float, z: float) -> tuple[float, float, float]:
-        x, y, z = (origin + turned @ (np.array([x, 0.0, z]) - origin)).tolist()
+        x, y, z = (origin + rotation @ (np.array([x, 0.0, z]) - origin)).tolist()
         return x, y, z
 
     def tensor(inertia: np.ndarray) -> tuple[tuple[float, float, float], ...]:
-        up = np.diag([1.0, -1.0, -1.0])
-        return tuple(map(tuple, (turned @ up @ inertia @ up @ turned.T).tolist()))
+        flip = np.diag([1.0, -1.0, -1.0])
+        return tuple(map(tuple, (rotation @ flip @ inertia @ flip @ rotation.T).tolist()))
 
     R, B, H, F = b.rear_wheel, b.body, b.front_frame, b.front_wheel
     rear, front = (np.diag([wheel.Ixx, wheel.Iyy, wheel.Ixx]) for wheel in (R, F))

@@ -46,8 +46,8 @@ class IdealBicycle:
     def contacts(self, motion: PlainMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Kinematics of both contacts: their heights (2,) m, the Jacobian (6, 9) of the velocities of the material
         points there, and the part (6,) of these points' accelerations without dv/dt."""
-        each = [_wheel_contact(motion.matrices[row], radius) for row, radius in self._wheels]
-        heights, jacobians, rates = zip(*each, strict=True)
+        contact_rows = [_wheel_contact(motion.matrices[row], radius) for row, radius in self._wheels]
+        heights, jacobians, rates = zip(*contact_rows, strict=True)
         return np.array(heights), np.vstack(jacobians), np.concatenate(rates)
 
     def rolling(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -129,8 +129,8 @@ def _wheel_contact(wheel: np.ndarray, radius: float) -> tuple[float, np.ndarray,
     axes, moving = wheel[PLACE, :, :3], wheel[RATE, :, :3]
     axle, turning = axes[:, 1], moving[:, 1]
     flat = np.sqrt(1.0 - axle[2] ** 2)
-    down = (axle * axle[2] - UPWARD) / flat
-    lowering = (turning * axle[2] + axle * turning[2] + down * axle[2] * turning[2] / flat) / flat
-    point, running = radius * axes.T @ down, radius * (moving.T @ down + axes.T @ lowering)
-    places = wheel @ np.append(point, 1.0)
-    return places[PLACE, 2], places[FIRST:].T, places[REST] + moving @ running
+    downward = (axle * axle[2] - UPWARD) / flat
+    lowering = (turning * axle[2] + axle * turning[2] + downward * axle[2] * turning[2] / flat) / flat
+    point, running = radius * axes.T @ downward, radius * (moving.T @ downward + axes.T @ lowering)
+    point_terms = wheel @ np.append(point, 1.0)
+    return point_terms[PLACE, 2], point_terms[FIRST:].T, point_terms[REST] + moving @ running

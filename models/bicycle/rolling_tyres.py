@@ -76,8 +76,12 @@ class RollingBicycle:
 
     def __post_init__(self) -> None:
         for name in ("rear_wheel", "body", "front_frame", "front_wheel"):
-            part = getattr(self.bicycle, name)
-            needed = {"mass": part.mass, "Ixx": part.Ixx, **({"Iyy": part.Iyy} if name.endswith("wheel") else {})}
+            bike_part = getattr(self.bicycle, name)
+            needed = {
+                "mass": bike_part.mass,
+                "Ixx": bike_part.Ixx,
+                **({"Iyy": bike_part.Iyy} if name.endswith("wheel") else {}),
+            }
             for key, value in needed.items():
                 if not value > 0.0:
                     allowed = "must be above 0 in engines, whose every body has inertia; linear equations take 0"
@@ -112,10 +116,10 @@ def _table(bicycle: RollingBicycle) -> np.ndarray:
     c, patch, rows = bicycle.control, net(bicycle.tyre.cells), joints(bicycle.vehicle)
     counts = [len(body.freedoms) for body in bicycle.vehicle.bodies for _ in body.freedoms]
     rows[[REAR, FRONT], tree.KIND] = tree.LOOSE
-    places = {body.name: body.position for body in bicycle.vehicle.bodies}
+    positions = {body.name: body.position for body in bicycle.vehicle.bodies}
     points = [
-        [joint, *np.subtract(places[wheel], places[below])]
-        for joint, wheel, below in ((PITCH, "rear wheel", "frame"), (STEER, "front wheel", "steering"))
+        [joint, *np.subtract(positions[wheel], positions[parent])]
+        for joint, wheel, parent in ((PITCH, "rear wheel", "frame"), (STEER, "front wheel", "steering"))
     ]
     control = [c.torque_gain * c.gain, c.until, c.friction, c.dry_friction, c.dry_rate, c.speed_gain, c.speed_bias]
     sections = [np.column_stack([rows, counts]), points, _tyres(bicycle), control, patch.cells, patch.strips]
@@ -195,50 +199,62 @@ def _tyre_load(tyre, vehicle, wheel):
 
 
 @lean
-def _add_steering_torque(numbers, vehicle):
+def _add_steering_torque(table_of_numbers, vehicle):
     """Add the steering torque (to the left) of control and friction, which depends on the speed of the rear wheel's
     centre."""
     v = vehicle.rates
     missing = max(
-        numbers[FEEDBACK_SPEED_LIMIT] - numbers[SPEED_GAIN] * abs(vehicle.frame.ahead) - numbers[SPEED_BIAS], 0.0
+        table_of_numbers[FEEDBACK_SPEED_LIMIT]
+        - table_of_numbers[SPEED_GAIN] * abs(vehicle.frame.ahead)
+        - table_of_numbers[SPEED_BIAS],
+        0.0,
     )
-    torque = -numbers[GAIN] * missing * v[LEAN] - numbers[FRICTION] * v[STEER]
-    if numbers[DRY_FRICTION] != 0.0:
-        torque -= numbers[DRY_FRICTION] * math.tanh(v[STEER] / numbers[DRY_RATE])
+    torque = -table_of_numbers[GAIN] * missing * v[LEAN] - table_of_numbers[FRICTION] * v[STEER]
+    if table_of_numbers[DRY_FRICTION] != 0.0:
+        torque -= table_of_numbers[DRY_FRICTION] * math.tanh(v[STEER] / table_of_numbers[DRY_RATE])
     vehicle.forces[STEER] += torque
     vehicle.ledger[STEER_POWER] = torque * v[STEER]
 
 
 @lean
-def all_bicycle_forces(numbers, q, v, f, report, ledger):
-    """Add all forces to ``f`` (9,); all are arrays: table, q, v (9,), report (2, REPORTED), ledger (LEDGER,)."""
-    vehicle, table = enter(numbers, q, v, f, doubles(room(numbers)), ledger), start(numbers)
+def all_bicycle_forces(table_of_numbers, q, v, forces_on_coordinates, report, ledger):
+    """Add all forces to ``forces_on_coordinates`` (9,); all are arrays: table, q, v (9,), report (2, REPORTED), ledger
+    (LEDGER,).
+    """
+    vehicle, table = (
+        enter(table_of_numbers, q, v, forces_on_coordinates, doubles(room(table_of_numbers)), ledger),
+        start(table_of_numbers),
+    )
     patches, ways = array(doubles(10 * WHEEL_COUNT), (WHEEL_COUNT, 10)), doubles(forces.WAY * WHEEL_COUNT)
     slips, creeping = (
         array(doubles(4 * WHEEL_COUNT), (WHEEL_COUNT, 4)),
         array(doubles(4 * WHEEL_COUNT), (WHEEL_COUNT, 4)),
     )
-    tyres = beyond(table, int(numbers[forces.OF_TYRES]))
+    tyres = beyond(table, int(table_of_numbers[forces.OF_TYRES]))
     for i in range(WHEEL_COUNT):
         wheel = WheelContact(patches[i], slips[i], row(ways, forces.WAY, i), report[i])
         _tyre_load(row(tyres, forces.PER_TYRE, i), vehicle, wheel)
-    cells = array(beyond(table, int(numbers[forces.OF_CELLS])), (5, int(numbers[forces.CELLS])))
-    strips = array(beyond(table, int(numbers[forces.OF_STRIPS])), (4, int(numbers[forces.STRIPS])))
-    tyre_forces(patches, slips, strips, cells, numbers[forces.MIDDLE], creeping)
+    cells = array(beyond(table, int(table_of_numbers[forces.OF_CELLS])), (5, int(table_of_numbers[forces.CELLS])))
+    strips = array(beyond(table, int(table_of_numbers[forces.OF_STRIPS])), (4, int(table_of_numbers[forces.STRIPS])))
+    tyre_forces(patches, slips, strips, cells, table_of_numbers[forces.MIDDLE], creeping)
     for i in range(WHEEL_COUNT):
         wheel = WheelContact(patches[i], slips[i], row(ways, forces.WAY, i), report[i])
         creep(row(tyres, forces.PER_TYRE, i), creeping[i], vehicle, wheel)
         ledger[DISSIPATED] += report[i, forces.POWER]
-    _add_steering_torque(numbers[int(numbers[forces.OF_KNOTS]) :], vehicle)
-    leave(numbers, vehicle)
+    _add_steering_torque(table_of_numbers[int(table_of_numbers[forces.OF_KNOTS]) :], vehicle)
+    leave(table_of_numbers, vehicle)
 
 
 @lean
-def bicycle_forces(numbers, t, q, v, f):
-    """Add the bicycle's forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
+def bicycle_forces(table_of_numbers, t, q, v, forces_on_coordinates):
+    """Add the bicycle's forces to ``forces_on_coordinates``. For callbacks: all arguments but the time (s) are pointers
+    to doubles.
+    """
     report, ledger = array(doubles(WHEEL_COUNT * REPORTED), (WHEEL_COUNT, REPORTED)), array(doubles(LEDGER), (LEDGER,))
-    table = array(numbers, (int(array(numbers, (forces.HEADER,))[forces.COUNT]),))
-    all_bicycle_forces(table, array(q, (COUNT,)), array(v, (COUNT,)), array(f, (COUNT,)), report, ledger)
+    table = array(table_of_numbers, (int(array(table_of_numbers, (forces.HEADER,))[forces.COUNT]),))
+    all_bicycle_forces(
+        table, array(q, (COUNT,)), array(v, (COUNT,)), array(forces_on_coordinates, (COUNT,)), report, ledger
+    )
 
 
 @lean
@@ -251,9 +267,9 @@ def set_bicycle_forces(block, t, n):
 
 
 @lean
-def read_bicycle(numbers, q, v, reports, ledgers):
+def read_bicycle(table_of_numbers, q, v, reports, ledgers):
     """Fill reports (m, 2, REPORTED) of the tyres and ledgers (m, LEDGER) of energy for states (m, 9)."""
     f = array(doubles(COUNT), (COUNT,))
     for i in range(len(q)):
         f[:] = 0.0
-        all_bicycle_forces(numbers, q[i], v[i], f, reports[i], ledgers[i])
+        all_bicycle_forces(table_of_numbers, q[i], v[i], f, reports[i], ledgers[i])

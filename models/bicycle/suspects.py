@@ -39,7 +39,7 @@ def predicted_weave(bicycle: Whipple, control: Control, observation: Observation
 
 def ranked_suspects(
     bicycle: Whipple,
-    base: Control,
+    base_control: Control,
     observations: Sequence[Observation],
     suspects: Sequence[str] = tuple(SUSPECTED_PARAMETERS),
 ) -> Choice:
@@ -54,7 +54,7 @@ def ranked_suspects(
     weights = [_whitening_matrix(observation, sensor) for observation in observations]
 
     def left(values: dict[str, float]) -> np.ndarray:
-        control = base.model_copy(update=values)
+        control = base_control.model_copy(update=values)
         return np.concatenate(
             [w @ (o.mean - predicted_weave(bicycle, control, o)) for w, o in zip(weights, observations, strict=True)]
         )
@@ -63,17 +63,21 @@ def ranked_suspects(
 
 
 def averaged_weave(
-    bicycle: Whipple, base: Control, choice: Choice, observation: Observation
+    bicycle: Whipple, base_control: Control, choice: Choice, observation: Observation
 ) -> tuple[np.ndarray, np.ndarray]:
     """Damping and frequency (2,) of the weave, averaged over all subsets with their weights, and their standard
     deviations (2,)."""
-    return choice.forecast(lambda values: predicted_weave(bicycle, base.model_copy(update=values), observation)[:2])
+    return choice.forecast(
+        lambda values: predicted_weave(bicycle, base_control.model_copy(update=values), observation)[:2]
+    )
 
 
-def forecast_deviations(bicycle: Whipple, base: Control, choice: Choice, observation: Observation) -> np.ndarray:
+def forecast_deviations(
+    bicycle: Whipple, base_control: Control, choice: Choice, observation: Observation
+) -> np.ndarray:
     """Forecast less measured damping and frequency (2,), divided by the standard deviation of measurement and forecast
     together."""
-    mean, deviation = averaged_weave(bicycle, base, choice, observation)
+    mean, deviation = averaged_weave(bicycle, base_control, choice, observation)
     return np.asarray((mean - observation.mean[:2]) / np.hypot(observation.deviation[:2], deviation))
 
 

@@ -57,10 +57,14 @@ def decaying_sinusoid(values: np.ndarray, rate: float = SAMPLING_RATE) -> comple
     squares; w is above 0."""
     times = np.arange(len(values)) / rate
 
-    def left(shape: np.ndarray) -> np.ndarray:
-        swing = np.exp(shape[0] * times)
+    def left(decay_and_frequency: np.ndarray) -> np.ndarray:
+        swing = np.exp(decay_and_frequency[0] * times)
         basis = np.column_stack(
-            [swing * np.cos(shape[1] * times), swing * np.sin(shape[1] * times), np.ones_like(times)]
+            [
+                swing * np.cos(decay_and_frequency[1] * times),
+                swing * np.sin(decay_and_frequency[1] * times),
+                np.ones_like(times),
+            ]
         )
         return np.asarray(values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0])
 
@@ -75,14 +79,14 @@ def observations(folder: str | Path) -> list[Observation]:
     folder, rows = Path(folder), _rows_of_windows(Path(folder) / "windows.csv")
     recordings = {label: _columns_of_recording(folder, label) for label in {row[0] for row in rows}}
     by_speed = dict[float, list[tuple[complex, float, float]]]()
-    for line, (label, speed, first, last) in enumerate(rows, 2):
+    for line, (label, speed, first_sample, last_sample) in enumerate(rows, 2):
         recording = recordings[label]
-        if last >= len(recording["speed"]):
+        if last_sample >= len(recording["speed"]):
             allowed = f"the recording has {len(recording['speed'])} samples"
-            raise InputError(folder / "windows.csv", f"line {line}, last sample", last, allowed)
-        lean, steer, sensor = (recording[name][first : last + 1] for name in COLUMN_HEADINGS)
+            raise InputError(folder / "windows.csv", f"line {line}, last sample", last_sample, allowed)
+        lean, steer, sensor = (recording[name][first_sample : last_sample + 1] for name in COLUMN_HEADINGS)
         if not np.isfinite([lean, steer, sensor]).all() or not np.any(steer) or np.ptp(lean) == 0.0:
-            raise InputError(folder / "windows.csv", f"line {line}", first, "gaps, or no motion, in this window")
+            raise InputError(folder / "windows.csv", f"line {line}", first_sample, "gaps, or no motion, in this window")
         slowness = np.abs(steer).mean() / np.mean(steer**2)
         by_speed.setdefault(speed, []).append((decaying_sinusoid(lean), float(sensor.mean()), float(slowness)))
     for speed, of_speed in by_speed.items():

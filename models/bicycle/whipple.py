@@ -178,8 +178,8 @@ class Whipple(Strict):
         M, C1, K0, K2 = self.linear
         damping = speed * C1 + np.array([[0.0, 0.0], [-control.lean_rate_gain(speed), control.friction]])
         stiffness = self.gravity * K0 + speed**2 * K2
-        below = np.linalg.solve(M, -np.hstack([stiffness, damping]))
-        return np.vstack([np.eye(2, 4, 2), below])
+        lower_rows = np.linalg.solve(M, -np.hstack([stiffness, damping]))
+        return np.vstack([np.eye(2, 4, 2), lower_rows])
 
     def eigenvalues(self, speed: float, control: Control = NO_CONTROL) -> np.ndarray:
         """Eigenvalues (4,) in 1/s at a speed (m/s), sorted by real, then imaginary part."""
@@ -206,8 +206,11 @@ class Whipple(Strict):
                 Polynomial(M[i, j]),
             ]
 
-        one, two = _product_of_quadratics(entry(0, 0), entry(1, 1)), _product_of_quadratics(entry(0, 1), entry(1, 0))
-        return [a - b for a, b in zip(one, two, strict=True)]
+        diagonal_product, other_product = (
+            _product_of_quadratics(entry(0, 0), entry(1, 1)),
+            _product_of_quadratics(entry(0, 1), entry(1, 0)),
+        )
+        return [a - b for a, b in zip(diagonal_product, other_product, strict=True)]
 
     @property
     def weave_speed(self) -> float | None:
@@ -226,11 +229,11 @@ class Whipple(Strict):
         return roots[-1] if roots else None
 
 
-def _product_of_quadratics(one: list[Polynomial], two: list[Polynomial]) -> list[Polynomial]:
+def _product_of_quadratics(first_entry: list[Polynomial], second_entry: list[Polynomial]) -> list[Polynomial]:
     """Coefficients of the product of two quadratics in s."""
     total = [Polynomial([0.0]) for _ in range(5)]
-    for i, a in enumerate(one):
-        for j, b in enumerate(two):
+    for i, a in enumerate(first_entry):
+        for j, b in enumerate(second_entry):
             total[i + j] = total[i + j] + a * b
     return total
 
@@ -246,13 +249,16 @@ def _positive_roots(condition: Polynomial) -> list[float]:
     return sorted(float(np.sqrt(square)) for square in real if square > 0.0)
 
 
-def load_bicycle(name: str, folder: str | Path = ".", file: str = "", place: str = "bicycle") -> Whipple:
-    """The parameter set with this name, or in a TOML file with all parameters; ``file`` and ``place`` name the asking
-    scene in messages."""
+def load_bicycle(name: str, folder: str | Path = ".", file: str = "", key_path: str = "bicycle") -> Whipple:
+    """The parameter set with this name, or in a TOML file with all parameters; ``file`` and ``key_path`` name the
+    asking scene in messages.
+    """
     sets = {path.stem: path for path in sorted(PARAMETER_SET_FOLDER.glob("*.toml"))}
     if name not in sets and not name.endswith(".toml"):
-        raise InputError(file, place, name, "must be a TOML file with all parameters, or a parameter set", tuple(sets))
-    path = sets.get(name) or existing(name, Path(folder), file, place)
+        raise InputError(
+            file, key_path, name, "must be a TOML file with all parameters, or a parameter set", tuple(sets)
+        )
+    path = sets.get(name) or existing(name, Path(folder), file, key_path)
     bicycle = read(Whipple, parse(path), path.name)
     try:
         bicycle.linear  # noqa: B018

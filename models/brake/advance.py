@@ -42,27 +42,29 @@ def end_status(motion, plane):
 
 
 @inlined
-def parts_of(state, regular):
-    """Number of equal parts into which to cut a step, so that the speed ``regular`` (m/s) falls below the vehicle's
-    speed.
+def parts_of(state, regularising_speed):
+    """Number of equal parts into which to cut a step, so that the speed ``regularising_speed`` (m/s) falls below the
+    vehicle's speed.
 
-    Slip angles are too small below ``regular``: the vehicle would slip sideways, and yaw on split friction, too far.
+    Slip angles are too small below ``regularising_speed``: the vehicle would slip sideways, and yaw on split friction,
+    too far.
     """
     speed = math.hypot(state[1, 0], state[1, 1])
-    return 1 if speed == 0.0 else int(min(math.ceil(regular / speed), MOST_PARTS))
+    return 1 if speed == 0.0 else int(min(math.ceil(regularising_speed / speed), MOST_PARTS))
 
 
 @lean
-def in_parts(parts, motion, torques, step, steer, vehicle, surfaces):
-    """Apply ``step_on`` to equal parts of a step. The report holds means over the parts, but the sum of the times
-    locked."""
-    rows, piece, time, regular = motion.report, step / parts, 0.0, vehicle.slope * 9.81 * step / parts
+def in_parts(part_count, motion, torques, step, steer, vehicle, surfaces):
+    """Apply ``step_on`` to ``part_count`` equal parts of a step. The report holds means over the parts, but the sum of
+    the times locked.
+    """
+    rows, piece, time, regular = motion.report, step / part_count, 0.0, vehicle.slope * 9.81 * step / part_count
     ends, sums = array(doubles(torques.size), torques.shape), array(doubles(rows.size), rows.shape)
     sums[:] = 0.0
-    for k in range(parts):
+    for k in range(part_count):
         for i in range(torques.shape[1]):
             for side in range(2):
-                ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / parts
+                ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / part_count
         used = step_on(motion, ends, piece, steer, regular, vehicle, surfaces)
         if used < 0.0:
             return used
@@ -75,7 +77,7 @@ def in_parts(parts, motion, torques, step, steer, vehicle, surfaces):
     report, locked = report_of(rows), report_of(sums).locked
     for c in range(rows.shape[0]):
         for i in range(rows.shape[1]):
-            rows[c, i] = sums[c, i] / parts
+            rows[c, i] = sums[c, i] / part_count
     for i in range(locked.size):
         report.locked[i], report.turning[i] = locked[i], motion.turning[i]
     return step
@@ -135,34 +137,37 @@ def _folded_sentence(plane: Plane, headings: np.ndarray) -> str:
 
 def _side_or_axle_lifted(loads: np.ndarray) -> bool:
     """Whether both wheels of a side, or both wheels of an axle, carry no load."""
-    up = loads <= 0.0
-    return bool((up[0] or up[3]) and (up[1] or up[2]))
+    is_lifted = loads <= 0.0
+    return bool((is_lifted[0] or is_lifted[3]) and (is_lifted[1] or is_lifted[2]))
 
 
 def _acceleration(plane: Plane, first: int, motion: PlaneMotion) -> tuple[float, float]:
     """Longitudinal and lateral acceleration (m/s^2) of a two-axle unit, in its own axes."""
     accelerations = motion.accelerations
-    k, along, across = plane.group[first], np.zeros(accelerations.size), np.zeros(accelerations.size)
+    k, row_along, across = plane.group[first], np.zeros(accelerations.size), np.zeros(accelerations.size)
     units = np.column_stack((np.cos(motion.state[0, 2:]), np.sin(motion.state[0, 2:])))
-    ahead, aside = fill_velocity_rows(
-        ChainPoint(k, 0.0, 0.0), Direction(*units[k]), units, motion.state[1], plane, along, across
+    bias_along, bias_across = fill_velocity_rows(
+        ChainPoint(k, 0.0, 0.0), Direction(*units[k]), units, motion.state[1], plane, row_along, across
     )
-    return float(along @ accelerations + ahead), float(across @ accelerations + aside)
+    return float(row_along @ accelerations + bias_along), float(across @ accelerations + bias_across)
 
 
 def _tipping_sentence(status: int, plane: Plane, four: slice, rates: tuple[float, float], loads: np.ndarray) -> str:
     """Sentence on how a vehicle tips over, from moments about the wheels that stay on the road; the statics are those
     of a body whose wheel loads follow its accelerations."""
-    body, (ahead, aside) = BODY_NAMES[four.start // 4], rates
-    static, by_x, by_y, y = (part[four] for part in (plane.static, plane.by_x, plane.by_y, plane.place[:, 1]))
+    body, (deceleration, side_acceleration) = BODY_NAMES[four.start // 4], rates
+    static, by_x, by_y, y = (
+        wheel_values[four] for wheel_values in (plane.static, plane.by_x, plane.by_y, plane.place[:, 1])
+    )
     if status == PITCHED_OVER:
         axle = 0 if loads[four][:2].max() <= 0.0 else 2
         limit = -static[axle : axle + 2].sum() / by_x[axle : axle + 2].sum()
         return (
-            f"the {body} pitches over: its {'rear' if axle else 'front'} wheels lift off at {ahead:.2f} m/s^2 "
+            f"the {body} pitches over: its {'rear' if axle else 'front'} wheels lift off at {deceleration:.2f} m/s^2 "
             f"along it, limit {limit:.2f}"
         )
-    pressed = static + by_x * ahead
+    pressed = static + by_x * deceleration
     limit = float(np.abs(y) @ pressed / np.abs(by_y @ y))
     side = "left" if loads[four][0] <= 0.0 else "right"
-    return f"the {body} rolls over: its {side} wheels lift off at {aside:.2f} m/s^2 across it, limit {limit:.2f}"
+    lift_off = f"its {side} wheels lift off at {side_acceleration:.2f} m/s^2 across it"
+    return f"the {body} rolls over: {lift_off}, limit {limit:.2f}"

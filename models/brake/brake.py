@@ -49,20 +49,21 @@ def of_wheels(*brakes: Brake) -> Brakes:
 
 
 @lean
-def torque(i, pressure, before, brakes):
-    """Torque (N m) of brake i at a pressure (bar), where ``before`` is its last torque and the pressure has not turned
-    back since."""
-    up = brakes.rising[i] * max(0.0, pressure - brakes.push_out[i])
-    down = brakes.falling[i] * max(0.0, pressure - brakes.release[i])
-    return max(up, min(down, before))
+def torque(i, pressure, last_torque, brakes):
+    """Torque (N m) of brake i at a pressure (bar), where ``last_torque`` is its last torque and the pressure has not
+    turned back since.
+    """
+    rising_torque = brakes.rising[i] * max(0.0, pressure - brakes.push_out[i])
+    falling_torque = brakes.falling[i] * max(0.0, pressure - brakes.release[i])
+    return max(rising_torque, min(falling_torque, last_torque))
 
 
 def torques_of_pressures(pressures: np.ndarray, brakes: Brakes) -> np.ndarray:
     """Torques (n,) in N m of the first brake over a sequence of pressures (n,) in bar; it starts without torque."""
-    before, along = 0.0, np.empty(len(pressures))
+    last_torque, torques = 0.0, np.empty(len(pressures))
     for n, pressure in enumerate(pressures):
-        before = along[n] = torque(0, pressure, before, brakes)
-    return along
+        last_torque = torques[n] = torque(0, pressure, last_torque, brakes)
+    return torques
 
 
 PAPER_FRONT = Brake(push_out=0.75, release=0.71, rising=1500.0, falling=1500.0)

@@ -37,17 +37,17 @@ class Axles:
 
     def dynamic_loads(self, z: float) -> tuple[float, float]:
         """Loads (N) of the front and the rear axle when the vehicle decelerates at z g."""
-        moved = self.height / self.wheelbase * z * self.weight
-        return self.front + moved, self.rear - moved
+        transferred_load = self.height / self.wheelbase * z * self.weight
+        return self.front + transferred_load, self.rear - transferred_load
 
 
 def crossing_time(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
     """Time (s) at which the speed first falls below ``speed``, interpolated linearly between samples; NaN if it never
     does."""
-    below = np.flatnonzero(speeds < speed)
-    if below.size == 0 or below[0] == 0:
+    rows_below = np.flatnonzero(speeds < speed)
+    if rows_below.size == 0 or rows_below[0] == 0:
         return float("nan")
-    i = below[0]
+    i = rows_below[0]
     share = (speeds[i - 1] - speed) / (speeds[i - 1] - speeds[i])
     return float(times[i - 1] + share * (times[i] - times[i - 1]))
 
@@ -57,9 +57,12 @@ def way_at(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray, time: fl
     i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2))
     passed, long = time - times[i], times[i + 1] - times[i]
     rate = (speeds[i + 1] - speeds[i]) / long
-    whole = long * (speeds[i] + 0.5 * rate * long)
-    some = passed * (speeds[i] + 0.5 * rate * passed)
-    return float(distance[i] + (distance[i + 1] - distance[i]) * (some / whole if whole > 0.0 else 0.0))
+    full_distance = long * (speeds[i] + 0.5 * rate * long)
+    partial_distance = passed * (speeds[i] + 0.5 * rate * passed)
+    return float(
+        distance[i]
+        + (distance[i + 1] - distance[i]) * (partial_distance / full_distance if full_distance > 0.0 else 0.0)
+    )
 
 
 def mean_fully_developed(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray) -> float:
@@ -174,10 +177,10 @@ def lock_table(
     UN R13, Annex 13 lets wheels lock below 15 km/h, and briefly above; not checked against the text of the regulation.
     """
     counted = locked & (speeds > least_speed)[:, None]
-    longest, now = np.zeros(locked.shape[1]), np.zeros(locked.shape[1])
+    longest, locked_time = np.zeros(locked.shape[1]), np.zeros(locked.shape[1])
     for length, row in zip(lengths, counted, strict=True):
-        now = np.where(row, now + length, 0.0)
-        longest = np.maximum(longest, now)
+        locked_time = np.where(row, locked_time + length, 0.0)
+        longest = np.maximum(longest, locked_time)
     time = lengths @ counted
-    whole = float(lengths[speeds > least_speed].sum())
-    return Locks(time, time / whole if whole else time, longest)
+    time_above = float(lengths[speeds > least_speed].sum())
+    return Locks(time, time / time_above if time_above else time, longest)

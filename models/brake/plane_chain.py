@@ -30,30 +30,30 @@ ALONG_X = Direction(1.0, 0.0)
 
 
 @lean
-def velocity(point, positions, rates, reach):
+def velocity(point, positions, rates, arm_lengths):
     """Velocity (2) of a ``ChainPoint`` in the ground's axes."""
     k, x, y = point
     vx, vy = rates[0], rates[1]
-    for j in range(reach.shape[1]):
-        way = reach[k, j] + (x if j == k else 0.0)
+    for j in range(arm_lengths.shape[1]):
+        arm = arm_lengths[k, j] + (x if j == k else 0.0)
         c, s = math.cos(positions[2 + j]), math.sin(positions[2 + j])
         side = y if j == k else 0.0
-        vx += rates[2 + j] * (-way * s - side * c)
-        vy += rates[2 + j] * (way * c - side * s)
+        vx += rates[2 + j] * (-arm * s - side * c)
+        vy += rates[2 + j] * (arm * c - side * s)
     return vx, vy
 
 
 @lean
-def chain_point_place(point, positions, reach):
+def chain_point_place(point, positions, arm_lengths):
     """Position (2) of a ``ChainPoint`` on the ground."""
     k, x, y = point
     px, py = positions[0], positions[1]
-    for j in range(reach.shape[1]):
-        way = reach[k, j] + (x if j == k else 0.0)
+    for j in range(arm_lengths.shape[1]):
+        arm = arm_lengths[k, j] + (x if j == k else 0.0)
         c, s = math.cos(positions[2 + j]), math.sin(positions[2 + j])
         side = y if j == k else 0.0
-        px += way * c - side * s
-        py += way * s + side * c
+        px += arm * c - side * s
+        py += arm * s + side * c
     return px, py
 
 
@@ -77,7 +77,7 @@ def fill_headings(positions, units):
 
 
 @inlined
-def fill_velocity_rows(point, direction, units, rates, plane, along, across):
+def fill_velocity_rows(point, direction, units, rates, plane, row_along, row_across):
     """Fill the two rows (n,) that map the coordinates' rates to the velocity of a ``ChainPoint`` along a ``Direction``
     and to the left of it; ``units`` : see ``fill_headings``.
 
@@ -85,34 +85,36 @@ def fill_velocity_rows(point, direction, units, rates, plane, along, across):
     force in these axes gives generalised forces by the transposed rows.
     """
     c, s = direction.cosine, direction.sine
-    along[0], along[1], across[0], across[1] = c, s, -s, c
-    ahead, aside = 0.0, 0.0
+    row_along[0], row_along[1], row_across[0], row_across[1] = c, s, -s, c
+    bias_along, bias_across = 0.0, 0.0
     for j in range(len(plane.units)):
-        way, side = plane.reach[point.unit, j], 0.0
+        arm, side = plane.reach[point.unit, j], 0.0
         if j == point.unit:
-            way, side = way + point.x, point.y
-        turned, aslant = c * units[j, 0] + s * units[j, 1], s * units[j, 0] - c * units[j, 1]
-        along[2 + j], across[2 + j] = way * aslant - side * turned, way * turned + side * aslant
-        ahead -= across[2 + j] * rates[2 + j] ** 2
-        aside += along[2 + j] * rates[2 + j] ** 2
-    return ahead, aside
+            arm, side = arm + point.x, point.y
+        cosine_between, aslant = c * units[j, 0] + s * units[j, 1], s * units[j, 0] - c * units[j, 1]
+        row_along[2 + j], row_across[2 + j] = arm * aslant - side * cosine_between, arm * cosine_between + side * aslant
+        bias_along -= row_across[2 + j] * rates[2 + j] ** 2
+        bias_across += row_along[2 + j] * rates[2 + j] ** 2
+    return bias_along, bias_across
 
 
 @inlined
-def inertia(units, rates, plane, mass, right, along, across):
-    """Fill the mass matrix (n, n), and ``right`` (n,) with the centrifugal terms, which stand beside the forces in the
-    equations.
+def inertia(units, rates, plane, mass, right_side, row_along, row_across):
+    """Fill the mass matrix (n, n), and ``right_side`` (n,) with the centrifugal terms, which stand beside the forces in
+    the equations.
 
-    units : see ``fill_headings``; along, across (n,) : room to work in.
+    units : see ``fill_headings``; row_along, row_across (n,) : room to work in.
     """
     size = coordinates(plane)
-    mass[:], right[:] = 0.0, 0.0
+    mass[:], right_side[:] = 0.0, 0.0
     for k in range(len(plane.units)):
-        ahead, aside = fill_velocity_rows(ChainPoint(k, 0.0, 0.0), ALONG_X, units, rates, plane, along, across)
+        bias_along, bias_across = fill_velocity_rows(
+            ChainPoint(k, 0.0, 0.0), ALONG_X, units, rates, plane, row_along, row_across
+        )
         for a in range(size):
-            right[a] -= plane.masses[k] * (along[a] * ahead + across[a] * aside)
+            right_side[a] -= plane.masses[k] * (row_along[a] * bias_along + row_across[a] * bias_across)
             for b in range(size):
-                mass[a, b] += plane.masses[k] * (along[a] * along[b] + across[a] * across[b])
+                mass[a, b] += plane.masses[k] * (row_along[a] * row_along[b] + row_across[a] * row_across[b])
         mass[2 + k, 2 + k] += plane.inertias[k]
 
 
@@ -125,26 +127,26 @@ def factorise_mass(mass, plane):
     first = count_of_prescribed(plane)
     for a in range(first, mass.shape[0]):
         for b in range(first, a + 1):
-            rest = mass[a, b]
+            element = mass[a, b]
             for c in range(first, b):
-                rest -= mass[a, c] * mass[b, c]
-            mass[a, b] = math.sqrt(rest) if a == b else rest / mass[b, b]
+                element -= mass[a, c] * mass[b, c]
+            mass[a, b] = math.sqrt(element) if a == b else element / mass[b, b]
 
 
 @inlined
-def solve(mass, plane, right):
-    """Turn forces (n,) in ``right`` into accelerations of the free coordinates, in place, with the matrix from
+def solve(mass, plane, right_side):
+    """Turn forces (n,) in ``right_side`` into accelerations of the free coordinates, in place, with the matrix from
     ``factorise_mass``."""
     size, first = coordinates(plane), count_of_prescribed(plane)
     if len(plane.units) == 1:
         for a in range(size):
-            right[a] /= mass[a, a]
+            right_side[a] /= mass[a, a]
         return
     for a in range(first, size):
         for b in range(first, a):
-            right[a] -= mass[a, b] * right[b]
-        right[a] /= mass[a, a]
+            right_side[a] -= mass[a, b] * right_side[b]
+        right_side[a] /= mass[a, a]
     for a in range(size - 1, first - 1, -1):
         for b in range(a + 1, size):
-            right[a] -= mass[b, a] * right[b]
-        right[a] /= mass[a, a]
+            right_side[a] -= mass[b, a] * right_side[b]
+        right_side[a] /= mass[a, a]

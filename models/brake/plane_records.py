@@ -53,9 +53,9 @@ class PlaneMotion(NamedTuple):
     report: np.ndarray
 
 
-def motion_of(state: np.ndarray, turning: np.ndarray) -> PlaneMotion:
+def motion_of(state: np.ndarray, wheel_turning: np.ndarray) -> PlaneMotion:
     """A ``PlaneMotion`` with zero accelerations and an empty report, from positions and rates, and wheel rotation."""
-    return PlaneMotion(state, turning, np.zeros(state.shape[1]), np.zeros((REPORT_SIZE, turning.size)))
+    return PlaneMotion(state, wheel_turning, np.zeros(state.shape[1]), np.zeros((REPORT_SIZE, wheel_turning.size)))
 
 
 class Wheels(NamedTuple):

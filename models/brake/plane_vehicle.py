@@ -72,18 +72,18 @@ class Plane(NamedTuple):
         return self.unit.size
 
 
-def plane_of_truck(vehicle: Truck, transfer: bool = True) -> Plane:
-    """``Plane`` of a two-axle vehicle; without ``transfer`` its wheel loads stay as they are at rest."""
+def plane_of_truck(vehicle: Truck, with_load_transfer: bool = True) -> Plane:
+    """``Plane`` of a two-axle vehicle; without ``with_load_transfer`` its wheel loads stay as they are at rest."""
     check_wheels(vehicle, vehicle.mass)
-    none = np.zeros(4, dtype=np.int64)
-    place, radius, spin, static, by_x, by_y = wheels(vehicle, transfer)
+    zeros = np.zeros(4, dtype=np.int64)
+    wheel_positions, radius, spin, static, by_x, by_y = wheels(vehicle, with_load_transfer)
     return Plane(
         np.array([vehicle.mass]),
         np.array([vehicle.yaw_inertia]),
         np.zeros((1, 1)),
-        none,
-        none.copy(),
-        place,
+        zeros,
+        zeros.copy(),
+        wheel_positions,
         radius,
         spin,
         static,
@@ -96,32 +96,39 @@ def plane_of_truck(vehicle: Truck, transfer: bool = True) -> Plane:
 def check_wheels(vehicle: Truck, mass: float) -> None:
     """Refuse a vehicle whose mass (kg) is at most its wheels' smallest possible mass: J / r^2 each, as if all in the
     rim."""
-    least = sum(2.0 * axle.spin_inertia / axle.radius**2 for axle in (vehicle.front, vehicle.rear))
-    if mass <= least:
-        allowed = f"must be above {least:.4g} kg: J / r^2 of its wheels, which cannot be lighter"
+    least_mass = sum(2.0 * axle.spin_inertia / axle.radius**2 for axle in (vehicle.front, vehicle.rear))
+    if mass <= least_mass:
+        allowed = f"must be above {least_mass:.4g} kg: J / r^2 of its wheels, which cannot be lighter"
         raise InputError("", "mass", mass, allowed)
 
 
-def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
+def wheels(vehicle: Truck, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
     """Fields place (4, 2), radius, spin, static, by_x and by_y (4,) of ``Plane`` for the four wheels of a two-axle
     body."""
     if not vehicle.front.x > 0.0 > vehicle.rear.x:
         raise InputError("", "rear.x", vehicle.rear.x, "must be below 0, and front.x above")
     shares = vehicle.front.roll_share + vehicle.rear.roll_share
-    if transfer and abs(shares - 1.0) > 1e-9:
+    if with_load_transfer and abs(shares - 1.0) > 1e-9:
         raise InputError("", "roll_share", shares, "of both axles must add up to 1")
     front, rear, side = vehicle.front, vehicle.rear, np.array([1.0, -1.0, 1.0, -1.0])
 
-    def each(name: str) -> np.ndarray:
+    def by_wheel(name: str) -> np.ndarray:
         """One value per wheel (4,) of a parameter that belongs to its axle."""
         return np.repeat([getattr(front, name), getattr(rear, name)], 2)
 
     share = np.repeat([-rear.x / vehicle.wheelbase, front.x / vehicle.wheelbase], 2)
     pitch = np.repeat([-1.0, 1.0], 2) * vehicle.mass * vehicle.height / (2.0 * vehicle.wheelbase)
-    roll = -side * each("roll_share") * vehicle.mass * vehicle.height / each("track")
-    place = np.column_stack((each("x"), side * each("track") / 2.0))
+    roll = -side * by_wheel("roll_share") * vehicle.mass * vehicle.height / by_wheel("track")
+    wheel_positions = np.column_stack((by_wheel("x"), side * by_wheel("track") / 2.0))
     static = vehicle.mass * GRAVITY * share / 2.0
-    return place, each("radius"), each("spin_inertia"), static, pitch * transfer, roll * transfer
+    return (
+        wheel_positions,
+        by_wheel("radius"),
+        by_wheel("spin_inertia"),
+        static,
+        pitch * with_load_transfer,
+        roll * with_load_transfer,
+    )
 
 
 PAPER_TRUCK = Truck(

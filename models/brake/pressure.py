@@ -78,27 +78,27 @@ def chamber_pressure(pressure, valve, time, fill, empty, supply):
 def press(valves, time, air, chambers, brakes):
     """Update pressures and torques over a time (s) with constant valve states (W,). Every pressure changes
     monotonically, so the torque law holds."""
-    taken = 0.0
+    air_used = 0.0
     for i in range(valves.size):
-        before = air.pressure[i]
+        pressure_before = air.pressure[i]
         fill = chambers.slow[i] if valves[i] == SLOW else chambers.fill_time[i]
-        after = chamber_pressure(before, valves[i], time, fill, chambers.empty_time[i], air.supply[0])
-        air.pressure[i], air.torque[i] = after, torque(i, after, air.torque[i], brakes)
+        pressure_after = chamber_pressure(pressure_before, valves[i], time, fill, chambers.empty_time[i], air.supply[0])
+        air.pressure[i], air.torque[i] = pressure_after, torque(i, pressure_after, air.torque[i], brakes)
         if valves[i] >= APPLY and chambers.reservoir < math.inf:
-            taken += chambers.volumes[i] * (after - before)
-    if taken > 0.0:
-        air.supply[0] -= taken / chambers.reservoir
+            air_used += chambers.volumes[i] * (pressure_after - pressure_before)
+    if air_used > 0.0:
+        air.supply[0] -= air_used / chambers.reservoir
 
 
 @lean
 def by_valves(valves, sample, air, chambers, brakes, torques):
     """Mode V, control by valves: fill ``torques`` (n + 1, W), at the ends of the n steps of a sample (s)."""
-    steps, last = torques.shape[0] - 1, air.commands.shape[0] - 1
+    steps, last_command = torques.shape[0] - 1, air.commands.shape[0] - 1
     for i in range(valves.size):
-        for k in range(last):
+        for k in range(last_command):
             air.commands[k, i] = air.commands[k + 1, i]
-        air.commands[last, i], torques[0, i] = valves[i], air.torque[i]
-    late = chambers.delay - (last - 1) * sample
+        air.commands[last_command, i], torques[0, i] = valves[i], air.torque[i]
+    late = chambers.delay - (last_command - 1) * sample
     step = sample / steps
     for n in range(steps):
         wait = min(max(late - n * step, 0.0), step)

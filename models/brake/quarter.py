@@ -43,21 +43,21 @@ class Quarter(Strict):
 
     @model_validator(mode="after")
     def _holds_its_wheel(self) -> "Quarter":
-        least = self.spin_inertia / self.radius**2
-        if self.mass <= least:
-            raise ValueError(f"mass must be above {least:.4g} kg: J / r^2 of the wheel, which cannot be lighter")
+        least_mass = self.spin_inertia / self.radius**2
+        if self.mass <= least_mass:
+            raise ValueError(f"mass must be above {least_mass:.4g} kg: J / r^2 of the wheel, which cannot be lighter")
         return self
 
     @property
     def plane(self) -> Plane:
         """The quarter vehicle as a ``Plane`` for compiled functions: one unit with one wheel at its centre."""
-        none, unit = np.zeros(1, dtype=np.int64), np.ones(1)
+        zeros, unit = np.zeros(1, dtype=np.int64), np.ones(1)
         return Plane(
             self.mass * unit,
             unit,
             np.zeros((1, 1)),
-            none,
-            none.copy(),
+            zeros,
+            zeros.copy(),
             np.zeros((1, 2)),
             self.radius * unit,
             self.spin_inertia * unit,
@@ -88,10 +88,10 @@ class QuarterStop:
     def release_time(self) -> float:
         """Time (s) at which the wheel first turned again after a locked period; NaN if it never did."""
         time, locked = self.path.time, self.path.locked
-        held = np.flatnonzero(locked > 0.0)
-        if held.size == 0 or self.path.turning[held[-1]] == 0.0:
+        locked_rows = np.flatnonzero(locked > 0.0)
+        if locked_rows.size == 0 or self.path.turning[locked_rows[-1]] == 0.0:
             return float("nan")
-        return float(time[held[-1] - 1] + locked[held[-1]])
+        return float(time[locked_rows[-1] - 1] + locked[locked_rows[-1]])
 
 
 @njit(cache=True, error_model="numpy")
@@ -101,18 +101,18 @@ def march(motion, torques, step, vehicle, path):
     path is filled from its second place on. Returns the step in which the vehicle came to rest, -1 if in none, -2 if
     loads were not found; a vehicle that rests is left to its torques like one that moves.
     """
-    rest, straight, surfaces = -1, np.zeros(1), surfaces_of(np.empty((4, 1)))
+    rest_step, straight, surfaces = -1, np.zeros(1), surfaces_of(np.empty((4, 1)))
     for n in range(torques.shape[0] - 1):
         under_wheels(motion.state, step, vehicle, surfaces)
         used = step_on(motion, torques[n : n + 2], step, straight, LEAST_SLIP_SPEED, vehicle, surfaces)
         if used < 0.0:
             return -2
-        if used < step and rest < 0:
-            rest = n + 1
+        if used < step and rest_step < 0:
+            rest_step = n + 1
         path.time[n + 1], path.position[n + 1] = path.time[n] + step, motion.state[0, 0]
         path.speed[n + 1], path.turning[n + 1] = motion.state[1, 0], motion.turning[0]
         path.locked[n + 1] = report_of(motion.report).locked[0] if used == step else 0.0
-    return rest
+    return rest_step
 
 
 def braked(
@@ -122,21 +122,21 @@ def braked(
     torques: np.ndarray,
     step: float,
     speed: float,
-    turning: float | None = None,
+    rim_turning: float | None = None,
 ) -> QuarterStop:
     """Straight braking from a speed (m/s) under torques (n + 1,) in N m at the steps' ends (s), linear between.
 
-    turning : rad/s at the start, that of rolling if not given. Raises InputError for a torque below 0 or no number.
+    rim_turning : rad/s at the start, that of rolling if not given. Raises InputError for a torque below 0 or no number.
     """
     if not (np.isfinite(torques).all() and (torques >= 0.0).all()):
         raise InputError("", "torques", float(np.min(torques)), "must be numbers from 0 on: a brake opposes turning")
     state, path = np.zeros((2, 3)), QuarterPath(*np.zeros((5, torques.size)))
     state[1, 0] = speed
-    spin = np.array([speed / quarter.radius if turning is None else turning])
+    spin = np.array([speed / quarter.radius if rim_turning is None else rim_turning])
     path.speed[0], path.turning[0] = speed, spin[0]
     vehicle = OnRoad(quarter.plane, np.zeros(1, dtype=np.int64), 0.0, tyres, road)
     ends = np.ascontiguousarray(torques, dtype=float)[:, None]
-    rest = march(motion_of(state, spin), ends, step, vehicle, path)
-    if rest == -2 or not all(np.isfinite(part).all() for part in path):
+    rest_step = march(motion_of(state, spin), ends, step, vehicle, path)
+    if rest_step == -2 or not all(np.isfinite(path_array).all() for path_array in path):
         raise RunFailed("braking", "no loads were found", float(path.time.max()))
-    return QuarterStop(path, rest)
+    return QuarterStop(path, rest_step)

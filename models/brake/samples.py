@@ -47,22 +47,22 @@ def row(coordinates: int, wheels: int) -> Row:
     """A ``Row`` of zeros for so many coordinates and wheels."""
     shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (REPORT_SIZE, wheels))
     ends = np.cumsum([math.prod(shape) for shape in shapes])
-    whole = np.zeros(ends[-1])
-    columns = np.split(whole, ends[:-1])
-    return Row(whole, *(column.reshape(shape) for column, shape in zip(columns, shapes, strict=True)))
+    block = np.zeros(ends[-1])
+    columns = np.split(block, ends[:-1])
+    return Row(block, *(column.reshape(shape) for column, shape in zip(columns, shapes, strict=True)))
 
 
 def parts(rows: list[np.ndarray], like: Row) -> Row:
     """``Row`` whose fields hold many rows each, from blocks of rows laid out as ``like``: every field has a first axis
     more, over the rows."""
-    ends = np.cumsum([part.size for part in like[1:]])
-    whole = np.concatenate(rows)
-    columns = np.split(whole, ends[:-1], axis=1)
+    ends = np.cumsum([field.size for field in like[1:]])
+    block = np.concatenate(rows)
+    columns = np.split(block, ends[:-1], axis=1)
     return Row(
-        whole,
+        block,
         *(
-            np.ascontiguousarray(column).reshape(-1, *part.shape)
-            for column, part in zip(columns, like[1:], strict=True)
+            np.ascontiguousarray(column).reshape(-1, *field.shape)
+            for column, field in zip(columns, like[1:], strict=True)
         ),
     )
 
@@ -122,16 +122,16 @@ structref.define_proxy(Reference, ReferenceType, Subject._fields)
 
 
 @njit(cache=True, error_model="numpy")
-def by_reference(commands, record, sample, braking, motion, others):
+def by_reference(commands, record, sample, braking, motion, vehicle_parts):
     """``Reference`` to the fields of a ``Subject``."""
-    return Reference(commands, record, sample, braking, motion, others)
+    return Reference(commands, record, sample, braking, motion, vehicle_parts)
 
 
 go: Callable[..., Any] = advance
 """Stands here for what ``moved`` puts in its place."""
 
 
-def some_samples(commands, record, sample, braking, motion, simulated_time, *others):
+def some_samples(commands, record, sample, braking, motion, simulated_time, *vehicle_parts):
     """Advance a vehicle from a time (s) on by ``commands.samples`` samples, or until it stops or the run ends. ``go``
     makes each step: ``advance`` or a function in its place. Returns how the last sample ended, and the time (s)."""
     air, chambers, brakes, torques = braking
@@ -141,7 +141,7 @@ def some_samples(commands, record, sample, braking, motion, simulated_time, *oth
             by_valves(commands.valves, sample, air, chambers, brakes, torques)
         else:
             by_pressures(commands.pressures, air, brakes, torques)
-        status, used = go(motion, torques, step, commands.steer, *others)
+        status, used = go(motion, torques, step, commands.steer, *vehicle_parts)
         simulated_time += used
         if status not in (FINE, AT_REST):
             break
@@ -178,10 +178,10 @@ def samples(subject):
         )
 
 
-def _with_globals(function: Callable[..., Any], **given: Any) -> Callable[..., Any]:
+def _with_globals(function: Callable[..., Any], **replacements: Any) -> Callable[..., Any]:
     """A copy of the function with other globals and without closure cells. numba identifies functions by the contents
     of these cells, which differ between processes if they hold compiled functions."""
-    return FunctionType(function.__code__, globals() | given, function.__name__)
+    return FunctionType(function.__code__, globals() | replacements, function.__name__)
 
 
 MoveSamples = Callable[..., Iterator[tuple[int, float, float, float]]]
@@ -192,8 +192,8 @@ def moved(step_function: Callable[..., Any]) -> MoveSamples:
     """``samples`` that advances its vehicle by the given ``step_function``."""
     march = _with_globals(samples, some=_with_globals(some_samples, go=step_function))
 
-    def begun(commands, record, sample, braking, motion, *others):
-        return march(Subject(commands, record, sample, braking, motion, others))
+    def begun(commands, record, sample, braking, motion, *vehicle_parts):
+        return march(Subject(commands, record, sample, braking, motion, vehicle_parts))
 
     return begun
 
@@ -204,16 +204,16 @@ class CompiledSamples:
 
     march: Callable[[Reference], Iterator[tuple[int, float, float, float]]]
 
-    def __call__(self, commands, record, sample, braking, motion, *others):
+    def __call__(self, commands, record, sample, braking, motion, *vehicle_parts):
         """Generator of ``samples``, from the fields of a ``Subject``."""
-        return self.march(by_reference(commands, record, sample, braking, motion, others))
+        return self.march(by_reference(commands, record, sample, braking, motion, vehicle_parts))
 
 
 def compiled(step_function: Callable[..., Any], name: str) -> CompiledSamples:
     """Compiled version of ``moved``, for a compiled step function."""
-    some = lean(named_closure(_with_globals(some_samples, go=step_function), name))
+    compiled_some = lean(named_closure(_with_globals(some_samples, go=step_function), name))
     return CompiledSamples(
-        njit(cache=True, error_model="numpy")(named_closure(_with_globals(samples, some=some), name))
+        njit(cache=True, error_model="numpy")(named_closure(_with_globals(samples, some=compiled_some), name))
     )
 
 

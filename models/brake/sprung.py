@@ -57,7 +57,7 @@ class Sprung:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the coordinates."""
-        return tuple(" ".join(place) for place in self.handling.vehicle.coordinates())
+        return tuple(" ".join(body_freedom) for body_freedom in self.handling.vehicle.coordinates())
 
     @property
     def turns(self) -> np.ndarray:
@@ -72,37 +72,39 @@ class Sprung:
 
     def _turning_coordinates(self, freedom: Freedom) -> np.ndarray:
         free = self.handling.vehicle
-        places = [(hitch_of(name), freedom) for name in free.towed]
+        hitch_coordinates = [(hitch_of(name), freedom) for name in free.towed]
         known = free.coordinates()
-        return np.array([known.index(place) for place in places if place in known], dtype=np.int64)
+        return np.array(
+            [known.index(coordinate) for coordinate in hitch_coordinates if coordinate in known], dtype=np.int64
+        )
 
-    def in_plane(self, transfer: bool = True) -> Plane:
+    def in_plane(self, with_load_transfer: bool = True) -> Plane:
         """``Plane`` of the vehicle and its wheels. In a train, loads are the static ones that its springs carry.
 
         Each hitch is taken to lie in the middle plane of the towing unit.
         """
-        alone, free = plane_of_truck(self.plane, transfer), self.handling.vehicle
+        plane, free = plane_of_truck(self.plane, with_load_transfer), self.handling.vehicle
         if not free.towed:
-            return alone
+            return plane
         units = [_unit(free, name) for name in (None, *free.towed)]
         masses, inertias, centres = (np.array(column) for column in zip(*units, strict=True))
-        of = [free.towed_under(tyre.body) for tyre in free.tyres]
-        unit = np.array([0 if name is None else 1 + free.towed.index(name) for name in of])
-        place = np.array([tyre.point[:2] for tyre in free.tyres])
-        place[:, 0] -= centres[unit]
-        none = np.zeros(unit.size)
-        return alone._replace(
+        unit_names = [free.towed_under(tyre.body) for tyre in free.tyres]
+        unit = np.array([0 if name is None else 1 + free.towed.index(name) for name in unit_names])
+        wheel_positions = np.array([tyre.point[:2] for tyre in free.tyres])
+        wheel_positions[:, 0] -= centres[unit]
+        zeros = np.zeros(unit.size)
+        return plane._replace(
             masses=masses,
             inertias=inertias,
             reach=_hitch_reach(np.array([free.body(hitch_of(name)).position[0] for name in free.towed]), centres),
             unit=unit,
             group=unit.copy(),
-            place=place,
+            place=wheel_positions,
             radius=np.array([tyre.point[2] for tyre in free.tyres]),
             spin=np.array(self.wheel_inertias),
             static=np.array([self.handling.held.tyres[tyre.name] for tyre in free.tyres]),
-            by_x=none,
-            by_y=none.copy(),
+            by_x=zeros,
+            by_y=zeros.copy(),
             jackknife_angle=FOLD,
             units=np.arange(len(units)),
         )
@@ -122,8 +124,8 @@ def _unit(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, flo
     """Mass (kg), yaw inertia (kg m^2) and position ahead (m) of a unit's centre of mass. The unit is a towed body with
     all that it carries, or the vehicle without its trailers."""
     bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed]
-    masses, places = np.array([body.mass for body in bodies]), np.array([body.position for body in bodies])
-    x, y, _ = masses @ places / masses.sum()
+    masses, positions = np.array([body.mass for body in bodies]), np.array([body.position for body in bodies])
+    x, y, _ = masses @ positions / masses.sum()
     return float(masses.sum()), _yaw_inertia(bodies, float(x), float(y)), float(x)
 
 
@@ -162,13 +164,17 @@ def _tyres_by_axle(vehicle: SpatialVehicle) -> list[Tyre]:
     """Tyres axle by axle, left before right; InputError unless the vehicle has two axles, and these and all trailer
     axles have two tyres each."""
     tyres = sorted(vehicle.tyres, key=lambda tyre: (tyre.axle, -tyre.point[1]))
-    names, ahead = [tyre.name for tyre in tyres], [vehicle.towed_under(tyre.body) is None for tyre in tyres]
+    names, on_front_unit = [tyre.name for tyre in tyres], [vehicle.towed_under(tyre.body) is None for tyre in tyres]
     pairs = list(zip(tyres[::2], tyres[1::2], strict=False))
-    beside = all(left.axle == right.axle and left.point[1] > right.point[1] for left, right in pairs)
-    if not beside or [tyre.axle for tyre in tyres] != [k // 2 for k in range(2 * len(pairs))] or sum(ahead) != 4:
+    left_before_right = all(left.axle == right.axle and left.point[1] > right.point[1] for left, right in pairs)
+    if (
+        not left_before_right
+        or [tyre.axle for tyre in tyres] != [k // 2 for k in range(2 * len(pairs))]
+        or sum(on_front_unit) != 4
+    ):
         of_towed = ", and of each axle behind them that is towed" if vehicle.towed else ""
         raise InputError(vehicle.name, "tyres", names, f"must be two of each of two axles{of_towed}")
-    if not all(ahead[:4]):
+    if not all(on_front_unit[:4]):
         raise InputError(vehicle.name, "axles", names, "must be first those of the vehicle, then those of what it tows")
     if len(tyres) > MOST_WHEELS:
         allowed = f"must be at most {MOST_WHEELS} of a braked train on its suspension"
@@ -189,16 +195,16 @@ def _wheel_inertias(name: str, tyres: list[Tyre], spin_inertia: float) -> list[f
 
 def _check_row(vehicle: SpatialVehicle) -> None:
     """Refuse trailers that are not coupled one behind the other, or have a coupling without yaw."""
-    before: str | None = None
+    carrier: str | None = None
     for name in vehicle.towed:
         hitch = vehicle.body(hitch_of(name))
-        if vehicle.towed_under(hitch.parent) != before:
-            allowed = f"must be on {before!r} or on what it carries: a braked train is a row"
+        if vehicle.towed_under(hitch.parent) != carrier:
+            allowed = f"must be on {carrier!r} or on what it carries: a braked train is a row"
             raise InputError(vehicle.name, f"bodies[{name}].parent", hitch.parent, allowed)
         if "rz" not in hitch.freedoms:
             allowed = "must have rz: what is towed by a braked vehicle yaws beside it"
             raise InputError(vehicle.name, f"bodies[{name}].freedoms", list(hitch.freedoms), allowed)
-        before = name
+        carrier = name
 
 
 def without_trailer(vehicle: SpatialVehicle) -> list[Body]:
@@ -220,14 +226,16 @@ POSITION_FIELDS = ("position", "point", "first_point", "second_point", "point_le
 def _displaced_vehicle(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
     """The vehicle with all positions shifted by ``distance`` on the ground."""
 
-    def at(part: Any, name: str) -> Vector:
-        x, y, z = np.add(getattr(part, name), (distance[0], distance[1], 0.0))
+    def moved_position(element: Any, name: str) -> Vector:
+        x, y, z = np.add(getattr(element, name), (distance[0], distance[1], 0.0))
         return float(x), float(y), float(z)
 
     parts: dict[str, Any] = {
         kind: tuple(
-            replace(part, **{name: at(part, name) for name in POSITION_FIELDS if hasattr(part, name)})
-            for part in getattr(vehicle, kind)
+            replace(
+                element, **{name: moved_position(element, name) for name in POSITION_FIELDS if hasattr(element, name)}
+            )
+            for element in getattr(vehicle, kind)
         )
         for kind in ("bodies", "springs", "tyres", "bars", "side_forces")
     }

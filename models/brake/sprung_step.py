@@ -84,53 +84,54 @@ class AtWheels(NamedTuple):
 
 
 @lean
-def wheel_forces_of(numbers):
+def wheel_forces_of(table):
     """``WheelForces`` of views of the last numbers in a table for compiled force functions."""
-    wheels = int(numbers[TYRES])
-    rows = array(beyond(start(numbers), int(numbers[COUNT])), (HELD, wheels))
+    wheels = int(table[TYRES])
+    rows = array(beyond(start(table), int(table[COUNT])), (HELD, wheels))
     return WheelForces(rows[0], rows[1], rows[2], rows[3])
 
 
 @lean
-def held_forces(numbers, q, v, f, contacts):
-    """Add all forces to ``f`` (n,), and fill the ``Contacts``."""
+def held_forces(table, q, v, force_sum, contacts):
+    """Add all forces to ``force_sum`` (n,), and fill the ``Contacts``."""
     wheel = WheelContact(
         array(doubles(10), (10,)),
         array(doubles(4), (4,)),
         array(doubles(WAY), (WAY,)),
         array(doubles(REPORTED), (REPORTED,)),
     )
-    way, ledger, creeping = wheel.way, array(doubles(LEDGER), (LEDGER,)), array(doubles(3), (3,))
-    vehicle = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
-    waves, held = numbers[int(numbers[OF_WAVES]) :], wheel_forces_of(numbers)
-    creeping[2], tyres = 0.0, beyond(start(numbers), int(numbers[OF_TYRES]))
-    for i in range(int(numbers[TYRES])):
+    wheel_geometry, ledger, creeping = wheel.way, array(doubles(LEDGER), (LEDGER,)), array(doubles(3), (3,))
+    vehicle = enter(table, q, v, force_sum, doubles(room(table)), ledger)
+    waves, wheel_forces = table[int(table[OF_WAVES]) :], wheel_forces_of(table)
+    creeping[2], tyres = 0.0, beyond(start(table), int(table[OF_TYRES]))
+    for i in range(int(table[TYRES])):
         tyre_row = row(tyres, PER_TYRE, i)
-        touch(tyre_row, waves, int(numbers[WAVES]), held.steer[i], 0.0, vehicle, wheel)
-        contacts.along[i] = dot(three(way, PASSING), three(way, ROLLING))
+        touch(tyre_row, waves, int(table[WAVES]), wheel_forces.steer[i], 0.0, vehicle, wheel)
+        contacts.along[i] = dot(three(wheel_geometry, PASSING), three(wheel_geometry, ROLLING))
         contacts.across[i], contacts.load[i] = wheel.report[SLIP_Y], wheel.report[PRESS]
-        creeping[0], creeping[1] = held.force_x[i], held.force_y[i]
+        creeping[0], creeping[1] = wheel_forces.force_x[i], wheel_forces.force_y[i]
         creep(tyre_row, creeping, vehicle, wheel)
         carrying = row(vehicle.tree.links, PER_LINK, int(tyre_row[CARRYING]))
-        twist(carrying, vehicle.tree.ground, times(three(way, AXLE), -held.moment[i]))
-    leave(numbers, vehicle)
+        twist(carrying, vehicle.tree.ground, times(three(wheel_geometry, AXLE), -wheel_forces.moment[i]))
+    leave(table, vehicle)
 
 
 @lean
-def forces(numbers, q, v, f):
-    """Add all forces to ``f`` (n,)."""
-    w = int(numbers[TYRES])
+def forces(table, q, v, force_sum):
+    """Add all forces to ``force_sum`` (n,)."""
+    w = int(table[TYRES])
     motion = array(doubles(3 * w), (3, w))
-    held_forces(numbers, q, v, f, Contacts(motion[0], motion[1], motion[2]))
+    held_forces(table, q, v, force_sum, Contacts(motion[0], motion[1], motion[2]))
 
 
 @lean
-def held(numbers, time, q, v, f):
-    """Add the forces to ``f``. For callbacks: all arguments but the time are pointers to doubles; the time is not
-    used."""
-    head = array(numbers, (HEADER,))
+def held(table, time, q, v, force_sum):
+    """Add the forces to ``force_sum``. For callbacks: all arguments but the time are pointers to doubles; the time is
+    not used.
+    """
+    head = array(table, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
-    forces(array(numbers, (int(head[COUNT]) + HELD * w,)), array(q, (n,)), array(v, (n,)), array(f, (n,)))
+    forces(array(table, (int(head[COUNT]) + HELD * w,)), array(q, (n,)), array(v, (n,)), array(force_sum, (n,)))
 
 
 @lean
@@ -143,28 +144,29 @@ def set_held(block, t, n):
 
 
 @lean
-def meet(contacts, regular, lag, angles, wheels):
-    """Set slip angles and loads of the ``Wheels`` from their ``Contacts``; regular (m/s) : see ``plane_step``; lag (W,)
-    of ``Surfaces``; angles of the tyres' tables."""
+def meet(contacts, regularising_speed, lag, angles, wheels):
+    """Set slip angles and loads of the ``Wheels`` from their ``Contacts``; regularising_speed (m/s) : see
+    ``plane_step``; lag (W,) of ``Surfaces``; angles of the tyres' tables.
+    """
     for i in range(contacts.load.size):
-        slide(i, contacts.along[i], contacts.across[i], regular, lag, angles, wheels)
+        slide(i, contacts.along[i], contacts.across[i], regularising_speed, lag, angles, wheels)
         wheels.load[i] = contacts.load[i]
 
 
 @lean
-def hold(known, before, after, step, motion, vehicle):
+def hold(known, torques_before, torques_after, step, motion, vehicle):
     """Compute the tyres' mean forces over a step (s) between brake torques (W,), store them as the wheels' constant
     forces, and fill the report.
 
     known : ``AtWheels`` with speeds at the start and their rates, and what ``meet`` takes.
     """
-    held, wheels, plane, report = known.held, known.wheels, vehicle.plane, report_of(motion.report)
-    for i in range(before.size):
+    wheel_forces, wheels, plane, report = known.held, known.wheels, vehicle.plane, report_of(motion.report)
+    for i in range(torques_before.size):
         speed, wheel = wheels.start[i], Wheel(plane.radius[i], plane.spin[i], motion.turning[i])
-        given = StepInput(speed, speed + step * wheels.rate[i], before[i], after[i], step)
-        tyre(i, given, wheel, vehicle.tables, wheels, known.surfaces, report)
-        held.force_x[i], held.force_y[i] = report.force_x[i], report.force_y[i]
-        held.moment[i] = wheel.inertia * (report.turning[i] - wheel.turning) / step
+        step_input = StepInput(speed, speed + step * wheels.rate[i], torques_before[i], torques_after[i], step)
+        tyre(i, step_input, wheel, vehicle.tables, wheels, known.surfaces, report)
+        wheel_forces.force_x[i], wheel_forces.force_y[i] = report.force_x[i], report.force_y[i]
+        wheel_forces.moment[i] = wheel.inertia * (report.turning[i] - wheel.turning) / step
 
 
 OVER, GAVE_UP = 6, 7
@@ -189,12 +191,12 @@ class Units(NamedTuple):
 
 
 @lean
-def to_units(whole, turns, plane):
+def to_units(coordinate_values, hinge_columns, plane):
     """Fill values (2 + U,) of the ``Units`` from values of all coordinates (n,): positions, rates or accelerations."""
     for a in range(PLANE):
-        plane[a] = whole[a]
-    for k in range(turns.size):
-        plane[PLANE + k] = plane[PLANE + k - 1] + whole[turns[k]]
+        plane[a] = coordinate_values[a]
+    for k in range(hinge_columns.size):
+        plane[PLANE + k] = plane[PLANE + k - 1] + coordinate_values[hinge_columns[k]]
 
 
 @inlined
@@ -236,9 +238,11 @@ def relax(contacts, half, slope, lag, surfaces):
     lag."""
 
 
-def accelerate(engine: Any, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
-    """Fill ``out`` (n,) with the accelerations of a ``FreeModel``; engines replace this function by their own."""
-    out[:] = engine.acceleration(0.0, q, v)
+def accelerate(engine: Any, q: np.ndarray, v: np.ndarray, accelerations: np.ndarray) -> None:
+    """Fill ``accelerations`` (n,) with the accelerations of a ``FreeModel``; engines replace this function by their
+    own.
+    """
+    accelerations[:] = engine.acceleration(0.0, q, v)
 
 
 def march(engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
@@ -263,7 +267,7 @@ def advance(motion, torques, step, steer, vehicle, course):
         wheels.rate[:] = 0.0
     known.held.steer[:] = steer
     for n in range(torques.shape[0] - 1):
-        before, after = torques[n], torques[n + 1]
+        torques_before, torques_after = torques[n], torques[n + 1]
         to_units(q, turns, plane[0])
         to_units(v, turns, plane[1])
         under_wheels(plane, step, vehicle, known.surfaces)
@@ -272,24 +276,24 @@ def advance(motion, torques, step, steer, vehicle, course):
         wheels.start[:] = contacts.along
         relax(contacts, half, vehicle.slope, course.lag, known.surfaces)
         meet(contacts, regular, known.surfaces.lag, angles, wheels)
-        hold(known, before, 0.5 * (before + after), half, motion, vehicle)
+        hold(known, torques_before, 0.5 * (torques_before + torques_after), half, motion, vehicle)
         accelerate(course.engine, q, v, rates)
         to_units(rates, turns, accelerations)
-        rest = comes_to_rest(plane[1], turning, accelerations, step, vehicle.plane)
-        if rest >= 0.0:
-            q += rest * v + 0.5 * rest**2 * rates
+        rest_time = comes_to_rest(plane[1], turning, accelerations, step, vehicle.plane)
+        if rest_time >= 0.0:
+            q += rest_time * v + 0.5 * rest_time**2 * rates
             v[:PLANE], turning[:] = 0.0, 0.0
             for k in range(turns.size):
                 v[turns[k]] = 0.0
-            if rest < step:
-                return AT_REST, time + rest
+            if rest_time < step:
+                return AT_REST, time + rest_time
         else:
             middle[0], middle[1] = q + half * v + 0.5 * half**2 * rates, v + half * rates
             course.forces[:] = 0.0
             held_forces(course.numbers, middle[0], middle[1], course.forces, contacts)
             wheels.rate[:] = (contacts.along - wheels.start) / half
             meet(contacts, regular, known.surfaces.lag, angles, wheels)
-            hold(known, before, after, step, motion, vehicle)
+            hold(known, torques_before, torques_after, step, motion, vehicle)
             if not march(course.engine, q, v):
                 return GAVE_UP, time
             turning[:] = motion.report[TURNING_ROW]
@@ -300,11 +304,11 @@ def advance(motion, torques, step, steer, vehicle, course):
     return FINE, time
 
 
-def advance_with(**parts: Callable[..., Any]) -> Callable[..., Any]:
+def advance_with(**replacements: Callable[..., Any]) -> Callable[..., Any]:
     """``advance`` in which the engines' own functions replace this module's default ones; see ``samples.moved``."""
-    return FunctionType(advance.__code__, globals() | parts, "advance")
+    return FunctionType(advance.__code__, globals() | replacements, "advance")
 
 
-def compiled(name: str, **parts: Callable[..., Any]) -> Callable[..., Any]:
+def compiled(name: str, **replacements: Callable[..., Any]) -> Callable[..., Any]:
     """Compiled ``advance_with`` for an engine's own compiled functions."""
-    return njit(cache=True, error_model="numpy")(named_closure(advance_with(**parts), name))
+    return njit(cache=True, error_model="numpy")(named_closure(advance_with(**replacements), name))

@@ -28,12 +28,12 @@ class Steering:
     @property
     def half(self) -> float:
         """Time (s) at which the angle first reaches half of its final value."""
-        goal, last = HALF_SHARE * abs(self.angles[-1]), np.sign(self.angles[-1])
-        reached = last * self.angles >= goal
+        goal, final_sign = HALF_SHARE * abs(self.angles[-1]), np.sign(self.angles[-1])
+        reached = final_sign * self.angles >= goal
         i = int(np.argmax(reached))
         if i == 0:
             return float(self.times[0])
-        return float(np.interp(goal, last * self.angles[i - 1 : i + 1], self.times[i - 1 : i + 1]))
+        return float(np.interp(goal, final_sign * self.angles[i - 1 : i + 1], self.times[i - 1 : i + 1]))
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ class Stretch:
     right: int
 
 
-def road(stretches: list[Stretch], line: float = 0.0, kinds: int = 1) -> Road:
+def road(stretches: list[Stretch], line: float = 0.0, kind_count: int = 1) -> Road:
     """Road of stretches in ascending order of x; the first one also extends to minus infinity.
 
     Another level of friction on a stretch is a surface of its own, ``TyreTable.scaled``.
@@ -84,7 +84,7 @@ def road(stretches: list[Stretch], line: float = 0.0, kinds: int = 1) -> Road:
     left, right = (np.array([getattr(s, side) for s in stretches], dtype=np.int64) for side in ("left", "right"))
     if min(left.min(), right.min()) < 0:
         raise InputError("", "stretches", int(min(left.min(), right.min())), "numbers of surfaces count from 0")
-    return Road(starts, left, right, line, kinds)
+    return Road(starts, left, right, line, kind_count)
 
 
 UNIFORM_ROAD = road([Stretch(0.0, 0, 0)])
@@ -130,18 +130,18 @@ def under_wheels(state, step, vehicle, surfaces):
         vx, vy = velocity(centre, state[0], state[1], plane.reach)
         low, high = min(px, px + step * vx), max(px, px + step * vx)
         right, left = min(py, py + step * vy), max(py, py + step * vy)
-        here = max(np.searchsorted(road.starts, low, side="right") - 1, 0)
-        there = max(np.searchsorted(road.starts, high, side="right") - 1, 0)
+        first_stretch = max(np.searchsorted(road.starts, low, side="right") - 1, 0)
+        last_stretch = max(np.searchsorted(road.starts, high, side="right") - 1, 0)
         share = 0.0
-        if there > here:
+        if last_stretch > first_stretch:
             side = road.left if py + 0.5 * step * vy >= road.line else road.right
-            first, second = side[here], side[there]
-            share = (high - road.starts[there]) / (high - low)
+            first, second = side[first_stretch], side[last_stretch]
+            share = (high - road.starts[last_stretch]) / (high - low)
         elif right < road.line <= left:
-            first, second = road.right[here], road.left[here]
+            first, second = road.right[first_stretch], road.left[first_stretch]
             share = (left - road.line) / (left - right)
         else:
-            first = second = road.left[here] if right >= road.line else road.right[here]
+            first = second = road.left[first_stretch] if right >= road.line else road.right[first_stretch]
         surfaces.first[i] = first * road.kinds + kind[i]
         surfaces.second[i] = second * road.kinds + kind[i]
         surfaces.share[i] = share if first != second else 0.0

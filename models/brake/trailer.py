@@ -39,20 +39,30 @@ class Trailer(Truck):
     )
 
 
-def plane_of_trailer(trailer: Trailer, transfer: bool = True) -> Plane:
+def plane_of_trailer(trailer: Trailer, with_load_transfer: bool = True) -> Plane:
     """``Plane`` of a trailer whose hook has a prescribed motion; the hook's position is the first two coordinates."""
     reach = np.array([[-trailer.drawbar, 0.0], [-trailer.drawbar, -trailer.front.x]])
-    parts: list[Any] = [*_units_of_train(trailer), reach, *_wheels(trailer, 0, transfer), 1, trailer.fold, np.arange(2)]
+    parts: list[Any] = [
+        *_units_of_train(trailer),
+        reach,
+        *_wheels(trailer, 0, with_load_transfer),
+        1,
+        trailer.fold,
+        np.arange(2),
+    ]
     return Plane(*parts)
 
 
-def plane_of_train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> Plane:
+def plane_of_train(vehicle: Truck, trailer: Trailer, with_load_transfer: bool = True) -> Plane:
     """``Plane`` of a truck with a trailer on its hook: eight wheels."""
-    truck_records, reach = plane_of_truck(vehicle, transfer), np.zeros((3, 3))
+    truck_records, reach = plane_of_truck(vehicle, with_load_transfer), np.zeros((3, 3))
     reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
     units = (np.concatenate((a, b)) for a, b in zip(truck_records[:2], _units_of_train(trailer), strict=True))
-    both = (np.concatenate((a, b)) for a, b in zip(truck_records[3:11], _wheels(trailer, 1, transfer), strict=True))
-    parts: list[Any] = [*units, reach, *both, 0, trailer.fold, np.arange(3)]
+    wheel_fields = (
+        np.concatenate((a, b))
+        for a, b in zip(truck_records[3:11], _wheels(trailer, 1, with_load_transfer), strict=True)
+    )
+    parts: list[Any] = [*units, reach, *wheel_fields, 0, trailer.fold, np.arange(3)]
     return Plane(*parts)
 
 
@@ -60,15 +70,15 @@ def _units_of_train(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:
     return (np.array([trailer.drawbar_mass, trailer.mass]), np.array([trailer.drawbar_inertia, trailer.yaw_inertia]))
 
 
-def _wheels(trailer: Trailer, first: int, transfer: bool) -> tuple[np.ndarray, ...]:
+def _wheels(trailer: Trailer, first: int, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
     """Unit and group of each wheel, then the results of ``wheels``; the front wheels belong to the drawbar, which is
     unit ``first``."""
     check_wheels(trailer, trailer.mass + trailer.drawbar_mass)
-    place, radius, spin, static, by_x, by_y = wheels(trailer, transfer)
-    place[:2, 0] = 0.0
+    wheel_positions, radius, spin, static, by_x, by_y = wheels(trailer, with_load_transfer)
+    wheel_positions[:2, 0] = 0.0
     static[:2] += trailer.drawbar_mass * GRAVITY / 2.0
     unit = np.array([first, first, first + 1, first + 1])
-    return unit, np.full(4, first + 1), place, radius, spin, static, by_x, by_y
+    return unit, np.full(4, first + 1), wheel_positions, radius, spin, static, by_x, by_y
 
 
 class Pull(NamedTuple):
@@ -103,7 +113,7 @@ def follow_hook(
 def _march_trailer(motion, hook, step, torques, vehicle, pull):
     plane, state, report, accelerations = vehicle.plane, motion.state, report_of(motion.report), motion.accelerations
     size, straight, states, forces = accelerations.size, np.zeros(motion.turning.size), pull.states, pull.forces
-    mass, (right, along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))
+    mass, (right, row_along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))
     states[0], surfaces = state, surfaces_of(np.empty((4, motion.turning.size)))
     under_wheels(state, step, vehicle, surfaces)
     for n in range(hook.shape[0] - 1):
@@ -112,7 +122,7 @@ def _march_trailer(motion, hook, step, torques, vehicle, pull):
             return False
         states[n + 1] = state
         fill_headings(0.5 * (states[n, 0] + state[0]), units)
-        inertia(units, 0.5 * (states[n, 1] + state[1]), plane, mass, right, along, across)
+        inertia(units, 0.5 * (states[n, 1] + state[1]), plane, mass, right, row_along, across)
         forces[n] = (mass @ accelerations - right)[:2]
         for i in range(plane.unit.size):
             psi = 0.5 * (states[n, 0, 2 + plane.unit[i]] + state[0, 2 + plane.unit[i]])

@@ -106,14 +106,14 @@ def node_force(k, grip):
 
 
 @lean
-def roll(slip, remaining, kappa, fade, held, grip):
+def roll(slip, remaining, kappa, fade, brake_force, grip):
     """Advance a wheel with a slip from -1 to 1 for at most ``remaining`` seconds, or until the slip leaves this range.
 
-    kappa : r^2 / (J u) in 1/(N s); fade : u' / u in 1/s; held : T / r in N. Returns the time used, slip then and
+    kappa : r^2 / (J u) in 1/(N s); fade : u' / u in 1/s; brake_force : T / r in N. Returns the time used, slip then and
     integral of the slip (s).
     """
     slips = grip.slips
-    last, used, area, turned = slips.size - 1, 0.0, 0.0, 0
+    last_cell, used, area, last_turn = slips.size - 1, 0.0, 0.0, 0
     cell = cell_and_share(slips, abs(slip))[0]
     if slip < 0.0:
         cell = -cell - 1
@@ -121,13 +121,13 @@ def roll(slip, remaining, kappa, fade, held, grip):
     for _ in range(MOST_PIECES):
         bottom, top = slip_at_node(cell, slips), slip_at_node(cell + 1, slips)
         slope = (high - low) / (top - bottom)
-        rate = kappa * (held - high - slope * (slip - top)) + (1.0 - slip) * fade
+        rate = kappa * (brake_force - high - slope * (slip - top)) + (1.0 - slip) * fade
         target, turn = (top, 1) if rate > 0.0 else (bottom, -1)
         if rate != 0.0 and target == slip:
-            if turned == -turn:  # either cell sends it into the other one: by rounding, it rests on their node
+            if last_turn == -turn:  # either cell sends it into the other one: by rounding, it rests on their node
                 return remaining, slip, area + slip * (remaining - used)
-            cell, turned = cell + turn, turn
-            if cell == last or cell < -last:
+            cell, last_turn = cell + turn, turn
+            if cell == last_cell or cell < -last_cell:
                 return used, slip, area
             if turn > 0:
                 low, high = high, node_force(cell + 1, grip)
@@ -137,25 +137,29 @@ def roll(slip, remaining, kappa, fade, held, grip):
         decay = kappa * slope + fade
         time = _time_of_distance(decay, rate, target - slip)
         if used + time >= remaining:
-            some = remaining - used
-            way = rate * some * phi_1(-decay * some)
-            end = min(slip + way, target) if turn > 0 else max(slip + way, target)  # not beyond it by rounding
-            return remaining, end, area + some * slip + distance_integral(way, rate, decay, some)
+            time_left = remaining - used
+            slip_change = rate * time_left * phi_1(-decay * time_left)
+            end = (
+                min(slip + slip_change, target) if turn > 0 else max(slip + slip_change, target)
+            )  # not beyond it by rounding
+            return remaining, end, area + time_left * slip + distance_integral(slip_change, rate, decay, time_left)
         area += time * slip + distance_integral(target - slip, rate, decay, time)
-        used, slip, turned = used + time, target, 0
+        used, slip, last_turn = used + time, target, 0
     return used, math.nan, area
 
 
 @lean
-def _time_of_distance(decay, rate, way):
-    """Time in which the distance ``way`` is covered at a rate that decays as exp(-decay t); infinite if it never is."""
+def _time_of_distance(decay, rate, distance):
+    """Time in which the distance ``distance`` is covered at a rate that decays as exp(-decay t); infinite if it never
+    is.
+    """
     if rate == 0.0:
         return math.inf
-    share = decay * way / rate
+    share = decay * distance / rate
     if share >= 1.0:
         return math.inf
     if abs(share) < 1e-9:
-        return way / rate * (1.0 + 0.5 * share)
+        return distance / rate * (1.0 + 0.5 * share)
     return -math.log1p(-share) / decay
 
 
@@ -166,48 +170,48 @@ def wheel_step(step_input, wheel, grip):
     radius, inertia, w0 = wheel.radius, wheel.inertia, wheel.turning
     u0, u1 = max(step_input.speed0, SLOWEST_SPEED), max(step_input.speed1, 0.0)
     mean = max(0.5 * (u0 + u1), SLOWEST_SPEED)
-    kappa, fade, last = radius * radius / (inertia * mean), (u1 - u0) / (step * mean), grip.slips.size - 1
-    sliding = node_force(last, grip)
-    gain, now, impulse, area, locked = (torque1 - torque0) / step, 0.0, 0.0, 0.0, 0.0
+    kappa, fade, last_node = radius * radius / (inertia * mean), (u1 - u0) / (step * mean), grip.slips.size - 1
+    sliding = node_force(last_node, grip)
+    gain, rest_time, impulse, area, locked = (torque1 - torque0) / step, 0.0, 0.0, 0.0, 0.0
     slip = 1.0 - radius * w0 / u0
     if slip > 1.0:  # it turns backwards: road and brake both stop that
         stops = sliding * radius + 0.5 * (torque0 + torque1)
         if stops * step <= -inertia * w0:
             return Rolled(w0 + stops * step / inertia, sliding, slip, 0.0)
-        now = -inertia * w0 / stops
-        impulse, area, slip = sliding * now, now, 1.0
+        rest_time = -inertia * w0 / stops
+        impulse, area, slip = sliding * rest_time, rest_time, 1.0
     freed = False
-    while now < step:
-        left, torque = step - now, torque0 + gain * now
-        held = 0.5 * (torque + torque1) / radius
-        if slip >= 1.0 and not freed and max(torque / radius, held) >= sliding:
-            free = now + (radius * sliding - torque) / gain if torque1 < radius * sliding else step
-            impulse += sliding * (free - now)
-            area += free - now
-            locked += free - now
-            now, slip, freed = free, 1.0, True
+    while rest_time < step:
+        left, torque = step - rest_time, torque0 + gain * rest_time
+        end_force = 0.5 * (torque + torque1) / radius
+        if slip >= 1.0 and not freed and max(torque / radius, end_force) >= sliding:
+            free = rest_time + (radius * sliding - torque) / gain if torque1 < radius * sliding else step
+            impulse += sliding * (free - rest_time)
+            area += free - rest_time
+            locked += free - rest_time
+            rest_time, slip, freed = free, 1.0, True
             continue
-        u = u0 + (u1 - u0) * now / step
+        u = u0 + (u1 - u0) * rest_time / step
         start = u * (1.0 - slip) / radius
-        ahead, gain_on = radius * start - 2.0 * u, -radius * (radius * sliding + held * radius) / inertia
+        overspeed, gain_on = radius * start - 2.0 * u, -radius * (radius * sliding + end_force * radius) / inertia
         gain_on -= 2.0 * (u1 - u0) / step
         if slip < -1.0 or (slip == -1.0 and gain_on > 0.0):  # it turns twice as fast as it rolls: friction is steady
-            used = min(left, -ahead / gain_on) if gain_on < 0.0 else left
-            now += used
+            used = min(left, -overspeed / gain_on) if gain_on < 0.0 else left
+            rest_time += used
             impulse -= sliding * used
             area -= used
-            if now >= step:
-                turned = start - radius * (sliding + held) * used / inertia
-                return Rolled(turned, impulse / step, area / step, locked)
+            if rest_time >= step:
+                turning_end = start - radius * (sliding + end_force) * used / inertia
+                return Rolled(turning_end, impulse / step, area / step, locked)
             slip, freed = -1.0, False
             continue
-        used, slip, part = roll(min(slip, 1.0), left, kappa, fade, held, grip)
+        used, slip, slip_integral = roll(min(slip, 1.0), left, kappa, fade, end_force, grip)
         if used == 0.0:  # by rounding alone: neither what lies beyond nor this takes it
             used = left
-        now += used
-        end = (u0 + (u1 - u0) * now / step) * (1.0 - slip) / radius
-        impulse += inertia * (end - start) / radius + held * used
-        area += part
+        rest_time += used
+        end = (u0 + (u1 - u0) * rest_time / step) * (1.0 - slip) / radius
+        impulse += inertia * (end - start) / radius + end_force * used
+        area += slip_integral
         freed = False
         if not slip <= 1.0:
             return Rolled(math.nan, math.nan, math.nan, math.nan)

@@ -107,10 +107,10 @@ def worst_violation(run: Result, assumption: Assumption) -> BrokenAssumption | N
     """The worst violation of an assumption in a run, or None if there is none; NaN and infinite values are not
     judged."""
     judged = [
-        _longest_exceedance(run, assumption, where, values)
+        _longest_exceedance(run, assumption, value_name, values)
         if isinstance(values, Gaussian)
-        else _gaussian_violation(run, assumption, where, np.asarray(values, float))
-        for where, values in assumption.watched_values(run).items()
+        else _gaussian_violation(run, assumption, value_name, np.asarray(values, float))
+        for value_name, values in assumption.watched_values(run).items()
     ]
     return max((breach for breach in judged if breach is not None), key=lambda breach: breach.share, default=None)
 
@@ -141,17 +141,17 @@ def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian
     timed = "time" in run.data.coords and len(values.mean) == len(run.times)
     first = float(run.times[np.argmax((shares > ALLOWED_TIME_SHARE).any(axis=0))]) if timed else math.nan
     worst = float(values.mean[row] + (-3.0, 3.0)[side] * values.deviation[row])
-    place = f"{where} {values.rows[row]}" if values.rows else where
+    value_name = f"{where} {values.rows[row]}" if values.rows else where
     share, law = float(shares[side, row]), " by the normal law"
-    return BrokenAssumption(a.name, a.says, place, share, first, worst, a.unit, a.allowed, a.remedy, law)
+    return BrokenAssumption(a.name, a.says, value_name, share, first, worst, a.unit, a.allowed, a.remedy, law)
 
 
 def with_assumptions(run: Result, assumptions: Iterable[Assumption]) -> Result:
     """The result with a list of its assumptions and of those that it violates; its status names violations, too."""
     listed = list(assumptions)
-    breaches = [breach for breach in (worst_violation(run, each) for each in listed) if breach is not None]
+    breaches = [breach for breach in (worst_violation(run, assumption) for assumption in listed) if breach is not None]
     run.data.attrs["assumptions"] = json.dumps(
-        {"assumed": [each.says for each in listed], "broken": [asdict(breach) for breach in breaches]}
+        {"assumed": [assumption.says for assumption in listed], "broken": [asdict(breach) for breach in breaches]}
     )
     if breaches:
         run.data.attrs["status"] += ", assumptions broken"
@@ -166,11 +166,11 @@ _RESULT_OBSERVER: ContextVar[Callable[[Result], None]] = ContextVar("noted", def
 def watching(note: Callable[[Result], None]) -> Iterator[None]:
     """Context in which ``note`` is called with each result that is checked for assumptions. Of nested contexts only the
     inner one is called."""
-    before = _RESULT_OBSERVER.set(note)
+    token = _RESULT_OBSERVER.set(note)
     try:
         yield
     finally:
-        _RESULT_OBSERVER.reset(before)
+        _RESULT_OBSERVER.reset(token)
 
 
 def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list[str]:
@@ -180,14 +180,14 @@ def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list
 
 def broken_of(run: Result) -> list[BrokenAssumption]:
     """Violated assumptions that are stored in a result."""
-    said: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
-    return [BrokenAssumption(**entry) for entry in said.get("broken", ())]
+    stored: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
+    return [BrokenAssumption(**entry) for entry in stored.get("broken", ())]
 
 
 def assumed_of(run: Result) -> list[str]:
     """Assumptions against which a result was checked."""
-    said: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
-    return list(said.get("assumed", ()))
+    stored: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
+    return list(stored.get("assumed", ()))
 
 
 @contextmanager

@@ -68,11 +68,15 @@ class TableHead:
     def groups(self) -> tuple[str, ...]:
         """Group name of each heading, from the row above if it has as many cells. An empty cell repeats the one before
         it. Empty if there is no such row."""
-        above = split_cells(self.titles[-1].text, self.separator) if self.titles else []
-        if len(self.names) < 3 or len(without_empty_end(above)) < 2 or len(above) not in (len(self.names), self.width):
+        cells_above = split_cells(self.titles[-1].text, self.separator) if self.titles else []
+        if (
+            len(self.names) < 3
+            or len(without_empty_end(cells_above)) < 2
+            or len(cells_above) not in (len(self.names), self.width)
+        ):
             return ()
         groups = [""]
-        for cell in above[: len(self.names)]:
+        for cell in cells_above[: len(self.names)]:
             groups.append(cell or groups[-1])
         return tuple(groups[1:])
 
@@ -161,37 +165,45 @@ def _head_in_line(
 ) -> TableHead | None:
     """Headings in line ``i`` if a row of numbers follows; else None."""
     names = without_empty_end(split_cells(lines[i].text, separator))
-    place = next((k for k, name in enumerate(names) if is_known_heading(name)), None)
-    if place is None or len(names) < 2 or any(is_number(name) or CLOCK_TIME_PATTERN.fullmatch(name) for name in names):
+    first_known = next((k for k, name in enumerate(names) if is_known_heading(name)), None)
+    if (
+        first_known is None
+        or len(names) < 2
+        or any(is_number(name) or CLOCK_TIME_PATTERN.fullmatch(name) for name in names)
+    ):
         return None
     for j in range(i + 1, min(i + 2 + MOST_ROWS_BETWEEN, len(lines))):
         cells = split_cells(lines[j].text, separator)
         if not (len(cells) >= len(names) >= len(without_empty_end(cells))):
             return None
-        if is_number(cells[place]) or CLOCK_TIME_PATTERN.fullmatch(cells[place]):
-            above, between = tuple(lines[:i]), tuple(lines[i + 1 : j])
+        if is_number(cells[first_known]) or CLOCK_TIME_PATTERN.fullmatch(cells[first_known]):
+            cells_above, between = tuple(lines[:i]), tuple(lines[i + 1 : j])
             first = lines[j]
             return TableHead(
-                lines[i], separator, tuple(names), len(cells), above, between, first.first_byte, first.number - 1
+                lines[i], separator, tuple(names), len(cells), cells_above, between, first.first_byte, first.number - 1
             )
         if any(is_number(cell) or is_known_heading(cell) for cell in cells):
             return None
     return None
 
 
-def plain_text(path: str | Path, text: str, wanted: Collection[str]) -> str:
+def plain_text(path: str | Path, text: str, wanted_headings: Collection[str]) -> str:
     """Text of a table in plain form: commas between columns, decimal points and units in the headings. Every line keeps
     its number.
 
-    ``wanted`` are names of columns, by which the headings are known. Titles become comments; a separator that ends the
-    lines, quotes and a row of units go. What has two meanings, or is no such table, comes back as it was, for the
-    reader to refuse; InputError where a comma can be a decimal sign or one of thousands.
+    ``wanted_headings`` are names of columns, by which the headings are known. Titles become comments; a separator that
+    ends the lines, quotes and a row of units go. What has two meanings, or is no such table, comes back as it was, for
+    the reader to refuse; InputError where a comma can be a decimal sign or one of thousands.
     """
     lines = [FileLine(i, line, i, i) for i, line in enumerate(text.split("\n"), start=1)]
-    asked = separator_line(lines[0].text)
-    used = [line for line in lines[bool(asked) :] if line.text.strip() and not line.text.startswith("#")]
-    heads = find_head(used, lambda cell: name_and_unit(cell)[0] in wanted, (asked,) if asked else tuple(SEPARATORS))
-    if len(heads) != 1 or not heads[0].separator or asked not in ("", *SEPARATORS):
+    declared_separator = separator_line(lines[0].text)
+    used = [line for line in lines[bool(declared_separator) :] if line.text.strip() and not line.text.startswith("#")]
+    heads = find_head(
+        used,
+        lambda cell: name_and_unit(cell)[0] in wanted_headings,
+        (declared_separator,) if declared_separator else tuple(SEPARATORS),
+    )
+    if len(heads) != 1 or not heads[0].separator or declared_separator not in ("", *SEPARATORS):
         return text
     return _plain_table(path, lines, heads[0])
 
@@ -204,8 +216,8 @@ def _plain_table(path: str | Path, lines: list[FileLine], header: TableHead) -> 
     new = {line.number: f"# {line.text}" if line.text.strip() else "" for line in lines[: header.line]}
     new[header.header.number] = ",".join(_headings_with_units(header))
     for number, row in rows.items():
-        kept = row[: len(header.names)] if len(row) == header.width and not any(row[len(header.names) :]) else row
-        new[number] = ",".join(_plain_cell(cell, sign) for cell in kept)
+        row_cells = row[: len(header.names)] if len(row) == header.width and not any(row[len(header.names) :]) else row
+        new[number] = ",".join(_plain_cell(cell, sign) for cell in row_cells)
     return "\n".join(new[line.number] for line in lines)
 
 

@@ -81,36 +81,43 @@ def size_of(values: np.ndarray) -> float:
     return deviation if deviation > UNMOVED_DEVIATION * largest else largest
 
 
-def observed_order(fine: float, coarse: float, declared: float) -> float:
+def observed_order(fine_difference: float, coarse_difference: float, declared: float) -> float:
     """Order of convergence from the differences between successive runs, limited to LEAST_ORDER up to the declared
     order."""
-    if not (fine > 0.0 and coarse > 0.0 and math.isfinite(fine) and math.isfinite(coarse)):
-        return declared if fine == 0.0 else LEAST_ORDER
-    return float(np.clip(math.log2(coarse / fine), LEAST_ORDER, declared))
+    if not (
+        fine_difference > 0.0
+        and coarse_difference > 0.0
+        and math.isfinite(fine_difference)
+        and math.isfinite(coarse_difference)
+    ):
+        return declared if fine_difference == 0.0 else LEAST_ORDER
+    return float(np.clip(math.log2(coarse_difference / fine_difference), LEAST_ORDER, declared))
 
 
 def estimate(
-    fine: np.ndarray,
-    coarse: np.ndarray,
+    fine_values: np.ndarray,
+    coarse_values: np.ndarray,
     declared: float,
     step: float,
     coarser: np.ndarray | None = None,
     unit: str = "",
 ) -> Estimate:
-    """Estimated error of ``fine`` (m, ...) from runs with twice and (over the first rows) four times the step, at the
-    rows of the run with twice the step.
+    """Estimated error of ``fine_values`` (m, ...) from runs with twice and (over the first rows) four times the step,
+    at the rows of the run with twice the step.
 
-    coarse : (m, ...); coarser : (k, ...) with k <= (m + 1) / 2, rows of every second one of these.
+    coarse_values : (m, ...); coarser : (k, ...) with k <= (m + 1) / 2, rows of every second one of these.
     """
-    gap, order = root_mean_square(fine - coarse), declared
+    gap, order = root_mean_square(fine_values - coarse_values), declared
     if coarser is not None and len(coarser) > 1:
         window = slice(0, 2 * len(coarser) - 1, 2)
         order = observed_order(
-            root_mean_square((fine - coarse)[window]), root_mean_square(coarse[window] - coarser), declared
+            root_mean_square((fine_values - coarse_values)[window]),
+            root_mean_square(coarse_values[window] - coarser),
+            declared,
         )
-    largest = float(np.abs(fine).max(initial=0.0))
-    error = max(gap / (2.0**order - 1.0), ONE_ROUNDING * largest * math.sqrt(len(fine)))
-    return estimate_rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine), step)
+    largest = float(np.abs(fine_values).max(initial=0.0))
+    error = max(gap / (2.0**order - 1.0), ONE_ROUNDING * largest * math.sqrt(len(fine_values)))
+    return estimate_rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine_values), step)
 
 
 def root_mean_square(values: np.ndarray) -> float:
@@ -126,8 +133,8 @@ def finite_rms(values: np.ndarray) -> float:
 
 def rows_at(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
     """Indices of the times in ``times`` (n,) nearest to the wanted ones (m,); both must be ascending."""
-    after = np.clip(np.searchsorted(times, wanted_times), 1, len(times) - 1)
-    return after - (wanted_times - times[after - 1] < times[after] - wanted_times)
+    row_after = np.clip(np.searchsorted(times, wanted_times), 1, len(times) - 1)
+    return row_after - (wanted_times - times[row_after - 1] < times[row_after] - wanted_times)
 
 
 class Series(NamedTuple):
@@ -146,113 +153,117 @@ or the share is 1; raises InputError or RunFailed where that cannot be."""
 
 def estimated(
     run: Result,
-    fine: Series,
+    fine_run: Series,
     rerun: Rerun,
     order: float,
     step: float,
     growth: Mapping[str, float] | None = None,
-    sizes: Mapping[str, float] | None = None,
+    channel_sizes: Mapping[str, float] | None = None,
 ) -> Result:
-    """The result with estimated errors of the channels in ``fine``, which are its own rows at steps of ``step`` (s).
+    """The result with estimated errors of the channels in ``fine_run``, which are its own rows at steps of ``step``
+    (s).
 
-    growth : by channel, least factor on
-    what a part tells, where errors grow faster than by a power of time; sizes : what shares are of, by channel, where
-    that is not its own deviation. Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
+    growth : by channel, least factor on what a part tells, where errors grow faster than by a power of time;
+    channel_sizes : what shares are of, by channel, where that is not its own deviation. Raises RunFailed, whose
+    ``partial`` is the result, where a channel is no answer.
     """
-    told, how = by_steps(fine, rerun, order, step, growth, sizes)
-    known = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
-    known |= fine.units
+    estimates, method_text = by_steps(fine_run, rerun, order, step, growth, channel_sizes)
+    known = {name: run.data[name].attrs.get("units", "") for name in fine_run.channels if name in run.data}
+    known |= fine_run.units
     return with_stated_errors(
-        run, {name: replace(estimate, unit=known.get(name, "")) for name, estimate in told.items()}, how
+        run, {name: replace(estimate, unit=known.get(name, "")) for name, estimate in estimates.items()}, method_text
     )
 
 
 def by_steps(
-    fine: Series,
+    fine_run: Series,
     rerun: Rerun,
     order: float,
     step: float,
     growth: Mapping[str, float] | None = None,
-    sizes: Mapping[str, float] | None = None,
+    channel_sizes: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, Estimate], str]:
-    """Estimated errors of the channels in ``fine``, without units, and a text on how they were estimated.
+    """Estimated errors of the channels in ``fine_run``, without units, and a text on how they were estimated.
 
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
-    be, half of it over a part tells. growth, sizes : as in ``estimated``.
+    be, half of it over a part tells. growth, channel_sizes : as in ``estimated``.
     """
     try:
-        told, how = _by_longer_steps(fine, rerun, order, step), "runs in longer steps"
+        estimates, method_text = _by_longer_steps(fine_run, rerun, order, step), "runs in longer steps"
     except (InputError, RunFailed):
-        told, how = _by_half_steps(fine, rerun, order, step, growth or {}), "a part in half the step"
-    for name, size in (sizes or {}).items():
-        told[name] = estimate_rescaled(told[name], size, step)
-    return told, how
+        estimates, method_text = _by_half_steps(fine_run, rerun, order, step, growth or {}), "a part in half the step"
+    for name, size in (channel_sizes or {}).items():
+        estimates[name] = estimate_rescaled(estimates[name], size, step)
+    return estimates, method_text
 
 
-def _by_longer_steps(fine: Series, rerun: Rerun, order: float, step: float) -> dict[str, Estimate]:
-    coarse = _within(fine, rerun(2.0, 1.0), step)
+def _by_longer_steps(fine_run: Series, rerun: Rerun, order: float, step: float) -> dict[str, Estimate]:
+    coarse = _within(fine_run, rerun(2.0, 1.0), step)
     coarser: Mapping[str, np.ndarray] = {}
     with suppress(InputError, RunFailed):
         coarser = _within(coarse, rerun(4.0, REPEATED_SHARE), step).channels
-    rows = rows_at(fine.times, coarse.times)
+    rows = rows_at(fine_run.times, coarse.times)
     return {
         name: estimate(values[rows], coarse.channels[name], order, step, coarser.get(name))
-        for name, values in fine.channels.items()
+        for name, values in fine_run.channels.items()
     }
 
 
-def _within(fine: Series, coarse: Series, step: float) -> Series:
+def _within(fine_run: Series, coarse_run: Series, step: float) -> Series:
     """The run in longer steps; RunFailed where it has no row after its start that a row of the finer run is near to.
 
     Steps of a short run, twice as long, may outlast it: nothing is there to compare.
     """
-    if len(coarse.times) < 2 or coarse.times[-1] > fine.times[-1] + 0.25 * step:
+    if len(coarse_run.times) < 2 or coarse_run.times[-1] > fine_run.times[-1] + 0.25 * step:
         raise RunFailed("", f"longer steps than {step:g} s do not fit into the run")
-    return coarse
+    return coarse_run
 
 
 def _by_half_steps(
-    fine: Series, rerun: Rerun, order: float, step: float, growth: Mapping[str, float]
+    fine_run: Series, rerun: Rerun, order: float, step: float, growth: Mapping[str, float]
 ) -> dict[str, Estimate]:
     """Estimates from part of the run, or all of a short one, repeated with half the step. The error found there is
     scaled to the run's own step by the order of the method, and to the rest of the run by its growth."""
-    finer = rerun(0.5, FINE_WINDOW if len(fine.times) > FEW_ROWS else 1.0)
+    finer = rerun(0.5, FINE_WINDOW if len(fine_run.times) > FEW_ROWS else 1.0)
     slack = 1e-9 * finer.times[-1]
-    part = (fine.times >= finer.times[0] - slack) & (fine.times <= finer.times[-1] + slack)
-    rows = rows_at(finer.times, fine.times[part])
-    told = {}
-    for name, values in fine.channels.items():
-        error = estimate(finer.channels[name][rows], values[part], order, step)
+    in_finer_run = (fine_run.times >= finer.times[0] - slack) & (fine_run.times <= finer.times[-1] + slack)
+    rows = rows_at(finer.times, fine_run.times[in_finer_run])
+    estimates = {}
+    for name, values in fine_run.channels.items():
+        error = estimate(finer.channels[name][rows], values[in_finer_run], order, step)
         later = max(
-            _growth_after_window(values[part] - finer.channels[name][rows], values) if part[0] else 1.0,
+            _growth_after_window(values[in_finer_run] - finer.channels[name][rows], values) if in_finer_run[0] else 1.0,
             growth.get(name, 1.0),
         )
-        told[name] = estimate_rescaled(
+        estimates[name] = estimate_rescaled(
             replace(error, error=error.error * 2.0**error.order * later), size_of(values), step
         )
-    return told
+    return estimates
 
 
-def _growth_after_window(gap: np.ndarray, values: np.ndarray) -> float:
-    """Ratio of the error's rms over the whole run to that over the first rows, in which ``gap`` (k, ...) is the
+def _growth_after_window(error_rows: np.ndarray, values: np.ndarray) -> float:
+    """Ratio of the error's rms over the whole run to that over the first rows, in which ``error_rows`` (k, ...) is the
     difference of two runs.
 
     The error is assumed to keep growing with the power of time found there, or with the roughness of the channel (n,
     ...).
     """
-    if len(gap) < 4:
+    if len(error_rows) < 4:
         return 1.0
-    first, second = root_mean_square(gap[: len(gap) // 2]), root_mean_square(gap[len(gap) // 2 :])
+    first, second = (
+        root_mean_square(error_rows[: len(error_rows) // 2]),
+        root_mean_square(error_rows[len(error_rows) // 2 :]),
+    )
     power = 0.5 * (math.log2(1.0 + (second / first) ** 2) - 1.0) if first > 0.0 else 0.0
     bends = np.diff(values, 2, axis=0)
-    before, over_all = root_mean_square(bends[: len(gap) - 2]), root_mean_square(bends)
-    rougher = over_all / before if before > 0.0 else 1.0
-    return max(1.0, rougher, (len(values) / len(gap)) ** min(power, STEEPEST_ERROR_GROWTH))
+    bends_at_start, over_all = root_mean_square(bends[: len(error_rows) - 2]), root_mean_square(bends)
+    rougher = over_all / bends_at_start if bends_at_start > 0.0 else 1.0
+    return max(1.0, rougher, (len(values) / len(error_rows)) ** min(power, STEEPEST_ERROR_GROWTH))
 
 
-def estimate_rescaled(estimate: Estimate, size: float, step: float) -> Estimate:
+def estimate_rescaled(estimate: Estimate, channel_size: float, step: float) -> Estimate:
     """The estimate with share and step recomputed for the size of the whole channel; ``step`` is the run's step."""
-    share = estimate.error / size if size > 0.0 else (0.0 if estimate.error == 0.0 else math.inf)
+    share = estimate.error / channel_size if channel_size > 0.0 else (0.0 if estimate.error == 0.0 else math.inf)
     wanted = (share / GOAL_SHARE) ** (1.0 / estimate.order) if share < math.inf else 1.0
     return replace(estimate, share=share, step=step / _whole_divisor(wanted))
 
@@ -264,33 +275,38 @@ def _whole_divisor(minimum: float) -> int:
 
 
 def of_tolerance(
-    run: Result, fine: Series, looser: Series, factor: float, tolerance: float, sizes: Mapping[str, float] | None = None
+    run: Result,
+    fine_run: Series,
+    looser: Series,
+    factor: float,
+    tolerance: float,
+    channel_sizes: Mapping[str, float] | None = None,
 ) -> Result:
     """The result of an adaptive method with estimated errors of its channels, from a run whose tolerance is ``factor``
     times as large. The error is assumed to grow only with the power TOLERANCE_POWER of the tolerance, so that it is
-    overestimated. ``sizes`` as in ``estimated``.
+    overestimated. ``channel_sizes`` as in ``estimated``.
 
     Rows may lie where steps end: the finer run is read at the looser one's times by a cubic spline.
     """
     from scipy.interpolate import CubicSpline
 
-    told = {}
-    for name, values in fine.channels.items():
-        same = len(looser.times) == len(fine.times) and np.array_equal(looser.times, fine.times)
-        at = values if same else CubicSpline(fine.times, values)(looser.times)
+    estimates = {}
+    for name, values in fine_run.channels.items():
+        same_times = len(looser.times) == len(fine_run.times) and np.array_equal(looser.times, fine_run.times)
+        values_at_looser = values if same_times else CubicSpline(fine_run.times, values)(looser.times)
         error = max(
-            root_mean_square(at - looser.channels[name]) / (factor**TOLERANCE_POWER - 1.0),
+            root_mean_square(values_at_looser - looser.channels[name]) / (factor**TOLERANCE_POWER - 1.0),
             LEAST_TOLERANCE_SHARE * tolerance * size_of(values),
         )
         estimate = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / TOLERANCE_POWER, tolerance)
-        told[name] = estimate_rescaled(estimate, (sizes or {}).get(name, size_of(values)), tolerance)
-    return with_stated_errors(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")
+        estimates[name] = estimate_rescaled(estimate, (channel_sizes or {}).get(name, size_of(values)), tolerance)
+    return with_stated_errors(run, estimates, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
-def by_cells(error: float, size: float, unit: str, cells: int, order: float, maximum_cells: int) -> Estimate:
+def by_cells(error: float, channel_size: float, unit: str, cells: int, order: float, maximum_cells: int) -> Estimate:
     """Estimated error on a grid of ``cells`` cells. Its ``step`` is the number of cells needed for GOAL_SHARE, at most
     ``maximum_cells``."""
-    share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
+    share = error / channel_size if channel_size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = cells * max(1.0, (min(share, 1.0) / GOAL_SHARE) ** (1.0 / order))
     return Estimate(error, unit, share, order, float(min(maximum_cells, math.ceil(needed))), CELLS_NOTE)
 
@@ -331,14 +347,14 @@ def with_stated_errors(run: Result, estimates: Mapping[str, Estimate], method: s
 
 def errors_of(run: Result) -> dict[str, Estimate]:
     """Estimates stored in a result, by channel; empty if no estimate was made."""
-    said = json.loads(run.data.attrs.get("error", "{}"))
-    return {name: Estimate(**values) for name, values in said.get("channels", {}).items()}
+    stored = json.loads(run.data.attrs.get("error", "{}"))
+    return {name: Estimate(**values) for name, values in stored.get("channels", {}).items()}
 
 
-def not_estimated(run: Result, why: str) -> Result:
+def not_estimated(run: Result, reason: str) -> Result:
     """The result with a statement why its error is not estimated, such as a force law that switches differently in
     every run."""
-    run.data.attrs["error"] = json.dumps({"why": why})
+    run.data.attrs["error"] = json.dumps({"why": reason})
     return run
 
 
@@ -347,9 +363,9 @@ def of_theory(run: Result, estimates: Mapping[str, Estimate], method: str) -> Re
 
     A finer grid does not reduce this error, so it leads to no warning and no refusal.
     """
-    said = json.loads(run.data.attrs["error"])
-    said["theory"] = {"how": method, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
-    run.data.attrs["error"] = json.dumps(said)
+    stored = json.loads(run.data.attrs["error"])
+    stored["theory"] = {"how": method, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
+    run.data.attrs["error"] = json.dumps(stored)
     return run
 
 
@@ -358,16 +374,19 @@ def of_chance(run: Result, estimates: Mapping[str, Estimate], samples: int) -> R
 
     The errors of the time step stay in the result as well.
     """
-    said = json.loads(run.data.attrs["error"])
-    said["chance"] = {"samples": samples, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
-    run.data.attrs["error"] = json.dumps(said)
+    stored = json.loads(run.data.attrs["error"])
+    stored["chance"] = {
+        "samples": samples,
+        "channels": {name: asdict(estimate) for name, estimate in estimates.items()},
+    }
+    run.data.attrs["error"] = json.dumps(stored)
     return run
 
 
-def by_chance(error: float, size: float, unit: str, samples: int) -> Estimate:
+def by_chance(error: float, channel_size: float, unit: str, samples: int) -> Estimate:
     """A standard error as an ``Estimate``; its ``step`` is the number of samples that would reduce the share to
     WARNED_SHARE."""
-    share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
+    share = error / channel_size if channel_size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = samples * max(1.0, (share / WARNED_SHARE) ** 2) if math.isfinite(share) else math.inf
     return Estimate(error, unit, share, 0.5, float(f"{needed:.2g}") if math.isfinite(needed) else math.inf)
 
@@ -380,18 +399,18 @@ def worst_of(run: Result) -> Estimate | None:
 def error_lines(run: Result) -> list[str]:
     """Printed lines on a result's error. First the worst channels for the time step and for cells, the worse one first,
     with a warning and advice if needed; then the errors of its theory and of its sample."""
-    said, told = json.loads(run.data.attrs.get("error", "{}")), errors_of(run)
-    text = [f"error not estimated: {said['why']}"] if "why" in said else []
-    shares = {name: estimate.share for name, estimate in sorted(told.items(), key=lambda entry: entry[1].share)}
-    worst = {told[name].of: name for name in shares}
+    stored, estimates = json.loads(run.data.attrs.get("error", "{}")), errors_of(run)
+    text = [f"error not estimated: {stored['why']}"] if "why" in stored else []
+    shares = {name: estimate.share for name, estimate in sorted(estimates.items(), key=lambda entry: entry[1].share)}
+    worst = {estimates[name].of: name for name in shares}
     for name in sorted(worst.values(), key=lambda name: -shares[name]):
-        line = f"error at most {_size_text(name, told[name])}, by {said['how']}"
-        text.append(f"{line}: WARNING, {told[name].advice(said['of'])}" if told[name].warned else line)
+        line = f"error at most {_size_text(name, estimates[name])}, by {stored['how']}"
+        text.append(f"{line}: WARNING, {estimates[name].advice(stored['of'])}" if estimates[name].warned else line)
     for kind, words in (("theory", "error of the theory"), ("chance", "standard error of {samples} paths")):
-        if kind in said:
-            name, values = max(said[kind]["channels"].items(), key=lambda entry: entry[1]["share"])
-            line = f"{words.format(**said[kind])} at most {_size_text(name, Estimate(**values))}"
-            text.append(f"{line}, {said[kind]['how']}" if "how" in said[kind] else line)
+        if kind in stored:
+            name, values = max(stored[kind]["channels"].items(), key=lambda entry: entry[1]["share"])
+            line = f"{words.format(**stored[kind])} at most {_size_text(name, Estimate(**values))}"
+            text.append(f"{line}, {stored[kind]['how']}" if "how" in stored[kind] else line)
     return text
 
 

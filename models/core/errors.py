@@ -28,20 +28,20 @@ class InputError(ValueError):
     def __init__(self, file: object, place: str, value: Any, allowed: str, choices: tuple[str, ...] = ()) -> None:
         self.file, self.place, self.value, self.allowed = str(file), place, value, allowed
         self.choices = choices
-        where = ": ".join(part for part in (str(file), place) if part)
+        location = ": ".join(text for text in (str(file), place) if text)
         name = value if isinstance(value, str) else place.rpartition(".")[2]
-        super().__init__(f"{where}{_value_text(value)}: {allowed}{nearest_names_phrase(name, choices)}")
+        super().__init__(f"{location}{_value_text(value)}: {allowed}{nearest_names_phrase(name, choices)}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Arguments for recreating the error in another process."""
         return type(self), (self.file, self.place, self.value, self.allowed, self.choices), vars(self)
 
 
-def _value_text(value: Any) -> str:
-    """Return `` = value`` as a scene file would hold it, cut to a readable length."""
-    if value is None:
+def _value_text(shown_value: Any) -> str:
+    """Return `` = shown_value`` as a scene file would hold it, cut to a readable length."""
+    if shown_value is None:
         return ""
-    plain = value.tolist() if hasattr(value, "tolist") else value
+    plain = shown_value.tolist() if hasattr(shown_value, "tolist") else shown_value
     text = str(plain).lower() if isinstance(plain, bool) else repr(plain)
     return f" = {text if len(text) <= LONGEST_VALUE_TEXT else text[: LONGEST_VALUE_TEXT - 3] + '...'}"
 
@@ -50,11 +50,11 @@ def nearest_names_phrase(name: object, choices: tuple[str, ...]) -> str:
     """Phrase that lists the accepted names and proposes the one most similar to ``name``."""
     if not choices:
         return ""
-    listed, more = sorted(choices), ""
+    listed, omitted_text = sorted(choices), ""
     if len(choices) > MOST_NAMES:
         listed = get_close_matches(str(name), choices, n=5, cutoff=0.3) or listed[:5]
-        more = f", and {len(choices) - len(listed)} others"
-    return f" (allowed: {', '.join(listed)}{more}){suggestion_phrase(name, choices)}"
+        omitted_text = f", and {len(choices) - len(listed)} others"
+    return f" (allowed: {', '.join(listed)}{omitted_text}){suggestion_phrase(name, choices)}"
 
 
 def suggestion_phrase(name: object, choices: tuple[str, ...]) -> str:
@@ -101,9 +101,9 @@ class RunFailed(RuntimeError):
 class Refused(InputError):
     """A valid scene needs something that the engine does not compute correctly."""
 
-    def __init__(self, engine: str, why: str, file: str = "") -> None:
-        self.engine, self.why = engine, why
-        super().__init__(file, f"engines.{engine}" if file else engine, None, why)
+    def __init__(self, engine: str, reason: str, file: str = "") -> None:
+        self.engine, self.why = engine, reason
+        super().__init__(file, f"engines.{engine}" if file else engine, None, reason)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Arguments for recreating the error in another process."""

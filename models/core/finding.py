@@ -50,7 +50,11 @@ def merged_findings(findings: Iterable[Finding]) -> list[Finding]:
     for finding in findings:
         kinds.setdefault((finding.check, finding.weight), []).append(finding)
     return [
-        f for alike in kinds.values() for f in (alike if len(alike) <= LISTED_FINDINGS else [_largest_finding(alike)])
+        f
+        for similar_findings in kinds.values()
+        for f in (
+            similar_findings if len(similar_findings) <= LISTED_FINDINGS else [_largest_finding(similar_findings)]
+        )
     ]
 
 
@@ -58,5 +62,5 @@ def _largest_finding(alike: list[Finding]) -> Finding:
     """The finding with the largest size, with the number of channels or places concerned."""
     worst = max(alike, key=lambda finding: abs(finding.size or 0.0))
     names = {name for finding in alike for name in finding.signals or (finding.place,)}
-    what = "channels" if worst.signals else "places"
-    return replace(worst, text=f"{worst.check!r} at {len(names)} {what}, the worst: {worst.text}")
+    noun = "channels" if worst.signals else "places"
+    return replace(worst, text=f"{worst.check!r} at {len(names)} {noun}, the worst: {worst.text}")

@@ -44,11 +44,11 @@ def normal_block(
     return np.random.Generator(bits).standard_normal((rows, channels))
 
 
-def _whole_number(name: str, value: int) -> int:
+def _whole_number(name: str, number: int) -> int:
     """The value, checked to be a whole number of at most 64 bits."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value < 2**64:
-        raise InputError("", name, value, "must be a whole number from 0 to 2^64 - 1")
-    return int(value)
+    if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number < 2**64:
+        raise InputError("", name, number, "must be a whole number from 0 to 2^64 - 1")
+    return int(number)
 
 
 def normal_samples(seed: int, path: int, count: int, channels: int, first: int = 0, source: int = FORCES) -> np.ndarray:

@@ -6,17 +6,17 @@ from models.machine.compiled import njit
 
 
 @njit(cache=True)
-def evaluate(coefficients, period, start, step, count, derivatives):
-    """Values of a piecewise polynomial at start + i step, then its first and second derivatives: shape (count, columns
-    (derivatives + 1)).
+def evaluate(coefficients, period, start_time, step, sample_count, derivatives):
+    """Values of a piecewise polynomial at start_time + i step, then its first and second derivatives: shape
+    (sample_count, columns (derivatives + 1)).
 
     coefficients : (degree + 1, pieces, columns), lowest power first, in the time since each piece's start;
     the pieces lie ``period`` (s) apart from t = 0 on, and the outer ones go on beyond their ends.
     """
     powers, pieces, columns = coefficients.shape
-    out = np.empty((count, columns * (derivatives + 1)))
-    for row in range(count):
-        time = start + row * step
+    values_out = np.empty((sample_count, columns * (derivatives + 1)))
+    for row in range(sample_count):
+        time = start_time + row * step
         piece = min(max(int(np.floor(time / period + 1e-9)), 0), pieces - 1)
         since = time - piece * period
         for order in range(derivatives + 1):
@@ -27,8 +27,8 @@ def evaluate(coefficients, period, start, step, count, derivatives):
                     for i in range(order):
                         factor *= power - i
                     value = value * since + factor * coefficients[power, piece, column]
-                out[row, order * columns + column] = value
-    return out
+                values_out[row, order * columns + column] = value
+    return values_out
 
 
 @njit(cache=True, nogil=True)
@@ -36,10 +36,10 @@ def interpolate(values, index, fraction):
     """Values (n, columns), linearly interpolated from each sample ``index`` by ``fraction`` of a period towards the
     next sample."""
     rows, columns = values.shape
-    out = np.empty((len(index), columns))
+    values_out = np.empty((len(index), columns))
     for i in range(len(index)):
         row = index[i]
-        after = min(row + 1, rows - 1)
+        next_row = min(row + 1, rows - 1)
         for column in range(columns):
-            out[i, column] = values[row, column] + fraction[i] * (values[after, column] - values[row, column])
-    return out
+            values_out[i, column] = values[row, column] + fraction[i] * (values[next_row, column] - values[row, column])
+    return values_out

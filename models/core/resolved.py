@@ -30,26 +30,26 @@ def missed_velocity_share(positions: np.ndarray, rates: np.ndarray, step: float,
         return 0.0, 0
     mass = mass if np.ndim(mass) == 2 else np.diag(mass)
     root = np.linalg.cholesky(mass)
-    way = step / 3.0 * (rates[:-2] + 4.0 * rates[1:-1] + rates[2:])
-    each = np.linalg.norm((positions[2:] - positions[:-2] - way) @ root, axis=1) / (2.0 * step)
-    whole = np.linalg.norm((rates - rates[0]) @ root, axis=1).max()
-    whole = max(
-        whole,
+    displacement = step / 3.0 * (rates[:-2] + 4.0 * rates[1:-1] + rates[2:])
+    errors_of_step = np.linalg.norm((positions[2:] - positions[:-2] - displacement) @ root, axis=1) / (2.0 * step)
+    velocity_scale = np.linalg.norm((rates - rates[0]) @ root, axis=1).max()
+    velocity_scale = max(
+        velocity_scale,
         ROUNDING_VELOCITY_SHARE * np.linalg.norm(rates[0] @ root),
         NEGLIGIBLE_VELOCITY * np.sqrt(mass.diagonal().max()),
     )
-    sums = np.concatenate(([0.0], np.cumsum(each)))
-    window = min(len(each), max(1, round(1.0 / step)))
+    sums = np.concatenate(([0.0], np.cumsum(errors_of_step)))
+    window = min(len(errors_of_step), max(1, round(1.0 / step)))
     within = sums[window:] - sums[:-window]
-    return float(within.max() / whole), int(within.argmax())
+    return float(within.max() / velocity_scale), int(within.argmax())
 
 
 def missed_by_first_order(positions: np.ndarray, rates: np.ndarray, step: float, mass: np.ndarray) -> tuple[float, int]:
     """``missed_velocity_share`` for first-order methods: the least result when rates belong to the steps' ends, or to
     the middle of the step after or before them."""
     middle = (rates[1:] + rates[:-1]) / 2.0
-    ways = ((positions, rates), (positions[:-1], middle), (positions[1:], middle))
-    return min(missed_velocity_share(places, velocities, step, mass) for places, velocities in ways)
+    variants = ((positions, rates), (positions[:-1], middle), (positions[1:], middle))
+    return min(missed_velocity_share(positions_at, velocities, step, mass) for positions_at, velocities in variants)
 
 
 def check_resolved(

@@ -85,8 +85,8 @@ class Result:
 
         It is written whole or not at all; numbers have checksums, so that whoever reads a damaged file is told.
         """
-        kept = {name: value for name, value in self.data.attrs.items() if name != "seconds"}
-        data = self.data.drop_attrs(deep=False).assign_attrs(kept)
+        saved_attributes = {name: value for name, value in self.data.attrs.items() if name != "seconds"}
+        data = self.data.drop_attrs(deep=False).assign_attrs(saved_attributes)
         checked = {
             name: {"fletcher32": True}
             for name, variable in data.variables.items()
@@ -153,10 +153,12 @@ def join_results(results: Mapping[str, Result], axis: str) -> Result:
 
     parts = [result.data for result in results.values()]
     data = xr.concat(parts, xr.Variable(axis, list(results)), combine_attrs="override")
-    data.attrs["engine"] = ", ".join(part.attrs["engine"] for part in parts)
+    data.attrs["engine"] = ", ".join(dataset.attrs["engine"] for dataset in parts)
     data.attrs["counts"] = json.dumps({name: result.counts() for name, result in results.items()})
-    for said in ("error", "assumptions"):
-        data.attrs[said] = json.dumps({name: json.loads(result.data.attrs[said]) for name, result in results.items()})
+    for attribute in ("error", "assumptions"):
+        data.attrs[attribute] = json.dumps(
+            {name: json.loads(result.data.attrs[attribute]) for name, result in results.items()}
+        )
     data.attrs["seconds"] = sum(result.seconds for result in results.values())
     return Result(data)
 
@@ -180,8 +182,8 @@ def load(path: Path) -> Result:
     import xarray as xr
 
     if not path.is_file():
-        told = "is a folder: name one file of it" if path.is_dir() else "no such file"
-        raise InputError(path, "", None, f"{told} (a saved result ends in .nc)")
+        refusal = "is a folder: name one file of it" if path.is_dir() else "no such file"
+        raise InputError(path, "", None, f"{refusal} (a saved result ends in .nc)")
     try:
         with xr.open_dataset(path, engine="h5netcdf") as data:
             return Result(data.load())
@@ -206,10 +208,13 @@ def provenance(command: str = "") -> dict[str, Any]:
 @cache
 def _commit_of_checkout() -> str:
     """Commit of the checkout that runs, marked if files were changed since."""
-    asked = partial(subprocess.run, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=10, check=True)
+    git_output = partial(
+        subprocess.run, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=10, check=True
+    )
     try:
         commit, changes = (
-            asked(["git", *words]).stdout.strip() for words in (("rev-parse", "--short=12", "HEAD"), ("status", "-s"))
+            git_output(["git", *words]).stdout.strip()
+            for words in (("rev-parse", "--short=12", "HEAD"), ("status", "-s"))
         )
     except (OSError, subprocess.CalledProcessError):
         return "not a checkout"

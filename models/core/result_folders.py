@@ -40,8 +40,8 @@ def resumed_folder(requested_folder: Path, blocks: str) -> Path:
 
     What the run left of files when it was killed is removed.
     """
-    begun = requested_folder.is_dir() and {path.name for path in requested_folder.iterdir()} <= {COMMAND_FILE}
-    if not begun and not (requested_folder / blocks).is_dir():
+    has_begun = requested_folder.is_dir() and {path.name for path in requested_folder.iterdir()} <= {COMMAND_FILE}
+    if not has_begun and not (requested_folder / blocks).is_dir():
         allowed = f"holds no unfinished run: name a folder with {blocks!r} in it, or leave out --resume"
         raise InputError("--resume", "", str(requested_folder), allowed)
     drop_parts(requested_folder)

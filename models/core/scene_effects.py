@@ -73,8 +73,8 @@ class Entry:
         """Take the effect out of a scene's table."""
         if self.leave_out is not None:
             return self.leave_out(table, scene)
-        *above, key = self.place.split(".")
-        for name in above:
+        *parent_keys, key = self.place.split(".")
+        for name in parent_keys:
             table = table[name]
         del table[key]
 
@@ -82,8 +82,8 @@ class Entry:
         """Put the effect into a scene's table, with its usual values."""
         if self.put_in is not None:
             return self.put_in(table, scene)
-        *above, key = self.place.split(".")
-        for name in above:
+        *parent_keys, key = self.place.split(".")
+        for name in parent_keys:
             table = table.setdefault(name, {})
         table[key] = deepcopy(self.usual_value)
 
@@ -116,8 +116,8 @@ class Effect:
 
 def _of_entry(entry: Entry) -> Effect:
     """An ``Effect`` made from a table entry, with the attribute names that an effect's own file would use."""
-    said = ("place", "cost", "needs", "excludes", "why", "after", "modules", "channels")
-    known = {key.upper(): getattr(entry, key) for key in said}
+    field_names = ("place", "cost", "needs", "excludes", "why", "after", "modules", "channels")
+    known = {key.upper(): getattr(entry, key) for key in field_names}
     known |= {"COUNTS": {"all": entry.counts, **entry.in_engines}} if entry.counts else {}
     known |= {"__doc__": entry.says, "named": entry.named, "leave_out": entry.drop}
     return Effect(known if entry.usual_value is None and entry.put_in is None else known | {"put_in": entry.add})
@@ -178,13 +178,13 @@ def module_of(system: str, name: str) -> Any:
 
 def named_effects(scene: Any) -> tuple[str, ...]:
     """Effects that a scene names; effects that only a table can name are not imported for this."""
-    there = [
+    named = [
         name
         for name, file in _effect_files(scene.system).items()
         if name in tables_of(scene) or _names_effect(scene, file)
     ]
-    there += [name for name, entry in _table(scene.system).items() if entry.named(scene)]
-    return tuple(sorted(there))
+    named += [name for name, entry in _table(scene.system).items() if entry.named(scene)]
+    return tuple(sorted(named))
 
 
 def _names_effect(scene: Any, file: Path) -> bool:
@@ -194,8 +194,8 @@ def _names_effect(scene: Any, file: Path) -> bool:
 
 def absent_effects(scene: Any) -> tuple[str, ...]:
     """Effects of the scene's system that the scene does not name."""
-    there = named_effects(scene)
-    return tuple(name for name in names_of(scene.system) if name not in there)
+    named = named_effects(scene)
+    return tuple(name for name in names_of(scene.system) if name not in named)
 
 
 def tables_of(scene: Any) -> Mapping[str, Any]:
@@ -263,34 +263,35 @@ def check(scene: Any) -> None:
     check_combination(named_effects(scene), scene)
 
 
-def check_combination(present: Iterable[str], scene: Any) -> None:
+def check_combination(present_effects: Iterable[str], scene: Any) -> None:
     """Check that effects of a scene, given by existing names, are allowed together."""
-    present = tuple(present)
-    for name in present:
+    present_effects = tuple(present_effects)
+    for name in present_effects:
         module = module_of(scene.system, name)
         why = f", {module.WHY}" if module.WHY else ""
-        for other in module.NEEDS:
-            if other not in present:
+        for other_effect in module.NEEDS:
+            if other_effect not in present_effects:
                 raise InputError(
                     scene.file,
                     _key_of_effect(module, name),
                     None,
-                    f"needs the effect {other!r}{why}: name it too"
-                    f"{_what_to_drop(scene, other, present)}{_table_of_effect(scene, other)}",
+                    f"needs the effect {other_effect!r}{why}: name it too"
+                    f"{_what_to_drop(scene, other_effect, present_effects)}{_table_of_effect(scene, other_effect)}",
                 )
-        for other in module.EXCLUDES:
-            if other in present:
+        for other_effect in module.EXCLUDES:
+            if other_effect in present_effects:
                 raise InputError(
                     scene.file,
                     _key_of_effect(module, name),
                     None,
-                    f"cannot stand beside {other!r}{why}: drop one of them{_table_of_effect(scene, other)}",
+                    f"cannot stand beside {other_effect!r}{why}: drop one of them"
+                    f"{_table_of_effect(scene, other_effect)}",
                 )
 
 
-def _what_to_drop(scene: Any, name: str, present: tuple[str, ...]) -> str:
+def _what_to_drop(scene: Any, name: str, present_effects: tuple[str, ...]) -> str:
     """Phrase on the effects that must be dropped so that the effect ``name`` can be added."""
-    clash = [other for other in module_of(scene.system, name).EXCLUDES if other in present]
+    clash = [other_effect for other_effect in module_of(scene.system, name).EXCLUDES if other_effect in present_effects]
     return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
 
 
@@ -301,8 +302,8 @@ def _key_of_effect(module: Any, name: str) -> str:
 
 def _table_of_effect(scene: Any, name: str) -> str:
     """Phrase on the key that names an effect, if this is not the effect's own name."""
-    place = _key_of_effect(module_of(scene.system, name), name).removeprefix("effects.")
-    return "" if place == name else f"; {name!r} is named by {place}"
+    key = _key_of_effect(module_of(scene.system, name), name).removeprefix("effects.")
+    return "" if key == name else f"; {name!r} is named by {key}"
 
 
 def own_table(scene: Any) -> Table:
@@ -337,25 +338,31 @@ def scene_without(scene: Any, *left_out: str) -> Any:
 def _dependency_depth(name: str, system: str) -> int:
     """Length of the longest chain of needed effects that starts at ``name``. Effects are left out before the effects
     that they need."""
-    return 1 + max((_dependency_depth(other, system) for other in module_of(system, name).NEEDS), default=0)
+    return 1 + max(
+        (_dependency_depth(other_effect, system) for other_effect in module_of(system, name).NEEDS), default=0
+    )
 
 
-def with_effects(scene: Any, *more: str) -> Any:
+def with_effects(scene: Any, *added_effects: str) -> Any:
     """The scene with the given effects at their usual values; raises InputError if one cannot be added, or not with
     these values."""
     table = own_table(scene)
-    for name in more:
+    for name in added_effects:
         _put_in(table, name, scene)
-    return _confirmed_scene(rebuilt_scene(table, scene), more, True)
+    return _confirmed_scene(rebuilt_scene(table, scene), added_effects, True)
 
 
-def _confirmed_scene(scene: Any, effects: Iterable[str], wanted: bool) -> Any:
-    """The scene, after a check that it names all these effects (``wanted``), or none of them."""
-    there = named_effects(scene)
+def _confirmed_scene(scene: Any, effects: Iterable[str], must_be_named: bool) -> Any:
+    """The scene, after a check that it names all these effects (``must_be_named``), or none of them."""
+    named = named_effects(scene)
     for name in effects:
-        if (name in there) is not wanted:
-            said = "cannot be in this scene: nothing of it takes part" if wanted else "is still there: leave it in"
-            raise InputError(scene.file, _key_of_effect(module_of(scene.system, name), name), None, f"{name!r} {said}")
+        if (name in named) is not must_be_named:
+            refusal = (
+                "cannot be in this scene: nothing of it takes part" if must_be_named else "is still there: leave it in"
+            )
+            raise InputError(
+                scene.file, _key_of_effect(module_of(scene.system, name), name), None, f"{name!r} {refusal}"
+            )
     return scene
 
 
@@ -382,6 +389,9 @@ def rebuilt_scene(table: Table, scene: Any) -> Any:
 
 def effect_lines(scene: Any, width: int = 10) -> list[str]:
     """Lines of ``twinrig show``: one per effect of the scene with its cost, and one that lists all absent effects."""
-    said = {name: module_of(scene.system, name).COST for name in named_effects(scene)}
-    there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]
-    return [*there, f"  {'absent':<{width}} {', '.join(absent_effects(scene)) or 'nothing'} (not computed)"]
+    cost_by_effect = {name: module_of(scene.system, name).COST for name in named_effects(scene)}
+    effect_lines_of_scene = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in cost_by_effect.items()]
+    return [
+        *effect_lines_of_scene,
+        f"  {'absent':<{width}} {', '.join(absent_effects(scene)) or 'nothing'} (not computed)",
+    ]

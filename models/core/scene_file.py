@@ -49,8 +49,8 @@ class SceneFile(Strict):
     def check_choice(self) -> None:
         """Require quantities and a tolerance where the scene lets its effects be chosen automatically; refuse them
         elsewhere."""
-        given = {"quantities": self.quantities or None, "tolerance": self.tolerance}
-        for key, value in given.items():
+        automatic_keys = {"quantities": self.quantities or None, "tolerance": self.tolerance}
+        for key, value in automatic_keys.items():
             if self.study == self.CHOOSING and value is None:
                 asks = "which quantities must stay right" if key == "quantities" else "how wrong they may be, as 0.02"
                 raise InputError(self.file, key, None, f"is missing: a choice of effects asks {asks}")
@@ -58,9 +58,9 @@ class SceneFile(Strict):
                 allowed = f'is read by effects = "auto", of the study {self.CHOOSING!r}, only'
                 raise InputError(self.file, key, value, allowed)
 
-    def path(self, name: str, place: str = "") -> Path:
-        """Path of a file that the scene names at ``place``: in the scene's folder, or else in the working folder."""
-        return existing(name, Path(self.folder), self.file, place)
+    def path(self, name: str, key_path: str = "") -> Path:
+        """Path of a file that the scene names at ``key_path``: in the scene's folder, or else in the working folder."""
+        return existing(name, Path(self.folder), self.file, key_path)
 
 
 Model = TypeVar("Model", bound=SceneFile)
@@ -98,7 +98,7 @@ def _table_with_chosen_effects(model: type[SceneFile], table: Mapping[str, Any],
     return plain
 
 
-def existing(name: str, folder: Path, file: str, place: str) -> Path:
+def existing(name: str, folder: Path, file: str, key_path: str) -> Path:
     """The file ``name`` within ``folder``, or else in the folder in which the command runs.
 
     Raises InputError that names the place of the scene that wanted it.
@@ -110,10 +110,10 @@ def existing(name: str, folder: Path, file: str, place: str) -> Path:
         if not path.exists() and Path(name).is_file():
             return Path(name)
         if path.is_dir():
-            raise InputError(file, place, name, "is a folder: name a file")
+            raise InputError(file, key_path, name, "is a folder: name a file")
     except OSError:  # such as a name that is too long
         pass
-    raise InputError(file, place, name, f"no such file, looked for as {str(path)!r}{similar_file(path)}")
+    raise InputError(file, key_path, name, f"no such file, looked for as {str(path)!r}{similar_file(path)}")
 
 
 def changed_tables(path: Path, changes: Iterable[str]) -> dict[str, Any]:
@@ -143,60 +143,66 @@ def _not_toml(path: Path, error: Exception) -> InputError:
     if not isinstance(error, tomllib.TOMLDecodeError):
         reason = "nested too deeply" if isinstance(error, RecursionError) else "a number has too many digits"
         return InputError(path, "", None, f"not valid TOML: {reason}")
-    what, line, column = _ERROR_PLACE_PATTERN.fullmatch(str(error)).groups()  # type: ignore[union-attr]
+    complaint, line, column = _ERROR_PLACE_PATTERN.fullmatch(str(error)).groups()  # type: ignore[union-attr]
     if line is None:
-        return InputError(path, "", None, f"not valid TOML: {what}")
+        return InputError(path, "", None, f"not valid TOML: {complaint}")
     text = path.read_bytes().decode("utf-8-sig").splitlines()[int(line) - 1].strip()
-    return InputError(path, f"line {line}, column {column}", text, f"not valid TOML: {what}")
+    return InputError(path, f"line {line}, column {column}", text, f"not valid TOML: {complaint}")
 
 
 _ERROR_PLACE_PATTERN = re.compile(r"(.*?)(?: \(at line (\d+), column (\d+)\))?", re.DOTALL)
 
 
-def _set_nested_key(table: dict[str, Any], change: str) -> None:
+def _set_nested_key(table: dict[str, Any], assignment: str) -> None:
     """Set one nested key from KEY.KEY=VALUE; the value is parsed as TOML, and is text if that fails."""
-    key, equals, text = (part.strip() for part in change.partition("="))
+    key, equals, text = (text_part.strip() for text_part in assignment.partition("="))
     if not equals or not all(key.split(".")):
-        raise InputError("--set", "", change, "must read KEY=VALUE, for example run.step=5e-4")
-    at, last = _table_of_key(table, key, text, "--set")
-    at[last] = _parsed_value(text)
+        raise InputError("--set", "", assignment, "must read KEY=VALUE, for example run.step=5e-4")
+    container, last_key = _table_of_key(table, key, text, "--set")
+    container[last_key] = _parsed_value(text)
 
 
-def set_key(table: dict[str, Any], key: str, value: Any) -> None:
+def set_key(table: dict[str, Any], key: str, new_value: Any) -> None:
     """Set one nested key, such as "run.step" or "manoeuvres.0.speed", to a plain value; None removes the key.
 
     Raises InputError for a key that leads nowhere, and for one to be taken out that is not there.
     """
     if not all(key.split(".")):
         raise InputError("set", "", key, "must name a key, for example run.step")
-    at, last = _table_of_key(table, key, value, "set")
-    if value is not None:
-        at[last] = value
-    elif isinstance(at, list) or last in at:
-        del at[last]
+    container, last_key = _table_of_key(table, key, new_value, "set")
+    if new_value is not None:
+        container[last_key] = new_value
+    elif isinstance(container, list) or last_key in container:
+        del container[last_key]
     else:
-        raise InputError("set", key, None, "is not in the scene and cannot be taken out", tuple(at))
+        raise InputError("set", key, None, "is not in the scene and cannot be taken out", tuple(container))
 
 
-def _table_of_key(table: dict[str, Any], key: str, value: Any, file: str) -> tuple[Any, Any]:
+def _table_of_key(table: dict[str, Any], key: str, new_value: Any, file: str) -> tuple[Any, Any]:
     """The table or list that holds a nested key, created if missing, and the key or index within it.
 
-    value, file : what a message shows as offending, and where it was written.
+    new_value, file : what a message shows as offending, and where it was written.
     """
-    *parents, last = key.split(".")
-    at: Any = table
+    *parents, last_key = key.split(".")
+    container: Any = table
     for i, parent in enumerate(parents):
-        at = at.setdefault(parent, {}) if isinstance(at, dict) else at[_list_index(at, parent, (file, key, value))]
-        if not isinstance(at, dict | list):
-            raise InputError(file, key, value, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
-    return at, last if isinstance(at, dict) else _list_index(at, last, (file, key, value))
+        container = (
+            container.setdefault(parent, {})
+            if isinstance(container, dict)
+            else container[_list_index(container, parent, (file, key, new_value))]
+        )
+        if not isinstance(container, dict | list):
+            raise InputError(file, key, new_value, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
+    return container, last_key if isinstance(container, dict) else _list_index(
+        container, last_key, (file, key, new_value)
+    )
 
 
-def _list_index(listed: list[Any], number: str, written: tuple[str, str, Any]) -> int:
+def _list_index(entries: list[Any], index_text: str, written: tuple[str, str, Any]) -> int:
     """Index in a list from its text, counted from 0 as in messages; written : file, key and value of the change."""
-    if not (number.isdecimal() and int(number) < len(listed)):
-        raise InputError(*written, f"a list of {len(listed)} has no entry {number!r}: they count from 0")
-    return int(number)
+    if not (index_text.isdecimal() and int(index_text) < len(entries)):
+        raise InputError(*written, f"a list of {len(entries)} has no entry {index_text!r}: they count from 0")
+    return int(index_text)
 
 
 def _parsed_value(text: str) -> Any:
@@ -214,6 +220,6 @@ BARE_POINT = re.compile(r"(?<![\w.])(?=\.?\d)(\d*)\.(\d*)(?=[eE][-+]?\d|(?![\w.]
 """A number that may lack digits before or behind its point, which TOML does not take: 20. or .5"""
 
 
-def _with_digits(number: re.Match) -> str:
+def _with_digits(number_match: re.Match) -> str:
     """The number as text, with at least one digit on both sides of the decimal point."""
-    return f"{number[1] or '0'}.{number[2] or '0'}"
+    return f"{number_match[1] or '0'}.{number_match[2] or '0'}"

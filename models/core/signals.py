@@ -42,8 +42,8 @@ class Signal(Protocol):
         """Longest step (s) with which an adaptive solver does not miss a feature of the signal."""
         ...
 
-    def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values at start + i step, shape (count, channels)."""
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values at start_time + i step, shape (sample_count, channels)."""
         ...
 
     def at(self, time: float) -> np.ndarray:
@@ -88,24 +88,28 @@ class Sampled:
             return self.values[None]
         return np.stack([self.values[:-1], np.diff(self.values, axis=0) / self.period])
 
-    def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values at start + i step, shape (count, channels)."""
-        index, part = _sample_and_fraction(start, step, count, self.period, len(self.values))
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values at start_time + i step, shape (sample_count, channels)."""
+        index, fractions = _sample_and_fraction(start_time, step, sample_count, self.period, len(self.values))
         if self.held:
             return self.values[index]
         from models.core.piecewise import interpolate
 
-        return interpolate(self.values, index, part)
+        return interpolate(self.values, index, fractions)
 
     def at(self, time: float) -> np.ndarray:
         """Values at one time (s), shape (channels,), identical to those of ``sample`` but faster for the single times
         that solvers need."""
-        position, last = time / self.period, len(self.values) - 1
+        position, last_row = time / self.period, len(self.values) - 1
         nearest = round(position)
         snapped = nearest if abs(position - nearest) < SNAP_SHARE else position
-        row = min(max(math.floor(snapped), 0), last)
-        before = self.values[row]
-        return before.copy() if self.held else before + (snapped - row) * (self.values[min(row + 1, last)] - before)
+        row = min(max(math.floor(snapped), 0), last_row)
+        row_before = self.values[row]
+        return (
+            row_before.copy()
+            if self.held
+            else row_before + (snapped - row) * (self.values[min(row + 1, last_row)] - row_before)
+        )
 
     def knots(self, duration: float) -> np.ndarray:
         """All sample times inside (0, duration)."""
@@ -114,17 +118,17 @@ class Sampled:
 
 @lru_cache(maxsize=2)
 def _sample_and_fraction(
-    start: float, step: float, count: int, period: float, samples: int
+    start_time: float, step: float, sample_count: int, period: float, samples: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Index of the sample at or before each time start + i step, and the fraction of a period after it; the same for
     all paths of an ensemble."""
-    position = (start + step * np.arange(count)) / period
+    position = (start_time + step * np.arange(sample_count)) / period
     nearest = np.rint(position)
     snapped = np.where(np.abs(position - nearest) < SNAP_SHARE, nearest, position)
     index = np.clip(np.floor(snapped), 0, samples - 1).astype(np.int64)
-    part = snapped - index
-    index.flags.writeable = part.flags.writeable = False
-    return index, part
+    fractions = snapped - index
+    index.flags.writeable = fractions.flags.writeable = False
+    return index, fractions
 
 
 @dataclass(frozen=True)
@@ -145,9 +149,9 @@ class Smooth:
     def __post_init__(self) -> None:
         from scipy.interpolate import make_interp_spline
 
-        times = self.period * np.arange(len(self.values))
-        spline = make_interp_spline(times, self.values, k=self.degree)
-        powers = [spline.derivative(i)(times[:-1]) if i else self.values[:-1] for i in range(self.degree + 1)]
+        sample_times = self.period * np.arange(len(self.values))
+        spline = make_interp_spline(sample_times, self.values, k=self.degree)
+        powers = [spline.derivative(i)(sample_times[:-1]) if i else self.values[:-1] for i in range(self.degree + 1)]
         pieces = np.stack([values / math.factorial(i) for i, values in enumerate(powers)])
         object.__setattr__(self, "_pieces", np.ascontiguousarray(pieces))
 
@@ -170,11 +174,11 @@ class Smooth:
         """Coefficients (powers, periods, value columns), lowest power first, in the time since each sample."""
         return self._pieces
 
-    def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values and derivatives at start + i step, shape (count, channels)."""
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values and derivatives at start_time + i step, shape (sample_count, channels)."""
         from models.core.piecewise import evaluate
 
-        return evaluate(self._pieces, self.period, start, step, count, self.derivatives)
+        return evaluate(self._pieces, self.period, start_time, step, sample_count, self.derivatives)
 
     def at(self, time: float) -> np.ndarray:
         """Values and derivatives at one time (s), shape (channels,)."""
@@ -213,31 +217,31 @@ class Stacked:
     @property
     def channels(self) -> int:
         """Total number of channels of the combined signals."""
-        return sum(part.channels for part in self.parts)
+        return sum(signal.channels for signal in self.parts)
 
     @property
     def period(self) -> float | None:
         """Period (s) of the first sampled signal in the stack."""
-        return next((part.period for part in self.parts if part.period is not None), None)
+        return next((signal.period for signal in self.parts if signal.period is not None), None)
 
     @property
     def held(self) -> bool:
         """True if any of the stacked signals is constant over each sampling period."""
-        return any(part.held for part in self.parts)
+        return any(signal.held for signal in self.parts)
 
     @property
     def resolution(self) -> float:
         """The shortest resolution (s) among the combined signals."""
-        return min(part.resolution for part in self.parts)
+        return min(signal.resolution for signal in self.parts)
 
-    def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values of all combined signals at start + i step, shape (count, channels)."""
-        return np.hstack([part.sample(start, step, count) for part in self.parts])
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values of all combined signals at start_time + i step, shape (sample_count, channels)."""
+        return np.hstack([signal.sample(start_time, step, sample_count) for signal in self.parts])
 
     def at(self, time: float) -> np.ndarray:
         """Values of all combined signals at one time (s), shape (channels,)."""
-        return np.concatenate([part.at(time) for part in self.parts])
+        return np.concatenate([signal.at(time) for signal in self.parts])
 
     def knots(self, duration: float) -> np.ndarray:
         """Times at which any of the stacked signals is not smooth."""
-        return np.unique(np.concatenate([part.knots(duration) for part in self.parts]))
+        return np.unique(np.concatenate([signal.knots(duration) for signal in self.parts]))

@@ -12,7 +12,7 @@ LEAST_PERIODS = 1.0
 """Of the cut-off that a record must hold: a straight line then passes to 1 %; with a fiftieth it turned round."""
 
 
-def low_passed(values: np.ndarray, period: float, bandwidth: float, file: str, place: str) -> np.ndarray:
+def low_passed(values: np.ndarray, period: float, bandwidth: float, file: str, key_path: str) -> np.ndarray:
     """Samples (n, columns) filtered by a Butterworth low-pass forward and backward: no delay, half the amplitude at
     ``bandwidth`` (Hz), order eight in total.
 
@@ -25,7 +25,7 @@ def low_passed(values: np.ndarray, period: float, bandwidth: float, file: str, p
     if not bandwidth < fastest:
         raise InputError(
             file,
-            place,
+            key_path,
             bandwidth,
             f"must be below {fastest:g} Hz, half the sampling rate of the file: faster motion is not in it",
         )
@@ -34,7 +34,7 @@ def low_passed(values: np.ndarray, period: float, bandwidth: float, file: str, p
         allowed = f"must be at least {least:.3g} Hz, or {lasting}" if least < fastest else lasting
         raise InputError(
             file,
-            place,
+            key_path,
             bandwidth,
             f"{allowed}: of slower motion the {length:g} s hold no whole period, and what is beyond their ends would "
             "be guessed",

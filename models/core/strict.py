@@ -31,49 +31,56 @@ LARGEST_QUANTITY = 1e15
 def quantity(unit: str, meaning: str, *, default: Any = ..., zero: bool = False, signed: bool = False) -> Any:
     """Model field for a physical quantity in SI: positive, or non-negative, or of either sign, and of plausible
     magnitude."""
-    above, least = (None, -LARGEST_QUANTITY) if signed else (None, 0) if zero else (0, None)
+    exclusive_least, least = (None, -LARGEST_QUANTITY) if signed else (None, 0) if zero else (0, None)
     return Field(
-        default, description=meaning, json_schema_extra={"unit": unit}, gt=above, ge=least, le=LARGEST_QUANTITY
+        default,
+        description=meaning,
+        json_schema_extra={"unit": unit},
+        gt=exclusive_least,
+        ge=least,
+        le=LARGEST_QUANTITY,
     )
 
 
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def read(model: type[Model], values: Mapping[str, Any], file: object, place: str = "") -> Model:
+def read(model: type[Model], values: Mapping[str, Any], file: object, key_path: str = "") -> Model:
     """Build ``model`` from a user's table; raises InputError that names file, place, value and what is allowed.
 
     Of several errors the first is told in full, an unknown key before all others, and the rest are named.
     """
     if not isinstance(values, Mapping):
-        raise InputError(file, place, values, ERROR_SENTENCES["dict_type"])
+        raise InputError(file, key_path, values, ERROR_SENTENCES["dict_type"])
     try:
         return model.model_validate(dict(values))
     except ValidationError as error:
-        raise message(error, model, file, place) from None
+        raise message(error, model, file, key_path) from None
 
 
-def message(error: ValidationError, model: type[BaseModel], file: object, place: str) -> InputError:
+def message(error: ValidationError, model: type[BaseModel], file: object, key_path: str) -> InputError:
     """One InputError from all faults that pydantic listed."""
-    first, *others = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+    first, *other_faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     keys = _keys_of_error(first)
     value = None if first["type"] == "missing" else first["input"]
-    said = _allowed_phrase(first, keys, _owning_model(model, keys))
-    rest = [
-        _dotted_key(place, _keys_of_error(fault))
-        for fault in others
-        if f"mean {_keys_of_error(fault)[-1]!r}" not in said
+    allowed = _allowed_phrase(first, keys, _owning_model(model, keys))
+    other_keys = [
+        _dotted_key(key_path, _keys_of_error(fault))
+        for fault in other_faults
+        if f"mean {_keys_of_error(fault)[-1]!r}" not in allowed
     ]
-    more = f"; also wrong: {', '.join(rest[:5])}{', ...' if len(rest) > 5 else ''}" if rest else ""
-    return InputError(file, _dotted_key(place, keys), value, said + more)
+    further_text = (
+        f"; also wrong: {', '.join(other_keys[:5])}{', ...' if len(other_keys) > 5 else ''}" if other_keys else ""
+    )
+    return InputError(file, _dotted_key(key_path, keys), value, allowed + further_text)
 
 
 def _keys_of_error(fault: Any) -> tuple[str, ...]:
-    return tuple(str(part) for part in fault["loc"])
+    return tuple(str(key) for key in fault["loc"])
 
 
-def _dotted_key(place: str, keys: tuple[str, ...]) -> str:
-    return ".".join((*((place,) if place else ()), *keys))
+def _dotted_key(key_path: str, keys: tuple[str, ...]) -> str:
+    return ".".join((*((key_path,) if key_path else ()), *keys))
 
 
 def _owning_model(model: type[BaseModel], keys: tuple[str, ...]) -> type[BaseModel] | None:
@@ -95,9 +102,9 @@ def _inner_model(annotation: Any) -> type[BaseModel] | None:
     return next((o for o in options if isinstance(o, type) and issubclass(o, BaseModel)), None)
 
 
-def _allowed_phrase(first: Any, keys: tuple[str, ...], owner: type[BaseModel] | None) -> str:
+def _allowed_phrase(first: Any, keys: tuple[str, ...], owning_model: type[BaseModel] | None) -> str:
     """Phrase that says which keys or values would have been accepted."""
-    fields = {} if owner is None else owner.model_fields
+    fields = {} if owning_model is None else owning_model.model_fields
     key = keys[-1] if keys else ""
     kind, facts = first["type"], _unit_and_meaning(fields.get(key))
     if kind == "extra_forbidden":
@@ -106,7 +113,7 @@ def _allowed_phrase(first: Any, keys: tuple[str, ...], owner: type[BaseModel] | 
     if kind == "missing":
         return f"is missing{facts}"
     if kind == "literal_error":
-        names = tuple(part.strip().strip("'") for part in first["ctx"]["expected"].replace(" or ", ", ").split(","))
+        names = tuple(phrase.strip().strip("'") for phrase in first["ctx"]["expected"].replace(" or ", ", ").split(","))
         return f"must be {' or '.join(names)}{facts}{suggestion_phrase(first['input'], names)}"
     if kind == "value_error":
         return f"{first['ctx']['error']}{facts}"
@@ -141,5 +148,5 @@ def _unit_and_meaning(field: FieldInfo | None) -> str:
         return ""
     extra = field.json_schema_extra
     unit = f"in {extra['unit']}" if isinstance(extra, dict) and extra.get("unit") else ""
-    told = ", ".join(part for part in (field.description or "", unit) if part)
-    return f" ({told})" if told else ""
+    description = ", ".join(phrase for phrase in (field.description or "", unit) if phrase)
+    return f" ({description})" if description else ""

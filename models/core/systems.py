@@ -61,8 +61,11 @@ class System:
 
 def systems_in_folder(folder: Path, package: str) -> dict[str, System]:
     """Systems by their names: all packages within ``folder`` (the package ``package``) that have scenes."""
-    places = sorted(path.parent for path in folder.glob("*/scene.py"))
-    systems = {place.name.replace("_", "-"): System(f"{package}.{place.name}", place) for place in places}
+    system_folders = sorted(path.parent for path in folder.glob("*/scene.py"))
+    systems = {
+        system_folder.name.replace("_", "-"): System(f"{package}.{system_folder.name}", system_folder)
+        for system_folder in system_folders
+    }
     return dict(sorted(systems.items(), key=lambda entry: entry[0] != DEFAULT_SYSTEM))
 
 

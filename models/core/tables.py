@@ -61,7 +61,7 @@ _HEADING_PATTERN = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 
 
 def read_table(
-    path: str | Path, columns: Columns, *, increasing: str | None = None, least: int = 1, gaps: bool = False
+    path: str | Path, columns: Columns, *, increasing: str | None = None, least_rows: int = 1, gaps: bool = False
 ) -> dict[str, np.ndarray]:
     """Read a CSV table whose header names the unit of every column.
 
@@ -71,7 +71,7 @@ def read_table(
     columns : name of each wanted column -> its accepted units, each with its factor to SI, for example
         ``{"time": SECONDS, "front": NEWTONS}``; the file has these columns and no others
     increasing : column whose values must rise from every row to the next one (time, arc length)
-    least : smallest accepted number of rows
+    least_rows : smallest accepted number of rows
     gaps : whether a cell may be empty or ``nan``, which is then NaN; never one of the increasing column
 
     Returns
@@ -90,8 +90,8 @@ def read_table(
     header, rows = _header_and_rows(path, text)
     names, factors = columns_and_factors(path, header, columns)
     raw = _all_cells(path, text, tuple(gaps and name != increasing for name in names))
-    if len(rows) < least:
-        raise InputError(path, "rows", len(rows), f"at least {least} rows of numbers are needed")
+    if len(rows) < least_rows:
+        raise InputError(path, "rows", len(rows), f"at least {least_rows} rows of numbers are needed")
     table = {name: raw[:, i] * factors[i] for i, name in enumerate(names)}
     if increasing is not None:
         _check_increasing(path, rows, increasing, raw[:, names.index(increasing)])
@@ -135,9 +135,9 @@ def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Line
     if not used:
         raise InputError(path, "", None, "the file is empty: a header line and rows of numbers are needed")
     if not text.endswith("\n") and _last_line_is_cut_off([line for _, line in used]):
-        place = f"line {len(lines)}"
+        line_text = f"line {len(lines)}"
         raise InputError(
-            path, place, lines[-1][1], "the last line has no line end and was cut off: add one, or delete the line"
+            path, line_text, lines[-1][1], "the last line has no line end and was cut off: add one, or delete the line"
         )
     return used[0], used[1:]
 
@@ -157,48 +157,52 @@ def _last_line_is_cut_off(lines: list[str]) -> bool:
     A number counts as complete if it has as many digits before the point, after it and in the exponent as every other
     row has at least.
     """
-    *before, last = [line.rpartition(",") for line in lines]
-    if last[0].count(",") != lines[0].rpartition(",")[0].count(",") or len(before) < 3:
+    *complete_lines, last_line = [line.rpartition(",") for line in lines]
+    if last_line[0].count(",") != lines[0].rpartition(",")[0].count(",") or len(complete_lines) < 3:
         return True
-    numbers = [NUMBER_PATTERN.fullmatch(cell.strip()) for _, _, cell in (*before[1:], last)]
+    numbers = [NUMBER_PATTERN.fullmatch(cell.strip()) for _, _, cell in (*complete_lines[1:], last_line)]
     if None in numbers:
         return True
-    *others, cut = [[len(part or "") for part in number.groups()] for number in numbers if number is not None]
-    fewest = [min(counts) for counts in zip(*others, strict=True)]
-    whole = cut[1] >= fewest[1] and cut[2] >= fewest[2] and (fewest[1] > 0 or cut[0] >= fewest[0])
-    value, *earlier = (float(cell) for _, _, cell in (last, *before[:0:-1][:COMPARED_ROWS]))
+    *digit_counts, cut = [[len(digits or "") for digits in number.groups()] for number in numbers if number is not None]
+    fewest = [min(counts) for counts in zip(*digit_counts, strict=True)]
+    has_all_digits = cut[1] >= fewest[1] and cut[2] >= fewest[2] and (fewest[1] > 0 or cut[0] >= fewest[0])
+    value, *earlier = (float(cell) for _, _, cell in (last_line, *complete_lines[:0:-1][:COMPARED_ROWS]))
     leaps = [abs(a - b) for a, b in itertools.pairwise(earlier)]
-    leaping = len(last[2]) < len(before[-1][2]) and abs(value - earlier[0]) > LARGEST_LEAP * max(leaps, default=0.0)
-    return not whole or leaping
+    leaping = len(last_line[2]) < len(complete_lines[-1][2]) and abs(value - earlier[0]) > LARGEST_LEAP * max(
+        leaps, default=0.0
+    )
+    return not has_all_digits or leaping
 
 
 def columns_and_factors(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:
     """Column names and factors to SI, in the order of the file."""
-    place = f"line {header[0]} (header)"
+    line_text = f"line {header[0]} (header)"
     names, factors = zip(
-        *(_column_and_factor(path, place, cell, columns) for cell in header[1].split(",")), strict=True
+        *(_column_and_factor(path, line_text, cell, columns) for cell in header[1].split(",")), strict=True
     )
     for name in names:
         if names.count(name) > 1:
-            raise InputError(path, place, name, "this column appears twice")
+            raise InputError(path, line_text, name, "this column appears twice")
     for name in columns:
         if name not in names:
-            raise InputError(path, place, header[1], f"column {name!r} is missing; wanted: {_header_wanted(columns)}")
+            raise InputError(
+                path, line_text, header[1], f"column {name!r} is missing; wanted: {_header_wanted(columns)}"
+            )
     return list(names), list(factors)
 
 
-def _column_and_factor(path: str | Path, place: str, cell: str, columns: Columns) -> tuple[str, float]:
+def _column_and_factor(path: str | Path, line_text: str, cell: str, columns: Columns) -> tuple[str, float]:
     """Name and factor to SI of one column heading, such as ``left [mm]``."""
     match = _HEADING_PATTERN.fullmatch(cell.strip().strip('"'))
     name, unit = match.groups() if match else (cell.strip(), None)
     if name not in columns:
         allowed = f"this column is not known; wanted, separated by commas: {_header_wanted(columns)}"
-        raise InputError(path, place, name, allowed, tuple(columns))
+        raise InputError(path, line_text, name, allowed, tuple(columns))
     units = tuple(columns[name])
     if unit is None:
-        raise InputError(path, place, cell.strip(), f"the unit is missing: write {name} [{units[0]}]", units)
+        raise InputError(path, line_text, cell.strip(), f"the unit is missing: write {name} [{units[0]}]", units)
     if unit not in columns[name]:
-        raise InputError(path, f"{place}, column {name!r}, unit", unit, "this unit is not known here", units)
+        raise InputError(path, f"{line_text}, column {name!r}, unit", unit, "this unit is not known here", units)
     return name, columns[name][unit]
 
 
@@ -240,8 +244,8 @@ def finite_number(path: str | Path, line_number: int, heading: str, cell: str) -
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        place = f"line {line_number}, column {heading.strip()!r}"
-        raise InputError(path, place, cell.strip(), "a finite number such as 0.5 or -1.2e-3 is needed")
+        line_text = f"line {line_number}, column {heading.strip()!r}"
+        raise InputError(path, line_text, cell.strip(), "a finite number such as 0.5 or -1.2e-3 is needed")
     return value
 
 
@@ -250,8 +254,10 @@ def _check_increasing(path: str | Path, rows: Lines, name: str, values: np.ndarr
     wrong = np.flatnonzero(np.diff(values) <= 0.0)
     if wrong.size:
         i = int(wrong[0]) + 1
-        place = f"line {rows[i][0]}, column {name!r}"
-        raise InputError(path, place, float(values[i]), f"must be greater than {values[i - 1]:g} in the row before it")
+        line_text = f"line {rows[i][0]}, column {name!r}"
+        raise InputError(
+            path, line_text, float(values[i]), f"must be greater than {values[i - 1]:g} in the row before it"
+        )
 
 
 @dataclass(frozen=True)
@@ -279,8 +285,8 @@ def table_blocks(path: Path, columns: tuple[Columns, ...], rows: int = ROWS_PER_
         if header is None:
             raise InputError(path, "", None, "the file is empty: a header line and rows of numbers are needed")
         names, factors = columns_and_factors(path, (header[0], header[1].strip()), _nearest_columns(header[1], columns))
-        while part := list(itertools.islice(lines, rows)):
-            yield _row_block(path, part, names, np.array(factors), header[1].split(","))
+        while block := list(itertools.islice(lines, rows)):
+            yield _row_block(path, block, names, np.array(factors), header[1].split(","))
 
 
 def _opened_text(path: Path) -> TextIO:

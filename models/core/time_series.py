@@ -26,7 +26,7 @@ def read_time_series(
     The first sample must lie at t = 0 and the period must be constant to 1e-6 of itself: a clock that
     jitters has to be repaired by someone who knows why. Where ``gaps`` are allowed, an empty cell or ``nan`` is NaN.
     """
-    table = read_table(path, {"time": SECONDS, **columns}, increasing="time", least=8, gaps=gaps)
+    table = read_table(path, {"time": SECONDS, **columns}, increasing="time", least_rows=8, gaps=gaps)
     time = table["time"]
     period = (time[-1] - time[0]) / (len(time) - 1)
     if abs(time[0]) > 1e-6 * period:
@@ -37,20 +37,24 @@ def read_time_series(
     return np.column_stack([table[name] for name in columns]), float(f"{period:.12g}")
 
 
-def other_unit(lasts: float, needed: float) -> str:
+def other_unit(lasts: float, needed_duration: float) -> str:
     """Hint that the times of a file may be in milliseconds, if it is far shorter (s) than needed; else empty."""
-    wrong = lasts < needed / SHORT_TIME_SHARE
+    wrong = lasts < needed_duration / SHORT_TIME_SHARE
     return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
 
 
-def sparse_record_warning(count: int, period: float, needed: float, needed_period: float = WHEEL_SAMPLE_TIME) -> str:
-    """Warning that nearly all of ``count`` samples, ``period`` (s) apart, lie beyond the needed time (s), and are too
-    far apart to resolve the motion (``needed_period``, s): their times may be in another unit. "" otherwise."""
-    lasts = period * (count - 1)
-    if count < MANY_SAMPLES or lasts < SHORT_TIME_SHARE * needed or period < needed_period:
+def sparse_record_warning(
+    sample_count: int, period: float, needed_duration: float, needed_period: float = WHEEL_SAMPLE_TIME
+) -> str:
+    """Warning that nearly all of ``sample_count`` samples, ``period`` (s) apart, lie beyond the needed time (s), and
+    are too far apart to resolve the motion (``needed_period``, s): their times may be in another unit. "" otherwise.
+    """
+    lasts = period * (sample_count - 1)
+    if sample_count < MANY_SAMPLES or lasts < SHORT_TIME_SHARE * needed_duration or period < needed_period:
         return ""
     return (
-        f"The samples lie {period:.4g} s apart and last for {lasts:.4g} s, of which the run takes {needed:.4g} s; "
+        f"The samples lie {period:.4g} s apart and last for {lasts:.4g} s, "
+        f"of which the run takes {needed_duration:.4g} s; "
         f"{'a wheel' if needed_period == WHEEL_SAMPLE_TIME else 'a chassis'} moves with up to "
         f"{0.5 / needed_period:g} Hz. If their times are in "
         "milliseconds, head the column time [ms]."

@@ -34,13 +34,13 @@ def _error_lines(results: Results) -> list[str]:
         return listed
     largest = max(worst, key=lambda name: worst[name].share)
     warned = [name for name, estimate in worst.items() if estimate.warned]
-    more = (
+    further_lines = (
         [f"  errors above {100.0 * WARNED_SHARE:g} % in {len(warned)} of {len(worst)}: {_list_of_few(warned)}"]
         if warned[1:]
         else []
     )
     first = f"  {len(worst)} results, the largest error {largest}: {error_lines(results[largest])[0]}"
-    return [first, *more, *listed]
+    return [first, *further_lines, *listed]
 
 
 def _list_of_few(names: list[str]) -> str:
@@ -52,14 +52,14 @@ def _list_of_few(names: list[str]) -> str:
 def worst_breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
     """Broken assumptions: for each name the worst violation over all results, and the names of the results that broke
     it."""
-    where: dict[str, list[str]] = {}
+    names_by_breach: dict[str, list[str]] = {}
     worst: dict[str, BrokenAssumption] = {}
     for name, run in results.items():
         for breach in broken_of(run):
-            where.setdefault(breach.name, []).append(name)
+            names_by_breach.setdefault(breach.name, []).append(name)
             if breach.name not in worst or breach.share > worst[breach.name].share:
                 worst[breach.name] = breach
-    return [(_list_of_few(where[name]), breach) for name, breach in worst.items()]
+    return [(_list_of_few(names_by_breach[name]), breach) for name, breach in worst.items()]
 
 
 def figure_remarks(results: Results) -> list[str]:
@@ -75,18 +75,18 @@ def figure_remarks(results: Results) -> list[str]:
 def joined_result(joined: Result, parts: Results) -> Result:
     """A result that joins other results, with the errors that each of them states and all assumptions that any of them
     broke."""
-    said = {name: json.loads(run.data.attrs["error"]) for name, run in parts.items()}
-    first = next(iter(said.values()))
+    stored_errors = {name: json.loads(run.data.attrs["error"]) for name, run in parts.items()}
+    first = next(iter(stored_errors.values()))
     channels = {
         f"{name}, {channel}": values
-        for name, each in said.items()
-        for channel, values in each.get("channels", {}).items()
+        for name, stored_error in stored_errors.items()
+        for channel, values in stored_error.get("channels", {}).items()
     }
     joined.data.attrs["error"] = json.dumps({**first, "channels": channels} if channels else first)
     assumed = dict.fromkeys(text for run in parts.values() for text in assumed_of(run))
-    kept = [replace(breach, where=f"{names}, {breach.where}") for names, breach in worst_breaches(parts)]
+    worst_breach = [replace(breach, where=f"{names}, {breach.where}") for names, breach in worst_breaches(parts)]
     joined.data.attrs["assumptions"] = json.dumps(
-        {"assumed": list(assumed), "broken": [asdict(breach) for breach in kept]}
+        {"assumed": list(assumed), "broken": [asdict(breach) for breach in worst_breach]}
     )
     broke = (run.data.attrs["status"] for run in parts.values() if broken_of(run))
     joined.data.attrs["status"] = next(broke, joined.data.attrs["status"])
@@ -100,12 +100,12 @@ def derived_result(derived: Result, results: Results, method: str) -> Result:
     Without estimates in the results it has none.
     """
     assumed = [says for run in results.values() for says in assumed_of(run)]
-    told = {
+    assumptions = {
         "assumed": list(dict.fromkeys(assumed)),
         "broken": [asdict(breach) for _, breach in worst_breaches(results)],
     }
-    derived.data.attrs["assumptions"] = json.dumps(told)
-    if told["broken"] and "assumptions broken" not in derived.data.attrs["status"]:
+    derived.data.attrs["assumptions"] = json.dumps(assumptions)
+    if assumptions["broken"] and "assumptions broken" not in derived.data.attrs["status"]:
         derived.data.attrs["status"] += ", assumptions broken"
     pairs = [pair for run in results.values() for pair in errors_of(run).items()]
     worst = dict(sorted(pairs, key=lambda pair: pair[1].share))
@@ -130,8 +130,8 @@ def summary_with_errors(summary: dict[str, Any]) -> dict[str, Any]:
 
 def _json_attribute(run: Result, key: str) -> dict[str, Any]:
     """Attribute of a result, parsed from JSON, with None in place of NaN and infinity."""
-    said: dict[str, Any] = json.loads(run.data.attrs[key], parse_constant=lambda text: None)
-    return said
+    attribute: dict[str, Any] = json.loads(run.data.attrs[key], parse_constant=lambda text: None)
+    return attribute
 
 
 DOUBT_ATTRIBUTES = ("engine", "error", "assumptions")
@@ -147,4 +147,4 @@ def results_with_attributes(attributes: Mapping[str, Mapping[str, str]]) -> dict
     """Results without channels that have the given attributes; inverse of ``attributes_for_json``."""
     import xarray as xr
 
-    return {name: Result(xr.Dataset(attrs=said)) for name, said in attributes.items()}
+    return {name: Result(xr.Dataset(attrs=attributes_of_run)) for name, attributes_of_run in attributes.items()}

@@ -21,14 +21,14 @@ def whole_file(path: Path) -> Iterator[Path]:
     An earlier file of that name is replaced. After an error the temporary file is removed, and the error is raised
     again; an OSError then names ``path``.
     """
-    part = path.with_name(PARTIAL_NAME.format(path.name, os.getpid(), path.suffix))
+    partial_path = path.with_name(PARTIAL_NAME.format(path.name, os.getpid(), path.suffix))
     try:
-        yield part
-        with part.open("rb") as file:
+        yield partial_path
+        with partial_path.open("rb") as file:
             os.fsync(file.fileno())
-        os.replace(part, path)
+        os.replace(partial_path, path)
     except BaseException as error:
-        part.unlink(missing_ok=True)
+        partial_path.unlink(missing_ok=True)
         if isinstance(error, OSError):
             error.filename = str(path)
         raise
@@ -36,16 +36,16 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 def write_whole(path: Path, content: bytes | memoryview | str) -> None:
     """Write a file of these bytes, or of this text in UTF-8 with its line ends as they are."""
-    with whole_file(path) as part:
-        part.write_bytes(content.encode() if isinstance(content, str) else content)
+    with whole_file(path) as partial_path:
+        partial_path.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 def drop_parts(folder: Path) -> None:
     """Remove temporary files and folders that killed processes left in a folder and its subfolders."""
-    for part in list(folder.rglob(PARTIAL_NAME.format("*", "*", "*"))):
-        number = part.name.rpartition(".part")[0].rpartition(".")[2]
+    for partial_path in list(folder.rglob(PARTIAL_NAME.format("*", "*", "*"))):
+        number = partial_path.name.rpartition(".part")[0].rpartition(".")[2]
         if number.isdigit() and not _runs_elsewhere(int(number)):
-            shutil.rmtree(part) if part.is_dir() else part.unlink(missing_ok=True)
+            shutil.rmtree(partial_path) if partial_path.is_dir() else partial_path.unlink(missing_ok=True)
 
 
 def _runs_elsewhere(process: int) -> bool:

@@ -91,11 +91,11 @@ def _draw_run(axes: Any, row: Row, line: int) -> None:
     y = line + (0.17 if row["road"] == "grade" else -0.17)
     for channel, mark in CHANNEL_MARKERS.items():
         if row[f"damage {channel}"] is not None:
-            place = np.clip(row[f"damage {channel}"], *DAMAGE_AXIS)
-            axes[0].plot(place, y, mark, color=colour, markersize=4, clip_on=False, alpha=0.8)
+            clipped_damage = np.clip(row[f"damage {channel}"], *DAMAGE_AXIS)
+            axes[0].plot(clipped_damage, y, mark, color=colour, markersize=4, clip_on=False, alpha=0.8)
     if row["damage f3x"] is None:
-        told = f"tumbled; its vertical f3 says {row['vertical damage f3']:.2f}"
-        axes[0].text(1.0, y, told, color=colour, fontsize=SMALL_TEXT, ha="center", va="center")
+        verdict_text = f"tumbled; its vertical f3 says {row['vertical damage f3']:.2f}"
+        axes[0].text(1.0, y, verdict_text, color=colour, fontsize=SMALL_TEXT, ha="center", va="center")
     for axis, name, span in (
         (axes[1], "pitch error max [rad]", PITCH_AXIS),
         (axes[2], "moment share to 15 Hz", MOMENT_SHARE_AXIS),
@@ -114,19 +114,19 @@ def _draw_verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
     axis.set_xlim(0, 10)
     axis.axis("off")
     columns = [(row["road"], key) for row in rows if row["method"] == "free" for key in ("verdict", "without truth")]
-    places = dict(zip(columns, (0.8, 2.6, 4.4, 6.2), strict=False))
-    for (road, key), x in places.items():
+    x_by_column = dict(zip(columns, (0.8, 2.6, 4.4, 6.2), strict=False))
+    for (road, key), x in x_by_column.items():
         name = "by damage" if key == "verdict" else "without truth"
-        where = "road" if road == "road" else "grade"
+        road_text = "road" if road == "road" else "grade"
         style = {"fontsize": SMALL_TEXT, "va": "bottom", "ha": "center", "rotation": 90, "color": ROAD_LABELS[road][1]}
-        axis.text(x, -0.75, f"{where}, {name}", **style)
+        axis.text(x, -0.75, f"{road_text}, {name}", **style)
     axis.text(8.9, -0.75, "seconds / free", fontsize=SMALL_TEXT, va="bottom", ha="center", rotation=90)
     free = next(row["seconds"] for row in rows if row["method"] == "free")
     for row in rows:
         line = methods.index(row["method"])
         for key in ("verdict", "without truth"):
             sign, colour = VERDICT_SIGNS[row[key]]
-            x = places[row["road"], key]
+            x = x_by_column[row["road"], key]
             axis.text(x, line, sign, color=colour, va="center", ha="center", fontsize=10, fontweight="bold")
         if row["road"] == rows[0]["road"]:
             axis.text(9.9, line, f"{row['seconds'] / free:.1f}", va="center", ha="right", fontsize=8)
@@ -152,20 +152,20 @@ def _draw_legend(figure: Any, grade: float | None) -> None:
     figure.legend(handles=[*marks, *roads, good, *signs], loc="outside lower center", ncols=4)
 
 
-def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: float | None) -> Any:
+def stiffness(sweep: dict[str, np.ndarray], offset_level: Any, limits: Limits, grade: float | None) -> Any:
     """Figure of pitch error and worst damage ratio over stiffness, for every road; the equivalent cut-off is on the
     upper axis.
 
-    sweep : per road what ``Bench.sweep`` gives; level : the bench of the road without the grade
+    sweep : per road what ``Bench.sweep`` gives; offset_level : the bench of the road without the grade
     """
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.6))
     for road, curve in sweep.items():
         name, colour = ROAD_LABELS[road]
         axes[0].loglog(curve[:, 0], curve[:, 1], "-", color=colour, label=f"spring {name}")
         axes[0].loglog(curve[:, 0], curve[:, 2], "o", color=colour, markersize=4, label=f"high-pass {name}")
-        held = curve[:, 1] < TUMBLING_PITCH
-        axes[1].loglog(curve[held, 0], curve[held, 3], "o-", color=colour, markersize=4)
-        tumbled = curve[~held, 0]
+        has_not_tumbled = curve[:, 1] < TUMBLING_PITCH
+        axes[1].loglog(curve[has_not_tumbled, 0], curve[has_not_tumbled, 3], "o-", color=colour, markersize=4)
+        tumbled = curve[~has_not_tumbled, 0]
         axes[1].plot(tumbled, np.full(len(tumbled), DAMAGE_AXIS[1]), "x", color=colour, label=f"tumbles {name}")
     low = limits.pitch_error / 2
     axes[0].axhspan(low, limits.pitch_error, color=ACCEPTED_COLOUR, alpha=0.16, linewidth=0, label="allowed")
@@ -173,16 +173,18 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
     axes[0].set(ylim=(low, 3.0), title="Largest pitch error [rad]")
     axes[1].set(ylim=(None, 1.5 * DAMAGE_AXIS[1]), title="Damage of the worst section force / true [-]")
     for axis in axes:
-        axis.axvline(level.holding, color=GREY, linewidth=0.8, linestyle="--", label="predicted to hold from here")
+        axis.axvline(
+            offset_level.holding, color=GREY, linewidth=0.8, linestyle="--", label="predicted to hold from here"
+        )
         axis.set_xlabel("stiffness of the spring to the ground [N m/rad]")
         turning = (
-            lambda k: np.sqrt(np.maximum(k, 0.0) / level.pitch_inertia) / (2 * math.pi),
-            lambda f: level.pitch_inertia * (2 * math.pi * f) ** 2,
+            lambda k: np.sqrt(np.maximum(k, 0.0) / offset_level.pitch_inertia) / (2 * math.pi),
+            lambda f: offset_level.pitch_inertia * (2 * math.pi * f) ** 2,
         )
-        above = axis.secondary_xaxis("top", functions=turning)
-        above.set_xlabel("cut-off of the equivalent high-pass [Hz]")
+        cutoff_axis = axis.secondary_xaxis("top", functions=turning)
+        cutoff_axis.set_xlabel("cut-off of the equivalent high-pass [Hz]")
         figure.draw_without_rendering()  # an axis beside another one takes its scale and its marks when it is drawn
-        above.xaxis.set_minor_locator(NullLocator())
+        cutoff_axis.xaxis.set_minor_locator(NullLocator())
     why = (
         "what the stiffness does"
         if grade is None

@@ -90,18 +90,18 @@ LETTER_WIDTH = 0.6
 """Width of a letter by its size, of bold ones; of others a tenth less."""
 
 
-def wrapped_text(text: str, inches: float, size: float) -> str:
+def wrapped_text(text: str, inches: float, font_size: float) -> str:
     """Text split into lines that fit into a width (inches) at a font size (points)."""
-    most = max(int(72 * inches / (LETTER_WIDTH * size)), 8)
-    return "\n".join("\n".join(wrap(line, most, break_long_words=False)) for line in text.split("\n"))
+    letters_per_line = max(int(72 * inches / (LETTER_WIDTH * font_size)), 8)
+    return "\n".join("\n".join(wrap(line, letters_per_line, break_long_words=False)) for line in text.split("\n"))
 
 
 def add_heading(figure: Figure, title: str, results: Results | None = None) -> None:
     """Add a title above the figure's left edge, and below the figure the warnings and doubts about its results."""
     size, wide = rcParams["figure.titlesize"], figure.get_figwidth()
     figure.suptitle(wrapped_text(title, wide, size), x=0.01, ha="left", fontweight="bold")
-    if told := figure_remarks(results or {}):
-        broken = wrapped_text("\n".join(told), 1.12 * wide, REMARK_FONT_SIZE)
+    if remarks := figure_remarks(results or {}):
+        broken = wrapped_text("\n".join(remarks), 1.12 * wide, REMARK_FONT_SIZE)
         figure.set_figheight(
             figure.get_figheight() + 1.2 * REMARK_FONT_SIZE / 72 * (1 + broken.count("\n"))
         )  # panels keep theirs
@@ -109,43 +109,50 @@ def add_heading(figure: Figure, title: str, results: Results | None = None) -> N
         figure.supxlabel(lines, x=0.01, ha="left", fontsize=REMARK_FONT_SIZE, color=REJECTED_COLOUR)
 
 
-def empty_figure(size: tuple[float, float] | None = None) -> Figure:
+def empty_figure(figure_size: tuple[float, float] | None = None) -> Figure:
     """An empty figure of a size in inches, or of matplotlib's default size. It does not use pyplot, which is slow to
     import and keeps every figure until it is closed."""
-    figure = Figure(figsize=size)
+    figure = Figure(figsize=figure_size)
     FigureCanvasAgg(figure)
     return figure
 
 
 def subplots(
-    rows: int = 1, columns: int = 1, figsize: tuple[float, float] | None = None, **more: Any
+    rows: int = 1, columns: int = 1, figsize: tuple[float, float] | None = None, **options_of_figure: Any
 ) -> tuple[Figure, Any]:
-    """A figure with panels in rows and columns; figsize : inches; more : as for matplotlib's ``Figure.subplots``."""
+    """A figure with panels in rows and columns; figsize : inches; options_of_figure : as for matplotlib's
+    ``Figure.subplots``.
+    """
     figure = empty_figure(figsize)
-    return figure, figure.subplots(rows, columns, **more)
+    return figure, figure.subplots(rows, columns, **options_of_figure)
 
 
 def subplot_mosaic(
-    places: Sequence[Sequence[str]], figsize: tuple[float, float] | None = None, **more: Any
+    panel_names: Sequence[Sequence[str]], figsize: tuple[float, float] | None = None, **options_of_figure: Any
 ) -> tuple[Figure, dict[str, Axes]]:
-    """A figure with panels by their names in rows of ``places``; more : as for ``Figure.subplot_mosaic``."""
+    """A figure with panels by their names in rows of ``panel_names``; options_of_figure : as for
+    ``Figure.subplot_mosaic``.
+    """
     figure = empty_figure(figsize)
-    return figure, figure.subplot_mosaic([list(row) for row in places], **more)
+    return figure, figure.subplot_mosaic([list(row) for row in panel_names], **options_of_figure)
 
 
 def panels(
-    count: int, across: int, height: float, wide: float = COLUMN_WIDTH, **more: Any
+    panel_count: int, column_count: int, height: float, figure_width: float = COLUMN_WIDTH, **options_of_figure: Any
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of ``count`` panels without empty places, ``across`` of them side by side, each ``height`` inches high.
+    """A figure of ``panel_count`` panels without empty places, ``column_count`` of them side by side, each ``height``
+    inches high.
 
-    more : as for ``subplots``; panels that share an axis show its numbers once.
+    options_of_figure : as for ``subplots``; panels that share an axis show its numbers once.
     """
-    down = -(-count // across)
-    figure, axes = subplots(down, across, figsize=(wide, height * down), squeeze=False, **more)
-    for place, axis in enumerate(axes.flat[count:], count):
-        axes.flat[place - across].xaxis.set_tick_params(labelbottom=True)
+    row_count = -(-panel_count // column_count)
+    figure, axes = subplots(
+        row_count, column_count, figsize=(figure_width, height * row_count), squeeze=False, **options_of_figure
+    )
+    for empty_panel, axis in enumerate(axes.flat[panel_count:], panel_count):
+        axes.flat[empty_panel - column_count].xaxis.set_tick_params(labelbottom=True)
         axis.remove()
-    return figure, list(axes.flat[:count])
+    return figure, list(axes.flat[:panel_count])
 
 
 def legend_below(figure: Figure, *axes: Axes, columns: int = 4) -> None:
@@ -167,14 +174,14 @@ def _lines_of_legends(figure: Figure) -> int:
 def save(figure: Figure, path: Path) -> Path:
     """Write ``path`` (.svg or .png) without a date, and return the path. The figure is drawn once, while ``savefig``
     draws it twice."""
-    with whole_file(path) as part:
+    with whole_file(path) as partial_path:
         if path.suffix == ".svg":
             from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-            FigureCanvasSVG(figure).print_svg(part, metadata={"Date": None})
+            FigureCanvasSVG(figure).print_svg(partial_path, metadata={"Date": None})
         else:
             figure.set_dpi(rcParams["savefig.dpi"])
-            FigureCanvasAgg(figure).print_png(part, metadata={"Software": None})
+            FigureCanvasAgg(figure).print_png(partial_path, metadata={"Software": None})
     return path
 
 

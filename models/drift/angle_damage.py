@@ -35,8 +35,8 @@ def unit_paths(samples: int, rate: int, length: int, correlation_time: float, se
     for path in range(samples):
         noise = normal_samples(seed, path, rate * length, 1, source=GYRO)[:, 0] / rate**0.5
         wander = bias_path(rate * length, 1 / rate, 0.0, 1.0, correlation_time, seed, path) / rate
-        for paths, part in ((walks, noise), (drifts, wander)):
-            paths.append(np.concatenate([[0.0], part.reshape(length, rate).sum(axis=1).cumsum()]))
+        for paths, samples_of_paths in ((walks, noise), (drifts, wander)):
+            paths.append(np.concatenate([[0.0], samples_of_paths.reshape(length, rate).sum(axis=1).cumsum()]))
     return np.array(walks), np.array(drifts)
 
 
@@ -46,13 +46,13 @@ def damage_at_angle_errors(result: Result, error: float) -> list[float]:
     return [pseudo_damage(rotated_to_maximum(forces[name])) for name in SECTION_FORCE_CHANNELS]
 
 
-def log_damage_over_pitch_error(result: Result, reach: float, file: str = "") -> CubicSpline:
+def log_damage_over_pitch_error(result: Result, largest_angle: float, file: str = "") -> CubicSpline:
     """Logarithm of the ratio of the section forces' damage to the true damage, as a function of a constant pitch error
     (rad).
 
     Raises InputError, which names the scene's file, for a run without damage.
     """
-    widest = np.arcsinh(reach / EVEN_SPACING_ANGLE)
+    widest = np.arcsinh(largest_angle / EVEN_SPACING_ANGLE)
     angles = EVEN_SPACING_ANGLE * np.sinh(np.linspace(-widest, widest, ANGLE_NODES))
     damage = np.array([damage_at_angle_errors(result, angle) for angle in angles])
     true = damage[ANGLE_NODES // 2]

@@ -60,12 +60,12 @@ class RigidPitch:
         """Pitch moment (n,) in N m from wheel forces (n, 2) in N."""
         return self.front_arm * forces[:, 0] - self.rear_arm * forces[:, 1]
 
-    def noise_intensity(self, deviation: float, period: float) -> float:
+    def noise_intensity(self, deviation: float, sample_period: float) -> float:
         """Intensity q (rad^2/s^3) of the pitch acceleration that white samples of both forces make.
 
         q = s^2 D (front^2 + rear^2) / (I + J)^2 with the standard deviation s (N) of each sample and the period D (s).
         """
-        return deviation**2 * period * (self.front_arm**2 + self.rear_arm**2) / self.total_inertia**2
+        return deviation**2 * sample_period * (self.front_arm**2 + self.rear_arm**2) / self.total_inertia**2
 
     def squared_growth_rate(self, rates: np.ndarray) -> np.ndarray:
         """Squared growth rate lambda^2 (1/s^2) for each of the fast pitch rates (rad/s); the forces are vertical in
@@ -73,43 +73,52 @@ class RigidPitch:
         return rates**2 * self.inertia / self.total_inertia
 
 
-def rigid_pitch(p: Parameters) -> RigidPitch:
+def rigid_pitch(parameters: Parameters) -> RigidPitch:
     """``RigidPitch`` of a pitch-plane parameter set."""
-    mass, coupling = p.m1 + p.m2 + p.m3, p.b * p.m1 - p.a * p.m2
-    carried = p.m1 * p.b**2 + p.m2 * p.a**2 - coupling**2 / mass
-    return RigidPitch(p.b - coupling / mass, p.a + coupling / mass, p.I, carried, mass, coupling)
+    mass, coupling = (
+        parameters.m1 + parameters.m2 + parameters.m3,
+        parameters.b * parameters.m1 - parameters.a * parameters.m2,
+    )
+    carried = parameters.m1 * parameters.b**2 + parameters.m2 * parameters.a**2 - coupling**2 / mass
+    return RigidPitch(
+        parameters.b - coupling / mass, parameters.a + coupling / mass, parameters.I, carried, mass, coupling
+    )
 
 
-def high_passed(values: np.ndarray, period: float, cutoff: float = FAST_PITCH_FREQUENCY) -> np.ndarray:
+def high_passed(values: np.ndarray, sample_period: float, cutoff: float = FAST_PITCH_FREQUENCY) -> np.ndarray:
     """Part of the signal ``values`` (n,) above ``cutoff`` (Hz), without delay, with the gain x^4 / (1 + x^4) at x = f /
     cutoff.
 
     That is a Butterworth filter of order 2 run forward and backward. Beyond its ends the signal goes on as its odd
     mirror image, for a period of the cut-off where it is that long.
     """
-    beyond = min(len(values) - 1, round(1.0 / (cutoff * period)))
+    beyond = min(len(values) - 1, round(1.0 / (cutoff * sample_period)))
     longer = np.pad(values, beyond, mode="reflect", reflect_type="odd")
-    power = (np.fft.rfftfreq(len(longer), period) / cutoff) ** 4
+    power = (np.fft.rfftfreq(len(longer), sample_period) / cutoff) ** 4
     return np.fft.irfft(np.fft.rfft(longer) * power / (1.0 + power), len(longer))[beyond : beyond + len(values)]
 
 
-def pitch_rate_of_forces(forces: np.ndarray, period: float, p: Parameters) -> np.ndarray:
+def pitch_rate_of_forces(forces: np.ndarray, sample_period: float, parameters: Parameters) -> np.ndarray:
     """Pitch rate (n,) in rad/s from wheel forces (n, 2) in N alone: their moment is integrated once, without a
     simulation."""
-    rigid = rigid_pitch(p)
+    rigid = rigid_pitch(parameters)
     moment = rigid.moment(forces)
-    steps = 0.5 * (moment[1:] + moment[:-1]) * period
+    steps = 0.5 * (moment[1:] + moment[:-1]) * sample_period
     return np.concatenate(([0.0], np.cumsum(steps))) / rigid.total_inertia
 
 
-def growth_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = FAST_PITCH_FREQUENCY) -> float:
+def growth_rate(
+    pitch_rate: np.ndarray, sample_period: float, parameters: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
+) -> float:
     """Growth rate lambda (1/s) from the pitch rate (n,) of a run or of ``pitch_rate_of_forces``; forces are vertical in
     space."""
-    return float(np.sqrt(rigid_pitch(p).squared_growth_rate(high_passed(pitch_rate, period, cutoff)).mean()))
+    return float(
+        np.sqrt(rigid_pitch(parameters).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff)).mean())
+    )
 
 
 def sinh_law_rate(
-    pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
+    pitch_rate: np.ndarray, sample_period: float, parameters: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
 ) -> np.ndarray:
     """Growth rate lambda (n,) in 1/s for use in the sinh law at each time, if the motion changes along the run.
 
@@ -117,8 +126,8 @@ def sinh_law_rate(
     variance q int g^2 ds depends on int lambda^2(u) w(u) du alone, with the weight w = u^2 (t - u) (3 t - u): what
     happens at about two thirds of the time counts most.
     """
-    times = period * np.arange(len(pitch_rate))
-    squares = rigid_pitch(p).squared_growth_rate(high_passed(pitch_rate, period, cutoff))
+    times = sample_period * np.arange(len(pitch_rate))
+    squares = rigid_pitch(parameters).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff))
 
     def weighted(values: np.ndarray) -> np.ndarray:
         second, third, fourth = (np.cumsum(values * times**power) for power in (2, 3, 4))
@@ -136,8 +145,8 @@ def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensit
     x = 2 lambda t it is q t^3 / 3 times 6 (sinh x - x) / x^3, whose bracket loses its digits for small x and is summed
     there.
     """
-    for name, given in (("times", times), ("rate", rate), ("intensity", intensity)):
-        if not (np.asarray(given, dtype=float) >= 0.0).all():
+    for name, argument in (("times", times), ("rate", rate), ("intensity", intensity)):
+        if not (np.asarray(argument, dtype=float) >= 0.0).all():
             raise InputError("", name, None, "must be 0 or more, and a number")
     t, x = np.asarray(times, dtype=float), 2.0 * np.asarray(rate, dtype=float) * np.asarray(times, dtype=float)
     small = np.minimum(np.abs(x), SERIES_LIMIT) ** 2
@@ -148,21 +157,23 @@ def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensit
     return intensity * t**3 / 3 * np.where(np.abs(x) > SERIES_LIMIT, closed, series)
 
 
-def heave_variance(times: np.ndarray | float, p: Parameters, deviation: float, period: float) -> np.ndarray:
+def heave_variance(
+    times: np.ndarray | float, parameters: Parameters, deviation: float, sample_period: float
+) -> np.ndarray:
     """Variance (m^2) of the common centre of mass: 2 s^2 D / M^2 t^3 / 3. Heave has no growth, in either frame."""
-    mass = rigid_pitch(p).mass
-    return 2 * deviation**2 * period / mass**2 * np.asarray(times, dtype=float) ** 3 / 3
+    mass = rigid_pitch(parameters).mass
+    return 2 * deviation**2 * sample_period / mass**2 * np.asarray(times, dtype=float) ** 3 / 3
 
 
-def holding_stiffness(p: Parameters, rate: float) -> float:
+def holding_stiffness(parameters: Parameters, rate: float) -> float:
     """Smallest rotational stiffness to the ground (N m/rad) that holds the pitch: (I + J) lambda^2."""
-    return rigid_pitch(p).total_inertia * rate**2
+    return rigid_pitch(parameters).total_inertia * rate**2
 
 
-def spring_of(p: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
+def spring_of(parameters: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
     """Stiffness and damping of a pitch spring to the ground with a natural frequency (Hz): k = (I + J) wc^2 in N m/rad,
     d = 2 zeta (I + J) wc in N m s/rad."""
-    corner, inertia = 2 * math.pi * frequency, rigid_pitch(p).total_inertia
+    corner, inertia = 2 * math.pi * frequency, rigid_pitch(parameters).total_inertia
     return inertia * corner**2, 2 * damping_ratio * inertia * corner
 
 
@@ -173,19 +184,19 @@ def drift_off_time(rate: float, intensity: float, angle: float) -> float:
     """
     from scipy.optimize import brentq
 
-    for name, value, least in (
+    for name, value, smallest_value in (
         ("rate", rate, 0.0),
         ("intensity", intensity, SMALLEST_POSITIVE),
         ("angle", angle, SMALLEST_POSITIVE),
     ):
-        if not (math.isfinite(value) and value >= least):
+        if not (math.isfinite(value) and value >= smallest_value):
             raise InputError("", name, value, "must be finite, intensity and angle above 0 and the rate not below")
     longest = (math.log(3.0) + 2.0 * math.log(angle / MEDIAN_OF_NORMAL) - math.log(intensity)) / 3.0  # without growth
     if rate == 0.0:
         return math.exp(longest)
-    most = math.log(2.0) + math.log(rate) + longest
-    ends = min(most, 0.0) - 1.0, min(most, math.log(3.0 * max(most, 0.0) + 3.0))
-    return math.exp(brentq(lambda x: 3.0 * (x - most) + _log_gain(x), *ends, xtol=1e-14)) / (2.0 * rate)
+    longest_log_time = math.log(2.0) + math.log(rate) + longest
+    ends = min(longest_log_time, 0.0) - 1.0, min(longest_log_time, math.log(3.0 * max(longest_log_time, 0.0) + 3.0))
+    return math.exp(brentq(lambda x: 3.0 * (x - longest_log_time) + _log_gain(x), *ends, xtol=1e-14)) / (2.0 * rate)
 
 
 def _log_gain(log_x: float) -> float:

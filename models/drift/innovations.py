@@ -79,24 +79,28 @@ def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:
     return Consistency(tuple(figures))
 
 
-def _mean_innovation(name: str, column: np.ndarray, tail: float) -> AcceptedStatistic:
+def _mean_innovation(name: str, column: np.ndarray, tail_probability: float) -> AcceptedStatistic:
     """Statistic of the mean innovation, in units of its standard deviation."""
     known = column[np.isfinite(column)]
-    wide = float(norm.isf(tail)) / math.sqrt(len(known))
+    wide = float(norm.isf(tail_probability)) / math.sqrt(len(known))
     return AcceptedStatistic(f"mean of {name}", float(known.mean()), -wide, wide)
 
 
-def _correlation(name: str, column: np.ndarray, tail: float) -> AcceptedStatistic:
+def _correlation(name: str, column: np.ndarray, tail_probability: float) -> AcceptedStatistic:
     """Statistic of serial correlation: root mean square of the correlations at lags 1 to CORRELATION_LAGS.
 
     For white samples each correlation is normal, with a variance of one over the number of pairs (Box and Pierce).
     """
-    whole = np.where(np.isfinite(column), column, 0.0)
-    there = np.isfinite(column).astype(float)
+    column_with_zeros = np.where(np.isfinite(column), column, 0.0)
+    is_known = np.isfinite(column).astype(float)
     lags = range(1, min(CORRELATION_LAGS, len(column) // 5) + 1)
-    pairs = np.array([float(there[lag:] @ there[:-lag]) for lag in lags])
-    power = float(whole @ whole) / there.sum()
-    each = np.array([float(whole[lag:] @ whole[:-lag]) for lag in lags]) / np.maximum(pairs, 1.0) / power
-    size = math.sqrt(float(np.sum(pairs * each**2)) / float(pairs.sum()))
-    high = math.sqrt(float(chi2.isf(tail, len(lags))) / float(pairs.sum()))
+    pairs = np.array([float(is_known[lag:] @ is_known[:-lag]) for lag in lags])
+    power = float(column_with_zeros @ column_with_zeros) / is_known.sum()
+    correlations = (
+        np.array([float(column_with_zeros[lag:] @ column_with_zeros[:-lag]) for lag in lags])
+        / np.maximum(pairs, 1.0)
+        / power
+    )
+    size = math.sqrt(float(np.sum(pairs * correlations**2)) / float(pairs.sum()))
+    high = math.sqrt(float(chi2.isf(tail_probability, len(lags))) / float(pairs.sum()))
     return AcceptedStatistic(f"correlation of {name}", size, 0.0, high)

@@ -58,27 +58,33 @@ def euler_covariance(steps: int, deviation: float, step: float, mass: float = 1.
     _check_inputs(deviation, step, mass, damping, steps)
     h = _damping_times_step(damping * step)
     kick = (deviation * step / mass) ** 2
-    last, before = _geometric_sum(h, steps), _geometric_sum(h, steps - 1)
-    mixed = (1 - h) * last * before / (2 - h) if h else steps * (steps - 1) / 2
+    last_sum, sum_before = _geometric_sum(h, steps), _geometric_sum(h, steps - 1)
+    mixed = (1 - h) * last_sum * sum_before / (2 - h) if h else steps * (steps - 1) / 2
     velocity = _geometric_sum(h * (2 - h), steps)
     return kick * np.array([[step**2 * _sum_of_squares(h, steps), step * mixed], [step * mixed, velocity]])
 
 
-def _damping_times_step(h: float) -> float:
+def _damping_times_step(damping_step: float) -> float:
     """Product of damping and step, after a check that it is below 2."""
-    if h >= 2:
-        raise InputError("", "damping", None, f"times step is {h:g}: the explicit Euler scheme is unstable from 2 on")
-    return h
+    if damping_step >= 2:
+        raise InputError(
+            "", "damping", None, f"times step is {damping_step:g}: the explicit Euler scheme is unstable from 2 on"
+        )
+    return damping_step
 
 
-def _geometric_sum(h: float, n: int) -> float:
+def _geometric_sum(damping_step: float, n: int) -> float:
     """(1 - (1 - h)^n) / h: the sum of (1 - h)^i over i < n."""
-    if h == 0 or n <= 0:
+    if damping_step == 0 or n <= 0:
         return float(max(n, 0))
-    return -math.expm1(n * math.log1p(-h)) / h if h < 0.5 else (1 - (1 - h) ** n) / h
+    return (
+        -math.expm1(n * math.log1p(-damping_step)) / damping_step
+        if damping_step < 0.5
+        else (1 - (1 - damping_step) ** n) / damping_step
+    )
 
 
-def _sum_of_squares(h: float, n: int) -> float:
+def _sum_of_squares(damping_step: float, n: int) -> float:
     """Sum over i < n of ((1 - (1 - h)^i) / h)^2, that is (n - 2 S1 + S2) / h^2.
 
     For small h the binomial expansion of (2 - h) (n - 2 S1 + S2): its terms up to h^1 vanish, and the exact
@@ -86,11 +92,19 @@ def _sum_of_squares(h: float, n: int) -> float:
     """
     if n == 0:
         return 0.0
-    if n * h > SERIES_LIMIT:
-        return (n - 2 * _geometric_sum(h, n) + _geometric_sum(h * (2 - h), n)) / h**2
+    if n * damping_step > SERIES_LIMIT:
+        return (
+            n - 2 * _geometric_sum(damping_step, n) + _geometric_sum(damping_step * (2 - damping_step), n)
+        ) / damping_step**2
     terms = range(2, 40)
-    whole = ((math.comb(2 * n, k + 1) - 4 * math.comb(n, k + 1) - 2 * math.comb(n, k), n ** (k + 1)) for k in terms)
-    return n**3 / (2 - h) * math.fsum(c / d * (-n * h) ** (k - 2) for k, (c, d) in zip(terms, whole, strict=True))
+    coefficients = (
+        (math.comb(2 * n, k + 1) - 4 * math.comb(n, k + 1) - 2 * math.comb(n, k), n ** (k + 1)) for k in terms
+    )
+    return (
+        n**3
+        / (2 - damping_step)
+        * math.fsum(c / d * (-n * damping_step) ** (k - 2) for k, (c, d) in zip(terms, coefficients, strict=True))
+    )
 
 
 def _check_inputs(deviation: float, step: float, mass: float, damping: float, length: float) -> None:
@@ -104,14 +118,14 @@ def _check_inputs(deviation: float, step: float, mass: float, damping: float, le
 
 
 def monte_carlo_errors(
-    count: int, steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0, seed: int = 0
+    path_count: int, steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0, seed: int = 0
 ) -> np.ndarray:
-    """Monte Carlo: errors (count, 2) of position (m) and velocity (m/s) of Euler paths after ``steps`` steps.
+    """Monte Carlo: errors (path_count, 2) of position (m) and velocity (m/s) of Euler paths after ``steps`` steps.
 
     Raises InputError as ``euler_covariance`` does.
     """
     _check_inputs(deviation, step, mass, damping, steps)
     _damping_times_step(damping * step)
-    kicks = deviation * step / mass * normal_samples(seed, 0, count * steps, 1).reshape(count, steps)
+    kicks = deviation * step / mass * normal_samples(seed, 0, path_count * steps, 1).reshape(path_count, steps)
     velocity = lfilter([1.0], [1.0, damping * step - 1.0], kicks, axis=1)
     return np.column_stack([step * velocity[:, :-1].sum(axis=1), velocity[:, -1]])

@@ -112,16 +112,16 @@ class Verdict:
     reason: str
 
 
-def figures_of_run(run: Result, p: Parameters) -> RunFigures:
+def figures_of_run(run: Result, parameters: Parameters) -> RunFigures:
     """Figures of a run for the vehicle's parameters p; raises InputError unless its rows are on a uniform, fine grid.
 
     The artificial moment is the mean over each step of I pitch'' less the suspension's moment, so it counts whatever
     acts on the chassis beside its springs and dampers, by whichever effect, in whichever engine.
     """
     step = _step(run)
-    inertia, heave = p.I * np.diff(run["pitch_rate"]) / step, p.m3 * np.diff(run["z3_rate"]) / step
-    moment = inertia - _step_means(_natural_moment(run, p), step)
-    force = heave - _step_means(p.m3 * p.g - run["f3"] - run["f4"], step)
+    inertia, heave = parameters.I * np.diff(run["pitch_rate"]) / step, parameters.m3 * np.diff(run["z3_rate"]) / step
+    moment = inertia - _step_means(_natural_moment(run, parameters), step)
+    force = heave - _step_means(parameters.m3 * parameters.g - run["f3"] - run["f4"], step)
     band = {
         name: low_pass(values, step)
         for name, values in (("moment", moment), ("inertia", inertia), ("force", force), ("heave", heave))
@@ -257,8 +257,8 @@ def _burden_sentences(figures: RunFigures, limits: Limits) -> list[str]:
     """Sentences on the stabiliser's share of moment and force where it exceeds the limit."""
     shares = {"moment": (figures.moment_share_band, "I pitch''"), "force": (figures.force_share_band, "m3 z3''")}
     return [
-        f"artificial {name} {share:.0%} of {whole}"
-        for name, (share, whole) in shares.items()
+        f"artificial {name} {share:.0%} of {full_value}"
+        for name, (share, full_value) in shares.items()
         if not share <= limits.artificial_share
     ]
 
@@ -287,13 +287,13 @@ def _step_means(values: np.ndarray, step: float) -> np.ndarray:
     return (values[1:] + values[:-1]) / 2.0 - step / 12.0 * np.diff(slope)
 
 
-def _natural_moment(run: Result, p: Parameters) -> np.ndarray:
+def _natural_moment(run: Result, parameters: Parameters) -> np.ndarray:
     """Pitch moment (n,) in N m on the chassis from suspension forces and body-fixed wheel forces, without the
     stabiliser."""
     moment = run["suspension_moment"]
     if run.data.attrs["mode"] != "force-body":
         return moment
-    return moment + np.sin(run["pitch"]) ** 2 * (p.b * run["f1"] - p.a * run["f2"])
+    return moment + np.sin(run["pitch"]) ** 2 * (parameters.b * run["f1"] - parameters.a * run["f2"])
 
 
 def _step(run: Result) -> float:

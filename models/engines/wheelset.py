@@ -14,7 +14,7 @@ from models.contact.inputs import Array
 from models.core.errors import RunFailed
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.native_parts import GroundSpring
-from models.rail.equations import LIMIT, ROLL, YAW, Equations, Y, Z
+from models.rail.equations import DERAILED_LIMIT, ROLL, YAW, Equations, Y, Z
 from models.rail.joint_forces import JOINTS, from_joints, joint_forces, rates_of, set_joint_forces, table, to_joints
 from models.rail.wheelset import GRAVITY
 from models.vehicles.spatial import Body, SpatialVehicle
@@ -63,7 +63,7 @@ class EngineWheelset(Equations):
         """States by the engine's RK4, every ``stride``-th of them, and the contacts in these states."""
         joints = to_joints(state)
         states = from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], count, step))
-        away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < LIMIT)
+        away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < DERAILED_LIMIT)
         if away.any():
             raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * step)
         return states[::stride], self.at(states[::stride])[1]

@@ -51,9 +51,9 @@ class Blocks(NamedTuple):
         """Number of blocks."""
         return -(-paths // self.size)
 
-    def block(self, number: int, paths: int) -> range:
+    def block(self, block_number: int, paths: int) -> range:
         """Path numbers of a block."""
-        return range(number * self.size, min((number + 1) * self.size, paths))
+        return range(block_number * self.size, min((block_number + 1) * self.size, paths))
 
 
 DEFAULT_BLOCKS = Blocks()
@@ -189,14 +189,18 @@ def each_block(
         missing = ((i, block(i)) for i in range(count) if not store.has(i))
         answers = _answers_of_blocks(job, missing, executor, blocks.ahead)
         with closing(answers):  # an interrupt drops at once what waits
-            given = 0
-            while given < count:
-                if store.has(given) and not failed:
-                    yield store.load(given)
-                    given += 1
-                elif lost is not None and (store.has(given) or given in failed):
-                    yield lost(block(given), failed[given]) if given in failed else store.load(given)
-                    given += 1
+            blocks_given = 0
+            while blocks_given < count:
+                if store.has(blocks_given) and not failed:
+                    yield store.load(blocks_given)
+                    blocks_given += 1
+                elif lost is not None and (store.has(blocks_given) or blocks_given in failed):
+                    yield (
+                        lost(block(blocks_given), failed[blocks_given])
+                        if blocks_given in failed
+                        else store.load(blocks_given)
+                    )
+                    blocks_given += 1
                 elif not _next_kept(answers, store, failed, counted):
                     break
         if failed and lost is None:
@@ -217,30 +221,32 @@ def in_order(
     the caller has claimed, and takes named arrays alone; what it has is not computed. Raises RunFailed for the first
     block that fails.
     """
-    kept: Store | _Memory = _Memory() if store is None else store
-    numbered, here, given = enumerate(blocks), dict[int, T](), 0
-    for given, block in numbered:
-        here[given] = block
-        if not kept.has(given):
+    values_by_index: Store | _Memory = _Memory() if store is None else store
+    numbered, blocks_by_index, block_index = enumerate(blocks), dict[int, T](), 0
+    for block_index, block in numbered:
+        blocks_by_index[block_index] = block
+        if not values_by_index.has(block_index):
             break
-        yield here.pop(given), kept.load(given)
+        yield blocks_by_index.pop(block_index), values_by_index.load(block_index)
 
     def missing() -> Iterator[tuple[int, T]]:
-        for i, block in chain([*here.items()], numbered):
-            here[i] = block
-            if not kept.has(i):
+        for i, block in chain([*blocks_by_index.items()], numbered):
+            blocks_by_index[i] = block
+            if not values_by_index.has(i):
                 yield i, block
 
     with closing(_answers_of_blocks(function, missing(), executor, ahead)) as answers:
         for i, _, answer in answers:
             if isinstance(answer, _Failure):
-                raise (_disk_full if answer.full else _lost_workers_error)(f"block {i}: {answer.reason}", kept)
-            _save_block(kept, i, answer)
-            while given in here and kept.has(given):
-                yield here.pop(given), kept.load(given)
-                given += 1
-    for i in sorted(here):
-        yield here[i], kept.load(i)
+                raise (_disk_full if answer.full else _lost_workers_error)(
+                    f"block {i}: {answer.reason}", values_by_index
+                )
+            _save_block(values_by_index, i, answer)
+            while block_index in blocks_by_index and values_by_index.has(block_index):
+                yield blocks_by_index.pop(block_index), values_by_index.load(block_index)
+                block_index += 1
+    for i in sorted(blocks_by_index):
+        yield blocks_by_index[i], values_by_index.load(i)
 
 
 def block_results(function: Callable[[T], Any], blocks: Iterable[T], executor: Executor | None = None) -> list[Any]:
@@ -252,8 +258,8 @@ def block_results(function: Callable[[T], Any], blocks: Iterable[T], executor: E
     if executor is None:
         return [function(block) for block in blocks]
     with closing(_answers_of_blocks(function, iter(enumerate(blocks)), executor, BLOCKS_AHEAD)) as answers:
-        kept = {i: answer for i, _, answer in answers}
-    ordered = [kept[i] for i in sorted(kept)]
+        answers_by_index = {i: answer for i, _, answer in answers}
+    ordered = [answers_by_index[i] for i in sorted(answers_by_index)]
     for answer in ordered:
         if isinstance(answer, _Failure):
             raise answer.error or RunFailed("ensemble", answer.reason)
@@ -261,13 +267,13 @@ def block_results(function: Callable[[T], Any], blocks: Iterable[T], executor: E
 
 
 def _next_kept(
-    answers: Iterator[tuple[int, range, Arrays | _Failure]],
+    block_answers: Iterator[tuple[int, range, Arrays | _Failure]],
     store: Store | _Memory,
     failed: dict[int, str],
     counted: _PathCounter,
 ) -> bool:
     """Store the next answer, or record why it failed; returns False when there are no more answers."""
-    i, block, answer = next(answers, (-1, range(0), _Failure("")))
+    i, block, answer = next(block_answers, (-1, range(0), _Failure("")))
     if i < 0:
         return False
     if isinstance(answer, _Failure):
@@ -284,10 +290,10 @@ def _next_kept(
 
 def _failed_blocks_error(failed: dict[int, tuple[range, str]], folder: Path | None) -> RunFailed:
     """The error that lists the failed blocks and paths."""
-    told = [f"block {i} (paths {block[0]} to {block[-1]}): {reason}" for i, (block, reason) in failed.items()]
-    kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
-    more = f"; {len(failed) - NAMED_FAILURES} more blocks" if len(failed) > NAMED_FAILURES else ""
-    return RunFailed("ensemble", "; ".join(told[:NAMED_FAILURES]) + more + kept)
+    failure_texts = [f"block {i} (paths {block[0]} to {block[-1]}): {reason}" for i, (block, reason) in failed.items()]
+    folder_hint = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
+    further_text = f"; {len(failed) - NAMED_FAILURES} more blocks" if len(failed) > NAMED_FAILURES else ""
+    return RunFailed("ensemble", "; ".join(failure_texts[:NAMED_FAILURES]) + further_text + folder_hint)
 
 
 def _answers_of_blocks(
@@ -299,12 +305,12 @@ def _answers_of_blocks(
         yield from ((i, block, _compute_block(job, block)) for i, block in missing)
         return
     ahead = ahead if ahead == 1 else max(ahead, 2 * getattr(executor, "width", 0))
-    queue, alone = deque(islice(missing, ahead)), deque[tuple[int, T]]()
+    queue, single_blocks = deque(islice(missing, ahead)), deque[tuple[int, T]]()
     lost, waiting = Counter[int](), dict[Future, tuple[int, T]]()
     try:
-        while queue or alone or waiting:
-            while (queue and _may_begin(queue[0][0], waiting, alone, ahead)) or (alone and not waiting):
-                i, block = (queue or alone).popleft()
+        while queue or single_blocks or waiting:
+            while (queue and _may_begin(queue[0][0], waiting, single_blocks, ahead)) or (single_blocks and not waiting):
+                i, block = (queue or single_blocks).popleft()
                 waiting[_submitted_block(executor, job, block)] = i, block
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 i, block = waiting.pop(future)
@@ -313,7 +319,7 @@ def _answers_of_blocks(
                 if died:
                     lost[i] += 1
                 if died and lost[i] < MOST_WORKER_LOSSES:
-                    (alone if lost[i] >= AMONG_OTHERS else queue).appendleft((i, block))
+                    (single_blocks if lost[i] >= AMONG_OTHERS else queue).appendleft((i, block))
                 else:
                     yield i, block, future.result() if error is None else _error_text(error)
             queue.extend(islice(missing, max(ahead - len(queue), 0)))
@@ -322,10 +328,12 @@ def _answers_of_blocks(
             future.cancel()
 
 
-def _may_begin(i: int, waiting: dict[Future, tuple[int, T]], alone: Collection[tuple[int, T]], ahead: int) -> bool:
+def _may_begin(
+    i: int, waiting: dict[Future, tuple[int, T]], single_blocks: Collection[tuple[int, T]], ahead: int
+) -> bool:
     """Whether a block may be started now: fewer than ``ahead`` are running, and it is less than ``ahead`` after the
     first unfinished one."""
-    first = min((other for other, _ in (*waiting.values(), *alone)), default=i)
+    first = min((other_index for other_index, _ in (*waiting.values(), *single_blocks)), default=i)
     return len(waiting) < ahead and i < first + ahead
 
 
@@ -353,13 +361,15 @@ def _save_block(store: Store | _Memory, block: int, arrays: Arrays) -> None:
 
 
 def _disk_full(reason: str, store: Store | _Memory) -> RunFailed:
-    kept = f"; the finished blocks are kept in {store.folder}: make room and resume" if isinstance(store, Store) else ""
-    return RunFailed("ensemble", f"{reason}{kept}")
+    folder_hint = (
+        f"; the finished blocks are kept in {store.folder}: make room and resume" if isinstance(store, Store) else ""
+    )
+    return RunFailed("ensemble", f"{reason}{folder_hint}")
 
 
 def _lost_workers_error(reason: str, store: Store | _Memory) -> RunFailed:
-    kept = f"; the finished blocks are kept in {store.folder}: resume there" if isinstance(store, Store) else ""
-    return RunFailed("ensemble", f"{reason}{kept}")
+    folder_hint = f"; the finished blocks are kept in {store.folder}: resume there" if isinstance(store, Store) else ""
+    return RunFailed("ensemble", f"{reason}{folder_hint}")
 
 
 def _submitted_block(executor: Executor, job: Callable[[T], Arrays], block: T) -> Future:
@@ -390,5 +400,5 @@ def _error_text(error: BaseException) -> _Failure:
     if isinstance(error, CancelledError) or type(error).__name__ == "FutureCancelledError":
         return _Failure("the cluster is gone: its scheduler ended, or cannot be reached any more", worker_is_gone=True)
     full = isinstance(error, OSError) and error.errno in DISK_FULL_ERRORS
-    said = str(error) if full or isinstance(error, PathFailed | RunFailed) else f"{type(error).__name__}: {error}"
-    return _Failure(said, full, error=error if isinstance(error, InputError | RunFailed) else None)
+    message = str(error) if full or isinstance(error, PathFailed | RunFailed) else f"{type(error).__name__}: {error}"
+    return _Failure(message, full, error=error if isinstance(error, InputError | RunFailed) else None)

@@ -25,14 +25,18 @@ def deviation_with_error(values: np.ndarray) -> tuple[float, float]:
     return deviation_of(len(values), float(np.mean(centred**2)), float(np.mean(centred**4)))
 
 
-def deviation_of(count: int, second: float, fourth: float) -> tuple[float, float]:
-    """Standard deviation and its standard error, from the second and fourth central moments of ``count`` values."""
-    if count < FEWEST_PATHS:
-        raise InputError("", "values", count, f"a standard deviation and its error need {FEWEST_PATHS} values or more")
-    spread = math.sqrt(second * count / (count - 1))
+def deviation_of(value_count: int, second_moment: float, fourth: float) -> tuple[float, float]:
+    """Standard deviation and its standard error, from the second and fourth central moments of ``value_count``
+    values.
+    """
+    if value_count < FEWEST_PATHS:
+        raise InputError(
+            "", "values", value_count, f"a standard deviation and its error need {FEWEST_PATHS} values or more"
+        )
+    spread = math.sqrt(second_moment * value_count / (value_count - 1))
     if spread == 0.0:
         return 0.0, 0.0
-    return spread, math.sqrt(max(fourth - second**2, 0.0) / count) / (2 * math.sqrt(second))
+    return spread, math.sqrt(max(fourth - second_moment**2, 0.0) / value_count) / (2 * math.sqrt(second_moment))
 
 
 def percentiles(errors: np.ndarray) -> np.ndarray:
@@ -42,7 +46,7 @@ def percentiles(errors: np.ndarray) -> np.ndarray:
     return np.nanpercentile(np.abs(errors), FAN_PERCENTILES, axis=0)
 
 
-def quantile_with_interval(values: np.ndarray, level: float) -> tuple[float, float, float]:
+def quantile_with_interval(values: np.ndarray, probability: float) -> tuple[float, float, float]:
     """Quantile of values (n,), some of which may be infinite, and the ends of its 95 % interval.
 
     Order statistics, so no law is assumed; the ranks of the interval by the normal limit of the binomial. Raises
@@ -51,16 +55,21 @@ def quantile_with_interval(values: np.ndarray, level: float) -> tuple[float, flo
     if not len(values) or np.isnan(values).any():
         raise InputError("", "values", None, "must be numbers, one or more; infinite ones are allowed")
     ordered = np.sort(values)
-    middle, low, high = (float(ordered[rank]) for rank in quantile_ranks(len(values), level))
+    middle, low, high = (float(ordered[rank]) for rank in quantile_ranks(len(values), probability))
     return middle, low, high
 
 
-def quantile_ranks(count: int, level: float) -> tuple[int, int, int]:
-    """Ranks, from 0, of a quantile of ``count`` values and of the ends of its 95 % interval; InputError for a level
-    that is not between 0 and 1."""
-    if not 0.0 < level < 1.0:
-        raise InputError("", "level", level, "must be between 0 and 1")
-    half = ERRORS_95 * math.sqrt(count * level * (1 - level))
-    places = (count * level, math.floor(count * level - half), count * level + half)
-    middle, low, high = (min(max(math.ceil(place) - 1, 0), count - 1) for place in places)
+def quantile_ranks(value_count: int, probability: float) -> tuple[int, int, int]:
+    """Ranks, from 0, of a quantile of ``value_count`` values and of the ends of its 95 % interval; InputError for a
+    level that is not between 0 and 1.
+    """
+    if not 0.0 < probability < 1.0:
+        raise InputError("", "level", probability, "must be between 0 and 1")
+    half = ERRORS_95 * math.sqrt(value_count * probability * (1 - probability))
+    rank_bounds = (
+        value_count * probability,
+        math.floor(value_count * probability - half),
+        value_count * probability + half,
+    )
+    middle, low, high = (min(max(math.ceil(rank) - 1, 0), value_count - 1) for rank in rank_bounds)
     return middle, low, high

@@ -52,15 +52,15 @@ class Store:
         if not file.exists():
             write_whole(file, json.dumps(described, indent=1).encode())
             return
-        kept = _read_note(file)
-        for key in (*described, *kept):
-            if described.get(key) != kept.get(key):
+        stored_job = _read_note(file)
+        for key in (*described, *stored_job):
+            if described.get(key) != stored_job.get(key):
                 allowed = (
                     f"this folder belongs to another job: {described.get(key)!r} is asked for here; "
                     "resume with what it was "
                     "begun with, or begin in a new folder"
                 )
-                raise InputError(file, key, kept.get(key), allowed)
+                raise InputError(file, key, stored_job.get(key), allowed)
 
     def path(self, block: int) -> Path:
         """Path of a block's file."""
@@ -105,10 +105,10 @@ def exclusive_folder(folder: Path) -> Iterator[None]:
 
 def _read_note(file: Path) -> dict[str, Any]:
     try:
-        kept = json.loads(file.read_text())
+        note = json.loads(file.read_text())
     except (OSError, ValueError) as error:
         raise InputError(file, "", None, f"is not the note of an ensemble: {error}") from None
-    return kept if isinstance(kept, dict) else {}
+    return note if isinstance(note, dict) else {}
 
 
 def fingerprint(facts: dict[str, Any]) -> dict[str, Any]:
@@ -120,15 +120,17 @@ def fingerprint(facts: dict[str, Any]) -> dict[str, Any]:
     return dict(_flat_items("", {**facts, "code of models": _code_checksum(), "versions": versions}))
 
 
-def _flat_items(place: str, value: Any) -> list[tuple[str, Any]]:
-    if isinstance(value, dict):
+def _flat_items(key_path: str, job_value: Any) -> list[tuple[str, Any]]:
+    if isinstance(job_value, dict):
         return [
-            pair for key, inner in value.items() for pair in _flat_items(f"{place}.{key}" if place else str(key), inner)
+            pair
+            for key, inner in job_value.items()
+            for pair in _flat_items(f"{key_path}.{key}" if key_path else str(key), inner)
         ]
-    if isinstance(value, np.ndarray):
-        digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
-        return [(place, f"{value.dtype} {list(value.shape)} {digest}")]
-    return [(place, list(value) if isinstance(value, tuple) else value)]
+    if isinstance(job_value, np.ndarray):
+        digest = hashlib.sha256(np.ascontiguousarray(job_value).tobytes()).hexdigest()[:16]
+        return [(key_path, f"{job_value.dtype} {list(job_value.shape)} {digest}")]
+    return [(key_path, list(job_value) if isinstance(job_value, tuple) else job_value)]
 
 
 @cache
@@ -144,40 +146,40 @@ def checksum_of_sources(root: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-def named_files(value: Any, folder: Path) -> dict[str, str]:
+def named_files(job_value: Any, folder: Path) -> dict[str, str]:
     """Checksum of each file that a text names, by that text; paths start from ``folder`` or from the working folder.
 
-    value : texts, and lists and tables of these. Files that a TOML file names count from its own folder; of code
+    job_value : texts, and lists and tables of these. Files that a TOML file names count from its own folder; of code
     named ``file.py:Name`` or ``module:Name`` it is the file, without what that imports.
     """
     hashes: dict[str, str] = {}
-    _collect_files(value, folder, hashes, set())
+    _collect_files(job_value, folder, hashes, set())
     return hashes
 
 
-def _collect_files(value: Any, folder: Path, hashes: dict[str, str], paths_seen: set[Path]) -> None:
-    if isinstance(value, dict | list | tuple):
-        for inner in value.values() if isinstance(value, dict) else value:
+def _collect_files(job_value: Any, folder: Path, hashes: dict[str, str], paths_seen: set[Path]) -> None:
+    if isinstance(job_value, dict | list | tuple):
+        for inner in job_value.values() if isinstance(job_value, dict) else job_value:
             _collect_files(inner, folder, hashes, paths_seen)
-    elif isinstance(value, str) and (path := _file(value, folder)) and path.resolve() not in paths_seen:
+    elif isinstance(job_value, str) and (path := _file(job_value, folder)) and path.resolve() not in paths_seen:
         paths_seen.add(path.resolve())
         content = path.read_bytes()
-        hashes[value] = hashes.get(value, "") + hashlib.sha256(content).hexdigest()[:16]
+        hashes[job_value] = hashes.get(job_value, "") + hashlib.sha256(content).hexdigest()[:16]
         if path.suffix == ".toml":
             _collect_files(_table(content), path.parent, hashes, paths_seen)
 
 
 def _file(text: str, folder: Path) -> Path | None:
     """The file that a text names, or None."""
-    before, _, _ = text.rpartition(":")
-    for path in (folder / text, Path(text), folder / before, Path(before)):
+    text_before_colon, _, _ = text.rpartition(":")
+    for path in (folder / text, Path(text), folder / text_before_colon, Path(text_before_colon)):
         if text and os.path.isfile(path):
             return path
-    return _of_module(before)
+    return _of_module(text_before_colon)
 
 
 def _of_module(name: str) -> Path | None:
-    if not name or not all(part.isidentifier() for part in name.split(".")):
+    if not name or not all(name_part.isidentifier() for name_part in name.split(".")):
         return None
     try:
         spec = find_spec(name)
@@ -186,9 +188,9 @@ def _of_module(name: str) -> Path | None:
     return Path(spec.origin) if spec and spec.origin and os.path.isfile(spec.origin) else None
 
 
-def _table(content: bytes) -> Any:
+def _table(file_content: bytes) -> Any:
     """Contents of a TOML file; empty if it is not valid, which is reported when the scene is read."""
     try:
-        return tomllib.loads(content.decode("utf-8-sig"))
+        return tomllib.loads(file_content.decode("utf-8-sig"))
     except ValueError:
         return None

@@ -45,9 +45,9 @@ class Moments:
         self.second = self.second + second + d**2 * n * m / total
         self.mean, self.count = self.mean + d * m / total, total
 
-    def deviation(self, *place: int) -> tuple[float, float]:
-        """Standard deviation of the values at index ``place``, and its standard error, as ``statistics.deviation``."""
-        return deviation_of(self.count, float(self.second[place]) / self.count, float(self.fourth[place]) / self.count)
+    def deviation(self, *index: int) -> tuple[float, float]:
+        """Standard deviation of the values at index ``index``, and its standard error, as ``statistics.deviation``."""
+        return deviation_of(self.count, float(self.second[index]) / self.count, float(self.fourth[index]) / self.count)
 
 
 class StreamedCovariance:
@@ -60,9 +60,9 @@ class StreamedCovariance:
         """Include values (n, ..., p)."""
         n, m, total = self.count, len(values), self.count + len(values)
         mean = values.mean(axis=0)
-        apart, d = values - mean, mean - self.mean
-        moved = d[..., :, None] * d[..., None, :] * (n * m / total)
-        self._sums = self._sums + np.einsum("n...i,n...j->...ij", apart, apart) + moved
+        deviations, d = values - mean, mean - self.mean
+        mean_shift = d[..., :, None] * d[..., None, :] * (n * m / total)
+        self._sums = self._sums + np.einsum("n...i,n...j->...ij", deviations, deviations) + mean_shift
         self.mean, self.count = self.mean + d * m / total, total
 
     @property
@@ -79,8 +79,8 @@ class Tally:
 
     def add(self, values: np.ndarray) -> None:
         """Count values (n,), some of which may be infinite."""
-        places, counts = np.unique(values, return_counts=True)
-        self._counts.update(dict(zip(places.tolist(), counts.tolist(), strict=True)))
+        distinct_values, counts = np.unique(values, return_counts=True)
+        self._counts.update(dict(zip(distinct_values.tolist(), counts.tolist(), strict=True)))
 
     @property
     def values(self) -> np.ndarray:
@@ -92,12 +92,12 @@ class Tally:
         """Number of occurrences (m,) of each of ``values``."""
         return np.array([self._counts[value] for value in sorted(self._counts)])
 
-    def quantile(self, level: float) -> tuple[float, float, float]:
+    def quantile(self, probability: float) -> tuple[float, float, float]:
         """Quantile and the ends of its 95 % interval, identical to ``statistics.quantile`` of all values."""
         upto = np.cumsum(self.counts)
-        places = np.searchsorted(upto, np.array(quantile_ranks(int(upto[-1]), level)), side="right")
-        low, high, most = (float(self.values[place]) for place in places)
-        return low, high, most
+        ranks = np.searchsorted(upto, np.array(quantile_ranks(int(upto[-1]), probability)), side="right")
+        low, high, upper = (float(self.values[rank]) for rank in ranks)
+        return low, high, upper
 
 
 class Spread:
@@ -117,16 +117,16 @@ class Spread:
             self._counts = np.zeros((columns, self._bins), dtype=np.int64)
         sizes = np.clip(np.abs(values), 0.0, LARGEST_MAGNITUDE)
         with np.errstate(divide="ignore"):
-            place = np.ceil(np.log(sizes / SMALLEST_MAGNITUDE) / self._width)
-        place = np.clip(np.nan_to_num(place, nan=0.0, neginf=0.0), 0, self._bins - 1).astype(np.int64)
+            bin_numbers = np.ceil(np.log(sizes / SMALLEST_MAGNITUDE) / self._width)
+        bin_numbers = np.clip(np.nan_to_num(bin_numbers, nan=0.0, neginf=0.0), 0, self._bins - 1).astype(np.int64)
         known = ~np.isnan(values)
-        cells = (np.arange(columns) * self._bins + place)[known]
+        cells = (np.arange(columns) * self._bins + bin_numbers)[known]
         self._counts += np.bincount(cells, minlength=self._counts.size).reshape(self._counts.shape)
 
-    def percentiles(self, levels: tuple[float, ...]) -> np.ndarray:
-        """Percentiles (levels, k) of the magnitudes; NaN where a column has no values."""
+    def percentiles(self, probabilities: tuple[float, ...]) -> np.ndarray:
+        """Percentiles (probabilities, k) of the magnitudes; NaN where a column has no values."""
         upto = self._counts.cumsum(axis=1)
-        wanted = np.array(levels)[:, None] / 100.0 * (upto[:, -1] - 1)
-        place = (upto[None] <= np.floor(wanted)[:, :, None]).sum(axis=2)
-        middle = SMALLEST_MAGNITUDE * np.exp(self._width * place) * (1.0 - QUANTILE_ACCURACY)
-        return np.where(upto[:, -1] > 0, np.where(place == 0, 0.0, middle), np.nan)
+        wanted = np.array(probabilities)[:, None] / 100.0 * (upto[:, -1] - 1)
+        bin_numbers = (upto[None] <= np.floor(wanted)[:, :, None]).sum(axis=2)
+        middle = SMALLEST_MAGNITUDE * np.exp(self._width * bin_numbers) * (1.0 - QUANTILE_ACCURACY)
+        return np.where(upto[:, -1] > 0, np.where(bin_numbers == 0, 0.0, middle), np.nan)

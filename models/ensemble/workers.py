@@ -70,10 +70,10 @@ class Processes(Executor):
         self._ours.close()
         self._theirs.close()
 
-    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
-        if kind is not None:
+    def __exit__(self, error_type: Any, error: Any, trace: Any) -> None:
+        if error_type is not None:
             self._ours.close()  # nobody waits for what is not wanted any more
-        self.shutdown(cancel_futures=kind is not None)
+        self.shutdown(cancel_futures=error_type is not None)
 
 
 def process_pool(workers: int) -> Processes:
@@ -87,11 +87,11 @@ def _interrupts_held() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
 def _prepare_worker(pipe: Connection) -> None:
@@ -138,24 +138,26 @@ class Crew:
     cluster: str | None = None
 
     @classmethod
-    def given(cls, workers: int | None = None, cluster: str | None = None, usual: int = DEFAULT_WORKERS) -> "Crew":
-        """The requested pool of workers; without a request, ``usual`` processes but at most one per core."""
-        return cls(workers or min(usual, os.cpu_count() or 1), cluster)
+    def given(
+        cls, workers: int | None = None, cluster: str | None = None, default_workers: int = DEFAULT_WORKERS
+    ) -> "Crew":
+        """The requested pool of workers; without a request, ``default_workers`` processes but at most one per core."""
+        return cls(workers or min(default_workers, os.cpu_count() or 1), cluster)
 
     @classmethod
-    def of(cls, scene: Any, usual: int = DEFAULT_WORKERS) -> "Crew":
+    def of(cls, scene: Any, default_workers: int = DEFAULT_WORKERS) -> "Crew":
         """The crew that a scene asks for, as ``given``."""
-        return cls.given(scene.workers, scene.cluster, usual)
+        return cls.given(scene.workers, scene.cluster, default_workers)
 
     @contextmanager
-    def at_work(self, blocks: int, *places: Path) -> Iterator[Executor | None]:
+    def at_work(self, blocks: int, *paths: Path) -> Iterator[Executor | None]:
         """The executor for a number of blocks; None where this process computes alone.
 
-        places : files and folders that the workers read or write, too; InputError where those of a cluster do not see
+        paths : files and folders that the workers read or write, too; InputError where those of a cluster do not see
         them, or where ``dask_workers`` has something to refuse.
         """
         if self.cluster is not None:
-            with dask_workers(self.cluster, *places) as executor:
+            with dask_workers(self.cluster, *paths) as executor:
                 yield executor
         elif (workers := min(self.workers, blocks)) > 1:
             with process_pool(workers) as executor:
@@ -171,12 +173,12 @@ def places_of(scene: Any) -> tuple[Path, ...]:
 
 
 @contextmanager
-def dask_workers(address: str, *places: Path) -> Iterator[Executor]:
+def dask_workers(address: str, *paths: Path) -> Iterator[Executor]:
     """The workers of a Dask scheduler, such as ``tcp://host:8786``, where the same twinrig must be installed.
 
     Certificates of a ``tls://`` address are those of Dask's configuration. Raises InputError where the extra
     ``dask_workers`` is not installed, nobody answers, no worker has joined, or one cannot compute the same: with other
-    sources, with several threads (engines share their callbacks within a process), or without sight of ``places``.
+    sources, with several threads (engines share their callbacks within a process), or without sight of ``paths``.
     """
     let_in("dask")
     try:
@@ -194,7 +196,7 @@ def dask_workers(address: str, *places: Path) -> Iterator[Executor]:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError("", "cluster", address, f"no Dask scheduler answers there: {reason}") from None
     with client:
-        _require_alike(client, address, places)
+        _require_alike(client, address, paths)
         from models.ensemble.dask_worker import Plain
 
         client.register_plugin(Plain())
@@ -234,15 +236,15 @@ class _WorkerState(NamedTuple):
     missing: list[str]
 
 
-def _worker_state(places: tuple[Path, ...], dask_worker: Any = None) -> _WorkerState:
-    """State of the worker on which this runs, for paths ``places``; Dask prescribes the argument's name."""
-    missing = [str(place) for place in places if not place.exists()]
+def _worker_state(paths: tuple[Path, ...], dask_worker: Any = None) -> _WorkerState:
+    """State of the worker on which this runs, for paths ``paths``; Dask prescribes the argument's name."""
+    missing = [str(path) for path in paths if not path.exists()]
     return _WorkerState(checksum_of_sources(Path(__file__).parents[1]), dask_worker.state.nthreads, missing)
 
 
-def _require_alike(client: Any, address: str, places: tuple[Path, ...]) -> None:
+def _require_alike(client: Any, address: str, paths: tuple[Path, ...]) -> None:
     """Raise InputError if there is no worker, or if one would not compute the same results."""
-    absolute = tuple(place.resolve() for place in places)
+    absolute = tuple(path.resolve() for path in paths)
     try:
         workers = client.run(_worker_state, absolute)
     except (ImportError, AttributeError) as error:
@@ -250,14 +252,15 @@ def _require_alike(client: Any, address: str, places: tuple[Path, ...]) -> None:
         raise InputError("", "cluster", address, allowed) from None
     if not workers:
         raise InputError("", "cluster", address, "no worker has joined this scheduler: start one, dask worker ADDRESS")
-    here = checksum_of_sources(Path(__file__).parents[1])
-    for worker, seen in workers.items():
-        if seen.sources != here:
+    checksum = checksum_of_sources(Path(__file__).parents[1])
+    for worker, worker_state in workers.items():
+        if worker_state.sources != checksum:
             allowed = "has another version of twinrig: install the same one on every machine"
-        elif seen.threads != 1:
-            allowed = f"has {seen.threads} threads, which would share an engine's callbacks: start it with --nthreads 1"
-        elif seen.missing:
-            allowed = f"does not see {', '.join(seen.missing)}: use a folder that all machines share"
+        elif worker_state.threads != 1:
+            threads = f"has {worker_state.threads} threads, which would share an engine's callbacks"
+            allowed = f"{threads}: start it with --nthreads 1"
+        elif worker_state.missing:
+            allowed = f"does not see {', '.join(worker_state.missing)}: use a folder that all machines share"
         else:
             continue
         raise InputError("", "cluster", address, f"the worker {worker} {allowed}")

@@ -40,16 +40,16 @@ def counted_load(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) 
     load = checked_load(load)
     turns = turning_points(load)
     spans, _, counts = rainflow_cycles(turns)
-    least, greatest = float(load.min()), float(load.max())
-    levels = np.linspace(least, greatest, LEVELS_OF_FIGURE + 1)
-    ranges = np.linspace(0.0, greatest - least, RANGES_OF_FIGURE + 1)[1:]
+    smallest, greatest = float(load.min()), float(load.max())
+    levels = np.linspace(smallest, greatest, LEVELS_OF_FIGURE + 1)
+    ranges = np.linspace(0.0, greatest - smallest, RANGES_OF_FIGURE + 1)[1:]
     return CountedLoad(
         {slope: damage_sum(spans, counts, slope) for slope in slopes},
         levels,
         level_crossings(turns, levels),
         ranges,
         range_pairs(spans, counts, ranges),
-        least,
+        smallest,
         greatest,
         float(load.mean()),
     )
@@ -58,19 +58,19 @@ def counted_load(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) 
 def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
     """Number of upward crossings of each level (l,) by a load (n,) or its turning points; levels may be in any order.
     InputError as in ``counted_load``, and for a level that is no number."""
-    load, given = checked_load(load), np.asarray(levels, float)
-    if np.isnan(given).any():
+    load, given_levels = checked_load(load), np.asarray(levels, float)
+    if np.isnan(given_levels).any():
         raise InputError("", "levels", None, "must be numbers")
-    levels, places = np.unique(given, return_inverse=True)
+    levels, index_of_level = np.unique(given_levels, return_inverse=True)
     rising = load[1:] > load[:-1]
-    begun = np.searchsorted(levels, load[:-1][rising], side="right")  # the first level above the start
+    first_level = np.searchsorted(levels, load[:-1][rising], side="right")  # the first level above the start
     ended = np.searchsorted(levels, load[1:][rising], side="right")  # one beyond the last level reached
-    change = np.bincount(begun, minlength=len(levels) + 1) - np.bincount(ended, minlength=len(levels) + 1)
-    return np.cumsum(change)[: len(levels)][places]
+    change = np.bincount(first_level, minlength=len(levels) + 1) - np.bincount(ended, minlength=len(levels) + 1)
+    return np.cumsum(change)[: len(levels)][index_of_level]
 
 
-def range_pairs(spans: np.ndarray, counts: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+def range_pairs(spans: np.ndarray, cycle_counts: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     """Number of cycles with at least each range (r,), from the ranges ``spans`` and counts of cycles (c,)."""
     order = np.argsort(spans)
-    above = np.concatenate((np.cumsum(counts[order][::-1])[::-1], [0.0]))
-    return above[np.searchsorted(spans[order], ranges * (1 - 1e-12), side="left")]
+    cycles_above = np.concatenate((np.cumsum(cycle_counts[order][::-1])[::-1], [0.0]))
+    return cycles_above[np.searchsorted(spans[order], ranges * (1 - 1e-12), side="left")]

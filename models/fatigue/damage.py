@@ -38,23 +38,25 @@ def checked_load(load: np.ndarray) -> np.ndarray:
             None,
             f"{np.ma.count_masked(load)} of {np.size(load)} samples are masked: leave them out or fill them",
         )
-    given = np.asarray(load)
-    if given.ndim != 1 or given.dtype.kind not in "biuf":
-        raise InputError("", "load", f"{given.ndim}-dimensional, {given.dtype}", "must be one row of real numbers")
-    load = given.astype(float)
+    load_array = np.asarray(load)
+    if load_array.ndim != 1 or load_array.dtype.kind not in "biuf":
+        raise InputError(
+            "", "load", f"{load_array.ndim}-dimensional, {load_array.dtype}", "must be one row of real numbers"
+        )
+    load = load_array.astype(float)
     if not len(load) or not np.isfinite(load).all():
         fault = f"{np.count_nonzero(~np.isfinite(load))} of {len(load)} samples are not finite"
         raise InputError("", "load", None, f"{fault}: damage needs at least one sample, and all of them finite")
     return load
 
 
-def damage_sum(spans: np.ndarray, counts: np.ndarray, slope: float) -> float:
+def damage_sum(spans: np.ndarray, cycle_counts: np.ndarray, slope: float) -> float:
     """Sum of count times range^slope over cycles (c,); InputError for an invalid slope, or a sum too large for a
     double."""
     if not (math.isfinite(slope) and slope > 0.0):
         raise InputError("", "slope", slope, "must be a Woehler exponent above 0")
     with np.errstate(over="ignore"):
-        damage = float(np.sum(counts * spans**slope))
+        damage = float(np.sum(cycle_counts * spans**slope))
     if not math.isfinite(damage):
         raise InputError(
             "", "load", float(spans.max()), f"has a range whose power {slope:g} is beyond all numbers: use another unit"
@@ -78,7 +80,7 @@ def pseudo_damage(load: np.ndarray, slope: float = WOEHLER_SLOPE) -> float:
 def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = WOEHLER_SLOPE) -> float:
     """Ratio of a load's pseudo-damage (n,) to that of the true load (m,); raises InputError if the true load never
     varies."""
-    whole = pseudo_damage(truth, slope)
-    if whole == 0.0 or np.ptp(truth) <= REST_RANGE_SHARE * np.abs(truth).max():
+    true_damage = pseudo_damage(truth, slope)
+    if true_damage == 0.0 or np.ptp(truth) <= REST_RANGE_SHARE * np.abs(truth).max():
         raise InputError("", "true load", None, "never varies, so it does no damage to which another could be compared")
-    return pseudo_damage(load, slope) / whole
+    return pseudo_damage(load, slope) / true_damage

@@ -69,7 +69,7 @@ class Bands:
 
     def _mean_over_samples(self, values: np.ndarray) -> np.ndarray:
         used = [channel.is_used for channel in self.problem.channels]
-        return np.array([row[part].mean() for row, part in zip(values, used, strict=True)])
+        return np.array([row[counts_in_channel].mean() for row, counts_in_channel in zip(values, used, strict=True)])
 
 
 def error_bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) -> Bands:

@@ -43,14 +43,14 @@ class Fit:
 def fit(
     problem: Problem,
     stage_store: Store | None = None,
-    tell: StageProgress = lambda text, share: None,
+    report_stage: StageProgress = lambda text, share: None,
     first: int = 0,
     executor: Executor | None = None,
 ) -> Fit:
     """Least-squares estimates by scipy; InputError where the model fails at the start values.
 
-    stage_store : finished stages, the first of them block ``first``; tell : told after each stage; executor : computes
-    the columns of Jacobians.
+    stage_store : finished stages, the first of them block ``first``; report_stage : told after each stage; executor :
+    computes the columns of Jacobians.
     """
     values, cost, converged = problem.start, np.inf, False
     for stage in range(MOST_STAGES):
@@ -60,23 +60,23 @@ def fit(
             block = _one_stage(problem, values, executor)
             if stage_store is not None:
                 stage_store.save(first + stage, block)
-        values, before, cost = block["values"], cost, float(block["cost"])
-        converged = before - cost <= COST_DECREASE * cost
+        values, cost_before, cost = block["values"], cost, float(block["cost"])
+        converged = cost_before - cost <= COST_DECREASE * cost
         size = np.sqrt(2.0 * cost / int((problem.weights > 0.0).sum()))
-        tell(f"stage {stage + 1}, error {size:.4g} of the channels", _done_share(stage, before, cost))
+        report_stage(f"stage {stage + 1}, error {size:.4g} of the channels", _done_share(stage, cost_before, cost))
         if converged:
             break
     return Fit(problem, values, problem.residuals(values), cost, stage + 1, converged)
 
 
-def _done_share(stage: int, previous_cost: float, cost: float) -> float:
+def _done_share(stage_number: int, previous_cost: float, cost: float) -> float:
     """Estimated share of the fit that is complete, from how little a stage still reduces the cost."""
     settled = (
         0.0
         if not np.isfinite(previous_cost)
         else min(1.0, -np.log10(max(1.0 - cost / previous_cost, COST_DECREASE)) / 4.0)
     )
-    return 0.9 * max(settled, stage / MOST_STAGES)
+    return 0.9 * max(settled, stage_number / MOST_STAGES)
 
 
 def _one_stage(problem: Problem, values: np.ndarray, executor: Executor | None) -> dict[str, np.ndarray]:
@@ -86,7 +86,9 @@ def _one_stage(problem: Problem, values: np.ndarray, executor: Executor | None) 
     scale, (low, high), residuals = problem.scale, problem.bounds, problem.residuals
     begin = np.clip(values / scale, low / scale + INSIDE_BOUNDS_STEP, high / scale - INSIDE_BOUNDS_STEP)
     if np.abs(residuals(begin * scale)).max() >= FAILED_RESIDUAL:
-        names = ", ".join(f"{each.name} = {value:.4g}" for each, value in zip(problem.parameters, values, strict=True))
+        names = ", ".join(
+            f"{parameter.name} = {value:.4g}" for parameter, value in zip(problem.parameters, values, strict=True)
+        )
         raise InputError("identify", "start", names, "the model fails at these values: start from others")
     solved = least_squares(
         lambda x: residuals(x * scale).ravel(),
@@ -101,12 +103,15 @@ def _one_stage(problem: Problem, values: np.ndarray, executor: Executor | None) 
     return {"values": solved.x * scale, "cost": np.array(solved.cost)}
 
 
-def fit_with_held(problem: Problem, k: int, value: float, start: np.ndarray) -> Problem:
-    """The fit with parameter ``k`` fixed at a value; the others start from ``start`` (p,)."""
-    others = [replace(each, start=float(at)) for each, at in zip(problem.parameters, start, strict=True)]
-    del others[k]
+def fit_with_held(problem: Problem, k: int, fixed_value: float, start_values: np.ndarray) -> Problem:
+    """The fit with parameter ``k`` fixed at a value; the others start from ``start_values`` (p,)."""
+    other_parameters = [
+        replace(parameter, start=float(start_value))
+        for parameter, start_value in zip(problem.parameters, start_values, strict=True)
+    ]
+    del other_parameters[k]
 
     def model(values: np.ndarray) -> object:
-        return problem.model(np.insert(values, k, value))
+        return problem.model(np.insert(values, k, fixed_value))
 
-    return replace(problem, model=model, parameters=others)  # type: ignore[arg-type]
+    return replace(problem, model=model, parameters=other_parameters)  # type: ignore[arg-type]

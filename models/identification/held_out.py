@@ -39,44 +39,51 @@ class Identified:
 
 
 def identified_vehicle(
-    first: Any, second: Any, search: Search, progress: Progress = lambda text, share: None
+    first_stretch: Any, second_stretch: Any, parameter_search: Search, progress: Progress = lambda text, share: None
 ) -> Identified:
     """Fit to the first stretch of a measurement, cross-validation on parts of it, and prediction of the second stretch
     with bands."""
-    problem = _fit_problem(first, search)
-    solved = fit(problem, tell=lambda text, share: progress(text, 0.4 * share))
+    problem = _fit_problem(first_stretch, parameter_search)
+    solved = fit(problem, report_stage=lambda text, share: progress(text, 0.4 * share))
     known = uncertainty(solved)
-    crossed = cross_validated(solved, search.blocks, progress)
+    crossed = cross_validated(solved, parameter_search.blocks, progress)
     predicted = problem.predicted(solved.values)
     errors = [
         error_model(row[channel.is_used], model[channel.is_used])
         for row, model, channel in zip(crossed, predicted, problem.channels, strict=True)
     ]
     progress("the prediction", 0.9)
-    return Identified(known, errors, crossed, error_bands(_fit_problem(second, search), known, errors))
+    return Identified(
+        known, errors, crossed, error_bands(_fit_problem(second_stretch, parameter_search), known, errors)
+    )
 
 
-def _fit_problem(scene: Any, search: Search) -> Problem:
-    whole = problem_of(scene, scene.path(scene.drive.file), search.parameters, low_pass=search.low_pass)
-    channels = {channel.name: channel for channel in whole.channels}
-    missing = next((name for name in search.channels if name not in channels), None)
+def _fit_problem(scene: Any, parameter_search: Search) -> Problem:
+    full_problem = problem_of(
+        scene, scene.path(scene.drive.file), parameter_search.parameters, low_pass=parameter_search.low_pass
+    )
+    channels = {channel.name: channel for channel in full_problem.channels}
+    missing = next((name for name in parameter_search.channels if name not in channels), None)
     if missing:
         raise InputError(scene.drive.file, missing, None, "this channel is compared: it must be in the file")
-    return replace(whole, channels=[channels[name] for name in search.channels])
+    return replace(full_problem, channels=[channels[name] for name in parameter_search.channels])
 
 
-def cross_validated(solved: Fit, count: int, progress: Progress) -> np.ndarray:
+def cross_validated(solved: Fit, part_count: int, progress: Progress) -> np.ndarray:
     """Prediction less measurement (channels, n); each part of the stretch is predicted by a fit to all other parts."""
     problem, times = solved.problem, solved.problem.clock.times
     target = np.array([channel.values for channel in problem.channels])
     answer = np.empty_like(target)
-    part = np.minimum((count * np.arange(len(times))) // len(times), count - 1)
-    starts = [replace(each, start=float(v)) for each, v in zip(problem.parameters, _inside_bounds(solved), strict=True)]
-    for k in range(count):
-        progress(f"part {k + 1} of {count}, predicted from the others", 0.4 + 0.5 * k / count)
-        others = Problem(problem.model, starts, problem.channels, problem.clock, part != k)
-        there = fit(others)
-        answer[:, part == k] = (problem.predicted(there.values) - target)[:, part == k]
+    part_of_sample = np.minimum((part_count * np.arange(len(times))) // len(times), part_count - 1)
+    starts = [
+        replace(parameter, start=float(v))
+        for parameter, v in zip(problem.parameters, _inside_bounds(solved), strict=True)
+    ]
+    for k in range(part_count):
+        progress(f"part {k + 1} of {part_count}, predicted from the others", 0.4 + 0.5 * k / part_count)
+        problem_without_part = Problem(problem.model, starts, problem.channels, problem.clock, part_of_sample != k)
+        fit_without_part = fit(problem_without_part)
+        answer[:, part_of_sample == k] = (problem.predicted(fit_without_part.values) - target)[:, part_of_sample == k]
     return answer
 
 

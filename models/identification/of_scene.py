@@ -30,7 +30,7 @@ def parameter_of_scene(scene: Any, text: str) -> Parameter:
 
     Raises InputError for a key that is not there or holds no number, and for a range that does not hold the start.
     """
-    key, equals, span = (part.strip() for part in text.partition("="))
+    key, equals, span = (piece.strip() for piece in text.partition("="))
     start, low, high = scene_value(scene, key)
     if equals:
         low, high = _low_and_high(key, span)
@@ -53,22 +53,22 @@ def _low_and_high(key: str, span: str) -> tuple[float, float]:
 def scene_value(scene: Any, key: str) -> tuple[float, float, float]:
     """Value of a scene at a dotted key, and the least and the largest value that its table allows."""
     owner: Any = scene
-    *tables, last = key.split(".")
+    *tables, last_key = key.split(".")
     for table in tables:
         owner = _value_at_key(owner, table, key)
-    value = _value_at_key(owner, last, key)
+    value = _value_at_key(owner, last_key, key)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(PARAMETERS_OPTION, key, None, "holds no number: a parameter is a number of the scene")
-    field = type(owner).model_fields.get(last) if isinstance(owner, BaseModel) else None
+    field = type(owner).model_fields.get(last_key) if isinstance(owner, BaseModel) else None
     limits = field.metadata if field is not None else []
-    low = max((float(each) for limit in limits for each in _limit_ends(limit, "gt", "ge")), default=-np.inf)
-    high = min((float(each) for limit in limits for each in _limit_ends(limit, "lt", "le")), default=np.inf)
+    low = max((float(limit_end) for limit in limits for limit_end in _limit_ends(limit, "gt", "ge")), default=-np.inf)
+    high = min((float(limit_end) for limit in limits for limit_end in _limit_ends(limit, "lt", "le")), default=np.inf)
     return float(value), low, high
 
 
-def _limit_ends(limit: Any, *names: str) -> list[float]:
+def _limit_ends(field_limit: Any, *names: str) -> list[float]:
     """Lower and upper end that a field's limit names; none for the general limit on all quantities."""
-    ends = (getattr(limit, name, None) for name in names)
+    ends = (getattr(field_limit, name, None) for name in names)
     return [end for end in ends if end is not None and abs(end) < LARGEST_QUANTITY]
 
 
@@ -127,12 +127,15 @@ def over_time(run: Result) -> dict[str, tuple[str, np.ndarray, np.ndarray]]:
     for name, channel in run.data.data_vars.items():
         if "time" not in channel.dims or channel.dtype.kind not in "fiu":
             continue
-        others = [dim for dim in channel.dims if dim != "time"]
+        other_dims = [dim for dim in channel.dims if dim != "time"]
         times, unit = run.times, str(channel.attrs.get("units", ""))
-        for place in np.ndindex(*(channel.sizes[dim] for dim in others)):
-            at = dict(zip(others, place, strict=True))
-            labels = [str(channel[dim].values[i]) if dim in channel.coords else f"{dim} {i}" for dim, i in at.items()]
-            answer[", ".join((str(name), *labels))] = unit, times, channel.isel(at).values.astype(float)
+        for index in np.ndindex(*(channel.sizes[dim] for dim in other_dims)):
+            index_by_dim = dict(zip(other_dims, index, strict=True))
+            labels = [
+                str(channel[dim].values[i]) if dim in channel.coords else f"{dim} {i}"
+                for dim, i in index_by_dim.items()
+            ]
+            answer[", ".join((str(name), *labels))] = unit, times, channel.isel(index_by_dim).values.astype(float)
     return answer
 
 
@@ -152,11 +155,11 @@ def _check_names(scene: Any, measurement: str | Path, engine: str) -> None:
     _channels_with_names(source, measurement, tuple(names))
 
 
-def _channels_with_names(source: Source, path: str | Path, names: tuple[str, ...]) -> list[str]:
+def _channels_with_names(measurement_source: Source, path: str | Path, names: tuple[str, ...]) -> list[str]:
     """Channels of a measurement that have one of these names; InputError if there are none."""
-    named = [channel.name for channel in source.channels if channel.name in names]
+    named = [channel.name for channel in measurement_source.channels if channel.name in names]
     if not named:
-        theirs = [channel.name for channel in source.channels]
+        theirs = [channel.name for channel in measurement_source.channels]
         raise InputError(path, "", theirs[0] if theirs else None, "no channel has the name of one of the run", names)
     return named
 
@@ -178,13 +181,13 @@ def problem_of(
 
     low_pass : Hz, of model and measurement alike, without phase; 0 for none. Times of both are the same clock.
     """
-    asked = [parameter_of_scene(scene, text) for text in parameters]
-    for i, each in enumerate(asked):
-        if each.name in [other.name for other in asked[:i]]:
-            raise InputError(PARAMETERS_OPTION, each.name, None, "is named twice")
-    model = SceneModel(scene, [each.name for each in asked], engine)
+    parameters_of_scene = [parameter_of_scene(scene, text) for text in parameters]
+    for i, parameter in enumerate(parameters_of_scene):
+        if parameter.name in [earlier.name for earlier in parameters_of_scene[:i]]:
+            raise InputError(PARAMETERS_OPTION, parameter.name, None, "is named twice")
+    model = SceneModel(scene, [parameter.name for parameter in parameters_of_scene], engine)
     _check_names(scene, measurement, engine)
-    first = over_time(model.result(np.array([each.start for each in asked])))
+    first = over_time(model.result(np.array([parameter.start for parameter in parameters_of_scene])))
     read = measured_curves(measurement, {name: unit for name, (unit, _, _) in first.items()})
     clock = _shared_clock(
         [first[name][1] for name in read], [times for times, _ in read.values()], low_pass, measurement
@@ -192,19 +195,19 @@ def problem_of(
     channels: list[ChannelOnClock] = [
         measured_channel(name, first[name][0], samples, clock, str(measurement)) for name, samples in read.items()
     ]
-    return Problem(model, asked, channels, clock)
+    return Problem(model, parameters_of_scene, channels, clock)
 
 
 def _shared_clock(
-    ours: list[np.ndarray], theirs: list[np.ndarray], low_pass: float, measurement: str | Path
+    run_times: list[np.ndarray], theirs: list[np.ndarray], low_pass: float, measurement: str | Path
 ) -> FitClock:
     """Time grid in the interval shared by the run and all measured channels; its step is the shortest in the
     measurement."""
-    begin = max(float(times[0]) for times in (*ours, *theirs))
-    end = min(float(times[-1]) for times in (*ours, *theirs))
+    begin = max(float(times[0]) for times in (*run_times, *theirs))
+    end = min(float(times[-1]) for times in (*run_times, *theirs))
     period = min(float(np.median(np.diff(times))) for times in theirs)
     if not end - begin >= 8.0 * period:
-        allowed = f"run and measurement share no time: the run goes from {ours[0][0]:g} to {ours[0][-1]:g} s"
+        allowed = f"run and measurement share no time: the run goes from {run_times[0][0]:g} to {run_times[0][-1]:g} s"
         raise InputError(measurement, "time", [float(theirs[0][0]), float(theirs[0][-1])], allowed)
     if low_pass and not 0.0 < low_pass < 0.5 / period:
         allowed = f"must be below {0.5 / period:g} Hz, half the sampling rate of the measurement, or 0 for none"

@@ -101,27 +101,27 @@ class ChannelOnClock:
         return float(np.sqrt(np.mean(self.values[self.is_used] ** 2)))
 
 
-def measured_channel(name: str, unit: str, curve: Curve, clock: FitClock, place: str = "") -> ChannelOnClock:
+def measured_channel(name: str, unit: str, curve: Curve, clock: FitClock, source: str = "") -> ChannelOnClock:
     """A channel of a file, interpolated to the clock; InputError if it has too few samples there, or is constant."""
     times, raw = curve
     values = without_outliers(raw)
     known = np.isfinite(values)
-    inside = known & (times >= clock.times[0]) & (times <= clock.times[-1])
-    if inside.sum() < FEWEST_SAMPLES:
+    is_inside = known & (times >= clock.times[0]) & (times <= clock.times[-1])
+    if is_inside.sum() < FEWEST_SAMPLES:
         allowed = f"samples between {clock.times[0]:g} and {clock.times[-1]:g} s: at least {FEWEST_SAMPLES} are needed"
-        raise InputError(place, name, int(inside.sum()), allowed)
+        raise InputError(source, name, int(is_inside.sum()), allowed)
     period = max(float(np.median(np.diff(times))), clock.period)
     nearest = np.abs(times[known][_nearest_sample(times[known], clock.times)] - clock.times)
     used = nearest <= 1.5 * period
     smooth = clock.filtered(np.interp(clock.times, times[known], values[known]))
     if not np.any(smooth[used]):
-        raise InputError(place, name, 0.0, "does not move: nothing can be identified by it")
+        raise InputError(source, name, 0.0, "does not move: nothing can be identified by it")
     return ChannelOnClock(name, unit, smooth, used, int(len(raw) - known.sum()))
 
 
-def _nearest_sample(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    right = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
-    return right - (wanted - times[right - 1] < times[right] - wanted)
+def _nearest_sample(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
+    right = np.clip(np.searchsorted(times, wanted_times), 1, len(times) - 1)
+    return right - (wanted_times - times[right - 1] < times[right] - wanted_times)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,28 +137,30 @@ class Problem:
     @property
     def start(self) -> np.ndarray:
         """Start values (p,) of the parameters."""
-        return np.array([each.start for each in self.parameters])
+        return np.array([parameter.start for parameter in self.parameters])
 
     @property
     def scale(self) -> np.ndarray:
         """Scales (p,) of the parameters."""
-        return np.array([each.scale for each in self.parameters])
+        return np.array([parameter.scale for parameter in self.parameters])
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest values (p,)."""
-        return np.array([each.low for each in self.parameters]), np.array([each.high for each in self.parameters])
+        return np.array([parameter.low for parameter in self.parameters]), np.array(
+            [parameter.high for parameter in self.parameters]
+        )
 
     def predicted(self, values: np.ndarray) -> np.ndarray:
         """Output of the model (channels, n) at all times of the clock, filtered by the same low-pass as the
         measurement; read-only."""
-        key, kept = values.tobytes(), self._latest_predictions
-        if key not in kept:
+        key, kept_predictions = values.tobytes(), self._latest_predictions
+        if key not in kept_predictions:
             prediction = self._march(values)
-            if len(kept) >= SETS_OF_PREDICTIONS * (len(self.parameters) + 1):
-                kept.pop(next(iter(kept)))
-            kept[key] = prediction
-        return kept[key]
+            if len(kept_predictions) >= SETS_OF_PREDICTIONS * (len(self.parameters) + 1):
+                kept_predictions.pop(next(iter(kept_predictions)))
+            kept_predictions[key] = prediction
+        return kept_predictions[key]
 
     @cached_property
     def _latest_predictions(self) -> dict[bytes, np.ndarray]:
@@ -183,9 +185,9 @@ class Problem:
     @cached_property
     def weights(self) -> np.ndarray:
         """Weights (channels, m): 0 for samples that do not count."""
-        every, part = slice(None, None, self.clock.stride), self.taking_part
-        rows = [channel.is_used & (True if part is None else part) for channel in self.channels]
-        return np.array([row[every] / channel.size for row, channel in zip(rows, self.channels, strict=True)])
+        sample_stride, taking_part = slice(None, None, self.clock.stride), self.taking_part
+        rows = [channel.is_used & (True if taking_part is None else taking_part) for channel in self.channels]
+        return np.array([row[sample_stride] / channel.size for row, channel in zip(rows, self.channels, strict=True)])
 
     @cached_property
     def target(self) -> np.ndarray:
@@ -202,33 +204,55 @@ class Problem:
         return (predicted - self.target) * self.weights
 
     def jacobian(
-        self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray] | None = None, executor: Executor | None = None
+        self,
+        values: np.ndarray,
+        function: Callable[[np.ndarray], np.ndarray] | None = None,
+        executor: Executor | None = None,
     ) -> np.ndarray:
         """Jacobian (channels, m, p) by forward differences in the parameters' scales, or backward differences where
         forward ones fail.
 
-        of : what is derived, the residuals if nothing else is named; executor : computes its columns.
+        function : what is derived, the residuals if nothing else is named; executor : computes its columns.
         """
-        answer = self.residuals if of is None else of
-        ways = [self._difference_steps(values, k) for k in range(len(self.parameters))]
-        base, there = answer(values), block_results(answer, [way[0][0] for way in ways], executor)
-        again = [k for k, way in enumerate(ways) if way[1:] and np.abs(there[k]).max() >= FAILED_RESIDUAL]
-        chosen = [way[1 if k in again else 0] for k, way in enumerate(ways)]
-        for k, moved in zip(again, block_results(answer, [chosen[k][0] for k in again], executor), strict=True):
-            there[k] = moved
-        columns = [(row - base) / change for row, (_, change) in zip(there, chosen, strict=True)]
+        answer = self.residuals if function is None else function
+        difference_steps = [self._difference_steps(values, k) for k in range(len(self.parameters))]
+        base, moved_values = (
+            answer(values),
+            block_results(answer, [difference_step[0][0] for difference_step in difference_steps], executor),
+        )
+        failed_columns = [
+            k
+            for k, difference_step in enumerate(difference_steps)
+            if difference_step[1:] and np.abs(moved_values[k]).max() >= FAILED_RESIDUAL
+        ]
+        chosen = [
+            difference_step[1 if k in failed_columns else 0] for k, difference_step in enumerate(difference_steps)
+        ]
+        for k, changed_values in zip(
+            failed_columns, block_results(answer, [chosen[k][0] for k in failed_columns], executor), strict=True
+        ):
+            moved_values[k] = changed_values
+        columns = [(row - base) / change for row, (_, change) in zip(moved_values, chosen, strict=True)]
         return np.stack(columns, axis=-1)
 
     def _difference_steps(self, values: np.ndarray, k: int) -> list[tuple[np.ndarray, float]]:
         """Steps for difference quotients: values (p,) with parameter ``k`` moved forward, then backward, and the step
         divided by its scale. Steps stay within the bounds; near the upper one the backward step comes first."""
-        each, ways = self.parameters[k], list[tuple[np.ndarray, float]]()
-        step = DIFFERENCE_STEP * each.scale * (-1.0 if values[k] + DIFFERENCE_STEP * each.scale > each.high else 1.0)
+        parameter, difference_steps = self.parameters[k], list[tuple[np.ndarray, float]]()
+        step = (
+            DIFFERENCE_STEP
+            * parameter.scale
+            * (-1.0 if values[k] + DIFFERENCE_STEP * parameter.scale > parameter.high else 1.0)
+        )
         for signed in (step, -step):
-            moved = values.copy()
-            moved[k] += signed
-            ways.append((moved, signed / each.scale))
-        return [way for way in ways if each.low <= way[0][k] <= each.high] or ways[:1]
+            moved_values = values.copy()
+            moved_values[k] += signed
+            difference_steps.append((moved_values, signed / parameter.scale))
+        return [
+            difference_step
+            for difference_step in difference_steps
+            if parameter.low <= difference_step[0][k] <= parameter.high
+        ] or difference_steps[:1]
 
 
 DIFFERENCE_STEP = 1e-4

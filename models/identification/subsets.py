@@ -69,12 +69,12 @@ class Subset:
 
     def spread(self, predict: Callable[[dict[str, float]], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Predictions (m,) of ``predict`` at the fitted values, and their variances (m,) from the covariance."""
-        here = predict(self.named)
-        slopes = np.zeros((len(here), len(self.names)))
+        fitted_predictions = predict(self.named)
+        slopes = np.zeros((len(fitted_predictions), len(self.names)))
         for i, (name, value) in enumerate(self.named.items()):
             step = DIFFERENCE_STEP * max(abs(value), LEAST_VALUE)
-            slopes[:, i] = (predict(self.named | {name: value + step}) - here) / step
-        return here, np.einsum("ij,jk,ik->i", slopes, self.covariance, slopes)
+            slopes[:, i] = (predict(self.named | {name: value + step}) - fitted_predictions) / step
+        return fitted_predictions, np.einsum("ij,jk,ik->i", slopes, self.covariance, slopes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +117,10 @@ class Choice:
         fullest = max(self.subset_fits, key=lambda fit: len(fit.names))
         size = np.sqrt(np.diag(fullest.covariance))
         pairs = combinations(range(len(size)), 2)
-        each = [(i, j, float(fullest.covariance[i, j] / (size[i] * size[j]))) for j, i in pairs]
-        return [(fullest.names[i], fullest.names[j], c) for i, j, c in sorted(each) if abs(c) > HIGH_CORRELATION]
+        correlations = [(i, j, float(fullest.covariance[i, j] / (size[i] * size[j]))) for j, i in pairs]
+        return [
+            (fullest.names[i], fullest.names[j], c) for i, j, c in sorted(correlations) if abs(c) > HIGH_CORRELATION
+        ]
 
 
 def fit_all(deviations: Deviations, candidates: Mapping[str, Candidate]) -> Subset:
@@ -137,9 +139,13 @@ def fit_all(deviations: Deviations, candidates: Mapping[str, Candidate]) -> Subs
         method="dogbox",
     )
     _, sizes, rows = np.linalg.svd(fit.jac * scale)
-    told = sizes > BLIND_SHARE * max(sizes.max(initial=0.0), 1e-300)
-    covariance = (rows[: len(sizes)][told].T / sizes[told] ** 2) @ rows[: len(sizes)][told] * np.outer(scale, scale)
-    undetermined = tuple(_combination(names, row) for row in rows[np.count_nonzero(told) :])
+    is_determined = sizes > BLIND_SHARE * max(sizes.max(initial=0.0), 1e-300)
+    covariance = (
+        (rows[: len(sizes)][is_determined].T / sizes[is_determined] ** 2)
+        @ rows[: len(sizes)][is_determined]
+        * np.outer(scale, scale)
+    )
+    undetermined = tuple(_combination(names, row) for row in rows[np.count_nonzero(is_determined) :])
     return Subset(names, fit.x, covariance, float(np.sum(fit.fun**2)), len(fit.fun), undetermined)
 
 
@@ -150,17 +156,17 @@ def ranked_subsets(
     tested, too."""
     everything = fit_all(deviations, candidates)
     blind = tuple(name for name in candidates if name in everything.undetermined)
-    told = [name for name in candidates if name not in blind]
-    subsets = [names for size in range(len(told) + 1) for names in combinations(told, size)]
+    names_seen = [name for name in candidates if name not in blind]
+    subsets = [names for size in range(len(names_seen) + 1) for names in combinations(names_seen, size)]
     fits = [fit_all(deviations, {name: candidates[name] for name in names}) for names in subsets]
     determined = [fit for fit in fits if not fit.undetermined and fit.freedoms > 0]
     fullest = max(determined, key=lambda fit: (len(fit.names), -fit.chi2))
     inflation = max(fullest.chi2 / fullest.freedoms, 1.0)
-    kept = sorted(determined, key=lambda fit: fit.criterion(inflation))
-    criteria = np.array([fit.criterion(inflation) for fit in kept])
+    ranked_fits = sorted(determined, key=lambda fit: fit.criterion(inflation))
+    criteria = np.array([fit.criterion(inflation) for fit in ranked_fits])
     weights = np.exp(-0.5 * (criteria - criteria[0]))
     calls = _removal_tests(fits, fullest, inflation, together or {})
-    return Choice(kept, criteria, weights / weights.sum(), inflation, calls, blind)
+    return Choice(ranked_fits, criteria, weights / weights.sum(), inflation, calls, blind)
 
 
 def _removal_tests(
@@ -169,15 +175,15 @@ def _removal_tests(
     """F statistic and p value for removing each parameter, and each named set, from the fullest subset."""
     by_names = {fit.names: fit for fit in fits}
     leaving: dict[str, Sequence[str]] = {name: (name,) for name in fullest.names}
-    leaving |= {said: names for said, names in together.items() if {*names} <= {*fullest.names}}
+    leaving |= {set_name: names for set_name, names in together.items() if {*names} <= {*fullest.names}}
     calls = {}
-    for said, gone in leaving.items():
-        less = by_names[tuple(name for name in fullest.names if name not in gone)]
-        ratio = max(less.chi2 - fullest.chi2, 0.0) / inflation / len(gone)
-        calls[said] = (ratio, float(f_distribution.sf(ratio, len(gone), fullest.freedoms)))
+    for set_name, gone in leaving.items():
+        reduced_fit = by_names[tuple(name for name in fullest.names if name not in gone)]
+        ratio = max(reduced_fit.chi2 - fullest.chi2, 0.0) / inflation / len(gone)
+        calls[set_name] = (ratio, float(f_distribution.sf(ratio, len(gone), fullest.freedoms)))
     return calls
 
 
 def _combination(names: tuple[str, ...], row: np.ndarray) -> str:
     """Text on a combination of parameters; those with coefficients below a hundredth are left out."""
-    return " with ".join(name for name, part in zip(names, row, strict=True) if abs(part) > 1e-2)
+    return " with ".join(name for name, coefficient in zip(names, row, strict=True) if abs(coefficient) > 1e-2)

@@ -74,9 +74,9 @@ class Uncertainty:
         values, vectors = np.linalg.eigh(self.covariance[inner])
         answer = []
         for value, vector in zip(values, vectors.T, strict=True):
-            whole = np.zeros(len(self.at_no_bound))
-            whole[self.at_no_bound] = vector * np.sign(vector[np.argmax(np.abs(vector))])
-            answer.append((float(np.sqrt(max(value, 0.0))), whole))
+            full_vector = np.zeros(len(self.at_no_bound))
+            full_vector[self.at_no_bound] = vector * np.sign(vector[np.argmax(np.abs(vector))])
+            answer.append((float(np.sqrt(max(value, 0.0))), full_vector))
         return answer
 
 
@@ -89,12 +89,15 @@ def uncertainty(fit: Fit, executor: Executor | None = None) -> Uncertainty:
     scores = np.einsum("cmp,cm->mp", jacobian, fit.residuals)
     lags, staying = _longest_lags(fit.residuals)
     covariance = np.zeros_like(inner)
-    part = np.ix_(free, free)
+    free_block = np.ix_(free, free)
     if free.any():
-        inverse = _information_inverse(inner[part])
-        both = _long_run(scores[:, free], lags), _stationary_covariance(jacobian[:, :, free], fit.residuals, lags)
-        covariance[part] = inverse @ _larger_covariance(*both) @ inverse
-        covariance[part] += _untold_variance(inner[part])
+        inverse = _information_inverse(inner[free_block])
+        both_covariances = (
+            _long_run(scores[:, free], lags),
+            _stationary_covariance(jacobian[:, :, free], fit.residuals, lags),
+        )
+        covariance[free_block] = inverse @ _larger_covariance(*both_covariances) @ inverse
+        covariance[free_block] += _untold_variance(inner[free_block])
     return Uncertainty(fit, covariance, inner, free, staying * problem.clock.stride * problem.clock.period)
 
 
@@ -118,13 +121,15 @@ def _longest_lags(residuals: np.ndarray) -> tuple[int, float]:
     for row in residuals:
         count, centred = len(row), row - row.mean()
         spectrum = np.abs(np.fft.rfft(centred, 2 * count)) ** 2
-        alike = np.fft.irfft(spectrum)[:count]
-        if alike[0] > 0.0:
-            alike /= alike[0]
-            negative = np.flatnonzero(alike <= 0.0)
-            staying = max(staying, float(1.0 + 2.0 * alike[1 : negative[0] if len(negative) else count].sum()))
-    most = max(1, int(MOST_LAGS * residuals.shape[1]))
-    return min(most, int(np.ceil(LONGEST_LAG_FACTOR * staying))), staying
+        autocorrelation = np.fft.irfft(spectrum)[:count]
+        if autocorrelation[0] > 0.0:
+            autocorrelation /= autocorrelation[0]
+            negative = np.flatnonzero(autocorrelation <= 0.0)
+            staying = max(
+                staying, float(1.0 + 2.0 * autocorrelation[1 : negative[0] if len(negative) else count].sum())
+            )
+    lag_limit = max(1, int(MOST_LAGS * residuals.shape[1]))
+    return min(lag_limit, int(np.ceil(LONGEST_LAG_FACTOR * staying))), staying
 
 
 def _long_run(scores: np.ndarray, lags: int) -> np.ndarray:
@@ -144,20 +149,20 @@ def _stationary_covariance(jacobian: np.ndarray, residuals: np.ndarray, lags: in
     total = np.zeros((jacobian.shape[2],) * 2)
     for rows, error in zip(jacobian, residuals, strict=True):
         for lag in range(lags + 1):
-            alike = float(error[lag:] @ error[: len(error) - lag]) / len(error)
+            autocovariance = float(error[lag:] @ error[: len(error) - lag]) / len(error)
             product = rows[lag:].T @ rows[: len(rows) - lag]
-            total += (1.0 - lag / (lags + 1.0)) * alike * (product if lag == 0 else product + product.T)
+            total += (1.0 - lag / (lags + 1.0)) * autocovariance * (product if lag == 0 else product + product.T)
     return total
 
 
-def _larger_covariance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def _larger_covariance(first_covariance: np.ndarray, second_covariance: np.ndarray) -> np.ndarray:
     """A covariance (p, p) that is at least as large as both given ones in every direction. Scores account for where
     residuals are large, but scatter more."""
-    values, vectors = np.linalg.eigh(second)
+    values, vectors = np.linalg.eigh(second_covariance)
     values = np.maximum(values, SINGULAR_SHARE * values[-1])
     root, back = (vectors * np.sqrt(values)) @ vectors.T, (vectors / np.sqrt(values)) @ vectors.T
-    ratios, turned = np.linalg.eigh(back @ first @ back)
-    return root @ (turned * np.maximum(ratios, 1.0)) @ turned.T @ root
+    ratios, principal_axes = np.linalg.eigh(back @ first_covariance @ back)
+    return root @ (principal_axes * np.maximum(ratios, 1.0)) @ principal_axes.T @ root
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,13 +194,13 @@ def likelihood_profile(uncertainty: Uncertainty, k: int) -> LikelihoodProfile:
     values = [v for v in solved.values[k] + spread * np.array(PROFILE_DEVIATIONS) if parameter.low < v < parameter.high]
     rises = []
     for value in values:
-        there = fit(_held_inside(problem, k, value, solved.values))
-        rises.append(2.0 * (there.cost - solved.cost) * weight)
+        held_fit = fit(_held_inside(problem, k, value, solved.values))
+        rises.append(2.0 * (held_fit.cost - solved.cost) * weight)
     parabola = ((np.array(values) - solved.values[k]) / uncertainty.deviations[k]) ** 2
     return LikelihoodProfile(parameter.name, np.array(values), np.array(rises), parabola)
 
 
 def _held_inside(problem: Problem, k: int, value: float, values: np.ndarray) -> Problem:
     low, high = problem.bounds
-    inside = np.clip(values, low + 1e-6 * problem.scale, high - 1e-6 * problem.scale)
-    return fit_with_held(problem, k, value, inside)
+    start_inside = np.clip(values, low + 1e-6 * problem.scale, high - 1e-6 * problem.scale)
+    return fit_with_held(problem, k, value, start_inside)

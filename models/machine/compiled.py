@@ -77,7 +77,7 @@ def _make_safe(function_cache: Any, function: Callable) -> None:
 
 def callback(function: Callable, signature: Any) -> Any:
     """C callback with this signature, kept on disk as kernels are; a kernel that it calls is one of its globals."""
-    law = CFunc(function, normalize_signature(signature), {}, {})
+    law: Any = CFunc(function, normalize_signature(signature), {}, {})
     law.enable_caching()
     _make_safe(law._cache, function)
     law.compile()

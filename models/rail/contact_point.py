@@ -25,10 +25,10 @@ class Cone(NamedTuple):
 
 
 @inlined
-def cone_on_rail(side, pose, cone):
+def cone_on_rail(wheel_side, pose, cone):
     """Contact of one wheel: (penetration, rolling radius, n_y, n_z, x, y, z).
 
-    side : RIGHT or LEFT; pose : y, z of the wheelset's centre (m), roll, yaw (rad); cone : ``Cone``.
+    wheel_side : RIGHT or LEFT; pose : y, z of the wheelset's centre (m), roll, yaw (rad); cone : ``Cone``.
     The normal (0, n_y, n_z) points into the rail; the place is relative to the wheelset's centre, in the track's axes
     (m). Penetration is negative where there is a gap. Yaw and roll must be less than a right angle less the cone's.
     """
@@ -36,19 +36,19 @@ def cone_on_rail(side, pose, cone):
     cosine = 1.0 / math.sqrt(1.0 + conicity * conicity)
     sine = conicity * cosine
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
-    ahead = math.asin(side * conicity * sy * cr / math.hypot(cy, sy * sr)) - math.atan2(sy * sr, cy)
-    ca, sa = math.cos(ahead), math.sin(ahead)
-    n_y = sy * cosine * sa + cy * (side * sine * cr - cosine * ca * sr)
-    n_z = side * sine * sr + cosine * ca * cr
+    contact_angle = math.asin(wheel_side * conicity * sy * cr / math.hypot(cy, sy * sr)) - math.atan2(sy * sr, cy)
+    ca, sa = math.cos(contact_angle), math.sin(contact_angle)
+    n_y = sy * cosine * sa + cy * (wheel_side * sine * cr - cosine * ca * sr)
+    n_z = wheel_side * sine * sr + cosine * ca * cr
     reach = half_gauge + radius / conicity  # from the wheelset's centre to the apex
-    apex_x, apex_y, apex_z = -side * reach * sy * cr, side * reach * cy * cr, side * reach * sr
-    axis_y = side * (half_gauge + head * sine) - y - apex_y  # the head's axis, seen from the apex
+    apex_x, apex_y, apex_z = -wheel_side * reach * sy * cr, wheel_side * reach * cy * cr, wheel_side * reach * sr
+    axis_y = wheel_side * (half_gauge + head * sine) - y - apex_y  # the head's axis, seen from the apex
     axis_z = radius + head * cosine - z - apex_z
     penetration = head - (n_y * axis_y + n_z * axis_z)
     # The generator per unit of the cone's radius, from the apex inwards: (sin ahead, -side / conicity, cos ahead).
-    inward = -side / conicity
-    turned = inward * cr - ca * sr
-    way_x, way_y, way_z = cy * sa - sy * turned, sy * sa + cy * turned, inward * sr + ca * cr
+    inward = -wheel_side / conicity
+    across_inward = inward * cr - ca * sr
+    way_x, way_y, way_z = cy * sa - sy * across_inward, sy * sa + cy * across_inward, inward * sr + ca * cr
     rolling = (n_z * axis_y - n_y * axis_z) / (n_z * way_y - n_y * way_z)
     return (
         penetration,

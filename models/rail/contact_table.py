@@ -146,11 +146,16 @@ class LoadedWheel:
         """Loads of the patches along their normals (N)."""
         if self.shares:
             return [share.load for share in self.shares]
-        return [0.0 if part is None else part.load for part in map(self.part, self.touches)]
+        return [
+            0.0 if patch_pressure is None else patch_pressure.load for patch_pressure in map(self.part, self.touches)
+        ]
 
     def part(self, touch: TouchingPlace) -> PatchPressure | None:
         """Pressure of one patch by the simplified theory; None if the theory finds no contact there."""
-        return next((part for part in self.normal_contact.patches if part.patch is touch.patch), None)
+        return next(
+            (patch_pressure for patch_pressure in self.normal_contact.patches if patch_pressure.patch is touch.patch),
+            None,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,15 +170,15 @@ class WheelsetContact:
     pair: MaterialPair = MaterialPair()  # noqa: RUF009 - a frozen value
     cell_factor: float = 1.0
 
-    def at(self, shift: float, yaw: float = 0.0) -> WheelsetPlacement:
+    def at(self, lateral_shift: float, yaw: float = 0.0) -> WheelsetPlacement:
         """Contact at a lateral displacement (m) to the right and a yaw (rad).
 
         Raises InputError as wheel_on_rail, and RunFailed where the load presses the bodies into each other beyond all
         measure, where no normal force carries the load, or where a wheel has climbed its flange.
         """
-        quantity("lateral_shift", shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
+        quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
         quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
-        pose = touching_pose(self.side, shift, yaw)
+        pose = touching_pose(self.side, lateral_shift, yaw)
         level, rolling = pose.roll, -self.speed / self.side.wheelset.radius
         for _ in range(ROLL_ITERATIONS):
             right, left = wheels = self._both_wheels(pose, rolling)
@@ -188,7 +193,9 @@ class WheelsetContact:
                 break
             rolling = self._free_spin(wheels)
             wheels = [self._at_other_spin(wheel, rolling) for wheel in wheels]
-        return _standing_placement(WheelsetPlacement(shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels)))
+        return _standing_placement(
+            WheelsetPlacement(lateral_shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels))
+        )
 
     def _both_wheels(self, pose: Pose, spin: float) -> list[LoadedWheel]:
         """The right wheel and the mirrored left wheel, each lowered until it touches its rail, then loaded.
@@ -253,12 +260,12 @@ class WheelsetContact:
         """The wheel with the creep forces of each patch; patches without contact get zero forces."""
         forces = []
         for touch, creepage, load in zip(wheel.touches, wheel.creepages, wheel.loads, strict=True):
-            part = wheel.part(touch)
-            if part is None or load == 0.0 or self.friction == 0.0:
+            patch_pressure = wheel.part(touch)
+            if patch_pressure is None or load == 0.0 or self.friction == 0.0:
                 forces.append((0.0, 0.0, 0.0))
                 continue
-            alone = replace(wheel.normal_contact, patches=(replace(part, load=load),))
-            creep = roll(alone, self.friction, *creepage, cells=round(CELLS_PER_STRIP / self.cell_factor))
+            single_patch = replace(wheel.normal_contact, patches=(replace(patch_pressure, load=load),))
+            creep = roll(single_patch, self.friction, *creepage, cells=round(CELLS_PER_STRIP / self.cell_factor))
             forces.append((creep.fx, creep.fy, creep.mz))
         pairs, axle = list(zip(wheel.touches, forces, strict=True)), wheel.pose.turn[:, 1]
         lifted = sum(force[1] * math.sin(touch.angle) for touch, force in pairs)
@@ -269,8 +276,8 @@ class WheelsetContact:
         """Creepages and spin (1/m) at a point of first touch."""
         if self.friction == 0.0:
             return 0.0, 0.0, 0.0
-        axle, place = pose.turn[:, 1], self._arm(pose, touch)
-        velocity = spin * np.cross(axle, place) + np.array([self.speed, 0.0, 0.0])
+        axle, arm = pose.turn[:, 1], self._arm(pose, touch)
+        velocity = spin * np.cross(axle, arm) + np.array([self.speed, 0.0, 0.0])
         across, into = _surface_axes(touch)
         slips = velocity[0] / self.speed, velocity @ across / self.speed, spin * axle @ into / self.speed
         return float(slips[0]), float(slips[1]), float(slips[2])
@@ -280,8 +287,8 @@ class WheelsetContact:
 
     def _arm(self, pose: Pose, touch: TouchingPlace) -> Array:
         """Vector from the wheelset's centre to a point of first touch, in the track's axes (m)."""
-        down = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
-        return pose.turn @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, down])
+        height_below = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
+        return pose.turn @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, height_below])
 
     def _patch_reports(self, wheel: LoadedWheel) -> tuple[PatchReport, ...]:
         """Reports of all patches of a wheel that carry load; patches that have grown together get one common report."""
@@ -338,22 +345,24 @@ class WheelsetContact:
         )
 
 
-def _standing_placement(placed: WheelsetPlacement) -> WheelsetPlacement:
+def _standing_placement(placement: WheelsetPlacement) -> WheelsetPlacement:
     """The contact unchanged; an error if a wheel stands on the tip of its flange."""
-    for name, places in (("right", placed.right), ("left", placed.left)):
-        least = min(place.below_tip for place in places)
-        if least < CLIMBING_DEPTH:
+    for name, patches_of_wheel in (("right", placement.right), ("left", placement.left)):
+        least_depth = min(patch.below_tip for patch in patches_of_wheel)
+        if least_depth < CLIMBING_DEPTH:
             raise RunFailed(
                 "contact table",
-                f"at {1e3 * placed.shift:g} mm the {name} wheel has climbed its flange and "
-                f"touches {1e3 * least:.1f} mm below the tip: no wheelset stays there",
+                f"at {1e3 * placement.shift:g} mm the {name} wheel has climbed its flange and "
+                f"touches {1e3 * least_depth:.1f} mm below the tip: no wheelset stays there",
             )
-    return placed
+    return placement
 
 
 def rolling_radius_difference(placed_at: WheelsetPlacement) -> float:
     """Rolling radius of the right wheel less that of the left one (m), each at the patch with the largest load."""
-    right, left = (max(places, key=lambda place: place.normal) for places in (placed_at.right, placed_at.left))
+    right, left = (
+        max(patches_of_wheel, key=lambda patch: patch.normal) for patches_of_wheel in (placed_at.right, placed_at.left)
+    )
     return right.rolling_radius - left.rolling_radius
 
 

@@ -17,33 +17,33 @@ def free_wheelset(wheelset: Wheelset) -> Wheelset:
     return wheelset.changed(**{f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"})
 
 
-def wavelength(kind: type[Equations], wheelset: Wheelset) -> float:
+def wavelength(equations_type: type[Equations], wheelset: Wheelset) -> float:
     """Wavelength (m) of the free wheelset, from the oscillation with the lowest frequency among the eigenvalues."""
-    roots = values(kind, free_wheelset(wheelset), SLOW_SPEED)
+    roots = values(equations_type, free_wheelset(wheelset), SLOW_SPEED)
     return 2.0 * math.pi * SLOW_SPEED / min(roots[roots.imag > 0.0], key=abs).imag
 
 
-def values(kind: type[Equations], wheelset: Wheelset, speed: float) -> np.ndarray:
+def values(equations_type: type[Equations], wheelset: Wheelset, speed: float) -> np.ndarray:
     """Eigenvalues (9,) in 1/s at a speed (m/s)."""
-    return np.linalg.eigvals(kind(wheelset, speed, "linear").state_matrix)
+    return np.linalg.eigvals(equations_type(wheelset, speed, "linear").state_matrix)
 
 
-def uncertainty(kind: type[Equations], wheelset: Wheelset, speed: float) -> float:
+def uncertainty(equations_type: type[Equations], wheelset: Wheelset, speed: float) -> float:
     """Change (1/s) of the hunting eigenvalue when slopes are taken over twice the distance; NaN without a hunting
     mode."""
-    equations = kind(wheelset, speed, "linear")
+    equations = equations_type(wheelset, speed, "linear")
     wide = np.linalg.eigvals(rate_jacobian(equations.rates, equations.rest, 2.0))
     return float(abs(hunting_eigenvalue(wide) - hunting_eigenvalue(np.linalg.eigvals(equations.state_matrix))))
 
 
-def largest_growth(kind: type[Equations], wheelset: Wheelset, speed: float) -> float:
+def largest_growth(equations_type: type[Equations], wheelset: Wheelset, speed: float) -> float:
     """Largest real part (1/s) of the eigenvalues at a speed (m/s), as an argument for ``linear.critical_speed``."""
-    return float(values(kind, wheelset, speed).real.max())
+    return float(values(equations_type, wheelset, speed).real.max())
 
 
-def root_locus(kind: type[Equations], wheelset: Wheelset, speeds: Iterable[float]) -> np.ndarray:
+def root_locus(equations_type: type[Equations], wheelset: Wheelset, speeds: Iterable[float]) -> np.ndarray:
     """Eigenvalues (speeds, 9) in 1/s at each speed, for a root locus."""
-    return np.array([values(kind, wheelset, float(speed)) for speed in speeds])
+    return np.array([values(equations_type, wheelset, float(speed)) for speed in speeds])
 
 
 def hunting_eigenvalue(values: np.ndarray) -> np.ndarray:

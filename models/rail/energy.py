@@ -55,19 +55,19 @@ class Ledger:
 def energy_ledger(equations: Equations, path: WheelsetPath) -> Ledger:
     """Energy balance along a path computed by RK4, of which every step must be recorded."""
     start, step = path.states[:-1], np.diff(path.times)[:, None]
-    done, rates = np.zeros((len(path.times), 5)), np.zeros_like(start)
-    for ahead, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
-        rates, powers = rates_and_powers(equations, start + ahead * step * rates)
-        done[1:] += weight / 6.0 * step * powers
-    return Ledger(path.times, *energies_at_states(equations, path.states), *done.cumsum(axis=0).T)
+    works, rates = np.zeros((len(path.times), 5)), np.zeros_like(start)
+    for stage_fraction, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
+        rates, powers = rates_and_powers(equations, start + stage_fraction * step * rates)
+        works[1:] += weight / 6.0 * step * powers
+    return Ledger(path.times, *energies_at_states(equations, path.states), *works.cumsum(axis=0).T)
 
 
 def rates_and_powers(equations: Equations, states: Array) -> tuple[Array, Array]:
     """Rates (n, 10) of the states, and powers (n, 5) whose integrals are the works, in the order of the ledger."""
     rates, contacts = equations.at(states)
     names = "elastic_power", "fx", "damping_power", "power"
-    elastic, ahead, damping, creep = (-contacts[name].sum(axis=1) for name in names)
-    drive, dampers = equations.speed * ahead, _spring_energy_and_damping(equations.body, states)[1]
+    elastic, forward_force, damping, creep = (-contacts[name].sum(axis=1) for name in names)
+    drive, dampers = equations.speed * forward_force, _spring_energy_and_damping(equations.body, states)[1]
     return rates, np.column_stack([elastic, drive, dampers, damping, creep])
 
 
@@ -75,8 +75,8 @@ def energies_at_states(equations: Equations, states: Array) -> tuple[Array, Arra
     """Energies (n,) in J at states (n, 10): kinetic energy, energy of the springs, and potential energy of gravity."""
     w, body = equations.wheelset, equations.body
     across = states[:, ROLL_RATE] ** 2 + (states[:, YAW_RATE] * np.cos(states[:, ROLL])) ** 2
-    moved = states[:, Y_RATE] ** 2 + states[:, Z_RATE] ** 2
-    kinetic = 0.5 * (w.mass * moved + w.yaw_inertia * across + w.spin_inertia * states[:, SPIN] ** 2)
+    squared_speed = states[:, Y_RATE] ** 2 + states[:, Z_RATE] ** 2
+    kinetic = 0.5 * (w.mass * squared_speed + w.yaw_inertia * across + w.spin_inertia * states[:, SPIN] ** 2)
     return kinetic, _spring_energy_and_damping(body, states)[0], -(w.mass * GRAVITY + 2.0 * body.carried) * states[:, Z]
 
 
@@ -87,11 +87,11 @@ def _spring_energy_and_damping(body: Body, states: Array) -> tuple[Array, Array]
     turning = np.array([cy * states[:, ROLL_RATE], sy * states[:, ROLL_RATE], states[:, YAW_RATE]])
     energy = power = np.zeros(len(states))
     for arm in (body.arm, -body.arm):
-        way, rate = arm * axle, np.cross(turning, arm * axle, axis=0)
-        way[1] += states[:, Y] - arm
-        way[2] += states[:, Z] - body.sunk
+        spring_travel, rate = arm * axle, np.cross(turning, arm * axle, axis=0)
+        spring_travel[1] += states[:, Y] - arm
+        spring_travel[2] += states[:, Z] - body.sunk
         rate[1] += states[:, Y_RATE]
         rate[2] += states[:, Z_RATE]
-        energy = energy + 0.5 * np.array(body.stiffness) @ way**2
+        energy = energy + 0.5 * np.array(body.stiffness) @ spring_travel**2
         power = power + np.array(body.damping) @ rate**2
     return energy, power

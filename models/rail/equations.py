@@ -54,7 +54,7 @@ DIFFERENCE_STEPS = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-
 """Steps of the differences that linearise: small against penetration (7e-5 m) and creepage."""
 LARGEST_SPEED = 200.0
 """m/s"""
-LIMIT = 0.3
+DERAILED_LIMIT = 0.3
 """Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
 DEEPEST_POSITION = 5e-3
 """Height (m) above which the rails carry every load that is allowed."""
@@ -93,23 +93,25 @@ class Stages(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def rates(state, speed, body, rails, out, report):
-    """Fill ``out`` with the time derivative of a state (10,), and ``report``, REPORT (patches,), with the contacts.
+def rates(state, speed, body, rails, state_rate, report):
+    """Fill ``state_rate`` with the time derivative of a state (10,), and ``report``, REPORT (patches,), with the
+    contacts.
 
     speed, body, rails : ``parameters`` of ``Equations``.
     """
-    made = rails_in(rails)
-    set_rates(state, speed, Body(*body), made, out, report, room_for(made.profile))
+    rails_record = rails_in(rails)
+    set_rates(state, speed, Body(*body), rails_record, state_rate, report, room_for(rails_record.profile))
 
 
 @lean
-def set_rates(state, speed, body, rails, out, report, room):
-    """Fill ``out`` with the time derivative of a state, using the workspace ``room``; ``report`` may have no rows if no
-    one needs it."""
+def set_rates(state, speed, body, rails, state_rate, report, workspace):
+    """Fill ``state_rate`` with the time derivative of a state, using the workspace ``workspace``; ``report`` may have
+    no rows if no one needs it.
+    """
     y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
     roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
-    wheelset = room.wheelset[0]
+    wheelset = workspace.wheelset[0]
     force, moment, velocity, turning = wheelset.force, wheelset.moment, wheelset.velocity, wheelset.turning
     for k in range(3):
         force[k] = moment[k] = 0.0
@@ -118,7 +120,7 @@ def set_rates(state, speed, body, rails, out, report, room):
     rolling = spin - yaw_rate * sr  # of the wheel against the axes that do not spin
     turning[0], turning[1] = cy * roll_rate + axle_x * rolling, sy * roll_rate + axle_y * rolling
     turning[2] = yaw_rate + axle_z * rolling
-    wheel_forces(Pose(y, z, roll, yaw), rails, report, room)
+    wheel_forces(Pose(y, z, roll, yaw), rails, report, workspace)
     force[1] += 2.0 * body.carried * body.lean
     force[2] += 2.0 * body.carried
     if body.held:
@@ -126,21 +128,22 @@ def set_rates(state, speed, body, rails, out, report, room):
     m1 = cy * moment[0] + sy * moment[1]
     across = cy * moment[1] - sy * moment[0]
     m2, m3 = cr * across + sr * moment[2], cr * moment[2] - sr * across
-    out[Y], out[Z], out[ROLL], out[YAW] = state[Y_RATE], state[Z_RATE], roll_rate, yaw_rate
-    out[ANGLE] = rolling
-    out[Y_RATE] = force[1] / body.mass + GRAVITY * body.lean
-    out[Z_RATE] = force[2] / body.mass + GRAVITY
+    state_rate[Y], state_rate[Z], state_rate[ROLL], state_rate[YAW] = state[Y_RATE], state[Z_RATE], roll_rate, yaw_rate
+    state_rate[ANGLE] = rolling
+    state_rate[Y_RATE] = force[1] / body.mass + GRAVITY * body.lean
+    state_rate[Z_RATE] = force[2] / body.mass + GRAVITY
     whirl = body.along * spin
-    out[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / body.across - yaw_rate**2 * sr * cr
-    out[SPIN] = m2 / body.along
-    out[YAW_RATE] = ((m3 - whirl * roll_rate) / body.across + 2.0 * roll_rate * yaw_rate * sr) / cr
+    state_rate[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / body.across - yaw_rate**2 * sr * cr
+    state_rate[SPIN] = m2 / body.along
+    state_rate[YAW_RATE] = ((m3 - whirl * roll_rate) / body.across + 2.0 * roll_rate * yaw_rate * sr) / cr
 
 
 @lean
-def _add_suspension_forces(state, body, turning, axle, force, moment):
-    """Add the forces of springs and dampers at both ends of the axle; turning : angular velocity about the x and y of
-    the axle's own axes (rad/s)."""
-    (turn_x, turn_y), (kx, ky, kz), (dx, dy, dz) = turning, body.stiffness, body.damping
+def _add_suspension_forces(state, body, angular_velocity, axle, force, moment):
+    """Add the forces of springs and dampers at both ends of the axle; angular_velocity : angular velocity about the x
+    and y of the axle's own axes (rad/s).
+    """
+    (turn_x, turn_y), (kx, ky, kz), (dx, dy, dz) = angular_velocity, body.stiffness, body.damping
     for side in (1.0, -1.0):
         arm, turn_z = side * body.arm, state[YAW_RATE]
         ax, ay, az = arm * axle[0], arm * axle[1], arm * axle[2]
@@ -165,34 +168,36 @@ def march(state, parameters, steps, path, reports):
     """
     stages = Stages(np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(0, REPORT))
     speed, body, rails = parameters
-    made = rails_in(rails)
-    return _march_with_arrays(state, (speed, Body(*body), made), steps, path, reports, room_for(made.profile), stages)
+    rails_record = rails_in(rails)
+    return _march_with_arrays(
+        state, (speed, Body(*body), rails_record), steps, path, reports, room_for(rails_record.profile), stages
+    )
 
 
 @lean
-def _march_with_arrays(state, parameters, steps, path, reports, room, stages):
+def _march_with_arrays(state, parameters, steps, path, reports, workspace, stages):
     """March the state over all steps with arrays allocated by the caller; holding no references to them saves 5 % of
     the time of a bare wheelset."""
-    (speed, body, rails), (step, count, every), (total, rate, here, none) = parameters, steps, stages
+    (speed, body, rails), (step, count, stride), (total, rate, stage_state, no_report) = parameters, steps, stages
     for i in range(count + 1):
-        row = i // every
+        row = i // stride
         for stage in range(4):  # one call of the rates, or it is compiled four times
-            kept = stage == 0 and row * every == i
-            report = reports[row] if kept else none
-            ahead = step if stage == 3 else 0.5 * step
+            is_recorded = stage == 0 and row * stride == i
+            report = reports[row] if is_recorded else no_report
+            stage_step = step if stage == 3 else 0.5 * step
             for k in range(STATE_COUNT):  # a sum of whole arrays would make one
-                here[k] = state[k] + ahead * rate[k] if stage > 0 else state[k]
-            set_rates(here, speed, body, rails, rate, report, room)
+                stage_state[k] = state[k] + stage_step * rate[k] if stage > 0 else state[k]
+            set_rates(stage_state, speed, body, rails, rate, report, workspace)
             for k in range(STATE_COUNT):
                 total[k] = total[k] + (1.0 if stage == 3 else 2.0) * rate[k] if stage > 0 else rate[k]
-            if kept:
+            if is_recorded:
                 for k in range(STATE_COUNT):
                     path[row, k] = state[k]
             if stage == 0 and i == count:
                 return i
         for k in range(STATE_COUNT):
             state[k] += step / 6.0 * total[k]
-        if not abs(state[Y]) + abs(state[YAW]) + abs(state[ROLL]) + abs(state[Z]) < LIMIT:
+        if not abs(state[Y]) + abs(state[YAW]) + abs(state[ROLL]) + abs(state[Z]) < DERAILED_LIMIT:
             return i
     return count
 
@@ -238,9 +243,9 @@ class Equations:
             rails = rails_of(w)
             sunk = float(brentq(lambda z: supported_force(z, rails) - w.load, 0.0, DEEPEST_POSITION, xtol=1e-15))
         stiffness, damping = (w.stiffness_x, w.stiffness_y, w.stiffness_z), (w.damping_x, w.damping_y, w.damping_z)
-        held = any(stiffness + damping)
+        has_suspension = any(stiffness + damping)
         inertia = w.mass, w.spin_inertia, w.yaw_inertia
-        return Body(*inertia, w.half_spacing, stiffness, damping, carried, sunk, float(self.lean), held)
+        return Body(*inertia, w.half_spacing, stiffness, damping, carried, sunk, float(self.lean), has_suspension)
 
     @cached_property
     def rails(self) -> Rails:
@@ -260,26 +265,26 @@ class Equations:
         """Largest possible number of contacts of both wheels together."""
         return int(count_of_patches(self.rails.profile))
 
-    def empty_contacts(self, *shape: int) -> Array:
+    def empty_contacts(self, *record_shape: int) -> Array:
         """Records REPORT (*shape, patches) for contacts that are not yet known.
 
         Filled as doubles: as records numpy fills them in four times the time, which is that of the rates at two states.
         """
-        return np.full((*shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
+        return np.full((*record_shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
 
     def rates(self, state: Array) -> Array:
         """Time derivative (10,) of a state (10,)."""
-        out = np.empty(STATE_COUNT)
-        rates(np.asarray(state, float), *self.parameters, out, NO_REPORT)
-        return out
+        state_rate = np.empty(STATE_COUNT)
+        rates(np.asarray(state, float), *self.parameters, state_rate, NO_REPORT)
+        return state_rate
 
     def at(self, states: Array) -> tuple[Array, Array]:
         """Time derivatives (n, 10) of states (n, 10) by the hand-written equations, and their contacts, REPORT (n,
         patches)."""
-        every, contacts = np.empty_like(states), self.empty_contacts(len(states))
-        for state, rate, contact in zip(states, every, contacts, strict=True):
+        state_rates, contacts = np.empty_like(states), self.empty_contacts(len(states))
+        for state, rate, contact in zip(states, state_rates, contacts, strict=True):
             rates(state, *self.parameters, rate, contact)
-        return every, contacts
+        return state_rates, contacts
 
     @cached_property
     def rest(self) -> Array:
@@ -288,28 +293,30 @@ class Equations:
         start[Z], start[SPIN] = self.body.sunk, -self.speed / self.wheelset.radius
         return self._state_in_balance(start, (Z, SPIN), (Z_RATE, SPIN))
 
-    def displaced_state(self, shift: float) -> Array:
+    def displaced_state(self, lateral_shift: float) -> Array:
         """State (10,) at a lateral displacement (m), at rest but for the spin, without yaw; height and roll are in
         equilibrium."""
         start, w = self.rest.copy(), self.wheelset
-        start[Y] = shift
-        start[ROLL] = -shift * w.tilt
+        start[Y] = lateral_shift
+        start[ROLL] = -lateral_shift * w.tilt
         if w.profiles:
-            rise, start[ROLL] = w.profiles.touching(w.radius, shift)
+            rise, start[ROLL] = w.profiles.touching(w.radius, lateral_shift)
             start[Z] += rise
         return self._state_in_balance(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
-    def _state_in_balance(self, start: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> Array:
+    def _state_in_balance(
+        self, start_state: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]
+    ) -> Array:
         """State in which two values, ``coordinates``, are solved for so that two accelerations vanish."""
-        places = list(coordinates)
-        scale = np.maximum(np.abs(start[places]), self.body.sunk)
+        state_indices = list(coordinates)
+        scale = np.maximum(np.abs(start_state[state_indices]), self.body.sunk)
 
-        def moved(unknown: Array) -> Array:
-            state = start.copy()
-            state[places] += unknown * scale
+        def displaced(unknowns: Array) -> Array:
+            state = start_state.copy()
+            state[state_indices] += unknowns * scale
             return state
 
-        solution = root(lambda unknown: self.rates(moved(unknown))[list(accelerations)], np.zeros(2), tol=1e-15)
+        solution = root(lambda unknown: self.rates(displaced(unknown))[list(accelerations)], np.zeros(2), tol=1e-15)
         if np.abs(solution.fun).max() > 1e-6:
             w = self.wheelset
             raise RunFailed(
@@ -317,7 +324,7 @@ class Equations:
                 f"no height was found at which both rails carry load = {w.load:g} N with mass = {w.mass:g} kg: give "
                 "values of a real wheelset",
             )
-        return moved(solution.x)
+        return displaced(solution.x)
 
     @cached_property
     def state_matrix(self) -> Array:
@@ -342,13 +349,13 @@ class Equations:
         self.check(path, step, stride)
         return path
 
-    def _marched(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
+    def _marched(self, state: Array, step_count: int, step: float, stride: int) -> tuple[Array, Array]:
         """States and contacts at every ``stride``-th step of a path; ``state`` (10,) is modified."""
-        kept = count // stride + 1
-        states, contacts = np.empty((kept, STATE_COUNT)), self.empty_contacts(kept)
-        done = march(state, self.parameters, (step, count, stride), states, contacts)
-        if done < count:
-            raise RunFailed("wheelset", "leaves the track", done * step)
+        row_count = step_count // stride + 1
+        states, contacts = np.empty((row_count, STATE_COUNT)), self.empty_contacts(row_count)
+        steps_done = march(state, self.parameters, (step, step_count, stride), states, contacts)
+        if steps_done < step_count:
+            raise RunFailed("wheelset", "leaves the track", steps_done * step)
         return states, contacts
 
     def check(self, path: WheelsetPath, step: float, stride: int) -> None:
@@ -393,11 +400,13 @@ class Equations:
         return count
 
 
-def rate_jacobian(rates: Callable[[Array], Array], state: Array, wide: float = 1.0) -> Array:
+def rate_jacobian(rates: Callable[[Array], Array], state: Array, step_factor: float = 1.0) -> Array:
     """Jacobian (9, 9) of the rates about a state without the angle of spin, by fourth-order central differences over
-    ``wide`` times the usual distance."""
-    columns, moved = [], wide * DIFFERENCE_STEPS
+    ``step_factor`` times the usual distance."""
+    columns, steps = [], step_factor * DIFFERENCE_STEPS
     for k in range(STATE_COUNT):
-        a, b, c, d = (rates(state + part * moved[k] * np.eye(STATE_COUNT)[k]) for part in (-2.0, -1.0, 1.0, 2.0))
-        columns.append((a - 8.0 * b + 8.0 * c - d) / (12.0 * moved[k]))
+        a, b, c, d = (
+            rates(state + multiple * steps[k] * np.eye(STATE_COUNT)[k]) for multiple in (-2.0, -1.0, 1.0, 2.0)
+        )
+        columns.append((a - 8.0 * b + 8.0 * c - d) / (12.0 * steps[k]))
     return np.delete(np.delete(np.array(columns).T, ANGLE, 0), ANGLE, 1)

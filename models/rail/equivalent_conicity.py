@@ -74,29 +74,30 @@ class KlingelWave:
 
 
 def equivalent_conicity(
-    displacements: Array, differences: Array, amplitude: float, *, guess: float | None = None
+    displacements: Array, differences: Array, amplitude: float, *, centre_guess: float | None = None
 ) -> float:
     """Equivalent conicity by EN 15302 at an amplitude, which is half of peak to peak; see ``klingel_wave``.
 
     displacements : (n,) lateral, to the right, rising; differences : (n,) of the rolling radii, right less left;
     amplitude : above 0. All in one unit of length.
     """
-    return klingel_wave(RollingRadiusTable(displacements, differences), amplitude, guess=guess).conicity
+    return klingel_wave(RollingRadiusTable(displacements, differences), amplitude, centre_guess=centre_guess).conicity
 
 
-def klingel_wave(table: RollingRadiusTable, amplitude: float, *, guess: float | None = None) -> KlingelWave:
+def klingel_wave(table: RollingRadiusTable, amplitude: float, *, centre_guess: float | None = None) -> KlingelWave:
     """Klingel's wave of an amplitude (the table's unit, half of peak to peak).
 
-    guess : where the centre is looked for, if several waves have this amplitude. Raises InputError where there is no
-    wave: dr without a change of sign, dr that falls with the displacement, an amplitude whose wave leaves the table; or
-    where there are several and ``guess`` is not given.
+    centre_guess : where the centre is looked for, if several waves have this amplitude. Raises InputError where there
+    is no wave: dr without a change of sign, dr that falls with the displacement, an amplitude whose wave leaves the
+    table; or where there are several and ``centre_guess`` is not given.
     """
     amplitude = number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
-    first, last = table.ends
-    if 0.0 <= 2.0 * amplitude - (last - first) <= AMPLITUDE_TOLERANCE * amplitude:
-        amplitude = (last - first) / 2.0
-    if 2.0 * amplitude > last - first:
-        allowed = f"is half of peak to peak, and the table goes from {first:g} to {last:g}: it cannot hold the wave"
+    first_displacement, last_displacement = table.ends
+    if 0.0 <= 2.0 * amplitude - (last_displacement - first_displacement) <= AMPLITUDE_TOLERANCE * amplitude:
+        amplitude = (last_displacement - first_displacement) / 2.0
+    if 2.0 * amplitude > last_displacement - first_displacement:
+        table_range = f"the table goes from {first_displacement:g} to {last_displacement:g}"
+        allowed = f"is half of peak to peak, and {table_range}: it cannot hold the wave"
         raise InputError(table.source, "amplitude", amplitude, allowed)
     waves = [
         wave
@@ -105,11 +106,11 @@ def klingel_wave(table: RollingRadiusTable, amplitude: float, *, guess: float | 
     ]
     if not waves:
         return _without_wave(table, amplitude)
-    if len(waves) > 1 and guess is None:
+    if len(waves) > 1 and centre_guess is None:
         centres = ", ".join(f"{wave.centre:.6g}" for wave in waves)
         allowed = f"has {len(waves)} waves, about {centres}: smooth the table, or choose one by near"
         raise InputError(table.source, "amplitude", amplitude, allowed)
-    return min(waves, key=lambda wave: abs(wave.centre - (guess or 0.0)))
+    return min(waves, key=lambda wave: abs(wave.centre - (centre_guess or 0.0)))
 
 
 def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
@@ -119,34 +120,37 @@ def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
     Between the rows of the table, the difference of both potentials is a parabola in the left turning point.
     """
     y, width = table.displacements, 2.0 * amplitude
-    places = np.unique(np.concatenate([y, y - width, [y[-1] - width]]))
-    places = places[(places >= y[0]) & (places <= y[-1] - width)]
+    candidates = np.unique(np.concatenate([y, y - width, [y[-1] - width]]))
+    candidates = candidates[(candidates >= y[0]) & (candidates <= y[-1] - width)]
     points: list[float] = []
-    for low, high in pairwise(places.tolist()):
+    for low, high in pairwise(candidates.tolist()):
         begin, middle, end = (
             table.integral(low + share * (high - low) + width) - table.integral(low + share * (high - low))
             for share in (0.0, 0.5, 1.0)
         )
         points += [float(low + share * (high - low)) for share in _parabola_roots(begin, middle, end)]
-    if len(places) == 1:
-        points = [float(places[0])]
-    apart = [k for k in range(len(points)) if k == 0 or points[k] - points[k - 1] > AMPLITUDE_TOLERANCE * amplitude]
-    return [points[k] for k in apart]
+    if len(candidates) == 1:
+        points = [float(candidates[0])]
+    separate = [k for k in range(len(points)) if k == 0 or points[k] - points[k - 1] > AMPLITUDE_TOLERANCE * amplitude]
+    return [points[k] for k in separate]
 
 
-def _parabola_roots(begin: float, middle_value: float, end: float) -> list[float]:
+def _parabola_roots(begin_value: float, middle_value: float, end_value: float) -> list[float]:
     """Roots between 0 and 1 of the parabola with the given values at 0, 1/2 and 1; empty if it is zero everywhere."""
-    bend, slope = 2.0 * (begin - 2.0 * middle_value + end), 4.0 * middle_value - 3.0 * begin - end
-    scale = max(abs(begin), abs(middle_value), abs(end))
+    bend, slope = (
+        2.0 * (begin_value - 2.0 * middle_value + end_value),
+        4.0 * middle_value - 3.0 * begin_value - end_value,
+    )
+    scale = max(abs(begin_value), abs(middle_value), abs(end_value))
     if scale == 0.0:
         return []
     if abs(bend) <= 1e-14 * abs(slope):
-        roots = [-begin / slope] if slope else []
-    elif (inside := slope * slope - 4.0 * bend * begin) < 0.0:
+        roots = [-begin_value / slope] if slope else []
+    elif (discriminant := slope * slope - 4.0 * bend * begin_value) < 0.0:
         roots = []
     else:
-        half = -0.5 * (slope + math.copysign(math.sqrt(inside), slope))
-        roots = [half / bend] + ([begin / half] if half else [])
+        half = -0.5 * (slope + math.copysign(math.sqrt(discriminant), slope))
+        roots = [half / bend] + ([begin_value / half] if half else [])
     return sorted(min(max(root, 0.0), 1.0) for root in roots if -1e-12 <= root <= 1.0 + 1e-12)
 
 
@@ -165,9 +169,11 @@ def _wave_from_turning_point(table: RollingRadiusTable, low: float, amplitude: f
     speed = np.sqrt(2.0 * energy)
     speed[0] = speed[-1] = 0.0
     moving = length > 0.0
-    way = length[moving] / (speed[1:] + speed[:-1])[moving]
+    path_by_speed = length[moving] / (speed[1:] + speed[:-1])[moving]
     return KlingelWave(
-        amplitude, low + amplitude, 2.0 * float(_crossing_times(way, np.diff(dr)[moving] / length[moving]).sum())
+        amplitude,
+        low + amplitude,
+        2.0 * float(_crossing_times(path_by_speed, np.diff(dr)[moving] / length[moving]).sum()),
     )
 
 
@@ -182,19 +188,20 @@ def _swing_energy(dr: Array, length: Array) -> Array:
 def _lowest_energy(dr: Array, length: Array, energy: Array) -> Array:
     """Energy at the maxima of the potential inside a piece, where a falling difference ``dr`` passes zero."""
     falls = (dr[:-1] > 0.0) & (dr[1:] < 0.0) & (length > 0.0)
-    way = length[falls] * dr[:-1][falls] / (dr[:-1] - dr[1:])[falls]
-    return energy[:-1][falls] - 0.5 * way * dr[:-1][falls]
+    distance_to_zero = length[falls] * dr[:-1][falls] / (dr[:-1] - dr[1:])[falls]
+    return energy[:-1][falls] - 0.5 * distance_to_zero * dr[:-1][falls]
 
 
-def _crossing_times(way: Array, slope: Array) -> Array:
-    """Time (n,) to cross each piece of dr; ``way`` : ratio of the piece's length to the sum of the speeds at both ends;
-    slope : of dr."""
+def _crossing_times(length_by_speeds: Array, slope: Array) -> Array:
+    """Time (n,) to cross each piece of dr; ``length_by_speeds`` : ratio of the piece's length to the sum of the speeds
+    at both ends; slope : of dr.
+    """
     root = np.sqrt(np.abs(slope))
-    angle = root * way
+    angle = root * length_by_speeds
     small, rising = angle < SERIES_LIMIT, slope > 0.0
     safe = np.where(small, 1.0, root)
     across = np.where(rising, np.arctan(angle), np.arctanh(np.where(rising, 0.0, np.minimum(angle, 1.0 - 1e-16))))
-    return 2.0 * np.where(small, way, across / safe)
+    return 2.0 * np.where(small, length_by_speeds, across / safe)
 
 
 def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
@@ -203,14 +210,18 @@ def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
     idle = _idle_centre(table, amplitude)
     if idle is not None:
         return KlingelWave(amplitude, idle, math.inf)
-    dr, (first, last) = table.differences, table.ends
-    rises = table.difference(last, "left") - table.difference(first)
+    dr, (first_displacement, last_displacement) = table.differences, table.ends
+    rises = table.difference(last_displacement, "left") - table.difference(first_displacement)
     if (dr >= 0.0).all() or (dr <= 0.0).all():
-        why = f"has no wave: dr does not change its sign from {first:g} to {last:g}, so that nothing swings"
+        why = (
+            f"has no wave: dr does not change its sign from {first_displacement:g} to {last_displacement:g}, "
+            "so that nothing swings"
+        )
     elif rises < 0.0:
         why = "has no wave: dr falls with the displacement; is it left less right? Right less left is wanted"
     else:
-        why = f"has no wave within the table, from {first:g} to {last:g}: it would swing beyond, or not come across"
+        table_range = f"from {first_displacement:g} to {last_displacement:g}"
+        why = f"has no wave within the table, {table_range}: it would swing beyond, or not come across"
     raise InputError(table.source, "amplitude", amplitude, why)
 
 
@@ -238,8 +249,14 @@ def harmonic_linearised_conicity(
     if displacements[0] == 0.0:
         displacements = np.concatenate([-displacements[:0:-1], displacements])
         differences = np.concatenate([-differences[:0:-1], differences])
-    most = min(displacements[-1] - centre, centre - displacements[0])
-    quantity("amplitude", amplitude, f"an amplitude above 0 and up to {most:g}, the table's", 1e-12, most)
+    largest_amplitude = min(displacements[-1] - centre, centre - displacements[0])
+    quantity(
+        "amplitude",
+        amplitude,
+        f"an amplitude above 0 and up to {largest_amplitude:g}, the table's",
+        1e-12,
+        largest_amplitude,
+    )
     phase = 2.0 * math.pi * (np.arange(HARMONIC_PHASES) + 0.5) / HARMONIC_PHASES
     values = np.interp(centre + amplitude * np.sin(phase), displacements, differences)
     return float((values * np.sin(phase)).mean() / amplitude)
@@ -262,14 +279,14 @@ class ConicityRow:
     spacing_error: float
 
 
-def conicity_row(table: RollingRadiusTable, amplitude: float, *, guess: float | None = None) -> ConicityRow:
+def conicity_row(table: RollingRadiusTable, amplitude: float, *, centre_guess: float | None = None) -> ConicityRow:
     """Both conicities of a table at an amplitude; InputError as ``klingel_wave``."""
-    wave = klingel_wave(table, amplitude, guess=guess)
+    wave = klingel_wave(table, amplitude, centre_guess=centre_guess)
     harmonic = harmonic_linearised_conicity(
         table.displacements, table.differences, amplitude * (1.0 - 1e-12), wave.centre
     )
     try:
-        coarse = klingel_wave(table.without_every_second_row(), amplitude, guess=wave.centre).conicity
+        coarse = klingel_wave(table.without_every_second_row(), amplitude, centre_guess=wave.centre).conicity
     except InputError:
         coarse = math.nan
     return ConicityRow(amplitude, wave.centre, wave.period, wave.conicity, harmonic, abs(coarse - wave.conicity))

@@ -80,19 +80,19 @@ def _pressed_patches(
     x, y = _grid_around(approximate_patches, margin, coarser)
     cosines = np.cos([patch.lean for patch in patches])
     heights = np.array([_height(patch, x, y) for patch in patches])
-    leading = float(np.cos(max(approximate_patches, key=lambda part: part.load).patch.lean))
-    cell, whole = (x[1] - x[0]) * (y[1] - y[0]), load / leading
-    alike = bool((cosines == leading).all())  # the heights are then the same at any approach
+    leading = float(np.cos(max(approximate_patches, key=lambda pressure_of_patch: pressure_of_patch.load).patch.lean))
+    cell, normal_load = (x[1] - x[0]) * (y[1] - y[0]), load / leading
+    has_equal_normals = bool((cosines == leading).all())  # the heights are then the same at any approach
     for _ in range(MOST_ITERATIONS):
         lowered = heights + approach * (leading - cosines)[:, None, None]
         owner = np.argmin(lowered, axis=0)
-        solved = solve_normal(lowered.min(axis=0), x[1] - x[0], y[1] - y[0], material_pair, load=whole)
+        solved = solve_normal(lowered.min(axis=0), x[1] - x[0], y[1] - y[0], material_pair, load=normal_load)
         forces = np.array([solved.pressure[owner == k].sum() * cell for k in range(len(patches))])
         vertical, reached = float(forces @ cosines), solved.approach / leading
         close = abs(vertical / load - 1.0) < SOLUTION_PRECISION and (
-            alike or abs(reached / approach - 1.0) < SOLUTION_PRECISION
+            has_equal_normals or abs(reached / approach - 1.0) < SOLUTION_PRECISION
         )
-        whole, approach = whole * load / vertical, reached
+        normal_load, approach = normal_load * load / vertical, reached
         if close:
             pieces, _ = label(solved.contact, np.ones((3, 3)))
             return [
@@ -104,27 +104,29 @@ def _pressed_patches(
 
 def _grid_around(approximate_patches: Sequence[PatchPressure], margin: float, coarser: float) -> tuple[Array, Array]:
     """Cell centres (m) of a grid around all patches, along x and along the contour."""
-    x0, x1 = min(part.box[0] for part in approximate_patches), max(part.box[1] for part in approximate_patches)
-    y0 = min(part.box[2] + part.patch.contour_position for part in approximate_patches)
-    y1 = max(part.box[3] + part.patch.contour_position for part in approximate_patches)
+    x0, x1 = min(patch.box[0] for patch in approximate_patches), max(patch.box[1] for patch in approximate_patches)
+    y0 = min(patch.box[2] + patch.patch.contour_position for patch in approximate_patches)
+    y1 = max(patch.box[3] + patch.patch.contour_position for patch in approximate_patches)
     high = margin * (y1 - y0)
-    narrowest = min(part.box[3] - part.box[2] for part in approximate_patches)
+    narrowest = min(patch.box[3] - patch.box[2] for patch in approximate_patches)
     rows = round(min(round(CELLS_Y * high / narrowest), MOST_CELLS_Y) / coarser)
     columns = round(CELLS_X / coarser)
-    along = (x0 + x1) / 2.0 + centres(columns, margin * (x1 - x0) / columns)
-    return along, (y0 + y1) / 2.0 + centres(rows, high / rows)
+    x_centres = (x0 + x1) / 2.0 + centres(columns, margin * (x1 - x0) / columns)
+    return x_centres, (y0 + y1) / 2.0 + centres(rows, high / rows)
 
 
 def _height(patch: Patch, x: Array, y: Array) -> Array:
     """Heights (ny, nx) of a patch along its normal, at the grid's points on the common contour."""
     known, across = patch.distance, y - patch.contour_position
-    over = (across >= known.y[0]) & (across <= known.y[-1])
+    is_inside = (across >= known.y[0]) & (across <= known.y[-1])
     heights = np.full((y.size, x.size), UNKNOWN_HEIGHT)
-    heights[over] = known.at(np.clip(x, known.x[0], known.x[-1])[None, :], across[over][:, None])
+    heights[is_inside] = known.at(np.clip(x, known.x[0], known.x[-1])[None, :], across[is_inside][:, None])
     return heights
 
 
-def _pressure_share(pressure: Array, x: Array, y: Array, contour_position: float, cell: float, pieces: Array) -> Share:
+def _pressure_share(
+    pressure: Array, x: Array, y: Array, contour_position: float, cell: float, piece_labels: Array
+) -> Share:
     """``Share`` of a patch whose origin is at a position on the contour (m); ``pressure`` is zero outside this
     patch."""
     total = float(pressure.sum())
@@ -138,11 +140,11 @@ def _pressure_share(pressure: Array, x: Array, y: Array, contour_position: float
         float(np.count_nonzero(pressure) * cell),
         box,
         float(pressure.max()),
-        int(pieces.flat[np.argmax(pressure)]),
+        int(piece_labels.flat[np.argmax(pressure)]),
     )
 
 
-def _outer_sides(cells: Array, inside: Array) -> tuple[float, float]:
+def _outer_sides(cells: Array, is_inside: Array) -> tuple[float, float]:
     """Positions (m) of the outer edges of the first and the last cell that are inside."""
     half = (cells[1] - cells[0]) / 2.0
-    return float(cells[inside][0] - half), float(cells[inside][-1] + half)
+    return float(cells[is_inside][0] - half), float(cells[is_inside][-1] + half)

@@ -15,7 +15,20 @@ from models.contact.inputs import Array
 from models.machine.compiled import inlined, njit
 from models.machine.records import record, records, size_of
 from models.machine.stack import array, at, beyond
-from models.rail.equations import ANGLE, LIMIT, ROLL, ROLL_RATE, SPIN, STATE_COUNT, Y_RATE, YAW, YAW_RATE, Z_RATE, Y, Z
+from models.rail.equations import (
+    ANGLE,
+    DERAILED_LIMIT,
+    ROLL,
+    ROLL_RATE,
+    SPIN,
+    STATE_COUNT,
+    Y_RATE,
+    YAW,
+    YAW_RATE,
+    Z_RATE,
+    Y,
+    Z,
+)
 from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, LaidProfile, Pose
 from models.rail.wheel_forces import REPORT, WHEELS, Rails, room_for, wheel_forces
 
@@ -36,15 +49,15 @@ def table(speed: float, rails: Rails) -> Array:
     strips, cells, (profile, nodes, knots) = rails.strips, rails.cells, rails.profile
     head = [speed, rails.law, rails.middle, nodes.size, knots.size, strips.shape[1], cells.shape[1]]
     parts = (rails.wheels, profile, nodes, knots)
-    return np.concatenate((head, *(part.view(float) for part in parts), strips.ravel(), cells.ravel()))
+    return np.concatenate((head, *(record_part.view(float) for record_part in parts), strips.ravel(), cells.ravel()))
 
 
 @inlined
-def rails_at(numbers):
+def rails_at(table_pointer):
     """``Rails`` as views of a table at a pointer to doubles."""
-    head = records(numbers, 1, TABLE_HEAD)[0]
+    head = records(table_pointer, 1, TABLE_HEAD)[0]
     nodes, knots, strips, cells = int(head.nodes), int(head.knots), int(head.strips), int(head.cells)
-    wheels = beyond(numbers, IN_HEAD)
+    wheels = beyond(table_pointer, IN_HEAD)
     profile = beyond(wheels, IN_WHEELS)
     first_node = beyond(profile, IN_PROFILE)
     first_knot = beyond(first_node, IN_NODE * nodes)
@@ -81,25 +94,26 @@ def from_joints(joints: Array) -> Array:
 
 def rates_of(joints: Array, accelerations: Array) -> Array:
     """Time derivative (10,) of the state, from positions and rates (10,) and accelerations (5,) of the joints."""
-    out = np.empty(STATE_COUNT)
-    out[_POSITIONS], out[_RATES] = joints[JOINTS:], accelerations
+    state_rate = np.empty(STATE_COUNT)
+    state_rate[_POSITIONS], state_rate[_RATES] = joints[JOINTS:], accelerations
     roll, yaw_rate, roll_rate = joints[3], joints[JOINTS + 2], joints[JOINTS + 3]
-    out[SPIN] += accelerations[2] * math.sin(roll) + yaw_rate * roll_rate * math.cos(roll)
-    return out
+    state_rate[SPIN] += accelerations[2] * math.sin(roll) + yaw_rate * roll_rate * math.cos(roll)
+    return state_rate
 
 
 @njit(cache=True, error_model="numpy")
-def joint_forces(numbers, t, q, v, f):
-    """Add the joints' forces (N, N m) to ``f`` (5,). For callbacks: all arguments but the time are pointers to doubles.
+def joint_forces(table_pointer, t, q, v, forces_out):
+    """Add the joints' forces (N, N m) to ``forces_out`` (5,). For callbacks: all arguments but the time are pointers to
+    doubles.
 
     The forces are NaN where the wheelset has left the track, because engines do not check before they continue.
     """
-    rails, speed = rails_at(numbers), records(numbers, 1, TABLE_HEAD)[0].speed
+    rails, speed = rails_at(table_pointer), records(table_pointer, 1, TABLE_HEAD)[0].speed
     y, z, yaw, roll, _ = array(q, (JOINTS,))
     y_rate, z_rate, yaw_rate, roll_rate, spin = array(v, (JOINTS,))
-    out = array(f, (JOINTS,))
-    if not abs(y) + abs(z) + abs(yaw) + abs(roll) < LIMIT:
-        out[:] = np.nan
+    joint_forces_view = array(forces_out, (JOINTS,))
+    if not abs(y) + abs(z) + abs(yaw) + abs(roll) < DERAILED_LIMIT:
+        joint_forces_view[:] = np.nan
         return
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
     axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
@@ -112,11 +126,11 @@ def joint_forces(numbers, t, q, v, f):
     for k in range(3):
         force[k] = moment[k] = 0.0
     wheel_forces(Pose(y, z, roll, yaw), rails, np.empty(0, REPORT), room)
-    out[0] += force[1]
-    out[1] += force[2]
-    out[2] += moment[2]
-    out[3] += cy * moment[0] + sy * moment[1]
-    out[4] += axle_x * moment[0] + axle_y * moment[1] + axle_z * moment[2]
+    joint_forces_view[0] += force[1]
+    joint_forces_view[1] += force[2]
+    joint_forces_view[2] += moment[2]
+    joint_forces_view[3] += cy * moment[0] + sy * moment[1]
+    joint_forces_view[4] += axle_x * moment[0] + axle_y * moment[1] + axle_z * moment[2]
 
 
 @njit(cache=True, error_model="numpy")

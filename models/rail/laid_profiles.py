@@ -68,21 +68,21 @@ class Profiles(Strict):
             Wheelset(radius, self.back_to_back, self.taping),
         )
 
-    def touching(self, radius: float, shift: float) -> tuple[float, float]:
+    def touching(self, radius: float, lateral_shift: float) -> tuple[float, float]:
         """Rise of the wheelset (m) from its height at the track's middle, and roll (rad), at which both wheels just
         touch; InputError if they cannot."""
         side = self.side(radius)
-        pose = touching_pose(side, shift, 0.0)
+        pose = touching_pose(side, lateral_shift, 0.0)
         return pose.fall - side.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
 
 
-def _contact_profile(name: str, kind: Kind, smoothing: float) -> ContactProfile:
-    known = BUILT_IN[kind]
+def _contact_profile(name: str, profile_kind: Kind, smoothing: float) -> ContactProfile:
+    known = BUILT_IN[profile_kind]
     if name in known:
         return known[name]()
     if not Path(name).suffix:
-        raise InputError("", kind, name, "is neither built in nor a file", tuple(known))
-    return read_profile(name, kind, smoothing=smoothing)
+        raise InputError("", profile_kind, name, "is neither built in nor a file", tuple(known))
+    return read_profile(name, profile_kind, smoothing=smoothing)
 
 
 @cache
@@ -114,11 +114,11 @@ def no_profile() -> LaidProfile:
     return LaidProfile(np.zeros(1, PROFILE_COUNTS), np.empty(0, WHEEL_NODE), np.empty(0, RAIL_KNOT))
 
 
-def _read_only_records(rows: Any, kind: np.dtype) -> Array:
+def _read_only_records(rows: Any, record_type: np.dtype) -> Array:
     """Read-only records (n,) from rows of numbers."""
-    made = np.ascontiguousarray(rows, float).view(kind)[:, 0]
-    made.flags.writeable = False
-    return made
+    records_array = np.ascontiguousarray(rows, float).view(record_type)[:, 0]
+    records_array.flags.writeable = False
+    return records_array
 
 
 def _evenly_spaced(y: Array, z: Array, spacing: float) -> Array:
@@ -127,37 +127,37 @@ def _evenly_spaced(y: Array, z: Array, spacing: float) -> Array:
     return np.interp(np.arange(0.0, length[-1], spacing), length, y)
 
 
-def _first_contact(side: WheelAndRail, shift: float) -> tuple[float, Array, Array] | None:
+def _first_contact(wheel_and_rail: WheelAndRail, lateral_shift: float) -> tuple[float, Array, Array] | None:
     """Position of first contact on the wheel (m from the taping line), all positions of the outline and their gaps (m).
     None where the profiles do not meet."""
     try:
-        pose = touching_pose(side, shift, 0.0)
+        pose = touching_pose(wheel_and_rail, lateral_shift, 0.0)
     except InputError:
         return None
-    points, gap = side.gaps(pose)
-    places = points[:, 1] - shift - side.wheelset.arm
-    return float(places[np.argmin(gap)]), places, gap
+    points, gap = wheel_and_rail.gaps(pose)
+    y_positions = points[:, 1] - lateral_shift - wheel_and_rail.wheelset.arm
+    return float(y_positions[np.argmin(gap)]), y_positions, gap
 
 
 def _ridge_position(
-    side: WheelAndRail, touch_before: tuple[float, float], touch_after: tuple[float, float]
+    wheel_and_rail: WheelAndRail, touch_before: tuple[float, float], touch_after: tuple[float, float]
 ) -> float | None:
     """Position of the largest gap between the two contact positions of a jump. ``touch_before`` and ``touch_after`` are
     pairs (shift, position). None if contact does not jump between them."""
     while abs(touch_after[1] - touch_before[1]) > CONTACT_JUMP:
         middle = (touch_before[0] + touch_after[0]) / 2.0
-        touch = _first_contact(side, middle)
+        touch = _first_contact(wheel_and_rail, middle)
         if touch is None:
             return None
-        here, places, gap = touch
+        contact_y, y_positions, gap = touch
         low, high = sorted((touch_before[1], touch_after[1]))
         if touch_after[0] - touch_before[0] < DISPLACEMENT_STEP:
-            between = (places > low) & (places < high)
-            return float(places[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE_HEIGHT else None
-        if abs(here - touch_before[1]) > abs(here - touch_after[1]):
-            touch_after = middle, here
+            between = (y_positions > low) & (y_positions < high)
+            return float(y_positions[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE_HEIGHT else None
+        if abs(contact_y - touch_before[1]) > abs(contact_y - touch_after[1]):
+            touch_after = middle, contact_y
         else:
-            touch_before = middle, here
+            touch_before = middle, contact_y
     return None
 
 

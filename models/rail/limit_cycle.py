@@ -115,13 +115,13 @@ class Orbit:
 
 
 def guess_near_state(
-    equations: Equations, state: Array, period: float, step: float, executor: Executor | None = None
+    equations: Equations, state: Array, orbit_period: float, step: float, executor: Executor | None = None
 ) -> Orbit:
     """Initial guess for ``solved_orbit``: a state (10,) near a maximum of y, and a period (s) divided into steps of at
     most ``step`` (s)."""
     start = state.copy()
     start[Y_RATE] = 0.0
-    return _with_slopes(Orbit(equations, start, period, math.ceil(period / step), np.empty(0)), executor)
+    return _with_slopes(Orbit(equations, start, orbit_period, math.ceil(orbit_period / step), np.empty(0)), executor)
 
 
 def orbit_of_small_amplitude(
@@ -136,20 +136,22 @@ def orbit_of_small_amplitude(
     def growth(_: Wheelset, speed: float) -> float:
         return float(np.linalg.eigvals(replace(equations, speed=speed).state_matrix).real.max())
 
-    at = replace(equations, speed=critical_speed(equations.wheelset, growth))
-    values, vectors = np.linalg.eig(at.state_matrix)
+    critical_equations = replace(equations, speed=critical_speed(equations.wheelset, growth))
+    values, vectors = np.linalg.eig(critical_equations.state_matrix)
     k = np.where(values.imag > 0.0, values.real, -math.inf).argmax()
-    state = at.rest.copy()
+    state = critical_equations.rest.copy()
     state[RETURNING_STATES] += amplitude * (vectors[:, k] / vectors[AMPLITUDE_INDEX, k]).real
-    guess = guess_near_state(at, state, 2.0 * math.pi / values[k].imag, step, executor)
+    guess = guess_near_state(critical_equations, state, 2.0 * math.pi / values[k].imag, step, executor)
     return solved_orbit(guess, "speed", executor=executor)
 
 
-def guess_from_orbit(orbit: Orbit, equations: Equations) -> Orbit:
+def guess_from_orbit(known_orbit: Orbit, equations: Equations) -> Orbit:
     """Initial guess for the orbit of changed equations: the known orbit, with its distance from rest enlarged by the
     share DISPLACED_GUESS."""
-    rest = orbit.equations.rest
-    return replace(orbit, equations=equations, state=rest + (1.0 + DISPLACED_GUESS) * (orbit.state - rest))
+    rest_state = known_orbit.equations.rest
+    return replace(
+        known_orbit, equations=equations, state=rest_state + (1.0 + DISPLACED_GUESS) * (known_orbit.state - rest_state)
+    )
 
 
 def branch_of_orbits(first: Orbit, amplitudes: Iterable[float], executor: Executor | None = None) -> Iterator[Orbit]:
@@ -157,10 +159,13 @@ def branch_of_orbits(first: Orbit, amplitudes: Iterable[float], executor: Execut
 
     Raises RunFailed where the branch cannot be followed.
     """
-    before, last = replace(first, state=first.equations.rest), first
+    earlier_orbit, latest_orbit = replace(first, state=first.equations.rest), first
     for amplitude in amplitudes:
-        before, last = last, _continued_orbit(before, last, amplitude, AMPLITUDE_HALVINGS, executor)
-        yield last
+        earlier_orbit, latest_orbit = (
+            latest_orbit,
+            _continued_orbit(earlier_orbit, latest_orbit, amplitude, AMPLITUDE_HALVINGS, executor),
+        )
+        yield latest_orbit
 
 
 def _continued_orbit(
@@ -168,16 +173,16 @@ def _continued_orbit(
 ) -> Orbit:
     """Orbit of an amplitude, predicted on the straight line through two earlier orbits; the interval is halved if this
     fails."""
-    way = latest_orbit.amplitude - earlier_orbit.amplitude
-    share = (amplitude - latest_orbit.amplitude) / way
+    amplitude_change = latest_orbit.amplitude - earlier_orbit.amplitude
+    share = (amplitude - latest_orbit.amplitude) / amplitude_change
     state = latest_orbit.state + share * (latest_orbit.state - earlier_orbit.state)
     state[Y] = amplitude
-    ahead = replace(
+    predicted_equations = replace(
         latest_orbit.equations, speed=latest_orbit.speed + share * (latest_orbit.speed - earlier_orbit.speed)
     )
     guess = replace(
         latest_orbit,
-        equations=ahead,
+        equations=predicted_equations,
         state=state,
         period=latest_orbit.period + share * (latest_orbit.period - earlier_orbit.period),
     )
@@ -193,15 +198,15 @@ def _continued_orbit(
 
 
 def solved_orbit(
-    guess: Orbit, unknown: SoughtQuantity, *, precise: bool = True, executor: Executor | None = None
+    orbit_guess: Orbit, sought_quantity: SoughtQuantity, *, precise: bool = True, executor: Executor | None = None
 ) -> Orbit:
-    """Orbit near a guess. ``unknown`` is solved for: speed or amplitude, while the other keeps the guess's value. A
-    precise one gets its own slopes.
+    """Orbit near a guess. ``sought_quantity`` is solved for: speed or amplitude, while the other keeps the guess's
+    value. A precise one gets its own slopes.
 
     The slopes of the guess lead there as long as they do; what is asked of the orbit is that it comes back.
     Raises RunFailed if none is found.
     """
-    orbit, fresh, left = guess, False, math.inf
+    orbit, fresh, left = orbit_guess, False, math.inf
     for _ in range(MOST_NEWTON_STEPS):
         try:
             end = _state_after(orbit.equations, orbit.state, orbit.period, orbit.steps)
@@ -213,31 +218,35 @@ def solved_orbit(
             return orbit if fresh or not precise else _with_slopes(orbit, executor)
         if not fresh and size > LEAST_GAIN * left:
             orbit, fresh = _with_slopes(orbit, executor), True
-        orbit, left, fresh = _newton_corrected(orbit, missed, unknown), size, False
-    raise RunFailed("wheelset", f"no periodic motion was found near {guess.speed:.6g} m/s and {guess.amplitude:.3g} m")
-
-
-def refined_orbit(orbit: Orbit, unknown: SoughtQuantity, executor: Executor | None = None) -> Orbit:
-    """The orbit computed with half the step, with the changes of its speed or amplitude and of its frequency."""
-    half = solved_orbit(replace(orbit, steps=2 * orbit.steps), unknown, precise=False, executor=executor)
-    return replace(
-        half,
-        error=abs(getattr(half, unknown) - getattr(orbit, unknown)),
-        frequency_error=abs(half.frequency - orbit.frequency),
+        orbit, left, fresh = _newton_corrected(orbit, missed, sought_quantity), size, False
+    raise RunFailed(
+        "wheelset", f"no periodic motion was found near {orbit_guess.speed:.6g} m/s and {orbit_guess.amplitude:.3g} m"
     )
 
 
-def _state_after(equations: Equations, state: Array, period: float, steps: int) -> Array:
-    return equations.run(state, period, period / steps, steps).states[-1]
+def refined_orbit(known_orbit: Orbit, sought_quantity: SoughtQuantity, executor: Executor | None = None) -> Orbit:
+    """The orbit computed with half the step, with the changes of its speed or amplitude and of its frequency."""
+    half = solved_orbit(
+        replace(known_orbit, steps=2 * known_orbit.steps), sought_quantity, precise=False, executor=executor
+    )
+    return replace(
+        half,
+        error=abs(getattr(half, sought_quantity) - getattr(known_orbit, sought_quantity)),
+        frequency_error=abs(half.frequency - known_orbit.frequency),
+    )
+
+
+def _state_after(equations: Equations, state: Array, orbit_period: float, steps: int) -> Array:
+    return equations.run(state, orbit_period, orbit_period / steps, steps).states[-1]
 
 
 Guess = tuple[Equations, Array, float]
 """Equations, state (10,) and period (s)."""
 
 
-def _with_slopes(orbit: Orbit, executor: Executor | None) -> Orbit:
+def _with_slopes(known_orbit: Orbit, executor: Executor | None) -> Orbit:
     """The orbit with slopes computed about itself."""
-    eq, T, state, signs = orbit.equations, orbit.period, orbit.state, (-1.0, 1.0)
+    eq, T, state, signs = known_orbit.equations, known_orbit.period, known_orbit.state, (-1.0, 1.0)
     pairs: list[list[Guess]] = [
         *(
             [(eq, state + sign * DIFFERENCE_SHARE * STATE_SIZES[k] * np.eye(STATE_COUNT)[k], T) for sign in signs]
@@ -246,42 +255,46 @@ def _with_slopes(orbit: Orbit, executor: Executor | None) -> Orbit:
         [(replace(eq, speed=eq.speed + sign * DIFFERENCE_SHARE), state, T) for sign in signs],
         [(eq, state, T * (1.0 + sign * DIFFERENCE_SHARE)) for sign in signs],
     ]
-    ends = block_results(partial(_ends_of_period, steps=orbit.steps), pairs, executor)
-    columns = [((after - before) / (2.0 * DIFFERENCE_SHARE * STATE_SIZES))[RETURNING_STATES] for before, after in ends]
-    return replace(orbit, slopes=np.array(columns).T)
+    ends = block_results(partial(_ends_of_period, steps=known_orbit.steps), pairs, executor)
+    columns = [
+        ((end_after - end_before) / (2.0 * DIFFERENCE_SHARE * STATE_SIZES))[RETURNING_STATES]
+        for end_before, end_after in ends
+    ]
+    return replace(known_orbit, slopes=np.array(columns).T)
 
 
-def _ends_of_period(pair: list[Guess], steps: int) -> list[Array]:
-    return [_state_after(*guess, steps) for guess in pair]
+def _ends_of_period(guess_pair: list[Guess], steps: int) -> list[Array]:
+    return [_state_after(*guess, steps) for guess in guess_pair]
 
 
-def _newton_corrected(orbit: Orbit, missed: Array, unknown: SoughtQuantity) -> Orbit:
+def _newton_corrected(known_orbit: Orbit, missed: Array, sought_quantity: SoughtQuantity) -> Orbit:
     """The orbit after one Newton correction with its slopes; the lateral rate stays zero."""
-    returned = orbit.slopes.copy()
+    returned = known_orbit.slopes.copy()
     returned[:, : len(RETURNING_STATES)] -= np.eye(len(RETURNING_STATES))
     free = [k for k in SECTION_COORDINATES if k != AMPLITUDE_INDEX]
-    columns = [*free, AMPLITUDE_INDEX if unknown == "amplitude" else SPEED_COLUMN, PERIOD_COLUMN]
+    columns = [*free, AMPLITUDE_INDEX if sought_quantity == "amplitude" else SPEED_COLUMN, PERIOD_COLUMN]
     *section, change, longer = -np.linalg.solve(returned[:, columns], missed)
-    state, speed = orbit.state.copy(), orbit.speed
-    places = [RETURNING_STATES[k] for k in free]
-    state[places] += section * STATE_SIZES[places]
-    if unknown == "amplitude":
+    state, speed = known_orbit.state.copy(), known_orbit.speed
+    state_indices = [RETURNING_STATES[k] for k in free]
+    state[state_indices] += section * STATE_SIZES[state_indices]
+    if sought_quantity == "amplitude":
         state[Y] += change * STATE_SIZES[Y]
     else:
         speed += change
-    period = orbit.period * (1.0 + longer)
-    return replace(orbit, equations=replace(orbit.equations, speed=speed), state=state, period=period)
+    period = known_orbit.period * (1.0 + longer)
+    return replace(known_orbit, equations=replace(known_orbit.equations, speed=speed), state=state, period=period)
 
 
 def attained_cycle(
-    equations: Equations, *, start: float = 5e-3, step: float = 5e-4, executor: Executor | None = None
+    equations: Equations, *, start_displacement: float = 5e-3, step: float = 5e-4, executor: Executor | None = None
 ) -> Orbit | None:
-    """The limit cycle that a wheelset reaches from a lateral displacement ``start`` (m); None if the motion dies out.
+    """The limit cycle that a wheelset reaches from a lateral displacement ``start_displacement`` (m); None if the
+    motion dies out.
 
     The motion is marched in steps (s) of this size until it repeats itself about, and then closed by Newton's method.
     Raises InputError for a step that is too large, RunFailed if the wheelset leaves the track or does not settle.
     """
-    state = equations.displaced_state(start)
+    state = equations.displaced_state(start_displacement)
     for _ in range(MOST_MARCHES):
         path = equations.run(state, MARCH_DURATION, step)
         y, state = path.states[:, Y], path.states[-1]
@@ -299,8 +312,10 @@ def attained_cycle(
 
 def positive_maxima(values: Array) -> np.ndarray:
     """Indices of the positive local maxima."""
-    before, here, after = values[:-2], values[1:-1], values[2:]
-    return 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.0))
+    previous_values, middle_values, next_values = values[:-2], values[1:-1], values[2:]
+    return 1 + np.flatnonzero(
+        (middle_values > previous_values) & (middle_values >= next_values) & (middle_values > 0.0)
+    )
 
 
 def bifurcation(

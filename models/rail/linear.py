@@ -92,9 +92,9 @@ def linear_matrices(wheelset: Wheelset, speed: float) -> LinearWheelset:
     stiffness = 2.0 * np.diag([w.stiffness_y + w.stiffness_z * arm * w.tilt**2, w.stiffness_x * arm])
     damping += np.array([[0.0, -gyroscopic], [gyroscopic, 0.0]])
     stiffness += gravity(w)
-    for motion, place in _contact_kinematics(w):
+    for motion, displacement in _contact_kinematics(w):
         damping += motion.T @ creep @ motion / speed
-        stiffness += motion.T @ creep @ place
+        stiffness += motion.T @ creep @ displacement
     return LinearWheelset(np.diag([w.mass + w.yaw_inertia * w.tilt**2, w.yaw_inertia]), damping, stiffness)
 
 
@@ -122,8 +122,8 @@ def gravity(w: Wheelset) -> Array:
 def kinematic_wavelength(wheelset: Wheelset) -> float:
     """Wavelength (m) from the eigenvalues of a wheelset with creep forces only: no inertia, suspension or weight."""
     creep = kalker_matrix(wheelset)
-    motion, place = (sum(pair[0].T @ creep @ pair[k] for pair in _contact_kinematics(wheelset)) for k in (0, 1))
-    values = np.linalg.eigvals(-np.linalg.solve(motion, place))
+    motion, displacement = (sum(pair[0].T @ creep @ pair[k] for pair in _contact_kinematics(wheelset)) for k in (0, 1))
+    values = np.linalg.eigvals(-np.linalg.solve(motion, displacement))
     return float(2.0 * math.pi / np.abs(values.imag).max())
 
 
@@ -139,15 +139,15 @@ def critical_speed(wheelset: Wheelset, growth: Callable[[Wheelset, float], float
     wheelset is unstable at the lowest speed, or stable up to the highest one that is looked at.
     """
     speeds = np.geomspace(LOWEST_SPEED, HIGHEST_SPEED, SPEEDS_TRIED)
-    below = speeds[0]
-    if growth(wheelset, below) >= 0.0:
+    slower = speeds[0]
+    if growth(wheelset, slower) >= 0.0:
         raise NoCriticalSpeed(unstable=True)
     for speed in speeds[1:]:
         if growth(wheelset, speed) >= 0.0:
             return float(
-                brentq(lambda v: growth(wheelset, v), below, speed, xtol=SPEED_PRECISION * speed, rtol=SPEED_PRECISION)
+                brentq(lambda v: growth(wheelset, v), slower, speed, xtol=SPEED_PRECISION * speed, rtol=SPEED_PRECISION)
             )
-        below = speed
+        slower = speed
     raise NoCriticalSpeed(unstable=False)
 
 

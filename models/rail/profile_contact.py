@@ -77,7 +77,7 @@ _LEAST_DEPTH_SQUARE = 1e-40
 
 
 @njit(cache=True, error_model="numpy")
-def profile_on_rail(side, pose, profile, modulus, touches):
+def profile_on_rail(wheel_side, pose, profile, modulus, touches):
     """Fill ``touches``, TOUCH (zones,), of the right (side 1) or left (-1) wheel; a depth of 0 or less is no contact.
 
     pose : ``Pose``; profile : ``LaidProfile``; modulus : E* (Pa).
@@ -85,22 +85,22 @@ def profile_on_rail(side, pose, profile, modulus, touches):
     head = profile.head[0]
     sums = np.zeros(int(head.zones), _SUMS)
     y, z, roll, yaw = pose
-    seen = _pose_of_wheel(
-        side * y, z + head.level, side * roll, side * yaw
+    wheel_pose = _pose_of_wheel(
+        wheel_side * y, z + head.level, wheel_side * roll, wheel_side * yaw
     )  # the left wheel is the right one in a mirror
-    knot, before = 0, -1.0
+    knot, previous_depth = 0, -1.0
     for j in range(0, int(head.nodes), COARSE_NODES):
-        node = _node_contact(profile.nodes[j], seen, head, profile.knots, knot)
+        node = _node_contact(profile.nodes[j], wheel_pose, head, profile.knots, knot)
         knot = node[-1]
-        if max(before, node[0]) > -SEARCH_MARGIN:
+        if max(previous_depth, node[0]) > -SEARCH_MARGIN:
             for i in range(max(0, j - COARSE_NODES), j):
-                fine = _node_contact(profile.nodes[i], seen, head, profile.knots, knot)
+                fine = _node_contact(profile.nodes[i], wheel_pose, head, profile.knots, knot)
                 if fine[0] > 0.0:
                     _add_node(profile.nodes[i], fine, i * head.spacing, sums)
-        before = node[0]
+        previous_depth = node[0]
     together = 0
     for zone in range(len(sums)):
-        _fill_touch(side, sums[zone], seen, touches[zone])
+        _fill_touch(wheel_side, sums[zone], wheel_pose, touches[zone])
         together += touches[zone].depth > 0.0
     if together > 1:
         settle_depths(touches, modulus)
@@ -116,45 +116,49 @@ def _pose_of_wheel(y, z, roll, yaw):
 
 
 @lean
-def _node_contact(node, seen, head, knots, knot):
+def _node_contact(node, wheel_pose, rail_head, knots, knot):
     """Contact of one node's circle: depth along the rail's normal (m), position x, y, z from the centre, slope of the
     rail, and the index of the knot."""
-    y, z, cr, sr, cy, sy, lead, level, steer = seen
+    y, z, cr, sr, cy, sy, lead, level, steer = wheel_pose
     sine = min(1.0, max(-1.0, -node.slope * steer))
     cosine = math.sqrt(1.0 - sine * sine)
-    ahead = node.radius * (sine - cosine * lead) * level
-    down = node.radius * (cosine + sine * lead) * level
-    arm = head.arm + node.y
-    across = cr * arm - sr * down
-    place_x, place_y, place_z = cy * ahead - sy * across, sy * ahead + cy * across, sr * arm + cr * down
-    here, last = y + place_y, int(head.knots) - 1
-    if not knots[0].y <= here < knots[last].y:
+    x_on_circle = node.radius * (sine - cosine * lead) * level
+    z_on_circle = node.radius * (cosine + sine * lead) * level
+    arm = rail_head.arm + node.y
+    across = cr * arm - sr * z_on_circle
+    place_x, place_y, place_z = (
+        cy * x_on_circle - sy * across,
+        sy * x_on_circle + cy * across,
+        sr * arm + cr * z_on_circle,
+    )
+    y_on_rail, last_knot = y + place_y, int(rail_head.knots) - 1
+    if not knots[0].y <= y_on_rail < knots[last_knot].y:
         return -1.0, place_x, place_y, place_z, 0.0, knot
-    while here < knots[knot].y:
+    while y_on_rail < knots[knot].y:
         knot -= 1
-    while here >= knots[knot + 1].y:
+    while y_on_rail >= knots[knot + 1].y:
         knot += 1
     cubic = knots[knot]
-    t = here - cubic.y
-    over = z + place_z - (cubic.c0 + t * (cubic.c1 + t * (cubic.c2 + t * cubic.c3)))
-    if over < -FAR_HEIGHT:
+    t = y_on_rail - cubic.y
+    height_over_rail = z + place_z - (cubic.c0 + t * (cubic.c1 + t * (cubic.c2 + t * cubic.c3)))
+    if height_over_rail < -FAR_HEIGHT:
         return -1.0, place_x, place_y, place_z, 0.0, knot
     slope = cubic.c1 + t * (2.0 * cubic.c2 + 3.0 * t * cubic.c3)
-    return over / math.sqrt(1.0 + slope * slope), place_x, place_y, place_z, slope, knot
+    return height_over_rail / math.sqrt(1.0 + slope * slope), place_x, place_y, place_z, slope, knot
 
 
 @lean
-def _add_node(node, at, length, sums):
+def _add_node(node, node_contact, length, zone_sums):
     """Add a touching node, which represents a length (m) of the contour, to the sums of its zone, or of both zones in a
     transition."""
-    depth, place_x, place_y, place_z, slope, _ = at
+    depth, place_x, place_y, place_z, slope, _ = node_contact
     upright = 1.0 / math.sqrt(1.0 + slope * slope)
     zone = int(node.zone)
     share = node.zone - zone
-    for part in range(2):
-        weight = (share if part == 1 else 1.0 - share) * depth**2
+    for zone_side in range(2):
+        weight = (share if zone_side == 1 else 1.0 - share) * depth**2
         if weight > 0.0:
-            to = sums[zone + part]
+            to = zone_sums[zone + zone_side]
             to.w2 += weight
             to.w3 += weight * depth
             to.s1 += weight * length
@@ -168,19 +172,23 @@ def _add_node(node, at, length, sums):
 
 
 @lean
-def _fill_touch(side, sums, seen, touch):
+def _fill_touch(wheel_side, zone_sums, wheel_pose, touch):
     """Fill one touch from the sums of its zone."""
     touch.depth = touch.n_y = touch.n_z = touch.x = touch.y = touch.z = touch.along = touch.across = 0.0
-    whole = sums.w2
-    if whole <= _LEAST_DEPTH_SQUARE:
+    weight_sum = zone_sums.w2
+    if weight_sum <= _LEAST_DEPTH_SQUARE:
         return
-    middle, size = sums.s1 / whole, math.hypot(sums.n_y, sums.n_z)
-    depth, n_y, n_z = 3.5 / 3.0 * sums.w3 / whole, sums.n_y / size, sums.n_z / size
-    spread = max(0.0, 7.0 * (sums.s2 / whole - middle * middle))
-    touch.depth, touch.n_y, touch.n_z = depth, side * n_y, n_z
-    touch.x, touch.y, touch.z = sums.x / whole, side * sums.y / whole, sums.z / whole
-    _, _, cr, sr, cy = seen[:5]
-    touch.along = 0.5 * (n_z * cr - n_y * cy * sr) * whole / sums.radius
+    middle, size = zone_sums.s1 / weight_sum, math.hypot(zone_sums.n_y, zone_sums.n_z)
+    depth, n_y, n_z = 3.5 / 3.0 * zone_sums.w3 / weight_sum, zone_sums.n_y / size, zone_sums.n_z / size
+    spread = max(0.0, 7.0 * (zone_sums.s2 / weight_sum - middle * middle))
+    touch.depth, touch.n_y, touch.n_z = depth, wheel_side * n_y, n_z
+    touch.x, touch.y, touch.z = (
+        zone_sums.x / weight_sum,
+        wheel_side * zone_sums.y / weight_sum,
+        zone_sums.z / weight_sum,
+    )
+    _, _, cr, sr, cy = wheel_pose[:5]
+    touch.along = 0.5 * (n_z * cr - n_y * cy * sr) * weight_sum / zone_sums.radius
     touch.across = depth / (spread + depth / SHARPEST_CURVATURE)
 
 
@@ -193,39 +201,45 @@ def settle_depths(touches, modulus):
     square lengths of both patches are added.
     """
     n = len(touches)
-    alone, load, axis = np.empty(n), np.empty(n), np.empty(n)
+    unloaded_depths, load, axis = np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
         touch = touches[i]
-        alone[i] = touch.depth
+        unloaded_depths[i] = touch.depth
         load[i], axis[i] = normal_force_and_axes(touch.depth, touch.along, touch.across, modulus)[:2]
     stiff = load.copy()
     for _ in range(SHARE_SWEEPS):
         for i in range(n):
-            down = 0.0
+            displacement = 0.0
             for j in range(n):
                 if j != i and load[j] > 0.0:
-                    down += load[j] * _cosine_of_normals(touches[i], touches[j], axis[i] ** 2 + axis[j] ** 2)
-            depth = alone[i] - down / (math.pi * modulus)
+                    displacement += load[j] * _cosine_of_normals(touches[i], touches[j], axis[i] ** 2 + axis[j] ** 2)
+            depth = unloaded_depths[i] - displacement / (math.pi * modulus)
             touches[i].depth = depth
-            load[i] = stiff[i] * (max(0.0, depth) / alone[i]) ** 1.5 if stiff[i] > 0.0 else 0.0
+            load[i] = stiff[i] * (max(0.0, depth) / unloaded_depths[i]) ** 1.5 if stiff[i] > 0.0 else 0.0
 
 
 @lean
-def _cosine_of_normals(first, second, squares):
+def _cosine_of_normals(first_touch, second_touch, squares):
     """Ratio (1/m) of the cosine between the normals of two touches to their distance, which ``squares`` enlarge."""
-    apart = (first.x - second.x) ** 2 + (first.y - second.y) ** 2 + (first.z - second.z) ** 2
-    return (first.n_y * second.n_y + first.n_z * second.n_z) / math.sqrt(apart + squares / 5.0)
+    squared_distance = (
+        (first_touch.x - second_touch.x) ** 2
+        + (first_touch.y - second_touch.y) ** 2
+        + (first_touch.z - second_touch.z) ** 2
+    )
+    return (first_touch.n_y * second_touch.n_y + first_touch.n_z * second_touch.n_z) / math.sqrt(
+        squared_distance + squares / 5.0
+    )
 
 
 @lean
-def normal_force_and_axes(penetration, along, across, modulus):
+def normal_force_and_axes(penetration, curvature_along, curvature_across, modulus):
     """Elastic normal force (N) and semi-axes (m) from a penetration (m), curvatures along and across (1/m) and E* (Pa);
     zeros where there is a gap."""
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
-    g, cosine, sine = aspect(min(along, across) / max(along, across))
-    short = math.sqrt(penetration * cosine / (max(along, across) * (cosine + sine)))
+    g, cosine, sine = aspect(min(curvature_along, curvature_across) / max(curvature_along, curvature_across))
+    short = math.sqrt(penetration * cosine / (max(curvature_along, curvature_across) * (cosine + sine)))
     load = 2.0 / 3.0 * math.pi * modulus * penetration * short / (g * (cosine + sine))
-    if along <= across:
+    if curvature_along <= curvature_across:
         return load, short / g, short
     return load, short, short / g

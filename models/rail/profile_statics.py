@@ -34,13 +34,13 @@ class Equilibrium:
         """Rolling radii (2,) of the right and the left wheel (m); each is the load-weighted mean over the wheel's
         patches."""
         axle = np.array([0.0, np.cos(self.roll), np.sin(self.roll)])
-        places = np.column_stack([self.touches[name] for name in "xyz"])
-        radius = np.linalg.norm(places - np.outer(places @ axle, axle), axis=1)
+        positions = np.column_stack([self.touches[name] for name in "xyz"])
+        radius = np.linalg.norm(positions - np.outer(positions @ axle, axle), axis=1)
         weighed, loads = (radius * self.loads).reshape(2, -1).sum(axis=1), self.loads.reshape(2, -1).sum(axis=1)
         return weighed / loads
 
 
-def equilibrium(wheelset: Wheelset, shift: float) -> Equilibrium:
+def equilibrium(wheelset: Wheelset, lateral_shift: float) -> Equilibrium:
     """Static equilibrium of the wheelset at a lateral displacement (m), without yaw, with half the load on each wheel.
 
     Raises InputError for a wheelset without profiles or a displacement at which not both wheels touch.
@@ -48,25 +48,27 @@ def equilibrium(wheelset: Wheelset, shift: float) -> Equilibrium:
     if wheelset.profiles is None:
         raise InputError("", "wheelset", None, "has cones: this needs profiles")
     rails, half = rails_of(wheelset), 0.5 * wheelset.load
-    z, roll = wheelset.profiles.touching(wheelset.radius, shift)
+    z, roll = wheelset.profiles.touching(wheelset.radius, lateral_shift)
 
-    def pose(unknown: Array) -> Equilibrium:
+    def pose(unknowns: Array) -> Equilibrium:
         touches = np.zeros(count_of_patches(rails.profile), TOUCH)
-        here = (z + unknown[0] * CHANGE_SIZE, roll + unknown[1] * CHANGE_SIZE)
-        contact_points(Pose(shift, *here, 0.0), rails, touches)
+        height_and_roll = (z + unknowns[0] * CHANGE_SIZE, roll + unknowns[1] * CHANGE_SIZE)
+        contact_points(Pose(lateral_shift, *height_and_roll, 0.0), rails, touches)
         modulus = rails.wheels["modulus"][0]
         loads = np.array(
             [normal_force_and_axes(touch.depth, touch.along, touch.across, modulus)[0] for touch in touches]
         )
-        return Equilibrium(*here, touches, loads)
+        return Equilibrium(*height_and_roll, touches, loads)
 
-    def off(unknown: Array) -> Array:
-        now = pose(unknown)
-        return (now.loads * now.touches["n_z"]).reshape(2, -1).sum(axis=1) / half - 1.0
+    def load_error(unknowns: Array) -> Array:
+        placed = pose(unknowns)
+        return (placed.loads * placed.touches["n_z"]).reshape(2, -1).sum(axis=1) / half - 1.0
 
-    solved = root(off, [5.0, 0.0], tol=1e-14)
+    solved = root(load_error, [5.0, 0.0], tol=1e-14)
     if np.abs(solved.fun).max() > LOAD_PRECISION:
-        raise RunFailed("wheelset", f"no height was found at which both wheels carry their load at y = {shift:g} m")
+        raise RunFailed(
+            "wheelset", f"no height was found at which both wheels carry their load at y = {lateral_shift:g} m"
+        )
     return pose(solved.x)
 
 

@@ -79,13 +79,13 @@ class RollingRadiusTable:
     def between(self, low: float, high: float) -> tuple[Array, Array]:
         """Displacements and differences of the section from ``low`` to ``high``, including both ends."""
         y, dr = self.displacements, self.differences
-        first, last = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
+        first_row, last_row = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
         ends = self.difference(low, "right"), self.difference(high, "left")
-        return np.array([low, *y[first:last], high]), np.array([ends[0], *dr[first:last], ends[1]])
+        return np.array([low, *y[first_row:last_row], high]), np.array([ends[0], *dr[first_row:last_row], ends[1]])
 
-    def difference(self, displacement: float, side: Any = "right") -> float:
+    def difference(self, displacement: float, side_of_jump: Any = "right") -> float:
         """Rolling radius difference at a displacement; at a jump, the value on the given side of it."""
-        i, share = self._row_before(displacement, side)
+        i, share = self._row_before(displacement, side_of_jump)
         dr = self.differences
         return float(dr[i] + share * (dr[i + 1] - dr[i]))
 
@@ -96,17 +96,17 @@ class RollingRadiusTable:
         step = share * (y[i + 1] - y[i])
         return float(self.potential[i] + step * (dr[i] + 0.5 * share * (dr[i + 1] - dr[i])))
 
-    def _row_before(self, displacement: float, side: Any) -> tuple[int, float]:
+    def _row_before(self, displacement: float, side_of_jump: Any) -> tuple[int, float]:
         """Index of the row before a displacement, and the position between that row and the next, as a share."""
         y = self.displacements
-        i = int(np.clip(np.searchsorted(y, displacement, side) - 1, 0, y.size - 2))
+        i = int(np.clip(np.searchsorted(y, displacement, side_of_jump) - 1, 0, y.size - 2))
         width = y[i + 1] - y[i]
         return i, float((displacement - y[i]) / width) if width > 0.0 else 0.0
 
     def without_every_second_row(self) -> "RollingRadiusTable":
         """The table without every second row, both ends kept; it serves to estimate the error of the spacing."""
-        kept = np.unique(np.append(np.arange(0, self.displacements.size, 2), self.displacements.size - 1))
-        return replace(self, displacements=self.displacements[kept], differences=self.differences[kept])
+        kept_rows = np.unique(np.append(np.arange(0, self.displacements.size, 2), self.displacements.size - 1))
+        return replace(self, displacements=self.displacements[kept_rows], differences=self.differences[kept_rows])
 
 
 def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
@@ -114,13 +114,13 @@ def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
 
     InputError names the line that is wrong.
     """
-    table = read_table(path, TABLE_COLUMNS, least=FEWEST_ROWS)
+    table = read_table(path, TABLE_COLUMNS, least_rows=FEWEST_ROWS)
     return RollingRadiusTable(table["y"], table["dr"], str(path))
 
 
 def rolling_radii_of(
-    right: WheelAndRail,
-    left: WheelAndRail,
+    right_side: WheelAndRail,
+    left_side: WheelAndRail,
     displacements: Array,
     report_progress: Callable[[float], Any] = lambda share: None,
 ) -> RollingRadiusTable:
@@ -134,7 +134,7 @@ def rolling_radii_of(
     for k, shift in enumerate(shifts.tolist()):
         report_progress(k / shifts.size)
         try:
-            rows.append((shift, *_rolling_radii(right, left, shift)))
+            rows.append((shift, *_rolling_radii(right_side, left_side, shift)))
         except InputError:
             if rows and shift > 0.0:
                 break
@@ -145,13 +145,13 @@ def rolling_radii_of(
     return RollingRadiusTable(y, of_right - of_left)
 
 
-def _rolling_radii(right: WheelAndRail, left: WheelAndRail, shift: float) -> tuple[float, float]:
+def _rolling_radii(right_side: WheelAndRail, left_side: WheelAndRail, lateral_shift: float) -> tuple[float, float]:
     """Rolling radii (m) of both wheels where they first touch, at a displacement (m) to the right."""
-    pose = touching_pose(right, shift, 0.0, left)
-    return rolling_radius(right, pose), rolling_radius(left, Pose(-shift, 0.0, -pose.roll, pose.fall))
+    pose = touching_pose(right_side, lateral_shift, 0.0, left_side)
+    return rolling_radius(right_side, pose), rolling_radius(left_side, Pose(-lateral_shift, 0.0, -pose.roll, pose.fall))
 
 
-def rolling_radius(side: WheelAndRail, pose: Pose) -> float:
+def rolling_radius(wheel_and_rail: WheelAndRail, pose: Pose) -> float:
     """Radius (m) of a wheel at the point nearest to its rail."""
-    across = float((pose.turn.T @ (lowest_point(side, pose) - side.centre(pose)))[1])
-    return float(side.wheelset.radius + side.wheel.curve(across - side.wheelset.arm))
+    across = float((pose.turn.T @ (lowest_point(wheel_and_rail, pose) - wheel_and_rail.centre(pose)))[1])
+    return float(wheel_and_rail.wheelset.radius + wheel_and_rail.wheel.curve(across - wheel_and_rail.wheelset.arm))

@@ -158,13 +158,13 @@ def rails_of(wheelset: Wheelset, law: str = "linear", cells: int = LEAST_CELLS) 
 
 def plain_rails(rails: Rails) -> tuple[Any, ...]:
     """``Rails`` as plain tuples, which Python passes to compiled functions faster."""
-    return tuple(tuple(part) if isinstance(part, LaidProfile) else part for part in rails)
+    return tuple(tuple(rail_part) if isinstance(rail_part, LaidProfile) else rail_part for rail_part in rails)
 
 
 @inlined
-def rails_in(parts):
+def rails_in(plain_tuples):
     """``Rails`` made from the plain tuples of ``plain_rails``."""
-    wheels, (head, nodes, knots), strips, cells, middle, law = parts
+    wheels, (head, nodes, knots), strips, cells, middle, law = plain_tuples
     return Rails(wheels, LaidProfile(head, nodes, knots), strips, cells, middle, law)
 
 
@@ -191,9 +191,9 @@ def room_for(profile):
 @lean
 def contact_points(pose, rails, touches):
     """Fill ``touches``, TOUCH (patches,), the right wheel's first; touches far from contact get no normal."""
-    each, wheels = len(touches) // 2, rails.wheels[0]
+    per_wheel, wheels = len(touches) // 2, rails.wheels[0]
     for k in range(2):
-        side, of_side = RIGHT if k == 0 else LEFT, touches[k * each : (k + 1) * each]
+        side, of_side = RIGHT if k == 0 else LEFT, touches[k * per_wheel : (k + 1) * per_wheel]
         if rails.profile.nodes.size > 0:
             profile_on_rail(side, pose, rails.profile, wheels.modulus, of_side)
             continue
@@ -208,12 +208,14 @@ def contact_points(pose, rails, touches):
 def supported_force(z, rails):
     """Vertical part (N) of the elastic normal forces, with the wheelset's centre at height z (m) in the middle of the
     track."""
-    touches, whole = np.zeros(count_of_patches(rails.profile), TOUCH), 0.0
+    touches, force_sum = np.zeros(count_of_patches(rails.profile), TOUCH), 0.0
     contact_points(Pose(0.0, z, 0.0, 0.0), rails, touches)
     for k in range(len(touches)):
         touch = touches[k]
-        whole += touch.n_z * normal_force_and_axes(touch.depth, touch.along, touch.across, rails.wheels[0].modulus)[0]
-    return whole
+        force_sum += (
+            touch.n_z * normal_force_and_axes(touch.depth, touch.along, touch.across, rails.wheels[0].modulus)[0]
+        )
+    return force_sum
 
 
 @inlined
@@ -236,11 +238,11 @@ def _linear_forces(a, b, motion, shear, poisson):
 def _fill_one_direction(sign, contacts, slip, speed, rails, wheel_forces):
     """Fill fx, fy, mz for wheels that roll forwards (sign 1), or for mirror images of wheels that roll backwards (sign
     -1)."""
-    by = max(abs(speed), REGULAR)
+    reference_speed = max(abs(speed), REGULAR)
     for k in range(len(contacts)):
         contact = contacts[k]
-        contact.xi_x, contact.xi_y = sign * slip[k].vx / by, slip[k].aside / by
-        contact.spin = sign * slip[k].turn / by
+        contact.xi_x, contact.xi_y = sign * slip[k].vx / reference_speed, slip[k].aside / reference_speed
+        contact.spin = sign * slip[k].turn / reference_speed
     if rails.law == FASTSIM:
         forces(
             contacts,
@@ -258,25 +260,26 @@ def _fill_one_direction(sign, contacts, slip, speed, rails, wheel_forces):
 
 
 @lean
-def _both_ways(forwards, contacts, slip, speed, rails, room):
-    """Fill fx, fy, mz in ``room`` as a mixture of forward and backward rolling; ``forwards`` is the weight of forward
-    rolling."""
+def _both_ways(forwards, contacts, slip, speed, rails, workspace):
+    """Fill fx, fy, mz in ``workspace`` as a mixture of forward and backward rolling; ``forwards`` is the weight of
+    forward rolling.
+    """
     for k in range(len(contacts)):
-        room.forces[k].fx = room.forces[k].fy = room.forces[k].mz = 0.0
-    directed = room.directed[: len(contacts)]
+        workspace.forces[k].fx = workspace.forces[k].fy = workspace.forces[k].mz = 0.0
+    directed = workspace.directed[: len(contacts)]
     for sign in (1.0, -1.0):
         share = forwards if sign > 0.0 else 1.0 - forwards
         if share > 0.0:
             _fill_one_direction(sign, contacts, slip, speed, rails, directed)
             for k in range(len(contacts)):
-                room.forces[k].fx += share * sign * directed[k].fx
-                room.forces[k].fy += share * directed[k].fy
-                room.forces[k].mz += share * sign * directed[k].mz
+                workspace.forces[k].fx += share * sign * directed[k].fx
+                workspace.forces[k].fy += share * directed[k].fy
+                workspace.forces[k].mz += share * sign * directed[k].mz
 
 
 @inlined
-def fill_creep_forces(contacts, slip, speed, rails, room):
-    """Fill the forces fx, fy, mz in ``room`` for contacts (CONTACT) from their sliding motion (MOTION).
+def fill_creep_forces(contacts, slip, speed, rails, workspace):
+    """Fill the forces fx, fy, mz in ``workspace`` for contacts (CONTACT) from their sliding motion (MOTION).
 
     The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image.
     """
@@ -286,22 +289,22 @@ def fill_creep_forces(contacts, slip, speed, rails, room):
             c = contacts[k]
             c.l1, c.l2, c.l3 = flexibilities_at(c.a, c.b, shear, poisson)
     if speed >= REGULAR:
-        _fill_one_direction(1.0, contacts, slip, speed, rails, room.forces[: len(contacts)])
+        _fill_one_direction(1.0, contacts, slip, speed, rails, workspace.forces[: len(contacts)])
     else:
-        _both_ways(max(0.0, 0.5 + 0.5 * speed / REGULAR), contacts, slip, speed, rails, room)
+        _both_ways(max(0.0, 0.5 + 0.5 * speed / REGULAR), contacts, slip, speed, rails, workspace)
 
 
 @inlined
-def wheel_forces(pose, rails, report, room):
+def wheel_forces(pose, rails, report, workspace):
     """Add the forces and moments of both rails on the wheelset to its resultants.
 
-    pose : ``Pose``; report : REPORT (patches,), filled, or of no rows where nobody asks; room : ``Workspace``, its
+    pose : ``Pose``; report : REPORT (patches,), filled, or of no rows where nobody asks; workspace : ``Workspace``, its
     wheelset given in, all else written over.
     """
-    if rails.law == LINEAR and rails.profile.nodes.size == 0 and room.wheelset[0].velocity[0] >= REGULAR:
-        _linear_cones(pose, rails.wheels[0], room.wheelset[0], report)
+    if rails.law == LINEAR and rails.profile.nodes.size == 0 and workspace.wheelset[0].velocity[0] >= REGULAR:
+        _linear_cones(pose, rails.wheels[0], workspace.wheelset[0], report)
     else:
-        patch_by_patch(pose, rails, report, room)
+        patch_by_patch(pose, rails, report, workspace)
 
 
 @lean
@@ -312,8 +315,8 @@ def _linear_cones(pose, wheels, wheelset, report):
     damping, velocity, turning = wheels.damping, wheelset.velocity, wheelset.turning
     for side in (RIGHT, LEFT):
         depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, pose, cone)
-        place = PatchPlace(n_y, n_z, cx, cy, cz)
-        motion = _patch_motion(place, velocity, turning)
+        patch_point = PatchPlace(n_y, n_z, cx, cy, cz)
+        motion = _patch_motion(patch_point, velocity, turning)
         elastic, a, b = normal_force_and_axes(
             depth, _longitudinal_curvature(rolling, cone.conicity), 0.5 / cone.head, modulus
         )
@@ -321,27 +324,33 @@ def _linear_cones(pose, wheels, wheelset, report):
         creeping = _linear_forces(a, b, slip, shear, poisson)
         load = elastic * max(0.0, 1.0 + damping * motion.rate)
         press = Pressed(depth, a, b, elastic, load, _flange_force(side, pose.y, wheels))
-        _add_patch_forces(place, press, creeping, wheelset.force, wheelset.moment)
+        _add_patch_forces(patch_point, press, creeping, wheelset.force, wheelset.moment)
         if len(report) > 0:
-            _fill_report(place, motion, press, creeping, speed, report[0 if side == RIGHT else 1])
+            _fill_report(patch_point, motion, press, creeping, speed, report[0 if side == RIGHT else 1])
 
 
 @lean
-def patch_by_patch(pose, rails, report, room):
+def patch_by_patch(pose, rails, report, workspace):
     """``wheel_forces`` for all kinds of patches, force laws and directions of rolling."""
-    touches, wheels, wheelset, n, count = room.touches, rails.wheels[0], room.wheelset[0], len(room.touches), 0
+    touches, wheels, wheelset, n, count = (
+        workspace.touches,
+        rails.wheels[0],
+        workspace.wheelset[0],
+        len(workspace.touches),
+        0,
+    )
     velocity, on_cones = wheelset.velocity, rails.profile.nodes.size == 0
     contact_points(pose, rails, touches)
     for k in range(n):
         if touches[k].n_z != 0.0 or touches[k].n_y != 0.0:
             push = _flange_force(RIGHT if 2 * k < n else LEFT, pose.y, wheels) if on_cones else 0.0
-            _fill_contact(touches[k], wheelset, wheels, push, room.contacts[count], room.motion[count])
-            room.motion[count].patch, count = k, count + 1
-    fill_creep_forces(room.contacts[:count], room.motion[:count], velocity[0], rails, room)
+            _fill_contact(touches[k], wheelset, wheels, push, workspace.contacts[count], workspace.motion[count])
+            workspace.motion[count].patch, count = k, count + 1
+    fill_creep_forces(workspace.contacts[:count], workspace.motion[:count], velocity[0], rails, workspace)
     for k in range(len(report)):
         _blank_report(report[k])
     for i in range(count):
-        contact, m, answer = room.contacts[i], room.motion[i], room.forces[i]
+        contact, m, answer = workspace.contacts[i], workspace.motion[i], workspace.forces[i]
         touch = touches[int(m.patch)]
         press = Pressed(touch.depth, contact.a, contact.b, m.elastic, contact.load, m.push)
         creeping = answer.fx, answer.fy, answer.mz
@@ -358,9 +367,9 @@ def _longitudinal_curvature(rolling, conicity):
 
 
 @inlined
-def _flange_force(side, y, wheels):
+def _flange_force(wheel_side, y, wheels):
     """Lateral force (N) of a cone's flange at a lateral position y."""
-    return -side * wheels.flange * max(0.0, side * y - wheels.clearance)
+    return -wheel_side * wheels.flange * max(0.0, wheel_side * y - wheels.clearance)
 
 
 @inlined
@@ -370,13 +379,15 @@ def _patch_place(touch):
 
 
 @inlined
-def _patch_motion(place, velocity, turning):
+def _patch_motion(patch_point, velocity, angular_velocity):
     """``PatchMotion`` of a patch, from velocity and angular velocity of the wheelset."""
-    n_y, n_z, cx, cy, cz = place
-    vx = velocity[0] + turning[1] * cz - turning[2] * cy
-    vy = velocity[1] + turning[2] * cx - turning[0] * cz
-    vz = velocity[2] + turning[0] * cy - turning[1] * cx
-    return PatchMotion(vx, vy, n_z * vy - n_y * vz, turning[1] * n_y + turning[2] * n_z, n_y * vy + n_z * vz)
+    n_y, n_z, cx, cy, cz = patch_point
+    vx = velocity[0] + angular_velocity[1] * cz - angular_velocity[2] * cy
+    vy = velocity[1] + angular_velocity[2] * cx - angular_velocity[0] * cz
+    vz = velocity[2] + angular_velocity[0] * cy - angular_velocity[1] * cx
+    return PatchMotion(
+        vx, vy, n_z * vy - n_y * vz, angular_velocity[1] * n_y + angular_velocity[2] * n_z, n_y * vy + n_z * vz
+    )
 
 
 @inlined
@@ -391,16 +402,16 @@ def _fill_contact(touch, wheelset, wheels, push, contact, motion):
 
 
 @inlined
-def _add_patch_forces(place, press, creeping, force, moment):
+def _add_patch_forces(patch_point, press, creeping, force, moment):
     """Add the forces of one patch to the wheelset's force and moment."""
-    n_y, n_z, cx, cy, cz = place
+    n_y, n_z, cx, cy, cz = patch_point
     fx, fy, mz = creeping
-    across, down = n_z * fy - n_y * press.load + press.push, -n_y * fy - n_z * press.load
+    across, force_down = n_z * fy - n_y * press.load + press.push, -n_y * fy - n_z * press.load
     force[0] += fx
     force[1] += across
-    force[2] += down
-    moment[0] += cy * down - cz * across
-    moment[1] += cz * fx - cx * down + n_y * mz
+    force[2] += force_down
+    moment[0] += cy * force_down - cz * across
+    moment[1] += cz * fx - cx * force_down + n_y * mz
     moment[2] += cx * across - cy * fx + n_z * mz
 
 
@@ -413,16 +424,16 @@ def _blank_report(report):
 
 
 @lean
-def _fill_report(place, motion, press, creeping, speed, report):
+def _fill_report(patch_point, motion, press, creeping, speed, report):
     """Fill the report of one patch."""
     fx, fy, mz = creeping
-    vx, vy, aside, turn, rate = motion
+    vx, vy, side_speed, turn, rate = motion
     report.load, report.fx, report.fy, report.mz = press.load, fx, fy, mz
-    by = max(abs(speed), REGULAR)
-    report.xi_x, report.xi_y, report.spin = vx / by, aside / by, turn / by
+    reference_speed = max(abs(speed), REGULAR)
+    report.xi_x, report.xi_y, report.spin = vx / reference_speed, side_speed / reference_speed, turn / reference_speed
     report.a, report.b, report.depth = press.a, press.b, press.depth
-    report.angle = math.atan2(-place.n_y, place.n_z)
-    report.power = fx * vx + fy * aside + mz * turn
-    report.x, report.y, report.z, report.flange_force = place.x, place.y, place.z, press.push
+    report.angle = math.atan2(-patch_point.n_y, patch_point.n_z)
+    report.power = fx * vx + fy * side_speed + mz * turn
+    report.x, report.y, report.z, report.flange_force = patch_point.x, patch_point.y, patch_point.z, press.push
     report.elastic_power = press.push * vy - press.elastic * rate
     report.damping_power = (press.elastic - press.load) * rate

@@ -84,9 +84,12 @@ class Wheelset(Strict):
 
     def coned(self, equivalent: float) -> "Wheelset":
         """A copy of the wheelset on cones with this equivalent conicity, as profiles have at some amplitude."""
-        most = min(LARGEST_CONICITY, 0.999 * self.half_gauge / self.radius)
+        largest_conicity = min(LARGEST_CONICITY, 0.999 * self.half_gauge / self.radius)
         conicity = brentq(
-            lambda c: self.changed(conicity=c).equivalent_conicity - equivalent, LEAST_CONICITY, most, xtol=1e-15
+            lambda c: self.changed(conicity=c).equivalent_conicity - equivalent,
+            LEAST_CONICITY,
+            largest_conicity,
+            xtol=1e-15,
         )
         return self.changed(conicity=float(conicity))
 

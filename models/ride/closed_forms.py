@@ -72,8 +72,8 @@ def half_car_acceleration(corner: QuarterCar, q: float, a: float, b: float, spee
     """
     base = a + b
     at_axle = corner.body_acceleration(q)
-    after = corner.correlation_of_acceleration(q, base / speed)
-    return ((a**2 + b**2) * at_axle + 2 * a * b * after) / base**2
+    delayed_correlation = corner.correlation_of_acceleration(q, base / speed)
+    return ((a**2 + b**2) * at_axle + 2 * a * b * delayed_correlation) / base**2
 
 
 def split_half_car(corner: QuarterCar, a: float, b: float) -> tuple[QuarterCar, QuarterCar, float]:

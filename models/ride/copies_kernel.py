@@ -78,9 +78,9 @@ def on_curve(curves, spring, argument, force):
 
 
 @lean
-def off_road(u, x, road, tyres, pressed, rate, lost):
-    """Fill ``lost`` (copies,) in N, the force of a tyre that only pushes less that of a linear tyre. It is 0 on the
-    road, and cancels the pull of a lifted tyre.
+def off_road(u, x, road, tyres, pressed, rate, missing_force):
+    """Fill ``missing_force`` (copies,) in N, the force of a tyre that only pushes less that of a linear tyre. It is 0
+    on the road, and cancels the pull of a lifted tyre.
 
     pressed, rate (copies,) are overwritten.
     """
@@ -92,19 +92,19 @@ def off_road(u, x, road, tyres, pressed, rate, lost):
     for j in range(n):
         add(pressed, -tyres.heights[u, j], x[j])
         add(rate, -tyres.heights[u, j], x[n + j])
-    for c in range(lost.size):
+    for c in range(missing_force.size):
         elastic = load + stiffness * pressed[c]
-        whole = elastic + damping * rate[c]
-        lost[c] = max(min(whole, 2.0 * elastic), 0.0) - whole
+        total_force = elastic + damping * rate[c]
+        missing_force[c] = max(min(total_force, 2.0 * elastic), 0.0) - total_force
 
 
 @lean
-def fill_rates(x, road, laws, force, out, room):
+def fill_rates(x, road, laws, force, state_rate, workspace):
     """Fill the time derivatives (2 n, copies) of states, positions, then rates, on roads (2 w, copies), and the
     nonlinear forces (s + u, copies) in N; room (2, copies) is overwritten."""
     n, w, springs = x.shape[0] // 2, road.shape[0], laws.rows.shape[0]
     for s in range(springs):
-        travel, slip, bent = room[0], room[1], force[s]
+        travel, slip, bent = workspace[0], workspace[1], force[s]
         travel[:], slip[:], bent[:] = 0.0, 0.0, 0.0
         for j in range(n):
             add(travel, laws.rows[s, j], x[j])
@@ -115,54 +115,54 @@ def fill_rates(x, road, laws, force, out, room):
             for c in range(bent.size):
                 bent[c] += laws.friction[s] * math.tanh(slip[c] / laws.turning[s])
     for u in range(laws.tyres.wheel.size):
-        off_road(u, x, road, laws.tyres, room[0], room[1], force[springs + u])
+        off_road(u, x, road, laws.tyres, workspace[0], workspace[1], force[springs + u])
     for i in range(n):
-        out[i], out[n + i] = 0.0, 0.0
-        add(out[i], 1.0, x[n + i])
+        state_rate[i], state_rate[n + i] = 0.0, 0.0
+        add(state_rate[i], 1.0, x[n + i])
         for j in range(2 * n):
-            add(out[n + i], laws.motion[i, j], x[j])
+            add(state_rate[n + i], laws.motion[i, j], x[j])
         for j in range(w):
-            add(out[n + i], laws.motion[i, 2 * n + j], road[j])
+            add(state_rate[n + i], laws.motion[i, 2 * n + j], road[j])
         for s in range(force.shape[0]):
-            add(out[n + i], laws.motion[i, 2 * n + w + s], force[s])
+            add(state_rate[n + i], laws.motion[i, 2 * n + w + s], force[s])
 
 
 @lean
-def fill_output(p, x, road, rate, force, laws, out):
+def fill_output(p, x, road, rate, force, laws, output):
     """Fill one output (copies,) from the states and their time derivatives."""
     n, w = x.shape[0] // 2, road.shape[0]
-    out[:] = 0.0
+    output[:] = 0.0
     for j in range(2 * n):
-        add(out, laws.read[p, j], x[j])
+        add(output, laws.read[p, j], x[j])
     for j in range(w):
-        add(out, laws.read[p, 2 * n + j], road[j])
+        add(output, laws.read[p, 2 * n + j], road[j])
     for j in range(n):
-        add(out, laws.read[p, 2 * n + w + j], rate[n + j])
+        add(output, laws.read[p, 2 * n + w + j], rate[n + j])
     for s in range(force.shape[0]):
-        add(out, laws.read[p, 3 * n + w + s], force[s])
+        add(output, laws.read[p, 3 * n + w + s], force[s])
 
 
 @lean
-def sum_up(value, sums, p, first):
+def sum_up(output_values, power_sums, p, first):
     """Add the first four powers of output p (copies,) to their sums, in columns from copy ``first`` on."""
-    for c in range(value.size):
-        square = value[c] * value[c]
-        sums[0, p, first + c] += value[c]
-        sums[1, p, first + c] += square
-        sums[2, p, first + c] += square * value[c]
-        sums[3, p, first + c] += square * square
+    for c in range(output_values.size):
+        square = output_values[c] * output_values[c]
+        power_sums[0, p, first + c] += output_values[c]
+        power_sums[1, p, first + c] += square
+        power_sums[2, p, first + c] += square * output_values[c]
+        power_sums[3, p, first + c] += square * square
 
 
 @lean
-def states_ahead(x, time, rate, moved):
-    """Fill ``moved`` with the states (2 n, copies) after a time (s) at constant rates."""
+def states_ahead(x, time, rate, next_states):
+    """Fill ``next_states`` with the states (2 n, copies) after a time (s) at constant rates."""
     for j in range(x.shape[0]):
         for c in range(x.shape[1]):
-            moved[j, c] = x[j, c] + time * rate[j, c]
+            next_states[j, c] = x[j, c] + time * rate[j, c]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def march(states, roads, step, first, every, laws, sums):
+def march(states, roads, step, first, every, laws, power_sums):
     """Advance the copies by steps (s) of the classical Runge-Kutta method, and sum up powers of their outputs on the
     way.
 
@@ -172,7 +172,13 @@ def march(states, roads, step, first, every, laws, sums):
     for copy in range(0, states.shape[1], COPIES_SIDE_BY_SIDE):
         columns = slice(copy, min(copy + COPIES_SIDE_BY_SIDE, states.shape[1]))
         x, road = states[:, columns].copy(), roads[:, :, columns].copy()
-        k1, k2, k3, k4, moved = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
+        k1, k2, k3, k4, moved_states = (
+            np.empty_like(x),
+            np.empty_like(x),
+            np.empty_like(x),
+            np.empty_like(x),
+            np.empty_like(x),
+        )
         forces = laws.rows.shape[0] + laws.tyres.wheel.size
         force, room = np.empty((forces, x.shape[1])), np.empty((2, x.shape[1]))
         for i in range(road.shape[0] // 2):
@@ -180,13 +186,13 @@ def march(states, roads, step, first, every, laws, sums):
             if i >= first and (i - first) % every == 0:
                 for p in range(laws.read.shape[0]):
                     fill_output(p, x, road[2 * i], k1, force, laws, room[0])
-                    sum_up(room[0], sums, p, copy)
-            states_ahead(x, 0.5 * step, k1, moved)
-            fill_rates(moved, road[2 * i + 1], laws, force, k2, room)
-            states_ahead(x, 0.5 * step, k2, moved)
-            fill_rates(moved, road[2 * i + 1], laws, force, k3, room)
-            states_ahead(x, step, k3, moved)
-            fill_rates(moved, road[2 * i + 2], laws, force, k4, room)
+                    sum_up(room[0], power_sums, p, copy)
+            states_ahead(x, 0.5 * step, k1, moved_states)
+            fill_rates(moved_states, road[2 * i + 1], laws, force, k2, room)
+            states_ahead(x, 0.5 * step, k2, moved_states)
+            fill_rates(moved_states, road[2 * i + 1], laws, force, k3, room)
+            states_ahead(x, step, k3, moved_states)
+            fill_rates(moved_states, road[2 * i + 2], laws, force, k4, room)
             for j in range(x.shape[0]):
                 for c in range(x.shape[1]):
                     x[j, c] += step / 6.0 * (k1[j, c] + 2.0 * (k2[j, c] + k3[j, c]) + k4[j, c])

@@ -94,8 +94,8 @@ def rounding_thresholds(C: np.ndarray, P: np.ndarray) -> np.ndarray:
     """Thresholds (p,) of the variance of y = C x below which it is mere rounding, so that the output counts as
     silent."""
     terms = abs(C) @ np.sqrt(abs(np.diagonal(P)))
-    most = abs(C).max(axis=1) * np.sqrt(abs(P).max(initial=0.0))
-    return np.asarray(np.maximum(CANCELLATION_SHARE * terms, SILENCE_SHARE * most) ** 2, float)
+    largest_output = abs(C).max(axis=1) * np.sqrt(abs(P).max(initial=0.0))
+    return np.asarray(np.maximum(CANCELLATION_SHARE * terms, SILENCE_SHARE * largest_output) ** 2, float)
 
 
 class NoiseArrivals(NamedTuple):
@@ -113,10 +113,15 @@ def noise_arrivals(system: DelayedSystem) -> NoiseArrivals:
     if system.independent:
         return NoiseArrivals([*system.B], [*system.D], [0.0] * len(system.B), True)
     delays = sorted(set(system.delays))
-    at = [[i for i, delay in enumerate(system.delays) if delay == hit] for hit in delays]
+    axles_by_hit = [[i for i, delay in enumerate(system.delays) if delay == hit] for hit in delays]
     if len(delays) == len(system.B):
-        return NoiseArrivals([system.B[i] for (i,) in at], [system.D[i] for (i,) in at], delays, False)
-    B, D = ([np.sum([each[i] for i in together], axis=0) for together in at] for each in (system.B, system.D))
+        return NoiseArrivals(
+            [system.B[i] for (i,) in axles_by_hit], [system.D[i] for (i,) in axles_by_hit], delays, False
+        )
+    B, D = (
+        [np.sum([matrices[i] for i in together], axis=0) for together in axles_by_hit]
+        for matrices in (system.B, system.D)
+    )
     return NoiseArrivals(B, D, delays, False)
 
 
@@ -124,37 +129,42 @@ Propagator = Callable[[float, np.ndarray], np.ndarray]
 """e^(A t) B of a time (s) and B (n, k)."""
 
 
-def _responses_before_arrival(A: np.ndarray, met: NoiseArrivals, moved: Propagator | None = None) -> list[np.ndarray]:
+def _responses_before_arrival(
+    A: np.ndarray, arrivals: NoiseArrivals, propagator: Propagator | None = None
+) -> list[np.ndarray]:
     """State responses F_j to earlier noise just before each hit; zero where no axle has met this noise before."""
-    if moved is None:
+    if propagator is None:
 
-        def moved(time: float, B: np.ndarray) -> np.ndarray:
+        def propagator(time: float, B: np.ndarray) -> np.ndarray:
             return np.asarray(expm(A * time) @ B)
 
-    before = [np.zeros_like(met.B[0])]
-    for j in range(1, len(met.B)):
-        none = met.independent or len(A) == 0
-        step = met.delays[j] - met.delays[j - 1]
-        before.append(np.zeros_like(met.B[0]) if none else moved(step, before[-1] + met.B[j - 1]))
-    return before
+    responses = [np.zeros_like(arrivals.B[0])]
+    for j in range(1, len(arrivals.B)):
+        never_correlated = arrivals.independent or len(A) == 0
+        step = arrivals.delays[j] - arrivals.delays[j - 1]
+        responses.append(
+            np.zeros_like(arrivals.B[0]) if never_correlated else propagator(step, responses[-1] + arrivals.B[j - 1])
+        )
+    return responses
 
 
-def noise_of(system: DelayedSystem, moved: Propagator | None = None) -> np.ndarray:
+def noise_of(system: DelayedSystem, propagator: Propagator | None = None) -> np.ndarray:
     """``noise_intensity`` of the noise in a given system, in double precision."""
-    return noise_intensity(system.A, noise_arrivals(system), moved).astype(float)
+    return noise_intensity(system.A, noise_arrivals(system), propagator).astype(float)
 
 
-def noise_intensity(A: np.ndarray, met: NoiseArrivals, moved: Propagator | None = None) -> np.ndarray:
+def noise_intensity(A: np.ndarray, arrivals: NoiseArrivals, propagator: Propagator | None = None) -> np.ndarray:
     """Matrix Q (n, n) in A P + P A' + Q = 0: increase of the covariance per second by the noise of all hits, with exact
     delays.
 
-    ``moved`` stands for the matrix exponential where it is known. Squares in extended precision: where two axles'
+    ``propagator`` stands for the matrix exponential where it is known. Squares in extended precision: where two axles'
     noises cancel in an output, so do the squares of their rounding.
     """
-    before, at = (
-        [each.astype(np.longdouble) for each in part] for part in (_responses_before_arrival(A, met, moved), met.B)
+    earlier_responses, hit_inputs = (
+        [matrix.astype(np.longdouble) for matrix in matrices]
+        for matrices in (_responses_before_arrival(A, arrivals, propagator), arrivals.B)
     )
-    return np.asarray(sum(b @ b.T + f @ b.T + b @ f.T for f, b in zip(before, at, strict=True)))
+    return np.asarray(sum(b @ b.T + f @ b.T + b @ f.T for f, b in zip(earlier_responses, hit_inputs, strict=True)))
 
 
 def lyapunov_solution(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
@@ -212,7 +222,7 @@ One is enough but where a motion hardly dies out; each takes as many digits off 
 
 
 def _with_marginal(
-    split: MarginalParts, met: NoiseArrivals, onto_stable: NoiseArrivals, P: np.ndarray, correction: np.ndarray
+    split: MarginalParts, arrivals: NoiseArrivals, onto_stable: NoiseArrivals, P: np.ndarray, correction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Covariance of the whole state (marginal motions first), its last correction and basis; motions with unbounded
     variance are left out.
@@ -220,24 +230,29 @@ def _with_marginal(
     A motion that does not diffuse responds only between the first and the last hit: its covariances are integrals over
     that window.
     """
-    k, onto_marginal = split.count_of_marginal_states, met._replace(B=[split.W0 @ b for b in met.B])
-    before = _responses_before_arrival(split.M, onto_marginal), _responses_before_arrival(split.S, onto_stable)
-    after = [
+    k, onto_marginal = split.count_of_marginal_states, arrivals._replace(B=[split.W0 @ b for b in arrivals.B])
+    responses_before = (
+        _responses_before_arrival(split.M, onto_marginal),
+        _responses_before_arrival(split.S, onto_stable),
+    )
+    responses_after = [
         [f + g for f, g in zip(*pair, strict=True)]
-        for pair in zip(before, (onto_marginal.B, onto_stable.B), strict=True)
+        for pair in zip(responses_before, (onto_marginal.B, onto_stable.B), strict=True)
     ]
     within, cross = np.zeros((k, k)), np.zeros((k, len(split.S)))
-    for j in range(0 if met.independent else len(met.B) - 1):
-        within += _integral_over_delay(split.M, after[0][j], met.delays[j + 1] - met.delays[j])
-        cross += after[0][j] @ after[1][j].T - before[0][j + 1] @ before[1][j + 1].T
+    for j in range(0 if arrivals.independent else len(arrivals.B) - 1):
+        within += _integral_over_delay(split.M, responses_after[0][j], arrivals.delays[j + 1] - arrivals.delays[j])
+        cross += (
+            responses_after[0][j] @ responses_after[1][j].T - responses_before[0][j + 1] @ responses_before[1][j + 1].T
+        )
     if len(split.S):
         from control import lyap
 
         cross = lyap(split.M, split.S.T, cross.astype(float), method="scipy")
-    whole = np.block([[within.astype(np.longdouble), cross], [cross.T, P]])
-    changed = np.zeros_like(whole)
+    full_covariance = np.block([[within.astype(np.longdouble), cross], [cross.T, P]])
+    changed = np.zeros_like(full_covariance)
     changed[k:, k:] = correction
-    return whole, changed, np.hstack([split.V0, split.V])
+    return full_covariance, changed, np.hstack([split.V0, split.V])
 
 
 def _integral_over_delay(M: np.ndarray, R: np.ndarray, length: float) -> np.ndarray:
@@ -274,18 +289,18 @@ def variance_verdicts(
     """
     direct = sum((d**2).sum(axis=1) for d in D) * fastest
     white = direct > (ZERO_MARGIN * accuracy) ** 2 * variance + floor
-    each = [_variance_verdict(*output, split) for output in zip(white, grown.rate, grown.power, strict=True)]
-    return tuple(status for status, _ in each), tuple(reason for _, reason in each)
+    verdicts = [_variance_verdict(*output, split) for output in zip(white, grown.rate, grown.power, strict=True)]
+    return tuple(status for status, _ in verdicts), tuple(reason for _, reason in verdicts)
 
 
 def _variance_verdict(white: bool, rate: float, power: int, split: MarginalParts | None) -> tuple[str, str]:
     if white:
         return INFINITE, WHITE_NOISE_REASON
     if power:
-        after = np.sqrt(rate * 100.0**power)
+        deviation_after = np.sqrt(rate * 100.0**power)
         return DIFFUSING, (
             f"the road drives a motion that nothing pulls back and that this output sees: its variance "
-            f"grows as {rate:.4g} t^{power} (t in s), a standard deviation of {after:.3g} after "
+            f"grows as {rate:.4g} t^{power} (t in s), a standard deviation of {deviation_after:.3g} after "
             "100 s"
         )
     if split is None or not split.count_of_marginal_states:

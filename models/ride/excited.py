@@ -57,17 +57,17 @@ def vehicle_with_road(vehicle: LinearVehicle, excitation: Excitation, speed: flo
     A[n : 2 * n, : 2 * n] = by_motion
     filters = [slice(first, first + m) for first in range(2 * n, len(A), m)]
     B = [np.zeros((len(A), k)) for _ in range(axles)]
-    for at, H, noise in zip(filters, excitation.heights, B, strict=True):
-        A[n : 2 * n, at] = by_height @ H + by_rate @ H @ excitation.F * speed
-        A[at, at] = speed * excitation.F
+    for filter_slice, H, noise in zip(filters, excitation.heights, B, strict=True):
+        A[n : 2 * n, filter_slice] = by_height @ H + by_rate @ H @ excitation.F * speed
+        A[filter_slice, filter_slice] = speed * excitation.F
         noise[n : 2 * n] = root * by_rate @ H @ excitation.G
-        noise[at] = root * excitation.G
+        noise[filter_slice] = root * excitation.G
     C = read.acceleration_factors @ A[n : 2 * n]
     C[:, :n] += read.displacement_factors
     C[:, n : 2 * n] += read.rate_factors
     D = []
-    for at, H, noise in zip(filters, excitation.heights, B, strict=True):
-        C[:, at] += read.road_factors @ H + speed * read.road_rate_factors @ H @ excitation.F
+    for filter_slice, H, noise in zip(filters, excitation.heights, B, strict=True):
+        C[:, filter_slice] += read.road_factors @ H + speed * read.road_rate_factors @ H @ excitation.F
         D.append(read.acceleration_factors @ noise[n : 2 * n] + root * read.road_rate_factors @ H @ excitation.G)
     return _system(vehicle, excitation, speed, A, B, C, D)
 
@@ -114,7 +114,7 @@ def vehicle_states(vehicle: LinearVehicle) -> VehicleStates:
     """``VehicleStates`` of a vehicle whose mass matrix may be singular; InputError where no spring or damper holds a
     massless body."""
     Y, Z = _range_and_kernel(vehicle.mass)
-    V, E = (Z @ part for part in _range_and_kernel(Z.T @ vehicle.damping @ Z))
+    V, E = (Z @ basis for basis in _range_and_kernel(Z.T @ vehicle.damping @ Z))
     n, a, b = len(vehicle.mass), Y.shape[1], V.shape[1]
     q_a, v_a, q_b = np.split(np.eye(2 * a + b), [a, 2 * a])
     q, direct = Y @ q_a + V @ q_b, np.zeros((n, n))
@@ -141,17 +141,20 @@ def first_order(
     """
     x, heights, axles = len(states.A), np.hstack(excitation.heights), len(excitation.heights)
     m, k = excitation.G.shape
-    path, each = np.zeros((axles * m,) * 2), np.zeros((axles, axles * m, k))
+    path, noise_inputs = np.zeros((axles * m,) * 2), np.zeros((axles, axles * m, k))
     for i in range(axles):
-        at = slice(i * m, (i + 1) * m)
-        path[at, at], each[i, at] = speed * excitation.F, speed**0.5 * excitation.G
+        filter_slice = slice(i * m, (i + 1) * m)
+        path[filter_slice, filter_slice], noise_inputs[i, filter_slice] = (
+            speed * excitation.F,
+            speed**0.5 * excitation.G,
+        )
     stiff, rate = vehicle.road_stiffness @ heights, heights @ path
     by_rate = states.B @ vehicle.road_damping
     A = np.zeros((x + axles * m,) * 2)
     A[:x, :x], A[x:, x:] = states.A, path
     A[:x, x:] = states.B @ stiff + by_rate @ rate
-    noise = heights @ each
-    B = np.concatenate([by_rate @ noise, each], axis=1)
+    noise = heights @ noise_inputs
+    B = np.concatenate([by_rate @ noise, noise_inputs], axis=1)
     q, read = np.hstack([states.Q, states.direct @ stiff]), vehicle.read
     v = q @ A
     C = read.displacement_factors @ q + read.rate_factors @ v + read.acceleration_factors @ v @ A
@@ -160,26 +163,30 @@ def first_order(
 
 
 def _direct_transmission(
-    read: OutputRows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray
+    output_rows: OutputRows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray
 ) -> np.ndarray:
     """Direct transmission D (axles, p, k) of white noise to the outputs, through q and q' of the state, B, and noise in
     the rates of the road's heights."""
-    seen = read.rate_factors @ q @ B + read.acceleration_factors @ v @ B + read.road_rate_factors @ noise
-    size = abs(read.rate_factors) @ abs(q) @ abs(B) + abs(read.acceleration_factors) @ abs(v) @ abs(B)
-    told = abs(seen) > NEGLIGIBLE_SHARE * (size + abs(read.road_rate_factors) @ abs(noise))
-    worse = abs(read.acceleration_factors @ (q @ B)) > NEGLIGIBLE_SHARE * (
-        abs(read.acceleration_factors) @ abs(q) @ abs(B)
+    transmission = (
+        output_rows.rate_factors @ q @ B
+        + output_rows.acceleration_factors @ v @ B
+        + output_rows.road_rate_factors @ noise
     )
-    return np.where(worse, np.inf, np.where(told, seen, 0.0))
+    size = abs(output_rows.rate_factors) @ abs(q) @ abs(B) + abs(output_rows.acceleration_factors) @ abs(v) @ abs(B)
+    is_certain = abs(transmission) > NEGLIGIBLE_SHARE * (size + abs(output_rows.road_rate_factors) @ abs(noise))
+    worse = abs(output_rows.acceleration_factors @ (q @ B)) > NEGLIGIBLE_SHARE * (
+        abs(output_rows.acceleration_factors) @ abs(q) @ abs(B)
+    )
+    return np.where(worse, np.inf, np.where(is_certain, transmission, 0.0))
 
 
-def _solved_for(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+def _solved_for(matrix: np.ndarray, right_side: np.ndarray) -> np.ndarray:
     """Solution of matrix X = right; InputError where no spring or damper holds a massless body."""
     if not len(matrix):
-        return right
+        return right_side
     if np.linalg.cond(matrix) > 1 / NEGLIGIBLE_SHARE:
         raise InputError("", "effects", None, "a massless body has no spring or damper that holds it")
-    return np.linalg.solve(matrix, right)
+    return np.linalg.solve(matrix, right_side)
 
 
 def _range_and_kernel(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -34,10 +34,10 @@ def save(system: DelayedSystem, covariance: StationaryCovariance, stem: Path) ->
 
     content = exported_arrays(system, covariance)
     paths = [stem.with_suffix(".npz"), stem.with_suffix(".mat")]
-    with whole_file(paths[0]) as part:
-        np.savez(part, allow_pickle=False, **content)
-    with whole_file(paths[1]) as part:
-        savemat(part, {**content, "outputs": content["outputs"].astype(object)})
+    with whole_file(paths[0]) as partial_path:
+        np.savez(partial_path, allow_pickle=False, **content)
+    with whole_file(paths[1]) as partial_path:
+        savemat(partial_path, {**content, "outputs": content["outputs"].astype(object)})
     return paths
 
 

@@ -85,8 +85,8 @@ def spectral_densities(
     if excitation.independent:
         return (abs(parts) ** 2).sum(axis=(0, 3)) / (2 * np.pi)
     delays = np.array(excitation.lengths) / speed
-    turned = parts * np.exp(-1j * delays[:, None] * omega)[:, :, None, None]
-    return (abs(turned.sum(axis=0)) ** 2).sum(axis=2) / (2 * np.pi)
+    delayed_parts = parts * np.exp(-1j * delays[:, None] * omega)[:, :, None, None]
+    return (abs(delayed_parts.sum(axis=0)) ** 2).sum(axis=2) / (2 * np.pi)
 
 
 def one_sided(vehicle: LinearVehicle, excitation: Excitation, speed: float, frequency: np.ndarray) -> np.ndarray:
@@ -96,11 +96,11 @@ def one_sided(vehicle: LinearVehicle, excitation: Excitation, speed: float, freq
 
 def _weighted_transfer(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np.ndarray:
     """Transfer functions (n, p, w) from heights to outputs, in which weighted outputs replace the unweighted ones."""
-    whole = transfer_functions(vehicle, omega)
+    transfer = transfer_functions(vehicle, omega)
     for i, output in enumerate(vehicle.outputs):
         if output.name in weights:
-            whole[:, i] *= weights[output.name](omega / (2 * np.pi))[:, None]
-    return whole
+            transfer[:, i] *= weights[output.name](omega / (2 * np.pi))[:, None]
+    return transfer
 
 
 def variances_by_quadrature(
@@ -116,7 +116,7 @@ def variances_by_quadrature(
     """
     _check_stable(vehicle)
 
-    def over(edges: np.ndarray, vehicle: LinearVehicle = vehicle) -> np.ndarray:
+    def panel_integrals(edges: np.ndarray, vehicle: LinearVehicle = vehicle) -> np.ndarray:
         """Contributions (panels, p) to the variances from the frequency interval in each row of ``edges``."""
         centre, half = edges.mean(axis=1), np.diff(edges, axis=1)[:, 0] / 2
         omega = (centre[:, None] + half[:, None] * LEGENDRE_NODES).ravel()
@@ -126,23 +126,23 @@ def variances_by_quadrature(
 
     frequencies = _panel_edges(vehicle, excitation, speed)
     edges = np.column_stack([frequencies[:-1], frequencies[1:]])
-    first = over(edges)
+    first = panel_integrals(edges)
     stiffness = vehicle.stiffness
     largest = np.sqrt(abs(stiffness).max(axis=1, initial=0.0))
     digit = EPS * np.outer(largest, largest) * np.cos(np.arange(stiffness.size)).reshape(stiffness.shape)
-    nudged = over(edges, replace(vehicle, stiffness=stiffness + digit))
+    nudged = panel_integrals(edges, replace(vehicle, stiffness=stiffness + digit))
     rounding = 10 * abs((nudged - first).sum(axis=0))  # one draw of many
-    seen = abs(_weighted_transfer(vehicle, frequencies[1:], weights or {})) @ abs(
+    weighted_gains = abs(_weighted_transfer(vehicle, frequencies[1:], weights or {})) @ abs(
         road(excitation, speed, frequencies[1:])
     )
-    terms = np.einsum("ambk,ambk,m->b", seen, seen, frequencies[1:])
+    terms = np.einsum("ambk,ambk,m->b", weighted_gains, weighted_gains, frequencies[1:])
     total = abs(first).sum(axis=0)
     limit = np.maximum(PANEL_TOLERANCE * np.maximum(total, SILENCE_SHARE * terms), rounding)
-    variance, error, taken = _halve_panels(over, edges, first, limit)
+    variance, error, panels_used = _halve_panels(panel_integrals, edges, first, limit)
     error += abs(first[-1]) + rounding  # beyond the last panel lies as much as in it
     known = np.divide(error, variance, out=np.zeros(len(total)), where=variance > 0)
     diverges = (abs(first[[0, -1]]) > 0.1 * total).any(axis=0)
-    return Quadrature(np.where(diverges, np.inf, variance), known, taken * GAUSS_POINTS)
+    return Quadrature(np.where(diverges, np.inf, variance), known, panels_used * GAUSS_POINTS)
 
 
 def _check_stable(vehicle: LinearVehicle) -> None:
@@ -154,23 +154,24 @@ def _check_stable(vehicle: LinearVehicle) -> None:
 
 
 def _halve_panels(
-    over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, limit: np.ndarray
+    over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, largest_change: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Sums (p,) over panels, and the last changes; panels are halved until that changes each sum by at most ``limit``
-    (p,)."""
-    variance, error = np.zeros_like(limit), np.zeros_like(limit)
-    taken, lowest = 2 * len(edges), edges[0, 1] / 64
+    """Sums (p,) over panels, and the last changes; panels are halved until that changes each sum by at most
+    ``largest_change`` (p,).
+    """
+    variance, error = np.zeros_like(largest_change), np.zeros_like(largest_change)
+    panels_used, lowest = 2 * len(edges), edges[0, 1] / 64
     while len(edges):
         finer = np.column_stack([edges[:, 0], edges.mean(axis=1), edges.mean(axis=1), edges[:, 1]]).reshape(-1, 2)
         parts = over(finer)
-        taken += len(finer)
+        panels_used += len(finer)
         halves = parts.reshape(len(edges), 2, -1).sum(axis=1)
         change = abs(halves - panels)
-        rough = (change > limit).any(axis=1) & (edges[:, 1] > lowest) & (taken < MOST_PANELS)
+        rough = (change > largest_change).any(axis=1) & (edges[:, 1] > lowest) & (panels_used < MOST_PANELS)
         variance += halves[~rough].sum(axis=0)
         error += change[~rough].sum(axis=0)
         edges, panels = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]
-    return variance, error, taken
+    return variance, error, panels_used
 
 
 LEGENDRE_NODES, LEGENDRE_WEIGHTS = leggauss(GAUSS_POINTS)
@@ -182,17 +183,17 @@ TO_LEGENDRE = (
 
 
 def _panel_integrals(
-    parts: np.ndarray, centre: np.ndarray, half: np.ndarray, excitation: Excitation, speed: float
+    delayed_parts: np.ndarray, centre: np.ndarray, half: np.ndarray, excitation: Excitation, speed: float
 ) -> np.ndarray:
     """Contributions (panels, p) to the variances, for outputs that are sums of delayed parts (a, panels, nodes, p, k);
     both signs of the frequency are included."""
-    integrals = np.einsum("ambpk,ambpk,b->mp", parts, parts.conj(), LEGENDRE_WEIGHTS).real
-    for j in range(1, len(parts)) if not excitation.independent else ():
+    integrals = np.einsum("ambpk,ambpk,b->mp", delayed_parts, delayed_parts.conj(), LEGENDRE_WEIGHTS).real
+    for j in range(1, len(delayed_parts)) if not excitation.independent else ():
         for i in range(j):
             gap = (excitation.lengths[j] - excitation.lengths[i]) / speed
             moments = 2 * 1j**LEGENDRE_DEGREES * spherical_jn(LEGENDRE_DEGREES, (half * gap)[:, None])
             weight = np.exp(1j * centre * gap)[:, None] * (moments @ TO_LEGENDRE)
-            integrals += 2 * np.einsum("mbpk,mbpk,mb->mp", parts[i], parts[j].conj(), weight).real
+            integrals += 2 * np.einsum("mbpk,mbpk,mb->mp", delayed_parts[i], delayed_parts[j].conj(), weight).real
     return integrals * half[:, None] / np.pi
 
 
@@ -258,7 +259,7 @@ def standard_errors(
     step = 2.0 * np.pi / duration / PER_LOBE
     omega = step * (np.arange(int(2.0 * np.pi * HIGHEST_FREQUENCY / step)) + 0.5)
     parts = np.array_split(omega, -(-len(omega) // FREQUENCIES_AT_ONCE))
-    density = np.concatenate([spectral_densities(vehicle, excitation, speed, part) for part in parts])
+    density = np.concatenate([spectral_densities(vehicle, excitation, speed, omega_part) for omega_part in parts])
     mean = 2.0 * step * np.sinc(omega * duration / (2.0 * np.pi)) ** 2 @ density
     square = 8.0 * np.pi / duration * step * (density**2).sum(axis=0)
     return np.sqrt(mean), np.sqrt(square)

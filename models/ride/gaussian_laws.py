@@ -27,10 +27,10 @@ def of_curve(curve: Curve | None, mean: float, deviation: float) -> tuple[float,
     if deviation == 0.0:
         return curve(mean), curve.slope_at_rest() if mean == 0.0 else _slope_of_curve(curve, mean)
     offset, slope, corners, bends = curve.hinges()
-    bent, above = np.array(bends), (mean - np.array(corners)) / deviation
-    density = np.exp(-(above**2) / 2.0) / np.sqrt(2.0 * np.pi)
-    beyond = deviation * (density + above * ndtr(above))  # mean of max(x - corner, 0)
-    return offset + slope * mean + float(bent @ beyond), slope + float(bent @ ndtr(above))
+    bent, corner_distance = np.array(bends), (mean - np.array(corners)) / deviation
+    density = np.exp(-(corner_distance**2) / 2.0) / np.sqrt(2.0 * np.pi)
+    beyond = deviation * (density + corner_distance * ndtr(corner_distance))  # mean of max(x - corner, 0)
+    return offset + slope * mean + float(bent @ beyond), slope + float(bent @ ndtr(corner_distance))
 
 
 def _slope_of_curve(curve: Curve, x: float) -> float:

@@ -33,14 +33,14 @@ class Unstable(InputError):
 
     def __init__(self, growth: float, frequency: float, speed: float | None = None) -> None:
         self.growth, self.frequency = growth, frequency
-        where = "at this speed" if speed is None else f"at {speed:g} m/s"
-        how = f"that swings at {frequency:.4g} Hz" if frequency else "that does not swing"
+        speed_text = "at this speed" if speed is None else f"at {speed:g} m/s"
+        motion_text = f"that swings at {frequency:.4g} Hz" if frequency else "that does not swing"
         super().__init__(
             "",
             "vehicle",
             None,
-            f"is unstable: a motion {how} grows at a rate of {growth:.4g} 1/s, twofold in "
-            f"{np.log(2) / growth:.3g} s, so nothing has a stationary variance; it must be stable {where}",
+            f"is unstable: a motion {motion_text} grows at a rate of {growth:.4g} 1/s, twofold in "
+            f"{np.log(2) / growth:.3g} s, so nothing has a stationary variance; it must be stable {speed_text}",
         )
 
 
@@ -81,11 +81,11 @@ def split_marginal(A: np.ndarray, accuracy: float = MATRIX_ACCURACY) -> Marginal
     V, form, zeros, left = _zeros_first(balanced, accuracy * norm)
     if zeros and accuracy * norm > FREE_ROUNDING:
         _refuse(norm)
-    U, rest, undamped = _undamped_first(form[zeros:, zeros:], 10 * accuracy * norm)
+    U, stable_part, undamped = _undamped_first(form[zeros:, zeros:], 10 * accuracy * norm)
     k = zeros + undamped
     V[:, zeros:] = V[:, zeros:] @ U
     form[:zeros, zeros:] = form[:zeros, zeros:] @ U
-    form[zeros:, zeros:] = rest
+    form[zeros:, zeros:] = stable_part
     W = V.T.copy()
     for size in {k, zeros}:
         _decouple(form, V, W, size)
@@ -101,7 +101,7 @@ def split_marginal(A: np.ndarray, accuracy: float = MATRIX_ACCURACY) -> Marginal
         zeros,
         scale,
         norm,
-        _by_slowest(left, rest[undamped:, undamped:]),
+        _by_slowest(left, stable_part[undamped:, undamped:]),
     )
 
 
@@ -199,12 +199,12 @@ def _by_motions(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """
     values, vectors = np.linalg.eig(A)
     T = np.where(values.imag < 0, vectors.imag, vectors.real)
-    same = np.eye(len(A), dtype=np.longdouble)
+    unit_matrix = np.eye(len(A), dtype=np.longdouble)
     if len(A) == 0 or not np.linalg.cond(T) < LARGEST_CONDITION:
-        return A, same, same
+        return A, unit_matrix, unit_matrix
     back = np.linalg.inv(T).astype(np.longdouble)
     wide = T.astype(np.longdouble)
-    back = back @ (2 * same - wide @ back)
+    back = back @ (2 * unit_matrix - wide @ back)
     return (back @ A.astype(np.longdouble) @ wide).astype(float), wide, back
 
 
@@ -243,12 +243,16 @@ def variance_growth(
     G_size = join(
         [abs(E) @ reach * np.linalg.norm(b / split.scale[:, None], axis=0) for E, b in zip(carried, B, strict=True)]
     )
-    seen = C @ split.V0
+    outputs_of_marginal = C @ split.V0
     seen_size = np.linalg.norm(C * split.scale, axis=1, keepdims=True) * np.ones(split.count_of_marginal_states)
-    z, least = split.zeros, ZERO_MARGIN * accuracy
-    most = least * variance * 2 * accuracy * split.norm_of_rates
-    rate, power = _of_zeros(split.M[:z, :z], G[:z], G_size[:z], seen[:, :z], seen_size[:, :z], least, most)
-    swung = _of_undamped(split.M[z:, z:], G[z:], G_size[z:], seen[:, z:], seen_size[:, z:], least, most)
+    z, least_rate = split.zeros, ZERO_MARGIN * accuracy
+    largest_rounding = least_rate * variance * 2 * accuracy * split.norm_of_rates
+    rate, power = _of_zeros(
+        split.M[:z, :z], G[:z], G_size[:z], outputs_of_marginal[:, :z], seen_size[:, :z], least_rate, largest_rounding
+    )
+    swung = _of_undamped(
+        split.M[z:, z:], G[z:], G_size[z:], outputs_of_marginal[:, z:], seen_size[:, z:], least_rate, largest_rounding
+    )
     rate = np.where(power <= 1, rate + swung, rate)
     return Growth(rate, np.where((power == 0) & (swung > 0), 1, power))
 
@@ -268,11 +272,11 @@ def _of_zeros(
     step, step_size = G, G_size
     for level in range(len(N)):
         factor = C @ step / factorial(level)
-        told = (abs(factor) * factorial(level) > lower_bound * (C_size @ step_size)).any(axis=1)
+        is_certain = (abs(factor) * factorial(level) > lower_bound * (C_size @ step_size)).any(axis=1)
         real = (abs(factor) > ZERO_PRODUCT_SHARE * (C_size @ step_size)).any(axis=1)
-        told |= (level == 0) & real & ((factor**2).sum(axis=1) > upper_bound)
-        rate[told] = (factor[told] ** 2).sum(axis=1) / (2 * level + 1)
-        power[told] = 2 * level + 1
+        is_certain |= (level == 0) & real & ((factor**2).sum(axis=1) > upper_bound)
+        rate[is_certain] = (factor[is_certain] ** 2).sum(axis=1) / (2 * level + 1)
+        power[is_certain] = 2 * level + 1
         step, step_size = N @ step, abs(N) @ step_size
     return rate, power
 
@@ -292,11 +296,11 @@ def _of_undamped(
     values, vectors = np.linalg.eig(T)
     right, left = C @ vectors, np.linalg.solve(vectors, G.astype(complex)) if len(T) else G
     for value in values[values.imag > 0]:
-        same = abs(values - value) < 1e-6 * abs(value)
-        first = bool(same[: np.flatnonzero(values == value)[0]].any())
-        amplitude = right[:, same] @ left[same]
-        told = (abs(amplitude) > lower_bound * (C_size @ G_size)).any(axis=1)
+        is_same_value = abs(values - value) < 1e-6 * abs(value)
+        first = bool(is_same_value[: np.flatnonzero(values == value)[0]].any())
+        amplitude = right[:, is_same_value] @ left[is_same_value]
+        is_certain = (abs(amplitude) > lower_bound * (C_size @ G_size)).any(axis=1)
         real = (abs(amplitude) > ZERO_PRODUCT_SHARE * (C_size @ G_size)).any(axis=1)
-        told |= real & (2 * (abs(amplitude) ** 2).sum(axis=1) > upper_bound)
-        rate[told] += 0.0 if first else 2 * (abs(amplitude[told]) ** 2).sum(axis=1)
+        is_certain |= real & (2 * (abs(amplitude) ** 2).sum(axis=1) > upper_bound)
+        rate[is_certain] += 0.0 if first else 2 * (abs(amplitude[is_certain]) ** 2).sum(axis=1)
     return rate

@@ -9,22 +9,22 @@ import math
 from models.core.errors import InputError
 
 
-def share_beyond(deviation: float, limit: float) -> float:
+def share_beyond(deviation: float, threshold: float) -> float:
     """Share of time for which abs(x) > limit, from the standard deviation of x; the unit of both is that of x."""
-    _check_value(deviation=deviation, limit=limit)
-    return 0.0 if deviation == 0.0 else math.erfc(limit / (math.sqrt(2.0) * deviation))
+    _check_value(deviation=deviation, limit=threshold)
+    return 0.0 if deviation == 0.0 else math.erfc(threshold / (math.sqrt(2.0) * deviation))
 
 
-def exceedances(deviation: float, rate_deviation: float, limit: float) -> float:
+def exceedances(deviation: float, rate_deviation: float, threshold: float) -> float:
     """Number of times per second that abs(x) exceeds the limit, from the standard deviations of x and of its rate x'
     (1/s).
 
     Rice's formula, both sides together: (sd x' / sd x) exp(-limit^2 / (2 sd^2)) / pi.
     """
-    _check_value(deviation=deviation, rate_deviation=rate_deviation, limit=limit)
+    _check_value(deviation=deviation, rate_deviation=rate_deviation, limit=threshold)
     if deviation == 0.0:
         return 0.0
-    return rate_deviation / (math.pi * deviation) * math.exp(-((limit / deviation) ** 2) / 2.0)
+    return rate_deviation / (math.pi * deviation) * math.exp(-((threshold / deviation) ** 2) / 2.0)
 
 
 def dynamic_load_factor(deviation: float, static: float) -> float:
@@ -38,8 +38,8 @@ def dynamic_load_factor(deviation: float, static: float) -> float:
     return deviation / static
 
 
-def _check_value(**given: float) -> None:
+def _check_value(**named_values: float) -> None:
     """Raise InputError for a negative value or one that is not a number."""
-    for name, value in given.items():
+    for name, value in named_values.items():
         if not 0.0 <= value < math.inf:
             raise InputError("", name, value, "must be 0 or more, and finite")

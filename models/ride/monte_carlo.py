@@ -58,8 +58,8 @@ class VarianceEstimate:
         """Standard scores (N, p): the estimate less the variances of the given standard deviations (N, p), divided by
         the standard errors."""
         known = np.isfinite(self.variance)
-        off = np.subtract(self.variance, deviation**2, out=np.zeros_like(self.variance), where=known)
-        return np.divide(off, self.error, out=np.full_like(off, np.nan), where=known)
+        variance_error = np.subtract(self.variance, deviation**2, out=np.zeros_like(self.variance), where=known)
+        return np.divide(variance_error, self.error, out=np.full_like(variance_error, np.nan), where=known)
 
 
 def variances_along_drive(
@@ -118,16 +118,16 @@ def at_constant_speed(
 
 
 def path_cell(
-    lengths: Sequence[float], longest: float, tolerance: float = AXLE_SHIFT_TOLERANCE
+    lengths: Sequence[float], longest_cell: float, tolerance: float = AXLE_SHIFT_TOLERANCE
 ) -> tuple[float, np.ndarray]:
-    """Length (m) of a path cell, at most ``longest``, and by how many cells each axle is behind the first.
+    """Length (m) of a path cell, at most ``longest_cell``, and by how many cells each axle is behind the first.
 
     All distances are whole numbers of cells up to ``tolerance`` (m), the last axle's exactly.
     """
     behind = np.asarray(lengths)
     if behind[-1] == 0.0:
-        return longest, np.zeros(len(behind), int)
-    count = int(np.ceil(behind[-1] / longest))
+        return longest_cell, np.zeros(len(behind), int)
+    count = int(np.ceil(behind[-1] / longest_cell))
     while True:
         cell = behind[-1] / count
         if np.abs(np.rint(behind / cell) * cell - behind).max() <= tolerance:
@@ -157,8 +157,8 @@ class _Cells:
         """Number of cells at a constant speed after which a copy no longer depends on its initial state."""
         slowest = -np.linalg.eigvals(self.at_rest + speed * self.per_speed).real.max()
         if slowest < SLOWEST_DECAY:
-            said = "has a motion that does not die out: a copy never forgets its beginning"
-            raise InputError("", "vehicle", None, said)
+            refusal = "has a motion that does not die out: a copy never forgets its beginning"
+            raise InputError("", "vehicle", None, refusal)
         return int(np.ceil(FORGETTING_EXPONENT / slowest * speed / self.length))
 
     def states(self, durations: np.ndarray, copies: int, seed: int) -> Iterator[np.ndarray]:
@@ -167,14 +167,14 @@ class _Cells:
         k, axles = self.at_unit_speed.B[0].shape[1], len(self.at_unit_speed.B)
         independent = self.at_unit_speed.independent
         draws = _draw_coefficients(seed, copies, k * LEGENDRE_MODES * (axles if independent else 1))
-        last = int(self.shifts[-1])
-        met = deque((next(draws) for _ in range(last)), maxlen=last + 1)
-        x, before = np.zeros((len(self.at_rest), copies)), None
+        last_shift = int(self.shifts[-1])
+        met = deque((next(draws) for _ in range(last_shift)), maxlen=last_shift + 1)
+        x, last_duration = np.zeros((len(self.at_rest), copies)), None
         for duration in durations:
             met.append(next(draws))
-            if duration != before:
+            if duration != last_duration:
                 E, R = self._cell_transition(duration)
-                before = duration
+                last_duration = duration
             noise = [met[-1]] if independent else [met[-1 - shift] for shift in self.shifts]
             x = E @ x + R @ np.concatenate(noise)
             yield x

@@ -98,16 +98,16 @@ def copies_in_time(
     *,
     copies: int = 500,
     seed: int = 0,
-    longest: float | None = None,
+    longest_step: float | None = None,
 ) -> Copies:
     """Run the copies for ``duration`` (s), after a settling time in which they lose the memory of their initial state.
 
-    longest : largest step (s); by itself it comes from the fastest rates.
+    longest_step : largest step (s); by itself it comes from the fastest rates.
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
     check_rates(vehicle, excitation)
     replaced = statistically_linear(vehicle.with_tyres(pushes_only=False), excitation, speed).vehicle
-    road = road_path(excitation, speed, longest or usual_step(vehicle, speed, replaced))
+    road = road_path(excitation, speed, longest_step or usual_step(vehicle, speed, replaced))
     settling, counted = int(np.ceil(settling_time(replaced) / road.step)), int(np.ceil(duration / road.step))
     march = CopiesMarch(vehicle, speed, road.step, copies)
     for number, portion in enumerate(road.blocks(STEPS_PER_BLOCK, copies, seed)):
@@ -124,26 +124,30 @@ RERUN_SHARE = 0.5
 
 
 def coarser_variances(
-    vehicle: SpatialVehicle, excitation: Excitation, speed: float, fine: Copies, times: int, seed: int
+    vehicle: SpatialVehicle, excitation: Excitation, speed: float, fine_copies: Copies, step_factor: int, seed: int
 ) -> np.ndarray:
-    """Variances (k, p) about the means for the first copies, rerun on the same roads with steps 2 or 4 ``times`` as
-    long."""
-    copies = len(fine.moments[0])
-    kept, road = max(1, math.ceil(RERUN_SHARE * copies)), RoadPath(excitation, speed, fine.step / 2.0)
-    settling, counted = fine.settling_steps // times, round(fine.duration / fine.step) // times
-    block, every = STEPS_PER_BLOCK // times, STEPS_PER_READING // times
-    march = CopiesMarch(vehicle, speed, times * fine.step, kept)
+    """Variances (k, p) about the means for the first copies, rerun on the same roads with steps 2 or 4 ``step_factor``
+    as long.
+    """
+    copies = len(fine_copies.moments[0])
+    rerun_copies, road = max(1, math.ceil(RERUN_SHARE * copies)), RoadPath(excitation, speed, fine_copies.step / 2.0)
+    settling, counted = (
+        fine_copies.settling_steps // step_factor,
+        round(fine_copies.duration / fine_copies.step) // step_factor,
+    )
+    block, reading_interval = STEPS_PER_BLOCK // step_factor, STEPS_PER_READING // step_factor
+    march = CopiesMarch(vehicle, speed, step_factor * fine_copies.step, rerun_copies)
     for number, portion in enumerate(road.blocks(STEPS_PER_BLOCK, copies, seed)):
         left = settling + counted - number * block
         march.march_over(
-            portion[: 2 * times * left + 1 : times, :, :kept].copy(),
-            _steps_to_first_output(settling, number * block, every),
-            every,
+            portion[: 2 * step_factor * left + 1 : step_factor, :, :rerun_copies].copy(),
+            _steps_to_first_output(settling, number * block, reading_interval),
+            reading_interval,
         )
         if left <= block:
             break
-    moments = march.sums.swapaxes(1, 2) / len(range(0, counted, every))
-    return replace(fine, moments=moments).about_mean()
+    moments = march.sums.swapaxes(1, 2) / len(range(0, counted, reading_interval))
+    return replace(fine_copies, moments=moments).about_mean()
 
 
 class CopiesMarch:
@@ -270,9 +274,9 @@ def _pushing_tyres(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.n
 def _padded_curves(curves: Sequence[Curve | None]) -> Curves:
     """``Curves`` of the springs, padded with bends of 0; a spring without a curve gets one that is 0 everywhere."""
     known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in curves]
-    most = max((len(corners) for _, _, corners, _ in known), default=0)
+    most_corners = max((len(corners) for _, _, corners, _ in known), default=0)
     offset, slope = np.array([line for *line, _, _ in known], dtype=float).reshape(-1, 2).T.copy()
-    corners, bends = np.zeros((len(known), most)), np.zeros((len(known), most))
-    for i, (_, _, at, bent_by) in enumerate(known):
-        corners[i, : len(at)], bends[i, : len(at)] = at, bent_by
+    corners, bends = np.zeros((len(known), most_corners)), np.zeros((len(known), most_corners))
+    for i, (_, _, corners_of_curve, bent_by) in enumerate(known):
+        corners[i, : len(corners_of_curve)], bends[i, : len(corners_of_curve)] = corners_of_curve, bent_by
     return Curves(offset, slope, corners, bends)

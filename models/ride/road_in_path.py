@@ -55,20 +55,23 @@ def road_in_path(
     at_1, at_2 = (at_speed(vehicle, excitation, v, weightings) for v in (1.0, 2.0))
     first, (m, axles) = 2 * len(vehicle.mass), (len(excitation.F), len(excitation.heights))
     road = np.arange(first, first + axles * m)
-    rest = np.setdiff1d(np.arange(len(at_1.A)), road)
+    other_states = np.setdiff1d(np.arange(len(at_1.A)), road)
     steady, by_speed = 2.0 * at_1.A - at_2.A, at_2.A - at_1.A
-    A = steady[np.ix_(rest, rest)]
+    A = steady[np.ix_(other_states, other_states)]
     known = np.linalg.pinv(np.hstack([excitation.F, excitation.G]))
     T = np.hstack(
         [
-            np.hstack([by_speed[np.ix_(rest, at)], B[rest]]) @ known
-            for at, B in zip(road.reshape(axles, m), at_1.B, strict=True)
+            np.hstack([by_speed[np.ix_(other_states, filter_states)], B[other_states]]) @ known
+            for filter_states, B in zip(road.reshape(axles, m), at_1.B, strict=True)
         ]
     )
     basis = np.zeros_like(at_1.A)
-    basis[rest, : len(rest)], basis[road, len(rest) :] = np.eye(len(rest)), np.eye(len(road))
-    basis[np.ix_(rest, np.arange(len(rest), len(basis)))] = T
-    inputs = steady[np.ix_(rest, road)] + A @ T
+    basis[other_states, : len(other_states)], basis[road, len(other_states) :] = (
+        np.eye(len(other_states)),
+        np.eye(len(road)),
+    )
+    basis[np.ix_(other_states, np.arange(len(other_states), len(basis)))] = T
+    inputs = steady[np.ix_(other_states, road)] + A @ T
     return RoadInPath(
         A,
         inputs.reshape(-1, axles, m),
@@ -107,10 +110,10 @@ class Responses:
         ]
         self.of_length = lru_cache(maxsize=64)(self._of_length)
 
-    def transition(self, start: float, end: float) -> np.ndarray:
+    def transition(self, start_time: float, end_time: float) -> np.ndarray:
         """Transition matrix E (n + a m, n + a m) over a step from start to end (s)."""
-        motion, inputs = self.of_length(round(end - start, 14))
-        driven = self.path(start + (end - start) * np.append(UNIT_POINTS, 1.0)) - self.path(start)
+        motion, inputs = self.of_length(round(end_time - start_time, 14))
+        driven = self.path(start_time + (end_time - start_time) * np.append(UNIT_POINTS, 1.0)) - self.path(start_time)
         decay = (power_terms(driven, SERIES_TERMS) @ self.decay).reshape(-1, self.m)
         E = np.zeros((self.n + self.axles * self.m,) * 2)
         E[: self.n, : self.n] = motion
@@ -126,24 +129,25 @@ class Responses:
         inputs = np.einsum("g,gij,jam->iagm", UNIT_WEIGHTS * length, left, self.form.noise_inputs, optimize=True)
         return expm(self.form.A * length), inputs.reshape(self.n * self.axles, -1)
 
-    def to_noise(self, axle: int, met: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """States (n + a m, L, k) at ``end`` (L,) after a unit of noise that the axle has met at ``met`` (L,), s.
+    def to_noise(self, axle: int, meeting_times: np.ndarray, end_time: np.ndarray) -> np.ndarray:
+        """States (n + a m, L, k) at ``end_time`` (L,) after a unit of noise that the axle has met at ``meeting_times``
+        (L,), s.
 
         Each pair of times lies in one step.
         """
-        left = (end - met)[:, None]
-        driven = self.path(met[:, None] + left * UNIT_POINTS) - self.path(met)[:, None]
+        left = (end_time - meeting_times)[:, None]
+        driven = self.path(meeting_times[:, None] + left * UNIT_POINTS) - self.path(meeting_times)[:, None]
         k = self.noise.shape[1] // self.m
         road = (power_terms(driven, SERIES_TERMS) @ self.noise) * (left * UNIT_WEIGHTS)[..., None]
         weighted = np.swapaxes(power_terms(left * (1.0 - UNIT_POINTS), SERIES_TERMS), 1, 2) @ road
-        out = np.zeros((self.n + self.axles * self.m, len(met), k))
+        responses = np.zeros((self.n + self.axles * self.m, len(meeting_times), k))
         columns = weighted.reshape(-1, SERIES_TERMS, self.m, k).transpose(1, 2, 0, 3).reshape(SERIES_TERMS * self.m, -1)
         motion = self.motion[axle].reshape(SERIES_TERMS, self.n, self.m).transpose(1, 0, 2).reshape(self.n, -1)
-        out[: self.n] = (motion @ columns).reshape(self.n, -1, k)
-        now = power_terms(self.path(end) - self.path(met), SERIES_TERMS) @ self.noise
+        responses[: self.n] = (motion @ columns).reshape(self.n, -1, k)
+        filter_states = power_terms(self.path(end_time) - self.path(meeting_times), SERIES_TERMS) @ self.noise
         rows = slice(self.n + axle * self.m, self.n + (axle + 1) * self.m)
-        out[rows] = now.reshape(-1, self.m, k).transpose(1, 0, 2)
-        return out
+        responses[rows] = filter_states.reshape(-1, self.m, k).transpose(1, 0, 2)
+        return responses
 
 
 def exponential_series(A: np.ndarray, B: np.ndarray) -> np.ndarray:
@@ -154,8 +158,8 @@ def exponential_series(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     return np.stack([row.ravel() for row in rows])
 
 
-def power_terms(t: np.ndarray, count: int) -> np.ndarray:
+def power_terms(t: np.ndarray, term_count: int) -> np.ndarray:
     """t^j / j! along a new last axis, j = 0 to count - 1."""
-    out = np.ones((*np.shape(t), count))
-    out[..., 1:] = np.asarray(t)[..., None] / np.arange(1, count)
-    return np.cumprod(out, axis=-1, out=out)
+    terms = np.ones((*np.shape(t), term_count))
+    terms[..., 1:] = np.asarray(t)[..., None] / np.arange(1, term_count)
+    return np.cumprod(terms, axis=-1, out=terms)

@@ -56,30 +56,33 @@ class RoadPath:
         move, root = _transition_over(F, G, self.speed * self.half)
         lags = np.rint(np.array(self.excitation.lengths) / (self.speed * self.half)).astype(int)
         lags = 0 * lags if self.excitation.independent else lags
-        met, moved = np.empty((0, len(F), copies)), np.empty((len(F), copies))
+        met, buffer = np.empty((0, len(F), copies)), np.empty((len(F), copies))
         while True:
             fresh = 2 * steps + (0 if len(met) else 1 + max(lags))
             drawn = normal_samples(seed, path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
             drawn = np.concatenate(
                 [met[-1:] if len(met) else _stationary_root(F, G) @ drawn[:1].mT, root @ drawn[len(met) == 0 :].mT]
             )
-            for before, after in pairwise(drawn):
-                np.add(after, np.dot(move, before, moved), after)  # two thirds of the time of after += move @ before
+            for last_states, next_states in pairwise(drawn):
+                np.add(
+                    next_states, np.dot(move, last_states, buffer), next_states
+                )  # two thirds of the time of after += move @ before
             met = np.concatenate([met[:-1], drawn])
             yield self._road_under_wheels(F, heights, met, lags, 2 * steps + 1)
             met, path = met[2 * steps :], path + 1
 
     def _road_under_wheels(
-        self, F: np.ndarray, heights: Sequence[np.ndarray], met: np.ndarray, lags: np.ndarray, count: int
+        self, F: np.ndarray, heights: Sequence[np.ndarray], met_states: np.ndarray, lags: np.ndarray, row_count: int
     ) -> np.ndarray:
-        """Heights and rates (count, 2 w, copies) under all wheels, from the filter states ``met`` with each axle's
-        delay."""
-        out = np.zeros((count, 2 * len(heights[0]), met.shape[2]))
+        """Heights and rates (row_count, 2 w, copies) under all wheels, from the filter states ``met_states`` with each
+        axle's delay.
+        """
+        roads = np.zeros((row_count, 2 * len(heights[0]), met_states.shape[2]))
         for lag, H in zip(lags, heights, strict=True):
             rates = self.speed * H @ F if self.has_rates else 0.0 * H
             first = max(lags) - lag
-            out += np.vstack([H, rates]) @ met[first : first + count]
-        return out
+            roads += np.vstack([H, rates]) @ met_states[first : first + row_count]
+        return roads
 
 
 def check_rates(vehicle: SpatialVehicle, excitation: Excitation, file: str = "") -> None:
@@ -94,9 +97,9 @@ def check_rates(vehicle: SpatialVehicle, excitation: Excitation, file: str = "")
         )
 
 
-def road_path(excitation: Excitation, speed: float, longest: float) -> RoadPath:
-    """Road path for runs with steps (s) of at most ``longest``; its half steps divide the axle distances."""
-    return RoadPath(excitation, speed, path_cell(excitation.lengths, speed * longest / 2.0)[0] / speed)
+def road_path(excitation: Excitation, speed: float, longest_step: float) -> RoadPath:
+    """Road path for runs with steps (s) of at most ``longest_step``; its half steps divide the axle distances."""
+    return RoadPath(excitation, speed, path_cell(excitation.lengths, speed * longest_step / 2.0)[0] / speed)
 
 
 def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:

@@ -19,20 +19,22 @@ class SpeedProfile:
     for fewer than two points, times that do not rise, and speeds that are negative or not finite.
     """
 
-    def __init__(self, times: Sequence[float], speeds: Sequence[float], file: str = "", place: str = "drive") -> None:
+    def __init__(
+        self, times: Sequence[float], speeds: Sequence[float], file: str = "", key_path: str = "drive"
+    ) -> None:
         self.times, self.speeds = np.array(times, float), np.array(speeds, float)
         if len(self.times) != len(self.speeds) or len(self.times) < 2:
             sizes = f"{len(self.times)} times, {len(self.speeds)} speeds"
-            raise InputError(file, place, sizes, "must be a table of two points or more, a time and a speed each")
+            raise InputError(file, key_path, sizes, "must be a table of two points or more, a time and a speed each")
         _check_values(
             self.speeds,
             (self.speeds >= 0.0) & np.isfinite(self.speeds),
-            f"{place}.speed",
+            f"{key_path}.speed",
             "must be 0 or above, in m/s: the road is met from one side only",
             file,
         )
         rises = np.append(True, np.diff(self.times) > 0.0) & np.isfinite(self.times)
-        _check_values(self.times, rises, f"{place}.time", "must rise from point to point, in s", file)
+        _check_values(self.times, rises, f"{key_path}.time", "must rise from point to point, in s", file)
         pieces = np.diff(self.times)
         self.accelerations = np.append(np.diff(self.speeds) / pieces, 0.0)
         self.paths = np.append(0.0, np.cumsum(pieces * (self.speeds[1:] + self.speeds[:-1]) / 2.0))
@@ -64,11 +66,11 @@ class SpeedProfile:
         return self.times[piece] + since
 
 
-def _check_values(values: np.ndarray, valid: np.ndarray, place: str, allowed: str, file: str) -> None:
+def _check_values(values: np.ndarray, valid: np.ndarray, key_path: str, allowed: str, file: str) -> None:
     """Raise InputError for the first value that is not valid."""
     if not valid.all():
-        at = int(np.argmin(valid))
-        raise InputError(file, f"{place}.{at}", float(values[at]), allowed)
+        first_wrong = int(np.argmin(valid))
+        raise InputError(file, f"{key_path}.{first_wrong}", float(values[first_wrong]), allowed)
 
 
 GAUSS_NODES = 5
@@ -95,22 +97,25 @@ class Nodes:
 
 def steps(
     profile: SpeedProfile,
-    begin: float,
+    begin_time: float,
     instants: Sequence[float] | np.ndarray,
     motion: float,
     road: float,
-    reach: float,
+    largest_rate_times_step: float,
 ) -> np.ndarray:
-    """Ends (N + 1,) of steps (s) from ``begin`` to the profile's end; its points and ``instants`` are among them.
+    """Ends (N + 1,) of steps (s) from ``begin_time`` to the profile's end; its points and ``instants`` are among them.
 
-    A step times the fastest rate of the motion (1/s) and of the road met (``road`` in 1/m) is at most ``reach``.
+    A step times the fastest rate of the motion (1/s) and of the road met (``road`` in 1/m) is at most
+    ``largest_rate_times_step``.
     """
-    within = [t for t in instants if begin < t < profile.times[-1]]
-    cuts = np.unique(np.concatenate([[begin], profile.times, within]))
+    within = [t for t in instants if begin_time < t < profile.times[-1]]
+    cuts = np.unique(np.concatenate([[begin_time], profile.times, within]))
     ends = [cuts[:1]]
     for start, stop in pairwise(cuts):
         rate = max(motion, road * float(profile.speed(np.array([start, stop])).max()))
-        ends.append(np.linspace(start, stop, max(1, int(np.ceil(rate * (stop - start) / reach))) + 1)[1:])
+        ends.append(
+            np.linspace(start, stop, max(1, int(np.ceil(rate * (stop - start) / largest_rate_times_step))) + 1)[1:]
+        )
     return np.concatenate(ends)
 
 
@@ -124,12 +129,12 @@ def integration_points(profile: SpeedProfile, step_ends: np.ndarray, distances: 
     path, ends_after = profile.path(step_ends), step_ends[step_ends >= profile.times[0]]
     stops = _passing_times(profile, path[profile.speed(step_ends) == 0.0], distances)
     shrinking = (stops[:, None] + np.diff(ends_after).max() * STANDSTILL_CUTS).ravel()
-    more = np.sort(np.concatenate([_passing_times(profile, path, distances), shrinking]))
-    more = more[(more > ends_after[0]) & (more < ends_after[-1])]
-    after = np.searchsorted(ends_after, more)
-    apart = np.minimum(ends_after[after] - more, more - ends_after[after - 1]) > EQUAL_CUTS
-    apart &= np.diff(more, prepend=-np.inf) > EQUAL_CUTS
-    cuts = np.sort(np.concatenate([ends_after, more[apart]]))
+    cell_ends = np.sort(np.concatenate([_passing_times(profile, path, distances), shrinking]))
+    cell_ends = cell_ends[(cell_ends > ends_after[0]) & (cell_ends < ends_after[-1])]
+    next_end = np.searchsorted(ends_after, cell_ends)
+    is_separate = np.minimum(ends_after[next_end] - cell_ends, cell_ends - ends_after[next_end - 1]) > EQUAL_CUTS
+    is_separate &= np.diff(cell_ends, prepend=-np.inf) > EQUAL_CUTS
+    cuts = np.sort(np.concatenate([ends_after, cell_ends[is_separate]]))
     time = cuts[:-1, None] + np.diff(cuts)[:, None] * UNIT_POINTS
     weight = np.diff(cuts)[:, None] * UNIT_WEIGHTS * profile.speed(time)
     moving = weight.any(axis=1)
@@ -137,7 +142,7 @@ def integration_points(profile: SpeedProfile, step_ends: np.ndarray, distances: 
     return Nodes(time, weight, np.searchsorted(step_ends, time, side="right") - 1)
 
 
-def _passing_times(profile: SpeedProfile, places: np.ndarray, distances: Sequence[float]) -> np.ndarray:
+def _passing_times(profile: SpeedProfile, positions: np.ndarray, distances: Sequence[float]) -> np.ndarray:
     """Times (s) at which any axle, one of ``distances`` behind the first, reaches the positions of the first."""
-    different = np.unique(places)
+    different = np.unique(positions)
     return np.concatenate([profile.time(different + distance) for distance in distances] or [np.zeros(0)])

@@ -81,8 +81,12 @@ class StatisticallyLinear:
     @property
     def contraction(self) -> float:
         """Largest ratio of a change to the change one iteration before, among changes above rounding."""
-        seen = [after / before for before, after in pairwise(self.gain_changes) if after > 100.0 * GAIN_TOLERANCE]
-        return max(seen[len(seen) // 2 :], default=0.0)
+        ratios = [
+            change_after / change_before
+            for change_before, change_after in pairwise(self.gain_changes)
+            if change_after > 100.0 * GAIN_TOLERANCE
+        ]
+        return max(ratios[len(ratios) // 2 :], default=0.0)
 
     @property
     def fixed_point_distance(self) -> float:
@@ -98,14 +102,14 @@ def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
 
 
 def statistically_linear(
-    vehicle: SpatialVehicle, excitation: Excitation, speed: float, scale: float = 1.0
+    vehicle: SpatialVehicle, excitation: Excitation, speed: float, start_scale: float = 1.0
 ) -> StatisticallyLinear:
     """Linearise the nonlinear springs of a vehicle statistically, on a road at a constant speed (m/s).
 
-    scale : of the travels and rates that the first gains are taken at. Where different ones lead to different fixed
-        points, the vehicle has several ways to move, and no one covariance.
-    InputError for tyres that may lift, which nothing linear stands for.
-    Raises Unstable where a replaced vehicle leaves its equilibrium on its own, RunFailed where no fixed point is found.
+    start_scale : of the travels and rates that the first gains are taken at. Where different ones lead to different
+        fixed points, the vehicle has several ways to move, and no one covariance. InputError for tyres that may lift,
+        which nothing linear stands for. Raises Unstable where a replaced vehicle leaves its equilibrium on its own,
+        RunFailed where no fixed point is found.
     """
     if vehicle.lifts:
         raise InputError(
@@ -114,7 +118,7 @@ def statistically_linear(
             None,
             "may lift, and no linear vehicle stands for that: take copies in time, or tyres that stay on the road",
         )
-    return _Search(vehicle, excitation, speed).iterate_to_fixed_point(scale)
+    return _Search(vehicle, excitation, speed).iterate_to_fixed_point(start_scale)
 
 
 Law = tuple[float, float, float]
@@ -144,17 +148,17 @@ class _Search:
         with_forces = self.plain.outputs[len(vehicle.outputs) :][: len(self.springs)]
         self.rows = np.array([output.displacement_factors for output in with_forces]).reshape(-1, len(self.plain.mass))
 
-    def iterate_to_fixed_point(self, scale: float) -> StatisticallyLinear:
+    def iterate_to_fixed_point(self, start_scale: float) -> StatisticallyLinear:
         """Iterate the gains to the fixed point; returns the linearised vehicle."""
         count = len(self.springs)
         first = _Moments(
             np.zeros(count),
-            np.full(count, scale * FIRST_TRAVEL_DEVIATION),
-            np.full(count, scale * FIRST_RATE_DEVIATION),
+            np.full(count, start_scale * FIRST_TRAVEL_DEVIATION),
+            np.full(count, start_scale * FIRST_RATE_DEVIATION),
         )
         gains, position = self._equivalent_gains(first), np.zeros(len(self.plain.mass))
         changes: list[float] = []
-        part = 1.0
+        relaxation_factor = 1.0
         while not changes or changes[-1] > GAIN_TOLERANCE:
             moments, position = self._spring_moments(gains, position)
             wanted = self._equivalent_gains(moments)
@@ -166,8 +170,8 @@ class _Search:
                     "iterations: the vehicle has no one way to move on this road",
                 )
             if len(changes) > 1 and changes[-1] > 0.9 * changes[-2] and changes[-1] > GAIN_TOLERANCE:
-                part = max(0.5 * part, 0.1)
-            gains = gains + part * (wanted - gains)
+                relaxation_factor = max(0.5 * relaxation_factor, 0.1)
+            gains = gains + relaxation_factor * (wanted - gains)
         return self._result(gains, moments, position, changes)
 
     def _equivalent_gains(self, moments: _Moments) -> np.ndarray:
@@ -179,8 +183,8 @@ class _Search:
     def _linearised_laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
         """Statistical linearisation of each spring's laws over travel and over rate: mean force, gain, and variance of
         the force that the gain does not represent."""
-        moved = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
-        return [(of_travel(s, mean, travel), of_rate(s, rate)) for s, mean, travel, rate in moved]
+        moments_by_spring = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
+        return [(of_travel(s, mean, travel), of_rate(s, rate)) for s, mean, travel, rate in moments_by_spring]
 
     def _linearised_vehicle(self, gains: np.ndarray, vehicle: SpatialVehicle) -> LinearVehicle:
         named = {s.name: (float(k), float(c)) for s, (k, c) in zip(self.springs, gains, strict=True)}
@@ -220,8 +224,8 @@ class _Search:
         covariance = stationary_covariance(system)
         left = self._left_out(linear, moments, system, covariance)
         springs = {s.name: self._spring_in_motion(i, gains[i], moments) for i, s in enumerate(self.springs)}
-        told = zip(covariance.names, left, covariance.status, strict=True)
-        sentences = tuple(_left_out_sentence(*each) for each in told)
+        outputs = zip(covariance.names, left, covariance.status, strict=True)
+        sentences = tuple(_left_out_sentence(*output) for output in outputs)
         return StatisticallyLinear(
             linear,
             system,
@@ -297,30 +301,30 @@ def _corner_frequency(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
 def _vehicle_under_forces(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> LinearVehicle:
     """The vehicle excited by forces along rows (f, n) instead of road heights; ``reading`` (p, f): direct effect of the
     forces on the outputs."""
-    none = np.zeros(len(rows))
+    no_roads = np.zeros(len(rows))
     outputs = tuple(
-        Output(o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, none)
+        Output(o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, no_roads)
         for o, read in zip(linear.outputs, reading, strict=True)
     )
     wheels = tuple(WheelPosition(str(i), 0.0, 0.0, 0) for i in range(len(rows)))
     return replace(linear, road_stiffness=-rows.T, road_damping=np.zeros(rows.T.shape), wheels=wheels, outputs=outputs)
 
 
-def _largest_gain_change(wanted: np.ndarray, gains: np.ndarray) -> float:
+def _largest_gain_change(wanted_gains: np.ndarray, gains: np.ndarray) -> float:
     """Largest relative change of a gain; a very small gain is related to the largest gain of its kind instead."""
-    size = np.maximum(abs(wanted), 1e-6 * abs(wanted).max(axis=0, initial=np.finfo(float).tiny))
-    return float((abs(wanted - gains) / size).max(initial=0.0))
+    size = np.maximum(abs(wanted_gains), 1e-6 * abs(wanted_gains).max(axis=0, initial=np.finfo(float).tiny))
+    return float((abs(wanted_gains - gains) / size).max(initial=0.0))
 
 
 def _left_out_sentence(name: str, share: float, status: str) -> str:
     """Sentence on how much the neglected share of force may change an output's standard deviation."""
     if status != "finite":
         return f"{name}: {status}, so that there is no deviation to judge"
-    said = f"{name}: forces that the replaced springs leave out would add {100 * share:.2g} % to its variance: "
-    for most, error, shape in ERROR_GRADES:
-        if share <= most:
-            return said + f"its deviation is good to {100 * error:.0f} %, and {shape}"
-    return said + (
+    opening = f"{name}: forces that the replaced springs leave out would add {100 * share:.2g} % to its variance: "
+    for largest_share, error, shape in ERROR_GRADES:
+        if share <= largest_share:
+            return opening + f"its deviation is good to {100 * error:.0f} %, and {shape}"
+    return opening + (
         f"the covariance is no longer good (deviations were found up to {100 * EXTRAPOLATION_ERROR:.0f} % off, and far "
         "from Gaussian): take Monte Carlo"
     )
@@ -328,4 +332,4 @@ def _left_out_sentence(name: str, share: float, status: str) -> str:
 
 def promised_error(share: float) -> float:
     """Relative error of an output's standard deviation that tests found not to be exceeded at this left-out share."""
-    return next((error for most, error, _ in ERROR_GRADES if share <= most), EXTRAPOLATION_ERROR)
+    return next((error for largest_share, error, _ in ERROR_GRADES if share <= largest_share), EXTRAPOLATION_ERROR)

@@ -83,7 +83,7 @@ def variance_sweep(
             points.append(point)
     shape = (len(speeds), len(excitations), -1)
     variance, status, reason = (
-        np.array(each).reshape(shape).swapaxes(0, 1).copy() for each in zip(*points, strict=True)
+        np.array(per_speed).reshape(shape).swapaxes(0, 1).copy() for per_speed in zip(*points, strict=True)
     )
     units = *(output.unit for output in linear.outputs), *["m/s^2"] * len(filters or {})
     return Sweep(tuple(excitations), np.array(speeds), system.names, units, variance, status, reason, direct)
@@ -111,9 +111,9 @@ def _fast_variances(
     quick = modal_variances(system, states, excitation.F, speed, shared)
     if isinstance(quick, str):
         return quick
-    none = Growth(np.zeros(len(system.C)), np.zeros(len(system.C), int))
+    no_growth = Growth(np.zeros(len(system.C)), np.zeros(len(system.C), int))
     status, reason = variance_verdicts(
-        noise_arrivals(system).D, quick.variance, quick.rounding_floor, none, quick.fastest_rate, accuracy
+        noise_arrivals(system).D, quick.variance, quick.rounding_floor, no_growth, quick.fastest_rate, accuracy
     )
     finite = np.array(status) == FINITE
     if (quick.relative_error[finite] > LARGEST_FAST_ERROR).any():
@@ -143,14 +143,17 @@ def modes(A: np.ndarray) -> Modes:
     count, label = connected_components(A != 0, directed=False)
     values, V, inverse = (np.zeros(shape, complex) for shape in (len(A), A.shape, A.shape))
     worst = 1.0
-    for part in range(count):
-        at = np.flatnonzero(label == part)
-        balanced, (scale, _) = matrix_balance(A[np.ix_(at, at)], permute=False, separate=True)
-        values[at], vectors = np.linalg.eig(balanced)
+    for block in range(count):
+        block_indices = np.flatnonzero(label == block)
+        balanced, (scale, _) = matrix_balance(A[np.ix_(block_indices, block_indices)], permute=False, separate=True)
+        values[block_indices], vectors = np.linalg.eig(balanced)
         worst = max(worst, np.linalg.cond(vectors))
         if not np.isfinite(worst) or worst * EPS > 1:
             return Modes(A, values, V, inverse, np.inf)
-        V[np.ix_(at, at)], inverse[np.ix_(at, at)] = scale[:, None] * vectors, np.linalg.inv(vectors) / scale
+        V[np.ix_(block_indices, block_indices)], inverse[np.ix_(block_indices, block_indices)] = (
+            scale[:, None] * vectors,
+            np.linalg.inv(vectors) / scale,
+        )
     return Modes(A, values, V, inverse, worst)
 
 
@@ -196,30 +199,34 @@ def modal_variances(
     the states of weightings stand last.
     """
     axles = len(system.B)
-    last = vehicle + axles * len(road)
+    first_weighting_state = vehicle + axles * len(road)
     A = system.A
     vehicle_modes = shared.of(A[:vehicle, :vehicle])
     path = shared.of(road)
-    behind = shared.of(A[last:, last:])
-    if max(each.condition for each in (vehicle_modes, path, behind)) * EPS > 1e-6:
+    behind = shared.of(A[first_weighting_state:, first_weighting_state:])
+    if max(mode_set.condition for mode_set in (vehicle_modes, path, behind)) * EPS > 1e-6:
         return "eigenvectors are nearly parallel"
     values = [vehicle_modes.values, np.tile(speed * path.values, axles), behind.values]
-    if max(each.real.max(initial=-np.inf) for each in values) > -1e-6:
+    if max(mode_set.real.max(initial=-np.inf) for mode_set in values) > -1e-6:
         return "a motion does not die out"
-    if max(each.rate_rounding for each in (vehicle_modes, path, behind)) > LARGEST_RATE_ROUNDING:
+    if max(mode_set.rate_rounding for mode_set in (vehicle_modes, path, behind)) > LARGEST_RATE_ROUNDING:
         return "rates lie too far apart"
     V, back = np.kron(np.eye(axles), path.V), np.kron(np.eye(axles), path.inverse)
     with np.errstate(divide="ignore", invalid="ignore"):
-        met = _coupling_solution(vehicle_modes, A[:vehicle, vehicle:last] @ V, values[1])
-        felt = _coupling_solution(behind, A[last:, :vehicle] @ vehicle_modes.V, values[0])
-        heard = _coupling_solution(behind, A[last:, :vehicle] @ met + A[last:, vehicle:last] @ V, values[1])
-    C0, C1, C2 = system.C[:, :vehicle], system.C[:, vehicle:last], system.C[:, last:]
+        met = _coupling_solution(vehicle_modes, A[:vehicle, vehicle:first_weighting_state] @ V, values[1])
+        felt = _coupling_solution(behind, A[first_weighting_state:, :vehicle] @ vehicle_modes.V, values[0])
+        heard = _coupling_solution(
+            behind,
+            A[first_weighting_state:, :vehicle] @ met + A[first_weighting_state:, vehicle:first_weighting_state] @ V,
+            values[1],
+        )
+    C0, C1, C2 = system.C[:, :vehicle], system.C[:, vehicle:first_weighting_state], system.C[:, first_weighting_state:]
     C = np.hstack([C0 @ vehicle_modes.V + C2 @ felt, C0 @ met + C1 @ V + C2 @ heard, C2 @ behind.V])
     arrivals, inputs = noise_arrivals(system), []
     for b in arrivals.B:
-        of_road = back @ b[vehicle:last]
+        of_road = back @ b[vehicle:first_weighting_state]
         of_vehicle = vehicle_modes.inverse @ (b[:vehicle] - met @ of_road)
-        of_weighting = behind.inverse @ (b[last:] - felt @ of_vehicle - heard @ of_road)
+        of_weighting = behind.inverse @ (b[first_weighting_state:] - felt @ of_vehicle - heard @ of_road)
         inputs.append(np.vstack([of_vehicle, of_road, of_weighting]))
     condition = vehicle_modes.condition * path.condition * behind.condition
     return _variance_sum(np.concatenate(values), C, inputs, arrivals.delays, arrivals.independent, condition)
@@ -234,12 +241,12 @@ def _variance_sum(
     s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool, condition: float
 ) -> ModalVariances | str:
     """Variances of y = C x for modes x_m' = s_m x_m + noise through the inputs, summed over the hits."""
-    before = np.zeros_like(inputs[0])
+    earlier_responses = np.zeros_like(inputs[0])
     Q = np.zeros((len(s), len(s)), complex)
     for j, b in enumerate(inputs):
         if j and not independent:
-            before = np.exp(s * (delays[j] - delays[j - 1]))[:, None] * (before + inputs[j - 1])
-        Q += b @ b.conj().T + before @ b.conj().T + b @ before.conj().T
+            earlier_responses = np.exp(s * (delays[j] - delays[j - 1]))[:, None] * (earlier_responses + inputs[j - 1])
+        Q += b @ b.conj().T + earlier_responses @ b.conj().T + b @ earlier_responses.conj().T
     P = -Q / (s[:, None] + s.conj())
     variance = ((C @ P) * C.conj()).sum(axis=1).real
     size = ((abs(C) @ abs(P)) * abs(C)).sum(axis=1)

@@ -73,7 +73,7 @@ def varying_speed(
     weightings: Mapping[str, str] | None = None,
     instants: Sequence[float] | np.ndarray = (),
     accuracy: float = MATRIX_ACCURACY,
-    reach: float = LARGEST_RATE_TIMES_STEP,
+    largest_rate_times_step: float = LARGEST_RATE_TIMES_STEP,
 ) -> VaryingSpeed:
     """Standard deviations along a drive that begins in the stationary state of its first speed, or at rest.
 
@@ -85,7 +85,7 @@ def varying_speed(
     weightings : weighted outputs to add, as in ``weighting.weighted``
     instants : times (s) within the drive that shall be among those of the result
     accuracy : of the vehicle's matrices, relative, as in ``stationary_covariance``
-    reach : fastest rate times step; the change at half of it tells the error
+    largest_rate_times_step : fastest rate times step; the change at half of it tells the error
 
     Raises
     ------
@@ -102,16 +102,23 @@ def varying_speed(
     else:
         P = stationary_covariance(at_speed(vehicle, excitation, first, weightings), accuracy).P
         P = np.linalg.solve(form.basis, np.linalg.solve(form.basis, P).T)
-    seen = [_all_variances(form, P, first, status)]
+    rows_of_results = [_all_variances(form, P, first, status)]
     time = [profile.times[0]]
-    moments = _covariance_by_step(form, profile, P, instants, reach)
+    moments = _covariance_by_step(form, profile, P, instants, largest_rate_times_step)
     for end, P in moments:
         time.append(end)
-        seen.append(_all_variances(form, P, float(profile.speed(np.array(end))), status))
-    deviation, height = np.split(np.sqrt(seen), [len(status)], axis=1)
-    at = np.array(time)
+        rows_of_results.append(_all_variances(form, P, float(profile.speed(np.array(end))), status))
+    deviation, height = np.split(np.sqrt(rows_of_results), [len(status)], axis=1)
+    end_time_array = np.array(time)
     return VaryingSpeed(
-        form.names, status, at, profile.path(at), profile.speed(at), deviation, height, form.basis @ P @ form.basis.T
+        form.names,
+        status,
+        end_time_array,
+        profile.path(end_time_array),
+        profile.speed(end_time_array),
+        deviation,
+        height,
+        form.basis @ P @ form.basis.T,
     )
 
 
@@ -129,21 +136,27 @@ def quasi_stationary(
     Errors are those of ``varying_speed``.
     """
     form = road_in_path(vehicle, excitation, weightings)
-    different, which = np.unique(speeds, return_inverse=True)
+    different, index_of_speed = np.unique(speeds, return_inverse=True)
     moving = different > 0.0
     deviations = np.empty((len(different), len(form.names)))
     if moving.any():
-        over = variance_sweep(lambda _: vehicle, {"road": excitation}, different[moving].tolist(), weightings, accuracy)
-        deviations[moving] = over.deviation[0]
+        sweep = variance_sweep(
+            lambda _: vehicle, {"road": excitation}, different[moving].tolist(), weightings, accuracy
+        )
+        deviations[moving] = sweep.deviation[0]
     if not moving.all():
         deviations[~moving] = np.sqrt(
             _all_variances(form, _standing_covariance(form), 0.0, [FINITE] * len(form.names))
         )[: len(form.names)]
-    return deviations[which]
+    return deviations[index_of_speed]
 
 
 def _covariance_by_step(
-    road_in_path: RoadInPath, profile: SpeedProfile, P: np.ndarray, instants: Sequence[float] | np.ndarray, reach: float
+    road_in_path: RoadInPath,
+    profile: SpeedProfile,
+    P: np.ndarray,
+    instants: Sequence[float] | np.ndarray,
+    largest_rate_times_step: float,
 ) -> Iterator[tuple[float, np.ndarray]]:
     """End of each step of the drive and the covariance there, starting from P.
 
@@ -151,11 +164,11 @@ def _covariance_by_step(
     """
     road, first = road_in_path.excitation, float(profile.speeds[0])
     pairs = [] if road.independent else list(combinations(range(len(road.lengths)), 2))
-    apart = [road.lengths[j] - road.lengths[i] for i, j in pairs]
-    lead = max(apart, default=0.0) / first if first else 0.0
+    axle_distances = [road.lengths[j] - road.lengths[i] for i, j in pairs]
+    lead = max(axle_distances, default=0.0) / first if first else 0.0
     motion, path = (float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in (road_in_path.A, road.F))
-    ends = steps(profile, profile.times[0] - lead, instants, motion, path, reach)
-    points = integration_points(profile, ends, sorted({distance for distance in apart if distance}))
+    ends = steps(profile, profile.times[0] - lead, instants, motion, path, largest_rate_times_step)
+    points = integration_points(profile, ends, sorted({distance for distance in axle_distances if distance}))
     responses = Responses(road_in_path, profile)
     hits = [_NoiseMet(responses, axle, points.time, ends) for axle in range(len(road.heights))]
     queues = [_Queue(responses, i, j, points.time, ends) for i, j in pairs]
@@ -187,13 +200,13 @@ class _NoiseMet:
     def of(self, step: int) -> np.ndarray:
         """Responses (n, c, k) to the noise met in a step."""
         block = step // STEPS_PER_BLOCK
-        last = min((block + 1) * STEPS_PER_BLOCK, len(self.ends) - 1)
+        last_step = min((block + 1) * STEPS_PER_BLOCK, len(self.ends) - 1)
         begin = self.first[block * STEPS_PER_BLOCK]
         if block != self.block:
-            time = self.time[begin : self.first[last]]
+            time = self.time[begin : self.first[last_step]]
             end = np.repeat(
-                self.ends[block * STEPS_PER_BLOCK + 1 : last + 1],
-                np.diff(self.first[block * STEPS_PER_BLOCK : last + 1]),
+                self.ends[block * STEPS_PER_BLOCK + 1 : last_step + 1],
+                np.diff(self.first[block * STEPS_PER_BLOCK : last_step + 1]),
             )
             self.made, self.block = self.responses.to_noise(self.axle, time, end), block
         return self.made[:, self.first[step] - begin : self.first[step + 1] - begin]
@@ -202,32 +215,34 @@ class _NoiseMet:
 class _Queue:
     """Responses (n, q, k) to noise that one axle has already met and the ``last`` axle will meet at given times (s)."""
 
-    def __init__(self, responses: Responses, axle: int, last: int, time: np.ndarray, step_ends: np.ndarray) -> None:
-        profile, form, self.last = responses.profile, responses.form, last
-        distance = form.excitation.lengths[last] - form.excitation.lengths[axle]
-        place = profile.path(time) - distance
-        met = profile.time(place) if distance else time
-        before = np.isneginf(met)
-        self.waiting = _delayed_responses(form, axle, -place[before])
-        self.met = _NoiseMet(responses, axle, met[~before], step_ends)
+    def __init__(
+        self, responses: Responses, axle: int, last_axle: int, time: np.ndarray, step_ends: np.ndarray
+    ) -> None:
+        profile, form, self.last = responses.profile, responses.form, last_axle
+        distance = form.excitation.lengths[last_axle] - form.excitation.lengths[axle]
+        position = profile.path(time) - distance
+        met = profile.time(position) if distance else time
+        is_before_start = np.isneginf(met)
+        self.waiting = _delayed_responses(form, axle, -position[is_before_start])
+        self.met = _NoiseMet(responses, axle, met[~is_before_start], step_ends)
 
     def move(self, E: np.ndarray, step: int) -> None:
         """Advance all responses by one step, and add those to noise that is met within the step."""
         n, _, k = self.waiting.shape
-        moved = (E @ self.waiting.reshape(n, -1)).reshape(n, -1, k)
-        self.waiting = np.concatenate([moved, self.met.of(step)], axis=1)
+        moved_responses = (E @ self.waiting.reshape(n, -1)).reshape(n, -1, k)
+        self.waiting = np.concatenate([moved_responses, self.met.of(step)], axis=1)
 
-    def take(self, count: int) -> np.ndarray:
-        """Remove the first ``count`` entries from the queue and return them."""
-        taken, self.waiting = self.waiting[:, :count], self.waiting[:, count:]
-        return taken
+    def take(self, response_count: int) -> np.ndarray:
+        """Remove the first ``response_count`` entries from the queue and return them."""
+        removed, self.waiting = self.waiting[:, :response_count], self.waiting[:, response_count:]
+        return removed
 
 
-def _sum_of_products(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _sum_of_products(first_responses: np.ndarray, second_responses: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Sum over points and channels of the products of two responses, both (n, c, k), weighted with the points' weights
     (c,)."""
-    n = len(first)
-    return (first * weight[:, None]).reshape(n, -1) @ second.reshape(n, -1).T
+    n = len(first_responses)
+    return (first_responses * weight[:, None]).reshape(n, -1) @ second_responses.reshape(n, -1).T
 
 
 def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
@@ -238,9 +253,9 @@ def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) 
     n, axles, m = road_in_path.noise_inputs.shape
     if not len(behind):
         return np.zeros((n + axles * m, 0, G.shape[1]))  # of a vehicle that may know no rest
-    after = np.zeros((axles * m, len(behind), G.shape[1]))
-    after[axle * m : (axle + 1) * m] = road.transpose(1, 0, 2)
-    return np.tensordot(_state_at_rest(road_in_path), after, 1)
+    initial_states = np.zeros((axles * m, len(behind), G.shape[1]))
+    initial_states[axle * m : (axle + 1) * m] = road.transpose(1, 0, 2)
+    return np.tensordot(_state_at_rest(road_in_path), initial_states, 1)
 
 
 def _state_at_rest(road_in_path: RoadInPath) -> np.ndarray:
@@ -268,8 +283,8 @@ def _standing_covariance(road_in_path: RoadInPath) -> np.ndarray:
             if i == j or not road.independent:
                 P[i, :, j] = expm(road.F * (road.lengths[j] - road.lengths[i])) @ stationary
                 P[j, :, i] = P[i, :, j].T
-    rest = _state_at_rest(road_in_path)
-    return rest @ P.reshape(rest.shape[1], -1) @ rest.T
+    rest_response = _state_at_rest(road_in_path)
+    return rest_response @ P.reshape(rest_response.shape[1], -1) @ rest_response.T
 
 
 def _all_variances(road_in_path: RoadInPath, P: np.ndarray, speed: float, status: Sequence[str]) -> np.ndarray:

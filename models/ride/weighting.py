@@ -36,31 +36,31 @@ class Weighting:
 
     def response(self, frequency: np.ndarray) -> np.ndarray:
         """Complex frequency response at frequencies (Hz), from the sections' formulas."""
-        out = np.ones(np.shape(frequency), complex)
+        transfer = np.ones(np.shape(frequency), complex)
         for section in self.sections:
             p = 1j * np.asarray(frequency) / section.frequency
             n0, n1, n2 = section.numerator
-            out *= (n0 + n1 * p + n2 * p**2) / (1.0 + p / section.quality + p**2)
-        return out
+            transfer *= (n0 + n1 * p + n2 * p**2) / (1.0 + p / section.quality + p**2)
+        return transfer
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """State-space form A (n, n), B (n,), C (n,) of x' = A x + B u, y = C x, with n = 2 per section and no direct
         transmission."""
         size = 2 * len(self.sections)
         A, B = np.zeros((size, size)), np.zeros(size)
-        before, direct = np.zeros(size), 1.0  # what reaches the next section: before . x + direct u
+        input_row, direct = np.zeros(size), 1.0  # what reaches the next section: before . x + direct u
         for i, section in enumerate(self.sections):
             rate = 2.0 * math.pi * section.frequency
             x, v = 2 * i, 2 * i + 1  # p^2 x = before - x - p x / quality, v = p x
             A[x, v] = rate
-            A[v] += rate * before
+            A[v] += rate * input_row
             A[v, x], A[v, v] = -rate, -rate / section.quality
             B[v] = rate * direct
             n0, n1, n2 = section.numerator
-            before = n2 * before
-            before[x], before[v] = n0 - n2, n1 - n2 / section.quality
+            input_row = n2 * input_row
+            input_row[x], input_row[v] = n0 - n2, n1 - n2 / section.quality
             direct = n2 * direct
-        return A, B, before
+        return A, B, input_row
 
 
 def weighting_of_standard(
@@ -131,6 +131,6 @@ def total_value(accelerations: Mapping[str, float], factors: Mapping[str, float]
     return math.sqrt(sum((factors[axis] * value) ** 2 for axis, value in accelerations.items()))
 
 
-def _block_columns(parts: Sequence[np.ndarray]) -> np.ndarray:
+def _block_columns(column_vectors: Sequence[np.ndarray]) -> np.ndarray:
     """Block-diagonal matrix in which each given vector is one column."""
-    return block_diag(*(part[:, None] for part in parts))
+    return block_diag(*(vector[:, None] for vector in column_vectors))

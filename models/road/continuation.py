@@ -27,42 +27,48 @@ MOST_POINTS = 5_000_000
 """Longest mirrored road, in points: about 400 MB with its coefficients and the fit."""
 
 
-def continued_road(profile: RoadProfile, rule: str, needed: float, file: object = "") -> RoadProfile:
-    """Road that reaches at least to ``needed``, or an error; a road that is long enough comes back as it is.
+def continued_road(
+    profile: RoadProfile, continuation_rule: str, needed_distance: float, file: object = ""
+) -> RoadProfile:
+    """Road that reaches at least to ``needed_distance``, or an error; a road that is long enough comes back as it is.
 
     Parameters
     ----------
     profile : any road; one without end is never changed
-    rule : "mirrored" or "refused", see the top of this file
-    needed : last arc length that the run reads, m
+    continuation_rule : "mirrored" or "refused", see the top of this file
+    needed_distance : last arc length that the run reads, m
     file : the user's file, for the message
 
     Raises
     ------
     InputError : unknown rule; the road is too short and the rule is "refused"
     """
-    if rule not in CONTINUATION_RULES:
-        raise InputError(file, "continuation", rule, "must be a rule for what follows a road's end", CONTINUATION_RULES)
-    if not math.isfinite(needed):
-        raise InputError(file, "distance", needed, "must be a finite distance in m")
-    if not isinstance(profile, SplineProfile) or needed <= profile.end + OVERRUN_SHARE * (profile.end - profile.start):
+    if continuation_rule not in CONTINUATION_RULES:
+        raise InputError(
+            file, "continuation", continuation_rule, "must be a rule for what follows a road's end", CONTINUATION_RULES
+        )
+    if not math.isfinite(needed_distance):
+        raise InputError(file, "distance", needed_distance, "must be a finite distance in m")
+    if not isinstance(profile, SplineProfile) or needed_distance <= profile.end + OVERRUN_SHARE * (
+        profile.end - profile.start
+    ):
         return profile
-    if rule == "refused":
-        allowed = f"the road ends at s = {profile.end:.6g} m and the run needs {needed:.6g} m"
+    if continuation_rule == "refused":
+        allowed = f"the road ends at s = {profile.end:.6g} m and the run needs {needed_distance:.6g} m"
         raise InputError(file, profile.name, None, f"{allowed}: shorten the run or declare continuation 'mirrored'")
-    station, height = _mirrored_points(profile, needed, file)
+    station, height = _mirrored_points(profile, needed_distance, file)
     longer = type(profile).through(station, height, f"{profile.name}, mirrored")
     return replace(longer, window_length=profile.window_length)
 
 
-def _mirrored_points(profile: SplineProfile, needed: float, file: object) -> tuple[np.ndarray, np.ndarray]:
-    """Stations and heights of the road, reflected at its ends repeatedly until it reaches ``needed``."""
+def _mirrored_points(profile: SplineProfile, needed_distance: float, file: object) -> tuple[np.ndarray, np.ndarray]:
+    """Stations and heights of the road, reflected at its ends repeatedly until it reaches ``needed_distance``."""
     station, height = profile.points
     gaps, length = np.diff(station), profile.end - profile.start
-    copies = math.ceil((needed - profile.start) / length)
+    copies = math.ceil((needed_distance - profile.start) / length)
     if copies * gaps.size > MOST_POINTS:
         allowed = f"mirroring {profile.name!r} that far takes more than {MOST_POINTS} points"
-        raise InputError(file, "distance (m)", needed, allowed)
+        raise InputError(file, "distance (m)", needed_distance, allowed)
     stations, heights = [station], [height]
     for i in range(1, copies):
         points, back = (station, height), (profile.end - (station[::-1] - profile.start), height[::-1])
@@ -93,9 +99,9 @@ def run_in(profile: SplineProfile, length: float = RUN_IN, reference: float | No
     """
     mean = reference_height(profile, length)  # also checks the length
     level = mean if reference is None else float(reference)
-    moved = profile.coefficients.copy()
-    moved[:, 3] -= level
-    return replace(profile, coefficients=moved, window_length=float(length))
+    coefficients = profile.coefficients.copy()
+    coefficients[:, 3] -= level
+    return replace(profile, coefficients=coefficients, window_length=float(length))
 
 
 def reference_height(profile: SplineProfile, length: float = RUN_IN) -> float:

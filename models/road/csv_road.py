@@ -47,7 +47,7 @@ def read_csv_road(path: str | Path, track: str = "mean") -> SplineProfile:
 
 def read_csv_tracks(path: str | Path) -> tuple[SplineProfile, SplineProfile]:
     """Left and right track of a CSV file; file, frame and errors as in :func:`read_csv_road`."""
-    table = read_table(path, _ROAD_COLUMNS, increasing="s", least=4)
+    table = read_table(path, _ROAD_COLUMNS, increasing="s", least_rows=4)
     station = table["s"] - table["s"][0]
     name = Path(path).name
     return _track_profile(station, table["left"], f"{name}, left"), _track_profile(
@@ -55,5 +55,5 @@ def read_csv_tracks(path: str | Path) -> tuple[SplineProfile, SplineProfile]:
     )
 
 
-def _track_profile(station: np.ndarray, up: np.ndarray, name: str) -> SplineProfile:
-    return SplineProfile.through(station, -up, name)
+def _track_profile(stations: np.ndarray, up: np.ndarray, name: str) -> SplineProfile:
+    return SplineProfile.through(stations, -up, name)

@@ -63,13 +63,22 @@ def fit_road(
     height = max(float(np.abs(tracks.left).max()), float(np.abs(tracks.right).max()))
     if float(np.ptp(tracks.left + tracks.right)) <= 1e-12 * height:
         raise InputError(tracks.name, "heights", None, "left and right have the same mean all along: there is no road")
-    least = 2.0 * float(measured.wavenumber[0]) if low is None else low
-    most = min(HIGHEST_WAVENUMBER, 0.5 * float(measured.wavenumber[-1])) if high is None else high
-    mean = _fit_first_order(measured.wavenumber, measured.mean, measured.degrees_of_freedom, least, most, tracks.name)
-    apart = float(np.abs(tracks.left - tracks.right).max())
+    low_wavenumber = 2.0 * float(measured.wavenumber[0]) if low is None else low
+    high_wavenumber = min(HIGHEST_WAVENUMBER, 0.5 * float(measured.wavenumber[-1])) if high is None else high
+    mean = _fit_first_order(
+        measured.wavenumber, measured.mean, measured.degrees_of_freedom, low_wavenumber, high_wavenumber, tracks.name
+    )
+    track_difference = float(np.abs(tracks.left - tracks.right).max())
     roll = (
-        _fit_first_order(measured.wavenumber, measured.roll, measured.degrees_of_freedom, least, most, tracks.name)
-        if apart > 0.0
+        _fit_first_order(
+            measured.wavenumber,
+            measured.roll,
+            measured.degrees_of_freedom,
+            low_wavenumber,
+            high_wavenumber,
+            tracks.name,
+        )
+        if track_difference > 0.0
         else None
     )
     silent = ShapeFilter(mean.filter.corner, 0.0)
@@ -117,11 +126,11 @@ def _band_averages(
     edges = np.geomspace(low, high, count + 1)
     middles, values = [], []
     for start, end in itertools.pairwise(edges):
-        inside = (k >= start) & (k < end)
-        if inside.any():
-            half = freedom * inside.sum() / 2.0
-            middle = float(np.exp(np.log(k[inside]).mean()))
-            flat = float(np.mean(density[inside] * k[inside] ** 2))
+        in_band = (k >= start) & (k < end)
+        if in_band.any():
+            half = freedom * in_band.sum() / 2.0
+            middle = float(np.exp(np.log(k[in_band]).mean()))
+            flat = float(np.mean(density[in_band] * k[in_band] ** 2))
             middles.append(middle)
             values.append(math.log(flat / middle**2) - (digamma(half) - math.log(half)))
     return np.array(middles), np.array(values)
@@ -129,11 +138,11 @@ def _band_averages(
 
 def _data_limit_sentences(tracks: MeasuredTracks, spectra: TrackSpectra) -> list[str]:
     """Sentences on limits of the data that no fit can remove."""
-    least = spectra.wavenumber[0]
+    lowest_wavenumber = spectra.wavenumber[0]
     low, high = spectra.confidence_factors()
     return [
         f"{tracks.length:g} m in {spectra.windows} windows: nothing is known of waves longer than "
-        f"{2.0 * math.pi / least:.3g} m ({least:.3g} rad/m)",
+        f"{2.0 * math.pi / lowest_wavenumber:.3g} m ({lowest_wavenumber:.3g} rad/m)",
         f"every single density is known to a factor {low:.2f} to {high:.2f} (95 %)",
         f"a coherency below {spectra.chance_coherency():.2f} cannot be told from none (95 %)",
     ]
@@ -141,20 +150,20 @@ def _data_limit_sentences(tracks: MeasuredTracks, spectra: TrackSpectra) -> list
 
 def _misfit_sentences(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> list[str]:
     """Sentences on where the fitted road differs from the measured one."""
-    said = []
+    sentences = []
     for name, fitted in (("mean", mean), ("roll", roll)):
         if fitted is None:
-            said.append(
+            sentences.append(
                 "left and right are the same heights: there is no roll process, and the file says nothing of it"
             )
             continue
         if not fitted.corner_is_resolved:
-            said.append(
+            sentences.append(
                 f"the corner of the {name} process is not told by this road: only its level above "
                 f"{fitted.low:.3g} rad/m is; do not read its variance"
             )
         if fitted.log_residual > math.log(2.0):
-            said.append(
+            sentences.append(
                 f"the {name} process is not of first order: the fit is off by a factor "
                 f"{_scatter_factor(fitted):.1f} (rms)"
             )
@@ -162,11 +171,11 @@ def _misfit_sentences(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | 
     used = (spectra.wavenumber >= mean.low) & (spectra.wavenumber <= mean.high)
     often = float(np.mean(shared[used] > spectra.chance_coherency()))
     if roll is not None and often > 0.2:
-        said.append(
+        sentences.append(
             f"mean and roll are coherent at {100.0 * often:.0f} % of the wavenumbers (5 % by chance): the tracks "
             "differ in level or lean on one another, which two independent processes cannot show"
         )
-    return said
+    return sentences
 
 
 def _scatter_factor(fitted: FilterFit) -> float:

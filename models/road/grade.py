@@ -49,20 +49,20 @@ class Graded:
     def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
         height, slope = self.profile.height_and_slope(s)
-        more = self._climb_and_slope(np.asarray(s, dtype=float))
-        return height + more[0], slope + more[1]
+        climb_and_slope = self._climb_and_slope(np.asarray(s, dtype=float))
+        return height + climb_and_slope[0], slope + climb_and_slope[1]
 
-    def sample_uniform(self, start: float, step: float, count: int) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
-        height, slope = self.profile.sample_uniform(start, step, count)
-        more = self._climb_and_slope(start + step * np.arange(count))
-        return height + more[0], slope + more[1]
+    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1."""
+        height, slope = self.profile.sample_uniform(start_station, step, sample_count)
+        climb_and_slope = self._climb_and_slope(start_station + step * np.arange(sample_count))
+        return height + climb_and_slope[0], slope + climb_and_slope[1]
 
     def height_slope_at(self, s: float) -> tuple[float, float]:
         """Height (m, positive down) and slope at one arc length ``s`` (m)."""
         height, slope = self.profile.height_slope_at(s)
-        more = self._climb_and_slope(np.asarray(s, dtype=float))
-        return height + float(more[0]), slope + float(more[1])
+        climb_and_slope = self._climb_and_slope(np.asarray(s, dtype=float))
+        return height + float(climb_and_slope[0]), slope + float(climb_and_slope[1])
 
     def _climb_and_slope(self, s: np.ndarray) -> HeightsAndSlopes:
         """Heights (m) and slopes that the grade adds at stations ``s``."""

@@ -30,7 +30,7 @@ def iso8608_road(
     n_min: float = 0.011,
     n_max: float = 2.83,
     waves: int = 100,
-    level: str = "one-sided",
+    level_convention: str = "one-sided",
     window_length: float = 40.0,
 ) -> "SineProfile":
     """Road at the geometric mean of an ISO 8608 class.
@@ -41,7 +41,7 @@ def iso8608_road(
     seed : of the phases, 0 or more; the same seed gives the same road everywhere
     n_min, n_max : band in waves per metre; the defaults are the standard's own limits
     waves : number of sines, one per bin of equal ratio
-    level : "one-sided" (the standard): amplitude_i = sqrt(2 Gd(n_i) dn_i), so that sum amplitude^2 / 2 is
+    level_convention : "one-sided" (the standard): amplitude_i = sqrt(2 Gd(n_i) dn_i), so that sum amplitude^2 / 2 is
         the integral of Gd over the band. "two-sided" reads the same figure as a density that stands at
         -n as well: the variance is doubled, every amplitude sqrt(2) times as high.
     window_length : fade-in from the flat at s = 0, m
@@ -50,35 +50,37 @@ def iso8608_road(
     ------
     InputError : unknown class or level, a band, a seed or a number of waves that is not possible
     """
-    _check_class(road_class, level)
+    _check_class(road_class, level_convention)
     road = rough_road(
-        DENSITY_OF_CLASS[road_class] * FACTOR_TO_ONE_SIDED[level], seed, n_min, n_max, waves, window_length
+        DENSITY_OF_CLASS[road_class] * FACTOR_TO_ONE_SIDED[level_convention], seed, n_min, n_max, waves, window_length
     )
-    name = f"ISO 8608 class {road_class} ({level}), seed {seed}"
+    name = f"ISO 8608 class {road_class} ({level_convention}), seed {seed}"
     from models.road.profile import SineProfile
 
     return SineProfile(road.amplitude, road.wavenumber, road.phase, road.window_length, name)
 
 
-def level_of_class(road_class: str, level: str = "one-sided") -> float:
+def level_of_class(road_class: str, level_convention: str = "one-sided") -> float:
     """S0 (m) of a class: the density at its geometric mean is S0 / Omega^2, **two-sided** over Omega in rad/m.
 
     One-sided Gd(n) = Gd(0.1) (n / 0.1)^-2 over waves per metre is 2 pi 0.01 Gd(0.1) / Omega^2 over Omega = 2 pi n,
-    half of it two-sided. ``level`` says how the standard's figure is read, see :func:`iso8608_road`. Raises
+    half of it two-sided. ``level_convention`` says how the standard's figure is read, see :func:`iso8608_road`. Raises
     InputError for an unknown class or level.
     """
-    _check_class(road_class, level)
-    return math.pi * 0.1**2 * DENSITY_OF_CLASS[road_class] * FACTOR_TO_ONE_SIDED[level]
+    _check_class(road_class, level_convention)
+    return math.pi * 0.1**2 * DENSITY_OF_CLASS[road_class] * FACTOR_TO_ONE_SIDED[level_convention]
 
 
-def class_at_level(level: float) -> str:
+def class_at_level(density_level: float) -> str:
     """Text with the ISO class of a road of density S0 / Omega^2 (S0 in m, two-sided over rad/m), and the convention
     used."""
-    if level <= 0.0:
+    if density_level <= 0.0:
         return "smooth"
-    place = math.log(level / level_of_class("A"), 4.0)  # whole numbers: means; halves: the limits between classes
-    name = list(DENSITY_OF_CLASS)[min(max(round(place), 0), len(DENSITY_OF_CLASS) - 1)]
-    return f"{level / level_of_class(name):.2f} times the mean of ISO 8608 class {name}, one-sided"
+    class_number = math.log(
+        density_level / level_of_class("A"), 4.0
+    )  # whole numbers: means; halves: the limits between classes
+    name = list(DENSITY_OF_CLASS)[min(max(round(class_number), 0), len(DENSITY_OF_CLASS) - 1)]
+    return f"{density_level / level_of_class(name):.2f} times the mean of ISO 8608 class {name}, one-sided"
 
 
 def rough_road(
@@ -104,12 +106,14 @@ def random_phases(seed: int, waves: int) -> np.ndarray:
     return 2.0 * math.pi * 2.0**-53 * (words >> np.uint64(11)).astype(float)
 
 
-def _check_class(road_class: str, level: str) -> None:
+def _check_class(road_class: str, level_convention: str) -> None:
     """Refuse a class or level convention that the standard does not know."""
     if road_class not in DENSITY_OF_CLASS:
         raise InputError("", "road class", road_class, "must be a class of ISO 8608", tuple(DENSITY_OF_CLASS))
-    if level not in FACTOR_TO_ONE_SIDED:
-        raise InputError("", "level", level, "must say how the density is to be read", tuple(FACTOR_TO_ONE_SIDED))
+    if level_convention not in FACTOR_TO_ONE_SIDED:
+        raise InputError(
+            "", "level", level_convention, "must say how the density is to be read", tuple(FACTOR_TO_ONE_SIDED)
+        )
 
 
 def _check_band(gd: float, seed: int, n_min: float, n_max: float, waves: int) -> None:

@@ -54,8 +54,8 @@ class DensityPart:
             track = self.level * sigma**-self.waviness
         x = np.asarray(sigma * abs(distance))
         coherency = np.ones(x.shape)
-        apart = x > 1e-8  # below, the coherency is 1 to rounding
-        coherency[apart] = 2.0 * (x[apart] / 2.0) ** order * kv(order, x[apart]) / gamma(order)
+        is_distant = x > 1e-8  # below, the coherency is 1 to rounding
+        coherency[is_distant] = 2.0 * (x[is_distant] / 2.0) ** order * kv(order, x[is_distant]) / gamma(order)
         return track * coherency
 
 
@@ -72,7 +72,7 @@ class IsotropicRoad:
 
     def cross_spectrum(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
         """Two-sided cross density (m^3) of two tracks ``distance`` (m) apart; real."""
-        return np.sum([part.density(wavenumber, distance) for part in self.parts], axis=0)
+        return np.sum([density_part.density(wavenumber, distance) for density_part in self.parts], axis=0)
 
     def coherency(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
         """Coherency of two tracks ``distance`` (m) apart: ratio of their cross density to the density of one track."""
@@ -91,9 +91,9 @@ def isotropic_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
     )
 
 
-def isotropic_class(road_class: str, corner: float = 0.0, level: str = "one-sided") -> IsotropicRoad:
+def isotropic_class(road_class: str, corner: float = 0.0, level_convention: str = "one-sided") -> IsotropicRoad:
     """Isotropic road at the mean of an ISO 8608 class, levelled off below the corner (rad/m)."""
-    return IsotropicRoad((DensityPart(level_of_class(road_class, level), corner),))
+    return IsotropicRoad((DensityPart(level_of_class(road_class, level_convention), corner),))
 
 
 def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence[float], distance: float) -> np.ndarray:
@@ -106,8 +106,8 @@ def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence
 
     scale = covariance(abs(distance))
 
-    def part(k: float) -> float:
-        along = quad(
+    def density_at(k: float) -> float:
+        integral = quad(
             lambda x: covariance(math.hypot(x, distance)) / scale,
             0.0,
             math.inf,
@@ -116,9 +116,9 @@ def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence
             epsabs=1e-12,
             limlst=500,
         )
-        return float(along[0]) * scale / math.pi
+        return float(integral[0]) * scale / math.pi
 
-    return np.array([part(k) for k in wavenumber])
+    return np.array([density_at(k) for k in wavenumber])
 
 
 def spectral_matrix(
@@ -129,12 +129,12 @@ def spectral_matrix(
     Entry ij is 1/(2 pi) int E[z_i(s) z_j(s + a)] exp(-i Omega a) da = S_ij exp(i Omega (x_j - x_i)): a response with
     the transfer functions H_i has the density sum_ij conj(H_i) S_ij H_j.
     """
-    out = np.empty((len(wavenumber), len(wheels), len(wheels)), complex)
+    matrices = np.empty((len(wavenumber), len(wheels), len(wheels)), complex)
     for i, first in enumerate(wheels):
-        for j, two in enumerate(wheels):
+        for j, second_wheel in enumerate(wheels):
             if isinstance(road, TwoTrackRoad):
-                side = road.cross_spectrum(wavenumber, first.y, two.y)
+                side = road.cross_spectrum(wavenumber, first.y, second_wheel.y)
             else:
-                side = road.cross_spectrum(wavenumber, first.y - two.y)
-            out[:, i, j] = side * np.exp(1j * wavenumber * (two.x - first.x))
-    return out
+                side = road.cross_spectrum(wavenumber, first.y - second_wheel.y)
+            matrices[:, i, j] = side * np.exp(1j * wavenumber * (second_wheel.x - first.x))
+    return matrices

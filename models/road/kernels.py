@@ -90,8 +90,8 @@ def _rotate_waves(sine, cosine, turn_sine, turn_cosine, wavenumber):
 
 
 @njit(cache=True)
-def sines_uniform(start, step, waves, height, slope):
-    """Fill ``height`` and ``slope`` at ``start + j step`` by complex rotation, exact every 128 samples."""
+def sines_uniform(start_station, step, waves, height, slope):
+    """Fill ``height`` and ``slope`` at ``start_station + j step`` by complex rotation, exact every 128 samples."""
     amplitude, wavenumber, phase, window = waves
     n = amplitude.size
     work = np.zeros((5, (n + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES))
@@ -100,26 +100,26 @@ def sines_uniform(start, step, waves, height, slope):
         number[i] = wavenumber[i]
         turn_sine[i], turn_cosine[i] = math.sin(number[i] * step), math.cos(number[i] * step)
     for first in range(0, height.size, RESYNCHRONISE):
-        s = start + first * step
+        s = start_station + first * step
         for i in range(n):
             angle = number[i] * s + phase[i]
             sine[i], cosine[i] = amplitude[i] * math.sin(angle), amplitude[i] * math.cos(angle)
         for j in range(first, min(first + RESYNCHRONISE, height.size)):
             value, rate = _rotate_waves(sine, cosine, turn_sine, turn_cosine, number)
-            height[j], slope[j] = faded_in(start + j * step, window, value, rate)
+            height[j], slope[j] = faded_in(start_station + j * step, window, value, rate)
 
 
 @njit(cache=True)
-def segment(station, s, guess):
-    """Index of the piece that contains ``s``; the search starts at the piece found last, ``guess``."""
-    last = station.size - 2
-    for i in range(guess, min(guess + 2, last + 1)):
-        if station[i] <= s < station[i + 1]:
+def segment(stations, s, guessed_piece):
+    """Index of the piece that contains ``s``; the search starts at the piece found last, ``guessed_piece``."""
+    last_piece = stations.size - 2
+    for i in range(guessed_piece, min(guessed_piece + 2, last_piece + 1)):
+        if stations[i] <= s < stations[i + 1]:
             return i
-    low, high = 0, last
+    low, high = 0, last_piece
     while low < high:
         middle = (low + high + 1) // 2
-        if station[middle] <= s:
+        if stations[middle] <= s:
             low = middle
         else:
             high = middle - 1
@@ -127,38 +127,38 @@ def segment(station, s, guess):
 
 
 @njit(cache=True)
-def cubic_at(s, piece, station, coefficients, window):
+def cubic_at(s, piece, stations, coefficients, window):
     """Height and slope of one cubic piece (coefficient rows from the highest power), multiplied by the window that
     starts at the first station."""
-    d = s - station[piece]
+    d = s - stations[piece]
     a, b, c, e = coefficients[piece, 0], coefficients[piece, 1], coefficients[piece, 2], coefficients[piece, 3]
     height = ((a * d + b) * d + c) * d + e
     slope = (3.0 * a * d + 2.0 * b) * d + c
     if window > 0.0:
-        return faded_in(s - station[0], window, height, slope)
+        return faded_in(s - stations[0], window, height, slope)
     return height, slope
 
 
 @njit(cache=True)
-def cubic_one(s, station, coefficients, window):
+def cubic_one(s, stations, coefficients, window):
     """Height and slope at one station."""
-    return cubic_at(s, segment(station, s, 0), station, coefficients, window)
+    return cubic_at(s, segment(stations, s, 0), stations, coefficients, window)
 
 
 @njit(cache=True)
-def fill_cubics(s, station, coefficients, window, height, slope):
+def fill_cubics(s, stations, coefficients, window, height, slope):
     """Fill ``height`` and ``slope`` at every station of the flat array ``s``."""
     piece = 0
     for j in range(s.size):
-        piece = segment(station, s[j], piece)
-        height[j], slope[j] = cubic_at(s[j], piece, station, coefficients, window)
+        piece = segment(stations, s[j], piece)
+        height[j], slope[j] = cubic_at(s[j], piece, stations, coefficients, window)
 
 
 @njit(cache=True)
-def cubics_uniform(start, step, station, coefficients, window, height, slope):
-    """Fill ``height`` and ``slope`` at ``start + j step``."""
+def cubics_uniform(start_station, step, stations, coefficients, window, height, slope):
+    """Fill ``height`` and ``slope`` at ``start_station + j step``."""
     piece = 0
     for j in range(height.size):
-        s = start + j * step
-        piece = segment(station, s, piece)
-        height[j], slope[j] = cubic_at(s, piece, station, coefficients, window)
+        s = start_station + j * step
+        piece = segment(stations, s, piece)
+        height[j], slope[j] = cubic_at(s, piece, stations, coefficients, window)

@@ -58,31 +58,31 @@ class TrackSpectra:
         """|S_lr| / sqrt(S_l S_r), biased up: pure chance gives about sqrt(2 / freedom)."""
         return np.abs(self.cross) / np.sqrt(self.left * self.right)
 
-    def confidence_factors(self, level: float = 0.95) -> tuple[float, float]:
-        """Factors by which to multiply a density to get its confidence interval at probability ``level``."""
+    def confidence_factors(self, probability: float = 0.95) -> tuple[float, float]:
+        """Factors by which to multiply a density to get its confidence interval at probability ``probability``."""
         from scipy.stats import chi2
 
-        low, high = chi2.ppf([(1.0 - level) / 2.0, (1.0 + level) / 2.0], self.degrees_of_freedom)
+        low, high = chi2.ppf([(1.0 - probability) / 2.0, (1.0 + probability) / 2.0], self.degrees_of_freedom)
         return self.degrees_of_freedom / high, self.degrees_of_freedom / low
 
-    def chance_coherency(self, level: float = 0.95) -> float:
-        """Coherency that two unrelated tracks do not exceed by chance, with probability ``level``."""
+    def chance_coherency(self, probability: float = 0.95) -> float:
+        """Coherency that two unrelated tracks do not exceed by chance, with probability ``probability``."""
         independent = self.degrees_of_freedom / 2.0
-        return math.sqrt(1.0 - (1.0 - level) ** (1.0 / (independent - 1.0)))
+        return math.sqrt(1.0 - (1.0 - probability) ** (1.0 / (independent - 1.0)))
 
 
 def read_tracks(
     path: str | Path,
     track_width: float = TRACK_WIDTH,
     *,
-    offset: float = 0.0,
-    first: float | None = None,
-    last: float | None = None,
+    lateral_offset: float = 0.0,
+    first_station: float | None = None,
+    last_station: float | None = None,
 ) -> MeasuredTracks:
-    """Left and right track of an OpenCRG or CSV road, from ``first`` to ``last`` (m along the road).
+    """Left and right track of an OpenCRG or CSV road, from ``first_station`` to ``last_station`` (m along the road).
 
-    track_width : m between the tracks; a CSV file does not tell it. offset : m, of their middle, to the left; OpenCRG
-    only. Heights between unevenly spaced stations come from the reader's spline, at the smallest spacing.
+    track_width : m between the tracks; a CSV file does not tell it. lateral_offset : m, of their middle, to the left;
+    OpenCRG only. Heights between unevenly spaced stations come from the reader's spline, at the smallest spacing.
 
     Raises
     ------
@@ -94,16 +94,22 @@ def read_tracks(
     if suffix == ".csv":
         left, right = read_csv_tracks(path)
     elif suffix == ".crg":
-        left, right = (read_opencrg(path, side, offset=offset, track_width=track_width) for side in ("left", "right"))
+        left, right = (
+            read_opencrg(path, side, lateral_offset=lateral_offset, track_width=track_width)
+            for side in ("left", "right")
+        )
     else:
         raise InputError(path, "", None, "must be a road in OpenCRG (.crg) or in CSV (.csv)")
-    start, end = (left.start if first is None else first), (left.end if last is None else last)
+    start, end = (
+        (left.start if first_station is None else first_station),
+        (left.end if last_station is None else last_station),
+    )
     if not left.start <= start < end <= left.end:
         raise InputError(path, "section (m)", (start, end), f"must lie between {left.start:g} and {left.end:g}")
     step = left.finest
     count = math.floor((end - start) / step * (1.0 + 1e-12)) + 1
-    up = [-track.sample_uniform(start, step, count)[0] for track in (left, right)]
-    return MeasuredTracks(up[0], up[1], step, track_width / 2.0, Path(path).name)
+    heights_up = [-track.sample_uniform(start, step, count)[0] for track in (left, right)]
+    return MeasuredTracks(heights_up[0], heights_up[1], step, track_width / 2.0, Path(path).name)
 
 
 def track_spectra(tracks: MeasuredTracks, window_length: float | None = None) -> TrackSpectra:
@@ -123,9 +129,9 @@ def track_spectra(tracks: MeasuredTracks, window_length: float | None = None) ->
     def density(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         from scipy.signal import csd
 
-        n, both = csd(x, y, 1.0 / tracks.increment, "hann", size, size // 2, detrend="linear")
+        n, cross_density = csd(x, y, 1.0 / tracks.increment, "hann", size, size // 2, detrend="linear")
         inner = (n > 0.0) & (n < n[-1])  # the ends stand once where all others stand for +- n
-        return np.asarray(both[inner] / (4.0 * math.pi))  # one-sided over n, to two-sided over 2 pi n
+        return np.asarray(cross_density[inner] / (4.0 * math.pi))  # one-sided over n, to two-sided over 2 pi n
 
     left, right = density(tracks.left, tracks.left).real, density(tracks.right, tracks.right).real
     cross = density(tracks.left, tracks.right)

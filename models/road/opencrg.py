@@ -48,7 +48,7 @@ class _Promise:
 
 
 def read_opencrg(
-    path: str | Path, track: str = "mean", *, offset: float = 0.0, track_width: float = TRACK_WIDTH
+    path: str | Path, track: str = "mean", *, lateral_offset: float = 0.0, track_width: float = TRACK_WIDTH
 ) -> SplineProfile:
     """C2 road along one track of an OpenCRG file.
 
@@ -57,7 +57,7 @@ def read_opencrg(
     path : file of any of the formats KRBI, KDBI, LRFI, LDFI
     track : "left" and "right" lie at v = offset +- track_width / 2, "centre" at v = offset, and "mean" is
         the mean height of left and right; between two long sections the height is linear in v
-    offset, track_width : m; v is positive to the left of the reference line
+    lateral_offset, track_width : m; v is positive to the left of the reference line
 
     Returns
     -------
@@ -71,11 +71,11 @@ def read_opencrg(
     if track not in _LATERAL_POSITIONS:
         raise InputError(path, "track", track, "must be a track", tuple(_LATERAL_POSITIONS))
     road = _load(path)
-    lines = [_heights_at(path, road, offset + side * track_width) for side in _LATERAL_POSITIONS[track]]
-    up = lines[0] if len(lines) == 1 else 0.5 * (lines[0] + lines[1])
-    if up.size < 4:
-        raise InputError(path, "cross sections", up.size, "at least 4 are needed")
-    return SplineProfile.through(np.arange(up.size) * road.u_inc, -up, f"{Path(path).name}, {track}")
+    lines = [_heights_at(path, road, lateral_offset + side * track_width) for side in _LATERAL_POSITIONS[track]]
+    heights_up = lines[0] if len(lines) == 1 else 0.5 * (lines[0] + lines[1])
+    if heights_up.size < 4:
+        raise InputError(path, "cross sections", heights_up.size, "at least 4 are needed")
+    return SplineProfile.through(np.arange(heights_up.size) * road.u_inc, -heights_up, f"{Path(path).name}, {track}")
 
 
 def write_opencrg(
@@ -83,7 +83,7 @@ def write_opencrg(
     path: str | Path,
     length: float,
     increment: float,
-    right: RoadProfile | None = None,
+    right_profile: RoadProfile | None = None,
     track_width: float = TRACK_WIDTH,
 ) -> None:
     """Write a road from s = 0 to ``length`` in the format KDBI.
@@ -93,10 +93,10 @@ def write_opencrg(
 
     Parameters
     ----------
-    profile : the road, or its left track if ``right`` is given
+    profile : the road, or its left track if ``right_profile`` is given
     path : file to write; it is replaced
     length, increment : m; the length is a whole number (3 or more) of increments of at least 1 mm
-    right : right track
+    right_profile : right track
     track_width : the two long sections stand at v = +- track_width / 2, m
 
     Raises
@@ -104,12 +104,12 @@ def write_opencrg(
     InputError : lengths that are not possible, a road too short, a file that cannot be written
     """
     count = _count_of_stations(path, length, increment)
-    tracks = [right if right is not None else profile, profile]  # the format goes from right to left
+    tracks = [right_profile if right_profile is not None else profile, profile]  # the format goes from right to left
     s = np.arange(count) * increment
-    up = np.column_stack([-track.height_and_slope(s)[0] for track in tracks])
+    heights_up = np.column_stack([-track.height_and_slope(s)[0] for track in tracks])
     across = [-track_width / 2.0, track_width / 2.0]
     try:
-        road = pyopencrg.CrgRoad(up, increment, across, comments=[f"{profile.name[:60]} (heights up, m)"])
+        road = pyopencrg.CrgRoad(heights_up, increment, across, comments=[f"{profile.name[:60]} (heights up, m)"])
         road.save(path, fmt="KDBI")
     except (OSError, ValueError) as error:
         raise InputError(path, "", None, f"the file cannot be written: {error}") from None
@@ -205,8 +205,10 @@ def _check_binary(path: str | Path, promise: _Promise, data: bytes) -> None:
     """Check that binary data are records without gaps, padded to a multiple of 80 bytes."""
     wanted = math.ceil(promise.records * promise.channels * promise.width / _HEADER_LINE_LENGTH) * _HEADER_LINE_LENGTH
     if len(data) != wanted:
-        what = f"{promise.records} cross sections of {promise.channels} values need {wanted} bytes"
-        raise InputError(path, f"data from byte {promise.offset}", len(data), f"{what}: the file is cut off or damaged")
+        expectation = f"{promise.records} cross sections of {promise.channels} values need {wanted} bytes"
+        raise InputError(
+            path, f"data from byte {promise.offset}", len(data), f"{expectation}: the file is cut off or damaged"
+        )
 
 
 def _check_text(path: str | Path, promise: _Promise, data: bytes) -> None:
@@ -220,9 +222,9 @@ def _check_text(path: str | Path, promise: _Promise, data: bytes) -> None:
         counted = len(lines) if ended else f"{len(lines)}, the last without a line end"
         allowed = f"{promise.records} cross sections need {wanted} lines: the file is cut off or damaged"
         raise InputError(path, f"lines of data from byte {promise.offset}", counted, allowed)
-    last = promise.channels - (per_record - 1) * per_line
+    last_line_values = promise.channels - (per_record - 1) * per_line
     for i, line in enumerate(lines):
-        width = (last if i % per_record == per_record - 1 else per_line) * promise.width
+        width = (last_line_values if i % per_record == per_record - 1 else per_line) * promise.width
         if len(line.rstrip()) != width:
             raise InputError(path, f"data line {i + 1}", line.decode("latin-1"), f"must be {width} characters wide")
 
@@ -237,11 +239,13 @@ def _heights_at(path: str | Path, road: Any, v: float) -> np.ndarray:
         grid = road.z[:, nearest]
     else:
         j = int(np.searchsorted(road.v, v)) - 1
-        part = (v - road.v[j]) / (road.v[j + 1] - road.v[j])
-        grid = (1.0 - part) * road.z[:, j] + part * road.z[:, j + 1]
-    up = grid + road.zr + road.banking * v
-    empty = np.flatnonzero(~np.isfinite(up))
+        fraction = (v - road.v[j]) / (road.v[j + 1] - road.v[j])
+        grid = (1.0 - fraction) * road.z[:, j] + fraction * road.z[:, j + 1]
+    heights_up = grid + road.zr + road.banking * v
+    empty = np.flatnonzero(~np.isfinite(heights_up))
     if empty.size:
-        place = f"cross section {empty[0] + 1} (u = {road.u[empty[0]]:g} m), v = {v:g} m"
-        raise InputError(path, place, float(up[empty[0]]), "a height is needed at every station of the track")
-    return up
+        location = f"cross section {empty[0] + 1} (u = {road.u[empty[0]]:g} m), v = {v:g} m"
+        raise InputError(
+            path, location, float(heights_up[empty[0]]), "a height is needed at every station of the track"
+        )
+    return heights_up

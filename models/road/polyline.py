@@ -14,9 +14,9 @@ class PolylineProfile(SplineProfile):
     """Piecewise linear road; at a point, the slope is that of the following piece. Units as in the base class."""
 
     @classmethod
-    def through(cls, station: ArrayLike, height: ArrayLike, name: str = "polyline") -> "PolylineProfile":
+    def through(cls, stations: ArrayLike, height: ArrayLike, name: str = "polyline") -> "PolylineProfile":
         """Straight pieces through 2 or more points, m, height positive down; raises InputError as its base."""
-        s, zeta = np.asarray(station, dtype=float), np.asarray(height, dtype=float)
+        s, zeta = np.asarray(stations, dtype=float), np.asarray(height, dtype=float)
         nothing = np.zeros(s.size - 1)
         with np.errstate(divide="ignore", invalid="ignore"):  # repeated stations are refused by the base
             slope = np.diff(zeta) / np.diff(s)

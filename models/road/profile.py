@@ -43,8 +43,8 @@ class RoadProfile(Protocol):
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
         ...
 
-    def sample_uniform(self, start: float, step: float, count: int) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
+    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1."""
         ...
 
     def height_slope_at(self, s: float) -> tuple[float, float]:
@@ -105,16 +105,16 @@ class SineProfile:
         kernels.fill_sines(flat, self.waves, height, slope)
         return height.reshape(shape), slope.reshape(shape)
 
-    def sample_uniform(self, start: float, step: float, count: int) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1.
+    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1.
 
         Agrees with :meth:`height_and_slope` to about 1e-14 of the sum of the amplitudes (slopes: of the
         sum of amplitude times wavenumber), as long as the rounding of s itself, 1e-16 of s times the
         wavenumber, stays below that.
         """
-        start, step = _checked_number(start, "start"), _checked_number(step, "step")
-        height, slope = np.empty(count), np.empty(count)
-        kernels.sines_uniform(start, step, self.waves, height, slope)
+        start_station, step = _checked_number(start_station, "start"), _checked_number(step, "step")
+        height, slope = np.empty(sample_count), np.empty(sample_count)
+        kernels.sines_uniform(start_station, step, self.waves, height, slope)
         return height, slope
 
     def height_slope_at(self, s: float) -> tuple[float, float]:
@@ -156,8 +156,8 @@ class SplineProfile:
         _check_order(self.name, self.station)
 
     @classmethod
-    def through(cls, station: ArrayLike, height: ArrayLike, name: str = "spline") -> "SplineProfile":
-        """C2 spline through at least 4 points: ``station`` and ``height`` (positive down) in m, shape (n,).
+    def through(cls, stations: ArrayLike, height: ArrayLike, name: str = "spline") -> "SplineProfile":
+        """C2 spline through at least 4 points: ``stations`` and ``height`` (positive down) in m, shape (n,).
 
         The ends are "not-a-knot". A natural spline would bend the first and the last few metres straight,
         an error of order h^2 where the rest has h^4, for the sake of a curvature of 0 that no measured
@@ -165,7 +165,7 @@ class SplineProfile:
         """
         from scipy.interpolate import CubicSpline
 
-        s, zeta = _read_only_copy(station, "station", 1), _read_only_copy(height, "height", 1)
+        s, zeta = _read_only_copy(stations, "station", 1), _read_only_copy(height, "height", 1)
         if s.size < 4 or zeta.shape != s.shape:
             raise InputError(name, "points", (s.size, zeta.size), "as many heights as stations, 4 or more, are needed")
         _check_order(name, s)
@@ -194,8 +194,8 @@ class SplineProfile:
     @property
     def points(self) -> HeightsAndSlopes:
         """Stations (m) and heights (m, positive down, without the window), each of shape (n,)."""
-        last = kernels.cubic_one(self.end, self.station, self.coefficients, 0.0)[0]
-        return self.station, np.append(self.coefficients[:, 3], last)
+        end_height = kernels.cubic_one(self.end, self.station, self.coefficients, 0.0)[0]
+        return self.station, np.append(self.coefficients[:, 3], end_height)
 
     def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
@@ -206,14 +206,14 @@ class SplineProfile:
         kernels.fill_cubics(flat, self.station, self.coefficients, self.window_length, height, slope)
         return height.reshape(shape), slope.reshape(shape)
 
-    def sample_uniform(self, start: float, step: float, count: int) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
-        start, step = _checked_number(start, "start"), _checked_number(step, "step")
-        last = start + max(count - 1, 0) * step
-        self._check_extent(min(start, last), max(start, last))
-        height, slope = np.empty(count), np.empty(count)
+    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1."""
+        start_station, step = _checked_number(start_station, "start"), _checked_number(step, "step")
+        last_station = start_station + max(sample_count - 1, 0) * step
+        self._check_extent(min(start_station, last_station), max(start_station, last_station))
+        height, slope = np.empty(sample_count), np.empty(sample_count)
         road = (self.station, self.coefficients, self.window_length)
-        kernels.cubics_uniform(start, step, *road, height, slope)
+        kernels.cubics_uniform(start_station, step, *road, height, slope)
         return height, slope
 
     def height_slope_at(self, s: float) -> tuple[float, float]:
@@ -221,13 +221,18 @@ class SplineProfile:
         self._check_extent(s, s)
         return kernels.cubic_one(float(s), self.station, self.coefficients, self.window_length)
 
-    def _check_extent(self, first: float, last: float) -> None:
+    def _check_extent(self, first_station: float, last_station: float) -> None:
         """Refuse arc lengths outside the road, where extrapolated polynomials would not be a road."""
         slack = OVERRUN_SHARE * (self.end - self.start)
         begin, end = self.extent
-        if not (first >= begin - slack and last <= end + slack):
+        if not (first_station >= begin - slack and last_station <= end + slack):
             allowed = f"the road is defined from s = {begin:.6g} m to {end:.6g} m; declare how it goes on"
-            raise InputError(self.name, "arc length (m)", first if not first >= begin - slack else last, allowed)
+            raise InputError(
+                self.name,
+                "arc length (m)",
+                first_station if not first_station >= begin - slack else last_station,
+                allowed,
+            )
 
 
 def _read_only_copy(values: ArrayLike, field: str, dimensions: int) -> np.ndarray:
@@ -245,10 +250,10 @@ def _flat_stations(s: ArrayLike) -> tuple[np.ndarray, tuple[int, ...]]:
     return np.ascontiguousarray(array).reshape(-1), array.shape
 
 
-def _checked_number(value: float, field: str) -> float:
-    if not math.isfinite(value):
-        raise InputError("", field, value, "must be a finite number")
-    return float(value)
+def _checked_number(number: float, field: str) -> float:
+    if not math.isfinite(number):
+        raise InputError("", field, number, "must be a finite number")
+    return float(number)
 
 
 def _checked_window(length: float) -> float:
@@ -257,8 +262,10 @@ def _checked_window(length: float) -> float:
     return float(length)
 
 
-def _check_order(name: str, station: np.ndarray) -> None:
-    wrong = np.flatnonzero(np.diff(station) <= 0.0)
+def _check_order(name: str, stations: np.ndarray) -> None:
+    wrong = np.flatnonzero(np.diff(stations) <= 0.0)
     if wrong.size:
         i = int(wrong[0]) + 1
-        raise InputError(name, f"station {i}", float(station[i]), f"must be greater than {station[i - 1]:g} before it")
+        raise InputError(
+            name, f"station {i}", float(stations[i]), f"must be greater than {stations[i - 1]:g} before it"
+        )

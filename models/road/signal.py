@@ -29,21 +29,23 @@ class RoadUnderWheels:
         wavelength."""
         return self.profile.finest / self.speed
 
-    def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values at start + i step, shape (count, 4)."""
-        out = np.empty((count, 4))
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values at start_time + i step, shape (sample_count, 4)."""
+        values_out = np.empty((sample_count, 4))
         for wheel, behind in enumerate((0.0, self.wheelbase)):
-            height, slope = self.profile.sample_uniform(self.speed * start - behind, self.speed * step, count)
-            out[:, wheel], out[:, 2 + wheel] = height, self.speed * slope
-        return out
+            height, slope = self.profile.sample_uniform(
+                self.speed * start_time - behind, self.speed * step, sample_count
+            )
+            values_out[:, wheel], values_out[:, 2 + wheel] = height, self.speed * slope
+        return values_out
 
     def at(self, time: float) -> np.ndarray:
         """Values at one time (s), shape (4,)."""
-        out = np.empty(4)
+        values_out = np.empty(4)
         for wheel, behind in enumerate((0.0, self.wheelbase)):
             height, slope = self.profile.height_slope_at(self.speed * time - behind)
-            out[wheel], out[2 + wheel] = height, self.speed * slope
-        return out
+            values_out[wheel], values_out[2 + wheel] = height, self.speed * slope
+        return values_out
 
     def knots(self, duration: float) -> np.ndarray:
         """Times at which a wheel passes a point where the road is only C2, such as its start."""

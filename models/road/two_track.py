@@ -83,7 +83,7 @@ class TwoTrackRoad:
 
 def road_of_level(
     half_track: float,
-    level: float = TRACK_DENSITY_LEVEL,
+    density_level: float = TRACK_DENSITY_LEVEL,
     *,
     corners: tuple[float, float] = (MEAN_CORNER, ROLL_CORNER),
     cutoff: float | None = None,
@@ -95,7 +95,7 @@ def road_of_level(
     """
     if not (math.isfinite(half_track) and half_track > 0.0):
         raise InputError("", "half_track", half_track, "must be above 0, in m: half the distance of the two tracks")
-    half = math.pi * level
+    half = math.pi * density_level
     return TwoTrackRoad(ShapeFilter(corners[0], half, cutoff), ShapeFilter(corners[1], half / half_track**2, cutoff))
 
 
@@ -146,23 +146,23 @@ def input_covariance(
 ) -> np.ndarray:
     """Covariance (w, w) in m^2 of the heights under the wheels, in closed form; arguments and errors as above."""
     behind = road_excitation(road, wheels, left_right, front_rear).lengths
-    out = np.zeros((len(wheels), len(wheels)))
+    covariances = np.zeros((len(wheels), len(wheels)))
     for i, first in enumerate(wheels):
-        for j, two in enumerate(wheels):
-            if left_right == "uncorrelated" and (first.y < 0.0) != (two.y < 0.0):
+        for j, second_wheel in enumerate(wheels):
+            if left_right == "uncorrelated" and (first.y < 0.0) != (second_wheel.y < 0.0):
                 continue
-            if front_rear == "uncorrelated" and first.axle != two.axle:
+            if front_rear == "uncorrelated" and first.axle != second_wheel.axle:
                 continue
-            y1, y2 = (abs(first.y), abs(two.y)) if left_right == "equal" else (first.y, two.y)
-            out[i, j] = float(road.covariance(np.array(behind[first.axle] - behind[two.axle]), y1, y2))
-    return out
+            y1, y2 = (abs(first.y), abs(second_wheel.y)) if left_right == "equal" else (first.y, second_wheel.y)
+            covariances[i, j] = float(road.covariance(np.array(behind[first.axle] - behind[second_wheel.axle]), y1, y2))
+    return covariances
 
 
 def _both_filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Matrices F, G of both processes together, and the rows that read z_M and theta; a process of zero intensity is
     left out."""
     parts = [road.mean, road.roll] if road.roll.intensity else [road.mean]
-    F, G, H = (block_diag(*matrices) for matrices in zip(*(part.matrices() for part in parts), strict=True))
+    F, G, H = (block_diag(*matrices) for matrices in zip(*(process.matrices() for process in parts), strict=True))
     return F, G, H[0], H[1] if len(H) == 2 else np.zeros(len(F))
 
 
@@ -175,11 +175,11 @@ def _height_row(
     height = mean + wheel.y * roll
     if left_right == "modelled":
         return height
-    if wheel.y == 0.0 and any(other.y for other in wheels):
+    if wheel.y == 0.0 and any(zeros_of_other.y for zeros_of_other in wheels):
         allowed = f"wheel {wheel.name!r} stands at y = 0, neither left nor right"
         raise InputError("", "left_right", left_right, allowed)
-    other = np.zeros(len(height))
-    return np.concatenate([height, other] if wheel.y >= 0.0 else [other, height])
+    zeros_of_other = np.zeros(len(height))
+    return np.concatenate([height, zeros_of_other] if wheel.y >= 0.0 else [zeros_of_other, height])
 
 
 def _axle_distances(wheels: Sequence[WheelPosition]) -> tuple[float, ...]:
@@ -187,17 +187,17 @@ def _axle_distances(wheels: Sequence[WheelPosition]) -> tuple[float, ...]:
     axles = sorted({wheel.axle for wheel in wheels})
     if not axles or axles != list(range(len(axles))):
         raise InputError("", "axles", axles, "must be numbered 0, 1, ... from the front, each with a wheel")
-    places = [{wheel.x for wheel in wheels if wheel.axle == axle} for axle in axles]
-    for axle, places_of_axle in enumerate(places):
+    wheel_positions = [{wheel.x for wheel in wheels if wheel.axle == axle} for axle in axles]
+    for axle, places_of_axle in enumerate(wheel_positions):
         if len(places_of_axle) > 1:
             raise InputError("", f"axle {axle}, x", sorted(places_of_axle), "the wheels of an axle must stand at one x")
-    behind = tuple(min(places[0]) - min(places_of_axle) for places_of_axle in places)
+    behind = tuple(min(wheel_positions[0]) - min(places_of_axle) for places_of_axle in wheel_positions)
     for axle in range(1, len(behind)):
         if behind[axle] < behind[axle - 1]:
-            raise InputError("", f"axle {axle}, x", min(places[axle]), f"must not lie before axle {axle - 1}")
+            raise InputError("", f"axle {axle}, x", min(wheel_positions[axle]), f"must not lie before axle {axle - 1}")
     return behind
 
 
-def _check_word(place: str, word: str, allowed_words: tuple[str, ...]) -> None:
-    if word not in allowed_words:
-        raise InputError("", place, word, "must say how the wheels' roads go together", allowed_words)
+def _check_word(option_name: str, chosen_word: str, allowed_words: tuple[str, ...]) -> None:
+    if chosen_word not in allowed_words:
+        raise InputError("", option_name, chosen_word, "must say how the wheels' roads go together", allowed_words)

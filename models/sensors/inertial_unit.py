@@ -33,27 +33,32 @@ def random_walk(deviation: float, rate: float) -> float:
 
 
 def measured_attitude(
-    rates: np.ndarray, period: float, deviation: np.ndarray, start: np.ndarray, paths: range, seed: int = 0
+    rates: np.ndarray,
+    sample_period: float,
+    deviation: np.ndarray,
+    start_attitude: np.ndarray,
+    paths: range,
+    seed: int = 0,
 ) -> np.ndarray:
     """Quaternions (n + 1, paths, 4) of the attitude from noisy rates, which are held over each period and integrated by
     exact rotations.
 
     rates : true local rates (n, 3) in rad/s, one for each period (s); deviation : (3,) in rad/s per sample, each axis
-    its own; start : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
+    its own; start_attitude : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
     """
     noise = np.stack([normal_samples(seed, path, len(rates), 3, source=GYRO) for path in paths], axis=1)
-    return true_attitude(rates[:, None, :] + deviation * noise, period, start)
+    return true_attitude(rates[:, None, :] + deviation * noise, sample_period, start_attitude)
 
 
-def true_attitude(rates: np.ndarray, period: float, start: np.ndarray) -> np.ndarray:
+def true_attitude(rates: np.ndarray, sample_period: float, start_attitude: np.ndarray) -> np.ndarray:
     """Quaternions (n + 1, ..., 4) of rates (n, ..., 3) in rad/s that are constant over each period (s), exactly."""
-    return integrate(np.concatenate([rates, rates[-1:]]), period, start, "held")
+    return integrate(np.concatenate([rates, rates[-1:]]), sample_period, start_attitude, "held")
 
 
-def error_rotation(measured: np.ndarray, true: np.ndarray) -> np.ndarray:
+def error_rotation(measured: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
     """Quaternions (..., 4) of the error E = S~ S^T, the rotation from the true to the measured attitude, in global
     components."""
-    return quaternion_product(measured, conjugate_quaternion(true))
+    return quaternion_product(measured, conjugate_quaternion(true_attitudes))
 
 
 def mean_scalar(walks: np.ndarray, time: float) -> float:
@@ -65,15 +70,15 @@ def mean_scalar(walks: np.ndarray, time: float) -> float:
     return float(np.exp(-np.sum(np.square(walks)) * time / 8))
 
 
-def mean_trace(walk: float, time: float) -> float:
+def mean_trace(angle_random_walk: float, time: float) -> float:
     """E[tr E] = 3 exp(-s^2 t) for three axes of equal noise, on any true motion: beyond the paper, and exact.
 
     Equal noise is the same in every frame, so that E is the Brownian motion of the rotation group itself.
     """
-    return float(3 * np.exp(-(walk**2) * time))
+    return float(3 * np.exp(-(angle_random_walk**2) * time))
 
 
-def mean_error(walks: np.ndarray, rates: np.ndarray, period: float, start: np.ndarray) -> np.ndarray:
+def mean_error(walks: np.ndarray, rates: np.ndarray, sample_period: float, start_attitude: np.ndarray) -> np.ndarray:
     """E[E] (3, 3) for unequal noise on a turning body: the mean rotation matrix of the error.
 
     From Stratonovich to Ito the noise leaves 1/2 sum s_i^2 G_i^2, with G_i the generator of a turn about local axis
@@ -81,12 +86,12 @@ def mean_error(walks: np.ndarray, rates: np.ndarray, period: float, start: np.nd
         d E[E] / dt = E[E] S (1/2 sum s_i^2 G_i^2) S^T,
     turned by the true motion S; or, for the measured attitude itself, d E[S~] / dt = E[S~] (skew(w) + 1/2 sum s_i^2
     G_i^2). The latter has constant coefficients over each period and is stepped by its matrix exponential: exact for
-    rates that are held. walks : (3,) in rad per sqrt(s); rates (n, 3) in rad/s, local; period s; start (4,).
+    rates that are held. walks : (3,) in rad per sqrt(s); rates (n, 3) in rad/s, local; sample_period s; start (4,).
     """
-    mean = rotation_matrix(start)
-    for step in _exponentials((skew_matrix(rates) + noise_decay_matrix(walks)) * period):
+    mean = rotation_matrix(start_attitude)
+    for step in _exponentials((skew_matrix(rates) + noise_decay_matrix(walks)) * sample_period):
         mean = mean @ step
-    return mean @ rotation_matrix(true_attitude(rates, period, start)[-1]).T
+    return mean @ rotation_matrix(true_attitude(rates, sample_period, start_attitude)[-1]).T
 
 
 def _exponentials(m: np.ndarray) -> np.ndarray:
@@ -115,15 +120,15 @@ def ito_norm(walks: np.ndarray, time: float) -> float:
     return 1 / mean_scalar(walks, time)
 
 
-def euler_mean_square(walk: float, axes: int, period: float, steps: int) -> float:
+def euler_mean_square(angle_random_walk: float, axes: int, sample_period: float, steps: int) -> float:
     """E[|q|^2] of explicit Euler on eq. (25) at rest: (1 + k s^2 D / 4)^n, exactly."""
-    return float(np.exp(steps * np.log1p(axes * walk**2 * period / 4)))
+    return float(np.exp(steps * np.log1p(axes * angle_random_walk**2 * sample_period / 4)))
 
 
-def euler_quaternions(turns: np.ndarray, start: np.ndarray) -> np.ndarray:
+def euler_quaternions(turn_vectors: np.ndarray, start_attitude: np.ndarray) -> np.ndarray:
     """Explicit Euler on eq. (25), never normalised: quaternions (paths, 4) after turns (n, paths, 3) in rad."""
-    q = np.broadcast_to(np.asarray(start, dtype=float), (turns.shape[1], 4))
-    for turn in turns:
+    q = np.broadcast_to(np.asarray(start_attitude, dtype=float), (turn_vectors.shape[1], 4))
+    for turn in turn_vectors:
         q = q + 0.5 * quaternion_product(q, np.concatenate([np.zeros((len(q), 1)), turn], axis=1))
     return q
 
@@ -135,40 +140,48 @@ DEGREES_PER_ROOT_HOUR = math.pi / 180 / 60
 
 
 def bias_path(
-    count: int, period: float, turn_on: float, instability: float, correlation_time: float, seed: int, path: int
+    sample_count: int,
+    sample_period: float,
+    turn_on: float,
+    instability: float,
+    correlation_time: float,
+    seed: int,
+    path: int,
 ) -> np.ndarray:
-    """Bias (count,) in rad/s at samples ``period`` (s) apart, one path of the process.
+    """Bias (sample_count,) in rad/s at samples ``sample_period`` (s) apart, one path of the process.
 
     turn_on, instability : standard deviations (rad/s); correlation_time : tau (s). The recursion over a period is
     exact, so the process does not depend on the sampling rate. Raises InputError for a time that is not above 0 or a
     deviation below it.
     """
-    _check_numbers(period=period, correlation_time=correlation_time)
+    _check_numbers(period=sample_period, correlation_time=correlation_time)
     _check_numbers(minimum=0.0, turn_on=turn_on, instability=instability)
-    drawn = normal_samples(seed, path, count + 1, 1, source=GYRO_BIAS)[:, 0]
-    kept = math.exp(-period / correlation_time)
-    kicks = drawn[1:] * math.sqrt(-math.expm1(-2 * period / correlation_time))
+    drawn = normal_samples(seed, path, sample_count + 1, 1, source=GYRO_BIAS)[:, 0]
+    decay = math.exp(-sample_period / correlation_time)
+    kicks = drawn[1:] * math.sqrt(-math.expm1(-2 * sample_period / correlation_time))
     kicks[:1] = drawn[1:2]
-    return turn_on * drawn[0] + instability * lfilter([1.0], [1.0, -kept], kicks)
+    return turn_on * drawn[0] + instability * lfilter([1.0], [1.0, -decay], kicks)
 
 
 def angle_variance(
-    time: np.ndarray, walk: float, turn_on: float, instability: float, correlation_time: float
+    time: np.ndarray, angle_random_walk: float, turn_on: float, instability: float, correlation_time: float
 ) -> np.ndarray:
     """Variance (rad^2) of the integrated angle's error after ``time`` (s), any shape.
 
-    s^2 t + turn_on^2 t^2 + 2 instability^2 tau^2 (t/tau - 1 + exp(-t/tau)); the last bracket is written as
-    (t/tau)^2 / 2 times 1F1(1; 3; -t/tau), which loses no digit at short times. walk in rad per sqrt(s), the others
-    in rad/s and s. Raises InputError as ``bias_path`` does, and for times below 0.
+    s^2 t + turn_on^2 t^2 + 2 instability^2 tau^2 (t/tau - 1 + exp(-t/tau)); the last bracket is written as (t/tau)^2 /
+    2 times 1F1(1; 3; -t/tau), which loses no digit at short times. angle_random_walk in rad per sqrt(s), the others in
+    rad/s and s. Raises InputError as ``bias_path`` does, and for times below 0.
     """
     _check_numbers(correlation_time=correlation_time)
-    _check_numbers(minimum=0.0, time=float(np.min(time)), walk=walk, turn_on=turn_on, instability=instability)
+    _check_numbers(
+        minimum=0.0, time=float(np.min(time)), walk=angle_random_walk, turn_on=turn_on, instability=instability
+    )
     wander = instability**2 * time**2 * hyp1f1(1, 3, -time / correlation_time)
-    return walk**2 * time + turn_on**2 * time**2 + wander
+    return angle_random_walk**2 * time + turn_on**2 * time**2 + wander
 
 
-def _check_numbers(minimum: float = math.ulp(0.0), **given: float) -> None:
+def _check_numbers(minimum: float = math.ulp(0.0), **named_values: float) -> None:
     """Refuse the first number that is below ``minimum``."""
-    for name, value in given.items():
+    for name, value in named_values.items():
         if not value >= minimum:
             raise InputError("", name, value, f"must be {'0 or more' if minimum == 0.0 else 'above 0'}")

@@ -30,7 +30,7 @@ class Record:
 
 def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
     """Assumptions behind a motion (n samples) recovered from a record."""
-    pitch, turned = cardan_pitch(recovered), np.linalg.norm(recovered.rates, axis=1) * record.period
+    pitch, turning_angles = cardan_pitch(recovered), np.linalg.norm(recovered.rates, axis=1) * record.period
     listed = [
         Assumption(
             "away from gimbal lock",
@@ -45,7 +45,7 @@ def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
             "fine samples",
             "the samples are fine enough for the turning",
             "sample faster (sampling_rate)",
-            partial(_as_known, {"body": turned}),
+            partial(_as_known, {"body": turning_angles}),
             "rad per sample",
             upper_limit=LARGEST_TURN_PER_SAMPLE,
         ),

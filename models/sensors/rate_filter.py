@@ -26,11 +26,11 @@ class _Rates(ExtendedKalmanFilter):
 
 
 def filter_rates(
-    spins: Spin, period: float, start: np.ndarray, noise: float, deviation: float = 0.0
+    spins: Spin, sample_period: float, start_rates: np.ndarray, noise: float, deviation: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Local rates (n, 3) in rad/s and their stated standard deviations (n, 3).
 
-    start : (3,) rad/s at the first sample, known to ``deviation`` (rad/s); noise : standard deviation of each
+    start_rates : (3,) rad/s at the first sample, known to ``deviation`` (rad/s); noise : standard deviation of each
     reading (m/s^2), white. The same readings make the prediction and the measurement, two correlations that the
     filter leaves out: between neighbouring predictions, and between a prediction and the measurement after it.
     """
@@ -43,40 +43,42 @@ def filter_rates(
     pairs = SYMMETRIC_ENTRIES[: 3 if planar else 6]
     indices = tuple(np.array(pairs).T)
     filter_ = _Rates(3, len(pairs))
-    filter_.x, filter_.P = np.asarray(start) @ frame, deviation**2 * UNIT_MATRIX
-    filter_.Q = np.diag((period * noise * spins.array.own_gains(planar)) ** 2)
+    filter_.x, filter_.P = np.asarray(start_rates) @ frame, deviation**2 * UNIT_MATRIX
+    filter_.Q = np.diag((sample_period * noise * spins.array.own_gains(planar)) ** 2)
     squares = spins.array.inverse_squares
     spreads = [float(np.sqrt(squares[i] if i == j else (squares[i] + squares[j]) / 4)) for i, j in pairs]
     filter_.R = np.diag([(noise * spread) ** 2 for spread in spreads])  # noise of each entry per unit of the readings'
     values = np.column_stack([0.5 * (spins.rate_matrix[:, i, j] + spins.rate_matrix[:, j, i]) for i, j in pairs])
     known, rows = own_acceleration(spins, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
     for i in range(1, len(values)):
-        _predict_rates(filter_, 0.5 * (known[i - 1] + known[i]), period, planar)
+        _predict_rates(filter_, 0.5 * (known[i - 1] + known[i]), sample_period, planar)
         filter_.update(values[i], _rate_product_jacobian, _skew_squared_entries, args=indices, hx_args=indices)
         rows.append((filter_.x.copy(), filter_.P))
-    rates, covariances = (np.array(part) for part in zip(*rows, strict=True))
+    rates, covariances = (np.array(column) for column in zip(*rows, strict=True))
     return rates @ frame.T, np.sqrt(np.einsum("ij,njk,ik->ni", frame, covariances, frame))
 
 
-def _predict_rates(filter_: _Rates, alpha: np.ndarray, period: float, planar: bool) -> None:
+def _predict_rates(filter_: _Rates, alpha: np.ndarray, sample_period: float, planar: bool) -> None:
     """Predict over one period with the mean acceleration; with sensors in a plane, w1 and w2 also turn about the
     normal."""
     slope, change = np.zeros((3, 3)), alpha
     if planar:
-        w = filter_.x + 0.5 * period * alpha  # the middle of the period
+        w = filter_.x + 0.5 * sample_period * alpha  # the middle of the period
         slope = np.array([[0.0, -w[2], -w[1]], [w[2], 0.0, w[0]], [0.0, 0.0, 0.0]])
         change = alpha + np.array([-w[1] * w[2], w[0] * w[2], 0.0])
-    filter_.F = UNIT_MATRIX + period * slope
-    filter_.predict(period * change)
+    filter_.F = UNIT_MATRIX + sample_period * slope
+    filter_.predict(sample_period * change)
 
 
-def _skew_squared_entries(w: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def _skew_squared_entries(w: np.ndarray, first_axis: np.ndarray, second_axis: np.ndarray) -> np.ndarray:
     """Entries of skew(w)^2 = w w^T - |w|^2 I."""
-    return w[first] * w[second] - (first == second) * (w @ w)
+    return w[first_axis] * w[second_axis] - (first_axis == second_axis) * (w @ w)
 
 
-def _rate_product_jacobian(w: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def _rate_product_jacobian(w: np.ndarray, first_axis: np.ndarray, second_axis: np.ndarray) -> np.ndarray:
     """Derivatives (entries, 3) of the measured rate products by the angular rate w."""
     return (
-        w[first, None] * UNIT_MATRIX[second] + w[second, None] * UNIT_MATRIX[first] - 2 * (first == second)[:, None] * w
+        w[first_axis, None] * UNIT_MATRIX[second_axis]
+        + w[second_axis, None] * UNIT_MATRIX[first_axis]
+        - 2 * (first_axis == second_axis)[:, None] * w
     )

@@ -155,10 +155,10 @@ def own_acceleration(spins: Spin, w: np.ndarray) -> np.ndarray:
     m = spins.rate_matrix
     about_normal = 0.5 * (m[:, 1, 0] - m[:, 0, 1])
     if spins.array.planar:
-        about_first, two = m[:, 2, 1] - w[:, 1] * w[:, 2], -m[:, 2, 0] + w[:, 0] * w[:, 2]
+        about_first, about_second = m[:, 2, 1] - w[:, 1] * w[:, 2], -m[:, 2, 0] + w[:, 0] * w[:, 2]
     else:
-        about_first, two = 0.5 * (m[:, 2, 1] - m[:, 1, 2]), 0.5 * (m[:, 0, 2] - m[:, 2, 0])
-    return np.column_stack([about_first, two, about_normal])
+        about_first, about_second = 0.5 * (m[:, 2, 1] - m[:, 1, 2]), 0.5 * (m[:, 0, 2] - m[:, 2, 0])
+    return np.column_stack([about_first, about_second, about_normal])
 
 
 def rates_up_to_sign(spins: Spin) -> np.ndarray:
@@ -198,8 +198,8 @@ def unexplained(spins: Spin) -> np.ndarray:
     offers = [flat, flat * [1.0, 1.0, -1.0]]
     offers += [] if spins.array.flat else [_unsigned_in_space(spins.rate_matrix)]
     left = np.stack([spins.relative_acceleration - _nearest_rigid(spins, w) for w in offers])
-    least = np.argmin(np.sum(left**2, axis=(2, 3)), axis=0)
-    return left[least, np.arange(len(least))]
+    sensor_with_least = np.argmin(np.sum(left**2, axis=(2, 3)), axis=0)
+    return left[sensor_with_least, np.arange(len(sensor_with_least))]
 
 
 def _nearest_rigid(spins: Spin, w: np.ndarray) -> np.ndarray:
@@ -209,11 +209,11 @@ def _nearest_rigid(spins: Spin, w: np.ndarray) -> np.ndarray:
     """
     array, square = spins.array, skew_matrix(w) @ skew_matrix(w)
     weights = np.where(np.arange(3) < array.weights.shape[1], array.spreads, 0.0) ** 2
-    rest = np.zeros_like(square)
-    rest[:, :, : array.weights.shape[1]] = spins.rate_matrix
-    moment = weights * (rest - square)
-    turned = (moment - np.swapaxes(moment, 1, 2)) / (weights[:, None] + weights + np.eye(3))  # no 0 / 0
-    return (turned + square) @ ((array.positions - array.positions.mean(axis=0)) @ array.frame).T
+    rate_products = np.zeros_like(square)
+    rate_products[:, :, : array.weights.shape[1]] = spins.rate_matrix
+    moment = weights * (rate_products - square)
+    angular_part = (moment - np.swapaxes(moment, 1, 2)) / (weights[:, None] + weights + np.eye(3))  # no 0 / 0
+    return (angular_part + square) @ ((array.positions - array.positions.mean(axis=0)) @ array.frame).T
 
 
 def fit_quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) -> Quality:
@@ -221,12 +221,16 @@ def fit_quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) ->
 
     Where it does not pass and sensors are left over, each is left out in turn to find the one that does not belong.
     """
-    whole = _quality_of(array, readings, noise)
-    if whole.rigid is not False:
-        return whole
+    full_quality = _quality_of(array, readings, noise)
+    if full_quality.rigid is not False:
+        return full_quality
     without = {name: _quality_without(array, readings, name, noise) for name in array.names}
-    told = {name: other.share for name, other in without.items() if other is not None and other.rigid}
-    return replace(whole, suspect=min(told, key=lambda name: told[name])) if told else whole
+    shares = {
+        name: other_quality.share
+        for name, other_quality in without.items()
+        if other_quality is not None and other_quality.rigid
+    }
+    return replace(full_quality, suspect=min(shares, key=lambda name: shares[name])) if shares else full_quality
 
 
 def _quality_of(array: SensorArray, readings: np.ndarray, noise: float) -> Quality:
@@ -241,21 +245,24 @@ def _quality_of(array: SensorArray, readings: np.ndarray, noise: float) -> Quali
 
 def _quality_without(array: SensorArray, readings: np.ndarray, name: str, noise: float) -> Quality | None:
     """Quality of the fit without the sensor ``name``; None if the remaining sensors do not make an array."""
-    keep = [i for i, other in enumerate(array.names) if other != name]
+    keep = [i for i, other_name in enumerate(array.names) if other_name != name]
     try:
-        rest = sensor_array({array.names[i]: array.positions[i].tolist() for i in keep})
+        remaining_array = sensor_array({array.names[i]: array.positions[i].tolist() for i in keep})
     except InputError:
         return None
-    return _quality_of(rest, readings[:, keep], noise)
+    return _quality_of(remaining_array, readings[:, keep], noise)
 
 
-def time_integral(values: np.ndarray, period: float, start: np.ndarray) -> np.ndarray:
-    """Sum of ``start`` and the time integral of values (n, ...), by cubics through four neighbouring samples: order 4
-    in the period."""
-    return start + np.concatenate([np.zeros_like(values[:1]), np.cumsum(cubic_integrals(values, period), axis=0)])
+def time_integral(values: np.ndarray, sample_period: float, start_values: np.ndarray) -> np.ndarray:
+    """Sum of ``start_values`` and the time integral of values (n, ...), by cubics through four neighbouring samples:
+    order 4 in the period.
+    """
+    return start_values + np.concatenate(
+        [np.zeros_like(values[:1]), np.cumsum(cubic_integrals(values, sample_period), axis=0)]
+    )
 
 
-def integrate_rates(spins: Spin, period: float, start: np.ndarray) -> np.ndarray:
+def integrate_rates(spins: Spin, sample_period: float, start_rates: np.ndarray) -> np.ndarray:
     """Local rates (n, 3) in rad/s by integration (20), from (3,) at the first sample; they drift with every error.
 
     In a plane alpha_1 and alpha_2 depend on the rates: c = w1 + i w2 obeys c' = mu + i w3 c with
@@ -263,21 +270,21 @@ def integrate_rates(spins: Spin, period: float, start: np.ndarray) -> np.ndarray
     """
     if len(spins.rate_matrix) < 4:
         raise InputError("", "readings", len(spins.rate_matrix), "at least four samples are needed to integrate them")
-    first = np.asarray(start) @ spins.array.frame
+    first = np.asarray(start_rates) @ spins.array.frame
     if not spins.array.planar:
-        return time_integral(own_acceleration(spins, np.zeros((1, 3))), period, first) @ spins.array.frame.T
+        return time_integral(own_acceleration(spins, np.zeros((1, 3))), sample_period, first) @ spins.array.frame.T
     m = spins.rate_matrix
-    w3 = time_integral(0.5 * (m[:, 1, 0] - m[:, 0, 1]), period, first[2])
-    turn = np.exp(1j * time_integral(w3, period, np.array(0.0)))
-    c = turn * time_integral((m[:, 2, 1] - 1j * m[:, 2, 0]) / turn, period, first[0] + 1j * first[1])
+    w3 = time_integral(0.5 * (m[:, 1, 0] - m[:, 0, 1]), sample_period, first[2])
+    turn = np.exp(1j * time_integral(w3, sample_period, np.array(0.0)))
+    c = turn * time_integral((m[:, 2, 1] - 1j * m[:, 2, 0]) / turn, sample_period, first[0] + 1j * first[1])
     return np.column_stack([c.real, c.imag, w3]) @ spins.array.frame.T
 
 
 def recovered_motion(
     array: SensorArray,
     readings: np.ndarray,
-    period: float,
-    start: StartState | None = None,
+    sample_period: float,
+    start_state: StartState | None = None,
     zeroed: bool = False,
     rates: np.ndarray | None = None,
     cut_offs: CutOffs | None = None,
@@ -285,22 +292,30 @@ def recovered_motion(
     """Motion of the body's reference point and axes, steps 1 to 6 of the paper.
 
     readings : (n, sensors, 3) in m/s^2, local; specific force, or with ``zeroed`` set to zero at rest on level
-    ground, as sensors with a correction for gravity give it (17); period : s
+    ground, as sensors with a correction for gravity give it (17); sample_period : s
     rates : (n, 3) in rad/s, local, from a gyro or a filter, in the place of the integrated ones
     Raises InputError for unusable readings, GimbalLock if angles are filtered where they are not defined.
     """
-    start, cut_offs = start or StartState(), cut_offs or CutOffs()
+    start_state, cut_offs = start_state or StartState(), cut_offs or CutOffs()
     spins = spin_from_readings(array, readings)
-    w = integrate_rates(spins, period, np.array(start.rates)) if rates is None else rates
-    w = _high_passed(w, period, cut_offs.turning)
-    orientation = integrate(w, period, np.array(start.orientation))
+    w = integrate_rates(spins, sample_period, np.array(start_state.rates)) if rates is None else rates
+    w = _high_passed(w, sample_period, cut_offs.turning)
+    orientation = integrate(w, sample_period, np.array(start_state.orientation))
     if cut_offs.turning is not None:
-        orientation = from_cardan(*high_pass(np.unwrap(cardan_angles(orientation), axis=0), period, cut_offs.turning).T)
+        orientation = from_cardan(
+            *high_pass(np.unwrap(cardan_angles(orientation), axis=0), sample_period, cut_offs.turning).T
+        )
     alpha = angular_acceleration(spins, w)
-    down = np.array([0.0, 0.0, GRAVITY])
-    acceleration = reference_acceleration(array, readings - down if zeroed else readings, orientation, alpha, w, down)
-    velocity = _high_passed(time_integral(acceleration, period, np.array(start.velocity)), period, cut_offs.position)
-    position = _high_passed(time_integral(velocity, period, np.array(start.position)), period, cut_offs.position)
+    gravity_vector = np.array([0.0, 0.0, GRAVITY])
+    acceleration = reference_acceleration(
+        array, readings - gravity_vector if zeroed else readings, orientation, alpha, w, gravity_vector
+    )
+    velocity = _high_passed(
+        time_integral(acceleration, sample_period, np.array(start_state.velocity)), sample_period, cut_offs.position
+    )
+    position = _high_passed(
+        time_integral(velocity, sample_period, np.array(start_state.position)), sample_period, cut_offs.position
+    )
     return RecoveredMotion(alpha, w, orientation, acceleration, velocity, position)
 
 
@@ -317,8 +332,8 @@ def reference_acceleration(
     return np.einsum("nij,nj->ni", rotation_matrix(orientation), readings.mean(axis=1) - lever) + down
 
 
-def _high_passed(values: np.ndarray, period: float, cut_off: float | None) -> np.ndarray:
-    return values if cut_off is None else high_pass(values, period, cut_off)
+def _high_passed(values: np.ndarray, sample_period: float, cut_off: float | None) -> np.ndarray:
+    return values if cut_off is None else high_pass(values, sample_period, cut_off)
 
 
 def tilt_displacement(tilt: float, times: np.ndarray, gravity: float = GRAVITY) -> np.ndarray:
@@ -330,22 +345,24 @@ BUTTERWORTH_ORDER = 2
 """Order of the Butterworth filter, which runs forwards and backwards: no phase, half the amplitude at the cut-off."""
 
 
-def check_cut_off(count: int, period: float, cut_off: float, file: str = "", place: str = "high-pass") -> None:
-    """Refuse a cut-off frequency (Hz) that does not suit ``count`` samples every ``period`` (s)."""
-    if not 0 < cut_off < 0.5 / period:
-        raise InputError(file, place, cut_off, f"the cut-off must lie between 0 and {0.5 / period:g} Hz")
-    if count <= round(1 / (cut_off * period)):
+def check_cut_off(
+    sample_count: int, sample_period: float, cut_off: float, file: str = "", key_path: str = "high-pass"
+) -> None:
+    """Refuse a cut-off frequency (Hz) that does not suit ``sample_count`` samples every ``sample_period`` (s)."""
+    if not 0 < cut_off < 0.5 / sample_period:
+        raise InputError(file, key_path, cut_off, f"the cut-off must lie between 0 and {0.5 / sample_period:g} Hz")
+    if sample_count <= round(1 / (cut_off * sample_period)):
         raise InputError(
             file,
-            place,
+            key_path,
             cut_off,
-            f"a record of {(count - 1) * period:g} s is shorter than one period of "
+            f"a record of {(sample_count - 1) * sample_period:g} s is shorter than one period of "
             f"the cut-off, {1 / cut_off:g} s: raise the cut-off",
         )
 
 
-def high_pass(values: np.ndarray, period: float, cut_off: float) -> np.ndarray:
-    """Values (n, ...), sampled every ``period`` (s), with frequencies below ``cut_off`` (Hz) removed.
+def high_pass(values: np.ndarray, sample_period: float, cut_off: float) -> np.ndarray:
+    """Values (n, ...), sampled every ``sample_period`` (s), with frequencies below ``cut_off`` (Hz) removed.
 
     A Butterworth filter of order BUTTERWORTH_ORDER run forwards and backwards, so that the amplitude falls by 1 / (1 +
     (fc/f)^4) and nothing is delayed; the ends are extended by their mirror image, which
@@ -353,6 +370,6 @@ def high_pass(values: np.ndarray, period: float, cut_off: float) -> np.ndarray:
     """
     from scipy.signal import butter, sosfiltfilt
 
-    check_cut_off(len(values), period, cut_off)
-    sections = butter(BUTTERWORTH_ORDER, cut_off, "highpass", fs=1 / period, output="sos")
-    return sosfiltfilt(sections, values, axis=0, padtype="even", padlen=round(1 / (cut_off * period)))
+    check_cut_off(len(values), sample_period, cut_off)
+    sections = butter(BUTTERWORTH_ORDER, cut_off, "highpass", fs=1 / sample_period, output="sos")
+    return sosfiltfilt(sections, values, axis=0, padtype="even", padlen=round(1 / (cut_off * sample_period)))

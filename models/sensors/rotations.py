@@ -78,7 +78,7 @@ def rotation_vector(q: np.ndarray) -> np.ndarray:
     return near[..., 1:] * np.divide(angle, size, out=np.full_like(size, 2.0), where=size > 0)
 
 
-def turns_between_samples(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
+def turns_between_samples(rates: np.ndarray, sample_period: float, integration_rule: Rule = "cubic") -> np.ndarray:
     """Rotation vectors (n - 1, ..., 3) in rad from each sample of local rates (n, ..., 3) in rad/s to the next one.
 
     "held" : the rate of the sample before, h w0, which is exact for rates that are constant over a period;
@@ -87,64 +87,68 @@ def turns_between_samples(rates: np.ndarray, period: float, rule: Rule = "cubic"
     for "cubic" 4. Raises ValueError for fewer, for a rate that is not finite, and InputError for a period or a rule
     that is none and for rates that turn a body farther than HALF_TURN from one sample to the next, unless they are
     held."""
-    if not 0.0 < period < np.inf:
-        raise InputError("", "period", period, "must be above 0, in s")
-    if rule not in get_args(Rule):
-        raise InputError("", "rule", rule, "is not known", get_args(Rule))
-    if len(rates) < (needed := 4 if rule == "cubic" else 2):
-        raise ValueError(f"{len(rates)} samples of the angular velocity: the rule {rule!r} needs at least {needed}")
+    if not 0.0 < sample_period < np.inf:
+        raise InputError("", "period", sample_period, "must be above 0, in s")
+    if integration_rule not in get_args(Rule):
+        raise InputError("", "rule", integration_rule, "is not known", get_args(Rule))
+    if len(rates) < (needed := 4 if integration_rule == "cubic" else 2):
+        raise ValueError(
+            f"{len(rates)} samples of the angular velocity: the rule {integration_rule!r} needs at least {needed}"
+        )
     if not np.isfinite(rates).all():
-        where = np.argwhere(~np.isfinite(rates))[0]
-        raise ValueError(f"sample {where[0]} of the angular velocity is not a finite number")
-    before, after = rates[:-1], rates[1:]
-    if rule == "held":
-        return period * before
-    _check_turned(rates, period)
-    if rule == "mean":
-        return 0.5 * period * (before + after)
-    return cubic_integrals(rates, period) + period**2 / 12 * np.cross(before, after)
+        bad_sample = np.argwhere(~np.isfinite(rates))[0]
+        raise ValueError(f"sample {bad_sample[0]} of the angular velocity is not a finite number")
+    earlier_rates, later_rates = rates[:-1], rates[1:]
+    if integration_rule == "held":
+        return sample_period * earlier_rates
+    _check_turned(rates, sample_period)
+    if integration_rule == "mean":
+        return 0.5 * sample_period * (earlier_rates + later_rates)
+    return cubic_integrals(rates, sample_period) + sample_period**2 / 12 * np.cross(earlier_rates, later_rates)
 
 
-def _check_turned(rates: np.ndarray, period: float) -> None:
+def _check_turned(rates: np.ndarray, sample_period: float) -> None:
     """Refuse angular rates that rotate the body too far between two samples."""
     fastest = float(np.linalg.norm(rates, axis=-1).max())
-    if fastest * period > HALF_TURN:
-        samples = f"for samples every {period:g} s, half a turn from one to the next: are they in degrees?"
-        raise InputError("", "rates", fastest, f"must be at most {HALF_TURN / period:.4g} rad/s {samples}")
+    if fastest * sample_period > HALF_TURN:
+        samples = f"for samples every {sample_period:g} s, half a turn from one to the next: are they in degrees?"
+        raise InputError("", "rates", fastest, f"must be at most {HALF_TURN / sample_period:.4g} rad/s {samples}")
 
 
-def cubic_integrals(values: np.ndarray, period: float) -> np.ndarray:
+def cubic_integrals(values: np.ndarray, sample_period: float) -> np.ndarray:
     """Integrals (n - 1, ...) over each period of the cubics through four neighbouring samples (n, ...), n >= 4."""
     inner = -values[:-3] + 13 * values[1:-2] + 13 * values[2:-1] - values[3:]
-    first = 9 * values[0] + 19 * values[1] - 5 * values[2] + values[3]
-    last = 9 * values[-1] + 19 * values[-2] - 5 * values[-3] + values[-4]
-    return period / 24 * np.concatenate([first[None], inner, last[None]])
+    first_integral = 9 * values[0] + 19 * values[1] - 5 * values[2] + values[3]
+    last_integral = 9 * values[-1] + 19 * values[-2] - 5 * values[-3] + values[-4]
+    return sample_period / 24 * np.concatenate([first_integral[None], inner, last_integral[None]])
 
 
-def integrate(rates: np.ndarray, period: float, start: np.ndarray, rule: Rule = "cubic") -> np.ndarray:
+def integrate(
+    rates: np.ndarray, sample_period: float, start_attitude: np.ndarray, integration_rule: Rule = "cubic"
+) -> np.ndarray:
     """Quaternions (n, ..., 4) at the samples of local rates (n, ..., 3) in rad/s, eq. (22); start (..., 4).
 
     Each step is the exact exponential of its rotation vector (``turns_between_samples``), and each result is divided by
     its norm, which therefore stays 1 within rounding for ever. Several bodies stand side by side in the middle axes.
     Raises InputError for a start that is no unit quaternion, and as ``turns_between_samples`` does.
     """
-    if not np.abs(np.linalg.norm(np.asarray(start, dtype=float), axis=-1) - 1.0).max() <= UNIT_NORM_TOLERANCE:
-        raise InputError("", "start", start, "must be unit quaternions")
-    steps = exponential(turns_between_samples(rates, period, rule))
+    if not np.abs(np.linalg.norm(np.asarray(start_attitude, dtype=float), axis=-1) - 1.0).max() <= UNIT_NORM_TOLERANCE:
+        raise InputError("", "start", start_attitude, "must be unit quaternions")
+    steps = exponential(turns_between_samples(rates, sample_period, integration_rule))
     count, middle = len(steps), steps.shape[1:-1]
-    first = np.broadcast_to(np.asarray(start, dtype=float), (*middle, 4)).reshape(-1, 4)
+    first = np.broadcast_to(np.asarray(start_attitude, dtype=float), (*middle, 4)).reshape(-1, 4)
     flat = np.ascontiguousarray(steps.reshape(count, -1, 4))
     return _chain_rotations(np.ascontiguousarray(first), flat).reshape(count + 1, *middle, 4)
 
 
 @njit(cache=True)
-def _chain_rotations(start, steps):
+def _chain_rotations(start_attitude, steps):
     """Normalised running products start, start steps[0], start steps[0] steps[1] ...: from shapes (m, 4) and (n, m, 4)
     to (n + 1, m, 4)."""
     attitudes = np.empty((steps.shape[0] + 1, steps.shape[1], 4))
     for j in range(steps.shape[1]):
-        a, b, c, d = start[j]
-        attitudes[0, j] = start[j]
+        a, b, c, d = start_attitude[j]
+        attitudes[0, j] = start_attitude[j]
         for i in range(steps.shape[0]):
             e, f, g, h = steps[i, j]
             a, b, c, d = (
@@ -169,9 +173,11 @@ def rotation_matrix(q: np.ndarray) -> np.ndarray:
 
 def from_matrix(s: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4), scalar 0 or more, of matrices (..., 3, 3); raises ValueError if one is no rotation."""
-    off = np.abs(np.swapaxes(s, -1, -2) @ s - np.eye(3)).max()
-    if not off < ORTHOGONALITY_TOLERANCE or not (np.linalg.det(s) > 0).all():
-        raise ValueError(f"not a rotation: S^T S departs from the identity by {off:.3g}, or S turns left into right")
+    departure = np.abs(np.swapaxes(s, -1, -2) @ s - np.eye(3)).max()
+    if not departure < ORTHOGONALITY_TOLERANCE or not (np.linalg.det(s) > 0).all():
+        raise ValueError(
+            f"not a rotation: S^T S departs from the identity by {departure:.3g}, or S turns left into right"
+        )
     return Rotation.from_matrix(s).as_quat(canonical=True, scalar_first=True)
 
 

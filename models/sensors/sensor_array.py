@@ -66,9 +66,11 @@ class SensorArray:
 
     def own_gains(self, planar: bool) -> np.ndarray:
         """Noise gains as ``noise_gains``, about the array's axes e1, e2, n."""
-        first, two, three = self.inverse_squares
+        first, second_axis, three = self.inverse_squares
         return np.sqrt(
-            [two, first, (first + two) / 4] if planar else np.array([two + three, first + three, first + two]) / 4
+            [second_axis, first, (first + second_axis) / 4]
+            if planar
+            else np.array([second_axis + three, first + three, first + second_axis]) / 4
         )
 
     @property
@@ -106,12 +108,12 @@ def sensor_array(positions: Mapping[str, Sequence[float]], formula: Formula = "a
     any arrangement and the less noisy one where the sensors lie nearly in a plane. Raises InputError for fewer than
     three sensors, for sensors on a line, and for "spatial" where they lie in a plane.
     """
-    names, places = tuple(positions), np.array([list(place) for place in positions.values()], dtype=float)
+    names, position_rows = tuple(positions), np.array([list(position) for position in positions.values()], dtype=float)
     if len(names) < 3:
         raise InputError("", "sensors", len(names), "at least three sensors that are not on a line are needed")
-    if places.shape != (len(names), 3) or not np.isfinite(places).all():
+    if position_rows.shape != (len(names), 3) or not np.isfinite(position_rows).all():
         raise InputError("", "sensors", None, "each position must be three finite numbers x, y, z in m")
-    frame, spreads, rows = np.linalg.svd((places - places.mean(axis=0)).T, full_matrices=False)
+    frame, spreads, rows = np.linalg.svd((position_rows - position_rows.mean(axis=0)).T, full_matrices=False)
     if not spreads[1] > LINE_SPREAD_RATIO * spreads[0]:
         raise InputError(
             "",
@@ -128,15 +130,15 @@ def sensor_array(positions: Mapping[str, Sequence[float]], formula: Formula = "a
             "the sensors lie in a plane, where this formula gives half of the "
             "angular acceleration plus a bias without a word: use 'auto' or 'plane'",
         )
-    up = np.copysign(1.0, frame[np.abs(frame[:, 2]).argmax(), 2])  # the normal along its axis, not against it
-    hand = np.array([1.0, up * np.linalg.det(frame), up])  # e1, e2, n right-handed
+    normal_sign = np.copysign(1.0, frame[np.abs(frame[:, 2]).argmax(), 2])  # the normal along its axis, not against it
+    hand = np.array([1.0, normal_sign * np.linalg.det(frame), normal_sign])  # e1, e2, n right-handed
     weights = (rows.T * hand / np.where(spreads > 0, spreads, 1.0))[:, : 2 if flat else 3]
     planar = flat or formula == "plane" or (formula == "auto" and near)
-    return SensorArray(names, places, frame * hand, spreads, bool(planar), weights)
+    return SensorArray(names, position_rows, frame * hand, spreads, bool(planar), weights)
 
 
 def sensor_readings(
-    places: np.ndarray,
+    sensor_positions: np.ndarray,
     pitch: np.ndarray,
     rate: np.ndarray,
     heave_acceleration: np.ndarray,
@@ -145,29 +147,31 @@ def sensor_readings(
 ) -> np.ndarray:
     """Specific forces (n, sensors, 3) in m/s^2, in the chassis' axes (x forward, y right, z down), eqs (16), (17).
 
-    places : (sensors, 3) in m from the centre of mass, local; pitch (rad, nose up), its rate and acceleration, and
-    the heave acceleration (m/s^2, down), each (n,). The vehicle moves in its plane: no roll, no yaw, no surge.
+    sensor_positions : (sensors, 3) in m from the centre of mass, local; pitch (rad, nose up), its rate and
+    acceleration, and the heave acceleration (m/s^2, down), each (n,). The vehicle moves in its plane: no roll, no yaw,
+    no surge.
     """
     count = len(pitch)
-    none = np.zeros(count)
-    turn = rotation_matrix(from_cardan(none, pitch, none))
-    alpha, w = (np.column_stack([none, values, none]) for values in (pitch_acceleration, rate))
+    no_angles = np.zeros(count)
+    turn = rotation_matrix(from_cardan(no_angles, pitch, no_angles))
+    alpha, w = (np.column_stack([no_angles, values, no_angles]) for values in (pitch_acceleration, rate))
     felt = (heave_acceleration - gravity)[:, None] * turn[:, 2]  # S^T along the global vertical
-    return in_space(places, felt, w, alpha)
+    return in_space(sensor_positions, felt, w, alpha)
 
 
-def in_space(places: np.ndarray, specific_forces: np.ndarray, w: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+def in_space(sensor_positions: np.ndarray, specific_forces: np.ndarray, w: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     """Specific forces (n, sensors, 3) in m/s^2, in the body's axes, eqs (16), (17), whatever its motion.
 
-    places : (sensors, 3) in m from a point of the body with ``specific_forces`` (n, 3); w, alpha : (n, 3), the body's
-    rates and their derivatives about its own axes, rad/s and rad/s^2. Any right-handed axes.
+    sensor_positions : (sensors, 3) in m from a point of the body with ``specific_forces`` (n, 3); w, alpha : (n, 3),
+    the body's rates and their derivatives about its own axes, rad/s and rad/s^2. Any right-handed axes.
     """
     lever = skew_matrix(alpha) + skew_matrix(w) @ skew_matrix(w)
-    return specific_forces[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(places))
+    return specific_forces[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(sensor_positions))
 
 
-def on_bracket(mount: np.ndarray, period: float, frequency: float, damping: float) -> np.ndarray:
-    """Reading (n, 3) of a sensor on a light bracket from that of a rigid mount (n, 3), sampled every ``period`` (s).
+def on_bracket(mount: np.ndarray, sample_period: float, frequency: float, damping: float) -> np.ndarray:
+    """Reading (n, 3) of a sensor on a light bracket from that of a rigid mount (n, 3), sampled every ``sample_period``
+    (s).
 
     Along each of the body's axes a one-way coupled oscillator of natural frequency (Hz) and damping ratio: its
     mass is too small to move the body, and what the sensor feels is what spring and damper pass on,
@@ -178,7 +182,7 @@ def on_bracket(mount: np.ndarray, period: float, frequency: float, damping: floa
 
     w0 = 2 * np.pi * frequency
     change = np.array([[0.0, 1.0], [-(w0**2), -2 * damping * w0]])
-    *system, _ = cont2discrete((change, np.eye(2)[:, 1:], -change[1:], np.zeros((1, 1))), period, method="foh")
+    *system, _ = cont2discrete((change, np.eye(2)[:, 1:], -change[1:], np.zeros((1, 1))), sample_period, method="foh")
     upper, lower = ss2tf(*system)
     start = lfilter_zi(upper[0], lower)
     return lfilter(upper[0], lower, mount, axis=0, zi=start[:, None] * mount[0])[0]

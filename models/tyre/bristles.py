@@ -53,61 +53,75 @@ def shape_factor(cells: int) -> float:
 
 
 @lean
-def tyre_forces(contacts, slides, strips, cells, middle, answer):
-    """Fill ``answer`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column has no meaning. No array is
+def tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces_out):
+    """Fill ``forces_out`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column has no meaning. No array is
     allocated.
 
-    contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N); slides
-    (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the tread (m/s);
-    strips, cells, middle : the patch's net as ``Grid`` holds it.
+    contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N);
+    sliding_velocities (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the
+    tread (m/s); strips, cells, middle_cells : the patch's net as ``Grid`` holds it.
     """
     w = len(contacts)
-    patches, answers = records(start(contacts), w, CONTACT), records(start(answer), w, FORCES)
-    lines, along = strips_in(strips), cells_in(cells, middle)
+    patches, answers = records(start(contacts), w, CONTACT), records(start(forces_out), w, FORCES)
+    lines, cell_table = strips_in(strips), cells_in(cells, middle_cells)
     room, slowest = Workspace(stacked(w, SLIP), stacked(1, BLOCK)), FADING_SPEED
     for i in range(w):
-        slowest = min(slowest, slides[i, 3])
-    _creepages(1.0, patches, slides)
-    forces_within(patches, lines, along, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
+        slowest = min(slowest, sliding_velocities[i, 3])
+    _creepages(1.0, patches, sliding_velocities)
+    forces_within(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
     if slowest < FADING_SPEED:
         backwards = stacked(w, FORCES)
-        _creepages(-1.0, patches, slides)
-        forces_within(patches, lines, along, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
-        _blend_directions(slides, backwards, answers)
+        _creepages(-1.0, patches, sliding_velocities)
+        forces_within(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
+        _blend_directions(sliding_velocities, backwards, answers)
 
 
 @lean
-def _creepages(sign, patches, slides):
+def _creepages(sign, patches, sliding_velocities):
     """Creepages of tyres that roll forwards (sign 1) or backwards (sign -1), from the sliding velocities."""
     for i in range(len(patches)):
-        patch, speed = patches[i], max(abs(slides[i, 3]), FADING_SPEED)
-        patch.xi_x, patch.xi_y = sign * slides[i, 0] / speed, slides[i, 1] / speed
-        patch.spin = sign * slides[i, 2] / speed
+        patch, speed = patches[i], max(abs(sliding_velocities[i, 3]), FADING_SPEED)
+        patch.xi_x, patch.xi_y = sign * sliding_velocities[i, 0] / speed, sliding_velocities[i, 1] / speed
+        patch.spin = sign * sliding_velocities[i, 2] / speed
 
 
 @lean
-def _blend_directions(slides, backwards, answers):
+def _blend_directions(sliding_velocities, backwards, forces_out):
     """Weighted sum of forces of forward rolling and of backward rolling; the latter are transformed to the forward
     view."""
-    for i in range(len(answers)):
-        share, answer, behind = min(1.0, max(0.0, 0.5 + 0.5 * slides[i, 3] / FADING_SPEED)), answers[i], backwards[i]
+    for i in range(len(forces_out)):
+        share, answer, behind = (
+            min(1.0, max(0.0, 0.5 + 0.5 * sliding_velocities[i, 3] / FADING_SPEED)),
+            forces_out[i],
+            backwards[i],
+        )
         answer.fx = share * answer.fx - (1.0 - share) * behind.fx
         answer.fy = share * answer.fy + (1.0 - share) * behind.fy
         answer.mz = share * answer.mz - (1.0 - share) * behind.mz
 
 
 def brush_forces(
-    load: float, mu: float, half_length: float, half_width: float, stiffness: float, slides: np.ndarray, cells: int = 21
+    load: float,
+    mu: float,
+    half_length: float,
+    half_width: float,
+    stiffness: float,
+    sliding_velocities: np.ndarray,
+    cells: int = 21,
 ) -> np.ndarray:
-    """Forces fx, fy (N) and moments mz (N m), (m, 3), of one tyre for sliding velocities ``slides`` (m, 4) as in
-    ``tyre_forces``.
+    """Forces fx, fy (N) and moments mz (N m), (m, 3), of one tyre for sliding velocities ``sliding_velocities`` (m, 4)
+    as in ``tyre_forces``.
 
     load in N; mu; half_length, half_width of the patch in m; stiffness of its bristles in N/m^3.
     """
-    slides = np.atleast_2d(np.asarray(slides, float))
-    contacts, forces, of = np.zeros((len(slides), 10)), np.empty((len(slides), 4)), net(cells)
+    sliding_velocities = np.atleast_2d(np.asarray(sliding_velocities, float))
+    contacts, forces, cell_net = (
+        np.zeros((len(sliding_velocities), 10)),
+        np.empty((len(sliding_velocities), 4)),
+        net(cells),
+    )
     patches = contacts.view(CONTACT)
     patches["a"], patches["b"], patches["load"], patches["mu"] = half_length, half_width, load, mu
     patches["l1"] = patches["l2"] = patches["l3"] = 1.0 / stiffness
-    tyre_forces(contacts, slides, of.strips, of.cells, of.middle, forces)
+    tyre_forces(contacts, sliding_velocities, cell_net.strips, cell_net.cells, cell_net.middle, forces)
     return forces[:, :3]

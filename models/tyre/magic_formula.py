@@ -17,10 +17,10 @@ Friction = Callable[[np.ndarray, float], np.ndarray]
 """Friction, from 0 on, at slips from 0 on (tan of the slip angle, across) under a load (N)."""
 
 
-def graded_nodes(end: float, first: float, count: int) -> np.ndarray:
-    """Nodes from 0 to ``end`` with spacings that grow in proportion to x + ``first``."""
-    nodes = first * np.expm1(np.linspace(0.0, np.log1p(end / first), count))
-    nodes[-1] = end
+def graded_nodes(last_node: float, first: float, node_count: int) -> np.ndarray:
+    """Nodes from 0 to ``last_node`` with spacings that grow in proportion to x + ``first``."""
+    nodes = first * np.expm1(np.linspace(0.0, np.log1p(last_node / first), node_count))
+    nodes[-1] = last_node
     return nodes
 
 
@@ -29,8 +29,8 @@ ANGLE_NODES, SLIP_NODES = graded_nodes(np.pi / 2.0, 0.03, 261), graded_nodes(1.0
 
 
 def by_similarity(
-    along: Friction,
-    across: Friction,
+    friction_along: Friction,
+    friction_across: Friction,
     loads: np.ndarray,
     angles: np.ndarray = ANGLE_NODES,
     slips: np.ndarray = SLIP_NODES,
@@ -44,12 +44,12 @@ def by_similarity(
     tangent = np.tan(angles)[:, None]
     total = np.hypot(slips, tangent)
     safe = np.maximum(total, 1e-300)
-    mu_x = np.stack([along(total, load) * slips / safe for load in loads], axis=1)
-    both = np.stack([across(total, load) * tangent / safe for load in loads], axis=1)
-    g, h = product_factors(both)
-    g[0] = _at_no_angle(across, slips, loads)
-    over = np.maximum(np.hypot(mu_x, g[:, None, :] * h[:, :, None]) / max(mu_x.max(), both.max()), 1.0)
-    return TyreTable(angles, slips, loads, mu_x / over, g / over.max(axis=1), h, name)
+    mu_x = np.stack([friction_along(total, load) * slips / safe for load in loads], axis=1)
+    mu_y = np.stack([friction_across(total, load) * tangent / safe for load in loads], axis=1)
+    g, h = product_factors(mu_y)
+    g[0] = _at_no_angle(friction_across, slips, loads)
+    excess = np.maximum(np.hypot(mu_x, g[:, None, :] * h[:, :, None]) / max(mu_x.max(), mu_y.max()), 1.0)
+    return TyreTable(angles, slips, loads, mu_x / excess, g / excess.max(axis=1), h, name)
 
 
 def product_factors(mu_y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -66,11 +66,11 @@ def product_factors(mu_y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return g, h
 
 
-def _at_no_angle(across: Friction, slips: np.ndarray, loads: np.ndarray) -> np.ndarray:
+def _at_no_angle(friction_across: Friction, slips: np.ndarray, loads: np.ndarray) -> np.ndarray:
     """Limit of g for slip angles towards 0: ratio of the slope of mu_y at a slip to that without slip."""
     little = np.full(1, 1e-9)
-    slope = np.array([across(little, load)[0] / little[0] for load in loads])[:, None]
-    secant = np.array([across(slips[1:], load) / slips[1:] for load in loads])
+    slope = np.array([friction_across(little, load)[0] / little[0] for load in loads])[:, None]
+    secant = np.array([friction_across(slips[1:], load) / slips[1:] for load in loads])
     return np.concatenate(([1.0], (slope * secant).sum(axis=0) / (slope * slope).sum()))
 
 
@@ -87,8 +87,8 @@ class Burckhardt:
 
     def __call__(self, slip: np.ndarray) -> np.ndarray:
         """Friction coefficients mu at slips from 0 on."""
-        least = np.minimum(slip, 1.0)
-        return -self.c1 * np.expm1(-self.c2 * least) - self.c3 * least
+        clipped_slip = np.minimum(slip, 1.0)
+        return -self.c1 * np.expm1(-self.c2 * clipped_slip) - self.c3 * clipped_slip
 
 
 BURCKHARDT = {
@@ -141,25 +141,25 @@ NAMED_SURFACES: dict[str, tuple[PureSlipCurve, PureSlipCurve]] = {
 """All surfaces that have a name, along and across."""
 
 
-def table_of_surface(name: str, scale: float = 1.0, load: float = 1e4, fall: float = 0.0) -> TyreTable:
-    """Table of one of ``NAMED_SURFACES``, its friction times ``scale`` at a load (N).
+def table_of_surface(name: str, friction_scale: float = 1.0, load: float = 1e4, fall: float = 0.0) -> TyreTable:
+    """Table of one of ``NAMED_SURFACES``, its friction times ``friction_scale`` at a load (N).
 
     fall : share of its friction that the tyre has lost at twice that load; 0 for none. It is linear in the load from a
     quarter of it to twice it, and constant beyond.
     """
     if name not in NAMED_SURFACES:
         raise InputError("", "surface", name, "no such surface", tuple(NAMED_SURFACES))
-    along, across = NAMED_SURFACES[name]
+    law_along, across = NAMED_SURFACES[name]
     if not 0.0 <= fall < 1.0:
         raise InputError(name, "fall", fall, "must be from 0 to below 1")
     loads = load * np.array([0.25, 1.0, 2.0]) if fall > 0.0 else np.array([load])
 
-    def times(load_there: float) -> float:
-        return scale * (1.0 - fall * (load_there / load - 1.0))
+    def load_factor(load_there: float) -> float:
+        return friction_scale * (1.0 - fall * (load_there / load - 1.0))
 
     return by_similarity(
-        lambda k, load_there: times(load_there) * along(k),
-        lambda k, load_there: times(load_there) * across(k),
+        lambda k, load_there: load_factor(load_there) * law_along(k),
+        lambda k, load_there: load_factor(load_there) * across(k),
         loads,
         name=name,
     )

@@ -47,13 +47,17 @@ def tir_table(path: str | Path) -> TyreTable:
     c = defaultdict(float, dict.fromkeys(UNIT_SCALES, 1.0)) | {
         name: _number_of(path, properties, name) for name in named
     }
-    least, most, nominal = c["FZMIN"], c["FZMAX"], c["FNOMIN"]
+    least_load, largest_load, nominal = c["FZMIN"], c["FZMAX"], c["FNOMIN"]
     for name in ("FNOMIN", "FZMIN", "FZMAX"):
         if not 0.0 < c[name] <= 1e7:
             raise _wrong_value(path, properties, name, "must be a load above 0 and at most 1e7 N")
-    if not least < most:
-        raise _wrong_value(path, properties, "FZMAX", f"must be above FZMIN, {least:g}")
-    loads = np.unique(np.concatenate((np.linspace(least, most, LOAD_NODES), np.clip([nominal], least, most))))
+    if not least_load < largest_load:
+        raise _wrong_value(path, properties, "FZMAX", f"must be above FZMIN, {least_load:g}")
+    loads = np.unique(
+        np.concatenate(
+            (np.linspace(least_load, largest_load, LOAD_NODES), np.clip([nominal], least_load, largest_load))
+        )
+    )
     curves = {load: (longitudinal_formula(c, load), lateral_formula(c, load)) for load in loads}
     _check_curves(path, curves)
     return by_similarity(
@@ -63,20 +67,20 @@ def tir_table(path: str | Path) -> TyreTable:
 
 def longitudinal_formula(c: dict[str, float], load: float) -> MagicFormulaCurve:
     """Magic formula of braking under a load (N) from a file's coefficients."""
-    _, off = _load_excess(c, load)
-    peak = (c["PDX1"] + c["PDX2"] * off) * c["LMUX"]
+    _, load_excess = _load_excess(c, load)
+    peak = (c["PDX1"] + c["PDX2"] * load_excess) * c["LMUX"]
     shape = c["PCX1"] * c["LCX"]
-    bend = (c["PEX1"] + c["PEX2"] * off + c["PEX3"] * off**2) * (1.0 + c["PEX4"]) * c["LEX"]
-    stiffness = (c["PKX1"] + c["PKX2"] * off) * math.exp(c["PKX3"] * off) * c["LKX"]
+    bend = (c["PEX1"] + c["PEX2"] * load_excess + c["PEX3"] * load_excess**2) * (1.0 + c["PEX4"]) * c["LEX"]
+    stiffness = (c["PKX1"] + c["PKX2"] * load_excess) * math.exp(c["PKX3"] * load_excess) * c["LKX"]
     return MagicFormulaCurve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
 
 
 def lateral_formula(c: dict[str, float], load: float) -> MagicFormulaCurve:
     """Magic formula of cornering under a load (N) from a file's coefficients, without their signs."""
-    nominal, off = _load_excess(c, load)
-    peak = abs(c["PDY1"] + c["PDY2"] * off) * c["LMUY"]
+    nominal, load_excess = _load_excess(c, load)
+    peak = abs(c["PDY1"] + c["PDY2"] * load_excess) * c["LMUY"]
     shape = c["PCY1"] * c["LCY"]
-    bend = (c["PEY1"] + c["PEY2"] * off) * c["LEY"]
+    bend = (c["PEY1"] + c["PEY2"] * load_excess) * c["LEY"]
     turn = math.sin(2.0 * math.atan2(load, c["PKY2"] * nominal))
     stiffness = abs(c["PKY1"]) * nominal * turn * c["LKY"] / load
     return MagicFormulaCurve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))

@@ -43,7 +43,7 @@ def tyre_table(path: str | Path) -> TyreTable:
             int(np.prod(shape)),
             "combinations of slip angle, load and slip are too many: are the same values repeated with other digits?",
         )
-    row = _row_of_each(path, lines, np.ravel_multi_index([place for _, place in axes], shape), axes)
+    row = _row_of_each(path, lines, np.ravel_multi_index([node_index for _, node_index in axes], shape), axes)
     mu_x, mu_y = (columns[name][row].reshape(shape) for name in ("mu_x", "mu_y"))
     g, h = product_factors(mu_y)
     _check_product(path, lines, row.reshape(shape), mu_x, mu_y, g[:, None, :] * h[:, :, None])
@@ -59,19 +59,19 @@ def _columns_in_si(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         parts.append(block)
     if not parts:
         raise InputError(path, "rows", 0, "at least one row of numbers is needed")
-    columns = {name: np.concatenate([part.values[name] for part in parts]) for name in parts[0].values}
-    return np.concatenate([part.lines for part in parts]), columns
+    columns = {name: np.concatenate([row_block.values[name] for row_block in parts]) for name in parts[0].values}
+    return np.concatenate([row_block.lines for row_block in parts]), columns
 
 
 def _check_ranges(path: str | Path, lines: np.ndarray, columns: dict[str, np.ndarray]) -> None:
-    for name, least, most, allowed in (
+    for name, least_value, largest_value, allowed in (
         ("slip angle", 0.0, np.pi / 2.0, "must be from 0 to 90 deg"),
         ("slip", 0.0, 1.0, "must be from 0 to 1"),
         ("load", 1.0, 1e6, "must be from 1 N to 1000 kN"),
         ("mu_x", 0.0, LARGEST_FRICTION, "must be from 0 to 3"),
         ("mu_y", 0.0, LARGEST_FRICTION, "must be from 0 to 3"),
     ):
-        wrong = np.flatnonzero(~((columns[name] >= least) & (columns[name] <= most * (1.0 + 1e-12))))
+        wrong = np.flatnonzero(~((columns[name] >= least_value) & (columns[name] <= largest_value * (1.0 + 1e-12))))
         if wrong.size:
             raise _error_in_row(path, lines, name, wrong[0], columns[name][wrong[0]], allowed)
     for name, zero in (("mu_x", "slip"), ("mu_y", "slip angle")):
@@ -80,19 +80,21 @@ def _check_ranges(path: str | Path, lines: np.ndarray, columns: dict[str, np.nda
             raise _error_in_row(path, lines, name, wrong[0], columns[name][wrong[0]], f"must be 0 where {zero} is 0")
 
 
-def _error_in_row(path: str | Path, lines: np.ndarray, name: str, row: int, value: float, allowed: str) -> InputError:
-    return InputError(path, f"line {lines[row]}, column {name!r}", float(value), f"{allowed} (in SI units)")
+def _error_in_row(
+    path: str | Path, lines: np.ndarray, name: str, row: int, wrong_value: float, allowed: str
+) -> InputError:
+    return InputError(path, f"line {lines[row]}, column {name!r}", float(wrong_value), f"{allowed} (in SI units)")
 
 
-def _row_of_each(path: str | Path, lines: np.ndarray, number: np.ndarray, axes: list) -> np.ndarray:
+def _row_of_each(path: str | Path, lines: np.ndarray, combination_number: np.ndarray, axes: list) -> np.ndarray:
     """Index of the row for each combination of nodes; every combination must occur exactly once."""
     shape = tuple(nodes.size for nodes, _ in axes)
-    order = np.argsort(number, kind="stable")
-    twice = np.flatnonzero(np.diff(number[order]) == 0)
+    order = np.argsort(combination_number, kind="stable")
+    twice = np.flatnonzero(np.diff(combination_number[order]) == 0)
     if twice.size:
         first, repeated = lines[order[twice[0]]], lines[order[twice[0] + 1]]
         raise InputError(path, f"line {repeated}", None, f"has the slip angle, load and slip of line {first}")
-    missing = np.flatnonzero(np.bincount(number, minlength=int(np.prod(shape))) == 0)
+    missing = np.flatnonzero(np.bincount(combination_number, minlength=int(np.prod(shape))) == 0)
     if missing.size:
         angle, load, slip = (nodes[i] for (nodes, _), i in zip(axes, np.unravel_index(missing[0], shape), strict=True))
         raise InputError(
@@ -108,9 +110,9 @@ def _row_of_each(path: str | Path, lines: np.ndarray, number: np.ndarray, axes: 
 def _check_product(
     path: str | Path, lines: np.ndarray, row: np.ndarray, mu_x: np.ndarray, mu_y: np.ndarray, product: np.ndarray
 ) -> None:
-    off = np.abs(product - mu_y)
-    worst = int(off.argmax())
-    if off.flat[worst] > PRODUCT_TOLERANCE * max(mu_x.max(), mu_y.max()):
+    deviation = np.abs(product - mu_y)
+    worst = int(deviation.argmax())
+    if deviation.flat[worst] > PRODUCT_TOLERANCE * max(mu_x.max(), mu_y.max()):
         raise _error_in_row(
             path,
             lines,

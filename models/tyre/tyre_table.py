@@ -82,12 +82,12 @@ class TyreTable:
             total = np.hypot(x, g[:, None, :] * h[:, :, None])
             if total.max() > peak * (1.0 + ROUNDING_SHARE):
                 i, j, k = np.unravel_index(total.argmax(), total.shape)
-                place = (
+                largest_position = (
                     f"slip angle {np.rad2deg(self.angles[i]):.4g} deg, load {self.loads[j]:g} N, slip {self.slips[k]:g}"
                 )
                 raise InputError(
                     self.name,
-                    place,
+                    largest_position,
                     float(total[i, j, k]),
                     "both together must not be above the largest "
                     f"of either alone, {peak:.6g}, by more than {ROUNDING_SHARE:.0%}",
@@ -140,15 +140,15 @@ class TyreTable:
         return [mu_x, g, _interpolate_axis(_interpolate_axis(self.h, 0, self.angles, angles), 1, self.loads, loads)]
 
 
-def _interpolate_axis(values: np.ndarray, axis: int, old: np.ndarray, new: np.ndarray) -> np.ndarray:
+def _interpolate_axis(values: np.ndarray, axis: int, old_nodes: np.ndarray, new_nodes: np.ndarray) -> np.ndarray:
     """Values at new nodes along one axis, linear between the old ones and constant beyond."""
-    if np.array_equal(old, new):
+    if np.array_equal(old_nodes, new_nodes):
         return values
-    cell = np.interp(new, old, np.arange(old.size))
-    low = np.minimum(cell.astype(int), max(old.size - 2, 0))
+    cell = np.interp(new_nodes, old_nodes, np.arange(old_nodes.size))
+    low = np.minimum(cell.astype(int), max(old_nodes.size - 2, 0))
     share = np.expand_dims(cell - low, tuple(range(1, values.ndim - axis)))
-    below, above = values.take(low, axis), values.take(np.minimum(low + 1, old.size - 1), axis)
-    return (1.0 - share) * below + share * above
+    values_below, values_above = values.take(low, axis), values.take(np.minimum(low + 1, old_nodes.size - 1), axis)
+    return (1.0 - share) * values_below + share * values_above
 
 
 class Tables(NamedTuple):
@@ -182,35 +182,39 @@ def stacked_tables(tables: Sequence[TyreTable]) -> Tables:
 
 
 @lean
-def cell_and_share(nodes, value):
+def cell_and_share(nodes, node_value):
     """Index of the table cell that contains a value, and the value's relative position in the cell; clamped at the
     ends."""
-    last = nodes.size - 1
-    if last == 0 or value <= nodes[0]:
+    last_node = nodes.size - 1
+    if last_node == 0 or node_value <= nodes[0]:
         return 0, 0.0
-    if value >= nodes[last]:
-        return last - 1, 1.0
-    low, high = 0, last
+    if node_value >= nodes[last_node]:
+        return last_node - 1, 1.0
+    low, high = 0, last_node
     while high - low > 1:
         middle = (low + high) // 2
-        if nodes[middle] <= value:
+        if nodes[middle] <= node_value:
             low = middle
         else:
             high = middle
-    return low, (value - nodes[low]) / (nodes[low + 1] - nodes[low])
+    return low, (node_value - nodes[low]) / (nodes[low + 1] - nodes[low])
 
 
 @lean
-def lateral_adhesion(table, cells, k, w, g, h):
+def lateral_adhesion(table, cells, k, w, slip_factors, angle_factors):
     """mu_y of one table at the slip angle and load of ``cells``, and at the slip in cell k with relative position w."""
     i, p, j, q = cells
-    i1, j1, k1 = min(i + 1, h.shape[1] - 1), min(j + 1, h.shape[2] - 1), min(k + 1, g.shape[2] - 1)
-    by_slip = (1.0 - p) * ((1.0 - w) * g[table, i, k] + w * g[table, i, k1])
-    by_slip += p * ((1.0 - w) * g[table, i1, k] + w * g[table, i1, k1])
+    i1, j1, k1 = (
+        min(i + 1, angle_factors.shape[1] - 1),
+        min(j + 1, angle_factors.shape[2] - 1),
+        min(k + 1, slip_factors.shape[2] - 1),
+    )
+    by_slip = (1.0 - p) * ((1.0 - w) * slip_factors[table, i, k] + w * slip_factors[table, i, k1])
+    by_slip += p * ((1.0 - w) * slip_factors[table, i1, k] + w * slip_factors[table, i1, k1])
     if q == 0.0:  # at a node, as everywhere in a table of one load
-        return by_slip * ((1.0 - p) * h[table, i, j] + p * h[table, i1, j])
-    by_load = (1.0 - p) * ((1.0 - q) * h[table, i, j] + q * h[table, i, j1])
-    by_load += p * ((1.0 - q) * h[table, i1, j] + q * h[table, i1, j1])
+        return by_slip * ((1.0 - p) * angle_factors[table, i, j] + p * angle_factors[table, i1, j])
+    by_load = (1.0 - p) * ((1.0 - q) * angle_factors[table, i, j] + q * angle_factors[table, i, j1])
+    by_load += p * ((1.0 - q) * angle_factors[table, i1, j] + q * angle_factors[table, i1, j1])
     return by_slip * by_load
 
 

@@ -97,20 +97,22 @@ class Overlay:
             f"{TABLE_HEADINGS[4]:>11}  at"
         )
         rows = [
-            f"  {each.name:<28} {each.rms:>11.4g} {each.unit or '-':<8} "
-            f"{_share_text(each.relative):>9} {each.peak:>11.4g}  "
-            f"{each.at:.6g} s{_within_error_text(each)}"
-            for each in self.matches
+            f"  {channel_match.name:<28} {channel_match.rms:>11.4g} {channel_match.unit or '-':<8} "
+            f"{_share_text(channel_match.relative):>9} {channel_match.peak:>11.4g}  "
+            f"{channel_match.at:.6g} s{_within_error_text(channel_match)}"
+            for channel_match in self.matches
         ]
         return [f"  {self.told()}", head, *rows, *(f"  {note}" for note in self.notes)]
 
     def told(self) -> str:
         """Sentence for the screen about the time shift between measurement and run."""
-        shift, alike = self.shift.seconds, self.shift.correlation
-        if np.isnan(alike):
+        shift, correlation = self.shift.seconds, self.shift.correlation
+        if np.isnan(correlation):
             return f"time shift {shift:.6g} s: as given, or nothing moves by which one could be told"
-        doubt = "" if alike >= DOUBTFUL_CORRELATION else "; in doubt, as both are hardly alike: name it with --shift"
-        return f"time shift {shift:.6g} s, by which the measurement is later (correlation {alike:.4f}){doubt}"
+        doubt = (
+            "" if correlation >= DOUBTFUL_CORRELATION else "; in doubt, as both are hardly alike: name it with --shift"
+        )
+        return f"time shift {shift:.6g} s, by which the measurement is later (correlation {correlation:.4f}){doubt}"
 
 
 def _share_text(relative: float) -> str:
@@ -119,8 +121,12 @@ def _share_text(relative: float) -> str:
     return f"{100.0 * relative:.3g} %" if np.isfinite(relative) else "-"
 
 
-def _within_error_text(match: Match) -> str:
-    return f"; rms within the run's own error of {match.stated:.2g}" if match.rms <= match.stated else ""
+def _within_error_text(channel_match: Match) -> str:
+    return (
+        f"; rms within the run's own error of {channel_match.stated:.2g}"
+        if channel_match.rms <= channel_match.stated
+        else ""
+    )
 
 
 def is_run_against_measurement(run: Path, measurement: Path) -> bool:
@@ -133,16 +139,19 @@ def is_run_against_measurement(run: Path, measurement: Path) -> bool:
     )
 
 
-def overlay_of_run(run: Result, file: str | Path, shift: float | None = None) -> Overlay:
+def overlay_of_run(run: Result, file: str | Path, time_shift_seconds: float | None = None) -> Overlay:
     """Compare a measurement with a run channel by channel, largest relative error first.
 
     Headers are ``name [unit]``, names those of the run's channels; units are converted. A run of several engines has a
-    channel of each under a name. shift : s, what the measurement's clock shows at the run's time 0; sought where None.
-    Raises InputError for a file without any channel
-    of the run, and for a unit that does not fit.
+    channel of each under a name. time_shift_seconds : s, what the measurement's clock shows at the run's time 0; sought
+    where None. Raises InputError for a file without any channel of the run, and for a unit that does not fit.
     """
-    timed = ((name, each) for name, each in channels_of(run.data) if each.over == TIME_AXIS and len(each.grid) > 3)
-    ours = {name: each for name, each in timed if np.isfinite(each.values).all()}
+    timed = (
+        (name, quantity)
+        for name, quantity in channels_of(run.data)
+        if quantity.over == TIME_AXIS and len(quantity.grid) > 3
+    )
+    ours = {name: quantity for name, quantity in timed if np.isfinite(quantity.values).all()}
     if not ours:
         raise InputError("compare", "", None, "the run has no channels over time: a measurement cannot lie over it")
     source = open_source(file)
@@ -150,115 +159,134 @@ def overlay_of_run(run: Result, file: str | Path, shift: float | None = None) ->
     named = {name: channel for channel in source.channels for name in _by_engine(channel.name, engines, ours)}
     if not named:
         theirs = [channel.name for channel in source.channels]
-        name = next((each for each in theirs if suggestion_phrase(each, tuple(ours))), theirs[0] if theirs else None)
+        name = next((other for other in theirs if suggestion_phrase(other, tuple(ours))), theirs[0] if theirs else None)
         raise InputError(file, "", name, "no channel has the name of one of the run", tuple(ours))
     doubts = list[str]()
     pairs = {name: _channel_pair(source, channel, ours[name], doubts) for name, channel in named.items()}
-    moved_by = time_shift(list(pairs.values())) if shift is None else TimeShift(shift, np.nan)
+    moved_by = time_shift(list(pairs.values())) if time_shift_seconds is None else TimeShift(time_shift_seconds, np.nan)
     matches = [_channel_match(name, pair, ours[name].unit, moved_by.seconds, run) for name, pair in pairs.items()]
-    kept = [match for match in matches if match is not None]
-    if not kept:
+    complete = [match for match in matches if match is not None]
+    if not complete:
         raise InputError(file, "time", moved_by.seconds, "at this time shift (s) no sample lies within the run")
     notes = [*_missing_channel_notes(source, ours, engines), *dict.fromkeys(doubts)]
-    return Overlay(moved_by, sorted(kept, key=lambda each: -each.relative), notes)
+    return Overlay(moved_by, sorted(complete, key=lambda channel_match: -channel_match.relative), notes)
 
 
-def _by_engine(name: str, engines: list[str], ours: Mapping[str, Quantity]) -> list[str]:
+def _by_engine(name: str, engines: list[str], run_quantities: Mapping[str, Quantity]) -> list[str]:
     """Names of the run's channels to compare with a measured channel: the same name, or this name followed by each
     engine's."""
-    if name in ours:
+    if name in run_quantities:
         return [name]
-    return [each for each in (f"{name}, {engine}" for engine in engines) if each in ours]
+    return [
+        channel_name for channel_name in (f"{name}, {engine}" for engine in engines) if channel_name in run_quantities
+    ]
 
 
-def _missing_channel_notes(source: Source, ours: Mapping[str, Quantity], engines: list[str]) -> Iterator[str]:
+def _missing_channel_notes(
+    measurement_source: Source, run_quantities: Mapping[str, Quantity], engines: list[str]
+) -> Iterator[str]:
     """Channels of the file that the run does not have, each with the nearest name."""
-    for channel in source.channels:
-        if not _by_engine(channel.name, engines, ours):
+    for channel in measurement_source.channels:
+        if not _by_engine(channel.name, engines, run_quantities):
             yield (
-                f"not compared: {channel.name!r} is no channel of the run{suggestion_phrase(channel.name, tuple(ours))}"
+                f"not compared: {channel.name!r} is no channel of the "
+                f"run{suggestion_phrase(channel.name, tuple(run_quantities))}"
             )
 
 
-def _channel_pair(source: Source, channel: Channel, ours: Quantity, doubts: list[str]) -> ChannelPair:
+def _channel_pair(
+    measurement_source: Source, channel: Channel, run_quantity: Quantity, doubts: list[str]
+) -> ChannelPair:
     """Times and values of one channel in the run and in the measurement, both in the run's unit; ``doubts`` gets what
-    its times make doubtful."""
-    if not channel.unit and ours.unit not in ("", "-"):
-        allowed = f"has no unit: write {channel.name} [{ours.unit}] in the header, or its unit there"
-        raise InputError(source.path, channel.name, None, allowed)
-    factor = factor_between(channel.unit, ours.unit, source.path, channel.name)
-    blocks = list(source.blocks([channel.name]))
-    times, values = (np.concatenate(parts) for parts in zip(*((b.times, b.values[:, 0]) for b in blocks), strict=True))
+    its times make doubtful.
+    """
+    if not channel.unit and run_quantity.unit not in ("", "-"):
+        allowed = f"has no unit: write {channel.name} [{run_quantity.unit}] in the header, or its unit there"
+        raise InputError(measurement_source.path, channel.name, None, allowed)
+    factor = factor_between(channel.unit, run_quantity.unit, measurement_source.path, channel.name)
+    blocks = list(measurement_source.blocks([channel.name]))
+    sample_times, values = (
+        np.concatenate(parts) for parts in zip(*((b.times, b.values[:, 0]) for b in blocks), strict=True)
+    )
     if not np.isfinite(values).any():
-        raise InputError(source.path, channel.name, None, "has no values: no cell of it holds a number")
-    clock = sample_timing(times, str(source.path), (channel.name,))
-    doubts.extend(each.text for each in clock.findings)
+        raise InputError(measurement_source.path, channel.name, None, "has no values: no cell of it holds a number")
+    clock = sample_timing(sample_times, str(measurement_source.path), (channel.name,))
+    doubts.extend(finding.text for finding in clock.findings)
     return ChannelPair(
-        ours.grid, ours.values, clock.times, factor * (values if clock.order is None else values[clock.order])
+        run_quantity.grid,
+        run_quantity.values,
+        clock.times,
+        factor * (values if clock.order is None else values[clock.order]),
     )
 
 
-def _channel_match(name: str, channel_pair: ChannelPair, unit: str, shift: float, run: Result) -> Match | None:
+def _channel_match(
+    name: str, channel_pair: ChannelPair, unit: str, time_shift_seconds: float, run: Result
+) -> Match | None:
     """Compare one channel at those measured times that lie within the run; None if no measured time does. The run is
     interpolated by a cubic spline."""
     from scipy.interpolate import CubicSpline
 
-    times = channel_pair.times - shift
+    times = channel_pair.times - time_shift_seconds
     slack = 1e-9 * (channel_pair.run_times[-1] - channel_pair.run_times[0])
-    inside = (
+    is_within = (
         np.isfinite(channel_pair.values)
         & (times >= channel_pair.run_times[0] - slack)
         & (times <= channel_pair.run_times[-1] + slack)
     )
-    if not inside.any():
+    if not is_within.any():
         return None
-    read = CubicSpline(channel_pair.run_times, channel_pair.run)(times[inside])
+    read = CubicSpline(channel_pair.run_times, channel_pair.run)(times[is_within])
     stated = errors_of(run).get(name.partition(", ")[0])
     return Match(
-        name, unit, times[inside], read, channel_pair.values[inside], np.nan if stated is None else stated.error
+        name, unit, times[is_within], read, channel_pair.values[is_within], np.nan if stated is None else stated.error
     )
 
 
-def saved_results(place: Path) -> dict[str, Result]:
+def saved_results(file_or_folder: Path) -> dict[str, Result]:
     """All saved results in a file or folder, by name; raises InputError if there are none."""
-    if not place.exists():
-        raise InputError(place, "", None, "no such file or folder")
-    files = [place] if place.is_file() else sorted(place.rglob("*.nc"))
+    if not file_or_folder.exists():
+        raise InputError(file_or_folder, "", None, "no such file or folder")
+    files = [file_or_folder] if file_or_folder.is_file() else sorted(file_or_folder.rglob("*.nc"))
     if not files:
-        raise InputError(place, "", None, "holds no saved result (.nc): name the folder of a run")
+        raise InputError(file_or_folder, "", None, "holds no saved result (.nc): name the folder of a run")
     return {file.stem: load(file) for file in files}
 
 
-def report(run_path: Path, measurement: Path, folder: Path, shift: float | None = None) -> dict[str, Any]:
+def report(run_path: Path, measurement: Path, folder: Path, time_shift_seconds: float | None = None) -> dict[str, Any]:
     """Compare a measurement with a run, or with the runs in a folder; saves ``compare.csv`` and figures, and returns
     the lines to print."""
-    overlays = {name: overlay_of_run(run, measurement, shift) for name, run in saved_results(run_path).items()}
-    with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
+    overlays = {
+        name: overlay_of_run(run, measurement, time_shift_seconds) for name, run in saved_results(run_path).items()
+    }
+    with whole_file(folder / "compare.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("run", *TABLE_HEADINGS))
-        for name, each in overlays.items():
-            for m in each.matches:
+        for name, overlay in overlays.items():
+            for m in overlay.matches:
                 writer.writerow((name, m.name, m.unit, m.rms, m.relative, m.peak, m.at, m.stated))
-    for name, each in overlays.items():
+    for name, overlay in overlays.items():
         draw_overlay(
-            each,
+            overlay,
             f"{measurement.name} over {name}",
             folder / (f"compare_{name}.png" if len(overlays) > 1 else "compare.png"),
         )
-    table = [line for name, each in overlays.items() for line in _overlay_lines(name, each, len(overlays))]
+    table = [line for name, overlay in overlays.items() for line in _overlay_lines(name, overlay, len(overlays))]
     return {
         "scene": f"{measurement} over {run_path}",
         "folder": str(folder),
         "failed": {},
-        "shift": {name: each.shift.seconds for name, each in overlays.items()},
-        "errors of channels": {name: {m.name: m.values() for m in each.matches} for name, each in overlays.items()},
+        "shift": {name: overlay.shift.seconds for name, overlay in overlays.items()},
+        "errors of channels": {
+            name: {m.name: m.values() for m in overlay.matches} for name, overlay in overlays.items()
+        },
         "table": table,
         "results": {},
     }
 
 
-def _overlay_lines(name: str, overlay: Overlay, count: int) -> Sequence[str]:
-    return [*([f"  {name}"] if count > 1 else []), *overlay.lines()]
+def _overlay_lines(name: str, overlay: Overlay, overlay_count: int) -> Sequence[str]:
+    return [*([f"  {name}"] if overlay_count > 1 else []), *overlay.lines()]
 
 
 def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
@@ -267,18 +295,18 @@ def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
 
     shown = overlay.matches[:SHOWN_CHANNELS]
     figure, axes = subplots(2, len(shown), figsize=(3.6 * len(shown) + 1.0, 5.4), sharex="col", squeeze=False)
-    for (top, below), match in zip(axes.T, shown, strict=True):
+    for (top, error_axis), match in zip(axes.T, shown, strict=True):
         unit = match.unit or "-"
         top.plot(match.times, match.measured, color=DARK, linewidth=1.8, label="measured")
         top.plot(match.times, match.run, color=VERMILION, linewidth=1.0, label="run")
         top.set(title=match.name, ylabel=f"{match.name} [{unit}]")
-        below.plot(match.times, match.error, color=BLUE)
-        below.plot(match.at, match.peak, "o", color=BLUE, markersize=5)
-        below.set(
+        error_axis.plot(match.times, match.error, color=BLUE)
+        error_axis.plot(match.at, match.peak, "o", color=BLUE, markersize=5)
+        error_axis.set(
             title=f"rms error {match.rms:.3g} {unit}, {_share_text(match.relative)} of its deviation",
             xlabel="time of the run [s]",
         )
-        below.set_ylabel(f"run less measurement [{unit}]")
+        error_axis.set_ylabel(f"run less measurement [{unit}]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     add_heading(figure, f"{title}: {overlay.told().partition(';')[0]}", {})
     save(figure, path)

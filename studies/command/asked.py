@@ -175,6 +175,6 @@ def study_of(scene: Any) -> Any:
     if hasattr(module, "Options"):
         read(module.Options, scene.options, scene.file, "options")
     elif scene.options:
-        place, value = next(iter(scene.options.items()))
-        raise InputError(scene.file, f"options.{place}", value, f"the study {scene.study!r} takes no options")
+        option_name, value = next(iter(scene.options.items()))
+        raise InputError(scene.file, f"options.{option_name}", value, f"the study {scene.study!r} takes no options")
     return module

@@ -25,42 +25,48 @@ EQUAL_PLACES = 1e-9
 """Places so near, by the largest of them, are the same."""
 
 
-def compare(first: Path, second: Path) -> tuple[list[QuantityDifference], list[str]]:
+def compare(first_path: Path, second_path: Path) -> tuple[list[QuantityDifference], list[str]]:
     """Differences of all quantities that occur in both results, largest relative one first, and notes on quantities
     that occur in only one.
 
     Raises InputError for what is no result, and for two results that have nothing to compare.
     """
-    pairs, notes = _file_pairs(first, second)
+    pairs, notes = _file_pairs(first_path, second_path)
     differences = list[QuantityDifference]()
     for name, *files in pairs:
         prefix = f"{name}: " if len(pairs) > 1 else ""
         a, b = (dict(_quantities_of_file(file)) for file in files)
         notes += _notes_on_missing(prefix, (files[0], a), (files[1], b))
         differences += [_quantity_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
-    return _by_share(differences, first, second), notes
+    return _by_share(differences, first_path, second_path), notes
 
 
-def compare_runs(first: Result, second: Result, names: tuple[str, str]) -> tuple[list[QuantityDifference], list[str]]:
+def compare_runs(
+    first_run: Result, second_run: Result, names: tuple[str, str]
+) -> tuple[list[QuantityDifference], list[str]]:
     """Differences between two results in memory; ``names`` are their names in messages and notes."""
-    a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first, second))
+    a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first_run, second_run))
     differences = [_quantity_difference(key, a[key], b[key], names[1]) for key in a if key in b]
     return _by_share(differences, *names), _notes_on_missing("", (names[0], a), (names[1], b))
 
 
-def _by_share(differences: list[QuantityDifference], first: object, second: object) -> list[QuantityDifference]:
+def _by_share(
+    differences: list[QuantityDifference], first_name: object, second_name: object
+) -> list[QuantityDifference]:
     """Differences sorted by their share of the quantity, largest first; raises InputError if there are none."""
     if not differences:
-        raise InputError(second, "", None, f"has no quantity in common with {first}: compare two results of one study")
-    return sorted(differences, key=lambda each: -each.share)
+        raise InputError(
+            second_name, "", None, f"has no quantity in common with {first_name}: compare two results of one study"
+        )
+    return sorted(differences, key=lambda difference: -difference.share)
 
 
 def _notes_on_missing(prefix: str, *sides: tuple[object, Collection[str]]) -> list[str]:
     """Notes on names that occur in only one of the two results."""
     return [
-        f"{prefix}only in {path}: {', '.join(alone)}"
-        for (path, names), (_, others) in (sides, sides[::-1])
-        if (alone := [name for name in names if name not in others])
+        f"{prefix}only in {path}: {', '.join(only_here)}"
+        for (path, names), (_, names_of_other) in (sides, sides[::-1])
+        if (only_here := [name for name in names if name not in names_of_other])
     ]
 
 
@@ -99,7 +105,8 @@ def _result_files(folder: Path) -> dict[str, Path]:
     files = [
         path
         for path in sorted(folder.rglob("*"))
-        if path.suffix in RESULT_SUFFIXES and not any(part.startswith(".") for part in path.relative_to(folder).parts)
+        if path.suffix in RESULT_SUFFIXES
+        and not any(folder_name.startswith(".") for folder_name in path.relative_to(folder).parts)
     ]
     netcdf = [path for path in files if path.suffix == ".nc" and not _holds_same_table(path)]
     chosen = netcdf or [path for path in files if path.suffix == ".csv"]
@@ -112,21 +119,21 @@ def _holds_same_table(path: Path) -> bool:
     return path.with_suffix(".csv").exists() and len(load(path).data.sizes) < 2
 
 
-def results_of(first: Path, second: Path) -> dict[str, Result]:
+def results_of(first_path: Path, second_path: Path) -> dict[str, Result]:
     """Results to compare, by file; for a CSV table beside a netCDF file, the netCDF file is read."""
-    files = [file for _, *pair in _file_pairs(first, second)[0] for file in pair]
+    files = [file for _, *pair in _file_pairs(first_path, second_path)[0] for file in pair]
     results = ((str(file), _result(file)) for file in files)
     return {
         name: run
         for name, run in results
-        if run is not None and all(said in run.data.attrs for said in DOUBT_ATTRIBUTES)
+        if run is not None and all(attribute in run.data.attrs for attribute in DOUBT_ATTRIBUTES)
     }
 
 
 def _result(path: Path) -> Result | None:
     """The saved result of a file, or of the netCDF file that belongs to a CSV table; None if there is none."""
-    beside = path.with_suffix(".nc")
-    return load(beside) if beside.is_file() else None
+    netcdf_path = path.with_suffix(".nc")
+    return load(netcdf_path) if netcdf_path.is_file() else None
 
 
 def _quantities_of_file(path: Path) -> Iterator[tuple[str, Quantity]]:
@@ -149,14 +156,17 @@ def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
     for name, channel in data.data_vars.items():
         if channel.dtype.kind not in "fiu" or channel.size == 0:
             continue
-        along = _dimension_along(channel)
-        over, grid = _grid_of_dimension(channel, along)
-        others = [dim for dim in channel.dims if dim != along]
-        for place in np.ndindex(*(channel.sizes[dim] for dim in others)):
-            at = dict(zip(others, place, strict=True))
-            labels = (str(channel[dim].values[i]) if dim in channel.coords else f"{dim} {i}" for dim, i in at.items())
-            values = channel.isel(at).values.astype(float).reshape(-1)
-            quantity = Quantity(str(channel.attrs.get("units", "")), values, over, grid, kinds)
+        dimension = _dimension_along(channel)
+        axis_name, grid = _grid_of_dimension(channel, dimension)
+        other_dims = [dim for dim in channel.dims if dim != dimension]
+        for index in np.ndindex(*(channel.sizes[dim] for dim in other_dims)):
+            index_by_dim = dict(zip(other_dims, index, strict=True))
+            labels = (
+                str(channel[dim].values[i]) if dim in channel.coords else f"{dim} {i}"
+                for dim, i in index_by_dim.items()
+            )
+            values = channel.isel(index_by_dim).values.astype(float).reshape(-1)
+            quantity = Quantity(str(channel.attrs.get("units", "")), values, axis_name, grid, kinds)
             yield ", ".join((str(name), *labels)), quantity
 
 
@@ -167,12 +177,12 @@ def _dimension_along(channel: Any) -> Any:
     return "time" if "time" in numbered else max(numbered, key=channel.sizes.get, default=None)
 
 
-def _grid_of_dimension(channel: Any, along: Any) -> tuple[str, np.ndarray]:
+def _grid_of_dimension(channel: Any, dimension: Any) -> tuple[str, np.ndarray]:
     """Name and values of the coordinate along a dimension; row numbers if it has none."""
-    if along not in channel.coords:
-        return "entry", np.arange(channel.sizes.get(along, 1), dtype=float)
-    unit = channel[along].attrs.get("units", "s" if along == "time" else "")
-    return f"{along} [{unit}]" if unit else str(along), channel[along].values.astype(float)
+    if dimension not in channel.coords:
+        return "entry", np.arange(channel.sizes.get(dimension, 1), dtype=float)
+    unit = channel[dimension].attrs.get("units", "s" if dimension == "time" else "")
+    return f"{dimension} [{unit}]" if unit else str(dimension), channel[dimension].values.astype(float)
 
 
 def _table(path: Path) -> Iterator[tuple[str, Quantity]]:
@@ -190,12 +200,12 @@ def _table(path: Path) -> Iterator[tuple[str, Quantity]]:
     if not columns:
         raise InputError(path, "", None, "is not a table of results: it has no rows")
     numeric = {head: values for head, cells in columns.items() if (values := _numeric_cells(cells)) is not None}
-    over = names[0]
-    labels = () if over in numeric else columns[over]
-    grid = numeric.pop(over, np.arange(len(rows), dtype=float))
+    axis_name = names[0]
+    labels = () if axis_name in numeric else columns[axis_name]
+    grid = numeric.pop(axis_name, np.arange(len(rows), dtype=float))
     for head, values in numeric.items():
         name, _, unit = head.partition(" [")
-        yield name, Quantity(unit.rstrip("]"), values, over, grid, labels=labels)
+        yield name, Quantity(unit.rstrip("]"), values, axis_name, grid, labels=labels)
 
 
 def _numeric_cells(cells: tuple[str, ...]) -> np.ndarray | None:
@@ -206,72 +216,99 @@ def _numeric_cells(cells: tuple[str, ...]) -> np.ndarray | None:
     return values if np.isfinite(values).any() else None
 
 
-def _quantity_difference(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
+def _quantity_difference(
+    name: str, first_quantity: Quantity, second_quantity: Quantity, file: object
+) -> QuantityDifference:
     """Difference of one quantity in two results; raises InputError if their kinds, units or rows do not match."""
-    if first.kind != second.kind:
-        raise InputError(file, name, second.kind, f"the other run is of {first.kind}: compare two runs of one kind")
-    if (first.unit, first.over) != (second.unit, second.over):
+    if first_quantity.kind != second_quantity.kind:
         raise InputError(
-            file, name, f"{second.unit} over {second.over}", f"the other one is in {first.unit} over {first.over}"
+            file, name, second_quantity.kind, f"the other run is of {first_quantity.kind}: compare two runs of one kind"
         )
-    for label, other in zip(first.labels, second.labels, strict=False):
+    if (first_quantity.unit, first_quantity.over) != (second_quantity.unit, second_quantity.over):
+        raise InputError(
+            file,
+            name,
+            f"{second_quantity.unit} over {second_quantity.over}",
+            f"the other one is in {first_quantity.unit} over {first_quantity.over}",
+        )
+    for label, other in zip(first_quantity.labels, second_quantity.labels, strict=False):
         if label != other:
             raise InputError(file, name, other, f"has other rows than the first, which has {label!r} there")
-    near = EQUAL_PLACES * np.abs(first.grid).max(initial=0.0)
-    if first.grid.shape == second.grid.shape and np.allclose(first.grid, second.grid, rtol=0.0, atol=near):
+    near = EQUAL_PLACES * np.abs(first_quantity.grid).max(initial=0.0)
+    if first_quantity.grid.shape == second_quantity.grid.shape and np.allclose(
+        first_quantity.grid, second_quantity.grid, rtol=0.0, atol=near
+    ):
         return QuantityDifference(
             name,
-            first.unit,
-            first.over,
-            first.grid,
-            first.values,
-            second.values,
+            first_quantity.unit,
+            first_quantity.over,
+            first_quantity.grid,
+            first_quantity.values,
+            second_quantity.values,
             "",
-            first.labels,
-            first.error + second.error,
+            first_quantity.labels,
+            first_quantity.error + second_quantity.error,
         )
-    if first.over != "time [s]":
-        rows = "" if len(first.grid) == len(second.grid) else f", {len(second.grid)} instead of {len(first.grid)}"
-        raise InputError(file, name, None, f"has rows at other places ({first.over}) than the first{rows}")
-    return _difference_in_time(name, first, second, file)
+    if first_quantity.over != "time [s]":
+        rows = (
+            ""
+            if len(first_quantity.grid) == len(second_quantity.grid)
+            else f", {len(second_quantity.grid)} instead of {len(first_quantity.grid)}"
+        )
+        raise InputError(file, name, None, f"has rows at other places ({first_quantity.over}) than the first{rows}")
+    return _difference_in_time(name, first_quantity, second_quantity, file)
 
 
-def _difference_in_time(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
+def _difference_in_time(
+    name: str, first_quantity: Quantity, second_quantity: Quantity, file: object
+) -> QuantityDifference:
     """Difference of two runs with rows at different times; the denser run is interpolated at the other's rows by a
     cubic spline."""
     from scipy.interpolate import CubicSpline
 
-    fine, coarse = (first, second) if len(first.grid) > len(second.grid) else (second, first)
+    fine, coarse = (
+        (first_quantity, second_quantity)
+        if len(first_quantity.grid) > len(second_quantity.grid)
+        else (second_quantity, first_quantity)
+    )
     unread = "cannot be read at other times: the"
     if not (np.diff(fine.grid) > 0.0).all():
         raise InputError(file, name, None, f"{unread} times of the denser run do not increase")
     if not np.isfinite(fine.values).all():
         raise InputError(file, name, None, f"{unread} denser run holds what is no number")
-    inside = (coarse.grid >= fine.grid[0] - 1e-9) & (coarse.grid <= fine.grid[-1] + 1e-9)
-    if not (inside.sum() > 1 and len(fine.grid) > 3):
+    is_within = (coarse.grid >= fine.grid[0] - 1e-9) & (coarse.grid <= fine.grid[-1] + 1e-9)
+    if not (is_within.sum() > 1 and len(fine.grid) > 3):
         raise InputError(file, name, None, "has no times in common with the first")
-    times = coarse.grid[inside]
-    pair = CubicSpline(fine.grid, fine.values)(times), coarse.values[inside]
-    note = (
-        f"on {len(times)} common rows, the denser run by a cubic spline{_common_part(times, first.grid, second.grid)}"
+    common_times = coarse.grid[is_within]
+    pair = CubicSpline(fine.grid, fine.values)(common_times), coarse.values[is_within]
+    extent = _common_extent(common_times, first_quantity.grid, second_quantity.grid)
+    note = f"on {len(common_times)} common rows, the denser run by a cubic spline{extent}"
+    values_of_both = pair if fine is first_quantity else pair[::-1]
+    return QuantityDifference(
+        name,
+        first_quantity.unit,
+        first_quantity.over,
+        common_times,
+        *values_of_both,
+        note,
+        stated=first_quantity.error + second_quantity.error,
     )
-    both = pair if fine is first else pair[::-1]
-    return QuantityDifference(name, first.unit, first.over, times, *both, note, stated=first.error + second.error)
 
 
-def _common_part(times: np.ndarray, *grids: np.ndarray) -> str:
+def _common_extent(common_times: np.ndarray, *grids: np.ndarray) -> str:
     """Phrase on the times (s) that were compared, where one run begins later or ends earlier than the other."""
-    begin, end = (float(pick(np.concatenate(grids))) for pick in (np.min, np.max))
+    begin, end = (float(extreme(np.concatenate(grids))) for extreme in (np.min, np.max))
     spacing = min(float(np.diff(grid).max()) for grid in grids)
-    if times[0] - begin < spacing and end - times[-1] < spacing:
+    first, last = common_times[0], common_times[-1]
+    if first - begin < spacing and end - last < spacing:
         return ""
-    return f"; only from {times[0]:g} to {times[-1]:g} s, the part that both runs have of {begin:g} to {end:g} s"
+    return f"; only from {first:g} to {last:g} s, the part that both runs have of {begin:g} to {end:g} s"
 
 
-def report(first: Path, second: Path, folder: Path) -> dict[str, Any]:
+def report(first_path: Path, second_path: Path, folder: Path) -> dict[str, Any]:
     """Compare two results; saves ``compare.csv`` and ``compare.png``, and returns the lines to print."""
-    differences, notes = compare(first, second)
-    with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
+    differences, notes = compare(first_path, second_path)
+    with whole_file(folder / "compare.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.writer(file)
         heads = ("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value")
         writer.writerow((*heads, "stated error of both"))
@@ -279,17 +316,18 @@ def report(first: Path, second: Path, folder: Path) -> dict[str, Any]:
             (d.name, d.unit, d.largest, d.where, d.rms, d.share, "" if np.isnan(d.stated) else d.stated)
             for d in differences
         )
-    results = results_of(first, second)
-    _figure(first, second, differences, results, folder / "compare.png")
+    results = results_of(first_path, second_path)
+    _figure(first_path, second_path, differences, results, folder / "compare.png")
     return {
-        "scene": f"{second} less {first}",
+        "scene": f"{second_path} less {first_path}",
         "folder": str(folder),
         "failed": {},
-        "names": [each.name for each in differences],
+        "names": [difference.name for difference in differences],
         "differences": {
-            name: [getattr(each, name) for each in differences] for name in ("largest", "rms", "at", "share")
+            name: [getattr(difference, name) for difference in differences]
+            for name in ("largest", "rms", "at", "share")
         },
-        "within the stated error": [each.name for each in differences if each.within],
+        "within the stated error": [difference.name for difference in differences if difference.within],
         "table": comparison_lines(differences, notes),
         "results": results,
     }
@@ -301,20 +339,20 @@ def comparison_lines(differences: list[QuantityDifference], notes: list[str]) ->
 
 
 def _file_lines(differences: list[QuantityDifference]) -> list[str]:
-    differ = [each for each in differences if each.largest > 0.0]
-    notes = [f"  {note}" for note in dict.fromkeys(each.note for each in differences if each.note)]
+    differ = [difference for difference in differences if difference.largest > 0.0]
+    notes = [f"  {note}" for note in dict.fromkeys(difference.note for difference in differences if difference.note)]
     if not differ:
         return [f"  all {len(differences)} quantities are the same to the last bit", *notes]
-    shown = [each for each in differences[:SHOWN_QUANTITIES] if each.largest > 0.0]
-    same, more = len(differences) - len(differ), len(differ) - len(shown)
+    shown = [difference for difference in differences[:SHOWN_QUANTITIES] if difference.largest > 0.0]
+    equal_count, not_shown = len(differences) - len(differ), len(differ) - len(shown)
     return [
         f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest",
         *(
             f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  {_difference_text(d)}"
             for d in shown
         ),
-        *([f"  {more} more that differ less: compare.csv"] if more else []),
-        *([f"  the same to the last bit: {same} of {len(differences)}"] if same else []),
+        *([f"  {not_shown} more that differ less: compare.csv"] if not_shown else []),
+        *([f"  the same to the last bit: {equal_count} of {len(differences)}"] if equal_count else []),
         *notes,
     ]
 
@@ -328,7 +366,9 @@ def _difference_text(difference: QuantityDifference) -> str:
     )
 
 
-def _figure(first: Path, second: Path, differences: list[QuantityDifference], results: Results, path: Path) -> None:
+def _figure(
+    first_path: Path, second_path: Path, differences: list[QuantityDifference], results: Results, path: Path
+) -> None:
     """Draw both results and, below, their difference, of the three quantities that differ most, or one that is
     equal."""
     from models.drawing.figures import (
@@ -344,22 +384,22 @@ def _figure(first: Path, second: Path, differences: list[QuantityDifference], re
         wrapped_text,
     )
 
-    differ = [each for each in differences if each.largest != 0][:3]
+    differ = [difference for difference in differences if difference.largest != 0][:3]
     shown = differ or differences[:1]
     share = 0.95 * COLUMN_WIDTH / len(shown) - 0.3
     figure, axes = subplots(2 if differ else 1, len(shown), figsize=(COLUMN_WIDTH, 4.8), sharex="col", squeeze=False)
-    for top, each in zip(axes[0], shown, strict=True):
-        top.plot(each.grid, each.first, color=DARK, linewidth=2.0, label=str(first))
-        top.plot(each.grid, each.second, color=VERMILION, linewidth=1.0, label=str(second))
-        top.set_title(wrapped_text(f"{each.name} [{each.unit or '-'}]", share, TITLE_TEXT))
-    for below, each in zip(axes[-1], differ, strict=False):
-        below.plot(each.grid, np.where(np.isfinite(each.gap), each.gap, np.nan), color=BLUE)
-        below.plot(each.at, each.gap[each.row], "o", color=BLUE, markersize=5)
-        error = ", rms within the stated error" if each.within else ""
-        told = f"difference [{each.unit or '-'}], largest {each.largest:.3g} at the mark{error}"
-        below.set_title(wrapped_text(told, share, TITLE_TEXT))
-    for lowest, each in zip(axes[-1], shown, strict=True):
-        lowest.set_xlabel(each.over)
+    for top, difference in zip(axes[0], shown, strict=True):
+        top.plot(difference.grid, difference.first, color=DARK, linewidth=2.0, label=str(first_path))
+        top.plot(difference.grid, difference.second, color=VERMILION, linewidth=1.0, label=str(second_path))
+        top.set_title(wrapped_text(f"{difference.name} [{difference.unit or '-'}]", share, TITLE_TEXT))
+    for error_axis, difference in zip(axes[-1], differ, strict=False):
+        error_axis.plot(difference.grid, np.where(np.isfinite(difference.gap), difference.gap, np.nan), color=BLUE)
+        error_axis.plot(difference.at, difference.gap[difference.row], "o", color=BLUE, markersize=5)
+        error = ", rms within the stated error" if difference.within else ""
+        panel_title = f"difference [{difference.unit or '-'}], largest {difference.largest:.3g} at the mark{error}"
+        error_axis.set_title(wrapped_text(panel_title, share, TITLE_TEXT))
+    for lowest, difference in zip(axes[-1], shown, strict=True):
+        lowest.set_xlabel(difference.over)
     legend_below(figure, axes[0, 0], columns=1)
     add_heading(figure, f"Largest differences of {len(differences)} quantities", results)
     save(figure, path)

@@ -13,8 +13,8 @@ def given_crew(workers: int | None, cluster: str | None) -> dict[str, Any]:
     if workers is not None and cluster is not None:
         allowed = "is for this machine, and the workers of a cluster are those that have joined it: leave one out"
         raise InputError("--workers", "", workers, allowed)
-    given = {"workers": workers, "cluster": cluster}
-    return {} if workers is None and cluster is None else given
+    crew_changes = {"workers": workers, "cluster": cluster}
+    return {} if workers is None and cluster is None else crew_changes
 
 
 def crew_of(scene: Any, workers: int | None, cluster: str | None) -> "Crew":

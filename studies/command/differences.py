@@ -51,8 +51,8 @@ class QuantityDifference:
         """Difference (n,); 0 where both are NaN, infinite where only one is a number or the infinities differ."""
         with np.errstate(invalid="ignore"):
             gap = self.second - self.first
-        same = (self.first == self.second) | (np.isnan(self.first) & np.isnan(self.second))
-        return np.where(same, 0.0, np.where(np.isnan(gap), np.inf, gap))
+        are_equal = (self.first == self.second) | (np.isnan(self.first) & np.isnan(self.second))
+        return np.where(are_equal, 0.0, np.where(np.isnan(gap), np.inf, gap))
 
     @property
     def row(self) -> int:

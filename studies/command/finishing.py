@@ -51,9 +51,9 @@ def finish(
             summary["queries"] = findings_as_dicts(doubts)
             write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
     except KeyboardInterrupt:
-        kept = {path.name for path in folder.iterdir()} - {COMMAND_FILE}
+        has_results = {path.name for path in folder.iterdir()} - {COMMAND_FILE}
         exit_with_message(
-            f"interrupted; {f'finished results are kept in {folder}' if kept else 'nothing was finished'}", 130
+            f"interrupted; {f'finished results are kept in {folder}' if has_results else 'nothing was finished'}", 130
         )
     finally:
         drop_if_empty(folder)
@@ -78,10 +78,10 @@ def folder_of(name: str, blocks: str | None, study: str, output_folder: Path | N
     return resumed_folder(resume, blocks)
 
 
-def untold_findings(findings: tuple[Finding, ...], told: str) -> list[str]:
-    """Lines of the findings whose text does not occur in ``told``, which is what a plan or a study has printed
+def untold_findings(findings: tuple[Finding, ...], printed_text: str) -> list[str]:
+    """Lines of the findings whose text does not occur in ``printed_text``, which is what a plan or a study has printed
     already."""
-    return finding_lines(finding for finding in findings if finding.text not in told)
+    return finding_lines(finding for finding in findings if finding.text not in printed_text)
 
 
 def _print_summary(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
@@ -100,5 +100,5 @@ def _print_summary(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None
     table = summary.get("table", [])
     for line in (*untold_findings(doubts, "\n".join(table)), *table):
         print(line)
-    kept = Path(summary["folder"]).exists()
-    print(f"  results in {summary['folder']}" if kept else "  nothing was saved")
+    has_folder = Path(summary["folder"]).exists()
+    print(f"  results in {summary['folder']}" if has_folder else "  nothing was saved")

@@ -35,7 +35,7 @@ def identify(
     engine: str = "",
     low_pass: float = 0.0,
     folder: Path | None = None,
-    tell: Tell = lambda text, share: None,
+    report_progress: Tell = lambda text, share: None,
 ) -> Uncertainty:
     """Estimates of keys of any scene whose run has channels over time, with their uncertainty.
 
@@ -44,28 +44,30 @@ def identify(
     The scene's crew computes the columns of Jacobians. Raises InputError and RunFailed.
     """
     problem = problem_of(scene, measurement, parameters, engine, low_pass)
-    with Crew.of(scene, usual=1).at_work(1 + len(problem.parameters), *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(1 + len(problem.parameters), *places_of(scene)) as pool:
         if folder is None:
-            return uncertainty(fit(problem, None, tell, executor=pool), pool)
+            return uncertainty(fit(problem, None, report_progress, executor=pool), pool)
         store = Store(folder / STAGES_FOLDER)
         with store.reserved_folder(_facts_of_stages(scene, measurement, problem, engine, low_pass)):
-            return uncertainty(fit(problem, store, tell, executor=pool), pool)
+            return uncertainty(fit(problem, store, report_progress, executor=pool), pool)
 
 
 def profiles_of(
-    scene: Any, uncertainty: Uncertainty, all_profiles: bool = False, tell: Tell = lambda text, share: None
+    scene: Any, uncertainty: Uncertainty, all_profiles: bool = False, report_progress: Tell = lambda text, share: None
 ) -> Iterator[LikelihoodProfile]:
     """Likelihood profiles of all parameters, or only of those that the data do not determine, computed by the scene's
     workers."""
     wanted = [
         k for k in range(len(uncertainty.fit.problem.parameters)) if all_profiles or not uncertainty.is_determined[k]
     ]
-    with Crew.of(scene, usual=1).at_work(len(wanted), *places_of(scene)) as pool:
-        for done, (k, made) in enumerate(
+    with Crew.of(scene, default_workers=1).at_work(len(wanted), *places_of(scene)) as pool:
+        for completed, (k, drawn_profile) in enumerate(
             in_order(partial(likelihood_profile, uncertainty), iter(wanted), pool), start=1
         ):
-            tell(f"profile of {uncertainty.fit.problem.parameters[k].name}", 0.9 + 0.1 * done / len(wanted))
-            yield made
+            report_progress(
+                f"profile of {uncertainty.fit.problem.parameters[k].name}", 0.9 + 0.1 * completed / len(wanted)
+            )
+            yield drawn_profile
 
 
 def _facts_of_stages(
@@ -78,19 +80,27 @@ def _facts_of_stages(
         "scene": table,
         "files": named_files([table, str(measurement)], Path(scene.folder)),
         "measurement": str(measurement),
-        "parameters": [[each.name, each.start, each.low, each.high] for each in problem.parameters],
+        "parameters": [
+            [parameter.name, parameter.start, parameter.low, parameter.high] for parameter in problem.parameters
+        ],
         "engine": engine,
         "low pass": low_pass,
     }
 
 
 def report(
-    scene: Any, measurement: Path, parameters: Sequence[str], folder: Path, tell: Tell, all_profiles: bool, **more: Any
+    scene: Any,
+    measurement: Path,
+    parameters: Sequence[str],
+    folder: Path,
+    report_progress: Tell,
+    all_profiles: bool,
+    **identify_options: Any,
 ) -> dict[str, Any]:
     """Identify parameters; saves ``identify.json`` and ``identify.png``, and returns the lines to print. all_profiles :
     profiles of all parameters."""
-    known = identify(scene, measurement, parameters, folder=folder, tell=tell, **more)
-    drawn = list(profiles_of(scene, known, all_profiles, tell))
+    known = identify(scene, measurement, parameters, folder=folder, report_progress=report_progress, **identify_options)
+    drawn = list(profiles_of(scene, known, all_profiles, report_progress))
     answer = as_dict(known, drawn)
     write_whole(folder / "identify.json", json.dumps(answer, indent=1) + "\n")
     draw_fit(known, f"{measurement.name} by {scene.title}", folder / "identify.png")
@@ -106,16 +116,16 @@ def report(
 
 def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> dict[str, Any]:
     """Uncertainty and profiles as plain values; None where a standard error does not exist."""
-    solved, names = uncertainty.fit, [each.name for each in uncertainty.fit.problem.parameters]
+    solved, names = uncertainty.fit, [parameter.name for parameter in uncertainty.fit.problem.parameters]
     return {
         "estimates": {
             name: {
                 "value": float(value),
                 "standard error": _finite_number(error),
                 "determined": bool(sure),
-                "at a bound": bool(at),
+                "at a bound": bool(is_at_bound),
             }
-            for name, value, error, sure, at in zip(
+            for name, value, error, sure, is_at_bound in zip(
                 names, solved.values, uncertainty.deviations, uncertainty.is_determined, solved.at_bound, strict=True
             )
         },
@@ -130,8 +140,12 @@ def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()
         "samples left out": {channel.name: channel.left_out for channel in solved.problem.channels},
         "converged": solved.converged,
         "profiles": {
-            each.name: {"values": each.values.tolist(), "rise": each.rise.tolist(), "quadratic": each.is_quadratic}
-            for each in profiles
+            parameter.name: {
+                "values": parameter.values.tolist(),
+                "rise": parameter.rise.tolist(),
+                "quadratic": parameter.is_quadratic,
+            }
+            for parameter in profiles
         },
     }
 
@@ -143,8 +157,8 @@ def correlation(uncertainty: Uncertainty) -> np.ndarray:
     return np.divide(uncertainty.covariance, outer, out=np.zeros_like(outer), where=outer > 0.0)
 
 
-def _finite_number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def _finite_number(number: float) -> float | None:
+    return float(number) if np.isfinite(number) else None
 
 
 def relative_errors(fit: Fit) -> dict[str, float]:
@@ -160,10 +174,10 @@ def identification_lines(uncertainty: Uncertainty, profiles: Sequence[Likelihood
     """Lines for the screen."""
     solved = uncertainty.fit
     table = [f"  {'parameter':<32}{'estimate':>13}{'standard error':>16}"]
-    for k, each in enumerate(solved.problem.parameters):
+    for k, parameter in enumerate(solved.problem.parameters):
         error = "at its bound" if solved.at_bound[k] else f"{uncertainty.deviations[k]:.3g}"
         doubt = "" if uncertainty.is_determined[k] else "  not determined by the data"
-        table.append(f"  {each.name:<32}{solved.values[k]:>13.6g}{error:>16}{doubt}")
+        table.append(f"  {parameter.name:<32}{solved.values[k]:>13.6g}{error:>16}{doubt}")
     table += [
         f"  error of {name:<23}{100.0 * value:>12.3g} % of its rms" for name, value in relative_errors(solved).items()
     ]
@@ -182,8 +196,8 @@ def identification_lines(uncertainty: Uncertainty, profiles: Sequence[Likelihood
         )
     for curve in profiles:
         shape = "as the standard error says" if curve.is_quadratic else "not as the standard error says"
-        at = ", ".join(f"{r:.3g} at {v:.4g}" for v, r in zip(curve.values, curve.rise, strict=True))
-        table.append(f"  profile of {curve.name}: {at} (95 % below 3.84), {shape}")
+        curve_text = ", ".join(f"{r:.3g} at {v:.4g}" for v, r in zip(curve.values, curve.rise, strict=True))
+        table.append(f"  profile of {curve.name}: {curve_text} (95 % below 3.84), {shape}")
     return table
 
 
@@ -193,24 +207,27 @@ def late_clock(uncertainty: Uncertainty) -> float:
 
     The model is that of the start: estimates take up a part of the delay.
     """
-    problem, times = uncertainty.fit.problem, uncertainty.fit.problem.clock.times
+    problem, clock_times = uncertainty.fit.problem, uncertainty.fit.problem.clock.times
     measured = [np.where(channel.is_used, channel.values, np.nan) for channel in problem.channels]
-    start = np.array([each.start for each in problem.parameters])
+    start = np.array([parameter.start for parameter in problem.parameters])
     pairs = [
-        ChannelPair(times, row, times, values) for row, values in zip(problem.predicted(start), measured, strict=True)
+        ChannelPair(clock_times, row, clock_times, values)
+        for row, values in zip(problem.predicted(start), measured, strict=True)
     ]
     shift = time_shift(pairs).seconds
     return shift if _mean_distance(pairs, shift) * SHIFT_IMPROVEMENT < _mean_distance(pairs, 0.0) else 0.0
 
 
-def _mean_distance(pairs: Sequence[ChannelPair], shift: float) -> float:
+def _mean_distance(channel_pairs: Sequence[ChannelPair], time_shift_seconds: float) -> float:
     """Mean over channels of rms difference / standard deviation of the measurement, with the measurement shifted
     earlier by a time (s)."""
     shares = []
-    for pair in pairs:
-        at = pair.times - shift
-        inside = np.isfinite(pair.values) & (at >= pair.run_times[0]) & (at <= pair.run_times[-1])
-        gap = np.interp(at[inside], pair.run_times, pair.run) - pair.values[inside]
+    for pair in channel_pairs:
+        shifted_times = pair.times - time_shift_seconds
+        is_within = (
+            np.isfinite(pair.values) & (shifted_times >= pair.run_times[0]) & (shifted_times <= pair.run_times[-1])
+        )
+        gap = np.interp(shifted_times[is_within], pair.run_times, pair.run) - pair.values[is_within]
         shares.append(float(np.sqrt(np.mean(gap**2))) / (float(np.nanstd(pair.values)) or 1.0))
     return float(np.mean(shares))
 
@@ -219,16 +236,16 @@ def _combination_lines(uncertainty: Uncertainty) -> list[str]:
     combinations = uncertainty.combinations()
     if not combinations:
         return []
-    names = [each.name for each in uncertainty.fit.problem.parameters]
+    names = [parameter.name for parameter in uncertainty.fit.problem.parameters]
 
-    def told(vector: np.ndarray) -> str:
+    def vector_text(vector: np.ndarray) -> str:
         order = np.argsort(-np.abs(vector))
         return " ".join(f"{vector[k]:+.2f} {names[k]}" for k in order if abs(vector[k]) >= NAMED_SHARE)
 
-    (best, first), (worst, last) = combinations[0], combinations[-1]
+    (best, first_direction), (worst, last_direction) = combinations[0], combinations[-1]
     return [
-        f"  best determined, within {100.0 * best:.2g} %: {told(first)}",
-        f"  worst determined, within {100.0 * worst:.2g} %: {told(last)}",
+        f"  best determined, within {100.0 * best:.2g} %: {vector_text(first_direction)}",
+        f"  worst determined, within {100.0 * worst:.2g} %: {vector_text(last_direction)}",
         f"  condition of the information: {uncertainty.condition:.3g}",
     ]
 
@@ -238,16 +255,16 @@ def draw_fit(uncertainty: Uncertainty, title: str, path: Path) -> None:
     from models.drawing.figures import BLUE, DARK, VERMILION, add_heading, save, subplots
 
     problem = uncertainty.fit.problem
-    predicted, times = problem.predicted(uncertainty.fit.values), problem.clock.times
+    predicted, clock_times = problem.predicted(uncertainty.fit.values), problem.clock.times
     count = len(problem.channels)
     figure, axes = subplots(2 * count, 1, figsize=(8.0, 2.6 * count + 0.8), sharex=True, squeeze=False)
-    for (top, below), channel, row in zip(axes[:, 0].reshape(count, 2), problem.channels, predicted, strict=True):
+    for (top, error_axis), channel, row in zip(axes[:, 0].reshape(count, 2), problem.channels, predicted, strict=True):
         measured = np.where(channel.is_used, channel.values, np.nan)
-        top.plot(times, measured, color=DARK, linewidth=1.2, label="measured")
-        top.plot(times, row, color=VERMILION, linewidth=0.8, label="model")
+        top.plot(clock_times, measured, color=DARK, linewidth=1.2, label="measured")
+        top.plot(clock_times, row, color=VERMILION, linewidth=0.8, label="model")
         top.set(title=channel.name, ylabel=f"[{channel.unit or '-'}]")
-        below.plot(times, row - measured, color=BLUE, linewidth=0.8)
-        below.set(ylabel=f"model less\nmeasured [{channel.unit or '-'}]")
+        error_axis.plot(clock_times, row - measured, color=BLUE, linewidth=0.8)
+        error_axis.set(ylabel=f"model less\nmeasured [{channel.unit or '-'}]")
     axes[-1, 0].set_xlabel("time [s]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     add_heading(figure, title, {})

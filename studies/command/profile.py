@@ -53,19 +53,19 @@ class Watch:
     def _sample_stack(self) -> None:
         """Attribute the time since the last sample to the present call stack; a call that holds the interpreter's lock
         ends before the sample."""
-        last = time.perf_counter()
+        last_time = time.perf_counter()
         while not self._over.wait(SAMPLING_PERIOD):
-            now = time.perf_counter()
+            current_time = time.perf_counter()
             frame = sys._current_frames().get(self._main or 0)
-            self.seconds[EVERYTHING_ELSE if frame is None else part_of_run(frame)] += now - last
-            last = now
+            self.seconds[EVERYTHING_ELSE if frame is None else part_of_run(frame)] += current_time - last_time
+            last_time = current_time
 
     def told(self, work: Callable[[Any], dict[str, Any]], progress: Any) -> dict[str, Any]:
         """Do the work, stop the watch, and add its lines to the summary."""
         summary = work(progress)
         self._over.set()
         self._thread.join()
-        spent: dict[str, float] = dict(sorted(self.seconds.items(), key=lambda part: -part[1]))
+        spent: dict[str, float] = dict(sorted(self.seconds.items(), key=lambda part_and_seconds: -part_and_seconds[1]))
         return summary | {"profile": spent, "table": [*summary.get("table", []), *profile_lines(spent)]}
 
 
@@ -86,8 +86,8 @@ def part_of_run(frame: FrameType) -> str:
         within = _engine(path)
         engine = engine or within
         if name in MARCH_FUNCTIONS and (within or path.stem == "march"):
-            part = f"marching in {engine}" if engine else BESIDE_ENGINES
-            return f"forces asked for by {engine}" if engine and forces else part
+            work_part = f"marching in {engine}" if engine else BESIDE_ENGINES
+            return f"forces asked for by {engine}" if engine and forces else work_part
     return f"building in {engine}" if engine else EVERYTHING_ELSE
 
 
@@ -109,6 +109,8 @@ def _engine(path: PurePath) -> str:
 
 def profile_lines(spent: dict[str, float]) -> list[str]:
     """Table to print with the seconds and shares of each kind of work, largest first."""
-    whole = sum(spent.values())
-    rows = [f"    {part:<30} {seconds:8.2f} s {seconds / whole:6.1%}" for part, seconds in spent.items()]
-    return [f"  where {whole:.1f} s went, by a look every {1000 * SAMPLING_PERIOD:.0f} ms", *rows]
+    total_seconds = sum(spent.values())
+    rows = [
+        f"    {work_part:<30} {seconds:8.2f} s {seconds / total_seconds:6.1%}" for work_part, seconds in spent.items()
+    ]
+    return [f"  where {total_seconds:.1f} s went, by a look every {1000 * SAMPLING_PERIOD:.0f} ms", *rows]

@@ -55,8 +55,8 @@ def compiled_beside(name: str, changes: list[str], scene: Any, engines: tuple[st
         yield
         return
     with TemporaryDirectory() as folder:
-        told = json.dumps([name, changes, engines[-1], scene.error, folder])
-        compiler = SecondCompiler([sys.executable, "-P", "-m", __name__, told])
+        request = json.dumps([name, changes, engines[-1], scene.error, folder])
+        compiler = SecondCompiler([sys.executable, "-P", "-m", __name__, request])
         compiler.attach()
         try:
             yield

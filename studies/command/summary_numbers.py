@@ -24,16 +24,20 @@ def summary_scalars(summary: dict[str, Any]) -> dict[str, float]:
     return {name: value for name, value in _scalars_of("", "", summary) if math.isfinite(value)}
 
 
-def _scalars_of(name: str, unit: str, value: Any) -> Iterator[tuple[str, float]]:
-    if isinstance(value, dict):
-        unit = f" [{value['unit']}]" if isinstance(value.get("unit"), str) and value["unit"] else unit
-        for key, inner in value.items():
+def _scalars_of(name: str, unit: str, summary_value: Any) -> Iterator[tuple[str, float]]:
+    if isinstance(summary_value, dict):
+        unit = (
+            f" [{summary_value['unit']}]"
+            if isinstance(summary_value.get("unit"), str) and summary_value["unit"]
+            else unit
+        )
+        for key, inner in summary_value.items():
             if key not in SKIPPED_KEYS:
                 yield from _scalars_of(name if key in FRAME_KEYS else _joined_name(name, str(key)), unit, inner)
-    elif isinstance(value, list):
-        yield from _numbers_of_list(name, unit, value)
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield name + unit, float(value) if isinstance(value, float) else value
+    elif isinstance(summary_value, list):
+        yield from _numbers_of_list(name, unit, summary_value)
+    elif isinstance(summary_value, int | float) and not isinstance(summary_value, bool):
+        yield name + unit, float(summary_value) if isinstance(summary_value, float) else summary_value
 
 
 def _numbers_of_list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[str, float]]:
@@ -61,12 +65,14 @@ def _numbers_of_list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[
             yield from _scalars_of(_joined_name(name, label), unit, value)
 
 
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
+def _is_text(summary_value: Any) -> bool:
+    return isinstance(summary_value, str)
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+def _is_number(summary_value: Any) -> bool:
+    return (
+        isinstance(summary_value, int | float) and not isinstance(summary_value, bool) and math.isfinite(summary_value)
+    )
 
 
 def _joined_name(name: str, key: str) -> str:

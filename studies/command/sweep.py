@@ -91,12 +91,12 @@ class Points:
         try:
             scene, engines, study = self.prepared_point(i)
             scene = scene.model_copy(update={"workers": 1, "cluster": None})
-            with whole_folder(self.folder / RUNS_FOLDER / f"{i:04d}") as place:
-                summary = study.run(scene, engines, place, lambda text, part: None)
+            with whole_folder(self.folder / RUNS_FOLDER / f"{i:04d}") as run_folder:
+                summary = study.run(scene, engines, run_folder, lambda text, part: None)
         except (InputError, RunFailed) as error:
             return _failed_record(error)
-        said = told.attributes_for_json(summary.get("results", {}))
-        return {"numbers": summary_scalars(summary), "failed": summary.get("failed", {}), "results": said}
+        attributes = told.attributes_for_json(summary.get("results", {}))
+        return {"numbers": summary_scalars(summary), "failed": summary.get("failed", {}), "results": attributes}
 
     def facts(self) -> dict[str, Any]:
         """Everything on which the points depend: the scene as written, the files that it names, and the code."""
@@ -125,14 +125,14 @@ def _failed_record(reason: object) -> Record:
 def whole_folder(folder: Path) -> Iterator[Path]:
     """Context with a folder to write into. It gets its final name only when it is complete, and replaces an older
     folder of this name."""
-    part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-    part.mkdir(parents=True)
+    partial_folder = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    partial_folder.mkdir(parents=True)
     try:
-        yield part
+        yield partial_folder
         shutil.rmtree(folder, ignore_errors=True)
-        os.replace(part, folder)
+        os.replace(partial_folder, folder)
     finally:
-        shutil.rmtree(part, ignore_errors=True)
+        shutil.rmtree(partial_folder, ignore_errors=True)
 
 
 _RANGE_PATTERN = re.compile(r"([^:,]+):([^:,]+):([^:,]+)")
@@ -140,19 +140,19 @@ _RANGE_PATTERN = re.compile(r"([^:,]+):([^:,]+):([^:,]+)")
 
 def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
     """Key and values of KEY=FROM:TO:N, evenly spaced, or of KEY=a,b,c; raises InputError."""
-    key, equals, rest = (part.strip() for part in text.partition("="))
-    if not equals or not key or not rest:
+    key, equals, value_text = (text_part.strip() for text_part in text.partition("="))
+    if not equals or not key or not value_text:
         raise InputError("--sweep", "", text, "must read KEY=FROM:TO:N or KEY=a,b,c, for example run.step=1e-4,2e-4")
-    matched = _RANGE_PATTERN.fullmatch(rest)
-    values = _spaced_values(text, *matched.groups()) if matched else _listed_values(rest)
+    matched = _RANGE_PATTERN.fullmatch(value_text)
+    values = _spaced_values(text, *matched.groups()) if matched else _listed_values(value_text)
     for value in values:
         if not _is_writable(value):
             allowed = "must be a finite number, a text, true, false or a list of these"
             raise InputError("--sweep", key, str(value), allowed)
     if not 2 <= len(values) <= MOST_POINTS:
-        raise InputError("--sweep", key, rest, f"gives {len(values)} value(s): 2 to {MOST_POINTS:,} make a sweep")
+        raise InputError("--sweep", key, value_text, f"gives {len(values)} value(s): 2 to {MOST_POINTS:,} make a sweep")
     if len(set(map(_value_text, values))) < len(values):
-        raise InputError("--sweep", key, rest, "gives a value twice")
+        raise InputError("--sweep", key, value_text, "gives a value twice")
     return key, values
 
 
@@ -164,36 +164,38 @@ def sweep_points(text: str, scene: str, changes: Sequence[str], engine: str | No
     return job
 
 
-def _spaced_values(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
+def _spaced_values(text: str, first_text: str, last_text: str, count_text: str) -> tuple[Any, ...]:
     """Evenly spaced values; integers if both ends and the spacing are integers."""
     try:
-        ends, n = (float(first), float(last)), int(count)
+        ends, n = (float(first_text), float(last_text)), int(count_text)
     except ValueError:
         raise InputError("--sweep", "", text, "FROM and TO must be numbers and N a whole number of points") from None
     if not np.isfinite(ends).all() or not 2 <= n <= MOST_POINTS:
         raise InputError("--sweep", "", text, f"FROM and TO must be finite, N from 2 to {MOST_POINTS:,}")
     values = np.linspace(*ends, n).tolist()
-    whole = all(re.fullmatch(r"\s*[+-]?\d+\s*", end) for end in (first, last)) and all(v == int(v) for v in values)
-    return tuple(int(value) for value in values) if whole else tuple(values)
+    are_integers = all(re.fullmatch(r"\s*[+-]?\d+\s*", end) for end in (first_text, last_text)) and all(
+        v == int(v) for v in values
+    )
+    return tuple(int(value) for value in values) if are_integers else tuple(values)
 
 
-def _listed_values(rest: str) -> tuple[Any, ...]:
+def _listed_values(list_text: str) -> tuple[Any, ...]:
     """Values of a list in a scene file's notation; words may lack quotes."""
     try:
-        return tuple(tomllib.loads(f"x = [{rest}]")["x"])
+        return tuple(tomllib.loads(f"x = [{list_text}]")["x"])
     except ValueError:
-        return tuple(part.strip() for part in rest.split(","))
+        return tuple(word.strip() for word in list_text.split(","))
 
 
-def _value_text(value: Any) -> str:
+def _value_text(summary_value: Any) -> str:
     """The value as a scene file would hold it."""
-    return json.dumps(value, ensure_ascii=False, default=str)
+    return json.dumps(summary_value, ensure_ascii=False, default=str)
 
 
-def _is_writable(value: Any) -> bool:
+def _is_writable(summary_value: Any) -> bool:
     """Whether a scene file can represent this value exactly."""
     try:
-        return bool(tomllib.loads(f"x = {_value_text(value)}")["x"] == value)
+        return bool(tomllib.loads(f"x = {_value_text(summary_value)}")["x"] == summary_value)
     except ValueError:
         return False
 
@@ -203,8 +205,8 @@ def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict
     from studies.command.sweep_figure import draw_sweep  # workers, which import this file, draw nothing
 
     with exclusive_folder(job.folder):
-        for part in (job.folder / RUNS_FOLDER).glob(".*.part"):
-            shutil.rmtree(part, ignore_errors=True)  # of a process that was killed while it wrote
+        for partial_folder in (job.folder / RUNS_FOLDER).glob(".*.part"):
+            shutil.rmtree(partial_folder, ignore_errors=True)  # of a process that was killed while it wrote
         records = _records_of_points(job, progress, crew)
         swept = _sweep_columns(job, records)
         _save_sweep(job.folder, swept)
@@ -264,8 +266,10 @@ def _records_of_points(job: Points, progress: Callable[[str, float], None], crew
     if crew.cluster is not None:  # whose workers compute in folders of their own
         job = replace(job, folder=job.folder.resolve(), scene=_absolute_path(job.scene))
     with crew.at_work(len(job.values), job.folder, *([Path(job.scene)] if Path(job.scene).is_file() else [])) as pool:
-        kept = run_paths(job, len(job.values), job.folder / RECORDS_FOLDER, pool, Blocks(1), tell, lost)["record"]
-    records = [json.loads(str(text_of_record)) for text_of_record in kept]
+        text_records = run_paths(job, len(job.values), job.folder / RECORDS_FOLDER, pool, Blocks(1), tell, lost)[
+            "record"
+        ]
+    records = [json.loads(str(text_of_record)) for text_of_record in text_records]
     if not any(record["numbers"] or record["failed"] for record in records):
         raise InputError("--sweep", job.key, None, f"the study of {job.scene} gives no numbers to draw over it")
     return records
@@ -286,7 +290,9 @@ def _save_sweep(folder: Path, swept: "SweepResults") -> None:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([swept.key, *swept.columns, "failed", "largest error [-]", "broken assumptions"])
     for i, value in enumerate(swept.values):
-        failed = "; ".join(f"{who}: {reason}" if who else reason for who, reason in swept.failures[i].items())
+        failed = "; ".join(
+            f"{engine_name}: {reason}" if engine_name else reason for engine_name, reason in swept.failures[i].items()
+        )
         writer.writerow([value, *(column[i] for column in swept.columns.values()), failed, errors[i], broken[i]])
     write_whole(folder / "sweep.csv", text.getvalue().encode())
     content = {"key": swept.key, "values": list(swept.values), "numbers": swept.columns, "failed": swept.failures}
@@ -314,5 +320,8 @@ def _table(columns: Columns, pages: list[str]) -> list[str]:
         f"{min(values):>12.5g} to {max(values):.5g}"
         for name, values in list(moving.items())[:12]
     ]
-    rest = f", {len(moving) - 12} more of them" if len(moving) > 12 else ""
-    return [*lines, f"  {len(moving)} of {len(columns)} numbers change{rest}: {', '.join(['sweep.csv', *pages])}"]
+    omitted_text = f", {len(moving) - 12} more of them" if len(moving) > 12 else ""
+    return [
+        *lines,
+        f"  {len(moving)} of {len(columns)} numbers change{omitted_text}: {', '.join(['sweep.csv', *pages])}",
+    ]

@@ -79,8 +79,8 @@ class SweepResults:
 
 def _results_of_engine(results: Results, engine: str) -> Results:
     """Results on which an engine's curve is based: those of this engine, and those that belong to no engine."""
-    others = set(LABELS) - {engine} if engine else set()
-    return {name: run for name, run in results.items() if run.data.attrs["engine"] not in others}
+    other_engines = set(LABELS) - {engine} if engine else set()
+    return {name: run for name, run in results.items() if run.data.attrs["engine"] not in other_engines}
 
 
 def draw_sweep(swept: SweepResults, folder: Path) -> list[str]:
@@ -100,22 +100,26 @@ def _changing_quantities(columns: Columns) -> dict[str, dict[str, list[Any]]]:
     one."""
     panels: dict[str, dict[str, list[Any]]] = {}
     for name, column in columns.items():
-        first, _, rest = name.partition(", ")
-        engine, what = (first, rest) if rest and first in LABELS else ("", name)
-        panels.setdefault(what, {})[engine] = column
+        first, _, rest_of_name = name.partition(", ")
+        engine, quantity_name = (first, rest_of_name) if rest_of_name and first in LABELS else ("", name)
+        panels.setdefault(quantity_name, {})[engine] = column
     return {
-        what: panel for what, panel in panels.items() if any(has_several_values(column) for column in panel.values())
+        quantity_name: panel
+        for quantity_name, panel in panels.items()
+        if any(has_several_values(column) for column in panel.values())
     }
 
 
-def _draw_page(swept: SweepResults, shown: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str) -> None:
-    figure, axes = panels(len(shown), min(PANELS_ACROSS, len(shown)), 2.3)
-    at, ticks = _axis_places(swept.values)
-    for axis, (what, curves) in zip(axes, shown, strict=True):
-        _draw_panel(axis, at, what, curves, swept, "o" if ticks else "o-")
+def _draw_page(
+    swept: SweepResults, shown_curves: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str
+) -> None:
+    figure, axes = panels(len(shown_curves), min(PANELS_ACROSS, len(shown_curves)), 2.3)
+    sweep_positions, ticks = _axis_places(swept.values)
+    for axis, (quantity_name, curves) in zip(axes, shown_curves, strict=True):
+        _draw_panel(axis, sweep_positions, quantity_name, curves, swept, "o" if ticks else "o-")
         if ticks:
-            axis.set_xticks(at, ticks)
-        elif _wants_log_axis(at):
+            axis.set_xticks(sweep_positions, ticks)
+        elif _wants_log_axis(sweep_positions):
             axis.set_xscale("log")
         else:
             axis.locator_params(axis="x", nbins=6)
@@ -133,12 +137,12 @@ def _axis_places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
 
 
 def _draw_panel(
-    axis: Any, at: np.ndarray, quantity: str, curves: dict[str, list[Any]], swept: SweepResults, style: str
+    axis: Any, sweep_positions: np.ndarray, quantity: str, curves: dict[str, list[Any]], swept: SweepResults, style: str
 ) -> None:
-    order = np.argsort(at)
+    order = np.argsort(sweep_positions)
     for i, (engine, column) in enumerate(curves.items()):
         axis.plot(
-            at[order],
+            sweep_positions[order],
             np.array(column, float)[order],
             style,
             color=COLOURS.get(engine, GREY),
@@ -146,7 +150,7 @@ def _draw_panel(
             linewidth=2.2 - 0.6 * min(i, 2),
             label=LABELS[engine] or None,
         )
-        _draw_marks(axis, at, np.array(column, float), swept, engine)
+        _draw_marks(axis, sweep_positions, np.array(column, float), swept, engine)
     if all(_wants_log_axis(np.array(present_numbers(column), float)) for column in curves.values()):
         axis.set_yscale("log")
     else:
@@ -154,17 +158,17 @@ def _draw_panel(
     lost = [i for i, failed in enumerate(swept.failures) if failed and any(col[i] is None for col in curves.values())]
     if lost:
         foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "linestyle": "none"}
-        axis.plot(at[lost], np.full(len(lost), 0.04), **FAILED_MARK, **foot)
+        axis.plot(sweep_positions[lost], np.full(len(lost), 0.04), **FAILED_MARK, **foot)
     axis.set_title(wrapped_text(_with_unit(quantity), 0.47 * COLUMN_WIDTH, 9), fontsize=9)
 
 
-def _draw_marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: SweepResults, engine: str) -> None:
+def _draw_marks(axis: Any, sweep_positions: np.ndarray, values: np.ndarray, swept: SweepResults, engine: str) -> None:
     """Draw open marks around the points of a curve at which a result broke an assumption or has an error that is a
     warning."""
     for points, look in ((swept.broken_points(engine), BROKEN_MARK), (swept.warned_points(engine), WARNING_MARK)):
         shown = [i for i in points if np.isfinite(values[i])]
         if shown:
-            axis.plot(at[shown], values[shown], linestyle="none", markerfacecolor="none", zorder=4, **look)
+            axis.plot(sweep_positions[shown], values[shown], linestyle="none", markerfacecolor="none", zorder=4, **look)
 
 
 def _with_unit(quantity: str) -> str:

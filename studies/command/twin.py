@@ -28,7 +28,7 @@ Tell = Callable[[str, float], None]
 """Told what is done now, and which part of all (0 to 1)."""
 
 
-def _tell_nobody(what: str, share: float) -> None:
+def _tell_nobody(activity: str, share: float) -> None:
     """Tell nobody."""
 
 
@@ -69,7 +69,7 @@ class ExaminedFile:
     @property
     def is_certified(self) -> bool:
         """Whether all builds agree with the file, and MuJoCo's parser lost nothing."""
-        return all(each.alike for each in self.agreements) and not self.misread
+        return all(agreement.alike for agreement in self.agreements) and not self.misread
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,12 +84,12 @@ class Twins:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the model files."""
-        return tuple(each.name for each in self.examined)
+        return tuple(examined_file.name for examined_file in self.examined)
 
     @property
     def alike(self) -> bool:
         """Whether all builds agree with their files, and both files with each other."""
-        files = all(each.is_certified for each in self.examined)
+        files = all(examined_file.is_certified for examined_file in self.examined)
         return files and (self.comparison is None or self.comparison.alike)
 
 
@@ -110,160 +110,185 @@ def content_kinds(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
 
 
-def examine(files: Sequence[Path], without: Sequence[str], wanted: TwinOptions, tell: Tell = _tell_nobody) -> Twins:
+def examine(
+    files: Sequence[Path], without: Sequence[str], twin_options: TwinOptions, report_progress: Tell = _tell_nobody
+) -> Twins:
     """Certify each file, and compare both if there are two; raises InputError if a file cannot be read or built.
 
-    tell : told what is done now, and which part of all.
+    report_progress : told what is done now, and which part of all.
     """
-    if wanted.states < 1:
-        raise InputError("--states", "", wanted.states, "must be 1 or more")
-    if wanted.quantity is not None and wanted.tolerance is None:
-        raise InputError("--quantity", "", wanted.quantity, "is what --tolerance is of: give both, or neither")
-    if wanted.controls and (not wanted.compare_paths or wanted.tolerance is not None or len(files) > 1):
+    if twin_options.states < 1:
+        raise InputError("--states", "", twin_options.states, "must be 1 or more")
+    if twin_options.quantity is not None and twin_options.tolerance is None:
+        raise InputError("--quantity", "", twin_options.quantity, "is what --tolerance is of: give both, or neither")
+    if twin_options.controls and (
+        not twin_options.compare_paths or twin_options.tolerance is not None or len(files) > 1
+    ):
         allowed = "acts on paths of one file alone: leave out --no-paths, --tolerance and other files"
-        raise InputError("--controls", "", str(wanted.controls), allowed)
+        raise InputError("--controls", "", str(twin_options.controls), allowed)
     read_files = [read(path, without) for path in files]
-    for file in read_files if wanted.compare_paths else ():
+    for file in read_files if twin_options.compare_paths else ():
         steps_of_path(file.twin)
-    tables = [read_controls(wanted.controls, file.twin.model) if wanted.controls else None for file in read_files]
+    tables = [
+        read_controls(twin_options.controls, file.twin.model) if twin_options.controls else None for file in read_files
+    ]
     parts = len(files) + (len(files) > 1)
     examined = [
-        _examine_file(file, table, wanted, partial(_report_progress, tell, i, parts))
+        _examine_file(file, table, twin_options, partial(_report_progress, report_progress, i, parts))
         for i, (file, table) in enumerate(zip(read_files, tables, strict=True))
     ]
     if len(examined) < 2:
         return Twins(tuple(examined), None)
-    tell("comparing the files", len(files) / parts)
-    first, second = (each.file.twin for each in examined)
-    names = [each.name for each in examined]
+    report_progress("comparing the files", len(files) / parts)
+    first, second = (examined_file.file.twin for examined_file in examined)
+    names = [examined_file.name for examined_file in examined]
     if names[0] == names[1]:
         names = [str(path) for path in files]
     comparison = compare(replace(first, name=names[0]), replace(second, name=names[1]))
-    gap = paths_apart(first, second) if wanted.compare_paths and comparison.acceleration_agreement is not None else None
+    gap = (
+        paths_apart(first, second)
+        if twin_options.compare_paths and comparison.acceleration_agreement is not None
+        else None
+    )
     return Twins(tuple(examined), comparison, gap)
 
 
-def _report_progress(tell: Tell, number: int, parts: int, what: str, share: float) -> None:
+def _report_progress(report_progress: Tell, file_number: int, file_count: int, activity: str, share: float) -> None:
     """Report the progress within one file as a share of that of all files."""
-    tell(what, (number + share) / parts)
+    report_progress(activity, (file_number + share) / file_count)
 
 
-def _examine_file(file: ModelFile, table: ControlTable | None, wanted: TwinOptions, tell: Tell) -> ExaminedFile:
+def _examine_file(
+    file: ModelFile, table: ControlTable | None, twin_options: TwinOptions, report_progress: Tell
+) -> ExaminedFile:
     """Certify one file, then compare its paths and price its accuracy if wanted. Each of these counts as a third of the
     progress."""
-    agreements = certificate(file.twin, wanted.states, lambda share: tell("comparing accelerations", share / 3))
-    explained = {each.build: removals_that_agree(file.twin, each.build) for each in agreements if not each.alike}
+    agreements = certificate(
+        file.twin, twin_options.states, lambda share: report_progress("comparing accelerations", share / 3)
+    )
+    explained = {
+        agreement.build: removals_that_agree(file.twin, agreement.build)
+        for agreement in agreements
+        if not agreement.alike
+    }
     lost = misread_numbers(file) if file.document.kind == "URDF" else []
     report = None
-    if wanted.compare_paths:
-        what = f"marching {steps_of_path(file.twin):,} steps by every build"
-        tell(what, 1 / 3)
-        report = compare_paths(file.twin, None, table, lambda share: tell(what, (1 + share) / 3))
+    if twin_options.compare_paths:
+        activity = f"marching {steps_of_path(file.twin):,} steps by every build"
+        report_progress(activity, 1 / 3)
+        report = compare_paths(file.twin, None, table, lambda share: report_progress(activity, (1 + share) / 3))
     price: tuple[str, ...] = ()
-    if wanted.tolerance is not None:
+    if twin_options.tolerance is not None:
         from models.advice.own_model_price import recommended_settings
         from models.advice.price.text import recommendation_lines as price_lines
 
-        tell("pricing", 2 / 3)
-        price = tuple(price_lines(recommended_settings(file.twin, wanted.tolerance, wanted.quantity)))
+        report_progress("pricing", 2 / 3)
+        price = tuple(price_lines(recommended_settings(file.twin, twin_options.tolerance, twin_options.quantity)))
     return ExaminedFile(
-        file, agreements, explained, tuple(lost), report, price, tuple(_constraints(file, wanted.states))
+        file, agreements, explained, tuple(lost), report, price, tuple(_constraints(file, twin_options.states))
     )
 
 
-def _constraints(file: ModelFile, count: int) -> Iterator[str]:
+def _constraints(file: ModelFile, state_count: int) -> Iterator[str]:
     """Lines on joint limits that are exceeded in the test states, on dry friction, and on constraints that are soft in
     MuJoCo, with the difference that the softness makes to accelerations."""
     twin = file.twin
-    beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, count)] if file.ignored_limits else []
+    beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, state_count)] if file.ignored_limits else []
     if any(beyond):
         names = dict.fromkeys(name for struck in beyond for name in struck)
         yield f"limits of {', '.join(names)} are not built: some would act at {sum(map(bool, beyond))} of the states"
     if frictions := twin.driven.frictions:
         yield (
-            f"dry friction of {len(frictions)} joints: compared at {len(states_of(twin, count))} of {count} states, at "
+            f"dry friction of {len(frictions)} joints: compared at {len(states_of(twin, state_count))} of "
+            f"{state_count} states, at "
             "which all of them slide, with faster rates where they would not; where they stick, MuJoCo's gives way"
         )
     if twin.driven.tied:
         kinds = {"couplings of joints": twin.driven.couplings, "joints between bodies": twin.driven.connections}
-        told = " and ".join(f"{len(rows)} {kind}" for kind, rows in kinds.items() if rows)
+        constraints_text = " and ".join(f"{len(rows)} {kind}" for kind, rows in kinds.items() if rows)
         yield (
-            f"{told}: rigid in Exudyn and the plain equations, which are held to the file with rigid ones; soft in "
-            f"MuJoCo, where accelerations are {two_digit_text(softness_difference(twin, count))} away from that"
+            f"{constraints_text}: rigid in Exudyn and the plain equations, which are held to the file with rigid "
+            "ones; soft in "
+            f"MuJoCo, where accelerations are {two_digit_text(softness_difference(twin, state_count))} away from that"
         )
 
 
 def twin_lines(twins: Twins) -> list[str]:
     """Lines for the terminal."""
     rows = list[str]()
-    for each in twins.examined:
-        rows += _file_lines(each)
+    for examined_file in twins.examined:
+        rows += _file_lines(examined_file)
     rows += _comparison_lines(twins.comparison, twins.names) if twins.comparison is not None else []
     return rows + ([twins.path_gap.line()] if twins.path_gap is not None else [])
 
 
-def verdict_sentence(each: ExaminedFile) -> str:
+def verdict_sentence(examined_file: ExaminedFile) -> str:
     """Sentence with the verdict on a file."""
-    worst = max(row.acceleration for row in each.agreements)
-    if each.misread:
-        return f"MuJoCo's parser made something else of {len(each.misread)} numbers of the file"
-    if each.is_certified:
-        bound = max(row.bound for row in each.agreements)
-        said = f"; up to {bound:.0e} may be rounding" if bound > EQUAL_ACCELERATION_SHARE else ""
-        return f"every build moves as the file does: accelerations differ by {two_digit_text(worst)} at the most{said}"
-    builds = ", ".join(row.build for row in each.agreements if not row.alike)
+    worst = max(row.acceleration for row in examined_file.agreements)
+    if examined_file.misread:
+        return f"MuJoCo's parser made something else of {len(examined_file.misread)} numbers of the file"
+    if examined_file.is_certified:
+        bound = max(row.bound for row in examined_file.agreements)
+        rounding_text = f"; up to {bound:.0e} may be rounding" if bound > EQUAL_ACCELERATION_SHARE else ""
+        return (
+            f"every build moves as the file does: accelerations differ by {two_digit_text(worst)} at the "
+            f"most{rounding_text}"
+        )
+    builds = ", ".join(row.build for row in examined_file.agreements if not row.alike)
     return f"differs in {builds}: accelerations by {two_digit_text(worst)}"
 
 
-def _file_lines(each: ExaminedFile) -> list[str]:
-    model, twin = each.file.twin.model, each.file.twin
+def _file_lines(examined_file: ExaminedFile) -> list[str]:
+    model, twin = examined_file.file.twin.model, examined_file.file.twin
     rows = [
-        f"{each.name}: {each.file.document.kind}, {model.nbody - 1} bodies, {twin.size} coordinates, "
+        f"{examined_file.name}: {examined_file.file.document.kind}, {model.nbody - 1} bodies, {twin.size} coordinates, "
         f"{model.ntendon} tendons, {model.nu} actuators",
-        f"  {verdict_sentence(each)}",
+        f"  {verdict_sentence(examined_file)}",
     ]
-    for row in each.agreements:
-        off = f"  differs most at {row.worst}: {row.difference:.3g} of {row.size:.3g}"
-        apart = f"  its constraints are {two_digit_text(row.gap)} (m, rad) apart where those of the file meet"
+    for row in examined_file.agreements:
+        largest_text = f"  differs most at {row.worst}: {row.difference:.3g} of {row.size:.3g}"
+        gap_text = f"  its constraints are {two_digit_text(row.gap)} (m, rad) apart where those of the file meet"
         rows.append(
             f"    {row.build:7s} mass {two_digit_text(row.mass)}  forces {two_digit_text(row.force)}  "
             f"accelerations {two_digit_text(row.acceleration)}"
-            f"{apart if row.gap > CONSTRAINT_GAP else ''}{'' if row.same_motion else off}"
+            f"{gap_text if row.gap > CONSTRAINT_GAP else ''}{'' if row.same_motion else largest_text}"
         )
-    for build, elements in each.explanations.items():
+    for build, elements in examined_file.explanations.items():
         said = ", ".join(f"{element.kind} of {element.owner}" for element, _ in elements[:3])
         rows.append(f"  {build}: {f'it is the {said}' if said else 'no single element explains it'}")
-    rows += [f"  {lost.sentence()}" for lost in each.misread]
-    rows += [f"  left out: {content.line()}" for content in each.file.left_out]
-    if each.file.ignored_limits:
+    rows += [f"  {lost.sentence()}" for lost in examined_file.misread]
+    rows += [f"  left out: {content.line()}" for content in examined_file.file.left_out]
+    if examined_file.file.ignored_limits:
         rows.append(
-            f"  limits not built, states drawn inside the ranges: {len(each.file.ignored_limits)} joints and tendons"
+            f"  limits not built, states drawn inside the ranges: {len(examined_file.file.ignored_limits)} joints "
+            "and tendons"
         )
-    rows += [f"  {note}" for note in (*each.constraint_lines, *each.file.notes)]
-    rows += [f"  {line}" for line in each.path.lines()] if each.path is not None else []
-    return rows + [f"  {line}".rstrip() for line in each.price_lines]
+    rows += [f"  {note}" for note in (*examined_file.constraint_lines, *examined_file.file.notes)]
+    rows += [f"  {line}" for line in examined_file.path.lines()] if examined_file.path is not None else []
+    return rows + [f"  {line}".rstrip() for line in examined_file.price_lines]
 
 
 def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]:
     if comparison.acceleration_agreement is None:
         rows = ["the files have not the same coordinates:", *(f"  {text}" for text in comparison.unmatched)]
-        return rows + [f"  {each.sentence(names)}" for each in comparison.differences]
-    apart, influential = comparison.acceleration_agreement, comparison.influential
+        return rows + [f"  {difference.sentence(names)}" for difference in comparison.differences]
+    agreement, influential = comparison.acceleration_agreement, comparison.influential
     head = "both files move alike" if comparison.alike else "the files do not move alike"
     rows = [
-        f"{head}: accelerations differ by {two_digit_text(apart.acceleration)}, most at {apart.worst}; "
-        f"mass matrices by {two_digit_text(apart.mass)}"
+        f"{head}: accelerations differ by {two_digit_text(agreement.acceleration)}, most at {agreement.worst}; "
+        f"mass matrices by {two_digit_text(agreement.mass)}"
     ]
-    for each in influential:
+    for difference in influential:
         size = (
             "cannot be tried"
-            if each.influence is None
-            else f"changes accelerations or masses by {two_digit_text(each.influence)}"
+            if difference.influence is None
+            else f"changes accelerations or masses by {two_digit_text(difference.influence)}"
         )
-        rows.append(f"  {each.sentence(names)} ({size})")
+        rows.append(f"  {difference.sentence(names)} ({size})")
     if not comparison.alike:
         rows.append(f"  {comparison.rest()}")
-    rows += [f"  without influence: {each.sentence(names)}" for each in comparison.silent_differences]
+    rows += [f"  without influence: {difference.sentence(names)}" for difference in comparison.silent_differences]
     return rows + [
-        f"  not compared, since it is off or MuJoCo's alone: {each.sentence(names)}" for each in comparison.not_compared
+        f"  not compared, since it is off or MuJoCo's alone: {difference.sentence(names)}"
+        for difference in comparison.not_compared
     ]

@@ -97,9 +97,9 @@ class Waiting:
     def state(self) -> tuple[str, float | None, str]:
         """Text, finished share and remaining time to show now; the share is None where it is unknown."""
         if self.compilations.is_compiling():
-            spent, most = self.compilations.spent(), COMPILE_SECONDS.get(self.system, 0.0)
-            share = spent / most if most > spent else None
-            return "compiling kernels, once", share, _time_left_text(most - spent if share else None, spent)
+            spent, expected_seconds = self.compilations.spent(), COMPILE_SECONDS.get(self.system, 0.0)
+            share = spent / expected_seconds if expected_seconds > spent else None
+            return "compiling kernels, once", share, _time_left_text(expected_seconds - spent if share else None, spent)
         worked = time.monotonic() - self.start_time - self.compilations.spent()
         march = SHARES_OF_MARCHES[-1] if SHARES_OF_MARCHES else None
         if march is None:
@@ -136,15 +136,15 @@ def progress_bar(text: str, system: str = "") -> Iterator[Tell]:
     if not sys.stderr.isatty():
         yield lambda text, share: None
         return
-    now, over = Waiting(text, system), threading.Event()
-    thread = threading.Thread(target=_draw, args=(now, over), daemon=True)
+    waiting, is_over = Waiting(text, system), threading.Event()
+    thread = threading.Thread(target=_draw, args=(waiting, is_over), daemon=True)
     thread.start()
     try:
-        yield now.tell
+        yield waiting.tell
     finally:
-        over.set()
+        is_over.set()
         thread.join()
-        now.compilations.detach()
+        waiting.compilations.detach()
 
 
 def _draw(waiting: Waiting, finished: threading.Event) -> None:

@@ -55,10 +55,12 @@ class Camera:
     def projected(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (..., 2) at which points (..., 3) appear, and their inverse distances (...) along the line of sight;
         the inverse distance of a point behind the camera is negative."""
-        seen = (points - self.eye) @ self.axes.T
-        near = -1.0 / seen[..., 2]
+        in_camera_axes = (points - self.eye) @ self.axes.T
+        near = -1.0 / in_camera_axes[..., 2]
         scale = height / (2.0 * np.tan(self.opening / 2.0)) * near
-        return np.stack([width / 2.0 + scale * seen[..., 0], height / 2.0 - scale * seen[..., 1]], -1), near
+        return np.stack(
+            [width / 2.0 + scale * in_camera_axes[..., 0], height / 2.0 - scale * in_camera_axes[..., 1]], -1
+        ), near
 
 
 def painted_picture(
@@ -69,8 +71,8 @@ def painted_picture(
 
     A later layer lies over all earlier ones, as arrows over bodies do.
     """
-    down = np.clip(np.arange(2 * height) / max(1.0, 2.0 * camera.horizon(height)), 0.0, 1.0)[:, None]
-    shade = (sky[0] + down * (sky[1] - sky[0])).astype(np.float32)
+    height_share = np.clip(np.arange(2 * height) / max(1.0, 2.0 * camera.horizon(height)), 0.0, 1.0)[:, None]
+    shade = (sky[0] + height_share * (sky[1] - sky[0])).astype(np.float32)
     image = np.broadcast_to(shade[:, None], (2 * height, 2 * width, 3)).copy()
     for layer in layers:
         nearest = np.zeros(image.shape[:2], np.float32)
@@ -92,22 +94,23 @@ def _shaded_triangles(
     normals = np.concatenate([surface.normals for surface in surfaces])
     sizes = [len(surface.corners) for surface in surfaces]
     colours = np.repeat([surface.colour for surface in surfaces], sizes, axis=0)
-    kept = ((near > 0.0) & (near < 1.0 / NEAREST_DRAWN)).all(axis=1)
+    in_front = ((near > 0.0) & (near < 1.0 / NEAREST_DRAWN)).all(axis=1)
     towards = LIGHT_DIRECTION @ camera.axes / np.linalg.norm(LIGHT_DIRECTION)
-    light = SHADED_BRIGHTNESS + (1.0 - SHADED_BRIGHTNESS) * (0.5 + 0.5 * normals[kept] @ towards)
-    clear = np.exp(-1.0 / (HAZE_DISTANCE * near[kept]))[..., None]
-    return corners[kept], near[kept], clear * light[..., None] * colours[kept, None] + (1.0 - clear) * haze
+    light = SHADED_BRIGHTNESS + (1.0 - SHADED_BRIGHTNESS) * (0.5 + 0.5 * normals[in_front] @ towards)
+    clear = np.exp(-1.0 / (HAZE_DISTANCE * near[in_front]))[..., None]
+    return corners[in_front], near[in_front], clear * light[..., None] * colours[in_front, None] + (1.0 - clear) * haze
 
 
 @njit(cache=True, error_model="numpy")
-def columns_within(start, growth, left, right):
-    """First and last column between ``left`` and ``right`` for which start + column * growth is not negative; the first
-    is greater than the last where there is no such column."""
+def columns_within(start_value, growth, left_column, right_column):
+    """First and last column between ``left_column`` and ``right_column`` for which start + column * growth is not
+    negative; the first is greater than the last where there is no such column.
+    """
     if growth > 0.0:
-        return max(left, -start / growth), right
+        return max(left_column, -start_value / growth), right_column
     if growth < 0.0:
-        return left, min(right, -start / growth)
-    return left, right if start >= 0.0 else left - 1.0
+        return left_column, min(right_column, -start_value / growth)
+    return left_column, right_column if start_value >= 0.0 else left_column - 1.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -130,15 +133,15 @@ def paint(corners, near, colours, image, nearest):
         for row in range(top, bottom + 1):
             # Shares of corners 1 and 2 at column 0, and their growth from column to column.
             first, one_on = (-x0 * (y2 - y0) - (x2 - x0) * (row - y0)) / area, (y2 - y0) / area
-            two, two_on = ((x1 - x0) * (row - y0) + x0 * (y1 - y0)) / area, -(y1 - y0) / area
+            weight_of_second, two_on = ((x1 - x0) * (row - y0) + x0 * (y1 - y0)) / area, -(y1 - y0) / area
             left, right = columns_within(first, one_on, max(0.0, min(x0, x1, x2)), min(width - 1.0, max(x0, x1, x2)))
-            left, right = columns_within(two, two_on, left, right)
-            left, right = columns_within(1.0 - first - two, -one_on - two_on, left, right)
+            left, right = columns_within(weight_of_second, two_on, left, right)
+            left, right = columns_within(1.0 - first - weight_of_second, -one_on - two_on, left, right)
             for column in range(math.ceil(left), math.floor(right) + 1):
-                b, c = first + column * one_on, two + column * two_on
+                b, c = first + column * one_on, weight_of_second + column * two_on
                 a = 1.0 - b - c
-                here = a * near[k, 0] + b * near[k, 1] + c * near[k, 2]
-                if here > nearest[row, column]:
-                    nearest[row, column] = here
+                inverse_depth = a * near[k, 0] + b * near[k, 1] + c * near[k, 2]
+                if inverse_depth > nearest[row, column]:
+                    nearest[row, column] = inverse_depth
                     for i in range(3):
                         image[row, column, i] = a * colours[k, 0, i] + b * colours[k, 1, i] + c * colours[k, 2, i]

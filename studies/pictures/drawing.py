@@ -21,8 +21,8 @@ def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: i
     around = stage.scenery(float(motion.times[k]))
 
     def end(body: str, point: tuple[float, float, float]) -> np.ndarray:
-        place, turn = poses[body]
-        return place + turn @ np.array(point)
+        position, turn = poses[body]
+        return position + turn @ np.array(point)
 
     struts = [
         rod(end(s.first_body, s.first_point), end(s.second_body, s.second_point), 0.025, GREY_COLOUR)
@@ -33,34 +33,37 @@ def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: i
         arrow(*line, thick, stage.arrow_styles[force.kind].colour)
         for force, line in zip(motion.arrows, arrow_lines(motion, stage, k), strict=True)
     ]
-    seen = [surface for surface in arrows if surface]
-    return painted_picture(stage.camera, [around + struts + bodies, seen], width, height, SKY_COLOURS)
+    arrow_surfaces = [surface for surface in arrows if surface]
+    return painted_picture(stage.camera, [around + struts + bodies, arrow_surfaces], width, height, SKY_COLOURS)
 
 
 def arrow_lines(motion: FilmedMotion, stage: Stage, k: int) -> list[tuple[np.ndarray, np.ndarray]]:
     """For each arrow of frame ``k``, its start and its vector (3,), in m of the picture."""
     spans = []
     for force in motion.arrows:
-        place, turn = drawn_pose(motion, stage, force.body, k)
+        position, turn = drawn_pose(motion, stage, force.body, k)
         on_body = motion.turns[force.body][k].T @ (force.points[k] - motion.positions[force.body][k])
-        spans.append((place + turn @ on_body, stage.arrow_styles[force.kind].scale * force.vectors[k]))
+        spans.append((position + turn @ on_body, stage.arrow_styles[force.kind].scale * force.vectors[k]))
     return spans
 
 
 def drawn_pose(motion: FilmedMotion, stage: Stage, body: str, k: int) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) and rotation (3, 3) with which a body is drawn in frame ``k``. Its displacement and rotation from
     rest are magnified, except for a wheel's spin."""
-    rest = np.array(stage.rest_positions[body])
-    place, turn = rest + stage.magnification * (motion.positions[body][k] - rest), motion.turns[body][k]
+    rest_position = np.array(stage.rest_positions[body])
+    position, turn = (
+        rest_position + stage.magnification * (motion.positions[body][k] - rest_position),
+        motion.turns[body][k],
+    )
     if body in stage.wheels:
         # the smallest rotation that takes the y axis to the axle
         axis = np.cross([0.0, 1.0, 0.0], turn[:, 1])
         sine = float(np.linalg.norm(axis))
         angle = np.arctan2(sine, turn[1, 1])
         lean = Rotation.from_rotvec(axis * (angle / sine if sine > 0 else 0.0))
-        return place, _magnified_turn(lean, stage.magnification) @ lean.as_matrix().T @ turn
-    return place, _magnified_turn(Rotation.from_matrix(turn), stage.magnification)
+        return position, _magnified_turn(lean, stage.magnification) @ lean.as_matrix().T @ turn
+    return position, _magnified_turn(Rotation.from_matrix(turn), stage.magnification)
 
 
-def _magnified_turn(turn: Rotation, times: float) -> np.ndarray:
-    return Rotation.from_rotvec(times * turn.as_rotvec()).as_matrix()
+def _magnified_turn(rotation: Rotation, magnification: float) -> np.ndarray:
+    return Rotation.from_rotvec(magnification * rotation.as_rotvec()).as_matrix()

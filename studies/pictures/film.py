@@ -93,13 +93,15 @@ class Stage:
     struts: tuple[Strut, ...] = ()
 
 
-def largest_differences(first: FilmedMotion, second: FilmedMotion) -> tuple[float, float, float]:
+def largest_differences(first_motion: FilmedMotion, second_motion: FilmedMotion) -> tuple[float, float, float]:
     """Largest differences between two filmed motions: of positions (m), of elements of the rotation matrices, and of
     forces (N)."""
-    places = [(place, second.positions[name]) for name, place in first.positions.items()]
-    turns = [(turn, second.turns[name]) for name, turn in first.turns.items()]
-    forces = [(a.vectors, b.vectors) for a, b in zip(first.arrows, second.arrows, strict=True)]
-    largest = (max((float(np.abs(a - b).max()) for a, b in pairs), default=0.0) for pairs in (places, turns, forces))
+    position_pairs = [(position, second_motion.positions[name]) for name, position in first_motion.positions.items()]
+    turns = [(turn, second_motion.turns[name]) for name, turn in first_motion.turns.items()]
+    forces = [(a.vectors, b.vectors) for a, b in zip(first_motion.arrows, second_motion.arrows, strict=True)]
+    largest = (
+        max((float(np.abs(a - b).max()) for a, b in pairs), default=0.0) for pairs in (position_pairs, turns, forces)
+    )
     return next(largest), next(largest), next(largest)
 
 
@@ -136,5 +138,5 @@ def _poses_of_frames(frames: list[list[tuple[Any, Any]]], bodies: Iterable[str])
     by_body = {
         name: list(zip(*path, strict=True)) for name, path in zip(bodies, zip(*frames, strict=True), strict=True)
     }
-    places = {name: np.array(place) for name, (place, _) in by_body.items()}
-    return places, {name: np.reshape(turn, (-1, 3, 3)) for name, (_, turn) in by_body.items()}
+    positions = {name: np.array(position) for name, (position, _) in by_body.items()}
+    return positions, {name: np.reshape(turn, (-1, 3, 3)) for name, (_, turn) in by_body.items()}

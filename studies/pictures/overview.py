@@ -50,13 +50,13 @@ CURVE_STYLES = {"reference": ("-", 3.2), "exudyn": ("-", 1.5), "mujoco": (":", 1
 
 def draw(path: Path) -> Path:
     """Run, draw, save ``path`` and return it."""
-    alike = {engine: _run(engine, method, 1e-3) for engine, method in RUNGE_KUTTA.items()}
+    runs = {engine: _run(engine, method, 1e-3) for engine, method in RUNGE_KUTTA.items()}
     figure, axes = subplot_mosaic(
         [["idea", "idea", "idea"], ["force", "gap", "price"]], figsize=(COLUMN_WIDTH, 4.5), height_ratios=(1, 1.5)
     )
     _draw_overview(axes["idea"])
-    _forces(axes["force"], alike)
-    _plot_differences(axes["gap"], alike)
+    _forces(axes["force"], runs)
+    _plot_differences(axes["gap"], runs)
     _plot_prices(axes["price"])
     add_heading(figure, "twinrig: one vehicle in two engines and by hand, each result with its error and its price")
     return save(figure, path)
@@ -110,8 +110,8 @@ def _plot_prices(axis: Any) -> None:
         axis.loglog(calls, errors, "o-", color=COLOURS[engine], markersize=3.5)
         axis.text(1.4 * calls[-1], errors[-1], name, color=COLOURS[engine], va="center", fontsize=SMALL_TEXT)
     for engine, (method, _, step) in ENGINE_DEFAULTS.items():
-        place = _calls_and_error(_run(engine, method, step), truth, step)
-        axis.plot(*place, "o", markersize=10, markerfacecolor="none", color=COLOURS[engine])
+        calls_and_error = _calls_and_error(_run(engine, method, step), truth, step)
+        axis.plot(*calls_and_error, "o", markersize=10, markerfacecolor="none", color=COLOURS[engine])
     axis.set(xlabel="work: force calls [-] (ring: usual step)", xlim=(4e2, 4e6), title="What accuracy costs: error [-]")
 
 
@@ -134,11 +134,11 @@ def _draw_overview(axis: Any) -> None:
     road = 0.5 + 0.16 * np.sin(1.9 * x) + 0.1 * np.sin(4.3 * x + 1.0)
     axis.fill_between(x, road, 0.0, color=PALE, alpha=0.6, linewidth=0)
     axis.plot(x, road, color=GREY)
-    for place in (2.1, 6.1):
-        height = float(np.interp(place, x, road))
-        axis.add_patch(Circle((place, height + 0.45), 0.45, facecolor="white", edgecolor=DARK, linewidth=2.0))
+    for wheel_x in (2.1, 6.1):
+        height = float(np.interp(wheel_x, x, road))
+        axis.add_patch(Circle((wheel_x, height + 0.45), 0.45, facecolor="white", edgecolor=DARK, linewidth=2.0))
         spring = np.linspace(height + 0.9, 2.45, 9)
-        axis.plot(place + 0.16 * np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]), spring, color=DARK)
+        axis.plot(wheel_x + 0.16 * np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]), spring, color=DARK)
     axis.add_patch(FancyBboxPatch((1.3, 2.45), 5.6, 0.8, boxstyle="round,pad=0.1", facecolor="#dddddd", edgecolor=DARK))
     axis.text(4.1, 2.85, "one scene file", ha="center", va="center", fontsize=9)
     for engine, height in (("exudyn", 3.45), ("mujoco", 2.1), ("reference", 0.75)):
@@ -149,15 +149,19 @@ def _draw_overview(axis: Any) -> None:
     _draw_box(axis, (20.7, 2.1), 6.0, "one result: compared,\nits error and its price", DARK, 1.7)
 
 
-def _draw_arrow(axis: Any, start: tuple[float, float], end: tuple[float, float], colour: str) -> None:
-    axis.add_patch(FancyArrowPatch(start, end, color=colour, arrowstyle="-|>", mutation_scale=10, linewidth=1.4))
+def _draw_arrow(axis: Any, start_point: tuple[float, float], end_point: tuple[float, float], colour: str) -> None:
+    axis.add_patch(
+        FancyArrowPatch(start_point, end_point, color=colour, arrowstyle="-|>", mutation_scale=10, linewidth=1.4)
+    )
 
 
-def _draw_box(axis: Any, middle: tuple[float, float], wide: float, text: str, colour: str, high: float = 0.95) -> None:
-    corner = middle[0] - wide / 2, middle[1] - high / 2
-    shape = FancyBboxPatch(corner, wide, high, boxstyle="round,pad=0.08", facecolor="white", edgecolor=colour)
+def _draw_box(
+    axis: Any, centre: tuple[float, float], box_width: float, text: str, colour: str, high: float = 0.95
+) -> None:
+    corner = centre[0] - box_width / 2, centre[1] - high / 2
+    shape = FancyBboxPatch(corner, box_width, high, boxstyle="round,pad=0.08", facecolor="white", edgecolor=colour)
     axis.add_patch(shape)
-    axis.text(*middle, text, color=colour, ha="center", va="center", fontsize=9, fontweight="bold")
+    axis.text(*centre, text, color=colour, ha="center", va="center", fontsize=9, fontweight="bold")
 
 
 if __name__ == "__main__":

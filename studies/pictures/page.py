@@ -117,13 +117,13 @@ class Page:
         axes = self._figure.add_axes((70 / PAGE_WIDTH, 62 / PAGE_HEIGHT, 1 - 82 / PAGE_WIDTH, 128 / PAGE_HEIGHT))
         first, curve = self.motions[0], self.stage.curve
         names = [arrow.name.rpartition(", ")[2] for arrow in first.arrows if arrow.kind == curve.kind]
-        times, every = first.times, max(1, len(first.times) // 60)
+        film_times, stride = first.times, max(1, len(first.times) // 60)
         for name, values, tone in zip(names, self._forces[0], cycle(CURVE_COLOURS)):
-            axes.plot(times, values, color=tone, label=name)
+            axes.plot(film_times, values, color=tone, label=name)
         for forces in self._forces[1:]:
             for values, tone in zip(forces, cycle(CURVE_COLOURS)):
-                axes.plot(times[::every], values[::every], "o", ms=3, color=tone)
-        axes.set_xlim(times[0], times[-1] if times[-1] > times[0] else times[0] + 1.0)
+                axes.plot(film_times[::stride], values[::stride], "o", ms=3, color=tone)
+        axes.set_xlim(film_times[0], film_times[-1] if film_times[-1] > film_times[0] else film_times[0] + 1.0)
         axes.set_ylabel(f"{curve.kind} [kN]")
         marks = ": lines {}, dots {}" if len(self.motions) > 1 else ""
         labels = (LABELS[motion.engine] for motion in self.motions)
@@ -143,10 +143,10 @@ def difference_sentence(motions: list[FilmedMotion]) -> str:
     is."""
     if len(motions) == 1:
         return f"poses as {LABELS[motions[0].engine]} reports them"
-    places, turns, forces = largest_differences(*motions)
+    position_gap, turns, forces = largest_differences(*motions)
     return (
         "poses as each engine reports them; largest difference over the film: "
-        f"places {places:.1e} m, rotations {turns:.1e} rad, forces {forces:.1e} N"
+        f"places {position_gap:.1e} m, rotations {turns:.1e} rad, forces {forces:.1e} N"
     )
 
 

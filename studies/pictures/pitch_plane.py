@@ -49,15 +49,15 @@ def _motion_of_engine(engine: str, assembly: Assembly, times: np.ndarray) -> tup
     run = model.run()
     channels = output_channels(assembly, run)
     rows = np.rint(times / (run.times[1] - run.times[0])).astype(int)
-    places, turns = (_exudyn_poses if engine == "exudyn" else _mujoco_poses)(model, run.states[rows, :4])
-    poses = {name: place + _body_offset(assembly, name) for name, place in places.items()}, turns
+    positions, turns = (_exudyn_poses if engine == "exudyn" else _mujoco_poses)(model, run.states[rows, :4])
+    poses = {name: position + _body_offset(assembly, name) for name, position in positions.items()}, turns
     return FilmedMotion(engine, run.times[rows], *poses, arrows(assembly, channels, rows, poses)), channels
 
 
 def _mujoco_poses(model: Any, states: np.ndarray) -> Poses:
     names = [body.name for body in model.assembly.vehicle.bodies]
-    places, turns = of_mujoco(model.model, {name: model.model.body(name).id for name in names}, states)
-    return {name: place * [0.0, 1.0, 1.0] for name, place in places.items()}, turns
+    positions, turns = of_mujoco(model.model, {name: model.model.body(name).id for name in names}, states)
+    return {name: position * [0.0, 1.0, 1.0] for name, position in positions.items()}, turns
 
 
 def _exudyn_poses(model: Any, states: np.ndarray) -> Poses:
@@ -67,16 +67,16 @@ def _exudyn_poses(model: Any, states: np.ndarray) -> Poses:
 
     mbs, nodes = model.built.mbs, model.built.nodes
 
-    def ask(node: Any, kind: Any) -> Any:
+    def ask(node: Any, output_kind: Any) -> Any:
         point = mbs.GetNode(node)["nodeType"] == "Point2D"
-        turned = kind == exu.OutputVariableType.RotationMatrix
-        return np.eye(3) if point and turned else mbs.GetNodeOutput(node, kind)
+        asks_rotation = output_kind == exu.OutputVariableType.RotationMatrix
+        return np.eye(3) if point and asks_rotation else mbs.GetNodeOutput(node, output_kind)
 
     coordinates = np.zeros((len(states), 7))
     coordinates[:, [1, 3, 5, 6]] = states
-    places, turns = of_exudyn(mbs, {name: partial(ask, node) for name, node in nodes.items()}, coordinates)
+    positions, turns = of_exudyn(mbs, {name: partial(ask, node) for name, node in nodes.items()}, coordinates)
     return (
-        {name: place @ EXUDYN_AXES.T for name, place in places.items()},
+        {name: position @ EXUDYN_AXES.T for name, position in positions.items()},
         {name: EXUDYN_AXES @ turn @ EXUDYN_AXES.T for name, turn in turns.items()},
     )
 
@@ -90,13 +90,13 @@ def _body_offset(assembly: Assembly, body: str) -> np.ndarray:
 
 def arrows(assembly: Assembly, channels: Channels, rows: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
     """Arrows of the road's forces on the wheels and of the suspension's forces on the chassis."""
-    up, (places, turns), arrows_drawn = np.array([0.0, 0.0, -1.0]), poses, []
+    upward, (positions, turns), arrows_drawn = np.array([0.0, 0.0, -1.0]), poses, []
     for axle, wheel, strut in zip(assembly.vehicle.axles, ("f1", "f2"), ("f3", "f4"), strict=True):
         road, mount = np.array([0.0, 0.0, WHEEL_RADIUS]), np.array([axle.x, 0.0, 0.0])
-        on_wheel, on_chassis = (channels[name][2][rows, None] * up for name in (wheel, strut))
-        mounts = places["chassis"] + turns["chassis"] @ mount
+        on_wheel, on_chassis = (channels[name][2][rows, None] * upward for name in (wheel, strut))
+        mounts = positions["chassis"] + turns["chassis"] @ mount
         arrows_drawn.append(
-            Arrow(f"wheel force, {axle.name}", "wheel force", axle.wheel, places[axle.wheel] + road, on_wheel)
+            Arrow(f"wheel force, {axle.name}", "wheel force", axle.wheel, positions[axle.wheel] + road, on_wheel)
         )
         arrows_drawn.append(Arrow(f"suspension force, {axle.name}", "suspension force", "chassis", mounts, on_chassis))
     return tuple(arrows_drawn)
@@ -105,11 +105,13 @@ def arrows(assembly: Assembly, channels: Channels, rows: np.ndarray, poses: Pose
 def stage(assembly: Assembly, channels: Channels) -> Stage:
     """The vehicle, seen from its right, on a road that passes by; z down."""
     height = channels["zeta1"][2]
-    way = assembly.vehicle.axles[0].x + SPEED * np.linspace(0.0, assembly.scene.run.duration, len(height))
-    road = PassingRoad(way, np.column_stack([height, height]), (-1.0, 1.0), SPEED, -1.0, MAGNIFICATION, 1.0)
+    distances = assembly.vehicle.axles[0].x + SPEED * np.linspace(0.0, assembly.scene.run.duration, len(height))
+    road = PassingRoad(distances, np.column_stack([height, height]), (-1.0, 1.0), SPEED, -1.0, MAGNIFICATION, 1.0)
     level = equilibrium(assembly.parameters, assembly.vehicle.geometry)
     names = [body.name for body in assembly.vehicle.bodies]
-    rest = {name: _body_offset(assembly, name) + np.array([0.0, 0.0, level[i]]) for i, name in enumerate(names)}
+    rest_positions = {
+        name: _body_offset(assembly, name) + np.array([0.0, 0.0, level[i]]) for i, name in enumerate(names)
+    }
     struts = tuple(Strut("chassis", (axle.x, 0.0, 0.0), axle.wheel, (0.0, 0.0, 0.0)) for axle in assembly.vehicle.axles)
     caption = f"displacements and road drawn {MAGNIFICATION:g} times as large; forces on wheels and chassis"
     camera = Camera((1.5, 4.6, -1.5), (0.0, 0.0, -0.66), (0.0, 0.0, -1.0), 0.46)
@@ -117,7 +119,7 @@ def stage(assembly: Assembly, channels: Channels) -> Stage:
         f"Pitch-plane vehicle at {SPEED:g} m/s on a road of class D",
         caption,
         shapes(assembly),
-        rest,
+        rest_positions,
         camera,
         ARROW_STYLES,
         FORCE_CURVE,

@@ -19,5 +19,5 @@ def describe(scene: PictureScene) -> str:
         f"  vehicle    {scene.vehicle}",
         f"  film       {shown}, {film.format}",
     ]
-    said = missing_extra(film.format)
-    return "\n".join([*lines, f"  note       {said}"] if said else lines)
+    missing_format = missing_extra(film.format)
+    return "\n".join([*lines, f"  note       {missing_format}"] if missing_format else lines)

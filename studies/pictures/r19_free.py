@@ -63,25 +63,29 @@ def _motion_of_engine(
     settings = Settings(INTEGRATORS[engine], road.step, (len(table) - 1) // 2 * road.step)
     model: Any = build(engine, vehicle, settings, SPEED, table)
     zero = np.zeros(len(vehicle.coordinates()))
-    gust = np.array([LATERAL_START_SPEED if place == ("body", "y") else 0.0 for place in vehicle.coordinates()])
+    gust = np.array([LATERAL_START_SPEED if position == ("body", "y") else 0.0 for position in vehicle.coordinates()])
     run = model.run(zero, gust)
-    kept = Trajectory(run.times[rows], run.states[rows])
+    kept_run = Trajectory(run.times[rows], run.states[rows])
     if engine == "exudyn":
-        poses = _exudyn_poses(model, kept.positions)
+        poses = _exudyn_poses(model, kept_run.positions)
     else:
-        joints = np.empty_like(kept.positions)
-        joints[:, model.numbers.columns] = kept.positions
+        joints = np.empty_like(kept_run.positions)
+        joints[:, model.numbers.columns] = kept_run.positions
         poses = of_mujoco(model.model, model.numbers.bodies, joints)
-    return FilmedMotion(engine, kept.times, *poses, arrows(vehicle, kept, table[2 * rows], poses))
+    return FilmedMotion(engine, kept_run.times, *poses, arrows(vehicle, kept_run, table[2 * rows], poses))
 
 
 def _exudyn_poses(model: Any, positions: np.ndarray) -> Poses:
     markers = {body.name: model.built.marker(body.name, body.position, True) for body in model.vehicle.bodies}
     model.mbs.Assemble()
-    asked = {name: partial(model.mbs.GetMarkerOutput, marker) for name, marker in markers.items()}
-    places, turns = of_exudyn(model.mbs, asked, np.array([model._values_in_exudyn_order(row) for row in positions]))
+    marker_output = {name: partial(model.mbs.GetMarkerOutput, marker) for name, marker in markers.items()}
+    body_positions, turns = of_exudyn(
+        model.mbs, marker_output, np.array([model._values_in_exudyn_order(row) for row in positions])
+    )
     axes = {name: np.transpose([model.built.in_body_axes(name, axis) for axis in np.eye(3)]) for name in markers}
-    return places, {name: turn @ axes[name] for name, turn in turns.items()}  # a mass that slides has other axes
+    return body_positions, {
+        name: turn @ axes[name] for name, turn in turns.items()
+    }  # a mass that slides has other axes
 
 
 def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
@@ -92,9 +96,9 @@ def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Po
         + road @ np.concatenate([output.road_factors, output.road_rate_factors])
         for output in linearise(vehicle, SPEED).outputs
     ]
-    held, names = preloads(replace(vehicle, gravity=GRAVITY)).tyres, vehicle.coordinates()
+    static_forces, names = preloads(replace(vehicle, gravity=GRAVITY)).tyres, vehicle.coordinates()
     arrows = [
-        _road_force_arrow("wheel load", vehicle, tyre, held[tyre.name] + force, 2, poses)
+        _road_force_arrow("wheel load", vehicle, tyre, static_forces[tyre.name] + force, 2, poses)
         for tyre, force in zip(vehicle.tyres, forces, strict=False)
     ]
     for side, speed in zip(vehicle.side_forces, forces[len(vehicle.tyres) :], strict=True):
@@ -105,27 +109,29 @@ def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Po
 
 
 def _road_force_arrow(
-    kind: str, vehicle: SpatialVehicle, place: Any, force: np.ndarray, axis: int, poses: Poses
+    arrow_kind: str, vehicle: SpatialVehicle, tyre_or_force: Any, force: np.ndarray, axis: int, poses: Poses
 ) -> Arrow:
     """Arrow of a tyre force or side force (f,) along one axis of space. It starts on the road below the force's point
     on its body."""
-    (x, y, _), body = place.point, place.body
+    (x, y, _), body = tyre_or_force.point, tyre_or_force.body
     points = poses[0][body] + poses[1][body] @ np.subtract((x, y, 0.0), vehicle.body(body).position)
-    return Arrow(f"{kind}, {place.name}", kind, body, points, force[:, None] * np.eye(3)[axis])
+    return Arrow(f"{arrow_kind}, {tyre_or_force.name}", arrow_kind, body, points, force[:, None] * np.eye(3)[axis])
 
 
 def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
     """The car, seen from ahead and to its left, on a road that passes by."""
     front = [tyre for tyre in vehicle.tyres if tyre.axle == 0]
     columns = [vehicle.tyres.index(tyre) for tyre in front]
-    way = front[0].point[0] + SPEED * road.half * np.arange(len(table))
+    distances = front[0].point[0] + SPEED * road.half * np.arange(len(table))
     tracks = front[0].point[1], front[1].point[1]
-    passing = PassingRoad(way, table[:, columns], tracks, SPEED, magnification=MAGNIFICATION)
-    rest = {body.name: body.position for body in vehicle.bodies}
+    passing = PassingRoad(distances, table[:, columns], tracks, SPEED, magnification=MAGNIFICATION)
+    rest_positions = {body.name: body.position for body in vehicle.bodies}
     camera = Camera((5.6, 4.6, 2.3), (-0.1, 0.1, 0.5), opening=0.5)
     caption = f"displacements and road drawn {MAGNIFICATION:g} times as large; forces of the road on the tyres"
     title = f"Car of {len(vehicle.coordinates())} freedoms at {SPEED:g} m/s on a road of class C, after a gust"
-    return Stage(title, caption, shapes(vehicle), rest, camera, ARROW_STYLES, FORCE_CURVE, passing.at, MAGNIFICATION)
+    return Stage(
+        title, caption, shapes(vehicle), rest_positions, camera, ARROW_STYLES, FORCE_CURVE, passing.at, MAGNIFICATION
+    )
 
 
 def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:

@@ -55,11 +55,11 @@ class PassingRoad:
 
     def _height(self, distance: np.ndarray, y: np.ndarray | float) -> np.ndarray:
         """Height (m) of the drawn road at a position along and across the path."""
-        left, two = (np.interp(distance, self.distances, column) for column in self.heights.T)
+        left, right_height = (np.interp(distance, self.distances, column) for column in self.heights.T)
         share = (np.asarray(y) - self.tracks[0]) / (self.tracks[1] - self.tracks[0])
-        return self.magnification * (left + share * (two - left))
+        return self.magnification * (left + share * (right_height - left))
 
 
-def _chosen_tiles(net: np.ndarray, chosen: np.ndarray, colour: Colour) -> PaintedSurface:
+def _chosen_tiles(net_of_points: np.ndarray, is_chosen: np.ndarray, colour: Colour) -> PaintedSurface:
     """Chosen tiles (a - 1, b - 1) of a net (a, b, 3)."""
-    return faceted_surface(net_triangles(net)[np.tile(chosen.ravel(), 2)], colour)
+    return faceted_surface(net_triangles(net_of_points)[np.tile(is_chosen.ravel(), 2)], colour)

@@ -25,13 +25,13 @@ class PaintedSurface:
     colour: Colour
     alpha: float = 1.0
 
-    def moved(self, offset: np.ndarray, turn: np.ndarray) -> "PaintedSurface":
-        """The surface after turning by ``turn`` (3, 3) and shifting by ``offset`` (3,)."""
-        return replace(self, corners=self.corners @ turn.T + offset, normals=self.normals @ turn.T)
+    def moved(self, shift: np.ndarray, rotation: np.ndarray) -> "PaintedSurface":
+        """The surface after turning by ``rotation`` (3, 3) and shifting by ``shift`` (3,)."""
+        return replace(self, corners=self.corners @ rotation.T + shift, normals=self.normals @ rotation.T)
 
-    def at(self, *place: float) -> "PaintedSurface":
+    def at(self, *shift: float) -> "PaintedSurface":
         """The surface shifted."""
-        return replace(self, corners=self.corners + np.array(place))
+        return replace(self, corners=self.corners + np.array(shift))
 
 
 def faceted_surface(corners: np.ndarray, colour: Colour) -> PaintedSurface:
@@ -44,16 +44,19 @@ def faceted_surface(corners: np.ndarray, colour: Colour) -> PaintedSurface:
 
 def net_triangles(points: np.ndarray) -> np.ndarray:
     """Triangles of a net of points (a, b, 3)."""
-    first, two, three, four = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+    first, second_corner, three, four = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     return np.concatenate(
-        [np.stack([first, two, three], 2).reshape(-1, 3, 3), np.stack([first, three, four], 2).reshape(-1, 3, 3)]
+        [
+            np.stack([first, second_corner, three], 2).reshape(-1, 3, 3),
+            np.stack([first, three, four], 2).reshape(-1, 3, 3),
+        ]
     )
 
 
-def surface_of_revolution(axial: ArrayLike, radii: ArrayLike, colour: Colour, pieces: int = 48) -> PaintedSurface:
+def surface_of_revolution(axial: ArrayLike, radii: ArrayLike, colour: Colour, piece_count: int = 48) -> PaintedSurface:
     """Solid of revolution about y from the outline (axial, radii), given from left to right. It is shaded smoothly
     around the axis, with sharp edges at the outline's corners."""
-    angles = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
+    angles = np.linspace(0.0, 2.0 * np.pi, piece_count + 1)
     y, r = np.array(axial, float), np.array(radii, float)
     ring = np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], 1)
     net = r[:, None, None] * ring + np.stack([0 * y, y, 0 * y], 1)[:, None]
@@ -112,24 +115,26 @@ def ball(radius: float, colour: Colour) -> PaintedSurface:
 
 
 def line_solid(
-    tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour
+    tail_point: np.ndarray, head_point: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour
 ) -> PaintedSurface:
     """A solid of revolution whose axis runs from one point (tail) to another (head); ``axial`` : positions from the
     tail (m)."""
-    along = (head - tail) / np.linalg.norm(head - tail)
-    aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])
-    aside /= np.linalg.norm(aside)
-    turn = np.column_stack([aside, along, np.cross(aside, along)])
-    return surface_of_revolution(axial, radii, colour, 16).moved(tail, turn)
+    direction = (head_point - tail_point) / np.linalg.norm(head_point - tail_point)
+    perpendicular = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
+    perpendicular /= np.linalg.norm(perpendicular)
+    turn = np.column_stack([perpendicular, direction, np.cross(perpendicular, direction)])
+    return surface_of_revolution(axial, radii, colour, 16).moved(tail_point, turn)
 
 
-def rod(tail: np.ndarray, head: np.ndarray, radius: float, colour: Colour) -> PaintedSurface:
+def rod(tail_point: np.ndarray, head_point: np.ndarray, radius: float, colour: Colour) -> PaintedSurface:
     """A round rod from one point to another."""
-    length = float(np.linalg.norm(head - tail))
-    return line_solid(tail, head, np.array([0.0, 0.0, length, length]), radius * np.array([0.0, 1.0, 1.0, 0.0]), colour)
+    length = float(np.linalg.norm(head_point - tail_point))
+    return line_solid(
+        tail_point, head_point, np.array([0.0, 0.0, length, length]), radius * np.array([0.0, 1.0, 1.0, 0.0]), colour
+    )
 
 
-def arrow(tail: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> PaintedSurface | None:
+def arrow(tail_point: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> PaintedSurface | None:
     """An arrow as long as the vector (m); None if it is shorter than a tenth of its thickness."""
     length = float(np.linalg.norm(vector))
     if length < 0.1 * thickness:
@@ -137,4 +142,4 @@ def arrow(tail: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour
     head = min(2.6 * thickness, length)
     axial = np.array([0.0, 0.0, length - head, length - head, length])
     radii = thickness * min(1.0, length / (2.6 * thickness)) * np.array([0.0, 0.35, 0.35, 1.0, 0.0])
-    return line_solid(tail, tail + vector, axial, radii, colour)
+    return line_solid(tail_point, tail_point + vector, axial, radii, colour)

@@ -29,7 +29,10 @@ def write(path: Path, frames: Iterable[np.ndarray], per_second: int) -> Path:
     gif: dict[str, Any] = {"duration": 1000.0 / per_second, "loop": 0}
     mp4: dict[str, Any] = {"fps": per_second, "codec": "libx264", "quality": 7}
     writer: Any
-    with whole_file(path) as part, imageio.get_writer(part, **(gif if path.suffix == ".gif" else mp4)) as writer:
+    with (
+        whole_file(path) as partial_path,
+        imageio.get_writer(partial_path, **(gif if path.suffix == ".gif" else mp4)) as writer,
+    ):
         for frame in frames:
             writer.append_data(frame)
     return path
@@ -38,6 +41,6 @@ def write(path: Path, frames: Iterable[np.ndarray], per_second: int) -> Path:
 def write_png(path: Path, image: np.ndarray) -> Path:
     """Write one image (h, w, 3) to a PNG file, the same bytes from the same image."""
     metadata: Any = {"Software": None}
-    with whole_file(path) as part:
-        imsave(part, np.ascontiguousarray(image), metadata=metadata)
+    with whole_file(path) as partial_path:
+        imsave(partial_path, np.ascontiguousarray(image), metadata=metadata)
     return path

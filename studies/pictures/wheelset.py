@@ -56,8 +56,8 @@ def _motion_of_engine(engine: str, duration: float, times: np.ndarray) -> Filmed
     run = not_estimated(simulate(scene, engine, SPEED), "a film shows the path, and the study wheelset its error")
     path: WheelsetPath = run.detail
     rows = np.rint(times / STEP).astype(int)
-    kept = WheelsetPath(path.times[rows], path.states[rows], contacts=path.contacts[rows])
-    joints = to_joints(kept.states)[:, :JOINTS]
+    path_of_frames = WheelsetPath(path.times[rows], path.states[rows], contacts=path.contacts[rows])
+    joints = to_joints(path_of_frames.states)[:, :JOINTS]
     if engine == "mujoco":
         poses = of_mujoco(equations.model.model, {"wheelset": 1}, joints)
     else:  # by a marker in the middle of the axle: the last link of its tree
@@ -70,25 +70,25 @@ def _motion_of_engine(engine: str, duration: float, times: np.ndarray) -> Filmed
         middle = mbs.AddMarker(link)
         mbs.Assemble()
         poses = of_exudyn(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
-    return FilmedMotion(engine, kept.times, *poses, arrows(CHOSEN_WHEELSET, kept), run)
+    return FilmedMotion(engine, path_of_frames.times, *poses, arrows(CHOSEN_WHEELSET, path_of_frames), run)
 
 
 def arrows(w: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
     """Arrows of the normal force and of the creep force on both wheels, at the contact points along a path."""
-    every = []
+    drawn_arrows = []
     for k, (name, side) in enumerate(SIDE_SIGNS.items()):
         cone = Cone(w.radius, w.half_gauge, w.conicity, w.head_radius)
         touched = [cone_on_rail(side, Pose(*state[[Y, Z, ROLL, YAW]].tolist()), cone) for state in path.states]
         points = np.array(touched)[:, -3:] + path.states[:, [Y, Z]] @ np.eye(3)[1:]  # in the track's axes
         contact = path.contacts[:, k]
-        sine, cosine, none = np.sin(contact["angle"]), np.cos(contact["angle"]), 0.0 * contact["angle"]
-        normal = contact["load"][:, None] * np.stack([none, sine, -cosine], 1)
+        sine, cosine, zeros = np.sin(contact["angle"]), np.cos(contact["angle"]), 0.0 * contact["angle"]
+        normal = contact["load"][:, None] * np.stack([zeros, sine, -cosine], 1)
         creep = np.stack([contact["fx"], contact["fy"] * cosine, contact["fy"] * sine], 1)
-        every += [
+        drawn_arrows += [
             Arrow(f"{kind}, {name}", kind, "wheelset", points, force)
             for kind, force in zip(ARROW_STYLES, (normal, creep), strict=True)
         ]
-    return tuple(every)
+    return tuple(drawn_arrows)
 
 
 def stage(wheelset: Wheelset) -> Stage:
@@ -117,7 +117,7 @@ def shapes(w: Wheelset) -> list[PaintedSurface]:
     tread = [w.radius + 0.028, w.radius + w.conicity * inner, w.radius - w.conicity * outer]
     radii = np.array([0.0, *tread, 0.39, 0.37, 0.19, 0.16, 0.0])
     for side, order in ((1.0, slice(None)), (-1.0, slice(None, None, -1))):
-        surfaces.append(surface_of_revolution(side * across[order], radii[order], STEEL_COLOUR, pieces=72))
+        surfaces.append(surface_of_revolution(side * across[order], radii[order], STEEL_COLOUR, piece_count=72))
         surfaces += [
             box(0.09, 0.03, 0.09, RUST_COLOUR).at(0.28 * np.cos(a), side * (w.half_gauge + y), 0.28 * np.sin(a))
             for a in np.arange(6) * np.pi / 3.0
@@ -128,17 +128,17 @@ def shapes(w: Wheelset) -> list[PaintedSurface]:
 
 def track(w: Wheelset, distance: float) -> list[PaintedSurface]:
     """Surfaces of rails, sleepers and ballast after the wheelset has travelled a distance (m)."""
-    first, last, top = -24.0, 2.4, w.radius
+    first, rail_end, top = -24.0, 2.4, w.radius
     head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
-    along = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # the outline lies in y and z
+    rotation = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # the outline lies in y and z
     rail = [
-        extruded_outline(head, last - first, STEEL_COLOUR).moved(np.zeros(3), along),
-        box(last - first, 0.02, 0.1, RAIL_COLOUR).at(0.0, 0.0, 0.1),
-        box(last - first, 0.14, 0.02, RAIL_COLOUR).at(0.0, 0.0, 0.16),
+        extruded_outline(head, rail_end - first, STEEL_COLOUR).moved(np.zeros(3), rotation),
+        box(rail_end - first, 0.02, 0.1, RAIL_COLOUR).at(0.0, 0.0, 0.1),
+        box(rail_end - first, 0.14, 0.02, RAIL_COLOUR).at(0.0, 0.0, 0.16),
     ]
     sides = w.half_gauge, -w.half_gauge
-    surfaces = [part.at((first + last) / 2.0, y, top) for y in sides for part in rail]
+    surfaces = [surface.at((first + rail_end) / 2.0, y, top) for y in sides for surface in rail]
     phase = distance % SLEEPER_SPACING
-    for i in range(int(np.ceil(first / SLEEPER_SPACING)), int(np.floor(last / SLEEPER_SPACING)) + 1):
+    for i in range(int(np.ceil(first / SLEEPER_SPACING)), int(np.floor(rail_end / SLEEPER_SPACING)) + 1):
         surfaces.append(box(0.24, 2.5, 0.1, CONCRETE_COLOUR).at(i * SLEEPER_SPACING - phase + 0.3, 0.0, top + 0.22))
     return [*surfaces, floor(top + 0.24, BALLAST_COLOUR, -1.0)]

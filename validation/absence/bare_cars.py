@@ -31,7 +31,7 @@ def cars(steps: int) -> tuple[Job, Job]:
     """Two runs of the bare car, by twinrig's model and by the hand-written one. Both check the path with the same
     guard, and give coordinates and rates (steps + 1, 23)."""
     car, q, v = start()
-    model, by_hand, times = (
+    model, by_hand, state_times = (
         build("mujoco", car, Settings("RK4", STEP, steps * STEP)),
         hand_built_handling.run(car, q, v, STEP, steps),
         STEP * np.arange(steps + 1),
@@ -43,15 +43,15 @@ def cars(steps: int) -> tuple[Job, Job]:
 
     def theirs() -> tuple[np.ndarray, ...]:
         states = by_hand()
-        guard("mujoco", times, states, steps * STEP)
+        guard("mujoco", state_times, states, steps * STEP)
         return tuple(np.split(states, 2, axis=1))
 
     return ours, theirs
 
 
-def ratio_of_cars(steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
+def ratio_of_cars(steps: int, round_count: int) -> tuple[float, tuple[float, float, float]]:
     """Largest difference between the states (m, rad, m/s, rad/s) of twinrig's car and the hand-written one, and the
     ratio of their computing times with its confidence interval."""
     jobs = cars(steps)
     ours, theirs = (np.hstack(job()) for job in jobs)
-    return float(np.abs(ours - theirs).max()), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))
+    return float(np.abs(ours - theirs).max()), paired_ratio(*interleave(jobs, round_count, clock=time.process_time))

@@ -40,12 +40,12 @@ def rides(engine: str, steps: int) -> tuple[Job, Job]:
     """Two runs of the bare ride in one engine, by twinrig's model and by the hand-written car. Both give states (steps
     + 1, 14), and check them with the same guard."""
     vehicle, road = scene()
-    table, rest, duration = road.table(steps, 0), np.zeros(len(vehicle.coordinates())), steps * road.step
+    table, rest_state, duration = road.table(steps, 0), np.zeros(len(vehicle.coordinates())), steps * road.step
     model = build(engine, vehicle, Settings(INTEGRATORS[engine], road.step, duration), road.speed, table)
     by_hand = BY_HAND[engine](Car.of(vehicle), table[:, : len(vehicle.tyres)], road.step, steps)
 
     def ours() -> np.ndarray:
-        path = model.run(rest, rest)
+        path = model.run(rest_state, rest_state)
         return np.hstack([path.positions, path.rates])
 
     def theirs() -> np.ndarray:
@@ -77,9 +77,9 @@ def copies(steps: int) -> tuple[Job, Job]:
     return ours, theirs
 
 
-def ratio_of_rides(engine: str, steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
+def ratio_of_rides(engine: str, steps: int, round_count: int) -> tuple[float, tuple[float, float, float]]:
     """Compare twinrig with a hand-built ride in an engine or the reference: largest difference of the states (m, rad,
     m/s, rad/s), and the ratio of computing times with its confidence interval."""
     jobs = copies(steps) if engine == "reference" else rides(engine, steps)
     ours, theirs = (job() for job in jobs)
-    return float(np.abs(ours - theirs).max()), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))
+    return float(np.abs(ours - theirs).max()), paired_ratio(*interleave(jobs, round_count, clock=time.process_time))

@@ -38,9 +38,9 @@ def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dic
 
     counts, march = dict[str, int](), BrakedVehicle.run
 
-    def watched(vehicle: BrakedVehicle, controller: Any, *more: Any) -> Any:
+    def watched(vehicle: BrakedVehicle, controller: Any, *arguments_of_march: Any) -> Any:
         counts.update(_counts_of_run(vehicle, controller))
-        return march(vehicle, controller, *more)
+        return march(vehicle, controller, *arguments_of_march)
 
     with mock.patch.object(BrakedVehicle, "run", watched):
         path = run(scene, engine, procedure=STOP).detail
@@ -57,8 +57,15 @@ def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
     chain = [controller]
     while hasattr(chain[-1], "controller"):
         chain.append(chain[-1].controller)
-    last, seeing = chain[-1], [part for part in chain if hasattr(part, "tooth_counter")]
-    conversions = [channels.conversion for part in seeing for channels in (part.wheels, part.pressures)]
+    innermost, seeing = (
+        chain[-1],
+        [controller_part for controller_part in chain if hasattr(controller_part, "tooth_counter")],
+    )
+    conversions = [
+        channels.conversion
+        for controller_part in seeing
+        for channels in (controller_part.wheels, controller_part.pressures)
+    ]
     return {
         "coordinates": len(vehicle.coordinates),
         "wheels": plane.wheels,
@@ -71,8 +78,8 @@ def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
         "push-outs": int((brakes.push_out > 0.0).sum()),
         "loops": int(((brakes.release != brakes.push_out) | (brakes.falling != brakes.rising)).sum()),
         "asked": len(chain) - 1,
-        "files": int(isinstance(last, MeasuredPressures)),
-        "controllers": int(not isinstance(last, (CONTROLLERS["none"], MeasuredPressures))),
+        "files": int(isinstance(innermost, MeasuredPressures)),
+        "controllers": int(not isinstance(innermost, (CONTROLLERS["none"], MeasuredPressures))),
         "surfaces": int(max(vehicle.road.left.max(), vehicle.road.right.max())) + 1,
         "tables": len(vehicle.tables.mu_x),
         "noisy signals": plane.wheels * sum(read.noise > 0.0 for read in conversions),

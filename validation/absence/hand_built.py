@@ -16,7 +16,7 @@ Run = Callable[[], np.ndarray]
 """One run from the start state; returns the states (steps + 1, 8)."""
 
 
-def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run:
+def exudyn_run(parameters: Parameters, start_state: np.ndarray, step: float, steps: int) -> Run:
     """A run in Exudyn by the classical Runge-Kutta method. Exudyn's x axis in the plane points backward."""
     import exudyn as exu
     import exudyn.itemInterface as items
@@ -25,22 +25,27 @@ def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run
     mbs = container.AddSystem()
     ground = mbs.AddObject(items.ObjectGround())
     nodes = [
-        mbs.AddNode(items.NodePoint2D(initialCoordinates=[0, start[i]], initialVelocities=[0, start[4 + i]]))
+        mbs.AddNode(
+            items.NodePoint2D(initialCoordinates=[0, start_state[i]], initialVelocities=[0, start_state[4 + i]])
+        )
         for i in (0, 1)
     ]
     nodes.append(
         mbs.AddNode(
-            items.NodeRigidBody2D(initialCoordinates=[0, start[2], start[3]], initialVelocities=[0, start[6], start[7]])
+            items.NodeRigidBody2D(
+                initialCoordinates=[0, start_state[2], start_state[3]],
+                initialVelocities=[0, start_state[6], start_state[7]],
+            )
         )
     )
     wheels = [
         mbs.AddObject(items.MassPoint2D(nodeNumber=node, mass=mass))
-        for node, mass in zip(nodes, (p.m1, p.m2), strict=False)
+        for node, mass in zip(nodes, (parameters.m1, parameters.m2), strict=False)
     ]
-    chassis = mbs.AddObject(items.RigidBody2D(nodeNumber=nodes[2], mass=p.m3, inertia=p.I))
-    for node, mass in zip(nodes, (p.m1, p.m2, p.m3), strict=True):
+    chassis = mbs.AddObject(items.RigidBody2D(nodeNumber=nodes[2], mass=parameters.m3, inertia=parameters.I))
+    for node, mass in zip(nodes, (parameters.m1, parameters.m2, parameters.m3), strict=True):
         heave = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=1))
-        mbs.AddLoad(items.LoadCoordinate(markerNumber=heave, load=mass * p.g))
+        mbs.AddLoad(items.LoadCoordinate(markerNumber=heave, load=mass * parameters.g))
 
     def spring(upper, upper_x, lower, stiffness, damping):
         ends = [
@@ -51,10 +56,10 @@ def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run
             items.CartesianSpringDamper(markerNumbers=ends, stiffness=[0, stiffness, 0], damping=[0, damping, 0])
         )
 
-    spring(wheels[0], 0.0, ground, p.k1, p.d1)
-    spring(wheels[1], 0.0, ground, p.k2, p.d2)
-    spring(chassis, p.b, wheels[0], p.k3, p.d3)
-    spring(chassis, -p.a, wheels[1], p.k4, p.d4)
+    spring(wheels[0], 0.0, ground, parameters.k1, parameters.d1)
+    spring(wheels[1], 0.0, ground, parameters.k2, parameters.d2)
+    spring(chassis, parameters.b, wheels[0], parameters.k3, parameters.d3)
+    spring(chassis, -parameters.a, wheels[1], parameters.k4, parameters.d4)
     march = exudyn_march(container, mbs, nodes, step, steps)
 
     def run() -> np.ndarray:
@@ -103,25 +108,27 @@ def exudyn_march(container: Any, mbs: Any, nodes: list[Any], step: float, steps:
     return march
 
 
-def mujoco_model(p: Parameters, step: float) -> Any:
+def mujoco_model(parameters: Parameters, step: float) -> Any:
     """The vehicle in MuJoCo, from its own XML; z is down, the hinge lifts the front."""
     import mujoco
 
-    return mujoco.MjModel.from_xml_string(MJCF.format(**{**p.model_dump(), "minus_a": -p.a, "step": repr(step)}))
+    return mujoco.MjModel.from_xml_string(
+        MJCF.format(**{**parameters.model_dump(), "minus_a": -parameters.a, "step": repr(step)})
+    )
 
 
-def mujoco_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run:
+def mujoco_run(parameters: Parameters, start_state: np.ndarray, step: float, steps: int) -> Run:
     """A run in MuJoCo by the classical Runge-Kutta method."""
     import mujoco
     from mujoco import rollout
 
-    model = mujoco_model(p, step)
+    model = mujoco_model(parameters, step)
     data = mujoco.MjData(model)
-    state = np.concatenate(([0.0], start))
+    state = np.concatenate(([0.0], start_state))
 
     def run() -> np.ndarray:
         path, _ = rollout.rollout(model, data, state[None, :], nstep=steps)
-        return np.vstack([start, path[0, :, 1:9]])
+        return np.vstack([start_state, path[0, :, 1:9]])
 
     return run
 

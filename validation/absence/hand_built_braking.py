@@ -97,206 +97,237 @@ class Known(NamedTuple):
 def step_workspace() -> Known:
     """Zeroed arrays in which a step keeps its intermediate values."""
     wheels = {name: np.zeros(4) for name in Known._fields}
-    others = {"last": np.zeros(3), "off": np.zeros(3), "first": np.zeros(6), "ends": np.zeros((2, 4))}
-    return Known(**{**wheels, **others, "cell": np.zeros(4, dtype=np.int64)})
+    other_arrays = {"last": np.zeros(3), "off": np.zeros(3), "first": np.zeros(6), "ends": np.zeros((2, 4))}
+    return Known(**{**wheels, **other_arrays, "cell": np.zeros(4, dtype=np.int64)})
 
 
 @inlined
-def settle(now, regular, starts, truck, known):
+def settle(truck_state, regularising_speed, starts, truck, workspace):
     """Compute each wheel's velocity, slip angle, heading and lever arms from the truck's state, and store them in
-    ``known``."""
+    ``workspace``."""
     x, y, angles = truck.x, truck.y, truck.tables.angles
-    vx, vy, r = now.state[3], now.state[4], now.state[5]
+    vx, vy, r = truck_state.state[3], truck_state.state[4], truck_state.state[5]
     c, s = truck.cosine, truck.sine
-    ahead, aslant = math.cos(now.state[2]), math.sin(now.state[2])
-    e, f = ahead * c - aslant * s, aslant * c + ahead * s
+    cosine, aslant = math.cos(truck_state.state[2]), math.sin(truck_state.state[2])
+    e, f = cosine * c - aslant * s, aslant * c + cosine * s
     for i in range(4):
         if i == 2:
-            c, s, e, f = 1.0, 0.0, ahead, aslant
+            c, s, e, f = 1.0, 0.0, cosine, aslant
         arm, side = x[i] * s - y[i] * c, x[i] * c + y[i] * s
         u, v = e * vx + f * vy + arm * r, e * vy - f * vx + side * r
         if starts:
-            known.start[i] = u
-        forwards = u if known.start[i] >= 0.0 else -u
-        angle = math.atan2(abs(v), max(forwards, regular))
-        known.rate[i], known.along[i], known.aside[i] = (v - side * r) * r, max(forwards, 0.0), v
-        known.angle[i] = angle
-        known.cell[i], known.share[i] = cell_and_share(angles, angle)
-        known.east[i], known.north[i], known.arm[i], known.side[i] = e, f, arm, side
+            workspace.start[i] = u
+        forwards = u if workspace.start[i] >= 0.0 else -u
+        angle = math.atan2(abs(v), max(forwards, regularising_speed))
+        workspace.rate[i], workspace.along[i], workspace.aside[i] = (v - side * r) * r, max(forwards, 0.0), v
+        workspace.angle[i] = angle
+        workspace.cell[i], workspace.share[i] = cell_and_share(angles, angle)
+        workspace.east[i], workspace.north[i], workspace.arm[i], workspace.side[i] = e, f, arm, side
 
 
 @inlined
-def tyre(i, given, now, truck, known):
+def tyre(i, truck_state, step_input, truck, workspace):
     """Compute the forces, slip and angular velocity of wheel i at the end of a step, and store them in the report."""
-    report, tables, load, u0, v = report_of(now.report), truck.tables, truck.load[i], known.start[i], known.aside[i]
-    sign, cells = 1.0 if u0 >= 0.0 else -1.0, TableCell(known.cell[i], known.share[i], 0, 0.0)
+    report, tables, load, u0, v = (
+        report_of(step_input.report),
+        truck.tables,
+        truck.load[i],
+        workspace.start[i],
+        workspace.aside[i],
+    )
+    sign, cells = 1.0 if u0 >= 0.0 else -1.0, TableCell(workspace.cell[i], workspace.share[i], 0, 0.0)
     w, force, slip, locked = wheel_step(
-        StepInput(sign * given.speed0, sign * given.speed1, given.torque0, given.torque1, given.step),
-        Wheel(truck.radius[i], truck.spin[i], sign * now.turning[i]),
+        StepInput(
+            sign * truck_state.speed0,
+            sign * truck_state.speed1,
+            truck_state.torque0,
+            truck_state.torque1,
+            truck_state.step,
+        ),
+        Wheel(truck.radius[i], truck.spin[i], sign * step_input.turning[i]),
         Grip(0, 0, 0.0, cells, load, tables.slips, tables.mu_x),
     )
-    k, part = cell_and_share(tables.slips, abs(slip))
-    side = load * lateral_adhesion(0, cells, k, part, tables.g, tables.h)
-    if slip > LOCKING_SLIP and (known.along[i] > 0.0 or v != 0.0):
-        total, speed = math.hypot(force, side), math.hypot(known.along[i], v)
-        part = min((slip - LOCKING_SLIP) / (1.0 - LOCKING_SLIP), 1.0)
-        force += part * (total * known.along[i] / speed - force)
-        side += part * (total * abs(v) / speed - side)
+    k, cell_share = cell_and_share(tables.slips, abs(slip))
+    side = load * lateral_adhesion(0, cells, k, cell_share, tables.g, tables.h)
+    if slip > LOCKING_SLIP and (workspace.along[i] > 0.0 or v != 0.0):
+        total, speed = math.hypot(force, side), math.hypot(workspace.along[i], v)
+        cell_share = min((slip - LOCKING_SLIP) / (1.0 - LOCKING_SLIP), 1.0)
+        force += cell_share * (total * workspace.along[i] / speed - force)
+        side += cell_share * (total * abs(v) / speed - side)
     report.force_x[i], report.force_y[i] = -sign * force, -math.copysign(side, v) if v != 0.0 else 0.0
-    report.load[i], report.slip[i], report.slip_angle[i] = load, slip, math.copysign(known.angle[i], v)
+    report.load[i], report.slip[i], report.slip_angle[i] = load, slip, math.copysign(workspace.angle[i], v)
     report.locked[i], report.turning[i] = locked, sign * w
 
 
 @inlined
-def respond(now, before, after, step, truck, known):
-    """Accelerations that the tyre forces cause over a step (s) in which the torques go from ``before`` to ``after``,
-    with wheel speeds extrapolated by the present accelerations."""
-    accelerations, report = now.accelerations, report_of(now.report)
+def respond(truck_state, torques_before, torques_after, step, truck, workspace):
+    """Accelerations that the tyre forces cause over a step (s) in which the torques go from ``torques_before`` to
+    ``torques_after``, with wheel speeds extrapolated by the present accelerations.
+    """
+    accelerations, report = truck_state.accelerations, report_of(truck_state.report)
     ax, ay, turn = 0.0, 0.0, 0.0
     for i in range(4):
         rate = (
-            known.rate[i]
-            + known.east[i] * accelerations[0]
-            + known.north[i] * accelerations[1]
-            + known.arm[i] * accelerations[2]
+            workspace.rate[i]
+            + workspace.east[i] * accelerations[0]
+            + workspace.north[i] * accelerations[1]
+            + workspace.arm[i] * accelerations[2]
         )
-        given = StepInput(known.start[i], known.start[i] + step * rate, before[i], after[i], step)
-        tyre(i, given, now, truck, known)
-        fx, fy, e, f = report.force_x[i], report.force_y[i], known.east[i], known.north[i]
+        step_input = StepInput(
+            workspace.start[i], workspace.start[i] + step * rate, torques_before[i], torques_after[i], step
+        )
+        tyre(i, step_input, truck_state, truck, workspace)
+        fx, fy, e, f = report.force_x[i], report.force_y[i], workspace.east[i], workspace.north[i]
         ax, ay = ax + e * fx - f * fy, ay + f * fx + e * fy
-        turn += known.arm[i] * fx + known.side[i] * fy
+        turn += workspace.arm[i] * fx + workspace.side[i] * fy
     return ax / truck.mass, ay / truck.mass, turn / truck.inertia
 
 
 @inlined
-def iterate_accelerations(now, torques, step, truck, known):
+def iterate_accelerations(truck_state, torques, step, truck, workspace):
     """Iterate until the accelerations agree with those that the tyre forces cause; returns whether this converged."""
-    accelerations, last, off = now.accelerations, known.last, known.off
-    left, before = math.inf, 0.0
+    accelerations, last_response, last_residual = truck_state.accelerations, workspace.last, workspace.off
+    left, last_change = math.inf, 0.0
     for n in range(ANDERSON_ROUNDS):
-        out, change, product, square = respond(now, torques[0], torques[1], step, truck, known), 0.0, 0.0, 0.0
+        response, change, product, square = (
+            respond(truck_state, torques[0], torques[1], step, truck, workspace),
+            0.0,
+            0.0,
+            0.0,
+        )
         for a in range(3):
-            gap = out[a] - accelerations[a]
+            gap = response[a] - accelerations[a]
             change = max(change, abs(gap))
-            product += gap * (gap - off[a])
-            square += (gap - off[a]) ** 2
-        left = change * min(change / before, 1.0) if before > 0.0 else change
-        done, before = not left > ACCELERATION_TOLERANCE or n == ANDERSON_ROUNDS - 1, change
-        mix = min(max(product / square, -2.0), 0.75) if n > 0 and square > 0.0 and not done else 0.0
+            product += gap * (gap - last_residual[a])
+            square += (gap - last_residual[a]) ** 2
+        left = change * min(change / last_change, 1.0) if last_change > 0.0 else change
+        is_done, last_change = not left > ACCELERATION_TOLERANCE or n == ANDERSON_ROUNDS - 1, change
+        mix = min(max(product / square, -2.0), 0.75) if n > 0 and square > 0.0 and not is_done else 0.0
         for a in range(3):
-            off[a] = out[a] - accelerations[a]
-            accelerations[a] = out[a] - mix * (out[a] - last[a])
-            last[a] = out[a]
-        if done:
+            last_residual[a] = response[a] - accelerations[a]
+            accelerations[a] = response[a] - mix * (response[a] - last_response[a])
+            last_response[a] = response[a]
+        if is_done:
             break
     return left <= ACCELERATION_TOLERANCE
 
 
 @inlined
-def time_of_rest(now, first, step, truck):
+def time_of_rest(truck_state, first, step, truck):
     """Time within the step at which the truck comes to rest, or -1 if it still moves at the end."""
-    accelerations, mass, inertia = now.accelerations, truck.mass, truck.inertia
+    accelerations, mass, inertia = truck_state.accelerations, truck.mass, truck.inertia
     speed = mass * (first[3] * first[3] + first[4] * first[4]) + inertia * first[5] * first[5]
-    if speed == 0.0 and not now.turning.any():
+    if speed == 0.0 and not truck_state.turning.any():
         return 0.0
-    both = mass * (first[3] * accelerations[0] + first[4] * accelerations[1]) + inertia * first[5] * accelerations[2]
+    power = mass * (first[3] * accelerations[0] + first[4] * accelerations[1]) + inertia * first[5] * accelerations[2]
     rate = (
         mass * (accelerations[0] * accelerations[0] + accelerations[1] * accelerations[1])
         + inertia * accelerations[2] * accelerations[2]
     )
-    if rate == 0.0 or both >= 0.0 or -both > step * rate or speed > 2.25 * step * step * rate:
+    if rate == 0.0 or power >= 0.0 or -power > step * rate or speed > 2.25 * step * step * rate:
         return -1.0
-    return -both / rate
+    return -power / rate
 
 
 @inlined
-def moved_state(now, time, known):
+def moved_state(truck_state, time, workspace):
     """Advance the state by a time (s) from the start of the step."""
-    state, first, accelerations = now.state, known.first, now.accelerations
+    state, first, accelerations = truck_state.state, workspace.first, truck_state.accelerations
     for a in range(3):
         state[3 + a] = first[3 + a] + time * accelerations[a]
         state[a] = first[a] + 0.5 * time * (first[3 + a] + state[3 + a])
 
 
 @lean
-def go(now, torques, step, truck, known):
+def go(truck_state, torques, step, truck, workspace):
     """Advance the truck by one ``Step`` with torques (2, 4) at its ends. Returns for how long the truck moved, or -1 if
     the accelerations did not converge."""
-    first, middle = known.first, known.middle
+    first, middle = workspace.first, workspace.middle
     for a in range(6):
-        first[a] = now.state[a]
+        first[a] = truck_state.state[a]
     for i in range(4):
         middle[i] = 0.5 * (torques[0, i] + torques[1, i])
-    settle(now, step.regular, True, truck, known)
-    accelerations = respond(now, torques[0], middle, 0.5 * step.time, truck, known)
-    now.accelerations[0], now.accelerations[1], now.accelerations[2] = accelerations
-    rest = time_of_rest(now, first, step.time, truck)
-    if rest >= 0.0:
-        moved_state(now, rest, known)
-        now.state[3:], now.turning[:] = 0.0, 0.0
-        return rest
-    moved_state(now, 0.5 * step.time, known)
-    settle(now, step.regular, False, truck, known)
-    if not iterate_accelerations(now, torques, step.time, truck, known):
+    settle(truck_state, step.regular, True, truck, workspace)
+    accelerations = respond(truck_state, torques[0], middle, 0.5 * step.time, truck, workspace)
+    truck_state.accelerations[0], truck_state.accelerations[1], truck_state.accelerations[2] = accelerations
+    rest_time = time_of_rest(truck_state, first, step.time, truck)
+    if rest_time >= 0.0:
+        moved_state(truck_state, rest_time, workspace)
+        truck_state.state[3:], truck_state.turning[:] = 0.0, 0.0
+        return rest_time
+    moved_state(truck_state, 0.5 * step.time, workspace)
+    settle(truck_state, step.regular, False, truck, workspace)
+    if not iterate_accelerations(truck_state, torques, step.time, truck, workspace):
         return -1.0
-    moved_state(now, step.time, known)
-    turning = report_of(now.report).turning
+    moved_state(truck_state, step.time, workspace)
+    turning = report_of(truck_state.report).turning
     for i in range(4):
-        now.turning[i] = turning[i]
+        truck_state.turning[i] = turning[i]
     return step.time
 
 
 @lean
-def in_parts(parts, now, torques, step, truck, known):
+def in_parts(part_count, truck_state, torques, step, truck, workspace):
     """Advance by a ``Step`` in equal substeps with ``go``. The report is the mean over the substeps; times of locking
     are added."""
-    rows, sums, part, time = now.report, now.weighted_sums, Step(step.time / parts, step.regular / parts), 0.0
+    rows, sums, step_part, time = (
+        truck_state.report,
+        truck_state.weighted_sums,
+        Step(step.time / part_count, step.regular / part_count),
+        0.0,
+    )
     sums[:] = 0.0
-    for k in range(parts):
+    for k in range(part_count):
         for i in range(4):
             for side in range(2):
-                known.ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / parts
-        used = go(now, known.ends, part, truck, known)
+                workspace.ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / part_count
+        used = go(truck_state, workspace.ends, step_part, truck, workspace)
         if used < 0.0:
             return used
         time += used
         for c in range(REPORT_SIZE):
             for i in range(4):
                 sums[c, i] += rows[c, i]
-        if used < part.time:
+        if used < step_part.time:
             return time
     report, locked = report_of(rows), report_of(sums).locked
     for c in range(REPORT_SIZE):
         for i in range(4):
-            rows[c, i] = sums[c, i] / parts
+            rows[c, i] = sums[c, i] / part_count
     for i in range(4):
-        report.locked[i], report.turning[i] = locked[i], now.turning[i]
+        report.locked[i], report.turning[i] = locked[i], truck_state.turning[i]
     return step.time
 
 
 @njit(cache=True, error_model="numpy")
-def march(now, torque, steps, step, truck, known, stop):
+def march(truck_state, torque, steps, step, truck, workspace, stop):
     """Fill a ``Stop`` sample by sample, with ``steps`` steps per sample. torque (4,) acts fully from the end of the
     first step on. Returns the number of samples, or 0 if the accelerations did not converge."""
     torques = np.zeros((2, 4))
     torques[1] = torque
-    stop.times[0], stop.states[0], stop.turning[0] = 0.0, now.state, now.turning
+    stop.times[0], stop.states[0], stop.turning[0] = 0.0, truck_state.state, truck_state.turning
     for n in range(1, stop.times.size):
         used = 0.0
         for _ in range(steps):
-            parts = int(min(math.ceil(step.regular / math.hypot(now.state[3], now.state[4])), MOST_PARTS))
+            parts = int(
+                min(math.ceil(step.regular / math.hypot(truck_state.state[3], truck_state.state[4])), MOST_PARTS)
+            )
             if parts <= 1:
-                part = go(now, torques, step, truck, known)
+                time_moved = go(truck_state, torques, step, truck, workspace)
             else:
-                part = in_parts(parts, now, torques, step, truck, known)
+                time_moved = in_parts(parts, truck_state, torques, step, truck, workspace)
             torques[0] = torque
-            used += part
-            if part < step.time:
+            used += time_moved
+            if time_moved < step.time:
                 break
-        stop.times[n], stop.states[n], stop.turning[n] = stop.times[n - 1] + used, now.state, now.turning
-        stop.reports[n] = now.report
-        if part < step.time:
-            return n + 1 if part >= 0.0 else 0
+        stop.times[n], stop.states[n], stop.turning[n] = (
+            stop.times[n - 1] + used,
+            truck_state.state,
+            truck_state.turning,
+        )
+        stop.reports[n] = truck_state.report
+        if time_moved < step.time:
+            return n + 1 if time_moved >= 0.0 else 0
     return stop.times.size
 
 
@@ -319,10 +350,10 @@ def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], 
     torque, grid = vehicle.brakes.rising * pressure, Step(step, vehicle.slope * 9.81 * step)
 
     def marched() -> BrakingPath:
-        now = TruckState(np.zeros(6), np.zeros(3), speed / truck.radius, *np.zeros((2, REPORT_SIZE, 4)))
-        now.state[3] = speed
+        truck_state = TruckState(np.zeros(6), np.zeros(3), speed / truck.radius, *np.zeros((2, REPORT_SIZE, 4)))
+        truck_state.state[3] = speed
         stop = Stop(*(np.empty((samples, *shape)) for shape in ((), (6,), (4,), (REPORT_SIZE, 4))))
-        n = march(now, torque, vehicle.substeps, grid, truck, step_workspace(), stop)
+        n = march(truck_state, torque, vehicle.substeps, grid, truck, step_workspace(), stop)
         applied = (np.arange(n) > 0.0)[:, None]
         return BrakingPath(
             stop.times[:n],
@@ -364,24 +395,26 @@ def forces(path: BrakingPath) -> np.ndarray:
     return np.stack((path.reports.force_x, path.reports.force_y))
 
 
-def largest_difference(ours: BrakingPath, theirs: BrakingPath) -> float:
+def largest_difference(own_path: BrakingPath, theirs: BrakingPath) -> float:
     """Largest difference between two stops: of states (m, rad, m/s, rad/s) and wheel speeds (rad/s), and of tyre
     forces, pressures and torques, these divided by their largest values."""
     shares = [
-        np.abs(states - other).max() / np.abs(other).max()
-        for states, other in (
-            (forces(ours), forces(theirs)),
-            (ours.pressures, theirs.pressures),
-            (ours.torques, theirs.torques),
+        np.abs(states - other_states).max() / np.abs(other_states).max()
+        for states, other_states in (
+            (forces(own_path), forces(theirs)),
+            (own_path.pressures, theirs.pressures),
+            (own_path.torques, theirs.torques),
         )
     ]
-    return float(max(np.abs(ours.states - theirs.states).max(), np.abs(ours.turning - theirs.turning).max(), *shares))
+    return float(
+        max(np.abs(own_path.states - theirs.states).max(), np.abs(own_path.turning - theirs.turning).max(), *shares)
+    )
 
 
-def ratio_of_stops(speed: float, rounds: int) -> tuple[float, tuple[float, float, float]]:
+def ratio_of_stops(speed: float, round_count: int) -> tuple[float, tuple[float, float, float]]:
     """Largest difference between twinrig's stop from a speed (m/s) and the hand-written one (see
     ``largest_difference``), and the ratio of computing times with its confidence interval."""
     jobs = bare_stops(speed)
     return largest_difference(*(job() for job in jobs)), paired_ratio(
-        *interleave(jobs, rounds, clock=time.process_time)
+        *interleave(jobs, round_count, clock=time.process_time)
     )

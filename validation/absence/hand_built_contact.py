@@ -26,19 +26,19 @@ CALLS_PER_TURN = 200
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def forces(axis, limit, along, across, halves, shares, bound):
+def forces(axis, friction_limit, creepage_along, creepage_across, halves, shares, bound):
     """Creep forces fx, fy (N) on a circular contact area of radius ``axis`` (m).
 
-    limit : friction by load (N); along, across : creepages by their flexibilities (N/m^3); halves, shares (n,) : half
-    length of a strip by the axis, share of the load; bound (cells,) : traction that a cell may bear divided by that in
-    the strip's middle
+    friction_limit : friction by load (N); creepage_along, creepage_across : creepages by their flexibilities (N/m^3);
+    halves, shares (n,) : half length of a strip by the axis, share of the load; bound (cells,) : traction that a cell
+    may bear divided by that in the strip's middle
     """
     cells, count, fx, fy = bound.size, halves.size, 0.0, 0.0
     for k in range(count):
         half, share = halves[k], shares[k]
-        middle = limit * share / half * cells * count / (4.0 * axis * axis)
+        middle = friction_limit * share / half * cells * count / (4.0 * axis * axis)
         step = 2.0 * axis * half / cells / middle
-        u, v, x, y, sum_x, sum_y = step * along, step * across, 0.0, 0.0, 0.0, 0.0
+        u, v, x, y, sum_x, sum_y = step * creepage_along, step * creepage_across, 0.0, 0.0, 0.0, 0.0
         for i in range(cells):
             x, y = x - u, y - v
             size = math.sqrt(x * x + y * y)
@@ -46,7 +46,7 @@ def forces(axis, limit, along, across, halves, shares, bound):
                 x, y = x * bound[i] / size, y * bound[i] / size
             sum_x, sum_y = sum_x + x, sum_y + y
         fx, fy = fx + share * sum_x, fy + share * sum_y
-    return limit * fx, limit * fy
+    return friction_limit * fx, friction_limit * fy
 
 
 def contact_jobs() -> tuple[Callable[[], Array], Callable[[], Array]]:
@@ -65,17 +65,17 @@ def contact_jobs() -> tuple[Callable[[], Array], Callable[[], Array]]:
 
     def theirs() -> Array:
         for _ in range(CALLS_PER_TURN):
-            along, across = CREEPAGES[0] / flexible[0], CREEPAGES[1] / flexible[1]
-            written = forces(AXIS, FRICTION * LOAD, along, across, halves, shares, bound)
+            flexible_along, across = CREEPAGES[0] / flexible[0], CREEPAGES[1] / flexible[1]
+            written = forces(AXIS, FRICTION * LOAD, flexible_along, across, halves, shares, bound)
         return np.array(written)
 
     return ours, theirs
 
 
-def ratio_of_contacts(rounds: int) -> tuple[float, tuple[float, float, float]]:
+def ratio_of_contacts(round_count: int) -> tuple[float, tuple[float, float, float]]:
     """Largest difference of the creep forces between twinrig and the hand-written code, divided by the friction limit;
     ratio of computing times with its confidence interval."""
     jobs = contact_jobs()
     ours, theirs = (job() for job in jobs)
     gap = float(np.abs(ours - theirs).max()) / (FRICTION * LOAD)
-    return gap, paired_ratio(*interleave(jobs, rounds, 5e-3, clock=time.process_time))
+    return gap, paired_ratio(*interleave(jobs, round_count, 5e-3, clock=time.process_time))

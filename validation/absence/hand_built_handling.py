@@ -27,34 +27,43 @@ from models.multibody.tree import cross, dot, plus, three, times
 from models.tyre.bristles import SECOND_ORDER_MARCH, THREE_BRISTLES, net, shape_factor
 from models.vehicles.free_vehicle import SPECK
 
-SIZE, CELLS = 23, 21
-HEAD, WHEEL, MOUNT, SEAT = 14, 18, 15, 6
+COORDINATE_COUNT, CELLS = 23, 21
+HEAD_LENGTH, WHEEL, MOUNT, SEAT = 14, 18, 15, 6
 """Numbers in the table that ``numbers_of`` writes."""
 TOUCH = size_of(CONTACT)
 
 
 @lean
-def add_car_forces(numbers, t, q, v, f):
-    """Add the generalised forces of the hand-written car to ``f`` (23,). All arguments but the time are pointers to
-    doubles: the parameter table, coordinates, rates and forces."""
-    head, q, v, f = array(numbers, (HEAD,)), array(q, (SIZE,)), array(v, (SIZE,)), array(f, (SIZE,))
-    wheels, mounts = beyond(numbers, HEAD), beyond(numbers, HEAD + 4 * WHEEL)
+def add_car_forces(table, t, q, v, forces_out):
+    """Add the generalised forces of the hand-written car to ``forces_out`` (23,). All arguments but the time are
+    pointers to doubles: the parameter table, coordinates, rates and forces.
+    """
+    head, q, v, forces_out = (
+        array(table, (HEAD_LENGTH,)),
+        array(q, (COORDINATE_COUNT,)),
+        array(v, (COORDINATE_COUNT,)),
+        array(forces_out, (COORDINATE_COUNT,)),
+    )
+    wheels, mounts = beyond(table, HEAD_LENGTH), beyond(table, HEAD_LENGTH + 4 * WHEEL)
     cells = beyond(mounts, 3 * MOUNT + 2 * SEAT)
     c_yaw, s_yaw, c_roll, s_roll = math.cos(q[2]), math.sin(q[2]), math.cos(q[4]), math.sin(q[4])
     c_pitch, s_pitch = math.cos(q[5]), math.sin(q[5])
     x, y = (c_pitch, s_roll * s_pitch, -c_roll * s_pitch), (0.0, c_roll, s_roll)
     z = s_pitch, -s_roll * c_pitch, c_roll * c_pitch
     turning = v[4], c_roll * v[5], s_roll * v[5]
-    frame, ahead, aside = (x, y, z, turning), c_yaw * v[0] + s_yaw * v[1], c_yaw * v[1] - s_yaw * v[0]
-    passing = ahead, aside, head[0]
+    frame, speed_forward, speed_leftward = (x, y, z, turning), c_yaw * v[0] + s_yaw * v[1], c_yaw * v[1] - s_yaw * v[0]
+    passing = speed_forward, speed_leftward, head[0]
     contacts, forces = doubles(4 * TOUCH), stacked(4, FORCES)
-    places, pushes = doubles(12), doubles(12)
-    left = places, pushes, contacts
-    moment = plus(_engine(mounts, head, frame, q, v, f), _add_seat_forces(beyond(mounts, 3 * MOUNT), frame, q, v, f))
+    wheel_positions, pushes = doubles(12), doubles(12)
+    left = wheel_positions, pushes, contacts
+    moment = plus(
+        _engine(mounts, head, frame, q, v, forces_out),
+        _add_seat_forces(beyond(mounts, 3 * MOUNT), frame, q, v, forces_out),
+    )
     for i in range(4):
         moment = plus(moment, _wheel(row(wheels, WHEEL, i), frame, passing, q, v, i, left))
-    _add_bar_forces((head[6], head[7], head[8]), 0, left, q, f)
-    _add_bar_forces((head[9], head[10], head[11]), 2, left, q, f)
+    _add_bar_forces((head[6], head[7], head[8]), 0, left, q, forces_out)
+    _add_bar_forces((head[9], head[10], head[11]), 2, left, q, forces_out)
     forces_within(
         records(contacts, 4, CONTACT),
         strips_in(array(beyond(cells, 5 * CELLS), (4, int(head[12])))),
@@ -64,85 +73,96 @@ def add_car_forces(numbers, t, q, v, f):
         Workspace(stacked(4, SLIP), stacked(1, BLOCK)),
         forces,
     )
-    along, across, turn, lift = 0.0, 0.0, 0.0, 0.0
+    force_along, across, turn, lift = 0.0, 0.0, 0.0, 0.0
     for i in range(4):
-        place, push, creep, k = row(places, 3, i), row(pushes, 3, i), forces[i], 9 + 3 * i
-        force, radius = (push[0] + creep.fx, push[1] + creep.fy, push[2]), q[3] + place[2]
-        f[k] += dot(x, force)
-        f[k + 1] += dot(z, force)
-        f[k + 2] -= radius * creep.fx
-        moment = plus(moment, plus(cross(three(place, 0), force), (radius * creep.fy, -radius * creep.fx, creep.mz)))
-        along, across, lift = along + creep.fx, across + creep.fy, lift + row(contacts, TOUCH, i)[2]
-        turn += (head[0] + place[0]) * creep.fy - place[1] * creep.fx + creep.mz
+        wheel_position, push, creep, k = row(wheel_positions, 3, i), row(pushes, 3, i), forces[i], 9 + 3 * i
+        force, radius = (push[0] + creep.fx, push[1] + creep.fy, push[2]), q[3] + wheel_position[2]
+        forces_out[k] += dot(x, force)
+        forces_out[k + 1] += dot(z, force)
+        forces_out[k + 2] -= radius * creep.fx
+        moment = plus(
+            moment, plus(cross(three(wheel_position, 0), force), (radius * creep.fy, -radius * creep.fx, creep.mz))
+        )
+        force_along, across, lift = force_along + creep.fx, across + creep.fy, lift + row(contacts, TOUCH, i)[2]
+        turn += (head[0] + wheel_position[0]) * creep.fy - wheel_position[1] * creep.fx + creep.mz
     middle = times(z, head[2])
-    speed = ahead + turning[1] * middle[2] - turning[2] * middle[1] - v[2] * middle[1]
+    speed = speed_forward + turning[1] * middle[2] - turning[2] * middle[1] - v[2] * middle[1]
     drag = -head[1] * abs(speed) * speed
     moment = plus(moment, cross(middle, (drag, 0.0, 0.0)))
-    along, turn = along + drag, turn - middle[1] * drag
-    f[0] += c_yaw * along - s_yaw * across
-    f[1] += s_yaw * along + c_yaw * across
-    f[2] += turn
-    f[3] += lift
-    f[4] += moment[0]
-    f[5] += dot(y, moment)
+    force_along, turn = force_along + drag, turn - middle[1] * drag
+    forces_out[0] += c_yaw * force_along - s_yaw * across
+    forces_out[1] += s_yaw * force_along + c_yaw * across
+    forces_out[2] += turn
+    forces_out[3] += lift
+    forces_out[4] += moment[0]
+    forces_out[5] += dot(y, moment)
 
 
 @lean
-def _wheel(w, frame, passing, q, v, i, left):
+def _wheel(w, frame, passing, q, v, i, wheel_records):
     """Compute spring forces, load and creepages of wheel i. Returns the moment of the springs on the chassis about S.
 
-    passing : speeds of S ahead and aside, its place ahead of the origin. left : where places, pushes and contacts of
-    all wheels are left.
+    passing : speeds of S ahead and aside, its place ahead of the origin. wheel_records : where places, pushes and
+    contacts of all wheels are left.
     """
-    (x, y, z, turning), (ahead, aside, s_x), k = frame, passing, 9 + 3 * i
-    place, push, contact = row(left[0], 3, i), row(left[1], 3, i), row(left[2], TOUCH, i)
+    (x, y, z, turning), (speed_forward, speed_leftward, s_x), k = frame, passing, 9 + 3 * i
+    wheel_position, push, contact = (
+        row(wheel_records[0], 3, i),
+        row(wheel_records[1], 3, i),
+        row(wheel_records[2], TOUCH, i),
+    )
     arm = plus(plus(times(x, w[0]), times(y, w[1])), times(z, w[2]))
-    moved, sliding = plus(times(x, q[k]), times(z, q[k + 1])), plus(times(x, v[k]), times(z, v[k + 1]))
-    rate = plus(sliding, cross(turning, moved))
-    strut = w[7] + w[5] * (w[3] * moved[0] + w[4] * moved[2]) + w[6] * (w[3] * rate[0] + w[4] * rate[2])
-    bush = w[10] + w[8] * (w[4] * moved[0] - w[3] * moved[2]) + w[9] * (w[4] * rate[0] - w[3] * rate[2])
-    along, up = -strut * w[3] - bush * w[4], bush * w[3] - strut * w[4]
-    place[0], place[1], place[2] = plus(arm, moved)
-    u, radius = plus(sliding, cross(turning, three(place, 0))), q[3] + place[2]
+    displacement, sliding = plus(times(x, q[k]), times(z, q[k + 1])), plus(times(x, v[k]), times(z, v[k + 1]))
+    rate = plus(sliding, cross(turning, displacement))
+    strut = w[7] + w[5] * (w[3] * displacement[0] + w[4] * displacement[2]) + w[6] * (w[3] * rate[0] + w[4] * rate[2])
+    bush = w[10] + w[8] * (w[4] * displacement[0] - w[3] * displacement[2]) + w[9] * (w[4] * rate[0] - w[3] * rate[2])
+    force_along, force_up = -strut * w[3] - bush * w[4], bush * w[3] - strut * w[4]
+    wheel_position[0], wheel_position[1], wheel_position[2] = plus(arm, displacement)
+    u, radius = plus(sliding, cross(turning, three(wheel_position, 0))), q[3] + wheel_position[2]
     load, tread = max(w[11] - w[12] * (radius - w[13]), 0.0), radius * v[k + 2]
-    push[0], push[1], push[2] = along, 0.0, up + load
+    push[0], push[1], push[2] = force_along, 0.0, force_up + load
     contact[0], contact[1], contact[2], contact[3] = math.sqrt(w[14] * load / w[12]), w[15], load, w[17]
-    contact[4] = (u[0] + ahead - v[2] * place[1] - radius * (turning[1] + v[k + 2])) / tread
-    contact[5] = (u[1] + aside + v[2] * (s_x + place[0]) + radius * turning[0]) / tread
+    contact[4] = (u[0] + speed_forward - v[2] * wheel_position[1] - radius * (turning[1] + v[k + 2])) / tread
+    contact[5] = (u[1] + speed_leftward + v[2] * (s_x + wheel_position[0]) + radius * turning[0]) / tread
     contact[6] = (turning[2] + v[2]) / tread
     contact[7] = contact[8] = contact[9] = w[16]
-    return cross((along, 0.0, up), arm)
+    return cross((force_along, 0.0, force_up), arm)
 
 
 @lean
-def _add_bar_forces(bar, i, left, q, f):
+def _add_bar_forces(bar, i, wheel_records, q, forces_out):
     """Add the forces of an anti-roll bar (stiffness, moment at rest, 1 / track) between the wheels i and i + 1 and the
     chassis' roll."""
-    (stiffness, held, by), (places, pushes, _) = bar, left
-    twist = held + stiffness * (q[4] - (row(places, 3, i)[2] - row(places, 3, i + 1)[2]) * by)
-    f[4] -= twist
-    row(pushes, 3, i)[2] += twist * by
-    row(pushes, 3, i + 1)[2] -= twist * by
+    (stiffness, moment_at_rest, inverse_track), (wheel_positions, pushes, _) = bar, wheel_records
+    twist = moment_at_rest + stiffness * (
+        q[4] - (row(wheel_positions, 3, i)[2] - row(wheel_positions, 3, i + 1)[2]) * inverse_track
+    )
+    forces_out[4] -= twist
+    row(pushes, 3, i)[2] += twist * inverse_track
+    row(pushes, 3, i + 1)[2] -= twist * inverse_track
 
 
 @lean
-def _engine(mounts, head, frame, q, v, f):
+def _engine(mounts, car_head, frame, q, v, forces_out):
     """Add the forces of the mounts on the engine's three coordinates. Returns their moment on the chassis about S."""
     x, y, z, turning = frame
     c_roll, s_roll, c_pitch, s_pitch = math.cos(q[7]), math.sin(q[7]), math.cos(q[8]), math.sin(q[8])
-    over = plus(times(y, c_roll), times(z, s_roll))
-    up = plus(times(z, c_roll), times(y, -s_roll))
-    ahead, high = plus(times(x, c_pitch), times(up, -s_pitch)), plus(times(x, s_pitch), times(up, c_pitch))
-    joint = plus(times(x, head[4]), times(z, head[5] + q[6]))
-    turning_wheel = plus(plus(turning, times(x, v[7])), times(over, v[8]))
+    lateral_axis = plus(times(y, c_roll), times(z, s_roll))
+    vertical_axis = plus(times(z, c_roll), times(y, -s_roll))
+    forward_axis, high = (
+        plus(times(x, c_pitch), times(vertical_axis, -s_pitch)),
+        plus(times(x, s_pitch), times(vertical_axis, c_pitch)),
+    )
+    joint = plus(times(x, car_head[4]), times(z, car_head[5] + q[6]))
+    turning_wheel = plus(plus(turning, times(x, v[7])), times(lateral_axis, v[8]))
     passing, total, twist = plus(cross(turning, joint), times(z, v[6])), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     moment = 0.0, 0.0, 0.0
     for i in range(3):
         m = row(mounts, MOUNT, i)
-        here = plus(plus(times(x, m[0]), times(y, m[1])), times(z, m[2]))
-        arm = plus(plus(times(ahead, m[3]), times(over, m[4])), times(high, m[5]))
-        gap = plus(here, times(plus(joint, arm), -1.0))
-        rate = plus(cross(turning, here), times(plus(passing, cross(turning_wheel, arm)), -1.0))
+        mount_point = plus(plus(times(x, m[0]), times(y, m[1])), times(z, m[2]))
+        arm = plus(plus(times(forward_axis, m[3]), times(lateral_axis, m[4])), times(high, m[5]))
+        gap = plus(mount_point, times(plus(joint, arm), -1.0))
+        rate = plus(cross(turning, mount_point), times(plus(passing, cross(turning_wheel, arm)), -1.0))
         force = (
             m[12] + m[6] * gap[0] + m[9] * rate[0],
             m[13] + m[7] * gap[1] + m[10] * rate[1],
@@ -150,32 +170,32 @@ def _engine(mounts, head, frame, q, v, f):
         )
         total, twist = plus(total, force), plus(twist, cross(arm, force))
         moment = plus(moment, cross(force, gap))
-    f[6] += dot(z, total)
-    f[7] += dot(x, twist)
-    f[8] += dot(over, twist)
+    forces_out[6] += dot(z, total)
+    forces_out[7] += dot(x, twist)
+    forces_out[8] += dot(lateral_axis, twist)
     return moment
 
 
 @lean
-def _add_seat_forces(seats, frame, q, v, f):
+def _add_seat_forces(seats, frame, q, v, forces_out):
     """Add the forces of both seats on their coordinates. Returns their moment on the chassis about S."""
     _, _, z, turning = frame
     moment = 0.0, 0.0, 0.0
     for i in range(2):
         s, k = row(seats, SEAT, i), 21 + i
-        moved = times(z, q[k])
-        force = s[5] - s[3] * moved[2] - s[4] * (v[k] * z[2] + cross(turning, moved)[2])
-        f[k] += force * z[2]
-        moment = plus(moment, cross(moved, (0.0, 0.0, force)))
+        displacement = times(z, q[k])
+        force = s[5] - s[3] * displacement[2] - s[4] * (v[k] * z[2] + cross(turning, displacement)[2])
+        forces_out[k] += force * z[2]
+        moment = plus(moment, cross(displacement, (0.0, 0.0, force)))
     return moment
 
 
 def numbers_of(handling: Handling) -> np.ndarray:
     """The car's parameters as one array: general ones, then those of the wheels, the engine mounts, the seats and the
     grid of the contact patch."""
-    car, of, held = handling.vehicle, net(CELLS), handling.held.parts
+    car, contact_net, preload_of = handling.vehicle, net(CELLS), handling.held.parts
     springs, s, joint = {p.name: p for p in car.springs}, car.body("sway").position, car.body("engine").position
-    bars = [number for bar in car.bars for number in (bar.stiffness, held[bar.name], 1.0 / bar.track)]
+    bars = [number for bar in car.bars for number in (bar.stiffness, preload_of[bar.name], 1.0 / bar.track)]
     head = [
         s[0],
         handling.given.drags[0].coefficient / 2.0,
@@ -184,12 +204,12 @@ def numbers_of(handling: Handling) -> np.ndarray:
         joint[0] - s[0],
         joint[2],
         *bars,
-        len(of.strips[0]),
-        of.middle,
+        len(contact_net.strips[0]),
+        contact_net.middle,
     ]
 
     def law(name: str) -> list[float]:
-        return [springs[name].stiffness, springs[name].damping, held[name]]
+        return [springs[name].stiffness, springs[name].damping, preload_of[name]]
 
     wheels = []
     for tyre, corner in zip(car.tyres, CORNER_NAMES, strict=True):
@@ -220,7 +240,9 @@ def numbers_of(handling: Handling) -> np.ndarray:
         for name in ("left", "right", "rear")
     ]
     seats = [[*np.subtract(springs[name].first_point, s), *law(name)] for name in ("left seat", "right seat")]
-    return np.concatenate([head, wheels, np.ravel(mounts), np.ravel(seats), of.cells.ravel(), of.strips.ravel()])
+    return np.concatenate(
+        [head, wheels, np.ravel(mounts), np.ravel(seats), contact_net.cells.ravel(), contact_net.strips.ravel()]
+    )
 
 
 def model_of(handling: Handling, step: float) -> mujoco.MjModel:
@@ -272,13 +294,13 @@ def run(handling: Handling, q: np.ndarray, v: np.ndarray, step: float, steps: in
     def marched() -> np.ndarray:
         with installed(callback):
             path, _ = rollout.rollout(built, data, state[None, :], nstep=steps)
-        return np.vstack([state[1:], path[0, :, 1 : 1 + 2 * SIZE]])
+        return np.vstack([state[1:], path[0, :, 1 : 1 + 2 * COORDINATE_COUNT]])
 
     return marched
 
 
-def _text(numbers: Any) -> str:
-    return " ".join(repr(float(number)) for number in numbers)
+def _text(values: Any) -> str:
+    return " ".join(repr(float(number)) for number in values)
 
 
 CORNER_NAMES = ("front left", "front right", "rear left", "rear right")

@@ -128,12 +128,12 @@ def mujoco_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
         for i, (corner, wheel) in enumerate(zip(car.corners.tolist(), wheels, strict=True))
     ]
     parts = {
-        name: "".join(part.format(**corner, mass=car.wheel, tyre=car.tyre) for corner in corners)
-        for name, part in CORNERS.items()
+        name: "".join(corner_template.format(**corner, mass=car.wheel, tyre=car.tyre) for corner in corners)
+        for name, corner_template in CORNERS.items()
     }
     centre, size = _text(np.array(car.centre)), 2 + road.size
-    whole = VEHICLE_XML.format(step=step, centre=centre, mass=car.mass, size=size, **parts)
-    model = mujoco.MjModel.from_xml_string(whole)
+    vehicle_xml = VEHICLE_XML.format(step=step, centre=centre, mass=car.mass, size=size, **parts)
+    model = mujoco.MjModel.from_xml_string(vehicle_xml)
     model.body_inertia[1] = car.inertia  # no distribution of mass has these, and the compiler says so
     model.numeric_data[:] = [2.0 / step, car.tyre, *road.ravel()]
     mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -162,9 +162,9 @@ def _road_law() -> Any:
     time = offset("mjData", "time")
 
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
-    def law(model, data):
-        numbers, forces = array_at(model, numeric), array_at(data, passive)
-        row = 2 + 4 * int(np.rint(double_at(data, time)[0] * numbers[0]))
+    def law(model, case_data):
+        numbers, forces = array_at(model, numeric), array_at(case_data, passive)
+        row = 2 + 4 * int(np.rint(double_at(case_data, time)[0] * numbers[0]))
         for i in range(4):
             forces[3 + i] += numbers[1] * numbers[row + i]
 
@@ -176,39 +176,48 @@ STATES, BODY, CORNER = 14, 4, 5
 
 
 @lean
-def rates(x, road, car, out):
+def rates(x, road, car, state_rate):
     """Time derivatives (14,) of the state of a linear car on road heights (4,). ``car`` holds masses of body and wheel,
     roll and pitch inertia, then x, y, stiffness, damping and tyre stiffness of every corner."""
     lift = roll = pitch = 0.0
     for i in range(4):
         k = BODY + CORNER * i
-        ahead, aside, stiffness, damping, tyre = car[k], car[k + 1], car[k + 2], car[k + 3], car[k + 4]
-        up, fast = x[0] + aside * x[1] - ahead * x[2], x[7] + aside * x[8] - ahead * x[9]
-        force = stiffness * (x[3 + i] - up) + damping * (x[10 + i] - fast)
-        lift, roll, pitch = lift + force, roll + aside * force, pitch - ahead * force
-        out[3 + i], out[10 + i] = x[10 + i], (tyre * (road[i] - x[3 + i]) - force) / car[1]
+        distance_ahead, distance_aside, stiffness, damping, tyre = (
+            car[k],
+            car[k + 1],
+            car[k + 2],
+            car[k + 3],
+            car[k + 4],
+        )
+        body_height, fast = (
+            x[0] + distance_aside * x[1] - distance_ahead * x[2],
+            x[7] + distance_aside * x[8] - distance_ahead * x[9],
+        )
+        force = stiffness * (x[3 + i] - body_height) + damping * (x[10 + i] - fast)
+        lift, roll, pitch = lift + force, roll + distance_aside * force, pitch - distance_ahead * force
+        state_rate[3 + i], state_rate[10 + i] = x[10 + i], (tyre * (road[i] - x[3 + i]) - force) / car[1]
     for i in range(3):
-        out[i] = x[7 + i]
-    out[7], out[8], out[9] = lift / car[0], roll / car[2], pitch / car[3]
+        state_rate[i] = x[7 + i]
+    state_rate[7], state_rate[8], state_rate[9] = lift / car[0], roll / car[2], pitch / car[3]
 
 
 @njit(cache=True, error_model="numpy")
 def march(states, roads, step, car):
     """March each copy by the classical Runge-Kutta method, one after the other, and overwrite ``states`` (14, copies).
     roads (2 steps + 1, 4, copies): heights (m) at half steps."""
-    rate, total, here = np.empty(STATES), np.empty(STATES), np.empty(STATES)
+    rate, total, stage_state = np.empty(STATES), np.empty(STATES), np.empty(STATES)
     for copy in range(states.shape[1]):
         x, road = states[:, copy].copy(), roads[:, :, copy].copy()
         for i in range(len(road) // 2):
             rates(x, road[2 * i], car, rate)
             for k in range(STATES):
-                total[k], here[k] = rate[k], x[k] + 0.5 * step * rate[k]
+                total[k], stage_state[k] = rate[k], x[k] + 0.5 * step * rate[k]
             for stage in range(2):
-                rates(here, road[2 * i + 1], car, rate)
+                rates(stage_state, road[2 * i + 1], car, rate)
                 for k in range(STATES):
                     total[k] += 2.0 * rate[k]
-                    here[k] = x[k] + (0.5 * step if stage == 0 else step) * rate[k]
-            rates(here, road[2 * i + 2], car, rate)
+                    stage_state[k] = x[k] + (0.5 * step if stage == 0 else step) * rate[k]
+            rates(stage_state, road[2 * i + 2], car, rate)
             for k in range(STATES):
                 x[k] += step / 6.0 * (total[k] + rate[k])
         states[:, copy] = x

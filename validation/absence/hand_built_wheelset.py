@@ -18,15 +18,16 @@ from models.rail.profile_contact import Pose, normal_force_and_axes
 from models.rail.wheel_forces import REPORT, rails_of
 
 STATES = 10
-SIZE = size_of(REPORT)
+REPORT_LENGTH = size_of(REPORT)
 
 
 @lean
-def rates(state, speed, p, told, out, report):
-    """Time derivatives (10,) of a wheelset's state: y, z, roll, yaw, spin angle, and their rates. If ``told``, the two
-    contacts are written to report (2, 18). p: mass, inertias about the track's direction and the axle, weight on each
-    side, radius, half gauge, conicity, rail head radius, contact modulus, shear modulus, Poisson's ratio."""
-    mass, along, across, carried, radius, gauge, conicity, head, modulus, shear, poisson = p
+def rates(state, speed, p, fills_report, state_rate, report):
+    """Time derivatives (10,) of a wheelset's state: y, z, roll, yaw, spin angle, and their rates. If ``fills_report``,
+    the two contacts are written to report (2, 18). p: mass, inertias about the track's direction and the axle, weight
+    on each side, radius, half gauge, conicity, rail head radius, contact modulus, shear modulus, Poisson's ratio.
+    """
+    mass, yaw_inertia, across, carried, radius, gauge, conicity, head, modulus, shear, poisson = p
     cone = Cone(radius, gauge, conicity, head)
     y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
     cr, sr, cy, sy = np.cos(roll), np.sin(roll), np.cos(yaw), np.sin(yaw)
@@ -40,26 +41,26 @@ def rates(state, speed, p, told, out, report):
         )
         vx, vy, vz = speed + wy * pz - wz * py, y_rate + wz * px - wx * pz, z_rate + wx * py - wy * px
         slip, turning = n_z * vy - n_y * vz, wy * n_y + wz * n_z
-        xi_x, xi_y, xi_spin, ahead, aside, moment = vx / speed, slip / speed, turning / speed, 0.0, 0.0, 0.0
+        xi_x, xi_y, xi_spin, force_ahead, force_aside, moment = vx / speed, slip / speed, turning / speed, 0.0, 0.0, 0.0
         if a > 0.0:
             area, ratio = a * b, a / b
             turn = area**1.5 * coefficient_at(2, ratio, poisson)
-            ahead = -shear * area * coefficient_at(0, ratio, poisson) * xi_x
-            aside = -shear * (area * coefficient_at(1, ratio, poisson) * xi_y + turn * xi_spin)
+            force_ahead = -shear * area * coefficient_at(0, ratio, poisson) * xi_x
+            force_aside = -shear * (area * coefficient_at(1, ratio, poisson) * xi_y + turn * xi_spin)
             moment = shear * (turn * xi_y - area**2 * coefficient_at(3, ratio, poisson) * xi_spin)
-        left, down = n_z * aside - n_y * load, -n_y * aside - n_z * load
-        fy, fz = fy + left, fz + down
+        left, force_down = n_z * force_aside - n_y * load, -n_y * force_aside - n_z * load
+        fy, fz = fy + left, fz + force_down
         mx, my, mz = (
-            mx + (py * down - pz * left),
-            my + (pz * ahead - px * down + n_y * moment),
-            mz + (px * left - py * ahead + n_z * moment),
+            mx + (py * force_down - pz * left),
+            my + (pz * force_ahead - px * force_down + n_y * moment),
+            mz + (px * left - py * force_ahead + n_z * moment),
         )
-        if told:
-            power = ahead * vx + aside * slip + moment * turning
+        if fills_report:
+            power = force_ahead * vx + force_aside * slip + moment * turning
             line = (
                 load,
-                ahead,
-                aside,
+                force_ahead,
+                force_aside,
                 moment,
                 xi_x,
                 xi_y,
@@ -76,27 +77,35 @@ def rates(state, speed, p, told, out, report):
                 -load * (n_y * vy + n_z * vz),
                 0.0,
             )
-            for k in range(SIZE):
+            for k in range(REPORT_LENGTH):
                 report[0 if side == RIGHT else 1, k] = line[k]
     m1, level = cy * mx + sy * my, cy * my - sy * mx
     m2, m3 = cr * level + sr * mz, cr * mz - sr * level
-    out[0], out[1], out[2], out[3], out[4] = y_rate, z_rate, roll_rate, yaw_rate, turn_rate
-    out[5], out[6], out[9] = fy / mass, (fz + 2.0 * carried) / mass + 9.81, m2 / along
-    out[7] = (m1 + along * spin * yaw_rate * cr) / across - yaw_rate**2 * sr * cr
-    out[8] = ((m3 - along * spin * roll_rate) / across + 2.0 * roll_rate * yaw_rate * sr) / cr
+    state_rate[0], state_rate[1], state_rate[2], state_rate[3], state_rate[4] = (
+        y_rate,
+        z_rate,
+        roll_rate,
+        yaw_rate,
+        turn_rate,
+    )
+    state_rate[5], state_rate[6], state_rate[9] = fy / mass, (fz + 2.0 * carried) / mass + 9.81, m2 / yaw_inertia
+    state_rate[7] = (m1 + yaw_inertia * spin * yaw_rate * cr) / across - yaw_rate**2 * sr * cr
+    state_rate[8] = ((m3 - yaw_inertia * spin * roll_rate) / across + 2.0 * roll_rate * yaw_rate * sr) / cr
 
 
 @njit(cache=True, error_model="numpy")
 def march(state, speed, step, p, path, reports):
     """March from a state (10,) by the classical Runge-Kutta method; fills path (steps + 1, 10) and reports (steps + 1,
     2, 18)."""
-    total, rate, here = np.empty(STATES), np.empty(STATES), np.empty(STATES)
+    total, rate, stage_state = np.empty(STATES), np.empty(STATES), np.empty(STATES)
     path[0] = state
     for i in range(len(path)):
         for stage in range(4):
             for k in range(STATES):
-                here[k] = path[i, k] + (step if stage == 3 else 0.5 * step) * rate[k] if stage > 0 else path[i, k]
-            rates(here, speed, p, stage == 0, rate, reports[i])
+                stage_state[k] = (
+                    path[i, k] + (step if stage == 3 else 0.5 * step) * rate[k] if stage > 0 else path[i, k]
+                )
+            rates(stage_state, speed, p, stage == 0, rate, reports[i])
             for k in range(STATES):
                 total[k] = total[k] + (1.0 if stage == 3 else 2.0) * rate[k] if stage > 0 else rate[k]
             if i == len(path) - 1:
@@ -112,7 +121,7 @@ def run(wheelset: Any, state: np.ndarray, speed: float, step: float, steps: int)
     p = (w.mass, w.spin_inertia, w.yaw_inertia, (w.load - w.mass * 9.81) / 2.0, *rails_of(w).wheels[0].tolist()[:7])
 
     def marched() -> tuple[np.ndarray, np.ndarray]:
-        path, reports = np.empty((steps + 1, STATES)), np.empty((steps + 1, 2, SIZE))
+        path, reports = np.empty((steps + 1, STATES)), np.empty((steps + 1, 2, REPORT_LENGTH))
         march(state, speed, step, p, path, reports)
         return path, reports.view(REPORT)[..., 0]
 

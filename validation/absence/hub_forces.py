@@ -16,7 +16,7 @@ from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES, COLUMNS_OF_HUB, H
 
 ENGINES = ("reference", "exudyn", "mujoco")
 HUBS = ("fl", "fr", "rl", "rr")
-STEPS, STEP, PERIOD = 20, 1e-3, 2e-3
+STEPS, STEP, SAMPLE_PERIOD = 20, 1e-3, 2e-3
 BARE_SCENE: dict[str, Any] = {
     "title": "bare",
     "system": "hub-forces",
@@ -39,15 +39,15 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 def write(folder: Path) -> None:
     """Write files of hub forces that carry the vehicle, with a vertical force that rises, and of angles that stay
     zero."""
-    rising = np.linspace(0.0, 1.0, round(STEPS * STEP / PERIOD) + 1) ** 2
+    rising = np.linspace(0.0, 1.0, round(STEPS * STEP / SAMPLE_PERIOD) + 1) ** 2
     forces = {
         f"{hub}_{name}": (next(iter(units)), (4e3 + 500.0 * rising) * (name == "fz"))
         for hub in HUBS
         for name, units in COLUMNS_OF_HUB.items()
     }
-    write_time_series(folder / "forces.csv", forces, PERIOD)
+    write_time_series(folder / "forces.csv", forces, SAMPLE_PERIOD)
     angles = {name: (next(iter(units)), 0.0 * rising) for name, units in COLUMNS_OF_ANGLES.items()}
-    write_time_series(folder / "angles.csv", angles, PERIOD)
+    write_time_series(folder / "angles.csv", angles, SAMPLE_PERIOD)
 
 
 def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
@@ -87,4 +87,4 @@ def _noisy_columns(measurement: Measurement) -> list[int]:
         return [0, 0]
     clean = recorded_measurement(measurement.truth, scene.forces.frame, round(forces.period / scene.run.step))
     pairs = ((forces.samples, clean[0].samples), (angles.samples, clean[1].samples))
-    return [int((told != true).any(axis=0).sum()) for told, true in pairs]
+    return [int((measured != true).any(axis=0).sum()) for measured, true in pairs]

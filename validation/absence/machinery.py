@@ -26,9 +26,9 @@ def allocated_arrays(job: Callable[[], Any]) -> int:
     """Number of arrays that compiled code allocates during a job, as counted by numba."""
     _nrt_python.memsys_enable_stats()
     try:
-        before = rtsys.get_allocation_stats().alloc
+        arrays_before = rtsys.get_allocation_stats().alloc
         job()
-        return int(rtsys.get_allocation_stats().alloc - before)
+        return int(rtsys.get_allocation_stats().alloc - arrays_before)
     finally:
         _nrt_python.memsys_disable_stats()
 
@@ -49,26 +49,28 @@ def bare_wheelsets(steps: int) -> tuple[Callable[[], WheelsetPath], Callable[[],
     return lambda: equations.run(start, steps * STEP, STEP), written
 
 
-def ratio_of_wheelsets(steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
+def ratio_of_wheelsets(steps: int, round_count: int) -> tuple[float, tuple[float, float, float]]:
     """Largest difference of states (m, rad, m/s, rad/s) and contact forces (ratio to the load) between twinrig's
     wheelset and the hand-written one; ratio of their computing times."""
     jobs = bare_wheelsets(steps)
     ours, theirs = (job() for job in jobs)
     gaps = [np.abs(ours.contacts[name] - theirs.contacts[name]).max() for name in ("load", "fx", "fy", "mz")]
-    apart = max(gaps) / theirs.contacts["load"].max()
-    gap = max(np.abs(ours.states - theirs.states).max(), apart)
-    return float(gap), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))
+    force_gap = max(gaps) / theirs.contacts["load"].max()
+    gap = max(np.abs(ours.states - theirs.states).max(), force_gap)
+    return float(gap), paired_ratio(*interleave(jobs, round_count, clock=time.process_time))
 
 
 def arrays_per_steps(
-    job: Callable[[int], Callable[[], Any]], short: int = SHORT_RUN_STEPS, long: int = 10 * SHORT_RUN_STEPS
+    job: Callable[[int], Callable[[], Any]], short_steps: int = SHORT_RUN_STEPS, long_steps: int = 10 * SHORT_RUN_STEPS
 ) -> int:
-    """How many more arrays a job allocates in ``long`` steps than in ``short`` ones; ``job(steps)`` builds the job."""
-    jobs = [job(steps) for steps in (short, long)]
+    """How many more arrays a job allocates in ``long_steps`` steps than in ``short_steps`` ones; ``job(steps)`` builds
+    the job.
+    """
+    jobs = [job(steps) for steps in (short_steps, long_steps)]
     for warm in jobs:
         warm()
-    few, many = map(allocated_arrays, jobs)
-    return many - few
+    arrays_of_short, arrays_of_long = map(allocated_arrays, jobs)
+    return arrays_of_long - arrays_of_short
 
 
 def made_by_wheelset(which: int) -> int:
@@ -90,9 +92,9 @@ def made_by_car() -> int:
 def made_by_hubs(engine: str) -> int:
     """How many more arrays a longer run of a bare vehicle driven by hub forces allocates."""
     scene = bare_scene("hub-forces")
-    most = hub_forces.STEPS
-    most = hub_forces.STEPS
-    return arrays_per_steps(lambda steps: hub_forces.job(scene, engine, steps), most // 4, most)
+    step_count = hub_forces.STEPS
+    step_count = hub_forces.STEPS
+    return arrays_per_steps(lambda steps: hub_forces.job(scene, engine, steps), step_count // 4, step_count)
 
 
 def made_by_braking(engine: str) -> tuple[int, int]:
@@ -112,7 +114,7 @@ def made_by_braking(engine: str) -> tuple[int, int]:
 
 def rows() -> list[Row]:
     """Report rows: numbers of arrays that the time loops of bare scenes allocate, which must be none."""
-    made, samples = zip(*map(made_by_braking, braking.ENGINES), strict=True)
+    braking_arrays, samples = zip(*map(made_by_braking, braking.ENGINES), strict=True)
     why = "a short run against a long one, by the count of numba's own memory; no effect is there that could make one"
     counted = {
         "wheelset": ("360 more steps of a bare wheelset make", made_by_wheelset(0)),
@@ -126,10 +128,10 @@ def rows() -> list[Row]:
         "braking": (
             f"{samples[0]} more samples of a bare braked vehicle make in compiled code of the reference, Exudyn and "
             "MuJoCo together, in four steps each",
-            sum(made),
+            sum(braking_arrays),
         ),
     }
     return [
-        Observed(f"absent.{name}.arrays", SYSTEM, f"arrays that {what}", count, "").at_most(0, why, "none")
-        for name, (what, count) in counted.items()
+        Observed(f"absent.{name}.arrays", SYSTEM, f"arrays that {cause}", count, "").at_most(0, why, "none")
+        for name, (cause, count) in counted.items()
     ]

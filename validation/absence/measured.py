@@ -16,7 +16,7 @@ from models.systems.measured.scene import MeasuredScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
 HUBS = ("fl", "fr", "rl", "rr")
-SAMPLES, PERIOD = 101, 1e-3
+SAMPLES, SAMPLE_PERIOD = 101, 1e-3
 CHANNELS = [
     *({"channel": hub, "quantity": "force", "at": hub, "component": "z", "frame": "inertial"} for hub in HUBS),
     *(
@@ -38,7 +38,7 @@ BARE_SCENE: dict[str, Any] = {
     "files": [FILE],
     "stabilise": {"method": "none", "smoothing": 20.0},
 }
-VIRTUAL = {"duration": PERIOD * (SAMPLES - 1), "format": "csv"}
+VIRTUAL = {"duration": SAMPLE_PERIOD * (SAMPLES - 1), "format": "csv"}
 ON_ROAD: dict[str, Any] = {"files": [], "virtual": VIRTUAL}
 FAULTS: dict[str, Any] = {
     "sensor_noise": {"noise": {"force": 8.0, "moment": 1.0, "angle": 1.75e-3, "angular rate": 5e-3}},
@@ -61,7 +61,7 @@ def write(folder: Path) -> None:
     swing = np.sin(np.linspace(0.0, 3.0, SAMPLES))
     forces = dict.fromkeys(HUBS, ("N", 4000.0 + 100.0 * swing))
     angles = {name: (next(iter(units)), 1e-3 * swing) for name, units in COLUMNS_OF_ANGLES.items()}
-    write_time_series(folder / "recording.csv", forces | angles, PERIOD)
+    write_time_series(folder / "recording.csv", forces | angles, SAMPLE_PERIOD)
 
 
 def counts_and_path(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:

@@ -51,7 +51,7 @@ def bare_scene(system: str, **instead: Any) -> Any:
 def _scene_folder(system: str) -> tempfile.TemporaryDirectory[str]:
     """A temporary folder with the files that scenes of a system read; it lasts as long as this process."""
     folder = tempfile.TemporaryDirectory()
-    getattr(file_of(system), "write", lambda place: None)(Path(folder.name))
+    getattr(file_of(system), "write", lambda folder_path: None)(Path(folder.name))
     return folder
 
 
@@ -86,8 +86,8 @@ def scenes_with_and_without(system: str, effect: str) -> tuple[Any, Any]:
     """Two scenes that differ by one effect: the bare scene with only the effects that this effect needs, and the same
     with the effect."""
     if effect in by_hand(system):
-        less, more = (bare_scene(system, **tables) for tables in by_hand(system)[effect])
-        return less, more
+        scene_without, scene_with = (bare_scene(system, **tables) for tables in by_hand(system)[effect])
+        return scene_without, scene_with
     needs = module_of(system, effect).NEEDS
     return with_effects(bare_scene(system), *needs), with_effects(bare_scene(system), *needs, effect)
 
@@ -101,12 +101,14 @@ def declared_counts(system: str, effect: str, engines: Iterable[str]) -> Counts:
 def added_counts(system: str, effect: str, quick: bool = False) -> Counts:
     """Counts that an effect adds, by engine: the difference between the two scenes of ``scenes_with_and_without`` in
     engines that accept both."""
-    before, after = (
+    counts_without, counts_with = (
         _counts_without_effect(system, effect, quick),
         counts_and_paths(system, scenes_with_and_without(system, effect)[1], quick),
     )
     return {
-        engine: _count_increases(before[engine], counts) for engine, (counts, _) in after.items() if engine in before
+        engine: _count_increases(counts_without[engine], counts)
+        for engine, (counts, _) in counts_with.items()
+        if engine in counts_without
     }
 
 
@@ -132,7 +134,7 @@ def probed_facts(systems: tuple[str, ...] = tuple(BARE_SCENE_FILES)) -> dict[str
     """Facts for the report, to be gathered in a fresh process: modules that bare scenes and effects import, counts that
     effects add, and whether an effect's removal keeps the path."""
     modules_of = {
-        system: sorted({module for some in _modules_of_effects(system).values() for module in some})
+        system: sorted({module for effect_modules in _modules_of_effects(system).values() for module in effect_modules})
         for system in systems
     }
     for system in systems:
@@ -158,14 +160,14 @@ def _probed_in_process(
     for name in addable_effects(system):
         adds[name] = added_counts(system, name)
         missing += [module for module in modules[name] if not _loaded_modules([module])]
-    last = counts_and_paths(system, bare_scene(system))
+    repeated = counts_and_paths(system, bare_scene(system))
     callbacks = {engine: counts["callbacks"] for engine, (counts, _) in first.items() if engine != "reference"}
     return {
         "imported": imported,
         "missing": missing,
         "adds": adds,
         "callbacks": callbacks,
-        "same": all(first[e][1] == last[e][1] for e in first),
+        "same": all(first[e][1] == repeated[e][1] for e in first),
     }
 
 
@@ -184,16 +186,18 @@ def _without_modules(system: str, modules: list[str]) -> Iterator[None]:
 
 
 def _loaded_modules(modules: list[str]) -> list[str]:
-    there = [name for name, module in sys.modules.items() if module is not None]
-    return [name for name in modules if any(loaded == name or loaded.startswith(f"{name}.") for loaded in there)]
+    loaded_modules = [name for name, module in sys.modules.items() if module is not None]
+    return [
+        name for name in modules if any(loaded == name or loaded.startswith(f"{name}.") for loaded in loaded_modules)
+    ]
 
 
 @cache
 def measured_counts() -> dict[str, Any]:
     """The facts of ``probed_facts``, computed in a process of their own."""
     code = "import json; from validation.absence.of_systems import probed_facts; print(json.dumps(probed_facts()))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return dict(json.loads(done.stdout.splitlines()[-1]))
+    completed_process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return dict(json.loads(completed_process.stdout.splitlines()[-1]))
 
 
 def rows(quick: bool) -> list[Row]:
@@ -276,11 +280,12 @@ def _added_count_rows(system: str, added_counts: dict[str, Counts]) -> list[Row]
     ]
 
 
-def _text(counts: Counts) -> str:
+def _text(counts_by_engine: Counts) -> str:
     """Text of the counts by engine; a single text where all engines have the same counts."""
-    said = {
-        engine: ", ".join(f"{n:+d} {key}" for key, n in sorted(counted.items())) for engine, counted in counts.items()
+    count_texts = {
+        engine: ", ".join(f"{n:+d} {key}" for key, n in sorted(counted.items()))
+        for engine, counted in counts_by_engine.items()
     }
-    if len({*said.values()}) == 1:
-        return next(iter(said.values())) or "nothing"
-    return "; ".join(f"{engine} {text or 'nothing'}" for engine, text in said.items())
+    if len({*count_texts.values()}) == 1:
+        return next(iter(count_texts.values())) or "nothing"
+    return "; ".join(f"{engine} {text or 'nothing'}" for engine, text in count_texts.items())

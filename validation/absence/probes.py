@@ -41,8 +41,8 @@ print(json.dumps({
 def probe(table: Mapping[str, Any], folder: str = ".", **options: Any) -> dict[str, Any]:
     """Modules imported, kernels compiled and states (as hexadecimal bytes) after a scene was run in a fresh process."""
     command = [sys.executable, "-c", PROBE_SCRIPT, json.dumps(table), folder]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, **options)
-    return json.loads(done.stdout.splitlines()[-1])
+    completed_process = subprocess.run(command, capture_output=True, text=True, check=True, **options)
+    return json.loads(completed_process.stdout.splitlines()[-1])
 
 
 def belongs_to_effects(module: str) -> bool:
@@ -86,67 +86,71 @@ def installed_callbacks() -> int:
 
 def march(engine: str, model: Model) -> MarchCounts:
     """Run a model once and count what its engine's march uses; the guard and the making of results are not counted."""
-    seen = MarchCounts()
-    with _watched_entry(engine, seen):
+    march_counts = MarchCounts()
+    with _watched_entry(engine, march_counts):
         model.run()
-    return seen
+    return march_counts
 
 
 def leanest_march(engine: str, make_model: Callable[[], Model], runs: int = 3) -> MarchCounts:
     """The march with the least memory among several runs. Memory that the time loop needs occurs in every run, so that
     it is in the least, too."""
-    return min((march(engine, make_model()) for _ in range(runs)), key=lambda seen: seen.peak_bytes)
+    return min((march(engine, make_model()) for _ in range(runs)), key=lambda march_counts: march_counts.peak_bytes)
 
 
 @contextmanager
-def _watched_entry(engine: str, counts: MarchCounts) -> Iterator[None]:
+def _watched_entry(engine: str, march_counts: MarchCounts) -> Iterator[None]:
     """Put a watch around the one function in which an engine spends its time."""
     if engine == "reference":
         from models.engines import reference
 
         real = reference.march_of
-        patch = mock.patch.object(reference, "march_of", lambda *key: _with_probes(real(*key), counts))
+        patch = mock.patch.object(reference, "march_of", lambda *key: _with_probes(real(*key), march_counts))
     elif engine == "mujoco":
         from mujoco import rollout
 
-        patch = mock.patch.object(rollout, "rollout", _with_probes(rollout.rollout, counts))
+        patch = mock.patch.object(rollout, "rollout", _with_probes(rollout.rollout, march_counts))
     else:
         import exudyn as exu
 
-        patch = mock.patch.object(exu.MainSystem, "SolveDynamic", _with_probes(exu.MainSystem.SolveDynamic, counts))
+        patch = mock.patch.object(
+            exu.MainSystem, "SolveDynamic", _with_probes(exu.MainSystem.SolveDynamic, march_counts)
+        )
     with patch:
         yield
 
 
-def _with_probes(function: Callable[..., Any], counts: MarchCounts) -> Callable[..., Any]:
-    """The function, with frames, memory and callbacks added to ``counts``."""
+def _with_probes(function: Callable[..., Any], march_counts: MarchCounts) -> Callable[..., Any]:
+    """The function, with frames, memory and callbacks added to ``march_counts``."""
 
     def call(*args: Any, **options: Any) -> Any:
-        counts.callbacks = max(counts.callbacks, installed_callbacks())
+        march_counts.callbacks = max(march_counts.callbacks, installed_callbacks())
         tracemalloc.start()
-        sys.setprofile(lambda frame, event, argument: _count_frame(counts, event))
+        sys.setprofile(lambda frame, event, argument: _count_frame(march_counts, event))
         try:
             result = function(*args, **options)
         finally:
             sys.setprofile(None)
             peak = tracemalloc.get_traced_memory()[1]
             tracemalloc.stop()
-        counts.peak_bytes += peak - _returned_bytes(result, [*args, *options.values()])
+        march_counts.peak_bytes += peak - _returned_bytes(result, [*args, *options.values()])
         return result
 
     return call
 
 
-def _count_frame(counts: MarchCounts, event: str) -> None:
-    counts.frames += event == "call"
+def _count_frame(march_counts: MarchCounts, event: str) -> None:
+    march_counts.frames += event == "call"
 
 
-def _returned_bytes(result: Any, given: Sequence[Any]) -> int:
+def _returned_bytes(result: Any, filled_arrays: Sequence[Any]) -> int:
     """Bytes of the arrays that a march returned, except for those that it received as arguments and filled."""
     parts = result if isinstance(result, tuple) else (result,)
-    arrays = [part for part in parts if isinstance(part, np.ndarray)]
-    filled = [array for array in given if isinstance(array, np.ndarray)]
-    return sum(array.nbytes for array in arrays if not any(np.may_share_memory(array, each) for each in filled))
+    arrays = [value for value in parts if isinstance(value, np.ndarray)]
+    filled = [array for array in filled_arrays if isinstance(array, np.ndarray)]
+    return sum(
+        array.nbytes for array in arrays if not any(np.may_share_memory(array, filled_array) for filled_array in filled)
+    )
 
 
 def user_functions(model: Any) -> int:
@@ -169,8 +173,8 @@ def _user_functions(mbs: Any) -> int:
     items = [getattr(mbs, f"Get{kind}")(i) for kind, count in kinds for i in range(count)]
     assert items, "the system is empty"
     told_of = [getattr(mbs, name)() for name in dir(mbs) if name.startswith("Get") and name.endswith("UserFunction")]
-    told = [value for item in items for key, value in item.items() if "UserFunction" in key]
-    return sum(bool(value) for value in (*told, *told_of))
+    function_values = [value for item in items for key, value in item.items() if "UserFunction" in key]
+    return sum(bool(value) for value in (*function_values, *told_of))
 
 
 @contextmanager
@@ -206,11 +210,11 @@ def _counting_setter(function: Callable[..., Any], functions: list[int]) -> Call
 
 
 def _counting_march(function: Callable[..., Any], functions: list[int]) -> Callable[..., Any]:
-    seen = dict[int, Any]()
+    systems_seen = dict[int, Any]()
 
     def call(mbs: Any, *args: Any, **options: Any) -> Any:
-        if id(mbs) not in seen:  # which keeps it, so that no other one has its number
-            seen[id(mbs)] = mbs
+        if id(mbs) not in systems_seen:  # which keeps it, so that no other one has its number
+            systems_seen[id(mbs)] = mbs
             functions.append(_user_functions(mbs))
         return function(mbs, *args, **options)
 

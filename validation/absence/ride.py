@@ -123,8 +123,8 @@ print(json.dumps(sorted(sys.modules)))
 def imported_modules(engine: str) -> list[str]:
     """Modules of the list FOREIGN_MODULES that have been imported after a linear ride in a fresh process."""
     command = [sys.executable, "-c", PROBE_SCRIPT, engine]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    modules = json.loads(done.stdout.splitlines()[-1])
+    completed_process = subprocess.run(command, capture_output=True, text=True, check=True)
+    modules = json.loads(completed_process.stdout.splitlines()[-1])
     return [
         name
         for name in FOREIGN_MODULES
@@ -140,11 +140,11 @@ def states(filters: dict[str, str]) -> int:
 
 def count_of_linearisations(name: str) -> int:
     """Number of linear vehicles that a sweep over SPEEDS needs."""
-    with mock.patch.object(of_scene, "linearise", wraps=linearise) as made:
+    with mock.patch.object(of_scene, "linearise", wraps=linearise) as watched_linearise:
         linear = of_scene.linear_vehicle(load_vehicle(name))
         for speed in SPEEDS:
             linear(speed)
-    return made.call_count
+    return watched_linearise.call_count
 
 
 def count_of_noisy_outputs(damping: float) -> int:
@@ -178,10 +178,10 @@ def rows(quick: bool = False) -> list[Row]:
     names = ("quarter_car", "quarter_car_nonlinear")
     bare, curved = (curve_and_callback_counts(name) for name in names)
     why = "counted from outside, in the modules of a fresh process, in the engine's items, in the system's size"
-    told = "modules of engines, of the compiler and of other routes that a linear ride of the reference imports"
+    quantity = "modules of engines, of the compiler and of other routes that a linear ride of the reference imports"
     counted = () if quick else (len(imported_modules("reference")),)
     return [
-        *(Observed("absent.ride.imports", SYSTEM, told, count, "").at_most(0, why, "none") for count in counted),
+        *(Observed("absent.ride.imports", SYSTEM, quantity, count, "").at_most(0, why, "none") for count in counted),
         behaviour_row(
             "absent.ride.states",
             SYSTEM,
@@ -217,5 +217,5 @@ def rows(quick: bool = False) -> list[Row]:
     ]
 
 
-def _counts_text(counts: dict[str, tuple[int, int]]) -> str:
-    return ", ".join(f"{engine} {curves}, {called}" for engine, (curves, called) in counts.items())
+def _counts_text(counts_by_engine: dict[str, tuple[int, int]]) -> str:
+    return ", ".join(f"{engine} {curves}, {called}" for engine, (curves, called) in counts_by_engine.items())

@@ -18,7 +18,7 @@ from models.systems.wheelset.scene import WheelsetScene
 from validation.common.rows import Row, System, behaviour_row
 
 SYSTEM: System = "effects"
-SPEED, SHIFT = 60.0, 3e-3
+SPEED, LATERAL_SHIFT = 60.0, 3e-3
 ENGINES = ("reference", "exudyn", "mujoco")
 FREE_WHEELSET = {name: 0.0 for name in Wheelset.model_fields if name.startswith(("stiffness", "damping"))}
 BARE_SCENE: dict[str, Any] = {
@@ -58,7 +58,7 @@ def without_net(law: Any) -> str:
     """Returns "the same" if the wheelset's rates do not change by a bit when FASTSIM's grid is filled with NaN, else
     "no numbers"."""
     equations = Equations(CHOSEN_WHEELSET, SPEED, law, 11)
-    state, (speed, body, _), rails = equations.displaced_state(SHIFT), equations.parameters, equations.rails
+    state, (speed, body, _), rails = equations.displaced_state(LATERAL_SHIFT), equations.parameters, equations.rails
     rails = rails._replace(strips=np.full_like(rails.strips, np.nan), cells=np.full_like(rails.cells, np.nan))
     rates = np.empty(eq.STATE_COUNT)
     eq.rates(state, speed, body, forces.plain_rails(rails), rates, equations.empty_contacts())

@@ -13,7 +13,7 @@ from models.core.runge_kutta import step_on
 from validation.adams_joints.mechanism import Mechanism
 from validation.adams_joints.motion import BodyMotion, Reaction, about_marker
 
-PLACE, TURN, VELOCITY, TURNING, ANGLE = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), 13
+POSITION, QUATERNION, VELOCITY, ANGULAR_VELOCITY, ANGLE = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), 13
 """Of a state (14,): centre, quaternion (scalar last), velocity, angular velocity, angle about the joint's axis."""
 START_VELOCITY_TOLERANCE = 1e-9
 """m/s, rad/s: start velocities that no joint allows."""
@@ -39,7 +39,7 @@ class ConstrainedBody:
 
     def rates(self, state: np.ndarray) -> np.ndarray:
         """Rates (14,) of a state."""
-        quaternion, turning = state[TURN], state[TURNING]
+        quaternion, turning = state[QUATERNION], state[ANGULAR_VELOCITY]
         x, y, z, w = quaternion
         product = np.array(  # of the angular velocity and the quaternion
             [
@@ -50,15 +50,15 @@ class ConstrainedBody:
             ]
         )
         accelerations, _ = self.accelerations_and_reaction(state)
-        about = self.joint_axes[2] @ turning
-        return np.concatenate([state[VELOCITY], 0.5 * product, accelerations, [about]])
+        axis_rate = self.joint_axes[2] @ turning
+        return np.concatenate([state[VELOCITY], 0.5 * product, accelerations, [axis_rate]])
 
     def accelerations_and_reaction(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Linear and angular accelerations (6,) of the body's centre, and the joint's force and moment (6,) about the
         centre."""
-        m, turned = self.mechanism, _rotation_matrix(state[TURN])
-        inertia = turned @ m.inertia @ turned.T
-        turning = state[TURNING]
+        m, rotation = self.mechanism, _rotation_matrix(state[QUATERNION])
+        inertia = rotation @ m.inertia @ rotation.T
+        turning = state[ANGULAR_VELOCITY]
         applied = self.springs(state)
         applied[:3] += m.mass * m.gravity
         applied[3:] -= _vector_product(turning, inertia @ turning)
@@ -66,34 +66,34 @@ class ConstrainedBody:
         mass = np.zeros((6, 6))
         mass[:3, :3], mass[3:, 3:] = m.mass * np.eye(3), inertia
         count = len(rows)
-        whole = np.block([[mass, -rows.T], [rows, np.zeros((count, count))]])
-        answer = np.linalg.solve(whole, np.concatenate([applied, wanted]))
+        saddle_matrix = np.block([[mass, -rows.T], [rows, np.zeros((count, count))]])
+        answer = np.linalg.solve(saddle_matrix, np.concatenate([applied, wanted]))
         return answer[:6], rows.T @ answer[6:]
 
     def springs(self, state: np.ndarray) -> np.ndarray:
         """Force and moment (6,) of all springs on the body about its centre."""
-        out, turned = np.zeros(6), _rotation_matrix(state[TURN])
+        wrench, rotation = np.zeros(6), _rotation_matrix(state[QUATERNION])
         for spring in self.mechanism.springs:
             if spring.turns:
                 law = spring.stiffness * (state[ANGLE] - spring.free_length)
-                law += spring.damping * (self.joint_axes[2] @ state[TURNING])
-                out[3:] -= law * self.joint_axes[2]
+                law += spring.damping * (self.joint_axes[2] @ state[ANGULAR_VELOCITY])
+                wrench[3:] -= law * self.joint_axes[2]
                 continue
-            arm = turned @ (spring.body - self.mechanism.centre)
-            apart = state[PLACE] + arm - spring.ground
-            length = np.linalg.norm(apart)
+            arm = rotation @ (spring.body - self.mechanism.centre)
+            offset = state[POSITION] + arm - spring.ground
+            length = np.linalg.norm(offset)
             if length > 0.0:
-                along = apart / length
-                speed = along @ (state[VELOCITY] + _vector_product(state[TURNING], arm))
-                force = -(spring.stiffness * (length - spring.free_length) + spring.damping * speed) * along
-                out += np.concatenate([force, _vector_product(arm, force)])
-        return out
+                direction = offset / length
+                speed = direction @ (state[VELOCITY] + _vector_product(state[ANGULAR_VELOCITY], arm))
+                force = -(spring.stiffness * (length - spring.free_length) + spring.damping * speed) * direction
+                wrench += np.concatenate([force, _vector_product(arm, force)])
+        return wrench
 
     def _constraints(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Matrix (c, 6) of the joint's constraints on the accelerations, and its right-hand side (c,)."""
-        kind, turning = self.mechanism.kind, state[TURNING]
-        turned = _rotation_matrix(state[TURN])
-        arm = turned @ self.arm
+        kind, turning = self.mechanism.kind, state[ANGULAR_VELOCITY]
+        rotation = _rotation_matrix(state[QUATERNION])
+        arm = rotation @ self.arm
         point = np.hstack([np.eye(3), -_skew_matrix(arm)])
         bent = -_vector_product(turning, _vector_product(turning, arm))
         turn, still = np.hstack([np.zeros((3, 3)), np.eye(3)]), np.zeros(3)
@@ -107,20 +107,20 @@ class ConstrainedBody:
         if kind == "spherical":
             return point, bent
         if kind == "universal":
-            on_body = turned @ self.mechanism.body.axes[:, 2]
+            on_body = rotation @ self.mechanism.body.axes[:, 2]
             row = _vector_product(on_body, axes[2]) @ turn
             swing = -axes[2] @ _vector_product(turning, _vector_product(turning, on_body))
             return np.vstack([point, row]), np.append(bent, swing)
         if kind == "distance":
-            apart = state[PLACE] + arm - self.mechanism.ground.place
+            offset = state[POSITION] + arm - self.mechanism.ground.place
             speed = state[VELOCITY] + _vector_product(turning, arm)
-            return (apart @ point)[None], np.array([apart @ bent - speed @ speed])
+            return (offset @ point)[None], np.array([offset @ bent - speed @ speed])
         return np.empty((0, 6)), np.empty(0)
 
     def at_motion(self, motion: BodyMotion, row: int) -> np.ndarray:
         """State (14,) of the body at a row of a motion; the angle about the joint's axis is zero there."""
-        turned = Rotation.from_matrix(motion.turned[row]).as_quat()
-        return np.concatenate([motion.place[row], turned, motion.velocity[row], motion.turning[row], [0.0]])
+        quaternion = Rotation.from_matrix(motion.turned[row]).as_quat()
+        return np.concatenate([motion.place[row], quaternion, motion.velocity[row], motion.turning[row], [0.0]])
 
     def marched(self, state: np.ndarray, steps: int, step: float) -> np.ndarray:
         """State after ``steps`` steps of length ``step`` (s)."""
@@ -130,29 +130,29 @@ class ConstrainedBody:
 
     def run(self, duration: float, step: float, stride: int) -> tuple[BodyMotion, Reaction]:
         """Motion and reaction by the classical Runge-Kutta method, at every ``stride``-th step."""
-        state, kept = self.start(), list[np.ndarray]()
+        state, states_kept = self.start(), list[np.ndarray]()
         for k in range(round(duration / step) + 1):
             if k % stride == 0:
-                kept.append(state)
+                states_kept.append(state)
             state = self._after_step(state, step)
-        return self._motion_and_reaction(np.array(kept), step * stride)
+        return self._motion_and_reaction(np.array(states_kept), step * stride)
 
     def _after_step(self, state: np.ndarray, step: float) -> np.ndarray:
-        after = step_on(lambda _, here: self.rates(here), 0.0, state, step)
-        after[TURN] /= np.linalg.norm(after[TURN])
-        return after
+        next_state = step_on(lambda _, stage_state: self.rates(stage_state), 0.0, state, step)
+        next_state[QUATERNION] /= np.linalg.norm(next_state[QUATERNION])
+        return next_state
 
     def _motion_and_reaction(self, states: np.ndarray, spacing: float) -> tuple[BodyMotion, Reaction]:
         solved = [self.accelerations_and_reaction(state) for state in states]
-        accelerations = np.array([each[0] for each in solved])
+        accelerations = np.array([solution[0] for solution in solved])
         wrenches = np.array([wrench + self.springs(state) for (_, wrench), state in zip(solved, states, strict=True)])
         motion = BodyMotion(
             spacing * np.arange(len(states)),
-            states[:, PLACE],
+            states[:, POSITION],
             states[:, VELOCITY],
             accelerations[:, :3],
-            np.array([_rotation_matrix(state[TURN]) for state in states]),
-            states[:, TURNING],
+            np.array([_rotation_matrix(state[QUATERNION]) for state in states]),
+            states[:, ANGULAR_VELOCITY],
             accelerations[:, 3:],
         )
         return motion, about_marker(self.mechanism, motion, wrenches[:, :3], wrenches[:, 3:])
@@ -173,5 +173,5 @@ def _skew_matrix(vector: np.ndarray) -> np.ndarray:
 def _rotation_matrix(quaternion: np.ndarray) -> np.ndarray:
     """Rotation (3, 3) of a quaternion, scalar last; it is scaled to 1 here."""
     x, y, z, w = quaternion / np.sqrt(quaternion @ quaternion)
-    part = _skew_matrix(np.array([x, y, z]))
-    return np.eye(3) + 2.0 * (w * part + part @ part)
+    skew_part = _skew_matrix(np.array([x, y, z]))
+    return np.eye(3) + 2.0 * (w * skew_part + skew_part @ skew_part)

@@ -42,7 +42,7 @@ class JointTree:
         """Joints as massless bodies, then the body at its centre."""
         m = self.mechanism
         ground, end = _vector_of(self.local(m.ground.place)), _vector_of(self.local(m.body.place))
-        held = {
+        joint_bodies = {
             "revolute": [Body("joint", 0.0, end, ("rz",))],
             "prismatic": [Body("joint", 0.0, end, ("z",))],
             "cylindrical": [Body("joint", 0.0, end, ("z", "rz"))],
@@ -56,8 +56,10 @@ class JointTree:
         }[m.kind]
         inertia = self.axes.T @ m.inertia @ self.axes
         rows = tuple(_vector_of(row) for row in 0.5 * (inertia + inertia.T))
-        body = Body(BODY_NAME, m.mass, _vector_of(self.local(m.centre)), (), (rows[0], rows[1], rows[2]), held[-1].name)
-        return SpatialVehicle("mechanism", (*held, body), (), (), ())
+        body = Body(
+            BODY_NAME, m.mass, _vector_of(self.local(m.centre)), (), (rows[0], rows[1], rows[2]), joint_bodies[-1].name
+        )
+        return SpatialVehicle("mechanism", (*joint_bodies, body), (), (), ())
 
     def driven(self) -> Driven:
         """The vehicle as the engines build it, with its springs as compiled forces."""
@@ -69,26 +71,26 @@ class JointTree:
         gravity = self.local(self.mechanism.gravity)
         return Driven(vehicle, gravity, spring_table(vehicle, springs), spring_forces, set_spring_forces)
 
-    def motion(self, times: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> BodyMotion:
+    def motion(self, motion_times: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> BodyMotion:
         """The body by coordinates, rates and accelerations (m, n) of the joints, in the axes of the ground."""
-        place, velocity, acceleration, turned, turning, spin_up = _motion_of_last_body(self.vehicle(), q, v, a)
-        out = self.axes.T
+        position, velocity, acceleration, rotation, turning, spin_up = _motion_of_last_body(self.vehicle(), q, v, a)
+        to_ground = self.axes.T
         return BodyMotion(
-            times,
-            place @ out,
-            velocity @ out,
-            acceleration @ out,
-            self.axes @ turned @ out,
-            turning @ out,
-            spin_up @ out,
+            motion_times,
+            position @ to_ground,
+            velocity @ to_ground,
+            acceleration @ to_ground,
+            self.axes @ rotation @ to_ground,
+            turning @ to_ground,
+            spin_up @ to_ground,
         )
 
     def start_rates(self) -> np.ndarray:
         """Rates (n,) of the joints at the start; InputError where the joint does not allow the body's velocity."""
         n = len(self.vehicle().coordinates())
         zero, unit = np.zeros((n, n)), np.eye(n)
-        each = self.motion(np.zeros(n), zero, unit, zero)
-        columns = np.hstack([each.velocity, each.turning]).T
+        unit_motions = self.motion(np.zeros(n), zero, unit, zero)
+        columns = np.hstack([unit_motions.velocity, unit_motions.turning]).T
         wanted = np.concatenate([self.mechanism.velocity, self.mechanism.turning])
         rates = np.linalg.lstsq(columns, wanted, rcond=None)[0]
         if np.abs(columns @ rates - wanted).max() > START_VELOCITY_TOLERANCE:
@@ -102,9 +104,9 @@ class JointTree:
         rates = self.start_rates()
         states = model.march(0.0 * rates, rates, round(duration / step), step)[::stride]
         q, v = np.split(states, 2, axis=1)
-        times = step * stride * np.arange(len(q))
-        a = np.array([model.acceleration(t, *row) for t, *row in zip(times.tolist(), q, v, strict=True)])
-        motion = self.motion(times, q, v, a)
+        motion_times = step * stride * np.arange(len(q))
+        a = np.array([model.acceleration(t, *row) for t, *row in zip(motion_times.tolist(), q, v, strict=True)])
+        motion = self.motion(motion_times, q, v, a)
         return motion, reaction_by_momentum(self.mechanism, motion)
 
 
@@ -112,9 +114,9 @@ def joint_tree(mechanism: Mechanism, path: BodyMotion) -> JointTree:
     """The joint chain whose hinges stay farthest from a singularity along a path; raises Refused where every chain
     comes too near."""
     trees = [JointTree(mechanism, axes) for axes in _candidate_axes(mechanism)]
-    apart = [_least_hinge_cosine(tree, path) for tree in trees]
-    best = int(np.argmax(apart))
-    if apart[best] < LEAST_COSINE:
+    hinge_cosines = [_least_hinge_cosine(tree, path) for tree in trees]
+    best = int(np.argmax(hinge_cosines))
+    if hinge_cosines[best] < LEAST_COSINE:
         raise Refused("joint tree", "the body turns so far that two hinges of its ball fall into one in every layout")
     return trees[best]
 
@@ -127,12 +129,12 @@ def _candidate_axes(m: Mechanism) -> list[np.ndarray]:
         x, y = m.ground.axes[:, 2], m.body.axes[:, 2]
         return [np.column_stack([x, y, np.cross(x, y)])]
     arm = (m.body.place if m.kind == "distance" else m.centre) - m.ground.place
-    along = arm / np.linalg.norm(arm) if np.linalg.norm(arm) > 0.0 else np.array([0.0, 0.0, 1.0])
-    side = np.cross(along, m.gravity)
+    arm_direction = arm / np.linalg.norm(arm) if np.linalg.norm(arm) > 0.0 else np.array([0.0, 0.0, 1.0])
+    side = np.cross(arm_direction, m.gravity)
     if np.linalg.norm(side) < 1e-6 * (1.0 + np.linalg.norm(m.gravity)):
-        side = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+        side = np.cross(arm_direction, np.eye(3)[np.argmin(np.abs(arm_direction))])
     x = side / np.linalg.norm(side)
-    base = np.column_stack([x, np.cross(along, x), along])
+    base = np.column_stack([x, np.cross(arm_direction, x), arm_direction])
     if m.kind == "distance":
         return [base, np.column_stack([base[:, 1], -base[:, 0], base[:, 2]])]
     return [np.roll(base, shift, axis=1) for shift in range(3)]
@@ -143,16 +145,16 @@ def _least_hinge_cosine(tree: JointTree, path: BodyMotion) -> float:
     mechanism has no such hinge."""
     if tree.mechanism.kind not in ("spherical", "free", "distance"):
         return 1.0
-    turned = tree.axes.T @ path.turned @ tree.axes
+    rotation = tree.axes.T @ path.turned @ tree.axes
     if tree.mechanism.kind != "distance":
-        return float(np.sqrt(1.0 - np.minimum(turned[:, 0, 2] ** 2, 1.0)).min())
+        return float(np.sqrt(1.0 - np.minimum(rotation[:, 0, 2] ** 2, 1.0)).min())
     m = tree.mechanism
     end = path.place + path.turned @ (m.body.place - m.centre)
     d = (end - m.ground.place) @ tree.axes / m.length
     of_rod = np.sqrt(np.maximum(1.0 - d[:, 0] ** 2, 0.0))
     tilt = np.arctan2(-d[:, 1], d[:, 2])
     first = np.column_stack([of_rod, d[:, 0] * np.sin(tilt), -d[:, 0] * np.cos(tilt)])  # the rod's own x axis
-    of_ball = np.sqrt(1.0 - np.minimum(np.einsum("mi,mi->m", first, turned[:, :, 2]) ** 2, 1.0))
+    of_ball = np.sqrt(1.0 - np.minimum(np.einsum("mi,mi->m", first, rotation[:, :, 2]) ** 2, 1.0))
     return float(min(of_rod.min(), of_ball.min()))
 
 
@@ -163,24 +165,24 @@ def _motion_of_last_body(
     3, 3), angular velocity and angular acceleration (m, 3). It is computed by relative motion from joint to joint."""
     count = len(q)
     x, w, alpha = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
-    speed, gain, turned = np.zeros((count, 3)), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
+    speed, gain, rotation = np.zeros((count, 3)), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
     kinds, origin = joints(vehicle), np.zeros(3)
-    places = [(int(kind), tuple(arm)) for kind, _, *arm in kinds]
-    for j, (kind, arm) in enumerate(places):
+    kinds_and_arms = [(int(kind), tuple(arm)) for kind, _, *arm in kinds]
+    for j, (kind, arm) in enumerate(kinds_and_arms):
         origin = origin + arm
-        axis = turned[:, :, kind % 3]
-        reach = turned @ np.array(arm) + (axis * q[:, j : j + 1] if kind < 3 else 0.0)
+        axis = rotation[:, :, kind % 3]
+        reach = rotation @ np.array(arm) + (axis * q[:, j : j + 1] if kind < 3 else 0.0)
         x, gain = x + reach, gain + np.cross(alpha, reach) + np.cross(w, np.cross(w, reach))
         speed = speed + np.cross(w, reach)
-        rate, more = axis * v[:, j : j + 1], axis * a[:, j : j + 1]
+        rate, angular_acceleration_part = axis * v[:, j : j + 1], axis * a[:, j : j + 1]
         if kind < 3:
-            speed, gain = speed + rate, gain + more + 2.0 * np.cross(w, rate)
+            speed, gain = speed + rate, gain + angular_acceleration_part + 2.0 * np.cross(w, rate)
         else:
-            w, alpha = w + rate, alpha + more + np.cross(w, rate)
-            turned = turned @ _rotations_about(kind % 3, q[:, j])
-    reach = turned @ (np.array(vehicle.bodies[-1].position) - origin)
+            w, alpha = w + rate, alpha + angular_acceleration_part + np.cross(w, rate)
+            rotation = rotation @ _rotations_about(kind % 3, q[:, j])
+    reach = rotation @ (np.array(vehicle.bodies[-1].position) - origin)
     gain = gain + np.cross(alpha, reach) + np.cross(w, np.cross(w, reach))
-    return x + reach, speed + np.cross(w, reach), gain, turned, w, alpha
+    return x + reach, speed + np.cross(w, reach), gain, rotation, w, alpha
 
 
 def _rotations_about(axis: int, angle: np.ndarray) -> np.ndarray:

@@ -86,13 +86,13 @@ class Mechanism:
         (spring,) = self.springs
         return replace(self, springs=(replace(spring, **values),))  # type: ignore[arg-type]
 
-    def moved(self, shift: np.ndarray) -> "Mechanism":
+    def moved(self, displacement: np.ndarray) -> "Mechanism":
         """The mechanism with the body shifted (m) at the start, together with its joint point and spring ends."""
         return replace(
             self,
-            centre=self.centre + shift,
-            body=replace(self.body, place=self.body.place + shift),
-            springs=tuple(replace(spring, body=spring.body + shift) for spring in self.springs),
+            centre=self.centre + displacement,
+            body=replace(self.body, place=self.body.place + displacement),
+            springs=tuple(replace(spring, body=spring.body + displacement) for spring in self.springs),
         )
 
 
@@ -106,46 +106,52 @@ class _Reading:
 
     def __init__(self, file: str, statements: list[Statement]) -> None:
         self.file, self.statements = file, statements
-        parts = {each.number: each for each in self.named("PART")}
-        grounds = [each for each in parts.values() if each.has("GROUND")]
-        bodies = [each for each in parts.values() if not each.has("GROUND")]
+        parts = {part_statement.number: part_statement for part_statement in self.named("PART")}
+        grounds = [part_statement for part_statement in parts.values() if part_statement.has("GROUND")]
+        bodies = [part_statement for part_statement in parts.values() if not part_statement.has("GROUND")]
         if len(grounds) != 1 or len(bodies) != 1:
-            told = [len(grounds), len(bodies)]
-            raise InputError(file, "PART", told, "must be one GROUND and one body: other counts are not supported")
+            part_counts = [len(grounds), len(bodies)]
+            raise InputError(
+                file, "PART", part_counts, "must be one GROUND and one body: other counts are not supported"
+            )
         self.ground, self.part = grounds[0], bodies[0]
-        self.markers = {each.number: self._marker(each, parts) for each in self.named("MARKER")}
+        self.markers = {
+            part_statement.number: self._marker(part_statement, parts) for part_statement in self.named("MARKER")
+        }
 
     def named(self, *names: str) -> list[Statement]:
-        return [each for each in self.statements if each.name in names]
+        return [statement for statement in self.statements if statement.name in names]
 
-    def _marker(self, statement: Statement, parts: dict[int, Statement]) -> Marker:
-        part = parts.get(statement.whole("PART"))
-        if part is None:
+    def _marker(self, statement: Statement, parts_by_number: dict[int, Statement]) -> Marker:
+        marker_part = parts_by_number.get(statement.whole("PART"))
+        if marker_part is None:
             raise statement.refuse(", PART", statement.whole("PART"), "is no part of the file")
-        frame = _turned_axes(part.numbers("REULER", (0.0, 0.0, 0.0)))
-        place = part.numbers("QG", (0.0, 0.0, 0.0)) + frame @ statement.numbers("QP", (0.0, 0.0, 0.0))
-        return Marker(part.number, place, frame @ _turned_axes(statement.numbers("REULER", (0.0, 0.0, 0.0))))
+        frame = _turned_axes(marker_part.numbers("REULER", (0.0, 0.0, 0.0)))
+        position = marker_part.numbers("QG", (0.0, 0.0, 0.0)) + frame @ statement.numbers("QP", (0.0, 0.0, 0.0))
+        return Marker(marker_part.number, position, frame @ _turned_axes(statement.numbers("REULER", (0.0, 0.0, 0.0))))
 
-    def marker(self, statement: Statement, number: int) -> Marker:
-        if number not in self.markers:
-            raise statement.refuse("", number, "is no marker of the file")
-        return self.markers[number]
+    def marker(self, statement: Statement, marker_number: int) -> Marker:
+        if marker_number not in self.markers:
+            raise statement.refuse("", marker_number, "is no marker of the file")
+        return self.markers[marker_number]
 
-    def pair(self, statement: Statement, first: int, second: int) -> tuple[Marker, Marker]:
+    def pair(self, statement: Statement, first_number: int, second_number: int) -> tuple[Marker, Marker]:
         """Of two markers, the one on the ground and the one on the body, in this order."""
-        both = self.marker(statement, first), self.marker(statement, second)
-        if {marker.part for marker in both} != {self.ground.number, self.part.number}:
-            raise statement.refuse("", [first, second], "must be a marker of the ground and one of the body")
-        return both if both[0].part == self.ground.number else both[::-1]
+        marker_pair = self.marker(statement, first_number), self.marker(statement, second_number)
+        if {marker.part for marker in marker_pair} != {self.ground.number, self.part.number}:
+            raise statement.refuse(
+                "", [first_number, second_number], "must be a marker of the ground and one of the body"
+            )
+        return marker_pair if marker_pair[0].part == self.ground.number else marker_pair[::-1]
 
     def mechanism(self) -> Mechanism:
-        part = self.part
-        centre = self.marker(part, part.whole("CM"))
-        ixx, iyy, izz, ixy, ixz, iyz = part.numbers("IP", (0.0,) * 6)
+        body_part = self.part
+        centre = self.marker(body_part, body_part.whole("CM"))
+        ixx, iyy, izz, ixy, ixz, iyz = body_part.numbers("IP", (0.0,) * 6)
         own = np.array([[ixx, -ixy, -ixz], [-ixy, iyy, -iyz], [-ixz, -iyz, izz]])
-        mass = float(part.numbers("MASS", (0.0,))[0])
+        mass = float(body_part.numbers("MASS", (0.0,))[0])
         if mass <= 0.0 or np.linalg.eigvalsh(own)[0] <= 0.0:
-            raise part.refuse("", None, "must have a mass and a positive inertia")
+            raise body_part.refuse("", None, "must have a mass and a positive inertia")
         kind, (ground, body), length = self._joint(centre)
         gravity = [sum(float(g.numbers(f"{axis}GRAV", (0.0,))[0]) for g in self.named("ACCGRAV")) for axis in "IJK"]
         return Mechanism(
@@ -158,10 +164,13 @@ class _Reading:
             ground=ground,
             body=body,
             length=length,
-            springs=tuple(self._spring(each, kind, ground) for each in self.named("SFORCE", "SPRINGDAMPER")),
-            velocity=np.array([part.numbers(f"V{axis}", (0.0,))[0] for axis in "XYZ"]),
-            on_body=any(self.marker(j, j.whole("I")).part == part.number for j in self.named("JOINT")),
-            turning=centre.axes @ [part.numbers(f"W{axis}", (0.0,))[0] for axis in "XYZ"],
+            springs=tuple(
+                self._spring(spring_statement, kind, ground)
+                for spring_statement in self.named("SFORCE", "SPRINGDAMPER")
+            ),
+            velocity=np.array([body_part.numbers(f"V{axis}", (0.0,))[0] for axis in "XYZ"]),
+            on_body=any(self.marker(j, j.whole("I")).part == body_part.number for j in self.named("JOINT")),
+            turning=centre.axes @ [body_part.numbers(f"W{axis}", (0.0,))[0] for axis in "XYZ"],
         )
 
     def _joint(self, centre: Marker) -> tuple[Kind, tuple[Marker, Marker], float]:
@@ -191,15 +200,15 @@ class _Reading:
         if match is None:
             raise joint.refuse(", FUNCTION", text, "is not supported: only DM(marker, marker) - length")
         ends, length = self.pair(joint, int(match[1]), int(match[2])), float(match[3])
-        apart = float(np.linalg.norm(ends[1].place - ends[0].place))
-        if abs(apart - length) > ASSEMBLY_TOLERANCE or length <= 0.0:
-            raise joint.refuse(", FUNCTION", length, f"must be above 0 and the distance at the start, {apart:g} m")
-        return "distance", ends, apart
+        distance = float(np.linalg.norm(ends[1].place - ends[0].place))
+        if abs(distance - length) > ASSEMBLY_TOLERANCE or length <= 0.0:
+            raise joint.refuse(", FUNCTION", length, f"must be above 0 and the distance at the start, {distance:g} m")
+        return "distance", ends, distance
 
-    def _spring(self, statement: Statement, kind: Kind, joint: Marker) -> Spring:
+    def _spring(self, statement: Statement, joint_kind: Kind, joint: Marker) -> Spring:
         ground, body = self.pair(statement, statement.whole("I"), statement.whole("J"))
         turns = statement.has("ROTATIONAL") or statement.has("ROTATION")
-        if turns and not (kind == "revolute" and _are_parallel(ground.axes[:, 2], joint.axes[:, 2])):
+        if turns and not (joint_kind == "revolute" and _are_parallel(ground.axes[:, 2], joint.axes[:, 2])):
             raise statement.refuse("", None, "turns about an axis that no revolute joint has: not supported")
         law = self._sprung(statement, turns) if statement.name == "SPRINGDAMPER" else self._function(statement, turns)
         angle = 0.0
@@ -207,23 +216,25 @@ class _Reading:
             x, y = (ground.axes[:, k] @ body.axes[:, 0] for k in range(2))
             sense = math.copysign(1.0, ground.axes[:, 2] @ joint.axes[:, 2])
             angle = math.atan2(y, x) * sense
-        stiffness, damping, rest = law
-        return Spring(turns, ground.place, body.place, stiffness, damping, rest - angle if turns else rest)
+        stiffness, damping, free_length = law
+        return Spring(
+            turns, ground.place, body.place, stiffness, damping, free_length - angle if turns else free_length
+        )
 
-    def _sprung(self, statement: Statement, turns: bool) -> tuple[float, float, float]:
-        names = ("KT", "CT", "ANGLE", "TORQUE") if turns else ("K", "C", "LENGTH", "FORCE")
-        stiffness, damping, rest, held = (float(statement.numbers(name, (0.0,))[0]) for name in names)
-        if held:
-            raise statement.refuse(f", {names[3]}", held, "is not supported: give the free length or angle")
-        return stiffness, damping, rest
+    def _sprung(self, statement: Statement, is_rotational: bool) -> tuple[float, float, float]:
+        names = ("KT", "CT", "ANGLE", "TORQUE") if is_rotational else ("K", "C", "LENGTH", "FORCE")
+        stiffness, damping, free_length, preload = (float(statement.numbers(name, (0.0,))[0]) for name in names)
+        if preload:
+            raise statement.refuse(f", {names[3]}", preload, "is not supported: give the free length or angle")
+        return stiffness, damping, free_length
 
-    def _function(self, statement: Statement, turns: bool) -> tuple[float, float, float]:
+    def _function(self, statement: Statement, is_rotational: bool) -> tuple[float, float, float]:
         """Stiffness, damping and free length (or angle) of a spring force, which must be linear in travel and rate.
         They are found by evaluating its expression."""
         text = statement.text("FUNCTION").lower().replace("\\", " ")
         i, j = (f"0*{statement.whole(end)}" for end in "IJ")
         travel, rate = (rf"az\(\s*{i}\s*,\s*{j}\s*\)", rf"wz\(\s*{i}\s*,\s*{j}\s*,\s*{j}\s*\)")
-        if not turns:
+        if not is_rotational:
             travel, rate = (rf"{name}\(\s*(?:{i}\s*,\s*{j}|{j}\s*,\s*{i})\s*\)" for name in ("dm", "vr"))
         plain = re.sub(rate, "(rate)", re.sub(travel, "(travel)", text))
         force = _evaluated_expression(statement, plain)
@@ -235,8 +246,12 @@ class _Reading:
             )
         if not stiffness and base:
             raise statement.refuse(", FUNCTION", text, "is not supported: a constant force needs a stiffness")
-        rest = base / stiffness if stiffness else 0.0
-        return stiffness, damping, -rest if turns else rest  # az is the angle of the ground beside the body
+        free_length = base / stiffness if stiffness else 0.0
+        return (
+            stiffness,
+            damping,
+            -free_length if is_rotational else free_length,
+        )  # az is the angle of the ground beside the body
 
 
 def _evaluated_expression(statement: Statement, text: str) -> Callable[[float, float], float]:
@@ -274,15 +289,15 @@ def _crossed_markers(ground: Marker, body: Marker, ground_first: bool) -> tuple[
     )
 
 
-def _check_assembled(joint: Statement, kind: Kind, ground: Marker, body: Marker) -> None:
+def _check_assembled(joint: Statement, joint_kind: Kind, ground: Marker, body: Marker) -> None:
     """Refuse a joint that the start does not fit."""
-    apart, z = body.place - ground.place, ground.axes[:, 2]
-    if kind in ("prismatic", "cylindrical"):
-        apart = apart - z * (z @ apart)
-    if np.linalg.norm(apart) > ASSEMBLY_TOLERANCE:
-        raise joint.refuse("", apart.round(9).tolist(), "m lie between its markers at the start: it must be assembled")
-    if kind == "universal":
+    offset, z = body.place - ground.place, ground.axes[:, 2]
+    if joint_kind in ("prismatic", "cylindrical"):
+        offset = offset - z * (z @ offset)
+    if np.linalg.norm(offset) > ASSEMBLY_TOLERANCE:
+        raise joint.refuse("", offset.round(9).tolist(), "m lie between its markers at the start: it must be assembled")
+    if joint_kind == "universal":
         if abs(z @ body.axes[:, 2]) > ASSEMBLY_TOLERANCE:
             raise joint.refuse("", None, "has arms that are not square to each other at the start")
-    elif kind != "spherical" and not (_are_parallel(z, body.axes[:, 2]) and z @ body.axes[:, 2] > 0.0):
+    elif joint_kind != "spherical" and not (_are_parallel(z, body.axes[:, 2]) and z @ body.axes[:, 2] > 0.0):
         raise joint.refuse("", None, "has z axes that are not parallel at the start")

@@ -42,9 +42,9 @@ class Statement:
     number: int
     values: dict[str, list[str]]
 
-    def refuse(self, what: str, value: object, allowed: str) -> InputError:
+    def refuse(self, key_text: str, wrong_value: object, allowed: str) -> InputError:
         """InputError about a key or value of this statement."""
-        return InputError(self.file, f"line {self.line}: {self.name}/{self.number}{what}", value, allowed)
+        return InputError(self.file, f"line {self.line}: {self.name}/{self.number}{key_text}", wrong_value, allowed)
 
     def has(self, key: str) -> bool:
         """Whether the statement has this key or flag."""
@@ -60,10 +60,10 @@ class Statement:
     def numbers(self, key: str, default: tuple[float, ...]) -> np.ndarray:
         """Values of a key, angles in rad. Those that the file omits are taken from the default, which also sets their
         number."""
-        given = [self._number(key, text) for text in self.values.get(key, [])]
-        if len(given) > len(default):
-            raise self.refuse(f", {key}", len(given), f"values found, at most {len(default)} have a meaning")
-        return np.array([*given, *default[len(given) :]])
+        values_given = [self._number(key, text) for text in self.values.get(key, [])]
+        if len(values_given) > len(default):
+            raise self.refuse(f", {key}", len(values_given), f"values found, at most {len(default)} have a meaning")
+        return np.array([*values_given, *default[len(values_given) :]])
 
     def _number(self, key: str, text: str) -> float:
         degrees = text.upper().endswith("D") and not text.upper().endswith("ED")
@@ -89,7 +89,7 @@ def read_statements(path: str | Path) -> list[Statement]:
     statements = [
         _parsed_statement(str(path), number, text) for number, text in _statement_texts(lines) if not _is_skipped(text)
     ]
-    for statement in (each for each in statements if each.name == "UNITS"):
+    for statement in (units_statement for units_statement in statements if units_statement.name == "UNITS"):
         for key, (value, *_) in statement.values.items():
             if value.upper() != SI_UNITS[key]:
                 raise statement.refuse(f", {key}", value, f"is not supported: only {SI_UNITS[key]}")
@@ -121,17 +121,17 @@ def _parsed_statement(file: str, line_number: int, text: str) -> Statement:
         )
     values: dict[str, list[str]] = {}
     key = ""
-    for part in _between_commas(head.group(3)):
-        named = _KEY_PATTERN.fullmatch(part)
+    for assignment in _between_commas(head.group(3)):
+        named = _KEY_PATTERN.fullmatch(assignment)
         if named:
             key = named.group(1).upper()
             values[key] = [named.group(2).strip()]
-        elif part.strip().upper() in KEYS_OF_STATEMENT[name]:
-            values[part.strip().upper()] = []
+        elif assignment.strip().upper() in KEYS_OF_STATEMENT[name]:
+            values[assignment.strip().upper()] = []
         elif key:
-            values[key].append(part.strip())
-        elif part.strip():
-            values[part.strip().upper()] = []
+            values[key].append(assignment.strip())
+        elif assignment.strip():
+            values[assignment.strip().upper()] = []
     statement = Statement(file, line_number, name, int(head.group(2) or 0), values)
     for unknown in (each for each in values if each not in KEYS_OF_STATEMENT[name]):
         raise statement.refuse(f", {unknown}", None, f"is not supported; read are {', '.join(KEYS_OF_STATEMENT[name])}")
@@ -147,4 +147,4 @@ def _between_commas(text: str) -> list[str]:
             parts.append("")
         else:
             parts[-1] += sign
-    return [part for part in parts if part.strip()]
+    return [piece for piece in parts if piece.strip()]

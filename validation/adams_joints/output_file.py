@@ -25,17 +25,17 @@ class OutputFile:
     columns: dict[str, np.ndarray]
     digits: int
 
-    def rounding(self, group: str) -> np.ndarray:
+    def rounding(self, column_group: str) -> np.ndarray:
         """Rounding error (m, columns) of a group's numbers: half of their last digit."""
-        size = np.maximum(np.abs(self.columns[group]), 1e-30)
+        size = np.maximum(np.abs(self.columns[column_group]), 1e-30)
         return 0.5 * 10.0 ** (np.floor(np.log10(size)) - self.digits + 1)
 
     def motion(self, mechanism: Mechanism) -> BodyMotion:
         """The body's motion as the file gives it."""
         scalar, *vector = self.columns["Quat"].T
-        turned = Rotation.from_quat(np.column_stack([*vector, scalar])).as_matrix() @ mechanism.axes.T
+        rotations = Rotation.from_quat(np.column_stack([*vector, scalar])).as_matrix() @ mechanism.axes.T
         c = self.columns
-        return BodyMotion(self.times, c["Pos"], c["Vel"], c["Acc"], turned, c["Avel"], c["Aacc"])
+        return BodyMotion(self.times, c["Pos"], c["Vel"], c["Acc"], rotations, c["Avel"], c["Aacc"])
 
     def energies(self, mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
         """Kinetic energy and total energy (m,) in J. The total is the sum of the kinetic and the gravitational
@@ -48,8 +48,8 @@ class OutputFile:
 
     def energy_lost(self, mechanism: Mechanism) -> float:
         """Ratio of the largest change of total energy to the largest kinetic energy; 0 for a body at rest."""
-        kinetic, whole = self.energies(mechanism)
-        return float(np.abs(whole - whole[0]).max() / max(kinetic.max(), 1e-30))
+        kinetic, total_energy = self.energies(mechanism)
+        return float(np.abs(total_energy - total_energy[0]).max() / max(kinetic.max(), 1e-30))
 
     def reaction(self) -> Reaction:
         """The reaction force and moment that the file gives."""
@@ -69,7 +69,7 @@ def read_output(path: str | Path) -> OutputFile:
     except (OSError, ValueError) as error:
         raise InputError(path, "", None, f"the file cannot be read: {error}") from None
     groups = {group: [f"{group}{k + 1}" for k in range(count)] for group, count in COLUMN_GROUPS.items()}
-    missing = [name for each in (["time"], *groups.values()) for name in each if name not in names]
+    missing = [name for column_names in (["time"], *groups.values()) for name in column_names if name not in names]
     if missing:
         raise InputError(path, "header", missing[0], "is missing")
     try:
@@ -77,7 +77,7 @@ def read_output(path: str | Path) -> OutputFile:
     except ValueError as error:
         raise InputError(path, "rows", None, f"must hold a number in every column: {error}") from None
     digits = max(_significant_digits(cell) for row in rows for cell in row)
-    columns = {group: table[:, [names.index(name) for name in each]] for group, each in groups.items()}
+    columns = {group: table[:, [names.index(name) for name in column_names]] for group, column_names in groups.items()}
     return OutputFile(table[:, names.index("time")], columns, digits)
 
 

@@ -16,8 +16,8 @@ from models.vehicles.free_vehicle import anchor, joints
 from models.vehicles.spatial import FREEDOMS, SpatialVehicle
 from validation.adams_joints.mechanism import Spring
 
-HEAD, PER_SPRING = 2, 10
-COORDINATE, STIFFNESS, DAMPING, REST, GROUND, ARM = 0, 1, 2, 3, 4, 7
+HEAD_LENGTH, PER_SPRING = 2, 10
+COORDINATE, STIFFNESS, DAMPING, FREE_LENGTH, GROUND, ARM = 0, 1, 2, 3, 4, 7
 """Of a spring: the coordinate that it turns (-1: it lies between two points), N/m, N s/m, m, place of its point on the
 ground, and that on the body from the last joint (m)."""
 _NONE = (0.0, 0.0, 0.0)
@@ -29,49 +29,49 @@ def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
     chain = joints(vehicle)
     kinds = chain[:, 0].astype(int)
     rows = np.column_stack([chain[:, 1], kinds >= FREEDOMS.index("rx"), kinds % 3, chain[:, 2:]])
-    last, origin = anchor(vehicle, vehicle.bodies[-1].name)
+    last_body, origin = anchor(vehicle, vehicle.bodies[-1].name)
     laws = [
         [
-            last if each.turns else -1,
-            each.stiffness,
-            each.damping,
-            each.free_length,
-            *each.ground,
-            *(each.body - origin),
+            last_body if spring.turns else -1,
+            spring.stiffness,
+            spring.damping,
+            spring.free_length,
+            *spring.ground,
+            *(spring.body - origin),
         ]
-        for each in springs
+        for spring in springs
     ]
     return np.concatenate([[len(rows), len(laws)], rows.ravel(), np.array(laws).ravel()])
 
 
 @compiled
-def spring_forces(numbers, t, q, v, f):
-    """Add the springs' forces (N, N m) to ``f`` (n,), at coordinates and rates (n,)."""
-    head = array(numbers, (HEAD,))
+def spring_forces(table, t, q, v, force_sum):
+    """Add the springs' forces (N, N m) to ``force_sum`` (n,), at coordinates and rates (n,)."""
+    head = array(table, (HEAD_LENGTH,))
     n, count = int(head[0]), int(head[1])
     if count == 0:
         return
-    chain = array(beyond(numbers, HEAD), (n, PER_JOINT))
-    springs = array(beyond(numbers, HEAD + n * PER_JOINT), (count, PER_SPRING))
-    place, rate, out = array(q, (n,)), array(v, (n,)), array(f, (n,))
+    chain = array(beyond(table, HEAD_LENGTH), (n, PER_JOINT))
+    springs = array(beyond(table, HEAD_LENGTH + n * PER_JOINT), (count, PER_SPRING))
+    joint_positions, rate, force_view = array(q, (n,)), array(v, (n,)), array(force_sum, (n,))
     m = array(doubles((n + 1) * PER_MOTION), (n + 1, PER_MOTION))
-    move(chain, place, rate, m)
+    move(chain, joint_positions, rate, m)
     for i in range(count):
         law = springs[i]
         j = int(law[COORDINATE])
         if j >= 0:
-            out[j] -= law[STIFFNESS] * (place[j] - law[REST]) + law[DAMPING] * rate[j]
+            force_view[j] -= law[STIFFNESS] * (joint_positions[j] - law[FREE_LENGTH]) + law[DAMPING] * rate[j]
             continue
         tip = locate(m[n], springs[i], ARM)
-        apart = plus(tip, times(three(law, GROUND), -1.0))
-        length = math.sqrt(dot(apart, apart))
+        offset = plus(tip, times(three(law, GROUND), -1.0))
+        length = math.sqrt(dot(offset, offset))
         if length == 0.0:  # no line, hence no force along it
             continue
-        along, speed = times(apart, 1.0 / length), 0.0
+        direction, speed = times(offset, 1.0 / length), 0.0
         for k in range(n):
-            speed += dot(along, column(chain[k, TURNS], m[k + 1], tip)) * rate[k]
-        push = -law[STIFFNESS] * (length - law[REST]) - law[DAMPING] * speed
-        add_wrench(chain, m, n - 1, tip, times(along, push), _NONE, out)
+            speed += dot(direction, column(chain[k, TURNS], m[k + 1], tip)) * rate[k]
+        push = -law[STIFFNESS] * (length - law[FREE_LENGTH]) - law[DAMPING] * speed
+        add_wrench(chain, m, n - 1, tip, times(direction, push), _NONE, force_view)
 
 
 @compiled

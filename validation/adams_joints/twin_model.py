@@ -41,8 +41,8 @@ def as_mjcf(mechanism: Mechanism) -> str:
     )
 
 
-def _numbers_text(numbers: np.ndarray) -> str:
-    return " ".join(repr(float(number)) for number in numbers)
+def _numbers_text(values: np.ndarray) -> str:
+    return " ".join(repr(float(number)) for number in values)
 
 
 def _joints(m: Mechanism, laws: list[Spring]) -> str:
@@ -94,17 +94,17 @@ def _start_rates(mechanism: Mechanism, twin: TwinModel) -> np.ndarray:
     """Joint rates (n,) at the start that give the body its initial velocity and angular velocity."""
     data, size = mujoco.MjData(twin.model), twin.size
     mujoco.mj_forward(twin.model, data)
-    moved, turned = np.empty((2, 3, size))
-    mujoco.mj_jacBodyCom(twin.model, data, moved, turned, 1)
+    centre_jacobian, rotation_jacobian = np.empty((2, 3, size))
+    mujoco.mj_jacBodyCom(twin.model, data, centre_jacobian, rotation_jacobian, 1)
     wanted = np.concatenate((mechanism.velocity, mechanism.turning))
-    rates: np.ndarray = np.linalg.lstsq(np.vstack((moved, turned)), wanted, rcond=None)[0]
+    rates: np.ndarray = np.linalg.lstsq(np.vstack((centre_jacobian, rotation_jacobian)), wanted, rcond=None)[0]
     return rates
 
 
 def _body_centres(twin: TwinModel, positions: np.ndarray) -> np.ndarray:
     """Positions (m, 3) of the body's centre at MuJoCo's coordinates (m, nq)."""
-    data, places = mujoco.MjData(twin.model), np.empty((len(positions), 3))
-    for place, data.qpos[:] in zip(places, positions, strict=True):
+    data, centres = mujoco.MjData(twin.model), np.empty((len(positions), 3))
+    for centre, data.qpos[:] in zip(centres, positions, strict=True):
         mujoco.mj_kinematics(twin.model, data)
-        place[:] = data.xipos[1]
-    return places
+        centre[:] = data.xipos[1]
+    return centres

@@ -71,12 +71,12 @@ class RollingTruck:
         return status, used
 
     def braked(
-        self, torques: np.ndarray, step: float = 5.5e-3, until: float = 0.0, duration: float = 200.0
+        self, torques: np.ndarray, step: float = 5.5e-3, end_speed: float = 0.0, duration: float = 200.0
     ) -> "RollingTruck":
         """Advance until the vehicle stands, or until it reaches a speed (m/s) or a time (s); returns the vehicle.
         Raises RunFailed."""
         status = FINE
-        while status == FINE and self.speed > until and self.time < duration - 1e-9:
+        while status == FINE and self.speed > end_speed and self.time < duration - 1e-9:
             status, _ = self.on(torques, step)
         if status not in (FINE, AT_REST):
             raise RunFailed("braking", "the truck does not come to its end", self.time)
@@ -127,4 +127,4 @@ def sideways_with_locked_front_wheels() -> float:
     """Lateral displacement (m) of a truck that slows from 10 to 1 m/s on ice with its front wheels steered by 0.05 rad
     and locked."""
     locked = np.array([LOCKING_TORQUE, LOCKING_TORQUE, 0.0, 0.0])
-    return float(RollingTruck(truck_on(), 10.0, steer=0.05).braked(locked, until=1.0).state[0, 1])
+    return float(RollingTruck(truck_on(), 10.0, steer=0.05).braked(locked, end_speed=1.0).state[0, 1])

@@ -23,7 +23,7 @@ TRUCK, HIGH_TRUCKS = plane_of_truck(PAPER_TRUCK), plane_of_truck(PAPER_TRUCK.mod
 """The paper's truck, and one as high as it is long and twice as high as it is wide."""
 
 
-def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
+def energy_grows(speeds: tuple[float, float, float], brake_torque: float) -> Error:
     """Case: the truck slides on ice with rates of x, y (m/s) and heading (rad/s) under brake torques (N m). Error:
     ratio of the largest gain of kinetic energy over 20 ms to the initial energy."""
 
@@ -31,14 +31,14 @@ def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
         return float(TRUCK.masses[0] * (rates[:2] ** 2).sum() + TRUCK.inertias[0] * rates[2] ** 2)
 
     def error(implementation: str, folder: Path) -> float:
-        moved = MovedVehicle(implementation, TRUCK, ICE, turning=0.0)
-        moved.state[1] = speeds
-        first, gains = energy(moved.state[1]), []
+        moved_vehicle = MovedVehicle(implementation, TRUCK, ICE, rim_turning=0.0)
+        moved_vehicle.state[1] = speeds
+        first, gains = energy(moved_vehicle.state[1]), []
         for _ in range(25):
-            before = energy(moved.state[1])
-            moved.under(np.full((5, 4), level), 5e-3)
-            gains.append(energy(moved.state[1]) - before)
-        return float(max(*gains, 0.0) / first) if np.isfinite(moved.state).all() else np.inf
+            energy_before = energy(moved_vehicle.state[1])
+            moved_vehicle.under(np.full((5, 4), brake_torque), 5e-3)
+            gains.append(energy(moved_vehicle.state[1]) - energy_before)
+        return float(max(*gains, 0.0) / first) if np.isfinite(moved_vehicle.state).all() else np.inf
 
     return error
 
@@ -46,9 +46,9 @@ def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
 def on_even_friction(implementation: str, folder: Path) -> float:
     """Case: the truck brakes straight ahead on even friction. Error: y, heading and yaw rate (m, rad, rad/s), which
     should be 0."""
-    moved = MovedVehicle(implementation, TRUCK, DRY)
-    moved.under(np.full((101, 4), 4e3))
-    return float(np.abs(moved.state[:, 1:]).max())
+    moved_vehicle = MovedVehicle(implementation, TRUCK, DRY)
+    moved_vehicle.under(np.full((101, 4), 4e3))
+    return float(np.abs(moved_vehicle.state[:, 1:]).max())
 
 
 def mirrored_truck_error(implementation: str, folder: Path) -> float:
@@ -56,9 +56,9 @@ def mirrored_truck_error(implementation: str, folder: Path) -> float:
     mirror image of the mirrored stop."""
     ends = []
     for side, stretch in ((1.0, Stretch(0.0, 0, 1)), (-1.0, Stretch(0.0, 1, 0))):
-        moved = MovedVehicle(implementation, TRUCK, ICE, DRY, road=road([stretch]), steer=0.05 * side)
-        moved.under(np.full((101, 4), 2e3))
-        ends.append(moved.state * np.array([1.0, side, side]))
+        moved_vehicle = MovedVehicle(implementation, TRUCK, ICE, DRY, road=road([stretch]), steer=0.05 * side)
+        moved_vehicle.under(np.full((101, 4), 2e3))
+        ends.append(moved_vehicle.state * np.array([1.0, side, side]))
     return float(np.abs(ends[0] - ends[1]).max())
 
 
@@ -77,20 +77,20 @@ def turned_over(implementation: str, folder: Path) -> float:
 def jackknifed_train_error(implementation: str, folder: Path) -> float:
     """Case: a train folded by 100 degrees slides on dry road with all wheels locked. Error: ratio of the largest gain
     of energy over 0.4 s to the initial energy."""
-    plane = plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER.model_copy(update={"fold": np.pi}), transfer=False)
-    moved = MovedVehicle(implementation, plane, DRY, turning=0.0)
-    state = moved.state
+    plane = plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER.model_copy(update={"fold": np.pi}), with_load_transfer=False)
+    moved_vehicle = MovedVehicle(implementation, plane, DRY, rim_turning=0.0)
+    state = moved_vehicle.state
     state[0, 3:] = np.radians(-100.0)
 
     def energy() -> float:
-        mass, rest = np.zeros((5, 5)), np.zeros(5)
+        mass, right_side = np.zeros((5, 5)), np.zeros(5)
         units = np.column_stack((np.cos(state[0, 2:]), np.sin(state[0, 2:])))
-        inertia(units, state[1], plane, mass, rest, rest.copy(), rest.copy())
+        inertia(units, state[1], plane, mass, right_side, right_side.copy(), right_side.copy())
         return float(0.5 * state[1] @ mass @ state[1])
 
     levels = [energy()]
     for _ in range(20):
-        moved.under(np.full((5, plane.wheels), 2e4), 5e-3)
+        moved_vehicle.under(np.full((5, plane.wheels), 2e4), 5e-3)
         levels.append(energy())
     return float(max(np.diff(levels).max(), 0.0) / levels[0]) if levels[-1] < 0.8 * levels[0] else np.inf
 
@@ -100,12 +100,12 @@ def no_friction_on_one_side(implementation: str, folder: Path) -> float:
     relative difference of the lost speed from mu g t / 2."""
     tyres, plane = (
         (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)),
-        plane_of_truck(PAPER_TRUCK, transfer=False),
+        plane_of_truck(PAPER_TRUCK, with_load_transfer=False),
     )
-    moved = MovedVehicle(implementation, plane, *tyres, turning=0.0, road=road([Stretch(0.0, 0, 1)]))
-    moved.under(np.full((6, 4), 2e4), 1e-3)
-    lost = abs((SPEED - moved.state[1, 0]) / (0.4 * GRAVITY * 5e-3) - 1.0)
-    return lost if moved.state[1, 2] < 0.0 else np.inf
+    moved_vehicle = MovedVehicle(implementation, plane, *tyres, rim_turning=0.0, road=road([Stretch(0.0, 0, 1)]))
+    moved_vehicle.under(np.full((6, 4), 2e4), 1e-3)
+    lost = abs((SPEED - moved_vehicle.state[1, 0]) / (0.4 * GRAVITY * 5e-3) - 1.0)
+    return lost if moved_vehicle.state[1, 2] < 0.0 else np.inf
 
 
 def braking_scene(**tables: Any) -> BrakingScene:
@@ -118,14 +118,14 @@ def lagging_at_rest(implementation: str, folder: Path) -> float:
     """Case: the truck stops from a slide on tyres with relaxation, then brakes on for 1 s. Error: distance and speed
     (m, m/s) after the stop."""
     scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5})
-    vehicle, begun = vehicle_and_start(scene, "stop")
+    vehicle, start_state = vehicle_and_start(scene, "stop")
     vehicle = marched_by(vehicle, implementation)
-    begun.state[1, 1] = 0.2
-    path = vehicle.run(AllApplied(4), begun, 10.0)
-    rest = StartState(path.states[-1].copy(), path.turning[-1].copy())
-    after = vehicle.run(AllApplied(4), rest, 1.0)
-    moved = np.abs(after.states[:, 0] - rest.state[0]).max() + np.abs(after.states[:, 1]).max()
-    return float(moved) if path.ended_at_rest else np.inf
+    start_state.state[1, 1] = 0.2
+    path = vehicle.run(AllApplied(4), start_state, 10.0)
+    rest_state = StartState(path.states[-1].copy(), path.turning[-1].copy())
+    path_after = vehicle.run(AllApplied(4), rest_state, 1.0)
+    displacement = np.abs(path_after.states[:, 0] - rest_state.state[0]).max() + np.abs(path_after.states[:, 1]).max()
+    return float(displacement) if path.ended_at_rest else np.inf
 
 
 def rest_error_of_scene(**tables: Any) -> Error:
@@ -159,9 +159,9 @@ def one_wheel_lifted(implementation: str, folder: Path) -> float:
     def balance() -> np.ndarray:
         return np.array([loads.sum(), loads @ TRUCK.place[:, 0], loads @ TRUCK.place[:, 1]])
 
-    before = balance()
+    balance_before = balance()
     share_out(loads, TRUCK.place)
-    return float(np.abs(balance() - before).max()) if loads.min() >= 0.0 else np.inf
+    return float(np.abs(balance() - balance_before).max()) if loads.min() >= 0.0 else np.inf
 
 
 def below_push_out(implementation: str, folder: Path) -> float:

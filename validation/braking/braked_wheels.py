@@ -27,8 +27,10 @@ def bent_friction(*points: tuple[float, float]) -> TyreTable:
     """Tyre table with friction at given points (slip, mu), equal at every load and slip angle, and no lateral
     friction."""
     slips, mu = np.array(points).T
-    along = np.tile(mu, (2, 1, 1))
-    return TyreTable(np.array([0.0, 1.5]), slips, np.array([LOAD]), along, np.ones((2, slips.size)), np.zeros((2, 1)))
+    friction_along = np.tile(mu, (2, 1, 1))
+    return TyreTable(
+        np.array([0.0, 1.5]), slips, np.array([LOAD]), friction_along, np.ones((2, slips.size)), np.zeros((2, 1))
+    )
 
 
 class MovedVehicle(RollingTruck):
@@ -40,15 +42,15 @@ class MovedVehicle(RollingTruck):
         plane: Plane,
         *tyres: TyreTable,
         speed: float = SPEED,
-        turning: float | None = None,
+        rim_turning: float | None = None,
         road: Road = UNIFORM_ROAD,
         steer: float = 0.0,
     ) -> None:
         go = advance if implementation == "reference" else CarriedChassis(implementation, plane).advance
         super().__init__(on_road(plane, stacked_tables(tyres), road), speed, steer=steer, step_function=go)
         self.implementation = implementation
-        if turning is not None:
-            self.turning[:] = turning
+        if rim_turning is not None:
+            self.turning[:] = rim_turning
 
     def under(self, torques: np.ndarray, step: float = STEP) -> bool:
         """Advance with torques (n + 1, W) at the ends of steps (s); returns whether the vehicle came to rest. Raises
@@ -67,16 +69,16 @@ class MovedVehicle(RollingTruck):
 
 def stopping_distance(
     implementation: str,
-    level: float,
+    brake_torque: float,
     *tyres: TyreTable,
     step: float = STEP,
-    turning: float | None = None,
+    rim_turning: float | None = None,
     road: Road = UNIFORM_ROAD,
 ) -> float:
     """Stopping distance (m) under a constant torque (N m); infinite unless all speeds end at exactly 0."""
-    wheel = MovedVehicle(implementation, QUARTER.plane, *tyres, turning=turning, road=road)
-    least = min(level / QUARTER.radius, LOAD * min(float(tyre.mu_x[0, 0, -1]) for tyre in tyres))
-    rests = wheel.under(np.full((int(2.0 * SPEED * QUARTER.mass / least / step) + 50, 1), level), step)
+    wheel = MovedVehicle(implementation, QUARTER.plane, *tyres, rim_turning=rim_turning, road=road)
+    least_force = min(brake_torque / QUARTER.radius, LOAD * min(float(tyre.mu_x[0, 0, -1]) for tyre in tyres))
+    rests = wheel.under(np.full((int(2.0 * SPEED * QUARTER.mass / least_force / step) + 50, 1), brake_torque), step)
     return float(wheel.state[0, 0]) if rests and not wheel.state[1].any() and wheel.turning[0] == 0.0 else np.inf
 
 
@@ -93,8 +95,10 @@ def settled_stop(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
 
 def steady_slip_case(tyre: TyreTable, slip: float, step: float = STEP) -> Error:
     """Case: a stop at constant slip. Error: relative difference of the distance from m v^2 / (2 F)."""
-    level, way, turning = settled_stop(tyre, slip)
-    return lambda name, folder: abs(stopping_distance(name, level, tyre, step=step, turning=turning) / way - 1.0)
+    level, distance, turning = settled_stop(tyre, slip)
+    return lambda name, folder: abs(
+        stopping_distance(name, level, tyre, step=step, rim_turning=turning) / distance - 1.0
+    )
 
 
 def from_rolling(tyre: TyreTable, slip: float, step: float) -> Error:
@@ -122,27 +126,27 @@ def at_the_peak(implementation: str, folder: Path) -> float:
     """Case: exactly the torque of the friction peak. Error: relative amount by which the distance lies outside the
     range from constant peak friction to constant sliding friction."""
     force = LOAD * 0.8
-    way = stopping_distance(
-        implementation, QUARTER.steady_torque(0.1, force), PEAKED_FRICTION, turning=0.9 * SPEED / QUARTER.radius
+    distance = stopping_distance(
+        implementation, QUARTER.steady_torque(0.1, force), PEAKED_FRICTION, rim_turning=0.9 * SPEED / QUARTER.radius
     )
-    least = QUARTER.mass * SPEED**2 / (2.0 * force)
-    return max(1.0 - way / least, way / (least * 0.8 / 0.6) - 1.0, 0.0)
+    shortest_distance = QUARTER.mass * SPEED**2 / (2.0 * force)
+    return max(1.0 - distance / shortest_distance, distance / (shortest_distance * 0.8 / 0.6) - 1.0, 0.0)
 
 
 def locked_wheel_error(implementation: str, folder: Path) -> float:
     """Case: the wheel is locked from the start. Error: relative difference of the distance from v^2 / (2 mu g)."""
-    way = stopping_distance(implementation, 2e4, DRY, turning=0.0)
-    return abs(way * 2.0 * GRAVITY * float(DRY.mu_x[0, 0, -1]) / SPEED**2 - 1.0)
+    distance = stopping_distance(implementation, 2e4, DRY, rim_turning=0.0)
+    return abs(distance * 2.0 * GRAVITY * float(DRY.mu_x[0, 0, -1]) / SPEED**2 - 1.0)
 
 
 def changing_friction_error(implementation: str, folder: Path) -> float:
     """Case: a locked wheel whose friction changes from 0.2 to 0.8 after 10 m. Error: relative difference of the
     distance from its closed form."""
     slick, rough = (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.2, 0.8))
-    way = stopping_distance(
-        implementation, 1e5, slick, rough, turning=0.0, road=road([Stretch(0.0, 0, 0), Stretch(10.0, 1, 1)])
+    distance = stopping_distance(
+        implementation, 1e5, slick, rough, rim_turning=0.0, road=road([Stretch(0.0, 0, 0), Stretch(10.0, 1, 1)])
     )
-    return abs(way / (10.0 + (SPEED**2 - 2.0 * 0.2 * GRAVITY * 10.0) / (2.0 * 0.8 * GRAVITY)) - 1.0)
+    return abs(distance / (10.0 + (SPEED**2 - 2.0 * 0.2 * GRAVITY * 10.0) / (2.0 * 0.8 * GRAVITY)) - 1.0)
 
 
 def friction_range_error(implementation: str, folder: Path) -> float:
@@ -150,7 +154,7 @@ def friction_range_error(implementation: str, folder: Path) -> float:
     t."""
     errors = []
     for mu in (1e-6, 1e-3, 0.1, 1.5):
-        wheel = MovedVehicle(implementation, QUARTER.plane, bent_friction((0.0, 0.0), (1.0, mu)), turning=0.0)
+        wheel = MovedVehicle(implementation, QUARTER.plane, bent_friction((0.0, 0.0), (1.0, mu)), rim_turning=0.0)
         wheel.under(np.full((41, 1), 1e6), 5e-3)
         errors.append(abs((SPEED - wheel.state[1, 0]) / (mu * GRAVITY * 0.2) - 1.0))
     return float(max(errors))
@@ -166,7 +170,7 @@ def at_rest(implementation: str, folder: Path) -> float:
 def backwards_spin_error(implementation: str, folder: Path) -> float:
     """Case: an unbraked wheel starts spinning backwards. Error: relative difference of rim speed and vehicle speed
     after 0.5 s."""
-    wheel = MovedVehicle(implementation, QUARTER.plane, DRY, turning=-10.0)
+    wheel = MovedVehicle(implementation, QUARTER.plane, DRY, rim_turning=-10.0)
     wheel.under(np.zeros((101, 1)), 5e-3)
     return wheel.rims
 
@@ -174,7 +178,7 @@ def backwards_spin_error(implementation: str, folder: Path) -> float:
 def released_brake_error(implementation: str, folder: Path) -> float:
     """Case: the brake of a locked wheel is released at the end of a step. Error: relative difference of rim speed and
     vehicle speed 0.6 s later."""
-    wheel = MovedVehicle(implementation, QUARTER.plane, ICE, turning=0.0)
+    wheel = MovedVehicle(implementation, QUARTER.plane, ICE, rim_turning=0.0)
     wheel.under(np.where(np.arange(161) < 40, 2e4, 0.0)[:, None], 5e-3)
     return wheel.rims
 
@@ -182,14 +186,16 @@ def released_brake_error(implementation: str, folder: Path) -> float:
 def on_the_line(implementation: str, folder: Path) -> float:
     """Case: a wheel exactly on the line between dry surface (left) and ice (right). Error: difference of the distance
     (m) from that on dry surface alone."""
-    both = stopping_distance(implementation, 2e3, DRY, ICE, road=road([Stretch(0.0, 0, 1)]))
-    return abs(both - stopping_distance(implementation, 2e3, DRY))
+    distance_on_line = stopping_distance(implementation, 2e3, DRY, ICE, road=road([Stretch(0.0, 0, 1)]))
+    return abs(distance_on_line - stopping_distance(implementation, 2e3, DRY))
 
 
 def slope_changes(implementation: str, folder: Path) -> float:
     """Case: a lightly braked wheel whose surface changes from dry to wet within a step of 20 ms. Error: relative
     difference of the distance from that with the unchanged force."""
-    level, way, turning = settled_stop(DRY, 0.004)
-    both = road([Stretch(0.0, 0, 0), Stretch(5.03, 1, 1)])
-    stop = stopping_distance(implementation, level, DRY, table_of_surface("wet"), step=2e-2, turning=turning, road=both)
-    return abs(stop / way - 1.0)
+    level, steady_distance, turning = settled_stop(DRY, 0.004)
+    two_surfaces = road([Stretch(0.0, 0, 0), Stretch(5.03, 1, 1)])
+    stop = stopping_distance(
+        implementation, level, DRY, table_of_surface("wet"), step=2e-2, rim_turning=turning, road=two_surfaces
+    )
+    return abs(stop / steady_distance - 1.0)

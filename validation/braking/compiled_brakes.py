@@ -33,14 +33,24 @@ DRY_TABLES = stacked_tables([table_of_surface("dry")])
 
 def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: BrakedStep) -> np.ndarray:
     """Compiled tyre step; its values (7,) are those of ``models.brake.plain.tyre.tyre``."""
-    wheels, report, below = Wheels(*np.zeros((KNOWN, 1))), np.empty((REPORT_SIZE, 1)), surfaces(1)
-    below.first[0], below.second[0], below.share[0] = surface.first, surface.second, surface.share
+    wheels, report, surfaces_below = Wheels(*np.zeros((KNOWN, 1))), np.empty((REPORT_SIZE, 1)), surfaces(1)
+    surfaces_below.first[0], surfaces_below.second[0], surfaces_below.share[0] = (
+        surface.first,
+        surface.second,
+        surface.share,
+    )
     wheels.start[0], wheels.load[0] = motion.start, load
-    ahead = motion.forward_speed if motion.start >= 0.0 else -motion.forward_speed
-    slide(0, ahead, motion.across, motion.least_speed, below.lag, tables.angles, wheels)
-    given = StepInput(motion.start, motion.start + braked.step * motion.rate, *braked.torques, braked.step)
+    forward_speed = motion.forward_speed if motion.start >= 0.0 else -motion.forward_speed
+    slide(0, forward_speed, motion.across, motion.least_speed, surfaces_below.lag, tables.angles, wheels)
+    step_input = StepInput(motion.start, motion.start + braked.step * motion.rate, *braked.torques, braked.step)
     compiled_tyre(
-        0, given, Wheel(braked.radius, braked.inertia, braked.turning), tables, wheels, below, Report(*report)
+        0,
+        step_input,
+        Wheel(braked.radius, braked.inertia, braked.turning),
+        tables,
+        wheels,
+        surfaces_below,
+        Report(*report),
     )
     return report[:, 0]
 
@@ -51,29 +61,29 @@ def friction(tables: Tables, table_index: int, angle: float, load: float, slip: 
         TableCell(*cell_and_share(tables.angles, angle), *cell_and_share(tables.loads, load)),
         cell_and_share(tables.slips, slip),
     )
-    below, above = (
+    mu_below, mu_above = (
         longitudinal_adhesion(table_index, cells, k, tables.mu_x) for k in (s, min(s + 1, tables.slips.size - 1))
     )
-    return below + w * (above - below), lateral_adhesion(table_index, cells, s, w, tables.g, tables.h)
+    return mu_below + w * (mu_above - mu_below), lateral_adhesion(table_index, cells, s, w, tables.g, tables.h)
 
 
-def under_wheels(road: Road, state: np.ndarray, step: float, kinds: np.ndarray) -> np.ndarray:
+def under_wheels(road: Road, state: np.ndarray, step: float, surface_kinds: np.ndarray) -> np.ndarray:
     """First table, second table and share of the second (4, 3) under the truck's wheels, for a state (2, 3) and a step
     (s)."""
-    below = surfaces(4)
-    compiled_under_wheels(state, step, OnRoad(PAPER_PLANE, kinds, 0.0, DRY_TABLES, road), below)
-    return np.column_stack((below.first, below.second, below.share))
+    surfaces_below = surfaces(4)
+    compiled_under_wheels(state, step, OnRoad(PAPER_PLANE, surface_kinds, 0.0, DRY_TABLES, road), surfaces_below)
+    return np.column_stack((surfaces_below.first, surfaces_below.second, surfaces_below.share))
 
 
 def lag_on(
-    state: np.ndarray, time: float, steer: np.ndarray, slope: float, length: np.ndarray, lag: np.ndarray
+    state: np.ndarray, time: float, steer: np.ndarray, slope: float, length: np.ndarray, slip_lags: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compiled counterpart of ``validation.braking.plain_relaxation.lag_on``: lagging slip angles of the truck's tyres
     after a step."""
-    after, lagging = lag.copy(), np.zeros(4)
+    lags_after, lagging = slip_lags.copy(), np.zeros(4)
     truck_on_road = OnRoad(PAPER_PLANE, np.zeros(4, dtype=np.int64), slope, DRY_TABLES, UNIFORM_ROAD)
-    compiled_lag_on(state, time, steer, truck_on_road, Lag(length, after), lagging)
-    return after, lagging
+    compiled_lag_on(state, time, steer, truck_on_road, Lag(length, lags_after), lagging)
+    return lags_after, lagging
 
 
 def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
@@ -82,8 +92,8 @@ def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
     return free_model(engine, driven(vehicle, engine))
 
 
-def wheel_forces_in(numbers: np.ndarray, wheels: int = 4) -> WheelForces:
+def wheel_forces_in(table: np.ndarray, wheels: int = 4) -> WheelForces:
     """Views into a table of numbers on the quantities that are constant at each wheel during a step; writing to them
     changes the table."""
-    rows = numbers[-wheels * HELD :].reshape(HELD, wheels)
+    rows = table[-wheels * HELD :].reshape(HELD, wheels)
     return WheelForces(rows[0], rows[1:3].T, rows[3])

@@ -32,8 +32,8 @@ class Piece:
     at a constant rate (N m/s)."""
 
     def __init__(self, wheel: ExactWheel, i: int, s0: float, torque: float, rate: float) -> None:
-        way = wheel.slips[i + 1] - wheel.slips[i]
-        c = (wheel.forces[i + 1] - wheel.forces[i]) / way
+        cell_width = wheel.slips[i + 1] - wheel.slips[i]
+        c = (wheel.forces[i + 1] - wheel.forces[i]) / cell_width
         f0 = wheel.forces[i] - c * wheel.slips[i]
         per = wheel.radius / (wheel.inertia * wheel.speed)
         self.s0, self.v, self.k = s0, wheel.speed, per * wheel.radius * c
@@ -63,41 +63,43 @@ class Piece:
             area = self.a * t + self.b * t * t / 2.0 - (self.s0 - self.a) * math.expm1(-self.k * t) / self.k
         return self.force[0] * t + self.force[1] * area
 
-    def meets(self, level: float) -> float:
+    def meets(self, acceleration_level: float) -> float:
         """Time (s) at which the rim's acceleration r w' (m/s^2) reaches a level; infinite if it never does."""
         if self.flat:
-            time = (-level / self.v - self.alpha) / self.beta if self.beta else math.inf
+            time = (-acceleration_level / self.v - self.alpha) / self.beta if self.beta else math.inf
         else:
-            share = (self.b + level / self.v) / (self.k * (self.s0 - self.a)) if self.s0 != self.a else -1.0
+            share = (
+                (self.b + acceleration_level / self.v) / (self.k * (self.s0 - self.a)) if self.s0 != self.a else -1.0
+            )
             time = -math.log(share) / self.k if share > 0.0 else math.inf
         return time if time > 0.0 else math.inf
 
-    def leaves(self, low: float, high: float, until: float) -> tuple[float, int]:
-        """First time before ``until`` at which the slip leaves its cell, and through which node: -1 lower, 1 upper.
-        Returns ``until`` and 0 if it stays."""
-        turn = min(self.meets(0.0), until)
-        for start, end in ((0.0, turn), (turn, until)):
+    def leaves(self, low: float, high: float, end_time: float) -> tuple[float, int]:
+        """First time before ``end_time`` at which the slip leaves its cell, and through which node: -1 lower, 1 upper.
+        Returns ``end_time`` and 0 if it stays."""
+        turn = min(self.meets(0.0), end_time)
+        for start, end in ((0.0, turn), (turn, end_time)):
             for node, side in ((low, -1), (high, 1)):
                 if end > start and side * (self.slip(end) - node) > 0.0:
                     if side * (self.slip(start) - node) >= 0.0:
                         return start, side
                     return _root_in_piece(lambda t, node=node: self.slip(t) - node, start, end), side  # type: ignore[misc]
-        return until, 0
+        return end_time, 0
 
 
 def _root_in_piece(function: Callable[[float], float], low: float, high: float) -> float:
     return float(brentq(function, low, high, xtol=1e-16, rtol=1e-14))
 
 
-def advance_phase(wheel: ExactWheel, state: list[float], rate: float, sign: float, level: float) -> None:
+def advance_phase(wheel: ExactWheel, state: list[float], rate: float, sign: float, acceleration_level: float) -> None:
     """Advance ``state`` (slip, torque, time, impulse) to the end of a phase in which the torque changes at a constant
-    rate (N m/s). The phase ends when the rim's acceleration reaches ``level``."""
+    rate (N m/s). The phase ends when the rim's acceleration reaches ``acceleration_level``."""
     i = min(int(np.searchsorted(wheel.slips, state[0], side="right")) - 1, wheel.slips.size - 2)
     for _ in range(100_000):
         piece = Piece(wheel, i, state[0], state[1], rate)
-        if sign * (piece.rim(0.0) - level) >= 0.0:
+        if sign * (piece.rim(0.0) - acceleration_level) >= 0.0:
             return
-        met = min(piece.meets(level), 0.1)
+        met = min(piece.meets(acceleration_level), 0.1)
         time, side = piece.leaves(wheel.slips[i], wheel.slips[i + 1], met)
         ended = side == 0 and met < 0.1
         state[:] = [piece.slip(time), state[1] + rate * time, state[2] + time, state[3] + piece.impulse(time)]
@@ -108,14 +110,20 @@ def advance_phase(wheel: ExactWheel, state: list[float], rate: float, sign: floa
     raise ArithmeticError("a phase that does not end")
 
 
-def exact_cycle(frozen: WheelAtSpeed, controller: FivePhase, begun: float | None = None) -> tuple[float, float]:
+def exact_cycle(wheel_at_speed: WheelAtSpeed, controller: FivePhase, begun: float | None = None) -> tuple[float, float]:
     """Period and mean force, as ``last_cycle`` gives them, of a wheel at constant vehicle speed whose brake torque is
     linear in the pressure. begun: rate of pressure (bar/s) in the first application."""
     rates = [rate_of_phase(k, controller) for k in range(6)]
     rates[0] = rates[0] if begun is None else begun
-    phases = [(frozen.brake.rising * speed, *end_of_phase(k, controller)) for k, speed in enumerate(rates)]
-    forces = frozen.load * frozen.tyre.mu_x[0, 0]
-    return last_cycle(ExactWheel(frozen.speed, frozen.radius, frozen.inertia, frozen.tyre.slips, forces), phases, 12)
+    phases = [(wheel_at_speed.brake.rising * speed, *end_of_phase(k, controller)) for k, speed in enumerate(rates)]
+    forces = wheel_at_speed.load * wheel_at_speed.tyre.mu_x[0, 0]
+    return last_cycle(
+        ExactWheel(
+            wheel_at_speed.speed, wheel_at_speed.radius, wheel_at_speed.inertia, wheel_at_speed.tyre.slips, forces
+        ),
+        phases,
+        12,
+    )
 
 
 def last_cycle(wheel: ExactWheel, phases: list[tuple[float, float, float]], cycles: int = 40) -> tuple[float, float]:
@@ -123,10 +131,10 @@ def last_cycle(wheel: ExactWheel, phases: list[tuple[float, float, float]], cycl
 
     phases : rate of torque (N m/s), sign and level of the end, of the beginning and of phases 1 to 5.
     """
-    at = [0.0, 0.0, 0.0, 0.0]
-    advance_phase(wheel, at, *phases[0])
+    wheel_state = [0.0, 0.0, 0.0, 0.0]
+    advance_phase(wheel, wheel_state, *phases[0])
     for _ in range(cycles):
-        at[2:] = [0.0, 0.0]
+        wheel_state[2:] = [0.0, 0.0]
         for later in phases[1:]:
-            advance_phase(wheel, at, *later)
-    return at[2], at[3] / at[2] / float(wheel.forces.max())
+            advance_phase(wheel, wheel_state, *later)
+    return wheel_state[2], wheel_state[3] / wheel_state[2] / float(wheel.forces.max())

@@ -56,5 +56,5 @@ def braked_error(drive: Drive, mu: float) -> float:
 
 def turning_error(drive: Drive) -> float:
     """Relative error of the load transfer between the left and right wheels in a steady turn."""
-    ahead, _, rate = drive.velocity()[-1]
-    return float(load_transfer(drive)[1] / asked_moments(drive, np.array([0.0, ahead * rate]))[1] - 1.0)
+    forward_speed, _, rate = drive.velocity()[-1]
+    return float(load_transfer(drive)[1] / asked_moments(drive, np.array([0.0, forward_speed * rate]))[1] - 1.0)

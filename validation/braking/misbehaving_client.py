@@ -14,46 +14,50 @@ GOOD_SAMPLES = 20
 NAN = float("nan")
 
 
-def answer_frame(number: int, magic: bytes = b"TRA1", mode: bytes = b"V", wheels: int = 4, first: float = 1.0) -> bytes:
+def answer_frame(
+    sample_number: int, magic: bytes = b"TRA1", frame_mode: bytes = b"V", wheels: int = 4, first: float = 1.0
+) -> bytes:
     """Bytes of a controller's answer, valid by default; arguments make it invalid."""
-    return struct.pack("<4sIBB6x8d", magic, number, mode[0], wheels, first, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+    return struct.pack(
+        "<4sIBB6x8d", magic, sample_number, frame_mode[0], wheels, first, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0
+    )
 
 
-def misbehave(kind: str, number: int, link: socket.socket) -> None:
-    """Misbehave in the way ``kind``, then wait until the other end closes the connection."""
-    if kind == "died":
+def misbehave(misbehaviour: str, sample_number: int, link: socket.socket) -> None:
+    """Misbehave in the way ``misbehaviour``, then wait until the other end closes the connection."""
+    if misbehaviour == "died":
         os._exit(9)
-    if kind == "late":
+    if misbehaviour == "late":
         time.sleep(0.8)
     link.sendall(
         {
-            "NaN": answer_frame(number, mode=b"P", first=NAN),
-            "infinite": answer_frame(number, mode=b"P", first=float("inf")),
-            "NaN as a valve": answer_frame(number, first=NAN),
-            "negative pressure": answer_frame(number, mode=b"P", first=-1.0),
-            "valve in no state": answer_frame(number, first=0.5),
-            "too few wheels": answer_frame(number, wheels=3),
-            "too many bytes": answer_frame(number) + b"\0",
-            "part of a frame": answer_frame(number)[:33],
+            "NaN": answer_frame(sample_number, frame_mode=b"P", first=NAN),
+            "infinite": answer_frame(sample_number, frame_mode=b"P", first=float("inf")),
+            "NaN as a valve": answer_frame(sample_number, first=NAN),
+            "negative pressure": answer_frame(sample_number, frame_mode=b"P", first=-1.0),
+            "valve in no state": answer_frame(sample_number, first=0.5),
+            "too few wheels": answer_frame(sample_number, wheels=3),
+            "too many bytes": answer_frame(sample_number) + b"\0",
+            "part of a frame": answer_frame(sample_number)[:33],
             "another protocol": b"HTTP/1.1 200 OK\r\n" + 63 * b" ",
-            "answer to another sample": answer_frame(number - 1),
-            "late": answer_frame(number),
+            "answer to another sample": answer_frame(sample_number - 1),
+            "late": answer_frame(sample_number),
             "silence": b"",
-        }[kind]
+        }[misbehaviour]
     )
     link.recv(1)
 
 
-def main(kind: str, port: str) -> None:
-    """Answer correctly for some samples, then misbehave in the way ``kind``."""
+def main(misbehaviour: str, port: str) -> None:
+    """Answer correctly for some samples, then misbehave in the way ``misbehaviour``."""
     with socket.create_connection(("127.0.0.1", int(port))) as link:
         while True:
-            asked = link.recv(104, socket.MSG_WAITALL)
-            if len(asked) < 104:
+            question = link.recv(104, socket.MSG_WAITALL)
+            if len(question) < 104:
                 return
-            number = struct.unpack_from("<I", asked, 4)[0]
+            number = struct.unpack_from("<I", question, 4)[0]
             if number >= GOOD_SAMPLES:
-                misbehave(kind, number, link)
+                misbehave(misbehaviour, number, link)
                 return
             link.sendall(answer_frame(number))
 

@@ -43,24 +43,25 @@ def largest_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
     """Largest difference between two arrays; in each column it is divided by the column's largest magnitude. Infinite
     where only one of them is not a number."""
     scale = np.maximum(np.abs(plain).max(axis=0), 1e-300)
-    apart = float(np.max(np.abs(compiled - plain) / scale))
-    return apart if np.isfinite(apart) else np.inf
+    difference = float(np.max(np.abs(compiled - plain) / scale))
+    return difference if np.isfinite(difference) else np.inf
 
 
-def tyre_reports(count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Tyre reports (count, 7) for random steps, by compiled and by plain code; wheels roll, are locked, are released or
-    spin backwards."""
+def tyre_reports(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+    """Tyre reports (state_count, 7) for random steps, by compiled and by plain code; wheels roll, are locked, are
+    released or spin backwards.
+    """
     random, tyre_tables = np.random.default_rng(seed), tables()
-    reports, plain = np.empty((2, count, 7))
-    for i in range(count):
+    reports, plain = np.empty((2, state_count, 7))
+    for i in range(state_count):
         u, rate, across = random.uniform(-3.0, 30.0), random.uniform(-9.0, 3.0), random.normal(0.0, 1.0)
         slip = random.choice([0.0, 1.0, random.uniform(-0.3, 1.2), random.uniform(-3.0, 2.0)])
         radius, inertia, step = random.uniform(0.25, 0.5), random.uniform(0.5, 15.0), random.choice([5.5e-3, 1.4e-3])
         load, level = random.uniform(0.0, 12e3), random.choice([0.0, 300.0, 2e3, 1e5])
         load *= random.choice([1.0, 1.0, 0.03])  # of light loads the slip decays so slowly that a series stands for it
         torques = level * random.uniform(0.5, 1.0), level * random.uniform(0.0, 1.0)
-        first, other = map(int, random.integers(0, 3, 2))
-        under = plain_tyre.Surface(first, other, float(random.choice([0.0, random.uniform()])))
+        first, second_table = map(int, random.integers(0, 3, 2))
+        under = plain_tyre.Surface(first, second_table, float(random.choice([0.0, random.uniform()])))
         turning = u * (1.0 - slip) / radius
         motion = plain_tyre.WheelMotion(u, rate, u + 0.5 * step * rate, across, 0.1)
         braked = plain_tyre.BrakedStep(torques, step, radius, inertia, turning)
@@ -69,20 +70,20 @@ def tyre_reports(count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray
     return reports, plain
 
 
-def random_surfaces(count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+def random_surfaces(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """Surface numbers and shares (4 count, 3) under the wheels of a truck that crosses seams and lines, by compiled and
     by plain code."""
     random, shares, plain = np.random.default_rng(seed), list[np.ndarray](), list[list[float]]()
     stretched: Road = road([Stretch(0.0, 0, 1), Stretch(1.0, 2, 2), Stretch(1.7, 1, 0)], 0.3, 2)
     kind = np.array([0, 0, 1, 1])
-    for _ in range(count):
+    for _ in range(state_count):
         state = np.array([random.uniform(-2.0, 4.0, 3), random.uniform(-30.0, 30.0, 3)]) * [1.0, 0.5, 1.0]
         step = random.choice([5.5e-3, 1e-3])
         shares.append(compiled.under_wheels(stretched, state, step, kind))
         under = plain_road.under_wheels(
             stretched, plain_road.ground_paths(state[0], state[1], PAPER_PLANE.place, step), kind
         )
-        plain += [[each.first, each.second, each.share] for each in under]
+        plain += [[surface.first, surface.second, surface.share] for surface in under]
     return np.concatenate(shares), np.array(plain)
 
 
@@ -122,12 +123,13 @@ def _air_row(air: Air, torques: np.ndarray) -> np.ndarray:
     return np.concatenate((air.pressure, torques.ravel(), air.supply))
 
 
-def slip_lags(count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Lagging slip angles after a step, and those used within the step, (count, 8) for random states, by compiled and
-    by plain code."""
+def slip_lags(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+    """Lagging slip angles after a step, and those used within the step, (state_count, 8) for random states, by compiled
+    and by plain code.
+    """
     random, steer = np.random.default_rng(seed), np.array([0.1, 0.1, 0.0, 0.0])
-    lags, plain = np.empty((2, count, 8))
-    for i in range(count):
+    lags, plain = np.empty((2, state_count, 8))
+    for i in range(state_count):
         state = np.array([random.uniform(-3.0, 3.0, 3), random.normal(0.0, 1.0, 3)])
         state[1, :2] *= random.choice([0.0, 0.3, 20.0])
         length, time, slope = random.uniform(0.1, 2.0, 4), random.choice([5.5e-3, 0.5]), random.uniform(5.0, 30.0)
@@ -138,17 +140,20 @@ def slip_lags(count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, n
     return lags, plain
 
 
-def friction_of_random_states(count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """mu_x and mu_y (count, 2) of random states: compiled code on stacked tables, and plain code on each table with its
-    own nodes."""
+def friction_of_random_states(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+    """mu_x and mu_y (state_count, 2) of random states: compiled code on stacked tables, and plain code on each table
+    with its own nodes.
+    """
     random, tyres = np.random.default_rng(seed), [table_of_surface("dry"), by_load("wet"), by_load("ice")]
-    all_tables, (coefficients, plain) = stacked_tables(tyres), np.empty((2, count, 2))
-    for i in range(count):
-        which, angle, load = int(random.integers(len(tyres))), random.uniform(0.0, 1.7), random.uniform(0.0, 12e3)
-        slip, chosen = random.uniform(), tyres[which]
-        coefficients[i] = compiled.friction(all_tables, which, angle, load, slip)
-        alone = Tables(chosen.angles, chosen.slips, chosen.loads, chosen.mu_x[None], chosen.g[None], chosen.h[None])
-        friction = plain_tyre.Friction(alone, plain_tyre.Surface(0, 0, 0.0), angle, load)
-        ahead = friction.ahead()
-        plain[i] = np.interp(slip, ahead.slips, ahead.forces) / load, friction.aside(slip) / load
+    all_tables, (coefficients, plain) = stacked_tables(tyres), np.empty((2, state_count, 2))
+    for i in range(state_count):
+        tyre_index, angle, load = int(random.integers(len(tyres))), random.uniform(0.0, 1.7), random.uniform(0.0, 12e3)
+        slip, chosen = random.uniform(), tyres[tyre_index]
+        coefficients[i] = compiled.friction(all_tables, tyre_index, angle, load, slip)
+        single_tables = Tables(
+            chosen.angles, chosen.slips, chosen.loads, chosen.mu_x[None], chosen.g[None], chosen.h[None]
+        )
+        friction = plain_tyre.Friction(single_tables, plain_tyre.Surface(0, 0, 0.0), angle, load)
+        friction_along = friction.ahead()
+        plain[i] = np.interp(slip, friction_along.slips, friction_along.forces) / load, friction.aside(slip) / load
     return coefficients, plain

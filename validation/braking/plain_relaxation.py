@@ -20,21 +20,21 @@ def lag_on(
     state: np.ndarray,
     time: float,
     steer: np.ndarray,
-    places: np.ndarray,
+    wheel_positions: np.ndarray,
     slope: float,
     length: np.ndarray,
-    lag: np.ndarray,
+    slip_lags: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Call ``models.brake.plain.relaxation.lag_on`` for a state (2, 3): x, y, heading, and their rates.
 
-    places (W, 2) : of the wheels (m); steer (W,) : rad; lag (W,) : the angles before.
+    wheel_positions (W, 2) : of the wheels (m); steer (W,) : rad; slip_lags (W,) : the angles before.
     """
     velocity, turning = state[1, :2], state[1, 2]
-    centres = velocity + turning * (places @ rotation(state[0, 2] + 0.5 * np.pi).T)
+    centres = velocity + turning * (wheel_positions @ rotation(state[0, 2] + 0.5 * np.pi).T)
     speeds = np.array(
         [rotation(state[0, 2] + angle).T @ centre for angle, centre in zip(steer, centres, strict=True)]
     ).T
-    return plain.lag_on(lag, speeds, time, length, slope)
+    return plain.lag_on(slip_lags, speeds, time, length, slope)
 
 
 def rotation(angle: float) -> np.ndarray:
@@ -57,5 +57,5 @@ def turn_apart(length: float, substeps: int = 4) -> float:
         substeps=substeps,
         relaxation=np.full(4, length),
     ).run(steady_torques(*np.repeat(torques, 2)), FIRST_SPEED, end.time)
-    places = CubicHermiteSpline(path.times, path.states[:, 0, :2], path.states[:, 1, :2])
-    return float(np.hypot(*(places(end.time) - (end.x, end.y))))
+    position_at = CubicHermiteSpline(path.times, path.states[:, 0, :2], path.states[:, 1, :2])
+    return float(np.hypot(*(position_at(end.time) - (end.x, end.y))))

@@ -42,14 +42,14 @@ def car_with_stops() -> Sprung:
     """The car with stops and dry friction at its wheels, and dampers in its tyres."""
     stop = Curve((-0.06, -0.03, 0.0, 0.03, 0.06), (-4e3, -500.0, 0.0, 300.0, 3e3))
     damper = Curve((-1.0, -0.1, 0.0, 0.2, 1.0), (-900.0, -200.0, 0.0, 150.0, 400.0))
-    whole: SpatialVehicle = load_vehicle("r19_free")
-    wheels = {tyre.body for tyre in whole.tyres}
+    vehicle: SpatialVehicle = load_vehicle("r19_free")
+    wheels = {tyre.body for tyre in vehicle.tyres}
     springs = tuple(
         replace(s, travel_force=stop, rate_force=damper, friction=60.0) if wheels & {s.first_body, s.second_body} else s
-        for s in whole.springs
+        for s in vehicle.springs
     )
-    tyres = tuple(replace(tyre, damping=80.0 + 10.0 * i) for i, tyre in enumerate(whole.tyres))
-    return suspended_vehicle(replace(whole, springs=springs, tyres=tyres), SPIN)
+    tyres = tuple(replace(tyre, damping=80.0 + 10.0 * i) for i, tyre in enumerate(vehicle.tyres))
+    return suspended_vehicle(replace(vehicle, springs=springs, tyres=tyres), SPIN)
 
 
 @cache
@@ -80,39 +80,50 @@ def wheels_of(vehicle: Sprung) -> int:
     return len(vehicle.handling.vehicle.tyres)
 
 
-def states(size: int, count: int = STATE_COUNT, wheels: int = 4) -> tuple[np.ndarray, list[WheelForces]]:
-    """Random coordinates and rates (count, 2, size) at any heading, and the random quantities held constant at their
-    wheels."""
+def states(
+    coordinate_count: int, state_count: int = STATE_COUNT, wheels: int = 4
+) -> tuple[np.ndarray, list[WheelForces]]:
+    """Random coordinates and rates (state_count, 2, size) at any heading, and the random quantities held constant at
+    their wheels.
+    """
     random = np.random.default_rng(SEED)
-    both = random.normal(0.0, 1.0, (count, 2, size)) * np.array([[0.02], [0.3]])
-    both[:, 0, :2], both[:, 0, 2] = random.uniform(-50.0, 50.0, (count, 2)), random.uniform(-np.pi, np.pi, count)
-    both[:, 0, 4:6], both[:, 1, :2] = (
-        random.uniform(-LARGEST_LEAN, LARGEST_LEAN, (count, 2)),
-        random.normal(0.0, 15.0, (count, 2)),
+    coordinates_and_rates = random.normal(0.0, 1.0, (state_count, 2, coordinate_count)) * np.array([[0.02], [0.3]])
+    coordinates_and_rates[:, 0, :2], coordinates_and_rates[:, 0, 2] = (
+        random.uniform(-50.0, 50.0, (state_count, 2)),
+        random.uniform(-np.pi, np.pi, state_count),
     )
-    kept = [
+    coordinates_and_rates[:, 0, 4:6], coordinates_and_rates[:, 1, :2] = (
+        random.uniform(-LARGEST_LEAN, LARGEST_LEAN, (state_count, 2)),
+        random.normal(0.0, 15.0, (state_count, 2)),
+    )
+    wheel_forces = [
         WheelForces(
             random.normal(0.0, 0.2, wheels), random.normal(0.0, 3e3, (wheels, 2)), random.normal(0.0, 300.0, wheels)
         )
-        for _ in range(count)
+        for _ in range(state_count)
     ]
-    return both, kept
+    return coordinates_and_rates, wheel_forces
 
 
 @cache
-def plain_accelerations(vehicle: str, count: int = STATE_COUNT) -> np.ndarray:
-    """Accelerations (count, n) at the states of ``states``, by plain code."""
+def plain_accelerations(vehicle: str, state_count: int = STATE_COUNT) -> np.ndarray:
+    """Accelerations (state_count, n) at the states of ``states``, by plain code."""
     suspension = Suspension(EVERY_VEHICLE[vehicle]())
-    both, kept = states(suspension.size, count, len(suspension.tyres))
-    return np.array([suspension.acceleration(q, v, kept_state) for (q, v), kept_state in zip(both, kept, strict=True)])
+    coordinates_and_rates, wheel_forces = states(suspension.size, state_count, len(suspension.tyres))
+    return np.array(
+        [
+            suspension.acceleration(q, v, kept_state)
+            for (q, v), kept_state in zip(coordinates_and_rates, wheel_forces, strict=True)
+        ]
+    )
 
 
-def accelerations(vehicle: Sprung, engine: str, count: int = STATE_COUNT) -> np.ndarray:
-    """Accelerations (count, n) at the states of ``states``, by an engine that calls the compiled forces."""
-    model, computed = in_engine(vehicle, engine), np.empty((count, vehicle.size))
+def accelerations(vehicle: Sprung, engine: str, state_count: int = STATE_COUNT) -> np.ndarray:
+    """Accelerations (state_count, n) at the states of ``states``, by an engine that calls the compiled forces."""
+    model, computed = in_engine(vehicle, engine), np.empty((state_count, vehicle.size))
     wheels = wheels_of(vehicle)
     rows = wheel_forces_in(model.numbers, wheels)
-    for i, (state, kept_state) in enumerate(zip(*states(vehicle.size, count, wheels), strict=True)):
+    for i, (state, kept_state) in enumerate(zip(*states(vehicle.size, state_count, wheels), strict=True)):
         rows.steer[:], rows.forces[:], rows.spin_moments[:] = (
             kept_state.steer,
             kept_state.forces,
@@ -125,8 +136,8 @@ def accelerations(vehicle: Sprung, engine: str, count: int = STATE_COUNT) -> np.
 def relative_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
     """Largest difference of the accelerations, in each state divided by the largest acceleration; infinite where one of
     them is not a number."""
-    off = float(np.max(np.abs(compiled - plain).max(axis=1) / np.abs(plain).max(axis=1)))
-    return off if np.isfinite(off) else np.inf
+    difference = float(np.max(np.abs(compiled - plain).max(axis=1) / np.abs(plain).max(axis=1)))
+    return difference if np.isfinite(difference) else np.inf
 
 
 def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -> BrakedVehicle:
@@ -137,18 +148,18 @@ def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -
         for level in ((150.0, 50.0) if valves else (3e2, 1e2))
     )
     plane = vehicle.in_plane()
-    each, ahead = np.ones(plane.wheels), np.arange(plane.wheels) < 2
+    unit_values, on_front_unit = np.ones(plane.wheels), np.arange(plane.wheels) < 2
     return on_tyres(
         plane,
         [table_of_surface(name) for name in ("wet", "dry", "ice")],
         of_wheels(front, front, *[rear] * (plane.wheels - 2)),
-        Chambers(0.05 * each, 0.04 * each, 6.0, 0.5 * each, 200.0, 3e-3),
+        Chambers(0.05 * unit_values, 0.04 * unit_values, 6.0, 0.5 * unit_values, 200.0, 3e-3),
         road([Stretch(0.0, 1, 0), Stretch(3.0, 2, 2)], 0.2),
-        steer=np.where(ahead, 0.05, 0.0),
+        steer=np.where(on_front_unit, 0.05, 0.0),
         substeps=2,
         engine=PlainOnSprings(vehicle) if engine == "reference" else OnSprings(engine, vehicle),
         sprung=vehicle,
-        relaxation=np.where(ahead, RELAXATION_LENGTHS[0], RELAXATION_LENGTHS[-1]) if lags else None,
+        relaxation=np.where(on_front_unit, RELAXATION_LENGTHS[0], RELAXATION_LENGTHS[-1]) if lags else None,
     )
 
 
@@ -177,11 +188,11 @@ def paths_apart(first: BrakingPath, other_path: BrakingPath) -> float:
     different lengths."""
     if len(first.times) != len(other_path.times):
         return np.inf
-    off = max(
+    difference = max(
         float(np.abs(first.states - other_path.states).max()),
         0.3 * float(np.abs(first.turning - other_path.turning).max()),
     )
-    return off if np.isfinite(off) else np.inf
+    return difference if np.isfinite(difference) else np.inf
 
 
 def circles_of_both_sides(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np.ndarray, np.ndarray]:

@@ -52,27 +52,27 @@ class FrictionChange(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def force_at(u, w, quarter, curve):
+def force_at(u, w, quarter_car, curve):
     """Longitudinal force (N) and slip of a wheel with angular velocity w (rad/s), whose centre moves at u (m/s)."""
     u, mu = max(u, SLOWEST_SPEED), curve.mu
-    slip = (u - quarter.radius * w) / u
+    slip = (u - quarter_car.radius * w) / u
     cell, share = cell_and_share(curve.slips, min(abs(slip), 1.0))
-    return math.copysign(quarter.mass * GRAVITY * (mu[cell] + share * (mu[cell + 1] - mu[cell])), slip), slip
+    return math.copysign(quarter_car.mass * GRAVITY * (mu[cell] + share * (mu[cell + 1] - mu[cell])), slip), slip
 
 
 @njit(cache=True, error_model="numpy")
-def rates(u, w, torque, quarter, curve):
+def rates(u, w, torque, quarter_car, curve):
     """Time derivatives of u (m/s^2) and w (rad/s^2); the brake holds a wheel that does not turn."""
-    force, _ = force_at(u, w, quarter, curve)
-    brake = torque if w > 0.0 else min(torque, quarter.radius * force)
-    return -force / quarter.mass, (quarter.radius * force - brake) / quarter.inertia
+    force, _ = force_at(u, w, quarter_car, curve)
+    brake = torque if w > 0.0 else min(torque, quarter_car.radius * force)
+    return -force / quarter_car.mass, (quarter_car.radius * force - brake) / quarter_car.inertia
 
 
 @njit(cache=True, error_model="numpy")
-def literal_step(u, w, torque, quarter, curve, step):
+def literal_step(u, w, torque, quarter_car, curve, step):
     """Speed and angular velocity after one step of the scheme as printed in the paper."""
-    mass, radius, inertia = quarter
-    force, slip = force_at(u, w, quarter, curve)
+    mass, radius, inertia = quarter_car
+    force, slip = force_at(u, w, quarter_car, curve)
     secant = force / slip if abs(slip) > 1e-12 else mass * GRAVITY * curve.mu[1] / curve.slips[1]
     decay = secant * radius * radius / (inertia * max(u, SLOWEST_SPEED))
     settled = (u - torque * u / (radius * secant)) / radius if secant > 0.0 else w - torque / inertia * step
@@ -80,24 +80,24 @@ def literal_step(u, w, torque, quarter, curve, step):
 
 
 @njit(cache=True, error_model="numpy")
-def advanced_by_scheme(scheme, u, w, torques, quarter, curve, step):
+def advanced_by_scheme(scheme, u, w, torques, quarter_car, curve, step):
     """Speed and angular velocity after one step of a scheme (0 Euler, 1 RK4, 2 literal), with brake torques (N m) at
     the step's start and end."""
-    now, then = torques
-    middle = 0.5 * (now + then)
+    torque_at_start, torque_at_end = torques
+    middle = 0.5 * (torque_at_start + torque_at_end)
     if scheme == 2:
-        return literal_step(u, w, middle, quarter, curve, step)
-    a, b = rates(u, w, now, quarter, curve)
+        return literal_step(u, w, middle, quarter_car, curve, step)
+    a, b = rates(u, w, torque_at_start, quarter_car, curve)
     if scheme == 0:
         return u + step * a, w + step * b
-    a2, b2 = rates(u + 0.5 * step * a, w + 0.5 * step * b, middle, quarter, curve)
-    a3, b3 = rates(u + 0.5 * step * a2, w + 0.5 * step * b2, middle, quarter, curve)
-    a4, b4 = rates(u + step * a3, w + step * b3, then, quarter, curve)
+    a2, b2 = rates(u + 0.5 * step * a, w + 0.5 * step * b, middle, quarter_car, curve)
+    a3, b3 = rates(u + 0.5 * step * a2, w + 0.5 * step * b2, middle, quarter_car, curve)
+    a4, b4 = rates(u + step * a3, w + step * b3, torque_at_end, quarter_car, curve)
     return u + step / 6.0 * (a + 2.0 * a2 + 2.0 * a3 + a4), w + step / 6.0 * (b + 2.0 * b2 + 2.0 * b3 + b4)
 
 
 @njit(cache=True, error_model="numpy")
-def march(scheme, u, w, torques, quarter, road, step):
+def march(scheme, u, w, torques, quarter_car, road, step):
     """Stopping distance (m), number of steps (s) and remaining speed (m/s) by a scheme (0 Euler, 1 RK4, 2 literal).
     torques (n + 1,): N m at the ends of the steps; the number of steps is -1 if the vehicle does not stop.
 
@@ -106,40 +106,40 @@ def march(scheme, u, w, torques, quarter, road, step):
     x = 0.0
     for n in range(torques.size - 1):
         curve = road.before if x < road.place else road.behind
-        after, turning = advanced_by_scheme(scheme, u, w, (torques[n], torques[n + 1]), quarter, curve, step)
-        if after <= 0.0:
-            return x + 0.5 * u * step * u / (u - after), n + 1, 0.0
-        x += 0.5 * step * (u + after)
-        u, w = after, max(turning, 0.0)
+        speed_after, turning = advanced_by_scheme(scheme, u, w, (torques[n], torques[n + 1]), quarter_car, curve, step)
+        if speed_after <= 0.0:
+            return x + 0.5 * u * step * u / (u - speed_after), n + 1, 0.0
+        x += 0.5 * step * (u + speed_after)
+        u, w = speed_after, max(turning, 0.0)
     return x, -1, u
 
 
 def marched_quarter(
-    scheme: int, quarter: Quarter, torques: np.ndarray, road: FrictionChange, speed: float, step: float
+    scheme: int, quarter_car: Quarter, torques: np.ndarray, road: FrictionChange, speed: float, step: float
 ) -> tuple[float, int, float]:
     """``march`` for a quarter vehicle that starts with a rolling wheel at a speed (m/s)."""
-    numbers = Numbers(quarter.mass, quarter.radius, quarter.spin_inertia)
-    way, steps, left = march(scheme, speed, speed / quarter.radius, torques, numbers, road, step)
-    return way, steps, left
+    numbers = Numbers(quarter_car.mass, quarter_car.radius, quarter_car.spin_inertia)
+    distance, steps, left = march(scheme, speed, speed / quarter_car.radius, torques, numbers, road, step)
+    return distance, steps, left
 
 
 def stopping_distance(
-    scheme: str, quarter: Quarter, tyre: TyreTable, torque: float, speed: float, step: float
+    scheme: str, quarter_car: Quarter, tyre: TyreTable, torque: float, speed: float, step: float
 ) -> tuple[float, float]:
     """Stopping distance (m) by one of SCHEMES under a constant torque (N m), from a speed (m/s) with a rolling wheel.
 
     A scheme may chatter or creep for ever. After LONGEST_TIME_RATIO times the time that the torque alone would take,
     the way until then is given, with the speed (m/s) that is left, else 0.
     """
-    most = int(LONGEST_TIME_RATIO * speed * quarter.mass * quarter.radius / (torque * step))
+    step_limit = int(LONGEST_TIME_RATIO * speed * quarter_car.mass * quarter_car.radius / (torque * step))
     curve = FrictionCurve(tyre.slips, tyre.mu_x[0, 0])
-    way, _, left = marched_quarter(
-        SCHEMES.index(scheme), quarter, np.full(most + 1, torque), FrictionChange(curve, curve), speed, step
+    distance, _, left = marched_quarter(
+        SCHEMES.index(scheme), quarter_car, np.full(step_limit + 1, torque), FrictionChange(curve, curve), speed, step
     )
-    return way, left
+    return distance, left
 
 
-def exact_distance(quarter: Quarter, tyre: TyreTable, torque: float, speed: float) -> float:
+def exact_distance(quarter_car: Quarter, tyre: TyreTable, torque: float, speed: float) -> float:
     """Exact stopping distance (m), to a relative accuracy of 1e-9, under a constant torque (N m) from a speed (m/s)
     with a rolling wheel.
 
@@ -147,8 +147,8 @@ def exact_distance(quarter: Quarter, tyre: TyreTable, torque: float, speed: floa
     and ln u falls by F / m: no speed stands in a denominator. Once the slip has settled, or is 1, the force is
     constant and the rest u^2 m / (2 F).
     """
-    nodes, forces = tyre.slips, quarter.mass * GRAVITY * tyre.mu_x[0, 0]
-    m, r, inertia = quarter.mass, quarter.radius, quarter.spin_inertia
+    nodes, forces = tyre.slips, quarter_car.mass * GRAVITY * tyre.mu_x[0, 0]
+    m, r, inertia = quarter_car.mass, quarter_car.radius, quarter_car.spin_inertia
 
     def rates_in(q: float, y: np.ndarray) -> list[float]:
         force = float(np.interp(y[0], nodes, forces))
@@ -158,11 +158,11 @@ def exact_distance(quarter: Quarter, tyre: TyreTable, torque: float, speed: floa
         return float(min(rates_in(q, y)[0] / (r * torque / inertia) - SETTLED_RATE, 1.0 - y[0]))
 
     settled.terminal = True  # type: ignore[attr-defined]
-    part = solve_ivp(
+    solution = solve_ivp(
         rates_in, (0.0, 1e9), [0.0, math.log(speed), 0.0], "DOP853", rtol=1e-12, atol=1e-14, events=settled
     )
-    slip, log_speed, way = part.y[:, -1]
-    return float(way + math.exp(2.0 * log_speed) * m / (2.0 * np.interp(slip, nodes, forces)))
+    slip, log_speed, distance = solution.y[:, -1]
+    return float(distance + math.exp(2.0 * log_speed) * m / (2.0 * np.interp(slip, nodes, forces)))
 
 
 FRONT_WHEEL = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
@@ -172,29 +172,32 @@ PAPER_STEP = 5.5e-3
 
 
 @cache
-def friction_table(surface_name: str, scale: float = 1.0) -> tuple[TyreTable, Tables]:
+def friction_table(surface_name: str, friction_scale: float = 1.0) -> tuple[TyreTable, Tables]:
     """Tyre table of a surface, both as an object and in the form for compiled functions."""
-    tyre = table_of_surface(surface_name, scale)
+    tyre = table_of_surface(surface_name, friction_scale)
     return tyre, stacked_tables([tyre])
 
 
-def steady_torque(quarter: Quarter, tyre: TyreTable, slip: float) -> tuple[float, float]:
+def steady_torque(quarter_car: Quarter, tyre: TyreTable, slip: float) -> tuple[float, float]:
     """Tyre force (N) at a slip, and the brake torque (N m) that holds this slip constant."""
-    force = quarter.mass * GRAVITY * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
-    return force, quarter.steady_torque(slip, force)
+    force = quarter_car.mass * GRAVITY * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
+    return force, quarter_car.steady_torque(slip, force)
 
 
 def constant_torque_stop(
-    quarter: Quarter,
+    quarter_car: Quarter,
     tyre: tuple[TyreTable, Tables],
     torque: float,
     speed: float,
     step: float = PAPER_STEP,
-    after: float = 0.0,
-    turning: float | None = None,
+    extra_time: float = 0.0,
+    rim_turning: float | None = None,
 ) -> QuarterStop:
-    """A run under a constant torque (N m). It lasts ``after`` (s) longer than a stop would take with the smaller of two
-    forces: torque / radius, and locked-wheel friction."""
-    least = min(torque / quarter.radius, quarter.mass * GRAVITY * float(tyre[0].mu_x[0, 0, -1]))
-    steps = math.ceil((1.25 * speed * quarter.mass / least + 0.5 + after) / step) if torque > 0.0 else 1000
-    return braked(quarter, tyre[1], UNIFORM_ROAD, np.full(steps + 1, torque), step, speed, turning)
+    """A run under a constant torque (N m). It lasts ``extra_time`` (s) longer than a stop would take with the smaller
+    of two forces: torque / radius, and locked-wheel friction.
+    """
+    least_force = min(torque / quarter_car.radius, quarter_car.mass * GRAVITY * float(tyre[0].mu_x[0, 0, -1]))
+    steps = (
+        math.ceil((1.25 * speed * quarter_car.mass / least_force + 0.5 + extra_time) / step) if torque > 0.0 else 1000
+    )
+    return braked(quarter_car, tyre[1], UNIFORM_ROAD, np.full(steps + 1, torque), step, speed, rim_turning)

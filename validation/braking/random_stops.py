@@ -24,9 +24,9 @@ class Draw:
         """A random number, uniform between low and high."""
         return float(self.random.uniform(low, high))
 
-    def integer(self, low: int, end: int) -> int:
+    def integer(self, low: int, upper_limit: int) -> int:
         """A random integer from low to below the end."""
-        return int(self.random.integers(low, end))
+        return int(self.random.integers(low, upper_limit))
 
     def choice(self, *choices: Any) -> Any:
         """A random element of ``choices``, all equally likely."""
@@ -37,12 +37,12 @@ class Draw:
         return bool(self.random.random() < share)
 
 
-def random_stop(seed: int, number: int) -> dict[str, Any]:
+def random_stop(seed: int, scene_number: int) -> dict[str, Any]:
     """Table of one random scene; equal arguments give equal scenes."""
-    draw = Draw(np.random.default_rng([seed, number]))
+    draw = Draw(np.random.default_rng([seed, scene_number]))
     kind = draw.choice("straight", "straight", "split", "j_turn", "j_turn", "turn")
     table: dict[str, Any] = {
-        "title": f"stop {number}",
+        "title": f"stop {scene_number}",
         "system": "braking",
         "procedures": {"stop": procedure(draw, kind)},
         "road": road(draw),
@@ -69,19 +69,19 @@ def random_stop(seed: int, number: int) -> dict[str, Any]:
     return table
 
 
-def procedure(generator: Draw, kind: str) -> dict[str, Any]:
+def procedure(generator: Draw, procedure_kind: str) -> dict[str, Any]:
     """A random procedure of the driver, as a table of a scene."""
-    options: dict[str, Any] = {"kind": kind, "speed": generator.within(2.0, 25.0)}
-    if kind == "split":
+    options: dict[str, Any] = {"kind": procedure_kind, "speed": generator.within(2.0, 25.0)}
+    if procedure_kind == "split":
         options["right"] = generator.choice(*SURFACES)
-    if kind == "turn":
+    if procedure_kind == "turn":
         options |= {
             "radius": generator.choice(-1.0, 1.0) * generator.within(60.0, 200.0),
             "speed": generator.within(2.0, 7.0),
         }
-    if kind == "j_turn" and generator.chance(0.5):
+    if procedure_kind == "j_turn" and generator.chance(0.5):
         options["steer"] = generator.within(-0.05, 0.05)
-    elif kind == "j_turn":
+    elif procedure_kind == "j_turn":
         options["steering"] = [[0.0, 0.0], [0.5, generator.within(-0.05, 0.05)], [1.5, generator.within(-0.05, 0.05)]]
     return options
 

@@ -26,26 +26,30 @@ Stretches = Sequence[tuple[float, Callable[[float], float]]]
 
 
 def own_distance(
-    quarter: Quarter, brake: Brake, surface_name: str, controller: Controller, speed: float, substeps: int
+    quarter_car: Quarter, brake: Brake, surface_name: str, controller: Controller, speed: float, substeps: int
 ) -> float:
     """Stopping distance (m) by twinrig's time step."""
     chambers = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY)
-    vehicle = on_tyres(quarter.plane, [table_of_surface(surface_name)], of_wheels(brake), chambers, substeps=substeps)
+    vehicle = on_tyres(
+        quarter_car.plane, [table_of_surface(surface_name)], of_wheels(brake), chambers, substeps=substeps
+    )
     return float(vehicle.run(controller, speed).states[-1, 0, 0])
 
 
 def reference_distance(
-    quarter: Quarter, brake: Brake, surface: str, controller: Controller, speed: float, tolerance: float = 1e-10
+    quarter_car: Quarter, brake: Brake, surface: str, controller: Controller, speed: float, tolerance: float = 1e-10
 ) -> float:
     """Stopping distance (m) by an adaptive reference solver, at a relative tolerance."""
     curve = NAMED_SURFACES[surface][0]
-    return tight_distance(quarter, brake, [(0.0, lambda s: float(curve(np.array(s))))], controller, speed, tolerance)
+    return tight_distance(
+        quarter_car, brake, [(0.0, lambda s: float(curve(np.array(s))))], controller, speed, tolerance
+    )
 
 
 def tight_distance(
-    quarter: Quarter,
+    quarter_car: Quarter,
     brake: Brake,
-    stretches: Stretches,
+    road_stretches: Stretches,
     controller: Controller,
     speed: float,
     tolerance: float = 1e-10,
@@ -53,49 +57,56 @@ def tight_distance(
 ) -> float:
     """Stopping distance (m) by the reference solver on a road with several stretches; method: name of scipy's
     solver."""
-    y, pressure, torque, number = np.array([0.0, speed, speed / quarter.radius]), 0.0, 0.0, 0
+    y, pressure, torque, number = np.array([0.0, speed, speed / quarter_car.radius]), 0.0, 0.0, 0
     while y[1] > LAST_SPEED:
-        given = Sample(number, round(number * SAMPLE * 1e9), y[2:] * quarter.radius, True, SUPPLY, float(y[1]))
-        valve = int(np.asarray(controller.sample(given).valves)[0])
+        sample = Sample(number, round(number * SAMPLE * 1e9), y[2:] * quarter_car.radius, True, SUPPLY, float(y[1]))
+        valve = int(np.asarray(controller.sample(sample).valves)[0])
         law = _law(pressure, torque, valve, brake)
-        y = _sample(y, law, quarter, stretches, {"method": method, "rtol": tolerance, "atol": 1e-2 * tolerance})
+        y = _sample(
+            y, law, quarter_car, road_stretches, {"method": method, "rtol": tolerance, "atol": 1e-2 * tolerance}
+        )
         pressure, torque, number = law(SAMPLE)[0], law(SAMPLE)[1], number + 1
-    slowing = GRAVITY * _friction_at(y[0], stretches)[0](1.0)  # so slow, all is applied and the wheel stands
+    slowing = GRAVITY * _friction_at(y[0], road_stretches)[0](1.0)  # so slow, all is applied and the wheel stands
     return float(y[0] + max(y[1], 0.0) ** 2 / (2.0 * slowing))
 
 
 def _law(pressure: float, torque: float, valve: int, brake: Brake) -> Callable[[float], tuple[float, float]]:
     """Function of the time (s) since the sample's start that gives brake pressure (bar) and torque (N m)."""
 
-    def at(time: float) -> tuple[float, float]:
+    def law_at(time: float) -> tuple[float, float]:
         p = pressure
         if valve == APPLY:
             p = SUPPLY + (pressure - SUPPLY) * np.exp(-time / FILL)
         elif valve == RELEASE:
             p = pressure * np.exp(-time / EMPTY)
-        up, down = brake.rising * max(p - brake.push_out, 0.0), brake.falling * max(p - brake.release, 0.0)
-        return p, max(up, min(down, torque))
+        rising_torque, falling_torque = (
+            brake.rising * max(p - brake.push_out, 0.0),
+            brake.falling * max(p - brake.release, 0.0),
+        )
+        return p, max(rising_torque, min(falling_torque, torque))
 
-    return at
+    return law_at
 
 
-def _friction_at(x: float, stretches: Stretches) -> tuple[Callable[[float], float], float]:
+def _friction_at(x: float, road_stretches: Stretches) -> tuple[Callable[[float], float], float]:
     """Friction law mu(slip) at a position x (m), and the position (m) at which this stretch ends."""
-    number = sum(begin <= x + 1e-10 for begin, _ in stretches[1:])
-    return stretches[number][1], stretches[number + 1][0] if number + 1 < len(stretches) else np.inf
+    number = sum(begin <= x + 1e-10 for begin, _ in road_stretches[1:])
+    return road_stretches[number][1], road_stretches[number + 1][0] if number + 1 < len(road_stretches) else np.inf
 
 
-def _sample(y: np.ndarray, law: Any, quarter: Quarter, stretches: Stretches, options: dict[str, Any]) -> np.ndarray:
+def _sample(
+    y: np.ndarray, law: Any, quarter_car: Quarter, road_stretches: Stretches, options: dict[str, Any]
+) -> np.ndarray:
     """State x, u, w after one sample. A wheel that stops turning stays locked as long as its brake can hold it."""
-    radius, inertia, load, now = quarter.radius, quarter.spin_inertia, quarter.mass * GRAVITY, 0.0
-    mu, end = _friction_at(y[0], stretches)
+    radius, inertia, load, time = quarter_car.radius, quarter_car.spin_inertia, quarter_car.mass * GRAVITY, 0.0
+    mu, end = _friction_at(y[0], road_stretches)
 
     def force(slip: float) -> float:
         return load * mu(slip)
 
     def turning(t: float, q: np.ndarray) -> list[float]:
         f = force(min(max(1.0 - radius * q[2] / max(q[1], 1e-6), 0.0), 1.0))
-        return [q[1], -f / quarter.mass, (radius * f - law(t)[1]) / inertia]
+        return [q[1], -f / quarter_car.mass, (radius * f - law(t)[1]) / inertia]
 
     def stops(t: float, q: np.ndarray) -> float:
         return float(q[2])
@@ -104,23 +115,27 @@ def _sample(y: np.ndarray, law: Any, quarter: Quarter, stretches: Stretches, opt
         return float(law(t)[1] - radius * force(1.0))
 
     def sliding(t: float, q: np.ndarray) -> list[float]:
-        return [q[1], -force(1.0) / quarter.mass, 0.0]
+        return [q[1], -force(1.0) / quarter_car.mass, 0.0]
 
     def passes(t: float, q: np.ndarray) -> float:
         return float(min(end - q[0], 1.0))
 
     for event in (stops, lets_go, passes):
         event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
-    while now < SAMPLE:
-        held = y[2] <= 1e-12 and law(now)[1] > radius * force(1.0)
+    while time < SAMPLE:
+        is_held = y[2] <= 1e-12 and law(time)[1] > radius * force(1.0)
         solution = solve_ivp(
-            sliding if held else turning, (now, SAMPLE), y, **options, events=(lets_go if held else stops, passes)
+            sliding if is_held else turning,
+            (time, SAMPLE),
+            y,
+            **options,
+            events=(lets_go if is_held else stops, passes),
         )
-        now, y = float(solution.t[-1]), solution.y[:, -1].copy()
+        time, y = float(solution.t[-1]), solution.y[:, -1].copy()
         if solution.t_events[1].size:
-            mu, end = _friction_at(y[0], stretches)
+            mu, end = _friction_at(y[0], road_stretches)
         elif solution.status == 1:
             y[2] = 0.0
-            if held:
+            if is_held:
                 y[2] = 1e-9  # free again: the road turns it on
     return y

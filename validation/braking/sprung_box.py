@@ -38,19 +38,19 @@ def box(stiffer: float = 1.0, spin_inertia: float = SPIN) -> Sprung:
         for x, u in (("f", 1.0), ("r", -1.0))
         for y, v in (("l", 1.0), ("r", -1.0))
     }
-    up: Vector = (0.0, 0.0, 1.0)
+    upward: Vector = (0.0, 0.0, 1.0)
     return suspended_vehicle(
         SpatialVehicle(
             "box",
             (
                 Body("chassis", 1000.0, (0.0, 0.0, 0.55), FREEDOMS, INERTIA_TENSOR),
-                *(Body(name, 30.0, at, ("z",)) for name, at in wheels.items()),
+                *(Body(name, 30.0, point, ("z",)) for name, point in wheels.items()),
             ),
             tuple(
-                SpringDamper(name, "chassis", name, at, at, up, SPRING * stiffer, DAMPER * stiffer**0.5)
-                for name, at in wheels.items()
+                SpringDamper(name, "chassis", name, point, point, upward, SPRING * stiffer, DAMPER * stiffer**0.5)
+                for name, point in wheels.items()
             ),
-            tuple(Tyre(name, name, at, "fr".index(name[0]), TYRE * stiffer) for name, at in wheels.items()),
+            tuple(Tyre(name, name, point, "fr".index(name[0]), TYRE * stiffer) for name, point in wheels.items()),
             (HALF, -HALF),
             side_forces=tuple(
                 SideForce(name, "chassis", (x, y, 0.0), "chassis", 5e4) for name, (x, y, _) in wheels.items()
@@ -81,9 +81,9 @@ def pitch_and_transfer(deceleration: float) -> tuple[float, float]:
 def constant_friction(mu: float) -> TyreTable:
     """Tyre table in which a sliding wheel has the same friction in every direction, and a rolling wheel has none."""
     slips, angles = np.array([0.0, 0.01, 1.0]), np.array([0.0, 0.01, np.pi / 2.0])
-    ahead, aside = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.01, 1.0])
-    x = mu * ahead[:, None, None] * np.array([0.0, 1.0, 1.0])
-    return TyreTable(angles, slips, np.array([1e3]), x, np.ones((3, 3)), mu * aside[:, None])
+    share_ahead, share_aside = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.01, 1.0])
+    x = mu * share_ahead[:, None, None] * np.array([0.0, 1.0, 1.0])
+    return TyreTable(angles, slips, np.array([1e3]), x, np.ones((3, 3)), mu * share_aside[:, None])
 
 
 def steady_torques(*torques: float) -> Pressures:
@@ -106,12 +106,12 @@ def braked_vehicle(
     steer : rad, of the front wheels; gradient : N m/bar. A controller of valves has SUPPLY.
     """
     brake, plane = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), sprung.in_plane()
-    none = np.zeros(plane.wheels)
+    zeros = np.zeros(plane.wheels)
     return on_tyres(
         plane,
         [tyre],
         of_wheels(*[brake] * plane.wheels),
-        Chambers(none + 0.03, none + 0.02, SUPPLY),
+        Chambers(zeros + 0.03, zeros + 0.02, SUPPLY),
         steer=np.where(np.arange(plane.wheels) < 2, steer, 0.0),
         substeps=substeps,
         sample=step,

@@ -58,11 +58,11 @@ def pulled_by_levers() -> PulledCaravan:
     car, behind = _mass(vehicle, None), _mass(vehicle, name)
     hitch, axle = np.array(vehicle.body(hitch_of(name)).position), vehicle.axles[2]
     rolling = sum(SPIN / tyre.point[2] ** 2 for tyre in vehicle.tyres if tyre.axle < 2)
-    whole = car[0] + behind[0] + rolling
-    back, above = hitch[0] - behind[1], behind[2] - hitch[2]
-    arm = hitch[0] - axle + CARAVAN_FRICTION * (hitch[2] + above * behind[0] / whole)
+    total_mass = car[0] + behind[0] + rolling
+    back, height_of_load = hitch[0] - behind[1], behind[2] - hitch[2]
+    arm = hitch[0] - axle + CARAVAN_FRICTION * (hitch[2] + height_of_load * behind[0] / total_mass)
     load = back * behind[0] * GRAVITY / arm
-    slowing = CARAVAN_FRICTION * load / whole
+    slowing = CARAVAN_FRICTION * load / total_mass
     return PulledCaravan(slowing, load, (car[0] + rolling) * slowing)
 
 
@@ -85,8 +85,8 @@ def pulled_caravan(change: Callable[[Handling], None] | None = None, duration: f
         steady_torques(0.0, 0.0, 0.0, 0.0, LOCKING_TORQUE, LOCKING_TORQUE), 8.0, duration
     )
     late = slice(-int(SETTLED_SHARE * len(path.times)), None)
-    times, speeds = path.times[late], path.states[late, 1, 0]
-    slowing = float(speeds[0] - speeds[-1]) / float(times[-1] - times[0])
+    late_times, speeds = path.times[late], path.states[late, 1, 0]
+    slowing = float(speeds[0] - speeds[-1]) / float(late_times[-1] - late_times[0])
     load = float(path.reports.load[late, 4:].sum(axis=1).mean())
     return PulledCaravan(slowing, load, _ball_force(vehicle, path, late, slowing))
 

@@ -31,11 +31,11 @@ def braked_turn(
     steer: float,
     torques: tuple[float, float],
     speed: float,
-    until: float,
+    end_speed: float,
     length: float = 0.0,
 ) -> TurnEnd:
-    """Final position of a braked turn from steady rolling at ``speed`` down to ``until`` (m/s). The front wheels are
-    steered by an angle (rad); torques: brake torques of the two axles (N m).
+    """Final position of a braked turn from steady rolling at ``speed`` down to ``end_speed`` (m/s). The front wheels
+    are steered by an angle (rad); torques: brake torques of the two axles (N m).
 
     length : over which tyres relax (m); 0 for none. Above 1 m/s only they have no damper of their own. The tyre's
     friction must not depend on the load. Raises RunFailed if the vehicle does not slow down in 200 s.
@@ -45,7 +45,7 @@ def braked_turn(
     start = np.concatenate(([0.0, 0.0, 0.0, speed, 0.0, 0.0], speed / equations.radius, lags))
 
     def slow(_: float, state: np.ndarray) -> float:
-        return float(np.hypot(state[3], state[4]) - until)
+        return float(np.hypot(state[3], state[4]) - end_speed)
 
     slow.terminal = True  # type: ignore[attr-defined]
     solution = solve_ivp(
@@ -77,20 +77,22 @@ class _Equations:
     def __call__(self, _: float, state: np.ndarray) -> np.ndarray:
         psi, u, v, r, turning = state[2], state[3], state[4], state[5], state[6:10]
         vx, vy = u - r * self.y, v + r * self.x
-        along, aside = self.c * vx + self.s * vy, self.c * vy - self.s * vx
-        slope = state[10:] if self.length else aside / along
-        mu_x, mu_y = self._friction(1.0 - self.radius * turning / along, np.arctan(np.abs(slope)))
+        speed_along, speed_aside = self.c * vx + self.s * vy, self.c * vy - self.s * vx
+        slope = state[10:] if self.length else speed_aside / speed_along
+        mu_x, mu_y = self._friction(1.0 - self.radius * turning / speed_along, np.arctan(np.abs(slope)))
         mu_y = -np.sign(slope) * mu_y
-        ahead, left = -self.c * mu_x - self.s * mu_y, -self.s * mu_x + self.c * mu_y
+        force_ahead, left = -self.c * mu_x - self.s * mu_y, -self.s * mu_x + self.c * mu_y
         m = self.vehicle.mass
-        system = np.array([[m - ahead @ self.by_x, -ahead @ self.by_y], [-left @ self.by_x, m - left @ self.by_y]])
-        ax, ay = np.linalg.solve(system, [ahead @ self.rest, left @ self.rest])
+        system = np.array(
+            [[m - force_ahead @ self.by_x, -force_ahead @ self.by_y], [-left @ self.by_x, m - left @ self.by_y]]
+        )
+        ax, ay = np.linalg.solve(system, [force_ahead @ self.rest, left @ self.rest])
         loads = self.rest + self.by_x * ax + self.by_y * ay
-        yaw = (self.x * left - self.y * ahead) @ loads / self.vehicle.yaw_inertia
+        yaw = (self.x * left - self.y * force_ahead) @ loads / self.vehicle.yaw_inertia
         wheels = (self.radius * mu_x * loads - self.torques) / self.inertia
-        moved = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r, ax + v * r, ay - u * r, yaw]
-        lags = (aside - np.abs(along) * slope) / self.length if self.length else np.zeros(0)
-        return np.concatenate((moved, wheels, lags))
+        rates = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r, ax + v * r, ay - u * r, yaw]
+        lags = (speed_aside - np.abs(speed_along) * slope) / self.length if self.length else np.zeros(0)
+        return np.concatenate((rates, wheels, lags))
 
     def _friction(self, slips: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Longitudinal friction mu_x with the sign of the slip, and lateral friction mu_y."""

@@ -32,7 +32,7 @@ TITLE = "What is not named is not computed"
 SYSTEM: System = "effects"
 ENGINES = ("reference", "exudyn", "mujoco")
 STEP = 1e-3
-START = {"pitch": 0.1, "z3": -0.1}
+START_MOTION = {"pitch": 0.1, "z3": -0.1}
 """m, rad: the vehicle moves, so that nothing is compared at rest."""
 
 FORCES = {"wheel_forces": {"file": "forces.csv", "interpolation": "held"}}
@@ -50,7 +50,7 @@ def added_to(effect: str) -> dict[str, Any]:
 
 def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = False) -> Scene:
     """Scene: the asymmetric vehicle with some effects, released from a tilted position."""
-    start = {} if guided else START
+    start = {} if guided else START_MOTION
     return build_scene(
         {
             "title": TITLE,
@@ -112,11 +112,11 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     those of the vehicle in turn and of other systems every third, and one process that looks for what is imported.
     """
     with tempfile.TemporaryDirectory() as name:
-        place = Path(name)
-        write_files(place)
-        rows = [*_imports(), *(row for engine in ENGINES for row in _absence(engine, place))]
+        files_folder = Path(name)
+        write_files(files_folder)
+        rows = [*_imports(), *(row for engine in ENGINES for row in _absence(engine, files_folder))]
         rows += [
-            _control(effect, place, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
+            _control(effect, files_folder, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
             for i, effect in enumerate(EFFECTS)
         ]
     return rows + ride.rows(quick) + wheelset.rows() + machinery.rows() + of_systems.rows(quick), {}
@@ -124,7 +124,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def _imports() -> list[Row]:
     """Modules imported and kernels compiled in a fresh process that ran a bare scene in all engines."""
-    probed = probe({"title": TITLE, "run": {"duration": 20 * STEP, "step": STEP}, "start": START})
+    probed = probe({"title": TITLE, "run": {"duration": 20 * STEP, "step": STEP}, "start": START_MOTION})
     foreign = [name for name in probed["modules"] if belongs_to_effects(name)]
     why = "a fresh process ran a scene without effects in all engines; counted in its list of modules"
     kernels = len(probed["marches"]) + len(probed["derivatives"])

@@ -26,7 +26,7 @@ TITLE = "Joints and springs of another multibody code"
 SYSTEM: System = "rolling-vehicle"
 FOLDER = "adams_joints"
 FAMILIES = ("Revolute", "Prismatic", "Cylindrical", "Spherical", "Universal", "Distance", "RotSpring", "TranSpring")
-QUICK = ("Revolute", "Distance")
+QUICK_FAMILIES = ("Revolute", "Distance")
 MODELS = {"TranSpring": "TransSpring"}
 """Families whose model file has another name."""
 ENGINES = ("exudyn", "mujoco")
@@ -42,7 +42,7 @@ TWINS = 1e-6
 """Of engines and reference, m and share: steps of 5 ms leave 3e-7 of both."""
 LOSES = 1e-4
 """Share of the largest kinetic energy that a file's own motion may lose without friction."""
-WINDOW = 10
+WINDOW_ROWS = 10
 """Rows of a file, a tenth of a second, after which a march from its own state is compared."""
 SHARED_FILES = {"Spherical": 0.0, "Universal": 90.0}
 """Families whose file is of the pendulum of Revolute's, and by how many degrees about z it is turned from that."""
@@ -55,7 +55,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     data = data_folder()
     rows: list[Row] = []
     saved: dict[str, Any] = {}
-    for family in QUICK if quick else FAMILIES:
+    for family in QUICK_FAMILIES if quick else FAMILIES:
         model = None if data is None else data / FOLDER / f"{MODELS.get(family, family)}_Case01.adm"
         if model is None or not model.is_file():
             reason = "TWINRIG_DATA names no folder with the other code's models"
@@ -75,8 +75,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, saved
 
 
-def _id(family: str, what: str) -> str:
-    return f"adams_joints.{family.lower()}.{what}"
+def _id(family: str, row_name: str) -> str:
+    return f"adams_joints.{family.lower()}.{row_name}"
 
 
 def _fitting(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[str, float]]:
@@ -88,13 +88,13 @@ def _fitting(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[
     moved = mechanism if starts_with_mechanism(mechanism, output) else mechanism.moved(shift)
     (spring,) = moved.springs
     travel, rate, law = _sprung(moved, output)
-    told = spring.stiffness * (travel - spring.free_length) + spring.damping * rate
-    if moved is mechanism and np.abs(told - law).max() <= FORCE_BOUND * np.abs(law).max():
+    law_force = spring.stiffness * (travel - spring.free_length) + spring.damping * rate
+    if moved is mechanism and np.abs(law_force - law).max() <= FORCE_BOUND * np.abs(law).max():
         return mechanism, {}
     early = output.times <= READ_OFF_SECONDS
     parts = np.column_stack([travel, rate, np.ones(len(travel))])[early]
-    stiffness, damping, held = np.linalg.lstsq(parts, law[early], rcond=None)[0].tolist()
-    constants = {"stiffness": stiffness, "damping": damping, "rest": -held / stiffness}
+    stiffness, damping, preload = np.linalg.lstsq(parts, law[early], rcond=None)[0].tolist()
+    constants = {"stiffness": stiffness, "damping": damping, "rest": -preload / stiffness}
     return moved.with_spring(stiffness=stiffness, damping=damping, free_length=constants["rest"]), constants
 
 
@@ -155,11 +155,11 @@ def own_model_rows(family: str, mechanism: Mechanism, folder: Path, duration: fl
     accelerations, paths = build_differences(mechanism, folder, round(duration / step), step)
     motion, _ = ConstrainedBody(mechanism).run(duration, step, every)
     quantity = f"{family} in MJCF: accelerations of all builds from the file as MuJoCo parsed it"
-    said = "rounding; the bound asked for"
+    tolerance_reason = "rounding; the bound asked for"
     alike = Observed(_id(family, "mjcf.accelerations"), SYSTEM, quantity, accelerations, "of the largest")
-    rows: list[Row] = [alike.at_most(EQUAL_ACCELERATION_SHARE, said, "native")]
-    for name, places in paths.items():
-        off = float(np.abs(places[::every] - motion.place).max())
+    rows: list[Row] = [alike.at_most(EQUAL_ACCELERATION_SHARE, tolerance_reason, "native")]
+    for name, positions in paths.items():
+        off = float(np.abs(positions[::every] - motion.place).max())
         quantity = f"{family} in MJCF: position of the centre from the reference with constraints, {name}"
         observed = Observed(_id(family, f"mjcf.position.{name}"), SYSTEM, quantity, off, "m")
         rows.append(observed.at_most(TWINS, "no code in common but Runge-Kutta's steps of 1 ms", "native"))
@@ -175,11 +175,14 @@ def _largest_reaction(mechanism: Mechanism, reaction: Reaction) -> tuple[float, 
 
 
 def _reaction_difference(
-    mechanism: Mechanism, one: Reaction, two: Reaction, rounding: tuple[Any, Any] = (0.0, 0.0)
+    mechanism: Mechanism, first_reaction: Reaction, second_reaction: Reaction, rounding: tuple[Any, Any] = (0.0, 0.0)
 ) -> float:
     """Largest difference of two reactions beyond rounding, divided by the sizes of ``_largest_reaction``."""
-    force, moment = _largest_reaction(mechanism, two)
-    off = np.abs(one.force - two.force) - rounding[0], np.abs(one.moment - two.moment) - rounding[1]
+    force, moment = _largest_reaction(mechanism, second_reaction)
+    off = (
+        np.abs(first_reaction.force - second_reaction.force) - rounding[0],
+        np.abs(first_reaction.moment - second_reaction.moment) - rounding[1],
+    )
     return max(0.0, float(off[0].max()) / force, float(off[1].max()) / moment)
 
 
@@ -196,11 +199,11 @@ def _against_file(
     family: str, name: str, mechanism: Mechanism, output: OutputFile, path: BodyMotion, pushed: Reaction
 ) -> list[Row]:
     m = len(path.times)
-    place = np.abs(path.place - output.columns["Pos"][:m]) - output.rounding("Pos")[:m]
+    position_error = np.abs(path.place - output.columns["Pos"][:m]) - output.rounding("Pos")[:m]
     digits = output.rounding("Rforce")[:m], output.rounding("Rtorque")[:m]
     theirs = Reaction(output.columns["Rforce"][:m], output.columns["Rtorque"][:m])
     seen = (
-        ("position", "position of the centre", max(0.0, float(place.max())), "m", PLACE_BOUND),
+        ("position", "position of the centre", max(0.0, float(position_error.max())), "m", PLACE_BOUND),
         (
             "reaction",
             "reaction by the largest",
@@ -229,14 +232,18 @@ def _windows(family: str, mechanism: Mechanism, output: OutputFile, duration: fl
     What energy the file loses meanwhile, dE, changes its speed by dE / (m v), and its place by that for this time.
     """
     body, theirs = ConstrainedBody(mechanism), output.motion(mechanism)
-    starts = np.arange(0, round(duration / STEP / STEPS_PER_ROW) - WINDOW, WINDOW)
-    ends = [body.marched(body.at_motion(theirs, k), WINDOW * STEPS_PER_ROW, STEP)[:3] for k in starts.tolist()]
-    digits = output.rounding("Pos")[starts] + output.rounding("Pos")[starts + WINDOW]
-    off = (np.abs(np.array(ends) - theirs.place[starts + WINDOW]) - digits).max(axis=1)
-    _, whole = output.energies(mechanism)
+    starts = np.arange(0, round(duration / STEP / STEPS_PER_ROW) - WINDOW_ROWS, WINDOW_ROWS)
+    ends = [body.marched(body.at_motion(theirs, k), WINDOW_ROWS * STEPS_PER_ROW, STEP)[:3] for k in starts.tolist()]
+    digits = output.rounding("Pos")[starts] + output.rounding("Pos")[starts + WINDOW_ROWS]
+    off = (np.abs(np.array(ends) - theirs.place[starts + WINDOW_ROWS]) - digits).max(axis=1)
+    _, total_energy = output.energies(mechanism)
     speed = np.linalg.norm(theirs.velocity, axis=1)
-    fastest = np.maximum(speed[starts], speed[starts + WINDOW])
-    lost = np.abs(whole[starts + WINDOW] - whole[starts]) / (mechanism.mass * fastest) * (WINDOW * STEPS_PER_ROW * STEP)
+    fastest = np.maximum(speed[starts], speed[starts + WINDOW_ROWS])
+    lost = (
+        np.abs(total_energy[starts + WINDOW_ROWS] - total_energy[starts])
+        / (mechanism.mass * fastest)
+        * (WINDOW_ROWS * STEPS_PER_ROW * STEP)
+    )
     why = "from state to state of the file, less its digits and what its loss of energy explains; the bound asked for"
     quantity = f"{family}: position 0.1 s after each of the file's own states, reference"
     left = max(0.0, float((off - lost).max()))
@@ -251,10 +258,10 @@ def _same_pendulum(family: str, mechanism: Mechanism, output: OutputFile, revolu
     """
     hinge, back = read_output(revolute), Rotation.from_euler("z", -SHARED_FILES[family], degrees=True)
     motion, reaction = ConstrainedBody(mechanism).run(float(hinge.times[-1]), STEP, STEPS_PER_ROW)
-    place, force = hinge.columns["Pos"], hinge.columns["Rforce"]
-    off = float((np.abs(back.apply(motion.place) - place) - hinge.rounding("Pos")).max())
+    position_error, force = hinge.columns["Pos"], hinge.columns["Rforce"]
+    off = float((np.abs(back.apply(motion.place) - position_error) - hinge.rounding("Pos")).max())
     pushed = float((np.abs(back.apply(reaction.force) - force) - hinge.rounding("Rforce")).max())
-    files = np.abs(back.apply(output.columns["Pos"]) - place).max(axis=1)
+    files = np.abs(back.apply(output.columns["Pos"]) - position_error).max(axis=1)
     since = output.times[np.argmax(files > PLACE_BOUND)]
     why = "the same pendulum on a hinge by the other code, in a file that keeps its energy; the bound asked for"
     hinged = f"{family}: %s beside the other code's file of the same pendulum on a hinge, reference"
@@ -283,19 +290,19 @@ def _twin(
     family: str, name: str, mechanism: Mechanism, run: tuple[BodyMotion, Reaction], plain: tuple[BodyMotion, Reaction]
 ) -> Row:
     """Rows: a mechanism built of joints in an engine, compared with the reference's constraint equations."""
-    place = float(np.abs(run[0].place - plain[0].place).max())
+    position_error = float(np.abs(run[0].place - plain[0].place).max())
     turned = float(np.abs(run[0].turned - plain[0].turned).max())
-    off = max(place, turned, _reaction_difference(mechanism, run[1], plain[1]))
+    off = max(position_error, turned, _reaction_difference(mechanism, run[1], plain[1]))
     why = "joint coordinates against constraints with multipliers, no code in common but Runge-Kutta's steps of 5 ms"
     quantity = f"{family}: {name} from the reference: position, rotation, reaction by the largest"
     return Observed(_id(family, f"twin.{name}"), SYSTEM, quantity, off, "m, -").at_most(TWINS, why, "native")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """What the files themselves hold."""
     rows = tuple(
-        (family, str(kept["digits"]), "-" if kept["lost"] is None else f"{kept['lost']:.1e}")
-        for family, kept in data.items()
+        (family, str(file_facts["digits"]), "-" if file_facts["lost"] is None else f"{file_facts['lost']:.1e}")
+        for family, file_facts in case_data.items()
     )
     note = "Where nothing damps, a motion that loses energy carries an integration error of the code that wrote it."
     heads = ("family", "digits of the file", "energy lost by the largest kinetic one")

@@ -42,31 +42,31 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return [*rows, *measured_rows], {"gaps": {e: g.tolist() for e, g in gaps.items()}, "measured": data}
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Eigenvalues on stiffening tyres, and the measured bicycle where its recordings were there."""
-    gaps = data["gaps"][ENGINES[0]]
-    told = [
+    gaps = case_data["gaps"][ENGINES[0]]
+    rows_of_tables = [
         Table(
             "Tyres that stiffen tend to ideal rolling",
             f"Largest distance (1/s) of the benchmark's eigenvalues at {SPEED:g} m/s from those of ideal rolling.",
             ("stiffness", *ENGINES, "order"),
             tuple(
-                (f"{s:g}", *(f"{data['gaps'][e][i]:.3e}" for e in ENGINES), "" if i == 0 else _order(gaps, i))
+                (f"{s:g}", *(f"{case_data['gaps'][e][i]:.3e}" for e in ENGINES), "" if i == 0 else _order(gaps, i))
                 for i, s in enumerate(STIFFNESS)
             ),
         )
     ]
-    if data["measured"]:
+    if case_data["measured"]:
         headings = ("speed", "damping", "nothing fitted", "frequency", "nothing fitted", "chosen without this speed")
-        told.append(
+        rows_of_tables.append(
             Table(
                 "Weave of a measured bicycle",
                 "Damping (1/s) and frequency (rad/s) with the windows' scatter; last, deviations in standard ones.",
                 headings,
-                tuple(map(tuple, data["measured"])),
+                tuple(map(tuple, case_data["measured"])),
             )
         )
-    return told
+    return rows_of_tables
 
 
 def _order(gaps: list[float], i: int) -> str:
@@ -79,15 +79,15 @@ def _published_rows(bicycle: Whipple) -> list[Row]:
     off = max(float(np.abs(here - there).max()) for here, there in matrices)
     values = max(float(np.abs(bicycle.eigenvalues(v) - there).max()) for v, there in PUBLISHED_EIGENVALUES.items())
     critical = max(abs((bicycle.weave_speed or 0.0) - WEAVE_SPEED), abs((bicycle.capsize_speed or 0.0) - CAPSIZE_SPEED))
-    given = (
+    published_values = (
         ("matrices", "M, C1, g K0, K2 of the benchmark bicycle: largest difference", off, "kg m^2 and so on"),
         ("eigenvalues", "eigenvalues at 0 to 10 m/s: largest difference", values, "1/s"),
         ("speeds", "weave and capsize speed: larger difference", critical, "m/s"),
     )
     why = "printed to 14 digits or more; rounding of the largest entries is 1e-13"
     return [
-        Observed(f"bicycle.published.{key}", SYSTEM, said, value, unit).at_most(1e-12, why, "published")
-        for key, said, value, unit in given
+        Observed(f"bicycle.published.{key}", SYSTEM, quantity, value, unit).at_most(1e-12, why, "published")
+        for key, quantity, value, unit in published_values
     ]
 
 
@@ -95,8 +95,10 @@ def _fault_rows(bicycle: Whipple) -> list[Row]:
     """Row: a trail that is 0.1 % longer must be told apart from the published bicycle."""
     wrong = bicycle.changed(trail=FAULT * bicycle.trail)
     caught = float(np.abs(wrong.eigenvalues(SPEED) - PUBLISHED_EIGENVALUES[SPEED]).max())
-    said = "trail a thousandth longer: largest change of an eigenvalue by what the published figures allow (1e-12 1/s)"
-    seen = Observed("bicycle.published.fault", SYSTEM, said, min(caught / 1e-12, 1e6), "")
+    quantity = (
+        "trail a thousandth longer: largest change of an eigenvalue by what the published figures allow (1e-12 1/s)"
+    )
+    seen = Observed("bicycle.published.fault", SYSTEM, quantity, min(caught / 1e-12, 1e6), "")
     return [seen.within(1e6, 1e-3, "a planted fault must be seen by far; counted up to a million", "closed form")]
 
 
@@ -145,12 +147,13 @@ def _energy_rows(duration: float) -> list[Row]:
             gap = run(scene, engine).detail.unaccounted()
         except RunFailed:
             gap = float("nan")
-        kept = "energy" if engine == "reference" else "energy less work of the tyres"
+        kept_quantity = "energy" if engine == "reference" else "energy less work of the tyres"
         rows.append(
             Observed(
                 f"bicycle.energy.{engine}",
                 SYSTEM,
-                f"{engine}, from 4.6 m/s upright with 0.5 rad/s of lean rate, {duration:g} s: largest change of {kept}",
+                f"{engine}, from 4.6 m/s upright with 0.5 rad/s of lean rate, {duration:g} s: largest change of "
+                f"{kept_quantity}",
                 gap,
                 "",
             ).at_most(1e-8, "relative to the energy at the start; no integrator here may lose more", "none")
@@ -231,18 +234,18 @@ def _predicted_rows(bicycle: Whipple, choice: Choice, observation: Observation) 
 
 def _choice_rows(choice: Choice) -> list[Row]:
     """Rows: suspects that the data call for at a significance level of 5 %, and what the experimenters suspected."""
-    told = ", ".join(
+    parameters_text = ", ".join(
         f"{name} {value:.3g}" for name, value in zip(choice.best_subset.names, choice.best_subset.values, strict=True)
     )
     return [
         Observed(
             f"bicycle.suspects.{key}",
             SYSTEM,
-            f"chance of leaving {said} out; best subset: {told}",
+            f"chance of leaving {suspect} out; best subset: {parameters_text}",
             choice.calls[name][1],
             "",
         ).at_most(0.05, "F test against the fullest subset that can be told apart", "measured")
-        for key, said, name in (
+        for key, suspect, name in (
             ("friction", "friction of the steering", "friction of either kind"),
             ("speed_gain", "the speed sensor's gain", "speed_gain"),
             ("speed_bias", "the speed sensor's bias", "speed_bias"),

@@ -26,7 +26,7 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row
 TITLE = "Brakes and controllers of anti-lock braking"
 SYSTEM: System = "anti-lock"
 SEED = 22
-LINE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
+LINEAR_BRAKE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
 WIDE_BRAKE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)
 PHASES = {
     "deep": FivePhase(1, e1=40.0, e2=60.0, e3=40.0, e4=10.0, e5=150.0, falling=60.0, fast=20.0, slow=15.0),
@@ -55,12 +55,15 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return [*rows, *_stop_rows(stops), *_substep_rows(), *_ensemble_rows()], {"stops": stops}
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Stops of the truck."""
-    if "stops" not in data:
+    if "stops" not in case_data:
         return []
     shown = (("distance", 2), ("time", 2), ("used", 3), ("locked", 0))
-    rows = [(name, *(f"{each[key]:.{digits}f}" for key, digits in shown)) for name, each in data["stops"].items()]
+    rows = [
+        (name, *(f"{stop_figures[key]:.{digits}f}" for key, digits in shown))
+        for name, stop_figures in case_data["stops"].items()
+    ]
     return [
         Table(
             "Straight stops by controller",
@@ -146,7 +149,9 @@ def _supply_row() -> Row:
 
 
 def _frozen(inertia: float = FRONT_WHEEL.spin_inertia) -> WheelAtSpeed:
-    return WheelAtSpeed(11.11, FRONT_WHEEL.mass * GRAVITY, FRONT_WHEEL.radius, inertia, LINE, table_of_surface("dry"))
+    return WheelAtSpeed(
+        11.11, FRONT_WHEEL.mass * GRAVITY, FRONT_WHEEL.radius, inertia, LINEAR_BRAKE, table_of_surface("dry")
+    )
 
 
 def _cycle_rows(name: str) -> list[Row]:
@@ -227,14 +232,14 @@ def _stop_rows(stops: dict[str, dict[str, float]]) -> list[Row]:
             "braking_controllers.locks",
             SYSTEM,
             f"longest time for which a wheel locks above 15 km/h in {len(stops)} stops of four controllers",
-            max(each["locked"] for each in stops.values()),
+            max(stop_figures["locked"] for stop_figures in stops.values()),
             "ms",
         ).at_most(1e3 * BRIEF, "ice, snow and dry at 11.11 and 22.2 m/s; only briefly", "published"),
         behaviour_row(
             "braking_controllers.stands",
             SYSTEM,
             f"how {len(stops)} stops of four controllers end",
-            "at rest" if all(each["stands"] for each in stops.values()) else "moving",
+            "at rest" if all(stop_figures["stands"] for stop_figures in stops.values()) else "moving",
             "at rest",
             "below 1.5 m/s all brakes are applied",
         ),
@@ -260,7 +265,7 @@ def _substep_rows() -> list[Row]:
     return rows
 
 
-def _ensemble_rows(runs: int = 24, fine: int = 32) -> list[Row]:
+def _ensemble_rows(runs: int = 24, fine_substeps: int = 32) -> list[Row]:
     """Rows: two ensembles of stops on ice with different substeps, from slightly varied speeds, because single stops on
     ice do not repeat."""
     random = np.random.default_rng(SEED)
@@ -272,7 +277,7 @@ def _ensemble_rows(runs: int = 24, fine: int = 32) -> list[Row]:
                 for speed in some
             ]
         )
-        for some, n in zip(speeds, (4, fine), strict=True)
+        for some, n in zip(speeds, (4, fine_substeps), strict=True)
     ]
     level = float(ttest_ind(*distances, equal_var=False).pvalue)
     return [
@@ -280,7 +285,7 @@ def _ensemble_rows(runs: int = 24, fine: int = 32) -> list[Row]:
             "braking_controllers.ice_mean",
             SYSTEM,
             f"relative difference of the mean stopping distance on ice of {runs} runs with 4 substeps "
-            f"from {runs} others with {fine}",
+            f"from {runs} others with {fine_substeps}",
             float(distances[0].mean() / distances[1].mean() - 1.0),
             "",
         ).at_most(1e-2, "speeds drawn within 0.2 %; on ice single runs do not repeat", "shared kernel"),

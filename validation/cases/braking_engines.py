@@ -73,9 +73,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {name: list(where) for name, where in turns.items()}
 
 
-def turn(until: float, steer: float = STEER, step_function: Callable[..., Any] = advance) -> TurnEnd:
-    """A braked turn of the truck on ice from SPEED down to ``until`` (m/s). Its end is interpolated linearly within the
-    last step."""
+def turn(end_speed: float, steer: float = STEER, step_function: Callable[..., Any] = advance) -> TurnEnd:
+    """A braked turn of the truck on ice from SPEED down to ``end_speed`` (m/s). Its end is interpolated linearly within
+    the last step.
+    """
     truck = RollingTruck(
         on_road(PAPER_PLANE, stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering),
         SPEED,
@@ -83,11 +84,11 @@ def turn(until: float, steer: float = STEER, step_function: Callable[..., Any] =
         step_function=step_function,
     )
     while True:
-        passed, place, fast = truck.time, truck.state[0].copy(), truck.speed
+        passed, position, fast = truck.time, truck.state[0].copy(), truck.speed
         status, used = truck.on(np.repeat(TORQUES, 2), STEP)
-        if status != FINE or truck.speed <= until:
-            share = (fast - until) / (fast - truck.speed)
-            x, y, heading = (float(value) for value in place + share * (truck.state[0] - place))
+        if status != FINE or truck.speed <= end_speed:
+            share = (fast - end_speed) / (fast - truck.speed)
+            x, y, heading = (float(value) for value in position + share * (truck.state[0] - position))
             return TurnEnd(x, y, heading, float(passed + share * used))
 
 
@@ -124,8 +125,8 @@ def _load_rows() -> list[Row]:
     ]
 
 
-def _symmetry_rows(until: float, steered: TurnEnd) -> list[Row]:
-    mirrored, straight = turn(until, -STEER), turn(until, 0.0)
+def _symmetry_rows(end_speed: float, steered: TurnEnd) -> list[Row]:
+    mirrored, straight = turn(end_speed, -STEER), turn(end_speed, 0.0)
     apart = max(abs(mirrored.x - steered.x), abs(mirrored.y + steered.y), abs(mirrored.heading + steered.heading))
     return [
         Observed(
@@ -212,9 +213,9 @@ def circle(radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: f
     return abs(float(np.hypot(*at) / front - 1.0)), abs(float(np.hypot(*behind) / rear - 1.0))
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Ends of the turn."""
-    rows = tuple((name, *(f"{value:.6f}" for value in where)) for name, where in data.items())
+    rows = tuple((name, *(f"{value:.6f}" for value in where)) for name, where in case_data.items())
     return [
         Table(
             "End of the turn",

@@ -32,7 +32,7 @@ STOPS = {True: 3, False: 200}
 """Random stops, by ``quick``."""
 LIMITS = ("rolls over", "pitches over", "jackknifes", "turns over")
 """Ends by a limit of the vehicle, which a legal scene may meet."""
-LINE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
+LINEAR_BRAKE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
 ROLLING = FivePhase(1, e1=21.21, e2=26.62, e3=20.73, e4=2.07, e5=50.4, falling=74.51, fast=42.29, slow=6.42)
 """Phases that a fast first application leaves with a release that does not end by the wheel's acceleration."""
 
@@ -43,13 +43,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     ends = [ending_text(number) for number in range(STOPS[quick])]
     rows = [_stops_row(ends), _jackknife_row(), *_roll_rows(), _slow_apply_row(), _cycle_row()]
     rows += [_yaw_row(speed) for speed in ((1.0,) if quick else (0.5, 1.0, 3.0))]
-    return rows + [_refused_row(*each) for each in REFUSED.items()], {"ends": ends}
+    return rows + [_refused_row(*refusal_arguments) for refusal_arguments in REFUSED.items()], {"ends": ends}
 
 
-def ending_text(number: int) -> str:
+def ending_text(scene_number: int) -> str:
     """Text on how a random stop ended; "" if the vehicle came to rest."""
     try:
-        path = run(build(random_stop(SEED, number))).detail
+        path = run(build(random_stop(SEED, scene_number))).detail
     except RunFailed as error:
         return error.reason
     return "" if path.ended_at_rest else "does not stand"
@@ -97,14 +97,14 @@ def _jackknife_row() -> Row:
             trailer=CHOSEN_TRAILER.model_copy(update={"fold": 1.0}).model_dump(),
         )
     )
-    kept = None if end is None or end.partial is None else end.partial.detail.states[:, 0, 2:]
-    angle = 0.0 if kept is None else float(np.abs(np.diff(kept, axis=1)).max())
-    told = "" if end is None or "jackknifes" not in end.reason else end.reason
+    headings = None if end is None or end.partial is None else end.partial.detail.states[:, 0, 2:]
+    angle = 0.0 if headings is None else float(np.abs(np.diff(headings, axis=1)).max())
+    angle_text = "" if end is None or "jackknifes" not in end.reason else end.reason
     return Observed(
         "braking_limits.jackknife",
         SYSTEM,
-        f"largest recorded hinge angle of a train that jackknifes, limit 1 rad: {told}",
-        angle if told else math.nan,
+        f"largest recorded hinge angle of a train that jackknifes, limit 1 rad: {angle_text}",
+        angle if angle_text else math.nan,
         "rad",
     ).within(1.0, 0.02, "a sample before the limit", "closed form")
 
@@ -150,7 +150,7 @@ def _slow_apply_row() -> Row:
     chambers = Chambers(np.full(1, 0.15), np.full(1, 0.1), 8.0, slow=np.full(1, 1.2))
     air, torques = resting_chambers(chambers, 0.01), np.empty((5, 1))
     for _ in range(50):
-        by_valves(np.full(1, SLOW), 0.01, air, chambers, of_wheels(LINE), torques)
+        by_valves(np.full(1, SLOW), 0.01, air, chambers, of_wheels(LINEAR_BRAKE), torques)
     return Observed(
         "braking_limits.slow_apply",
         SYSTEM,
@@ -163,7 +163,7 @@ def _slow_apply_row() -> Row:
 def _cycle_row() -> Row:
     """Row: limit cycle of the controller after a fast first application to a rolling wheel, compared with the exact
     cycle after a slow one."""
-    frozen = WheelAtSpeed(20.0, 16900.0, 0.5, 13.35, LINE, table_of_surface("snow"))
+    frozen = WheelAtSpeed(20.0, 16900.0, 0.5, 13.35, LINEAR_BRAKE, table_of_surface("snow"))
     period, _ = exact_cycle(frozen, ROLLING, ROLLING.slow)
     reached = limit_cycle(frozen, replace(ROLLING), 1e-4).period
     return Observed(
@@ -215,9 +215,9 @@ REFUSED: dict[str, Callable[[], Any]] = {
 """What is beyond physics, and must be refused before it runs."""
 
 
-def _refused_row(name: str, ask: Callable[[], Any]) -> Row:
+def _refused_row(name: str, ask_refused: Callable[[], Any]) -> Row:
     try:
-        ask()
+        ask_refused()
         outcome = "taken"
     except InputError as error:
         outcome = "refused" if error.place and error.value is not None else "refused without its value"
@@ -231,7 +231,7 @@ def _refused_row(name: str, ask: Callable[[], Any]) -> Row:
     )
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Stops that a limit of the vehicle ended."""
-    ends = tuple((str(i), end) for i, end in enumerate(data["ends"]) if end)
+    ends = tuple((str(i), end) for i, end in enumerate(case_data["ends"]) if end)
     return [Table("Random stops that do not come to rest", "", ("number", "how it ended"), ends)] if ends else []

@@ -72,15 +72,15 @@ CLASSES = {
 """The same of a class: its name, and what it does."""
 ROUND = 100
 """Exchanges of a round."""
-QUICK = ("NaN", "too few wheels", "silence", "died")
+QUICK_FAULTS = ("NaN", "too few wheels", "silence", "died")
 
 
 @allowing_breaches("both sides are cut off after the same few samples", "stop")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of bits, costs and faults; quick: half a second of braking, few faults."""
-    ways = _tables_of_ways(folder, second=not quick)
-    rows = _bits(ways, folder, 0.5 if quick else 4.0)
-    costs = _costs(ways, folder, 5 if quick else 40)
+    tables_by_connection = _tables_of_ways(folder, with_second=not quick)
+    rows = _bits(tables_by_connection, folder, 0.5 if quick else 4.0)
+    costs = _costs(tables_by_connection, folder, 5 if quick else 40)
     rows += [
         Observed(
             f"braking_port.cost.{_id(name)}",
@@ -91,10 +91,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         ).beside("", f"median of rounds of {ROUND} in which all ways have their turn", "none")
         for name, (cost, low, high) in costs.items()
     ]
-    told = [_process(kind, folder) for kind in (QUICK if quick else FAULTS)]
+    told = [_process(kind, folder) for kind in (QUICK_FAULTS if quick else FAULTS)]
     told += [_class(kind, folder) for kind in (("catches everything",) if quick else CLASSES)]
     told += [] if quick else [_slave(kind, folder) for kind in SLAVES]
-    return rows + [row for each in told for row in _fault_rows(each)], {"costs": costs, "faults": told}
+    return rows + [row for way_name in told for row in _fault_rows(way_name)], {"costs": costs, "faults": told}
 
 
 def _scene(folder: Path, duration: float, table: dict[str, Any]) -> Any:
@@ -112,16 +112,16 @@ def _scene(folder: Path, duration: float, table: dict[str, Any]) -> Any:
     )
 
 
-def _tables_of_ways(folder: Path, second: bool) -> dict[str, dict[str, Any] | str]:
+def _tables_of_ways(folder: Path, with_second: bool) -> dict[str, dict[str, Any] | str]:
     """Scene tables of all ways to connect a controller, by name, and a text on those that are not available."""
-    ways: dict[str, dict[str, Any] | str] = {"callable": {"callable": EXAMPLE}}
-    if second:
-        ways["second process in Python"] = {
+    tables_by_connection: dict[str, dict[str, Any] | str] = {"callable": {"callable": EXAMPLE}}
+    if with_second:
+        tables_by_connection["second process in Python"] = {
             "command": [sys.executable, "-m", "models.brake.port.client", EXAMPLE, "{port}"]
         }
-    ways["second process in C"] = _built_c(folder)
-    ways["FMU"] = _built_fmu(folder)
-    return ways
+    tables_by_connection["second process in C"] = _built_c(folder)
+    tables_by_connection["FMU"] = _built_fmu(folder)
+    return tables_by_connection
 
 
 def _built_c(folder: Path) -> dict[str, Any] | str:
@@ -140,12 +140,12 @@ def _built_fmu(folder: Path) -> dict[str, Any] | str:
     return {"fmu": FmuBuilder.build_FMU(Path(port.__path__[0]) / "example_slave.py", dest=folder).name}
 
 
-def _bits(ways: dict[str, dict[str, Any] | str], folder: Path, duration: float) -> list[Row]:
+def _bits(tables_by_connection: dict[str, dict[str, Any] | str], folder: Path, duration: float) -> list[Row]:
     """Rows: every way to connect a controller compared bit by bit with a direct call, and then the replay of its
     log."""
     first = run(_scene(folder, duration, {"callable": EXAMPLE, "log": "port.log"})).detail
     rows = []
-    for name, table in {**ways, "replay": {"replay": "port.log"}}.items():
+    for name, table in {**tables_by_connection, "replay": {"replay": "port.log"}}.items():
         key, what = (
             f"braking_port.bits.{_id(name)}",
             f"a run through the {name} has the bits of the callable, {len(first.times) - 1} samples",
@@ -177,20 +177,22 @@ def _compare_bits(path: Driven, other_run: Driven) -> str:
     return f"other {', '.join(apart)}" if apart else "same bits"
 
 
-def _costs(ways: dict[str, dict[str, Any] | str], folder: Path, rounds: int) -> dict[str, list[float]]:
+def _costs(
+    tables_by_connection: dict[str, dict[str, Any] | str], folder: Path, round_count: int
+) -> dict[str, list[float]]:
     """Time of one exchange in microseconds for each way to connect a controller: median of the rounds with its 95 %
     interval."""
     facts, seconds = ControllerRun(np.full(4, 0.5), SAMPLE, folder=folder), dict[str, list[float]]()
     with ExitStack() as stack:
         tables = {
             name: PortTable(timeout=PATIENT, start=PATIENT, **table)
-            for name, table in ways.items()
+            for name, table in tables_by_connection.items()
             if isinstance(table, dict)
         }
         controllers = {
             name: stack.enter_context(controller_of_run(table, facts, Example(4)))[0] for name, table in tables.items()
         }
-        for i in range(rounds):
+        for i in range(round_count):
             for name, controller in controllers.items():
                 seconds.setdefault(name, []).append(_timed(controller, i * ROUND))
     return {name: list(median(1e6 * np.array(values) / ROUND)) for name, values in seconds.items()}
@@ -202,25 +204,25 @@ def _timed(controller: Controller, first: int) -> float:
         for i in range(first, first + ROUND)
     ]
     start = time.perf_counter()
-    for given in samples:
-        ask(controller, given)
+    for sample in samples:
+        ask(controller, sample)
     return time.perf_counter() - start
 
 
-def _process(kind: str, folder: Path) -> dict[str, Any]:
-    words = [sys.executable, "-S", str(Path(misbehaving_client.__file__)), kind, "{port}"]
-    return _failed(f"second process: {kind}", FAULTS[kind], {"command": words}, folder)
+def _process(misbehaviour: str, folder: Path) -> dict[str, Any]:
+    words = [sys.executable, "-S", str(Path(misbehaving_client.__file__)), misbehaviour, "{port}"]
+    return _failed(f"second process: {misbehaviour}", FAULTS[misbehaviour], {"command": words}, folder)
 
 
-def _class(kind: str, folder: Path) -> dict[str, Any]:
-    name, does = CLASSES[kind]
+def _class(misbehaviour: str, folder: Path) -> dict[str, Any]:
+    name, does = CLASSES[misbehaviour]
     well = f"        if given.number < {misbehaving_client.GOOD_SAMPLES}: return Command(valves=np.ones(4))\n"
     (folder / "fails.py").write_text(
         "import ctypes, os, signal, time\nimport numpy as np\nfrom models.brake.controller import Command\n"
         "class Fails:\n"
         "    def __init__(self, wheels): pass\n    def sample(self, given):\n" + well + f"        {does}\n"
     )
-    return _failed(f"class that {kind}", name, {"callable": "fails.py:Fails"}, folder)
+    return _failed(f"class that {misbehaviour}", name, {"callable": "fails.py:Fails"}, folder)
 
 
 SLAVES = {
@@ -233,10 +235,10 @@ SLAVES = {
 """What an FMU does, and the name under which the run must end."""
 
 
-def _slave(kind: str, folder: Path) -> dict[str, Any]:
+def _slave(misbehaviour: str, folder: Path) -> dict[str, Any]:
     from pythonfmu import FmuBuilder
 
-    name, does = SLAVES[kind]
+    name, does = SLAVES[misbehaviour]
     line = "        wheels = np.array"
     well = (
         f"        if self._number == {misbehaving_client.GOOD_SAMPLES}:\n            import ctypes, os\n   "
@@ -245,21 +247,24 @@ def _slave(kind: str, folder: Path) -> dict[str, Any]:
     source = (Path(port.__path__[0]) / "example_slave.py").read_text().replace(line, well + line)
     (folder / "fails_slave.py").write_text(source)
     return _failed(
-        f"FMU that {kind}", name, {"fmu": FmuBuilder.build_FMU(folder / "fails_slave.py", dest=folder).name}, folder
+        f"FMU that {misbehaviour}",
+        name,
+        {"fmu": FmuBuilder.build_FMU(folder / "fails_slave.py", dest=folder).name},
+        folder,
     )
 
 
-def _failed(kind: str, name: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
+def _failed(misbehaviour: str, name: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
     """How a run with a failing controller ends, and the time (s) since its last good sample."""
     watched, timeout = _Watch(), TIMEOUT if name == "silence" else PATIENT
-    told = {"kind": kind, "expected": name, "name": "no error", "number": -1, "kept": 0, "message": ""}
+    outcome = {"kind": misbehaviour, "expected": name, "name": "no error", "number": -1, "kept": 0, "message": ""}
     try:
         with watched:
             run(_scene(folder, 1.0, {**table, "timeout": timeout}))
     except ControllerFailed as error:
-        kept = 0 if error.partial is None else len(error.partial.times) - 1
-        told |= {"name": error.name, "number": error.number, "kept": kept, "message": str(error)}
-    return {**told, "seconds": time.perf_counter() - watched.last}
+        samples_kept = 0 if error.partial is None else len(error.partial.times) - 1
+        outcome |= {"name": error.name, "number": error.number, "kept": samples_kept, "message": str(error)}
+    return {**outcome, "seconds": time.perf_counter() - watched.last}
 
 
 class _Watch:
@@ -275,16 +280,16 @@ class _Watch:
     def __exit__(self, *_: object) -> None:
         self._march.ask = self._ask
 
-    def _noted(self, controller: Controller, sample: Sample, *more: Any) -> Any:
+    def _noted(self, controller: Controller, sample: Sample, *arguments: Any) -> Any:
         self.last = time.perf_counter()
-        return self._ask(controller, sample, *more)
+        return self._ask(controller, sample, *arguments)
 
 
 def _fault_rows(fault: dict[str, Any]) -> list[Row]:
     well = misbehaving_client.GOOD_SAMPLES
     slow = fault["name"] == fault["expected"] == "silence" and fault["number"] <= well  # a busy machine is silent, too
-    whole = fault["kept"] == fault["number"] and (fault["number"] == well or slow)
-    ended = fault["name"] if whole else f"{fault['name']} at {fault['number']}, {fault['kept']} samples kept"
+    is_complete = fault["kept"] == fault["number"] and (fault["number"] == well or slow)
+    ended = fault["name"] if is_complete else f"{fault['name']} at {fault['number']}, {fault['kept']} samples kept"
     key = f"braking_port.fault.{_id(fault['kind'])}"
     return [
         behaviour_row(
@@ -309,10 +314,15 @@ def _id(name: str) -> str:
     return name.replace(": ", ".").replace(" ", "-")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Costs, and every fault with its message."""
-    costs = tuple((name, f"{cost:.1f} ({low:.1f} to {high:.1f})") for name, (cost, low, high) in data["costs"].items())
-    faults = tuple((each["kind"], each["message"], f"{each['seconds']:.3f}") for each in data["faults"])
+    costs = tuple(
+        (name, f"{cost:.1f} ({low:.1f} to {high:.1f})") for name, (cost, low, high) in case_data["costs"].items()
+    )
+    faults = tuple(
+        (fault_record["kind"], fault_record["message"], f"{fault_record['seconds']:.3f}")
+        for fault_record in case_data["faults"]
+    )
     return [
         Table(
             "Cost of one exchange",

@@ -39,7 +39,7 @@ LAWS = {
     "relaxation": (laws.slip_lags, 1e-12, "difference of slip angles that lag by a relaxation length from plain code"),
 }
 """Both sides at random states, the bound, and what it is."""
-WHY = "another algorithm in plain code; they differ by rounding"
+ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -61,7 +61,7 @@ def _law_row(name: str) -> Row:
     both, bound, what = LAWS[name]
     return Observed(
         f"braking_reference.{name}", SYSTEM, what, laws.largest_difference(*both()), "by the largest"
-    ).at_most(bound, WHY, "native")
+    ).at_most(bound, ROUNDING_REASON, "native")
 
 
 def _acceleration_row(vehicle: str, engine: str) -> Row:
@@ -73,7 +73,7 @@ def _acceleration_row(vehicle: str, engine: str) -> Row:
         f"{whole.STATE_COUNT} states of any heading",
         whole.relative_difference(accelerations, whole.plain_accelerations(vehicle)),
         "by the largest",
-    ).at_most(1e-12, WHY, "native")
+    ).at_most(1e-12, ROUNDING_REASON, "native")
 
 
 def _relaxing_row() -> Row:

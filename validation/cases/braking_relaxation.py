@@ -49,9 +49,9 @@ def rise_apart(engine: str, samples: int = 20) -> float:
     slick = table_of_surface("wet").scaled(SLICK)
     vehicle = replace(braked_vehicle(car(), slick, engine, STEER), relaxation=whole.RELAXATION_LENGTHS)
     path = vehicle.run(steady_torques(*4 * (0.0,)), SPEED, samples * vehicle.sample - 1e-6)
-    ways = SPEED * np.cos(STEER) * (path.times[1:] - 0.5 * vehicle.sample)
+    distances = SPEED * np.cos(STEER) * (path.times[1:] - 0.5 * vehicle.sample)
     risen = np.tan(path.reports.slip_angle[:, :2]) / -np.tan(STEER)
-    return float(np.abs(risen - (1.0 - np.exp(-ways[:, None] / whole.RELAXATION_LENGTHS[:2]))).max())
+    return float(np.abs(risen - (1.0 - np.exp(-distances[:, None] / whole.RELAXATION_LENGTHS[:2]))).max())
 
 
 def turn(engine: str | None, length: float, stiffer: float | None = None, duration: float = 0.2) -> Run:

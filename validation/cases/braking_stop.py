@@ -33,7 +33,7 @@ HEADLINE = {
     "dry, light": ("dry", 0.004, 22.22),
 }
 """Surface, slip that settles, speed (m/s)."""
-FURTHER = {
+FURTHER_CASES = {
     "snow": ("snow", 0.04, 13.9, 1.0, 1.0),
     "snow, light": ("snow", 0.004, 13.9, 1.0, 1.0),
     "wet": ("wet", 0.05, 22.22, 1.0, 1.0),
@@ -46,7 +46,7 @@ FURTHER = {
     "heavy wheel": ("wet", 0.03, 11.11, 1.0, 4.0),
 }
 """The same with factors of mass and spin inertia."""
-BOUND = 5e-4
+DISTANCE_BOUND = 5e-4
 STEPS = {True: (PAPER_STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, PAPER_STEP, 1e-2, 2e-2)}
 """Steps (s) of the sweep, by ``quick``."""
 FINE_STEP = 5e-4
@@ -65,10 +65,10 @@ WATCHED_SECONDS = 2.0
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: the four headline cases, two steps, two surfaces."""
     steps = tuple(step for step in STEPS[quick] if step >= FINE_STEP)
-    curves = {name: _curve(*each, steps) for name, each in HEADLINE.items()}
+    curves = {name: _curve(*headline_arguments, steps) for name, headline_arguments in HEADLINE.items()}
     rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
     if not quick:
-        rows += [_further_row(name, *each) for name, each in FURTHER.items()]
+        rows += [_further_row(name, *headline_arguments) for name, headline_arguments in FURTHER_CASES.items()]
     rows += [
         _sweep_row(
             ("ice", "dry") if quick else tuple(NAMED_SURFACES),
@@ -88,15 +88,21 @@ def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> di
     tyre, _ = both = friction_table(name)
     force, torque = steady_torque(FRONT_WHEEL, tyre, slip)
     true = exact_distance(FRONT_WHEEL, tyre, torque, speed)
-    ways = {"ours": [(constant_torque_stop(FRONT_WHEEL, both, torque, speed, step).distance, 0.0) for step in steps]}
-    ways |= {key: [stopping_distance(key, FRONT_WHEEL, tyre, torque, speed, step) for step in steps] for key in SCHEMES}
+    distances = {
+        "ours": [(constant_torque_stop(FRONT_WHEEL, both, torque, speed, step).distance, 0.0) for step in steps]
+    }
+    distances |= {
+        key: [stopping_distance(key, FRONT_WHEEL, tyre, torque, speed, step) for step in steps] for key in SCHEMES
+    }
     steadily = constant_torque_stop(
-        FRONT_WHEEL, both, torque, speed, turning=(1.0 - slip) * speed / FRONT_WHEEL.radius
+        FRONT_WHEEL, both, torque, speed, rim_turning=(1.0 - slip) * speed / FRONT_WHEEL.radius
     ).distance
     return {
         "exact": true,
         "steady": steadily / (FRONT_WHEEL.mass * speed**2 / (2.0 * force)) - 1.0,
-        "errors": {key: [(way / true - 1.0, left) for way, left in ends] for key, ends in ways.items()},
+        "errors": {
+            key: [(scheme_name / true - 1.0, left) for scheme_name, left in ends] for key, ends in distances.items()
+        },
         "at": steps.index(PAPER_STEP),
     }
 
@@ -113,7 +119,7 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
             f"relative error of the stopping distance of a wheel that rolls first, {name}, steps of 5.5 ms",
             ours,
             "",
-        ).at_most(BOUND, why, "closed form"),
+        ).at_most(DISTANCE_BOUND, why, "closed form"),
         Observed(
             f"{key}.steady",
             SYSTEM,
@@ -123,14 +129,14 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
         ).at_most(1e-7, "m v^2 / (2 F); exact in each step but the last, at rest", "closed form"),
     ]
     for scheme, (error, left) in errors.items():
-        said = (
+        note = (
             f", and still rolls at {left:.2g} m/s in {LONGEST_TIME_RATIO:g} times the time of stopping" if left else ""
         )
         rows.append(
             Observed(
                 f"{key}.{scheme.split()[-1].lower()}",
                 SYSTEM,
-                f"relative error of the stopping distance with {scheme}, {name}, steps of 5.5 ms{said}",
+                f"relative error of the stopping distance with {scheme}, {name}, steps of 5.5 ms{note}",
                 100.0 * error,
                 "%",
             ).beside(f"{100.0 * ours:.1e} % of ours", "the same vehicle, torque and table", "closed form")
@@ -154,7 +160,7 @@ def _further_row(name: str, surface: str, slip: float, speed: float, mass: float
         "m/s), steps of 5.5 ms",
         error,
         "",
-    ).at_most(BOUND, "as the four above", "closed form")
+    ).at_most(DISTANCE_BOUND, "as the four above", "closed form")
 
 
 def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
@@ -162,7 +168,7 @@ def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
     path, speed = stopped.path, stopped.path.speed
     rim = radius * path.turning
     broken = {
-        "no number": not all(np.isfinite(part).all() for part in path),
+        "no number": not all(np.isfinite(path_field).all() for path_field in path),
         "turns backwards": rim.min() < 0.0,
         "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
         "does not stop": brakes and stopped.step_of_rest < 0,
@@ -174,13 +180,15 @@ def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
     return [name for name, wrong in broken.items() if wrong]
 
 
-def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float, ...]) -> Row:
+def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tuple[float, ...]) -> Row:
     wrong, runs = list[str](), 0
     for on, step in product(surfaces, steps):
         tyre = friction_table(on)
         lock = float(tyre[0].mu_x.max()) * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
         speed = 11.11 if step >= 1e-3 else SLOW_SPEED
-        for level in levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else levels[SOME_LEVELS]:
+        for level in (
+            friction_levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else friction_levels[SOME_LEVELS]
+        ):
             faults = faults_of(
                 constant_torque_stop(FRONT_WHEEL, tyre, level * lock, speed, step, WATCHED_SECONDS),
                 FRONT_WHEEL.radius,
@@ -207,8 +215,8 @@ def _locked_row() -> Row:
     for on in NAMED_SURFACES:
         tyre = friction_table(on)
         torque = 2.0 * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius * float(tyre[0].mu_x.max())
-        way = constant_torque_stop(FRONT_WHEEL, tyre, torque, 11.11, turning=0.0).distance
-        errors.append(abs(way * 2.0 * GRAVITY * float(tyre[0].mu_x[0, 0, -1]) / 11.11**2 - 1.0))
+        distance = constant_torque_stop(FRONT_WHEEL, tyre, torque, 11.11, rim_turning=0.0).distance
+        errors.append(abs(distance * 2.0 * GRAVITY * float(tyre[0].mu_x[0, 0, -1]) / 11.11**2 - 1.0))
     return Observed(
         "braking_stop.locked",
         SYSTEM,
@@ -239,57 +247,57 @@ def _release_row() -> Row:
     ).at_most(1e-3, "asked for: the time at which torque falls to that of sliding", "closed form")
 
 
-def _friction_row(levels: int) -> Row:
+def _friction_row(level_count: int) -> Row:
     torque = 3.0 * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
-    ways = [
+    distances = [
         constant_torque_stop(FRONT_WHEEL, friction_table("ice", float(scale)), torque, 11.11).distance
-        for scale in np.geomspace(0.3, 8.0, levels)
+        for scale in np.geomspace(0.3, 8.0, level_count)
     ]
     return Observed(
         "braking_stop.friction",
         SYSTEM,
-        f"levels of friction, of {levels}, at which a higher level does not shorten the stop, brakes beyond lock",
-        sum(b >= a for a, b in pairwise(ways)),
+        f"levels of friction, of {level_count}, at which a higher level does not shorten the stop, brakes beyond lock",
+        sum(b >= a for a, b in pairwise(distances)),
         "",
     ).within(0, 0, "asked for", "none")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Error of the stopping distance by scheme and step."""
     lines = [
         (case, scheme, *(f"{100.0 * error:+.2g}{'*' if left else ''}" for error, left in errors))
-        for case, curve in data["curves"].items()
+        for case, curve in case_data["curves"].items()
         for scheme, errors in curve["errors"].items()
     ]
     note = (
         f"In per cent of the exact distance. *: it does not stop in {LONGEST_TIME_RATIO:g} times its time; "
         "the way until then."
     )
-    heads = ("case", "scheme", *(f"{1e3 * step:g} ms" for step in data["steps"]))
+    heads = ("case", "scheme", *(f"{1e3 * step:g} ms" for step in case_data["steps"]))
     return [Table("Stopping distance of a quarter vehicle", note, heads, tuple(lines))]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Error over step, a panel per headline case."""
     from models.drawing.figures import COLUMN_WIDTH, GREY, add_heading, legend_below, subplots
 
     figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 5.8), sharex=True, sharey=True)
-    milliseconds = 1e3 * np.array(data["steps"])
+    milliseconds = 1e3 * np.array(case_data["steps"])
     styles = {"ours": "o-", "explicit Euler": "D:", "RK4": "s--", "paper's, literal": "^-."}
-    for ax, (name, curve) in zip(axes.flat, data["curves"].items(), strict=True):
+    for ax, (name, curve) in zip(axes.flat, case_data["curves"].items(), strict=True):
         for scheme, style in styles.items():
             errors, left = 100.0 * np.abs(np.transpose(curve["errors"][scheme]))
             label = "exact wheel, mean force (ours)" if scheme == "ours" else scheme
             ax.loglog(milliseconds, np.maximum(errors, 1e-7), style, label=label)
             ax.plot(milliseconds[left > 0.0], errors[left > 0.0], "x", color="black", markersize=9)
-        ax.axhline(100.0 * BOUND, color=GREY, linewidth=0.8)
+        ax.axhline(100.0 * DISTANCE_BOUND, color=GREY, linewidth=0.8)
         ax.axvline(1e3 * PAPER_STEP, color=GREY, linewidth=0.8, linestyle=":")
         ax.set(title=name, xlabel="step [ms]", ylabel="error of the stopping distance [%]")
         ax.label_outer()
     add_heading(figure, "Braked to a stop by a constant torque: which step each scheme needs")
     legend_below(figure, axes.flat[0])
     caption = (
-        f"Error of the stopping distance over the step; grey: the bound of {100 * BOUND:g} % and the paper's "
+        f"Error of the stopping distance over the step; grey: the bound of {100 * DISTANCE_BOUND:g} % and the paper's "
         "step. Crosses: it has not stopped in three times its time. Errors below 1e-7 % are drawn there."
     )
     return [(caption, figure)]

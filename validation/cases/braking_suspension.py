@@ -52,9 +52,9 @@ def _locked_rows(mu: float) -> list[Row]:
     """Rows of the box and the car with locked wheels, from a speed at which the stop takes 4 s."""
     speed, rows = 4.0 * mu * GRAVITY, []
     for name, vehicle_kind in (("box", box()), ("car", car())):
-        vehicle, place = braked_vehicle(vehicle_kind, constant_friction(mu)), f"{name}.{mu:g}"
+        vehicle, row_name = braked_vehicle(vehicle_kind, constant_friction(mu)), f"{name}.{mu:g}"
         path = vehicle.run(steady_torques(*4 * (LOCKING_TORQUE,)), speed)
-        way, exact = float(path.states[-1, 0, 0]), speed**2 / (2.0 * mu * GRAVITY)
+        distance, exact = float(path.states[-1, 0, 0]), speed**2 / (2.0 * mu * GRAVITY)
         late = -len(path.times) // 8
         gained = float(path.reports.load[late, :2].sum() - path.reports.load[0, :2].sum())
         plane, pitch = vehicle_kind.plane, float(path.states[late, 0, PITCH])
@@ -62,17 +62,17 @@ def _locked_rows(mu: float) -> list[Row]:
         weight = float(path.reports.load[late].sum()) / (plane.mass * GRAVITY)
         rows += [
             Observed(
-                f"braking_suspension.locked.{place}",
+                f"braking_suspension.locked.{row_name}",
                 SYSTEM,
                 f"relative difference of the {name}'s stopping distance from v^2 / (2 mu g), wheels "
                 f"locked, mu = {mu:g}",
-                abs(way / exact - 1.0),
+                abs(distance / exact - 1.0),
                 "relative",
             ).at_most(
                 1e-3, "wheels take v / r in J v / (r T) to lock; the centre of mass leans ahead of them", "closed form"
             ),
             Observed(
-                f"braking_suspension.transfer.{place}",
+                f"braking_suspension.transfer.{row_name}",
                 SYSTEM,
                 f"relative difference of the {name}'s load transfer from m a h / L and the shift of its leaning weight",
                 abs(gained * plane.wheelbase / moment - 1.0),
@@ -81,14 +81,14 @@ def _locked_rows(mu: float) -> list[Row]:
                 2e-2 if mu == HARD_FRICTION else 2e-3, "pitch takes the weight forwards, and wheels less", "closed form"
             ),
             Observed(
-                f"braking_suspension.weight.{place}",
+                f"braking_suspension.weight.{row_name}",
                 SYSTEM,
                 "ratio of the sum of the wheel loads to the weight, late in braking",
                 weight,
                 "",
             ).within(1.0, 1e-4, "the body has come to rest on its springs", "closed form"),
             Observed(
-                f"braking_suspension.stays.{place}",
+                f"braking_suspension.stays.{row_name}",
                 SYSTEM,
                 f"speed of the {name} and its rims 2 s after the stop",
                 remaining_speed(vehicle, path),
@@ -114,8 +114,8 @@ def _pitch_rows(mu: float, pitch: float, gained: float) -> list[Row]:
     ]
 
 
-def _mirror_rows(turn: Run, mirrored: Run) -> list[Row]:
-    apart = np.abs(turn.states[-1, 0, :3] * (1.0, -1.0, -1.0) - mirrored.states[-1, 0, :3]).max()
+def _mirror_rows(left_turn: Run, mirrored: Run) -> list[Row]:
+    apart = np.abs(left_turn.states[-1, 0, :3] * (1.0, -1.0, -1.0) - mirrored.states[-1, 0, :3]).max()
     return [
         Observed(
             "braking_suspension.mirror",
@@ -127,10 +127,10 @@ def _mirror_rows(turn: Run, mirrored: Run) -> list[Row]:
     ]
 
 
-def _engine_rows(wet: TyreTable) -> list[Row]:
+def _engine_rows(wet_table: TyreTable) -> list[Row]:
     """Rows of stops in both engines with steps of 1 ms."""
     ends = [
-        braked_vehicle(car(), wet, engine, 0.05, 1e-3).run(steady_torques(*HARDER), 15.0).states[-1, 0, :2]
+        braked_vehicle(car(), wet_table, engine, 0.05, 1e-3).run(steady_torques(*HARDER), 15.0).states[-1, 0, :2]
         for engine in ("mujoco", "exudyn")
     ]
     return [
@@ -144,9 +144,9 @@ def _engine_rows(wet: TyreTable) -> list[Row]:
     ]
 
 
-def _order_rows(wet: TyreTable) -> list[Row]:
-    ways = [
-        braked_vehicle(car(), wet, steer=0.05, substeps=n).run(steady_torques(*HARDER), 10.0).states[-1, 0, 0]
+def _order_rows(wet_table: TyreTable) -> list[Row]:
+    distances = [
+        braked_vehicle(car(), wet_table, steer=0.05, substeps=n).run(steady_torques(*HARDER), 10.0).states[-1, 0, 0]
         for n in (1, 4, 16)
     ]
     return [
@@ -154,14 +154,14 @@ def _order_rows(wet: TyreTable) -> list[Row]:
             "braking_suspension.step",
             SYSTEM,
             "relative difference of the stopping distance of a braked turn in steps of 5.5 ms from steps of 0.34 ms",
-            abs(float(ways[0] / ways[2] - 1.0)),
+            abs(float(distances[0] / distances[2] - 1.0)),
             "relative",
         ).at_most(5e-4, "order two", "none"),
         Observed(
             "braking_suspension.substeps",
             SYSTEM,
             "relative difference of the stopping distance of a braked turn in steps of 1.4 ms from steps of 0.34 ms",
-            abs(float(ways[1] / ways[2] - 1.0)),
+            abs(float(distances[1] / distances[2] - 1.0)),
             "relative",
         ).beside(5e-4, "four substeps, as a scene has them", "none"),
     ]
@@ -174,7 +174,7 @@ def _ice_rows() -> list[Row]:
         Stop(braked_vehicle(car(), ice, engine, substeps=4, gradient=150.0).run(SlipBangBang(wheels=4), speed))
         for engine in ("mujoco", None)
     ]
-    ways = [stop.of_vehicle()["stopping distance [m]"] for stop in stops]
+    distances = [stop.of_vehicle()["stopping distance [m]"] for stop in stops]
     return [
         Observed(
             "braking_suspension.ice.locks",
@@ -187,7 +187,7 @@ def _ice_rows() -> list[Row]:
             "braking_suspension.ice.distance",
             SYSTEM,
             "difference of the stopping distance on ice from that of the plane vehicle",
-            abs(ways[0] / ways[1] - 1.0),
+            abs(distances[0] / distances[1] - 1.0),
             "relative",
         ).beside(0.05, "single runs on ice scatter", "none"),
     ]
@@ -207,9 +207,9 @@ class _Timed:
         return command
 
 
-def _speed_row(wet: TyreTable) -> Row:
+def _speed_row(wet_table: TyreTable) -> Row:
     """Row on the computing time, from the fastest tenth of the samples, which other processes disturb least."""
-    vehicle, controller = braked_vehicle(car(), wet, substeps=4, gradient=150.0), _Timed(SlipBangBang(wheels=4))
+    vehicle, controller = braked_vehicle(car(), wet_table, substeps=4, gradient=150.0), _Timed(SlipBangBang(wheels=4))
     vehicle.run(controller, 15.0, 2.0)
     speed = vehicle.sample / float(np.nanquantile(controller.seconds, 0.1))
     return Observed(
@@ -254,9 +254,9 @@ def _limit_rows(ends: list[list[float]]) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """The limit of a stiff suspension."""
-    rows = tuple((f"{stiffer:g}", f"{apart:.6f}") for stiffer, apart in data["limit"])
+    rows = tuple((f"{stiffer:g}", f"{apart:.6f}") for stiffer, apart in case_data["limit"])
     return [
         Table(
             "Stiff suspension and plane vehicle",

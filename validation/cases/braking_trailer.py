@@ -22,7 +22,7 @@ QUICK_DURATION, FULL_DURATION = 0.05, 1.0
 STATICS = 1e-3
 """Of the closed form of a caravan that brakes alone, which knows no lean: pitched by 2.7 mrad its centre of mass, half
 a metre above the ball, comes ahead by 5e-4 of its arm."""
-WHY = "another algorithm in plain code; they differ by rounding"
+ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -65,7 +65,7 @@ def _acceleration_row(vehicle: str, engine: str) -> Row:
         "any heading",
         whole.relative_difference(accelerations, whole.plain_accelerations(vehicle)),
         "by the largest",
-    ).at_most(1e-12, WHY, "native")
+    ).at_most(1e-12, ROUNDING_REASON, "native")
 
 
 def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
@@ -81,19 +81,19 @@ def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
 
 
 def _locked_row() -> Row:
-    way, wanted = train.locked_stop()
+    stopping_way, wanted = train.locked_stop()
     return Observed(
         "braking_trailer.locked",
         SYSTEM,
         "way of a stop of car and caravan with all wheels locked, over v^2 / (2 mu g), less 1",
-        abs(way / wanted - 1.0),
+        abs(stopping_way / wanted - 1.0),
         "",
     ).at_most(1e-3, "wheels lock within a millisecond, and the car leans ahead by less than one", "closed form")
 
 
 def _alone_rows() -> list[Row]:
     errors = train.caravan_errors()
-    told = {
+    quantities = {
         "deceleration": "deceleration of a train whose caravan brakes alone, wheels locked",
         "load": "load of the axle of a caravan that brakes alone",
         "pull": "force at the ball of a caravan that brakes alone",
@@ -102,7 +102,7 @@ def _alone_rows() -> list[Row]:
         Observed(
             f"braking_trailer.alone.{key}", SYSTEM, f"{what} / closed form - 1", abs(float(getattr(errors, key))), ""
         ).at_most(STATICS, "moments about the ball and momentum of both; springs lean by 2.7 mrad", "closed form")
-        for key, what in told.items()
+        for key, what in quantities.items()
     ]
 
 
@@ -111,9 +111,9 @@ def _control_rows() -> list[Row]:
     ice, speed = table_of_surface("ice"), 11.11
     vehicle = braked_vehicle(whole.towing_car(), ice, substeps=4, gradient=150.0)
     controlled, locked = (
-        Stop(vehicle.run(way, speed)) for way in (SlipBangBang(wheels=6), steady_torques(*6 * (1e5,)))
+        Stop(vehicle.run(controller, speed)) for controller in (SlipBangBang(wheels=6), steady_torques(*6 * (1e5,)))
     )
-    ways = [stop.of_vehicle()["stopping distance [m]"] for stop in (controlled, locked)]
+    distances = [stop.of_vehicle()["stopping distance [m]"] for stop in (controlled, locked)]
     return [
         Observed(
             "braking_trailer.ice.locks",
@@ -126,7 +126,7 @@ def _control_rows() -> list[Row]:
             "braking_trailer.ice.distance",
             SYSTEM,
             "stopping distance of car and caravan on ice with the slip controller, over that with locked wheels",
-            ways[0] / ways[1],
+            distances[0] / distances[1],
             "",
         ).at_most(1.0, "ice has its largest friction at a slip of some per cent", "none"),
     ]
@@ -134,12 +134,12 @@ def _control_rows() -> list[Row]:
 
 def _fault_rows() -> list[Row]:
     """Rows: faults planted in the force table that both engines share."""
-    held = train.relative_difference(train.pulled_caravan(train.hold_on_to_the_car), train.pulled_by_levers())
+    pulled = train.relative_difference(train.pulled_caravan(train.hold_on_to_the_car), train.pulled_by_levers())
     turned = whole.towing_car.__wrapped__()
     keep_to_the_car(turned.handling)
     apart = whole.relative_difference(whole.accelerations(turned, "exudyn", 5), whole.plain_accelerations("caravan", 5))
     seen = {
-        "brakes": ("brakes of the caravan hold on to the car, by the load of its axle", abs(held.load) > STATICS),
+        "brakes": ("brakes of the caravan hold on to the car, by the load of its axle", abs(pulled.load) > STATICS),
         "heading": ("wheels of the caravan keep to the car's heading, by plain code", apart > 1e-12),
     }
     return [

@@ -61,19 +61,20 @@ class Judged:
         return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
-def judged(scene: DrawnRide, second: bool) -> Judged:
-    """Choose effects for a scene, then check the choice by the identity of covariance and adjoint and, if ``second``,
-    by frequency responses."""
+def judged(scene: DrawnRide, on_second: bool) -> Judged:
+    """Choose effects for a scene, then check the choice by the identity of covariance and adjoint and, if
+    ``on_second``, by frequency responses.
+    """
     chooser = asked_speeds(scene)
-    choice, whole = chooser.choose(), chooser.full_scenes[0]
-    rest = whole.reduced(reduced_without(scene.scene, choice.left_out))
-    two, deviation = Screen(whole.full, chooser.rows).certificate_sides(rest)
+    choice, full_scene = chooser.choose(), chooser.full_scenes[0]
+    rest = full_scene.reduced(reduced_without(scene.scene, choice.left_out))
+    two, deviation = Screen(full_scene.full, chooser.rows).certificate_sides(rest)
     chosen, none = frozenset(choice.left_out), frozenset[Effect]()
     return Judged(
         scene,
         choice,
         float(abs(two / deviation - 1).max()),
-        changes_by_frequency(chooser, choice) if second else None,
+        changes_by_frequency(chooser, choice) if on_second else None,
         worst_nearby(chooser, chosen, DRAWS if chosen else 0, DRAWS),
         measured_step(chooser, chosen) / measured_step(chooser, none) if chosen else 1.0,
     )
@@ -101,10 +102,12 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _kept_rows(choices: list[Judged]) -> list[Row]:
-    share = float(np.mean([each.choice.within_tolerance for each in choices]))
-    lies = sum(not each.honest for each in choices)
-    second = [each for each in choices if each.by_frequency is not None]
-    gap = max(float(abs(each.by_frequency - each.choice.confirmed_change).max()) for each in second)
+    share = float(np.mean([judged_choice.choice.within_tolerance for judged_choice in choices]))
+    lies = sum(not judged_choice.honest for judged_choice in choices)
+    second = [judged_choice for judged_choice in choices if judged_choice.by_frequency is not None]
+    gap = max(
+        float(abs(judged_choice.by_frequency - judged_choice.choice.confirmed_change).max()) for judged_choice in second
+    )
     return [
         Observed(
             "choice_linear.kept",
@@ -137,10 +140,11 @@ def _prediction_row(choices: list[Judged]) -> Row:
     """Row: ratios of predicted to confirmed changes, over all choices and quantities whose change is above zero and
     below 5 %."""
     predicted, confirmed_ = (
-        np.concatenate([getattr(each.choice, f"{part}_change") for each in choices]) for part in PREDICTED_CONFIRMED
+        np.concatenate([getattr(judged_choice.choice, f"{stage}_change") for judged_choice in choices])
+        for stage in PREDICTED_CONFIRMED
     )
-    told = (abs(confirmed_) > JUDGED_CHANGES[0]) & (abs(confirmed_) < JUDGED_CHANGES[1])
-    ratios = predicted[told] / confirmed_[told]
+    is_judged = (abs(confirmed_) > JUDGED_CHANGES[0]) & (abs(confirmed_) < JUDGED_CHANGES[1])
+    ratios = predicted[is_judged] / confirmed_[is_judged]
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0)))
     return Observed(
         "choice_linear.predictions",
@@ -162,7 +166,7 @@ def _identity_row(choices: list[Judged]) -> Row:
         SYSTEM,
         "difference of the variance of what is left, from the whole scene's covariance and the "
         "reduced adjoint, from the reduced covariance, worst of all scenes",
-        max(each.identity for each in choices),
+        max(judged_choice.identity for judged_choice in choices),
         "",
     ).at_most(1e-12, "asked; an identity", "closed form")
 
@@ -170,9 +174,11 @@ def _identity_row(choices: list[Judged]) -> Row:
 def _equal_rows(choices: list[Judged]) -> list[Row]:
     """Rows over all scenes: whether the tolerance holds near each scene as well, and the saving, both by routes that
     the choice itself does not use."""
-    told = sum(bool(each.choice.said) and not each.choice.left_out for each in choices)
-    gaps = [abs(each.saving / each.measured - 1.0) for each in choices]
-    saving = [each for each in choices if each.choice.left_out]
+    told_in_advance = sum(
+        bool(judged_choice.choice.said) and not judged_choice.choice.left_out for judged_choice in choices
+    )
+    gaps = [abs(judged_choice.saving / judged_choice.measured - 1.0) for judged_choice in choices]
+    saving = [judged_choice for judged_choice in choices if judged_choice.choice.left_out]
     return [
         Observed(
             "choice_linear.nearby",
@@ -180,14 +186,14 @@ def _equal_rows(choices: list[Judged]) -> list[Row]:
             f"largest ratio of the change to the tolerance in {len(saving)} of {len(choices)} scenes in "
             f"which effects were left out, {DRAWS} random speeds each, every mass, stiffness and "
             "damping up to 5 % off at random",
-            max(each.nearby for each in choices),
+            max(judged_choice.nearby for judged_choice in choices),
             "",
         ).at_most(1.0, "the tolerance holds nearby, too, or nothing is left out", "native"),
         Observed(
             "choice_linear.said",
             SYSTEM,
             f"share of {len(choices)} scenes in which all effects that could go were refused with a reason",
-            told / len(choices),
+            told_in_advance / len(choices),
             "",
         ).at_most(0.1, "asked: at most a tenth", "none"),
         Observed(
@@ -208,7 +214,7 @@ def _equal_rows(choices: list[Judged]) -> list[Row]:
             "choice_linear.saves",
             SYSTEM,
             "choices that leave effects out and save no calls",
-            str(sum(each.saving < 1.0 + EQUAL_COST_LOG for each in saving)),
+            str(sum(judged_choice.saving < 1.0 + EQUAL_COST_LOG for judged_choice in saving)),
             "0",
             "what saves nothing stays in",
             "none",
@@ -217,7 +223,7 @@ def _equal_rows(choices: list[Judged]) -> list[Row]:
 
 
 def _saving_row(choices: list[Judged]) -> Row:
-    saved = [each.saving for each in choices if each.scene.tolerance == TOLERANCE]
+    saved = [judged_choice.saving for judged_choice in choices if judged_choice.scene.tolerance == TOLERANCE]
     return Observed(
         "choice_linear.saving",
         SYSTEM,
@@ -337,10 +343,10 @@ def _summary_of_choice(judged_choice: Judged) -> dict[str, Any]:
     }
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """The choices by how they fared."""
-    scenes = data["scenes"]
-    saved = np.array([each["saving"] for each in scenes])
+    scenes = case_data["scenes"]
+    saved = np.array([judged_choice["saving"] for judged_choice in scenes])
     rows = tuple((f"{share:g} %", f"{np.percentile(saved, share):.3g}") for share in (10, 25, 50, 75, 90))
     note = (
         f"Ratio of calls of the whole scene to calls of what is left, at equal accuracy, {len(scenes)} scenes with "
@@ -349,13 +355,14 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("What choosing effects saves", note, ("percentile", "times fewer calls"), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot predicted over confirmed changes, and the saved computing time over the tolerance."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     predicted, confirmed_ = (
-        100 * abs(np.array([v for each in data["scenes"] for v in each[key]])) for key in PREDICTED_CONFIRMED
+        100 * abs(np.array([v for judged_choice in case_data["scenes"] for v in judged_choice[key]]))
+        for key in PREDICTED_CONFIRMED
     )
     ends = np.array([1e-4, 12.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
@@ -368,7 +375,9 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         title="All that was left out, together",
     )
     left.legend(loc="upper left")
-    tolerance, saving = (np.array([each[key] for each in data["scenes"]]) for key in ("tolerance", "saving"))
+    tolerance, saving = (
+        np.array([judged_choice[key] for judged_choice in case_data["scenes"]]) for key in ("tolerance", "saving")
+    )
     right.plot(100 * tolerance, saving, "o", ms=4, color=VERMILION)
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
     add_heading(figure, "Choice in ride: changes as predicted and as confirmed, and calls saved")

@@ -31,7 +31,7 @@ NOISY_RIDE, FINE_TOLERANCE = 4, 0.005
 """A ride, and a tolerance for which its copies are too few if they are the fewest."""
 RESAMPLED, UNSURE = 4000, 0.0015
 """Of copies, to tell what they are sure of: this quantile is left below."""
-QUICK = (0, 2, 3)
+QUICK_SCENES = (0, 2, 3)
 """Scenes of the pitch plane alone in the quick share, by both implementations."""
 JUDGED_CHANGES = (1e-4, 0.05)
 """Confirmed changes whose predictions are judged: as for linear scenes."""
@@ -50,10 +50,10 @@ def judged_ride(asked: BentRide) -> JudgedByRuns:
     engine = ENGINES["ride"][0]
     choice = Chooser(asked.opened(), engine, list(asked.quantities), asked.tolerance).choose()
     fresh = Variants(asked.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
-    whole, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
-    if whole is None or rest is None:
+    full_scene, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
+    if full_scene is None or rest is None:
         return JudgedByRuns("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
-    again = [_least_certain_change(whole.of(name).cases[0], rest.of(name).cases[0]) for name in asked.quantities]
+    again = [_least_certain_change(full_scene.of(name).cases[0], rest.of(name).cases[0]) for name in asked.quantities]
     return JudgedByRuns("ride", engine, asked, choice, np.array(again))
 
 
@@ -70,7 +70,7 @@ def _least_certain_change(full_mean_squares: np.ndarray, reduced: np.ndarray) ->
 @allowing_breaches("random scenes: whether what is left changes them as foretold is judged")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Random scenes of four systems; the quick share has three of the pitch plane."""
-    seeds = {"pitch-plane": QUICK} if quick else {system: range(count) for system, count in COUNTS.items()}
+    seeds = {"pitch-plane": QUICK_SCENES} if quick else {system: range(count) for system, count in COUNTS.items()}
     choices = [judged(system, seed) for system, seeds_of in seeds.items() for seed in seeds_of]
     rows = [
         *_row_of_kept_tolerances(choices),
@@ -78,20 +78,26 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         *(row for system in seeds for row in _saving(choices, system)),
     ]
     rows += [] if quick else [_refused()]
-    return rows, {"scenes": [_summary_of_choice(each) for each in choices], "systems": list(seeds)}
+    return rows, {"scenes": [_summary_of_choice(judged_choice) for judged_choice in choices], "systems": list(seeds)}
 
 
 def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
-    kept = float(np.mean([each.choice.within_tolerance and each.is_honest for each in choices]))
+    kept_share = float(
+        np.mean([judged_choice.choice.within_tolerance and judged_choice.is_honest for judged_choice in choices])
+    )
     return [
         Observed(
-            "choice_nonlinear.kept", SYSTEM, f"share of {len(choices)} random scenes whose tolerance is kept", kept, ""
+            "choice_nonlinear.kept",
+            SYSTEM,
+            f"share of {len(choices)} random scenes whose tolerance is kept",
+            kept_share,
+            "",
         ).within(1.0, 0.05, "asked: at least 95 of 100", "none"),
         Observed(
             "choice_nonlinear.honest",
             SYSTEM,
             "choices that are reported as kept although two more runs show that they are not",
-            float(sum(not each.is_honest for each in choices)),
+            float(sum(not judged_choice.is_honest for judged_choice in choices)),
             "",
         ).at_most(0.0, "asked: never", "none"),
     ]
@@ -100,17 +106,17 @@ def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
 def _refused() -> Row:
     """Row: a choice is refused for a ride with few copies and a fine tolerance, since random scatter could exceed this
     tolerance."""
-    asked, said = drawn_bent(NOISY_RIDE), "a choice"
+    asked, outcome = drawn_bent(NOISY_RIDE), "a choice"
     try:
         Chooser(asked.opened(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE).choose()
     except InputError as error:
-        said = "refused" if "samples would tell" in error.allowed else error.allowed
+        outcome = "refused" if "samples would tell" in error.allowed else error.allowed
     return behaviour_row(
         "choice_nonlinear.refused",
         SYSTEM,
         f"choice for a ride of {FEWEST_COPIES} copies at a tolerance of {100 * FINE_TOLERANCE:g} %, where chance may "
         "add more than that",
-        said,
+        outcome,
         "refused",
         "and how many samples would tell",
     )
@@ -120,8 +126,8 @@ def _pairs(choices: list[JudgedByRuns]) -> np.ndarray:
     """Predicted and confirmed changes (n, 2) of all quantities whose change is significant and below 5 %."""
     pairs = [
         (p, c)
-        for each in choices
-        for p, c in zip(each.choice.predicted_change, each.choice.confirmed_change, strict=True)
+        for judged_choice in choices
+        for p, c in zip(judged_choice.choice.predicted_change, judged_choice.choice.confirmed_change, strict=True)
     ]
     return np.array([pair for pair in pairs if JUDGED_CHANGES[0] < pair[1] < JUDGED_CHANGES[1]]).reshape(-1, 2)
 
@@ -130,18 +136,18 @@ def _predictions(choices: list[JudgedByRuns], quick: bool) -> Row:
     ratios = np.divide(*_pairs(choices).T)
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0))) if len(ratios) else 1.0
     name, asked = "choice_nonlinear.predictions", "asked: within a factor of 2"
-    said = f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones"
+    quantity = f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones"
     if quick:  # too few for a share
-        return Observed(name, SYSTEM, said, share, "").beside(
+        return Observed(name, SYSTEM, quantity, share, "").beside(
             "1 within 0.05", f"{asked}; judged in the full share", "none"
         )
-    return Observed(name, SYSTEM, said, share, "").within(1.0, 0.05, asked, "none")
+    return Observed(name, SYSTEM, quantity, share, "").within(1.0, 0.05, asked, "none")
 
 
 def _saving(choices: list[JudgedByRuns], system: str) -> list[Row]:
-    of_system = [each for each in choices if each.system == system]
-    calls = np.array([each.choice.calls for each in of_system], float)
-    seconds = np.array([each.choice.seconds for each in of_system])
+    of_system = [judged_choice for judged_choice in choices if judged_choice.system == system]
+    calls = np.array([judged_choice.choice.calls for judged_choice in of_system], float)
+    seconds = np.array([judged_choice.choice.seconds for judged_choice in of_system])
     name = f"choice_nonlinear.saving.{system}"
     note = "steps within a sample alone may grow" if system == "braking" else "it depends on the step that a scene has"
     return [
@@ -187,21 +193,24 @@ def _summary_of_choice(judged_choice: JudgedByRuns) -> Saved:
     }
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Savings by system, and which effects went how often."""
     rows = []
-    for system in data["systems"]:
-        of_system = [each for each in data["scenes"] if each["system"] == system]
-        saved = [each["calls"][0] / each["calls"][2] for each in of_system]
-        alone = [each["calls"][0] / each["calls"][1] for each in of_system]
-        faster = [each["seconds"][0] / each["seconds"][2] for each in of_system]
-        went = sorted({name for each in of_system for name in each["left out"]})
+    for system in case_data["systems"]:
+        of_system = [judged_choice for judged_choice in case_data["scenes"] if judged_choice["system"] == system]
+        saved = [judged_choice["calls"][0] / judged_choice["calls"][2] for judged_choice in of_system]
+        alone = [judged_choice["calls"][0] / judged_choice["calls"][1] for judged_choice in of_system]
+        faster = [judged_choice["seconds"][0] / judged_choice["seconds"][2] for judged_choice in of_system]
+        went = sorted({name for judged_choice in of_system for name in judged_choice["left out"]})
         rows.append(
             (
                 system,
                 str(len(of_system)),
                 *(f"{np.median(values):.3g}" for values in (saved, alone, faster)),
-                ", ".join(f"{name} {sum(name in each['left out'] for each in of_system)}" for name in went) or "none",
+                ", ".join(
+                    f"{name} {sum(name in judged_choice['left out'] for judged_choice in of_system)}" for name in went
+                )
+                or "none",
             )
         )
     heads = ("system", "scenes", "fewer calls", "by steps alone", "fewer CPU seconds", "effects left out, how often")
@@ -212,23 +221,24 @@ def tables(data: Saved) -> list[Table]:
     return [Table("What choosing effects and steps saves", note, heads, tuple(rows))]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot predicted over confirmed changes, and savings over the tolerance."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     ends = np.array([1e-4, 6.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
-    for i, system in enumerate(data["systems"]):
-        of_system = [each for each in data["scenes"] if each["system"] == system]
+    for i, system in enumerate(case_data["systems"]):
+        of_system = [judged_choice for judged_choice in case_data["scenes"] if judged_choice["system"] == system]
         predicted, confirmed = (
-            100 * np.array([value for each in of_system for value in each[key]]) for key in ("predicted", "confirmed")
+            100 * np.array([value for judged_choice in of_system for value in judged_choice[key]])
+            for key in ("predicted", "confirmed")
         )
         left.plot(confirmed.clip(ends[0]), predicted.clip(ends[0]), "os^D"[i], ms=4, color=f"C{i}", label=system)
         shift = 1.06 ** (i - 1)
         right.plot(
-            [100 * each["tolerance"] * shift for each in of_system],
-            [each["calls"][0] / each["calls"][2] for each in of_system],
+            [100 * judged_choice["tolerance"] * shift for judged_choice in of_system],
+            [judged_choice["calls"][0] / judged_choice["calls"][2] for judged_choice in of_system],
             "os^D"[i],
             ms=4,
             color=f"C{i}",

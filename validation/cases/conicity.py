@@ -29,22 +29,22 @@ Y = np.linspace(-8.0, 8.0, 161)
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Closed forms and the standard's tables; in full also wheels of profiles that are not alike."""
     rows = [*_closed_forms(), _cubic(), _refused()]
-    told: dict[str, Any] = {}
+    saved_data: dict[str, Any] = {}
     for name in PROFILES:
         of_standard, saved = _standard(name)
         rows += of_standard
-        told |= saved
+        saved_data |= saved
     if not quick:
         rows += _mirrored_profiles()
-    return rows, {"standard": told}
+    return rows, {"standard": saved_data}
 
 
-def _relative_error(period: float, exact: float) -> float:
-    return abs(period / exact - 1.0)
+def _relative_error(wave_period: float, exact: float) -> float:
+    return abs(wave_period / exact - 1.0)
 
 
-def _closed_form_row(id: str, quantity: str, off: float, why: str) -> Row:
-    return Observed(f"conicity.{id}", SYSTEM, quantity, off, "").at_most(ROUNDING, why, "closed form")
+def _closed_form_row(id: str, quantity: str, off: float, tolerance_reason: str) -> Row:
+    return Observed(f"conicity.{id}", SYSTEM, quantity, off, "").at_most(ROUNDING, tolerance_reason, "closed form")
 
 
 def _closed_forms() -> list[Row]:
@@ -99,13 +99,14 @@ def _closed_forms() -> list[Row]:
     ]
 
 
-def two_slopes(inner: float, outer: float, bend: float, amplitude: float) -> float:
-    """Period of the wave where the radius difference dr has the slope ``inner`` up to ``bend``, and ``outer`` beyond
-    it. The amplitude is larger than ``bend``."""
-    rest = inner * bend / outer
+def two_slopes(inner_slope: float, outer: float, bend: float, amplitude: float) -> float:
+    """Period of the wave where the radius difference dr has the slope ``inner_slope`` up to ``bend``, and ``outer``
+    beyond it. The amplitude is larger than ``bend``.
+    """
+    rest = inner_slope * bend / outer
     deep, root = amplitude - bend + rest, math.sqrt(outer)
     speed = root * math.sqrt(deep**2 - rest**2)
-    within = math.atan(math.sqrt(inner) * bend / speed) / math.sqrt(inner)
+    within = math.atan(math.sqrt(inner_slope) * bend / speed) / math.sqrt(inner_slope)
     return 4.0 * (within + math.acos(rest / deep) / root)
 
 
@@ -197,11 +198,11 @@ def _mirrored_profiles() -> list[Row]:
     ]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot both conicities of the standard's profiles with the standard's limits."""
     from models.drawing.figures import BLUE, VERMILION, add_heading, legend_below, panels
 
-    standard = data["standard"]
+    standard = case_data["standard"]
     if not standard:
         return []
     figure, axes = panels(len(standard), 2, 2.6)

@@ -39,12 +39,12 @@ COUNTS = (1, 4, 8)
 EVALUATIONS = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
 """Calls of the callback per step."""
 ENGINE_NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
-NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
+THEORY_NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
 ENGINES = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
-ROUNDS, FIGURE_ROUNDS = 48, 6
+TIMING_ROUNDS, FIGURE_ROUNDS = 48, 6
 """Rounds of what rows tell, timed by itself, as work between its turns slows short ones; of all, for the table."""
 SHORTEST_TURN = 0.001
-WHY = "median of the ratios within interleaved rounds, seconds of the processor; start of a run taken out"
+TIMING_NOTE = "median of the ratios within interleaved rounds, seconds of the processor; start of a run taken out"
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Setup:
         if self.law is None:
             return "no contact" if self.bridge == "none" else "empty callback"
         theory, cells = self.law
-        return f"FASTSIM, {cells} cells" if theory == "fastsim" else NAMES[theory]
+        return f"FASTSIM, {cells} cells" if theory == "fastsim" else THEORY_NAMES[theory]
 
     @property
     def told(self) -> bool:
@@ -92,44 +92,46 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, data
     setups = every()
-    told = [each for each in setups if each.told]
-    rows += _price_rows(Prices([*told, *(each.without for each in told)], ROUNDS))
+    listed_setups = [setup for setup in setups if setup.told]
+    rows += _price_rows(Prices([*listed_setups, *(setup.without for setup in listed_setups)], TIMING_ROUNDS))
     shown = Prices(setups, FIGURE_ROUNDS)
-    return rows, {**data, "points": [shown.point(each) for each in setups]}
+    return rows, {**data, "points": [shown.point(setup) for setup in setups]}
 
 
 def every() -> list[Setup]:
     """All set-ups."""
     setups = []
     for engine, (usual, fine) in ENGINES.items():
-        best, *others = ("native", "jitted", "plain") if engine == "mujoco" else (*ROUTES, "plain")
+        best, *other_bridges = ("native", "jitted", "plain") if engine == "mujoco" else (*ROUTES, "plain")
         for method, count in (*((usual, count) for count in COUNTS), (fine, 4)):
             setups += [Setup(engine, method, bridge, None, count) for bridge in ("none", "empty")]
             setups += [Setup(engine, method, best, law, count) for law in (LAWS if method == usual else (MAIN,))]
-        setups += [Setup(engine, method, other, MAIN, 4) for method in (usual, fine) for other in others]
+        setups += [
+            Setup(engine, method, other_bridge, MAIN, 4) for method in (usual, fine) for other_bridge in other_bridges
+        ]
     return [*setups, Setup("mujoco", "Euler", "plain", LAWS[-1], 4)]
 
 
 class Prices:
     """Measured times (s) of every round: per step for each set-up, and per evaluation of the forces on all wheels."""
 
-    def __init__(self, setups: list[Setup], rounds: int) -> None:
+    def __init__(self, setups: list[Setup], round_count: int) -> None:
         self.setups = setups
-        kernels = sorted({(each.law, each.count) for each in setups if each.law is not None})
-        runs, loops = [_job(each) for each in setups], [_kernel_job(law, count) for law, count in kernels]
+        kernels = sorted({(setup.law, setup.count) for setup in setups if setup.law is not None})
+        runs, loops = [_job(setup) for setup in setups], [_kernel_job(law, count) for law, count in kernels]
         jobs = [part for march, steps in runs for part in (partial(march, steps), partial(march, 1))]
-        seconds = interleave([*jobs, *(job for job, _ in loops)], rounds, SHORTEST_TURN, clock=time.process_time)
-        whole, first, alone = seconds[: len(jobs) : 2], seconds[1 : len(jobs) : 2], seconds[len(jobs) :]
+        seconds = interleave([*jobs, *(job for job, _ in loops)], round_count, SHORTEST_TURN, clock=time.process_time)
+        full_time, first, alone = seconds[: len(jobs) : 2], seconds[1 : len(jobs) : 2], seconds[len(jobs) :]
         self._steps = {
-            each: (a, b, steps - 1) for each, a, b, (_, steps) in zip(setups, whole, first, runs, strict=True)
+            setup: (a, b, steps - 1) for setup, a, b, (_, steps) in zip(setups, full_time, first, runs, strict=True)
         }
-        self._calls = {kernel: each / calls for kernel, each, (_, calls) in zip(kernels, alone, loops, strict=True)}
+        self._calls = {kernel: setup / calls for kernel, setup, (_, calls) in zip(kernels, alone, loops, strict=True)}
 
     def rounds(self, setup: Setup) -> tuple[Any, Any, Any]:
         """Times (s) of each round: of a step, of a step without contact (the engine's share), and of the contact kernel
         in a step."""
         step, bare = (
-            (whole - first) / steps for whole, first, steps in (self._steps[setup], self._steps[setup.without])
+            (full_time - first) / steps for full_time, first, steps in (self._steps[setup], self._steps[setup.without])
         )
         calls = 1 if setup.bridge == "before each step" else EVALUATIONS[setup.method]
         return step, bare, 0.0 if setup.law is None else calls * self._calls[setup.law, setup.count]
@@ -137,7 +139,7 @@ class Prices:
     def point(self, setup: Setup) -> dict[str, Any]:
         """Median time (s) of a step, its parts for engine, kernel and bridge, and the bridge's share of it."""
         a, b, c = self.rounds(setup)
-        step, bare, kernel = (float(np.median(part)) for part in (a, b, c))
+        step, bare, kernel = (float(np.median(round_times)) for round_times in (a, b, c))
         share = median((a - b - c) / a)
         return {
             "engine": setup.engine,
@@ -155,17 +157,17 @@ class Prices:
         }
 
 
-def _kernel_job(law: tuple[str, int], count: int) -> tuple[Callable[[], Any], int]:
-    wheels = Setup("", "", "native", law, count).wheels()
+def _kernel_job(law: tuple[str, int], wheel_count: int) -> tuple[Callable[[], Any], int]:
+    wheels = Setup("", "", "native", law, wheel_count).wheels()
     q, v = wheels.state()
     f, numbers, calls = np.zeros(wheels.size), wheels.numbers, 4 if law[0] == "simplified" else 200
     return lambda: _repeat(numbers, q, v, f, calls), calls
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat(numbers, q, v, f, times):
-    for _ in range(times):
-        forces(start(numbers), 0.0, start(q), start(v), start(f))
+def _repeat(table_of_wheels, q, v, force_sum, repeats):
+    for _ in range(repeats):
+        forces(start(table_of_wheels), 0.0, start(q), start(v), start(force_sum))
 
 
 def _job(setup: Setup) -> tuple[Callable[[int], Any], int]:
@@ -213,12 +215,12 @@ def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
     """A contact law that calls the Python functions of the library: FASTSIM, or the simplified theory of 1983."""
     bodies = separate(wheels.bodies) if wheels.theory == "simplified" else None
 
-    def add(numbers: Array, q: Array, v: Array, f: Array) -> None:
+    def add(table_of_wheels: Array, q: Array, v: Array, force_sum: Array) -> None:
         pressed: Any
         creep: Any
-        for k, (place, rate) in enumerate(zip(q.view(FREEDOM), v.view(FREEDOM), strict=True)):
-            approach, mu, speed = wheels.sunk + place["z"], wheels.mu, wheels.speed
-            slip = rate["x"] / speed, rate["y"] / speed - place["yaw"], rate["yaw"] / speed
+        for k, (position, rate) in enumerate(zip(q.view(FREEDOM), v.view(FREEDOM), strict=True)):
+            approach, mu, speed = wheels.sunk + position["z"], wheels.mu, wheels.speed
+            slip = rate["x"] / speed, rate["y"] / speed - position["yaw"], rate["yaw"] / speed
             if bodies is not None:
                 pressed = press(bodies, wheels.pair, approach=approach)
                 creep = roll(pressed, mu, *slip, cells=wheels.cells)
@@ -226,7 +228,7 @@ def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
                 pressed = by_approach(*wheels.curvatures, approach, wheels.pair)
                 ellipse = RollingEllipse(pressed.a, pressed.b, pressed.load, mu, *slip)
                 creep = fastsim(ellipse, wheels.pair, cells=wheels.cells)
-            f[FREEDOMS * k : FREEDOMS * (k + 1)] += creep.fx, creep.fy, wheels.load - pressed.load, creep.mz
+            force_sum[FREEDOMS * k : FREEDOMS * (k + 1)] += creep.fx, creep.fy, wheels.load - pressed.load, creep.mz
 
     return add
 
@@ -248,7 +250,7 @@ def _price_rows(prices: Prices) -> list[Row]:
             f"{ENGINE_NAMES[setup.engine]}, {setup.method}: {what}, step with FASTSIM at four wheels (21 x 21, native, "
             f"{spelled(step, 1e6)} us), 95 % interval {low:.3f} to {high:.3f}"
         )
-        rows.append(Observed(name, SYSTEM, what, value, "").aim(bound, WHY))
+        rows.append(Observed(name, SYSTEM, what, value, "").aim(bound, TIMING_NOTE))
     return rows
 
 
@@ -275,7 +277,7 @@ def _agreement_row() -> Row:
     q, v = wheels.state()
     with installed(kernel_law(forces)):
         path = Marcher(model(wheels, 1e-4, "RK4")).run(np.concatenate((q, v))[None], steps)[0]
-    other = Rolling(wheels, Forces(wheels).of).run(q, v, steps, 1e-4, "RK44")
+    by_engine = Rolling(wheels, Forces(wheels).of).run(q, v, steps, 1e-4, "RK44")
     size = wheels.size
     scale = np.repeat([np.abs(path[:, :size]).max(), np.abs(path[:, size:]).max()], size)
     return Observed(
@@ -283,22 +285,22 @@ def _agreement_row() -> Row:
         SYSTEM,
         "difference of the state after 0.1 s with FASTSIM in MuJoCo from that in Exudyn, over the "
         "largest displacement or rate",
-        float((np.abs(path[-1] - other) / scale).max()),
+        float((np.abs(path[-1] - by_engine) / scale).max()),
         "",
     ).at_most(1e-10, "the same kernel and method; what differs is rounding", "shared kernel")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Every cost per step, and runs at low speed."""
-    slow = slow_wheels.table(data["slow"])
-    if "points" not in data:
+    slow = slow_wheels.table(case_data["slow"])
+    if "points" not in case_data:
         return [slow]
     note = (
         "Microseconds per step, median of interleaved rounds, that of the step with its 95 % interval; "
         "start of a run taken out. Kernel: the forces of all wheels in a compiled loop, times the calls per step. "
         "Bridge: what the step takes beyond the engine's own and the kernel, for plain Python its slower kernel "
         "too. Share: of the bridge in the step, median of the rounds with its 95 % interval. Rows time what they "
-        f"tell by itself, in {ROUNDS} rounds; here are {FIGURE_ROUNDS} of all."
+        f"tell by itself, in {TIMING_ROUNDS} rounds; here are {FIGURE_ROUNDS} of all."
     )
     heads = ("engine", "method", "wheels", "bridge", "law", "step", "engine's own", "kernel", "bridge's", "share [%]")
     rows = tuple(
@@ -309,18 +311,18 @@ def tables(data: dict[str, Any]) -> list[Table]:
             p["bridge"],
             p["law"],
             "{:.2f} ({:.2f} to {:.2f})".format(*(1e6 * value for value in (p["step"], *p["range"]))),
-            *(f"{1e6 * p[part]:.2f}" for part in ("own", "kernel", "over")),
+            *(f"{1e6 * p[part_name]:.2f}" for part_name in ("own", "kernel", "over")),
             "{:.0f} ({:.0f} to {:.0f})".format(*(100.0 * share for share in p["share"])),
         )
-        for p in data["points"]
+        for p in case_data["points"]
     )
     return [Table("Cost per step of a contact kernel inside an engine", note, heads, rows), slow]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot cost per step for each law, and shares of engine, kernel and bridge."""
-    if "points" not in data:
+    if "points" not in case_data:
         return []
     from validation.contact.contact_bridges_figure import figure
 
-    return [("Contact kernels inside the engines: cost per step by law, and its shares", figure(data["points"]))]
+    return [("Contact kernels inside the engines: cost per step by law, and its shares", figure(case_data["points"]))]

@@ -23,11 +23,11 @@ TITLE = "Creepage and spin coefficients of the linear theory"
 SYSTEM: System = "contact"
 CELLS = 10
 """Cells per axis of the coarsest grid; the others have twice and four times as many. A long axis has more."""
-NAMES = ("C11", "C22", "C23", "C33")
+COEFFICIENT_NAMES = ("C11", "C22", "C23", "C33")
 BOUNDS = {"C11": 0.015, "C22": 0.015, "C23": 0.015, "C33": 0.05}
 """Of the published table, against the exact theory; C33 has twice as much beyond a/b = 0.2 to 5."""
 NUS = (0.0, 0.25, 0.5)
-QUICK = (0.8, 2.0)
+QUICK_RATIOS = (0.8, 2.0)
 MISPRINT = 1.15
 """C23 at a/b = 0.8, nu = 1/4 as some copies of the table have it; 1.25 is right."""
 INNER, RESIDUAL = 3e-6, 1e-4
@@ -44,7 +44,7 @@ SLENDER = (
     (30.0, 0.5),
 )
 """Ratios a/b beyond the table, and Poisson's ratios."""
-WHY = "the same continuum problem solved on cells, extrapolated to none"
+REFERENCE_NOTE = "the same continuum problem solved on cells, extrapolated to none"
 
 
 def exact(ratio: float, nu: float, cells: int = CELLS) -> Array:
@@ -84,7 +84,7 @@ def _on_grid(ratio: float, nu: float, cells: int) -> Array:
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for the nodes of the table and the planted misprint; in the full run between and beyond the nodes, too."""
-    ratios, nus = (QUICK, (0.25,)) if quick else (RATIOS.tolist(), NUS)
+    ratios, nus = (QUICK_RATIOS, (0.25,)) if quick else (RATIOS.tolist(), NUS)
     nodes = [[ratio, nu, *exact(ratio, nu)] for ratio in ratios for nu in nus]
     data: dict[str, Any] = {"nodes": nodes}
     rows = [*_node_rows(np.array(nodes)), _misprint(np.array(nodes))]
@@ -109,14 +109,14 @@ def _node_rows(nodes: Array) -> list[Row]:
     middle = (nodes[:, 0] > 0.19) & (nodes[:, 0] < 5.1)
     rows = [
         _worst_difference_row(name, off[middle, i], nodes[middle], "a/b 0.2 to 5", BOUNDS[name])
-        for i, name in enumerate(NAMES)
+        for i, name in enumerate(COEFFICIENT_NAMES)
     ]
     if not middle.all():
         rows += [
             _worst_difference_row(
                 name, off[~middle, i], nodes[~middle], "a/b 0.1 and 10", BOUNDS[name] * (1 + (name == "C33"))
             )
-            for i, name in enumerate(NAMES)
+            for i, name in enumerate(COEFFICIENT_NAMES)
         ]
     return rows
 
@@ -130,7 +130,7 @@ def _worst_difference_row(name: str, off: Array, nodes: Array, where: str, bound
         f"of {len(off)}, at a/b {ratio:.4g}, nu {nu:g}",
         float(off.max()),
         "",
-    ).at_most(bound, WHY, "published")
+    ).at_most(bound, REFERENCE_NOTE, "published")
 
 
 def _misprint(nodes: Array) -> Row:
@@ -163,11 +163,11 @@ def _between_rows(interpolated: Array, nodes: Array) -> list[Row]:
             f"contact_coefficients.between.{span}.{name}",
             SYSTEM,
             f"largest error of the interpolation of {name} half-way between tabulated {span}",
-            float(off[part, i].max()),
+            float(off[span_columns, i].max()),
             "",
         ).at_most(0.01, why, "native")
-        for span, part in spans.items()
-        for i, name in enumerate(NAMES)
+        for span, span_columns in spans.items()
+        for i, name in enumerate(COEFFICIENT_NAMES)
     ]
 
 
@@ -179,7 +179,7 @@ def _beyond_rows(beyond: Array) -> list[Row]:
     asymptotes, nodes = "Kalker's asymptotes, led on from the table", "nodes by the same theory; 30 lies between them"
     parts = [
         (f"beyond.{name}", f"{name} at a/b {_span(beyond)}", off[:, i], 0.03, asymptotes)
-        for i, name in enumerate(NAMES[:3])
+        for i, name in enumerate(COEFFICIENT_NAMES[:3])
     ]
     parts += [
         ("beyond.C33", f"C33 at a/b {_span(beyond[~long])}", off[~long, 3], 0.03, asymptotes),
@@ -187,13 +187,13 @@ def _beyond_rows(beyond: Array) -> list[Row]:
     ]
     return [
         Observed(
-            f"contact_coefficients.{place}",
+            f"contact_coefficients.{region}",
             SYSTEM,
             f"largest difference of {what} from the exact theory",
             float(values.max()),
             "",
         ).at_most(bound, why, "native")
-        for place, what, values, bound, why in parts
+        for region, what, values, bound, why in parts
     ]
 
 
@@ -202,31 +202,34 @@ def _span(rows: Array) -> str:
     return ", ".join(f"{ratio:g}" if ratio >= 1 else f"1/{1 / ratio:g}" for ratio in np.unique(rows[:, 0]))
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Deviation of the table from the exact theory, node by node at nu = 1/4."""
-    nodes = np.array(data["nodes"])
+    nodes = np.array(case_data["nodes"])
     some = nodes[nodes[:, 1] == 0.25]
     rows = tuple(
-        (f"{node[0]:.4g}", *(f"{value:.4g} ({100 * part:+.2f} %)" for value, part in zip(node[2:], parts, strict=True)))
+        (
+            f"{node[0]:.4g}",
+            *(f"{value:.4g} ({100 * part_name:+.2f} %)" for value, part_name in zip(node[2:], parts, strict=True)),
+        )
         for node, parts in zip(some, deviation(some), strict=True)
     )
     note = (
         "Coefficients of the exact theory, nu = 1/4, and how far the published table is above them. C33 of the "
         "table was recalled, not read."
     )
-    return [Table("Kalker's coefficients by the exact theory", note, ("a/b", *NAMES), rows)]
+    return [Table("Kalker's coefficients by the exact theory", note, ("a/b", *COEFFICIENT_NAMES), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot coefficients over the axis ratio, and the library's deviation from the exact theory."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))
     ratio = np.geomspace(0.01, 100.0, 201)
     c = coefficients(ratio, 0.25)
-    solved = np.array([row for part in data.values() for row in part])
+    solved = np.array([row for part_name in case_data.values() for row in part_name])
     quarter = solved[np.abs(solved[:, 1] - 0.25) < 0.04]
-    for i, (name, curve) in enumerate(zip(NAMES, (c.c11, c.c22, c.c23, c.c33), strict=True)):
+    for i, (name, curve) in enumerate(zip(COEFFICIENT_NAMES, (c.c11, c.c22, c.c23, c.c33), strict=True)):
         left.loglog(ratio, curve, color=f"C{i}", label=name)
         left.loglog(quarter[:, 0], quarter[:, 2 + i], "o", color=f"C{i}", markersize=3.5)
         right.semilogx(solved[:, 0], 100 * deviation(solved)[:, i], "o", color=f"C{i}", markersize=3.5, label=name)

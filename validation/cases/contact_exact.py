@@ -18,10 +18,10 @@ from validation.common.scenes import data_folder
 
 TITLE = "The exact theory of contact on cells"
 SYSTEM: System = "contact"
-PAIR, MU, LOAD, SIZE = MaterialPair(), 0.3, 8e4, 5e-3
+MATERIAL_PAIR, MU, LOAD, CONTACT_SIZE = MaterialPair(), 0.3, 8e4, 5e-3
 """Materials, friction, N, and sqrt(ab) in m."""
-LIMIT = MU * LOAD
-SAMPLE = "contact_sample.csv"
+FRICTION_LIMIT = MU * LOAD
+SAMPLE_FILE = "contact_sample.csv"
 STRIP = 0.02
 """a/b of the ellipse whose middle is nearly a cylinder's."""
 CASES: dict[str, tuple[float, float, float, float]] = {
@@ -35,9 +35,9 @@ CASES: dict[str, tuple[float, float, float, float]] = {
     "spin, long": (5.0, 0.0, 0.0, 0.15),
 }
 """a/b, creepages divided by mu N / (G ab), spin divided by mu N / (G (ab)^(3/2))."""
-DRAWN, SEED = 12, 47
+DRAWN_CONTACTS, SEED = 12, 47
 """Contacts that are drawn to see whether the solver converges: ellipses, creepages with spin and cells at random."""
-SHARE = 0.0075
+ERROR_SHARE = 0.0075
 """Of mu N: the error that 40 cells along each axis are said to have at most, 80 half of it."""
 
 
@@ -60,18 +60,28 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + sample_rows, {"refined": refined, "sample": sample, "strip": _strip(40, 0.5)[:2]}
 
 
-def _row(name: str, words: str, value: float, bound: float, why: str, unit: str = "", side: Any = "closed form") -> Row:
-    return Observed(f"contact_exact.{name}", SYSTEM, words, value, unit).at_most(bound, why, side)
+def _row(
+    name: str,
+    quantity: str,
+    largest_error: float,
+    bound: float,
+    tolerance_reason: str,
+    unit: str = "",
+    independence: Any = "closed form",
+) -> Row:
+    return Observed(f"contact_exact.{name}", SYSTEM, quantity, largest_error, unit).at_most(
+        bound, tolerance_reason, independence
+    )
 
 
 def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, Array]:
     """Numerical solution of the normal problem for a Hertzian ellipse with a/b = ratio, and its relative errors (3,) of
     approach, peak pressure and area."""
-    a, b = SIZE * ratio**0.5, SIZE / ratio**0.5
-    truth = by_axes(a, b, PAIR, load=LOAD)
+    a, b = CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5
+    truth = by_axes(a, b, MATERIAL_PAIR, load=LOAD)
     dx, dy = 2 * a / cells, 2 * b / cells
     x, y = centres(cells + 5, dx), centres(cells + 5, dy)
-    solved = solve_normal(float(truth.A) * x**2 + float(truth.B) * y[:, None] ** 2, dx, dy, PAIR, load=LOAD)
+    solved = solve_normal(float(truth.A) * x**2 + float(truth.B) * y[:, None] ** 2, dx, dy, MATERIAL_PAIR, load=LOAD)
     values = np.array([solved.approach, solved.pressure.max(), solved.area])
     return solved, values / [float(truth.approach), float(truth.p0), np.pi * a * b] - 1.0
 
@@ -112,19 +122,19 @@ def carter(x: Array, a: float, share: float) -> Array:
     Carter (1926) as in Johnson, Contact Mechanics, 1985, section 8.3: two semi-ellipses, of which the second fills the
     zone that sticks, a (1 - share) wide each way, at the leading edge.
     """
-    whole = np.sqrt(np.maximum(1 - (x / a) ** 2, 0.0))
+    full_traction = np.sqrt(np.maximum(1 - (x / a) ** 2, 0.0))
     half = a * (1 - share)
-    return whole - half / a * np.sqrt(np.maximum(1 - ((x - (a - half)) / half) ** 2, 0.0))
+    return full_traction - half / a * np.sqrt(np.maximum(1 - ((x - (a - half)) / half) ** 2, 0.0))
 
 
 def _strip(cells: int, share: float) -> tuple[list[float], list[float], float]:
     """For the middle line of a slender ellipse: x/a, traction divided by mu p0, and error of the integrated traction
     relative to full sliding."""
-    b = SIZE / STRIP**0.5
+    b = CONTACT_SIZE / STRIP**0.5
     a = STRIP * b
     pressed = hertzian(a, b, LOAD, cells + 1)  # odd: one strip of cells lies in the middle
     bound = MU * 1.5 * LOAD / (np.pi * a * b)
-    solved = solve_rolling(pressed, MU, 2 * share * bound / PAIR.modulus, 0.0, 0.0, PAIR)
+    solved = solve_rolling(pressed, MU, 2 * share * bound / MATERIAL_PAIR.modulus, 0.0, 0.0, MATERIAL_PAIR)
     traction = -solved.traction[cells // 2, :, 0] / bound
     error = float(traction.sum() * pressed.dx / (np.pi * a / 2) - (1 - (1 - share) ** 2))
     return (pressed.x / a).tolist(), traction.tolist(), error
@@ -149,8 +159,8 @@ def shift(share: float, nu: float, cells: int) -> RollingSolution:
     Cattaneo and Mindlin."""
     body = Material(E=2.1e11, nu=nu)
     pair = MaterialPair(body, body)
-    way = 3 * LIMIT * (2 - nu) / (8 * SIZE * pair.G) * (1 - (1 - share) ** (2 / 3))
-    return solve_shift(hertzian(SIZE, SIZE, LOAD, cells), MU, way, 0.0, pair)
+    shift_distance = 3 * FRICTION_LIMIT * (2 - nu) / (8 * CONTACT_SIZE * pair.G) * (1 - (1 - share) ** (2 / 3))
+    return solve_shift(hertzian(CONTACT_SIZE, CONTACT_SIZE, LOAD, cells), MU, shift_distance, 0.0, pair)
 
 
 def _shift_rows() -> list[Row]:
@@ -159,7 +169,7 @@ def _shift_rows() -> list[Row]:
         _row(
             f"cattaneo.{share:g}",
             f"error of the force on Cattaneo and Mindlin's shifted ball over mu N, {share:g} of sliding",
-            abs(shift(share, 0.0, 40).fx / LIMIT + share),
+            abs(shift(share, 0.0, 40).fx / FRICTION_LIMIT + share),
             1e-3,
             why,
         )
@@ -171,20 +181,23 @@ def roll(name: str, cells: int, sign: float = 1.0, mirrored: float = 1.0) -> Arr
     """Forces (3,) of one of CASES: fx and fy divided by mu N, mz divided by mu N sqrt(ab). The creepages may be
     reversed (``sign``) or mirrored in y."""
     ratio, xi_x, xi_y, spin = CASES[name]
-    creepage = LIMIT / (PAIR.G * SIZE**2) * sign
-    pressed = hertzian(SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, cells)
+    creepage = FRICTION_LIMIT / (MATERIAL_PAIR.G * CONTACT_SIZE**2) * sign
+    pressed = hertzian(CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5, LOAD, cells)
     across = mirrored * creepage
-    solved = solve_rolling(pressed, MU, creepage * xi_x, across * xi_y, across * spin / SIZE, PAIR)
-    return np.array([solved.fx, solved.fy, solved.mz / SIZE]) / LIMIT
+    solved = solve_rolling(pressed, MU, creepage * xi_x, across * xi_y, across * spin / CONTACT_SIZE, MATERIAL_PAIR)
+    return np.array([solved.fx, solved.fy, solved.mz / CONTACT_SIZE]) / FRICTION_LIMIT
 
 
 def _sliding_rows() -> list[Row]:
     """Rows on creepages that are so large that the whole patch slides."""
-    pressed = hertzian(SIZE, SIZE, LOAD, 20)
+    pressed = hertzian(CONTACT_SIZE, CONTACT_SIZE, LOAD, 20)
     rows = []
     for angle in (0.0, 0.7, 2.0):
-        solved = solve_rolling(pressed, MU, np.cos(angle), np.sin(angle), 0.0, PAIR)
-        gap = np.hypot(solved.fx + LIMIT * np.cos(angle), solved.fy + LIMIT * np.sin(angle)) / LIMIT
+        solved = solve_rolling(pressed, MU, np.cos(angle), np.sin(angle), 0.0, MATERIAL_PAIR)
+        gap = (
+            np.hypot(solved.fx + FRICTION_LIMIT * np.cos(angle), solved.fy + FRICTION_LIMIT * np.sin(angle))
+            / FRICTION_LIMIT
+        )
         rows.append(
             _row(
                 f"sliding.{angle:g}",
@@ -195,7 +208,7 @@ def _sliding_rows() -> list[Row]:
                 "half of 0.3 degrees",
             )
         )
-    most = np.hypot(solved.fx, solved.fy) / LIMIT - 1.0
+    most = np.hypot(solved.fx, solved.fy) / FRICTION_LIMIT - 1.0
     return [
         *rows,
         _row("sliding.most", "excess of the force above mu N, over mu N", max(float(most), 0.0), 1e-12, "Coulomb"),
@@ -226,7 +239,7 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
     for name, values in refined.items():
         left = 2.0 * np.linalg.norm(np.diff(np.array(values)[:, 1:3], axis=0), axis=1)
         cells = int(values[-2][0])
-        bound = SHARE * 40 / cells
+        bound = ERROR_SHARE * 40 / cells
         rows.append(
             _row(
                 f"refined.{name.replace(', ', '.').replace(' ', '_')}",
@@ -234,7 +247,7 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
                 float(left[-1]),
                 bound,
                 "as its documentation states",
-                side="none",
+                independence="none",
             )
         )
     total = np.array([np.diff(np.array(v)[:, 1:3], axis=0) for v in refined.values()])
@@ -252,33 +265,42 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
     ]
 
 
-def drawn_case(rng: np.random.Generator) -> tuple[ContactCase, int]:
+def drawn_case(generator: np.random.Generator) -> tuple[ContactCase, int]:
     """A random contact with spin, a/b from 0.2 to 5 and Poisson's ratio from 0 to 0.5, with no forces computed; and 60
     to 120 cells."""
-    ratio, level = (float(np.exp(rng.uniform(np.log(low), np.log(high)))) for low, high in ((0.2, 5.0), (0.1, 10.0)))
-    body = Material(E=2.1e11, nu=float(rng.uniform(0.0, 0.5)))
-    x, y, spin = (float(part) for part in rng.normal(size=3))
-    case = ContactCase(
-        SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, MU, MaterialPair(body, body), "drawn", (x, y, spin), level
+    ratio, level = (
+        float(np.exp(generator.uniform(np.log(low), np.log(high)))) for low, high in ((0.2, 5.0), (0.1, 10.0))
     )
-    return case, int(rng.integers(60, 121))
+    body = Material(E=2.1e11, nu=float(generator.uniform(0.0, 0.5)))
+    x, y, spin = (float(component) for component in generator.normal(size=3))
+    case = ContactCase(
+        CONTACT_SIZE * ratio**0.5,
+        CONTACT_SIZE / ratio**0.5,
+        LOAD,
+        MU,
+        MaterialPair(body, body),
+        "drawn",
+        (x, y, spin),
+        level,
+    )
+    return case, int(generator.integers(60, 121))
 
 
 def _converged_row() -> Row:
     rng, failed = np.random.default_rng(SEED), 0
-    for case, cells in (drawn_case(rng) for _ in range(DRAWN)):
+    for case, cells in (drawn_case(rng) for _ in range(DRAWN_CONTACTS)):
         try:
             solve_rolling(hertzian(case.a, case.b, LOAD, cells), MU, *case.motion, case.pair)
         except RunFailed:
             failed += 1
     return _row(
         "converged",
-        f"{DRAWN} contacts drawn at random, a/b 0.2 to 5, with spin, 60 to 120 cells along each "
+        f"{DRAWN_CONTACTS} contacts drawn at random, a/b 0.2 to 5, with spin, 60 to 120 cells along each "
         "axis: how many the solver gave up",
         float(failed),
         0.0,
         "none is asked for",
-        side="none",
+        independence="none",
     )
 
 
@@ -287,21 +309,21 @@ def _rows_of_contact_sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
     difference."""
     words = "largest difference from the forces of CONTACT's sample (40 cells, error 0.6 %) over mu N"
     folder = data_folder()
-    if folder is None or not (folder / SAMPLE).is_file():
-        return [], [not_run("contact_exact.sample", SYSTEM, words, f"TWINRIG_DATA names no folder with {SAMPLE}")]
-    lines = (folder / SAMPLE).read_text(encoding="utf-8").splitlines()
+    if folder is None or not (folder / SAMPLE_FILE).is_file():
+        return [], [not_run("contact_exact.sample", SYSTEM, words, f"TWINRIG_DATA names no folder with {SAMPLE_FILE}")]
+    lines = (folder / SAMPLE_FILE).read_text(encoding="utf-8").splitlines()
     table = list(csv.DictReader(line for line in lines if not line.startswith("#")))[:: 4 if quick else 1]
     solved = [_differences_from_file(row, 20 if quick else 40) for row in table]
-    force, moment = (max(part[i] for part in solved) for i in (2, 3))
+    force, moment = (max(solved_row[i] for solved_row in solved) for i in (2, 3))
     return solved, [
-        _row("sample", words, force, 0.01, "its own error and ours", side="native"),
+        _row("sample", words, force, 0.01, "its own error and ours", independence="native"),
         _row(
             "sample.moment",
             words.replace("forces", "moments").replace("mu N", "mu N sqrt(ab)"),
             moment,
             0.01,
             "its own error and ours",
-            side="native",
+            independence="native",
         ),
     ]
 
@@ -326,12 +348,12 @@ def _differences_from_file(row: dict[str, str], cells: int) -> list[Any]:
     return [row["kind"], value["a_over_b"], float(force), moment]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Forces over grids, and the sample."""
-    grids = [f"{int(row[0])} cells" for row in next(iter(data["refined"].values()))]
+    grids = [f"{int(row[0])} cells" for row in next(iter(case_data["refined"].values()))]
     rows = tuple(
         (name, *(f"{100 * fx:z.2f}, {100 * fy:z.2f}" for _, fx, fy, _ in values))
-        for name, values in data["refined"].items()
+        for name, values in case_data["refined"].items()
     )
     solved = [
         Table(
@@ -341,10 +363,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
             rows,
         )
     ]
-    if data["sample"]:
+    if case_data["sample"]:
         rows = tuple(
             (f"{ratio:g}", kind, f"{100 * force:.2f}", f"{100 * moment:.2f}")
-            for kind, ratio, force, moment in data["sample"]
+            for kind, ratio, force, moment in case_data["sample"]
         )
         solved.append(
             Table(
@@ -357,12 +379,12 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return solved
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Carter's strip, and how the forces settle with the cells."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
-    x, traction = data["strip"]
+    x, traction = case_data["strip"]
     fine = np.linspace(-1, 1, 801)
     left.plot(fine, carter(fine, 1.0, 0.5), color="0.4", label="Carter")
     left.plot(x, traction, ".", label="40 cells, middle of a/b = 1/50")
@@ -370,7 +392,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     left.set_title("Cylinder at half the creepage of sliding")
     left.set_xticks([-1, -0.5, 0, 0.5, 1])
     left.legend()
-    for name, values in data["refined"].items():
+    for name, values in case_data["refined"].items():
         numbers = np.array(values)
         left_over = np.linalg.norm(np.diff(numbers[:, 1:3], axis=0), axis=1)
         right.loglog(numbers[1:, 0], 100 * left_over, "o-", label=name)

@@ -15,17 +15,17 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row
 TITLE = "Hertz: two smooth bodies touch on an ellipse"
 SYSTEM: System = "contact"
 DIGITS = 60
-BOUND = 1e-10
+RELATIVE_BOUND = 1e-10
 LOAD = 1e5
 PRESSURE, SHORT_SEMI_AXIS = Decimal(10) ** 9, Decimal(1) / 1000
 """Largest pressure (Pa) and short semi-axis (m) of the contacts compared."""
-PAIR = MaterialPair(STEEL, Material(E=7e10, nu=0.33))
+MATERIAL_PAIR = MaterialPair(STEEL, Material(E=7e10, nu=0.33))
 """Steel on aluminium: the combined modulus is exact for any two materials as long as there is no friction."""
 NEAR_CIRCLE = tuple(1.0 - 10.0**-k for k in range(1, 16))
-RANGE = tuple(float(g) for g in 10.0 ** np.linspace(-6, 0, 49))
+AXIS_RATIOS = tuple(float(g) for g in 10.0 ** np.linspace(-6, 0, 49))
 """Ratios of axes: 1e-4 and a curvature ratio of 1e-4 are inside."""
-NAMES = {"long": "longer semi-axis", "short": "shorter semi-axis", "p0": "largest pressure"}
-WHY = (
+QUANTITY_NAMES = {"long": "longer semi-axis", "short": "shorter semi-axis", "p0": "largest pressure"}
+BOUND_REASON = (
     "K and E by the arithmetic-geometric mean in 60 decimal digits, which leaves 30 where K - E cancels: no digit "
     "and no integral shared with the code"
 )
@@ -35,24 +35,24 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for axes, pressure, approach and load over all ratios of axes, for one published contact, for refusals;
     the same in quick.
     """
-    errors = _errors((*RANGE, *NEAR_CIRCLE))
+    errors = _errors((*AXIS_RATIOS, *NEAR_CIRCLE))
     rows = [
         Observed(
             f"contact_hertz.{name}",
             SYSTEM,
-            f"largest relative error of {NAMES.get(name, name)}, axis ratios 1e-6 to 1e6",
+            f"largest relative error of {QUANTITY_NAMES.get(name, name)}, axis ratios 1e-6 to 1e6",
             max(worst),
             "",
-        ).at_most(BOUND, WHY, "closed form")
+        ).at_most(RELATIVE_BOUND, BOUND_REASON, "closed form")
         for name, worst in errors.items()
     ]
-    return rows + _published() + _behaviour(), {"ratio": [*RANGE, *NEAR_CIRCLE], "errors": errors}
+    return rows + _published() + _behaviour(), {"ratio": [*AXIS_RATIOS, *NEAR_CIRCLE], "errors": errors}
 
 
 def ellipse(ratio: float) -> dict[str, Decimal]:
     """Exact curvatures, load and approach (many digits) of a contact with a ratio of short to long semi-axis."""
     with localcontext(prec=DIGITS):
-        g, modulus = Decimal(ratio), Decimal(PAIR.modulus)
+        g, modulus = Decimal(ratio), Decimal(MATERIAL_PAIR.modulus)
         k, e = _complete(g)
         if ratio == 1.0:
             flat = steep = _pi() * PRESSURE / (4 * SHORT_SEMI_AXIS * modulus)
@@ -70,9 +70,9 @@ def ellipse(ratio: float) -> dict[str, Decimal]:
         }
 
 
-def _complete(g: Decimal) -> tuple[Decimal, Decimal]:
+def _complete(axis_ratio: Decimal) -> tuple[Decimal, Decimal]:
     """K and E at the modulus sqrt(1 - g^2): K = pi / (2 M(1, g)), E = K (1 - sum 2^(n-1) c_n^2)."""
-    a, b, total, weight = Decimal(1), g, (1 - g * g) / 2, Decimal(1) / 2
+    a, b, total, weight = Decimal(1), axis_ratio, (1 - axis_ratio * axis_ratio) / 2, Decimal(1) / 2
     while abs(a - b) > Decimal(10) ** (4 - DIGITS) * a:
         weight, c = 2 * weight, (a - b) / 2
         a, b = (a + b) / 2, (a * b).sqrt()
@@ -94,18 +94,18 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     approach, with the long axis along x and along y."""
     truth = [ellipse(g) for g in ratios]
     flat, steep, load, approach = (
-        np.array([float(each[name]) for each in truth]) for name in ("flat", "steep", "load", "approach")
+        np.array([float(computed[name]) for computed in truth]) for name in ("flat", "steep", "load", "approach")
     )
     touching = [
-        by_load(flat, steep, load, PAIR),
-        by_approach(flat, steep, approach, PAIR),
-        _exchange_axes(by_load(steep, flat, load, PAIR)),
-        _exchange_axes(by_approach(steep, flat, approach, PAIR)),
+        by_load(flat, steep, load, MATERIAL_PAIR),
+        by_approach(flat, steep, approach, MATERIAL_PAIR),
+        _exchange_axes(by_load(steep, flat, load, MATERIAL_PAIR)),
+        _exchange_axes(by_approach(steep, flat, approach, MATERIAL_PAIR)),
     ]
     named = {"a": "long", "b": "short", "p0": "p0", "approach": "approach", "load": "load"}
     return {
         name: [
-            max(float(abs(Decimal(float(getattr(each, field)[i])) / exact[name] - 1)) for each in touching)
+            max(float(abs(Decimal(float(getattr(computed, field)[i])) / exact[name] - 1)) for computed in touching)
             for i, exact in enumerate(truth)
         ]
         for field, name in named.items()
@@ -148,18 +148,30 @@ def _published() -> list[Row]:
 
 def _behaviour() -> list[Row]:
     """Rows: zero and negative loads give zero, and input that is no Hertzian contact is refused."""
-    nothing = [by_load(1.0, 2.0, load, PAIR) for load in (0.0, -1.0, -1e6)] + [by_approach(1.0, 2.0, -1e-3, PAIR)]
-    exact = all(value == 0.0 for each in nothing for value in (each.a, each.b, each.p0, each.approach, each.load))
+    nothing = [by_load(1.0, 2.0, load, MATERIAL_PAIR) for load in (0.0, -1.0, -1e6)] + [
+        by_approach(1.0, 2.0, -1e-3, MATERIAL_PAIR)
+    ]
+    exact = all(
+        value == 0.0
+        for nothing_solved in nothing
+        for value in (
+            nothing_solved.a,
+            nothing_solved.b,
+            nothing_solved.p0,
+            nothing_solved.approach,
+            nothing_solved.load,
+        )
+    )
     why = "a silent number would be wrong"
     asked: dict[str, Callable[[], object]] = {
-        "flat": lambda: by_load(0.0, 1.0, LOAD, PAIR),
-        "concave": lambda: by_load(1.0, -0.1, LOAD, PAIR),
-        "not finite": lambda: by_load(1.0, np.nan, LOAD, PAIR),
-        "radius in mm": lambda: by_load(1 / 920, 1 / 600, LOAD, PAIR),
+        "flat": lambda: by_load(0.0, 1.0, LOAD, MATERIAL_PAIR),
+        "concave": lambda: by_load(1.0, -0.1, LOAD, MATERIAL_PAIR),
+        "not finite": lambda: by_load(1.0, np.nan, LOAD, MATERIAL_PAIR),
+        "radius in mm": lambda: by_load(1 / 920, 1 / 600, LOAD, MATERIAL_PAIR),
         "modulus in MPa": lambda: Material(E=2.1e5, nu=0.28),
-        "approach in mm": lambda: by_approach(1.0, 1.0, 0.1, PAIR),
-        "shapes": lambda: by_load([1.0, 2.0], [1.0, 2.0, 3.0], LOAD, PAIR),
-        "friction of steel on aluminium": PAIR.require_likeness,
+        "approach in mm": lambda: by_approach(1.0, 1.0, 0.1, MATERIAL_PAIR),
+        "shapes": lambda: by_load([1.0, 2.0], [1.0, 2.0, 3.0], LOAD, MATERIAL_PAIR),
+        "friction of steel on aluminium": MATERIAL_PAIR.require_likeness,
     }
     rows = [
         behaviour_row(
@@ -185,22 +197,25 @@ def _behaviour() -> list[Row]:
     ]
 
 
-def _outcome(ask: Callable[[], object]) -> str:
+def _outcome(ask_refused: Callable[[], object]) -> str:
     try:
-        ask()
+        ask_refused()
     except InputError:
         return "refused"
     return "accepted"
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Worst errors by range of the ratio of axes."""
-    ratio = np.array(data["ratio"])
+    ratio = np.array(case_data["ratio"])
     ranges = {"1e-6 to 1e-4": (0.0, 1e-4), "1e-4 to 0.1": (1e-4, 0.1), "0.1 to 0.9": (0.1, 0.9), "0.9 to 1": (0.9, 1.0)}
     rows = tuple(
         (
             title,
-            *(f"{np.array(errors)[(ratio > low) & (ratio <= high)].max():.1e}" for errors in data["errors"].values()),
+            *(
+                f"{np.array(errors)[(ratio > low) & (ratio <= high)].max():.1e}"
+                for errors in case_data["errors"].values()
+            ),
         )
         for title, (low, high) in ranges.items()
     )
@@ -208,10 +223,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
         f"Worst relative error against {DIGITS} digits, driven by load and by approach, the long axis along x and "
         "along y."
     )
-    return [Table("Hertz: relative error by the ratio of axes", note, ("axes", *data["errors"]), rows)]
+    return [Table("Hertz: relative error by the ratio of axes", note, ("axes", *case_data["errors"]), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot semi-axes over the ratio of curvatures, and errors over the axis ratio."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
@@ -222,10 +237,12 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         left.loglog(curvature, values * 1e3, label=name)
     left.set(title="Steel, 100 kN, B = 1 1/m", xlabel="ratio of curvatures A/B [-]", ylabel="semi-axis [mm]")
     left.legend()
-    ratio = np.array(data["ratio"])
-    for name, errors in data["errors"].items():
-        right.loglog(ratio[: len(RANGE)], np.maximum(errors[: len(RANGE)], 1e-17), ".", markersize=4, label=name)
-    right.axhline(BOUND, color="black", linestyle=":", label="allowed")
+    ratio = np.array(case_data["ratio"])
+    for name, errors in case_data["errors"].items():
+        right.loglog(
+            ratio[: len(AXIS_RATIOS)], np.maximum(errors[: len(AXIS_RATIOS)], 1e-17), ".", markersize=4, label=name
+        )
+    right.axhline(RELATIVE_BOUND, color="black", linestyle=":", label="allowed")
     right.set(title="Relative error against 60 digits [-]", xlabel="short axis / long axis [-]", ylim=(3e-18, 1e-9))
     right.legend(loc="center", ncols=3)
     add_heading(figure, "Hertzian contact loses no digits from a thin line to the circle")

@@ -20,7 +20,15 @@ from models.systems.contact.scene import Method
 from models.systems.contact.work_precision import ContactCase, with_exact_forces
 from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_bands import FASTSIM_BANDS, HELD_SHARE, ROUNDING, kept_shares, theory_errors
-from validation.contact.contact_set import AXIS_RATIOS, JUDGED_PART, PAIR, POISSON, read_contacts, read_drawn, read_wide
+from validation.contact.contact_set import (
+    AXIS_RATIOS,
+    JUDGED_PART,
+    MATERIAL_PAIR,
+    POISSON,
+    read_contacts,
+    read_drawn,
+    read_wide,
+)
 from validation.contact.programs import compare, table
 
 TITLE = "Stated errors of rolling contact"
@@ -91,7 +99,7 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     against = np.array([case.parts[1] * case.parts[2] < 0 for case in unseen])
     for name in ["blended intermediate"] if quick else [*FASTSIM_BANDS, "simplified"]:
         drawn = theory_errors(name, unseen)
-        for some, place, which, most in (
+        for some, row_name, which, most in (
             (theory_errors(name, cases), "", "of the set", MISSED_SHARE),
             (drawn, "drawn.", "drawn", 1 - HELD_SHARE),
             (drawn.of(against), "against.", "drawn with lateral creepage against spin", MISSED_SHARE),
@@ -101,7 +109,7 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
             ):
                 rows.append(
                     Observed(
-                        f"contact_price.{place}{kind}.{name.replace(' ', '-')}",
+                        f"contact_price.{row_name}{kind}.{name.replace(' ', '-')}",
                         SYSTEM,
                         f"{name}: share "
                         f"of {some.error.size} contacts {which} beyond the band of error that is stated "
@@ -138,22 +146,22 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
     ]
 
 
-def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide: list[ContactCase]) -> list[Row]:
+def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide_cases: list[ContactCase]) -> list[Row]:
     """Rows: error of FASTSIM_BANDS's moment relative to the exact theory."""
     rows = []
-    range_of_set = [case for case in wide if AXIS_RATIOS[0] <= case.a / case.b <= AXIS_RATIOS[-1]]
+    range_of_set = [case for case in wide_cases if AXIS_RATIOS[0] <= case.a / case.b <= AXIS_RATIOS[-1]]
     sets = {
         "set": (cases, "the set"),
         "drawn": (unseen, "the drawn contacts"),
         "less_wide": (range_of_set, "the wide contacts of a/b 0.2 to 5, Poisson's ratio 0 to 0.5"),
-        "wide": (wide, "the wide contacts, a/b 0.1 to 10, Poisson's ratio 0 to 0.5"),
+        "wide": (wide_cases, "the wide contacts, a/b 0.1 to 10, Poisson's ratio 0 to 0.5"),
     }
-    for (bound, (mean, most)), (place, (some, words)) in product(MOMENTS.items(), sets.items()):
+    for (bound, (mean, most)), (row_name, (some, words)) in product(MOMENTS.items(), sets.items()):
         lever = np.array([max(c.a, c.b) / np.sqrt(c.a * c.b) for c in some])
         error = theory_errors(f"blended {bound}", some).moment_error * lever
         for what, value, allowed in (("mean", error.mean(), mean), ("95 %", np.quantile(error, 0.95), most)):
             observed = Observed(
-                f"contact_price.mz.{bound}.{place}.{what.split()[0]}",
+                f"contact_price.mz.{bound}.{row_name}.{what.split()[0]}",
                 SYSTEM,
                 f"{bound} bound, moment of {len(some)} contacts: {words}; {what} of the error",
                 float(value),
@@ -161,7 +169,7 @@ def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide: list
             )
             rows.append(
                 observed.aim(allowed, SLENDER)
-                if (bound, place) == ("elliptic", "wide")
+                if (bound, row_name) == ("elliptic", "wide")
                 else observed.at_most(allowed, "the exact theory, kept", "native")
             )
     return rows
@@ -201,8 +209,8 @@ def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[st
     return [float(value) for value in np.mean(answers, axis=0)]
 
 
-def _program_rows(answers: dict[str, Any]) -> list[Row]:
-    t = {name: np.array(values) for name, values in answers["seconds"].items()}
+def _program_rows(program_answers: dict[str, Any]) -> list[Row]:
+    t = {name: np.array(values) for name, values in program_answers["seconds"].items()}
     why = "the paper's figure is of a computer and a Fortran program of 1983"
     what = "ratio of the time of contact and forces by the program of 1983 to that of the program of 1982"
     ratio, low, high = paired_ratio(t["1983"] + t["press"], t["1982"])
@@ -227,7 +235,7 @@ def _table_row(folder: Path) -> Row:
         header="a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [%],spin [1/m]",
     )
     start = time.perf_counter()
-    answers = answer_table(path, out, partial(Built, PAIR), Method())
+    answers = answer_table(path, out, partial(Built, MATERIAL_PAIR), Method())
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()
@@ -238,11 +246,11 @@ def _table_row(folder: Path) -> Row:
     )
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """The paper's comparison."""
-    return [table(data["programs"])] if data else []
+    return [table(case_data["programs"])] if case_data else []
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """No figure, since the cost of accuracy in contact is drawn with the other problems of ``price``."""
     return []

@@ -28,7 +28,7 @@ QUICK_SHIFTS = np.array([0.0, 4.5, 5.0, 6.0, 6.5])
 LOAD = 1e4
 """Vertical load of a wheel (N): the benchmark has 20 kN on a wheelset."""
 CELLS = 40
-PAIR = MaterialPair()
+MATERIAL_PAIR = MaterialPair()
 BENCHMARK = (
     "Manchester contact benchmark, case A (Shackleton and Iwnicki, Vehicle Syst. Dyn. 46, 2008, 129-149), "
     "S1002 on UIC 60 at 1:40, gauge 1435 mm, back to back 1360 mm, radius 460 mm"
@@ -50,13 +50,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + ([] if quick else _benchmark_rows(data["no yaw"])), data
 
 
-def _right_wheel_contact(shift: float, yaw: float, exact: bool) -> dict[str, Any]:
+def _right_wheel_contact(lateral_shift: float, yaw: float, exact: bool) -> dict[str, Any]:
     """Contact of the right wheel at a lateral shift (mm) and yaw (rad): contact points, their loads, and peak
     pressure."""
-    touches = wheel_on_rail(s1002(), uic60(), lateral_shift=shift * 1e-3, yaw=yaw)
-    pressed = press([touch.patch for touch in touches], PAIR, load=LOAD)
-    loads = {id(part.patch): part.load for part in pressed.patches}
-    places = [
+    touches = wheel_on_rail(s1002(), uic60(), lateral_shift=lateral_shift * 1e-3, yaw=yaw)
+    pressed = press([touch.patch for touch in touches], MATERIAL_PAIR, load=LOAD)
+    loads = {id(patch_pressure.patch): patch_pressure.load for patch_pressure in pressed.patches}
+    contact_points = [
         {
             "rail": 1e3 * touch.rail_y,
             "wheel": 1e3 * touch.wheel_y,
@@ -67,15 +67,21 @@ def _right_wheel_contact(shift: float, yaw: float, exact: bool) -> dict[str, Any
         }
         for touch in touches
     ]
-    told = {"shift": shift, "yaw": yaw, "places": places, "area": 1e6 * pressed.area, "peak": pressed.peak / 1e6}
-    heaviest = max(pressed.patches, key=lambda part: part.load)
-    return told | {"exact": _exact_peak(heaviest.patch, heaviest.load, heaviest.box) if exact else None}
+    contact_facts = {
+        "shift": lateral_shift,
+        "yaw": yaw,
+        "places": contact_points,
+        "area": 1e6 * pressed.area,
+        "peak": pressed.peak / 1e6,
+    }
+    heaviest = max(pressed.patches, key=lambda patch_pressure: patch_pressure.load)
+    return contact_facts | {"exact": _exact_peak(heaviest.patch, heaviest.load, heaviest.box) if exact else None}
 
 
-def _exact_peak(patch: Any, load: float, box: tuple[float, float, float, float]) -> float | None:
+def _exact_peak(patch: Any, load: float, box_ends: tuple[float, float, float, float]) -> float | None:
     """Peak pressure (MPa) of one contact patch under its load, by the exact theory; None where the patch merges with
     its neighbour."""
-    x0, x1, y0, y1 = box
+    x0, x1, y0, y1 = box_ends
     distance = patch.distance
     wide, high = 0.15 * (x1 - x0), 0.3 * (y1 - y0)
     grid = (x0 - wide, x1 + wide, max(y0 - high, distance.y[0]), min(y1 + high, distance.y[-1]))
@@ -127,8 +133,8 @@ def rail_off(rail: ContactProfile) -> float:
     tree = KDTree(np.column_stack([laid.y, laid.z]))
     points = np.column_stack([rail.y, rail.z])[rail.z < 0.036]
 
-    def far(shift: np.ndarray) -> float:
-        return float(tree.query(points - shift)[0].max())
+    def far(lateral_shift: np.ndarray) -> float:
+        return float(tree.query(points - lateral_shift)[0].max())
 
     start = np.array([rail.y[np.argmin(rail.z)] - laid.y[np.argmin(laid.z)], 0.0])
     return float(minimize(far, start, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-8}).fun)
@@ -136,7 +142,7 @@ def rail_off(rail: ContactProfile) -> float:
 
 def _main(case: dict[str, Any]) -> dict[str, float]:
     """The contact point with the largest normal force."""
-    return max(case["places"], key=lambda place: place["load"])
+    return max(case["places"], key=lambda contact_point: contact_point["load"])
 
 
 def _place_rows(cases: list[dict[str, Any]]) -> list[Row]:
@@ -175,7 +181,10 @@ def _place_rows(cases: list[dict[str, Any]]) -> list[Row]:
 def _benchmark_rows(cases: list[dict[str, Any]]) -> list[Row]:
     by = {case["shift"]: case for case in cases}
     vertical = max(
-        abs(sum(place["load"] * np.cos(np.radians(place["angle"])) for place in case["places"]) - LOAD)
+        abs(
+            sum(contact_point["load"] * np.cos(np.radians(contact_point["angle"])) for contact_point in case["places"])
+            - LOAD
+        )
         for case in cases
     )
     return [
@@ -203,7 +212,7 @@ def _benchmark_rows(cases: list[dict[str, Any]]) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Every shift: places, loads, pressures."""
     heads = (
         "shift [mm]",
@@ -220,7 +229,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
         f"{BENCHMARK}; {LOAD / 1e3:g} kN on the right wheel, vertical. A row for every place closer than 0.2 mm; y on "
         "the rail from its highest point, on the wheel from the taping line; pressures of the theory of 1983."
     )
-    return [Table(f"Places of contact, {name}", note, heads, tuple(_table_rows(cases))) for name, cases in data.items()]
+    return [
+        Table(f"Places of contact, {name}", note, heads, tuple(_table_rows(cases))) for name, cases in case_data.items()
+    ]
 
 
 def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
@@ -228,26 +239,30 @@ def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
         (
             f"{case['shift']:g}",
             f"{1e3 * case['yaw']:g}",
-            f"{place['rail']:.2f}",
-            f"{place['wheel']:.2f}",
-            f"{place['ahead']:.2f}",
-            f"{place['angle']:.1f}",
-            f"{place['load'] / 1e3:.2f}",
+            f"{contact_point['rail']:.2f}",
+            f"{contact_point['wheel']:.2f}",
+            f"{contact_point['ahead']:.2f}",
+            f"{contact_point['angle']:.1f}",
+            f"{contact_point['load'] / 1e3:.2f}",
             f"{case['peak']:.0f}",
             f"{case['exact']:.0f}" if case["exact"] is not None else "-",
         )
         for case in cases
-        for place in case["places"]
+        for contact_point in case["places"]
     ]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot position and load of the contact points over the lateral shift."""
     from models.drawing.figures import add_heading, subplots
 
     figure, axis = subplots(figsize=(7.0, 3.6))
-    for name, cases in data.items():
-        points = [(case["shift"], place["rail"], place["load"]) for case in cases for place in case["places"]]
+    for name, cases in case_data.items():
+        points = [
+            (case["shift"], contact_point["rail"], contact_point["load"])
+            for case in cases
+            for contact_point in case["places"]
+        ]
         shift, rail, load = np.array(points).T
         hollow: dict[str, Any] = {} if name == "no yaw" else {"markerfacecolor": "none", "markersize": 10}
         style: dict[str, Any] = {"marker": "o", "linestyle": "none", **hollow}

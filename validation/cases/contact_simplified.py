@@ -20,7 +20,7 @@ from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_shapes import (
     CURVATURE,
     FRICTION,
-    PAIR,
+    MATERIAL_PAIR,
     Box,
     Shape,
     creepages,
@@ -37,7 +37,7 @@ TITLE = "Rolling contact of any shape: the theory of 1983"
 SYSTEM: System = "contact"
 EXACT_CELLS = 36
 """Cells of the exact grid along each axis."""
-WAYS = {
+FITTING_OPTIONS = {
     "elliptic": PLAIN,
     "paper": PAPER,
     "elliptic, gradient": SimplifiedOptions(fit="gradient"),
@@ -45,7 +45,7 @@ WAYS = {
     "elliptic, one net": replace(PLAIN, separate=False),
 }
 """Ways to use the theory; the first is the default, the second the paper to the letter."""
-ROUNDS = 10
+TIMING_ROUNDS = 10
 """Of timing."""
 NETS = (5, 7, 9, 11, 15, 19, 25)
 HERTZ = (0.05, 0.2, 1.0, 5.0, 20.0)
@@ -72,9 +72,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _hertz(ratio: float, options: SimplifiedOptions) -> dict[str, float]:
     """Relative errors of approach, area and peak pressure on Hertz's ellipse."""
-    exact = by_load(CURVATURE, CURVATURE * ratio, 1e5, PAIR)
+    exact = by_load(CURVATURE, CURVATURE * ratio, 1e5, MATERIAL_PAIR)
     a, b = float(exact.a), float(exact.b)
-    contact = press(quadratic(CURVATURE, CURVATURE * ratio, 2.5 * a, 2.5 * b), PAIR, load=1e5, options=options)
+    contact = press(quadratic(CURVATURE, CURVATURE * ratio, 2.5 * a, 2.5 * b), MATERIAL_PAIR, load=1e5, options=options)
     return _errors(contact, float(exact.approach), np.pi * a * b, float(exact.p0))
 
 
@@ -88,7 +88,7 @@ def largest_jump(patch: Patch, steps: int) -> float:
     until rounding."""
 
     def load(depth: float) -> float:
-        return load_at_depth(patch, depth, PAIR).load
+        return load_at_depth(patch, depth, MATERIAL_PAIR).load
 
     return max(_jump(load, *ends) for ends in pairwise(np.linspace(2e-6, 6e-5, steps + 1).tolist()))
 
@@ -106,32 +106,37 @@ def _jump(load: Callable[[float], float], low: float, high: float) -> float:
     return abs(at_high - at_low)
 
 
-def _against_exact(shape: Shape) -> dict[str, Any]:
+def _against_exact(contact_shape: Shape) -> dict[str, Any]:
     """Errors of every way of fitting, and the exact values. Errors of approach, area and peak are relative; those of
     forces are in % of mu N."""
-    contacts = {name: press(shape.distance, PAIR, load=shape.load, options=way) for name, way in WAYS.items()}
-    normal = exact_normal(shape, EXACT_CELLS, shape.box or _box_around(contacts["elliptic"]))
-    motions = creepages(normal.area, shape.load)
+    contacts = {
+        name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options)
+        for name, fitting_options in FITTING_OPTIONS.items()
+    }
+    normal = exact_normal(contact_shape, EXACT_CELLS, contact_shape.box or _box_around(contacts["elliptic"]))
+    motions = creepages(normal.area, contact_shape.load)
     exact = {key: exact_rolling(normal, motion) for key, motion in motions.items()}
     solved = {key: solution for key, solution in exact.items() if solution is not None}
     figures = {"approach": normal.approach, "area": normal.area, "peak": float(normal.pressure.max())}
-    ways = {}
+    errors_by_fitting = {}
     for name, contact in contacts.items():
         forces = [
-            float(100.0 * np.hypot(rolled.fx - true.fx, rolled.fy - true.fy) / (FRICTION * shape.load))
+            float(100.0 * np.hypot(rolled.fx - true.fx, rolled.fy - true.fy) / (FRICTION * contact_shape.load))
             for rolled, true in ((roll(contact, FRICTION, *motions[key]), true) for key, true in solved.items())
         ]
         mean, most = (float(np.mean(forces)), float(np.max(forces))) if forces else (np.nan, np.nan)
-        ways[name] = _errors(contact, **figures) | {"force": mean, "force_max": most}
-    return {"exact": figures, "ways": ways, "rolling": len(solved), "asked": len(exact)}
+        errors_by_fitting[name] = _errors(contact, **figures) | {"force": mean, "force_max": most}
+    return {"exact": figures, "ways": errors_by_fitting, "rolling": len(solved), "asked": len(exact)}
 
 
-def _approach_of(shape: Shape) -> dict[str, float]:
+def _approach_of(contact_shape: Shape) -> dict[str, float]:
     """Relative errors of the approach with a grid for each patch, and with one grid for all patches."""
-    exact = exact_normal(shape, EXACT_CELLS, shape.box or (0.0, 0.0, 0.0, 0.0)).approach
+    exact = exact_normal(contact_shape, EXACT_CELLS, contact_shape.box or (0.0, 0.0, 0.0, 0.0)).approach
     return {
-        name: press(shape.distance, PAIR, load=shape.load, options=way).approach / exact - 1.0
-        for name, way in (("each", PLAIN), ("one", WAYS["elliptic, one net"]))
+        name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options).approach
+        / exact
+        - 1.0
+        for name, fitting_options in (("each", PLAIN), ("one", FITTING_OPTIONS["elliptic, one net"]))
     }
 
 
@@ -140,8 +145,8 @@ def _errors_on_rails() -> dict[str, dict[str, float]]:
     grid."""
     errors = {}
     for position in placed_wheelsets():
-        pressed = press([touch.patch for touch in position.touches], PAIR, load=position.load)
-        along = np.cos(min(part.patch.lean for part in pressed.patches))
+        pressed = press([touch.patch for touch in position.touches], MATERIAL_PAIR, load=position.load)
+        along = np.cos(min(patch_pressure.patch.lean for patch_pressure in pressed.patches))
         name = f"S1002 on UIC 60, {1e3 * position.shift:g} mm, yaw {1e3 * position.yaw:g} mrad, "
         name += f"{1e-3 * position.load:g} kN"
         error = pressed.approach * along / exact_placed(position, pressed, EXACT_CELLS).approach - 1.0
@@ -151,7 +156,7 @@ def _errors_on_rails() -> dict[str, dict[str, float]]:
 
 def _box_around(normal_contact: NormalContact) -> Box:
     """Box around all patches of a contact, enlarged by a fifth of its size on every side."""
-    x0, x1, y0, y1 = np.array([part.box for part in normal_contact.patches]).T
+    x0, x1, y0, y1 = np.array([patch_pressure.box for patch_pressure in normal_contact.patches]).T
     (low_x, high_x), (low_y, high_y) = (x0.min(), x1.max()), (y0.min(), y1.max())
     wide, high = 0.2 * (high_x - low_x), 0.2 * (high_y - low_y)
     return low_x - wide, high_x + wide, low_y - high, high_y + high
@@ -159,18 +164,18 @@ def _box_around(normal_contact: NormalContact) -> Box:
 
 def _times() -> dict[str, list[float]]:
     """Computing times (s) of the functions of both theories at about 45 x 45 cells."""
-    hertz = by_load(CURVATURE, 1.5 * CURVATURE, 1e5, PAIR)
+    hertz = by_load(CURVATURE, 1.5 * CURVATURE, 1e5, MATERIAL_PAIR)
     a, b = float(hertz.a), float(hertz.b)
     distance, creepage = quadratic(CURVATURE, 1.5 * CURVATURE, 2.5 * a, 2.5 * b), (1e-3, 5e-4, 0.3)
-    contact, (patch,) = press(distance, PAIR, load=1e5), separate(distance)
+    contact, (patch,) = press(distance, MATERIAL_PAIR, load=1e5), separate(distance)
     jobs: dict[str, Callable[[], Any]] = {
-        "1982": lambda: fastsim(RollingEllipse(a, b, 1e5, FRICTION, *creepage), PAIR, cells=45),
+        "1982": lambda: fastsim(RollingEllipse(a, b, 1e5, FRICTION, *creepage), MATERIAL_PAIR, cells=45),
         "roll": lambda: roll(contact, FRICTION, *creepage),
-        "press": lambda: press(distance, PAIR, load=1e5),
-        "depth": lambda: load_at_depth(patch, 5e-5, PAIR),
+        "press": lambda: press(distance, MATERIAL_PAIR, load=1e5),
+        "depth": lambda: load_at_depth(patch, 5e-5, MATERIAL_PAIR),
         "exact": lambda: exact_normal(shapes_by_formula()[0], 45, (-0.008, 0.008, -0.008, 0.008)),
     }
-    return dict(zip(jobs, interleave(list(jobs.values()), ROUNDS).tolist(), strict=True))
+    return dict(zip(jobs, interleave(list(jobs.values()), TIMING_ROUNDS).tolist(), strict=True))
 
 
 def _hertz_rows(hertz: dict[str, dict[str, float]]) -> list[Row]:
@@ -209,26 +214,26 @@ def _jump_row(jump: float) -> Row:
     )
 
 
-def _shape_rows(shapes: dict[str, dict[str, Any]]) -> list[Row]:
+def _shape_rows(errors_by_shape: dict[str, dict[str, Any]]) -> list[Row]:
     rows = []
-    for name, case in shapes.items():
-        place = "contact_simplified." + "_".join(re.findall(r"\w+", name))
+    for name, case in errors_by_shape.items():
+        row_name = "contact_simplified." + "_".join(re.findall(r"\w+", name))
         best = case["ways"]["elliptic"]
         rows.append(
             Observed(
-                f"{place}.approach", SYSTEM, f"error of the approach, {name}", 100.0 * abs(best["approach"]), "%"
+                f"{row_name}.approach", SYSTEM, f"error of the approach, {name}", 100.0 * abs(best["approach"]), "%"
             ).at_most(100.0 * APPROACH, FIGURE, "native")
         )
         for key, what in (("area", "area"), ("peak", "peak pressure")):
             rows.append(
-                Observed(f"{place}.{key}", SYSTEM, f"error of the {what}, {name}", 100.0 * best[key], "%").beside(
+                Observed(f"{row_name}.{key}", SYSTEM, f"error of the {what}, {name}", 100.0 * best[key], "%").beside(
                     0.0, ABOUT, "native"
                 )
             )
         asked = f"{case['rolling']} of {case['asked']} creepages"
         rows.append(
             Observed(
-                f"{place}.force", SYSTEM, f"mean error of the force, {name}, {asked}", best["force"], "% of mu N"
+                f"{row_name}.force", SYSTEM, f"mean error of the force, {name}, {asked}", best["force"], "% of mu N"
             ).beside(0.0, ABOUT, "native")
         )
     return rows
@@ -238,12 +243,12 @@ def _grown_rows(grown: dict[str, dict[str, float]]) -> list[Row]:
     """Rows: largest error of the approach among contact areas that have merged, and among wheels on rails."""
     rows = []
     kinds = (("grown", "distances with several valleys", False), ("wheels", "wheels on rails", True))
-    for place, what, chosen in kinds:
+    for row_name, what, chosen in kinds:
         errors = {name: abs(case["each"]) for name, case in grown.items() if name.startswith("S1002") == chosen}
         worst = max(errors, key=errors.__getitem__)
         rows.append(
             Observed(
-                f"contact_simplified.{place}.approach",
+                f"contact_simplified.{row_name}.approach",
                 SYSTEM,
                 f"error of the approach, {len(errors)} {what}, worst: {worst}",
                 100.0 * errors[worst],
@@ -253,53 +258,53 @@ def _grown_rows(grown: dict[str, dict[str, float]]) -> list[Row]:
     return rows
 
 
-def _time_rows(times: dict[str, list[float]]) -> list[Row]:
+def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
     why = "the paper's program was written for one machine of 1983; compiled marches made FASTSIM alone much cheaper"
     return [
         Observed(
             "contact_simplified.time.forces",
             SYSTEM,
-            f"ratio of the time of FASTSIM twice with the refit, {cost(times['roll'])}, to that of "
-            f"the 1982 program, {cost(times['1982'])}",
-            _ratio(times, "roll", "1982"),
+            f"ratio of the time of FASTSIM twice with the refit, {cost(seconds_by_program['roll'])}, to that of "
+            f"the 1982 program, {cost(seconds_by_program['1982'])}",
+            _ratio(seconds_by_program, "roll", "1982"),
             "",
         ).beside("about 3 with the contact, which contact_price compares", why),
         Observed(
             "contact_simplified.time.exact",
             SYSTEM,
             "ratio of the time of the exact normal problem at the same fineness, "
-            f"{cost(times['exact'])}, to that of this method, {cost(times['press'])}",
-            _ratio(times, "exact", "press"),
+            f"{cost(seconds_by_program['exact'])}, to that of this method, {cost(seconds_by_program['press'])}",
+            _ratio(seconds_by_program, "exact", "press"),
             "",
         ).beside("", "what the theory saves", "none"),
     ]
 
 
-def _ratio(times: dict[str, list[float]], first: str, other: str) -> float:
-    return float(np.median(times[first]) / np.median(times[other]))
+def _ratio(seconds_by_program: dict[str, list[float]], first: str, other_program: str) -> float:
+    return float(np.median(seconds_by_program[first]) / np.median(seconds_by_program[other_program]))
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Hertz's ellipses; and in the full run every shape and way, and the size of the net."""
     signed = "{:+.2f}".format
     hertz = tuple(
         (ratio, *(signed(100.0 * case[key]) for key in ("approach", "area", "peak", "paper")))
-        for ratio, case in data["hertz"].items()
+        for ratio, case in case_data["hertz"].items()
     )
     heads: tuple[str, ...] = ("B/A", "approach [%]", "area [%]", "peak pressure [%]", "approach, paper [%]")
     tables = [Table("Theory of 1983 on Hertz's ellipses", "Error by ratio of curvatures, 15 x 15 net.", heads, hertz)]
-    if "shapes" not in data:
+    if "shapes" not in case_data:
         return tables
     rows = tuple(
         (
             name,
-            way,
+            fitting_options,
             *(signed(100.0 * errors[key]) for key in ("approach", "area", "peak")),
             f"{errors['force']:.1f}",
             f"{errors['force_max']:.1f}",
         )
-        for name, case in data["shapes"].items()
-        for way, errors in case["ways"].items()
+        for name, case in case_data["shapes"].items()
+        for fitting_options, errors in case["ways"].items()
     )
     note = (
         f"Errors against the exact contact on {EXACT_CELLS} x {EXACT_CELLS} cells. Forces: mean and largest over "
@@ -310,18 +315,18 @@ def tables(data: dict[str, Any]) -> list[Table]:
     heads = ("shape", "way", "approach [%]", "area [%]", "peak [%]", "force, mean [% mu N]", "force, max [% mu N]")
     nets = tuple(
         (net, *(signed(100.0 * case[key]) for key in ("approach", "area", "peak")))
-        for net, case in data["nets"].items()
+        for net, case in case_data["nets"].items()
     )
     together = tuple(
         (name, *("" if np.isnan(value) else signed(100.0 * value) for value in case.values()))
-        for name, case in data["grown"].items()
+        for name, case in case_data["grown"].items()
     )
     return [
         *tables,
-        Table("Theory of 1983 against the exact contact", note + " " + _errors_text(data["shapes"]), heads, rows),
+        Table("Theory of 1983 against the exact contact", note + " " + _errors_text(case_data["shapes"]), heads, rows),
         Table(
             "Size of the crude net",
-            "Errors on an ellipse with B/A = 5. " + _net_errors_text(data["nets"]),
+            "Errors on an ellipse with B/A = 5. " + _net_errors_text(case_data["nets"]),
             ("net", *heads[2:5]),
             nets,
         ),
@@ -336,14 +341,14 @@ def tables(data: dict[str, Any]) -> list[Table]:
     ]
 
 
-def _errors_text(shapes: dict[str, dict[str, Any]]) -> str:
+def _errors_text(errors_by_shape: dict[str, dict[str, Any]]) -> str:
     """Sentence on the errors of the ways of fitting: means over all shapes."""
 
     def mean(variant: str, key: str) -> str:
         scale = 1.0 if key == "force" else 100.0
-        return f"{scale * np.nanmean([abs(case['ways'][variant][key]) for case in shapes.values()]):.1f} %"
+        return f"{scale * np.nanmean([abs(case['ways'][variant][key]) for case in errors_by_shape.values()]):.1f} %"
 
-    apart = shapes["two patches"]["ways"]
+    apart = errors_by_shape["two patches"]["ways"]
     return (
         f"Mean errors over all shapes: Hertz's profile of the pressure instead of the paper's makes "
         f"{mean('elliptic', 'area')} of {mean('paper', 'area')} in the area, {mean('elliptic', 'force')} of "
@@ -368,15 +373,15 @@ def _net_errors_text(nets: dict[str, dict[str, float]]) -> str:
     )
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot the errors of the two pressure profiles for each shape."""
-    if "shapes" not in data:
+    if "shapes" not in case_data:
         return []
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
-    shapes = data["shapes"]
+    shapes = case_data["shapes"]
     figure, axes = subplots(1, 4, figsize=(COLUMN_WIDTH, 4.2), sharey=True)
-    place = np.arange(len(shapes))
+    shape_positions = np.arange(len(shapes))
     for axis, (key, label) in zip(
         axes,
         {
@@ -387,12 +392,17 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         }.items(),
         strict=True,
     ):
-        for way, mark in (("elliptic", "o"), ("paper", "x")):
+        for fitting_options, mark in (("elliptic", "o"), ("paper", "x")):
             scale = 1.0 if key == "force" else 100.0
-            axis.plot([scale * case["ways"][way][key] for case in shapes.values()], place, mark, label=way)
+            axis.plot(
+                [scale * case["ways"][fitting_options][key] for case in shapes.values()],
+                shape_positions,
+                mark,
+                label=fitting_options,
+            )
         axis.axvline(0.0, color="0.7", linewidth=0.8)
         axis.set_xlabel(label)
-    axes[0].set_yticks(place, list(shapes))
+    axes[0].set_yticks(shape_positions, list(shapes))
     axes[0].invert_yaxis()
     axes[0].legend(loc="upper right")
     add_heading(figure, "Theory of 1983 against exact contact: errors with Hertz's and with the paper's pressure")

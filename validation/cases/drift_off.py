@@ -75,7 +75,9 @@ COMBINATIONS = (
 @allowing_breaches("that runs drift off is what is shown", "upright")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per combination; quick: the first one, by few paths."""
-    combinations = [_combination(each, folder, quick) for each in (COMBINATIONS[:1] if quick else COMBINATIONS)]
+    combinations = [
+        _combination(combination, folder, quick) for combination in (COMBINATIONS[:1] if quick else COMBINATIONS)
+    ]
     return [_row(figures) for figures in combinations], {"combinations": combinations}
 
 
@@ -87,14 +89,14 @@ def _combination(combination: Combination, folder: Path, quick: bool) -> Saved:
     late = [np.inf if time is None else time for time in predicted]
     median, low, high = quantile_with_interval(np.array(measured), 0.5)
     inner = [quantile_with_interval(np.array(measured), level)[0] for level in (0.25, 0.75)]
-    said = (
+    source_text = (
         combination.source
         + (f" {combination.size:g} N" if combination.size else "")
         + ("" if combination.interpolation == "linear" else ", held")
     )
     return {
         "name": combination.name,
-        "source": said,
+        "source": source_text,
         "rate": combination.rate,
         "predicted": quantile_with_interval(np.array(late), 0.5)[0],
         "median": median,
@@ -137,22 +139,24 @@ def _models(combination: Combination, folder: Path, paths: int) -> tuple[list[fl
     """Predicted and measured drift-off times of vehicles with random parameters, all started from the true state."""
     true = virtual_drive(folder, combination.duration, 1 / combination.rate, STEP, road=combination.road)
     assembly = assembly_of_scene(force_scene(folder, step=STEP, duration=combination.duration))
-    p, others = assembly.parameters, list[Parameters]()
+    p, other_vehicles = assembly.parameters, list[Parameters]()
     for i in range(MODELS):
         factors = np.random.Generator(np.random.Philox(key=[SEED, i])).uniform(0.9, 1.1, len(PAPER_FACTORS))
-        others.append(p.model_copy(update=perturbed_parameters(p, dict(zip(PAPER_FACTORS, factors, strict=True)))))
+        other_vehicles.append(
+            p.model_copy(update=perturbed_parameters(p, dict(zip(PAPER_FACTORS, factors, strict=True))))
+        )
     return (
-        [model_error_curve(assembly, other).passing_time() for other in others],
-        [_drift_off(replace(assembly, parameters=other), true) for other in others],
+        [model_error_curve(assembly, other_vehicle).passing_time() for other_vehicle in other_vehicles],
+        [_drift_off(replace(assembly, parameters=other_vehicle), true) for other_vehicle in other_vehicles],
     )
 
 
-def _drift_off(assembly: Assembly, true: Result) -> float:
+def _drift_off(assembly: Assembly, true_run: Result) -> float:
     """First time (s) at which the run's pitch differs from the true pitch by UNTRUSTED_PITCH; infinite if it never
     does.
     """
     run = simulate(assembly.scene, "reference", assembly=assembly)
-    time = GrowthCurve(run.times, np.abs(run["pitch"] - true["pitch"])).passing_time()
+    time = GrowthCurve(run.times, np.abs(run["pitch"] - true_run["pitch"])).passing_time()
     return np.inf if time is None else time
 
 
@@ -172,21 +176,21 @@ def _row(combination: Saved) -> Row:
     )
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """All combinations."""
     rows = tuple(
         (
-            each["name"],
-            each["source"],
-            f"{each['rate']:g}",
-            f"{each['predicted']:.2f}",
-            f"{each['median']:.2f}",
-            f"{each['low']:.2f} to {each['high']:.2f}",
-            "{:.1f} to {:.1f}".format(*each["quartiles"]),
-            str(each["members"]),
-            f"{each['median'] / each['predicted']:.3f}",
+            combination["name"],
+            combination["source"],
+            f"{combination['rate']:g}",
+            f"{combination['predicted']:.2f}",
+            f"{combination['median']:.2f}",
+            f"{combination['low']:.2f} to {combination['high']:.2f}",
+            "{:.1f} to {:.1f}".format(*combination["quartiles"]),
+            str(combination["members"]),
+            f"{combination['median'] / combination['predicted']:.3f}",
         )
-        for each in data["combinations"]
+        for combination in case_data["combinations"]
     )
     heads = (
         "road",
@@ -205,19 +209,21 @@ def tables(data: Saved) -> list[Table]:
     return [Table("Drift-off, predicted and measured", note, heads, rows)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot measured over predicted drift-off times."""
     from models.drawing.figures import BLUE, DARK, GREEN, VERMILION, add_heading, subplots
 
     figure, axis = subplots(figsize=(5.2, 4.2))
-    ends = [each["predicted"] for each in data["combinations"]]
+    ends = [combination["predicted"] for combination in case_data["combinations"]]
     line = np.array([0.9 * min(ends), 1.1 * max(ends)])
     axis.fill_between(line, 0.9 * line, 1.1 * line, alpha=0.15, color=DARK, linewidth=0, label="within 10 %")
     for source, colour in (("noise", BLUE), ("interpolation", VERMILION), ("model", GREEN)):
-        of_source = [each for each in data["combinations"] if each["source"].startswith(source)]
+        of_source = [
+            combination for combination in case_data["combinations"] if combination["source"].startswith(source)
+        ]
         if of_source:
             predicted, middle, quartiles = (
-                np.array([each[k] for each in of_source]) for k in ("predicted", "median", "quartiles")
+                np.array([combination[k] for combination in of_source]) for k in ("predicted", "median", "quartiles")
             )
             spread = np.abs(quartiles.T - middle)
             axis.errorbar(predicted, middle, spread, fmt="o", color=colour, label=source, markersize=4, elinewidth=0.8)

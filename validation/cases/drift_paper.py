@@ -20,7 +20,7 @@ FORCE_NOISE_ALONE = ("options.noise_samples=1", "options.perturbed_models=0")
 """Without the random models and all noise samples but one."""
 RATES = (200.0, 400.0, 1000.0, 2000.0)
 """Sampling rates (Hz) of the full report; the quick one has the study's own alone."""
-QUICK = (*FORCE_NOISE_ALONE, "run.duration=15")
+QUICK_CHANGES = (*FORCE_NOISE_ALONE, "run.duration=15")
 """Of the quick share: a quarter of a minute, in which undisturbed forces do not drift off."""
 
 FIGURES = (
@@ -95,7 +95,7 @@ FIGURES = (
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for drift-off times, enforced moments, inertia term of the reference; quick: 15 s, one sampling rate."""
-    scene = load(SCENE, QUICK if quick else ())
+    scene = load(SCENE, QUICK_CHANGES if quick else ())
     runs, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
     rows = [
         Observed(f"drift.{name}", SYSTEM, f"{words}, {rate}", runs[which][what], unit).beside(paper, why)
@@ -153,7 +153,7 @@ def _at_rate(rate: float) -> dict[str, float]:
     return {"drift-off": rows["undisturbed"]["drift-off"], "moment max": rows["guided, undisturbed"]["moment max"]}
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Tables of all runs of the reference, and of undisturbed runs at several sampling rates."""
     rows = tuple(
         (
@@ -164,18 +164,20 @@ def tables(data: Saved) -> list[Table]:
             _cell(row.get("moment max"), ".0f"),
             _cell(row.get("inertia max"), ".0f"),
         )
-        for row in data["rows"]
+        for row in case_data["rows"]
     )
     heads = ("run", "drift-off [s]", "heave error [m]", "moment rms [N m]", "moment max [N m]", "I beta'' max [N m]")
     note = "A run has drifted off when its pitch is 0.05 rad wrong."
-    tables = [Table(f"The six runs, {data['duration']:g} s on the study road", note, heads, rows)]
-    if data["rates"]:
-        rates = tuple((f"{rate:g}", _cell(when, ".1f") or "never", f"{most:.1f}") for rate, when, most in data["rates"])
+    tables = [Table(f"The six runs, {case_data['duration']:g} s on the study road", note, heads, rows)]
+    if case_data["rates"]:
+        rates = tuple(
+            (f"{rate:g}", _cell(when, ".1f") or "never", f"{most:.1f}") for rate, when, most in case_data["rates"]
+        )
         note = "Undisturbed forces, linear between the samples. The paper's 70 N m fits a rate of about 400 Hz."
         columns = ("sampling rate [Hz]", "drift-off [s]", "moment max [N m]")
         tables.append(Table("What the sampling rate does", note, columns, rates))
     return tables
 
 
-def _cell(value: float | None, format_name: str) -> str:
-    return "" if value is None else format(value, format_name)
+def _cell(cell_value: float | None, format_name: str) -> str:
+    return "" if cell_value is None else format(cell_value, format_name)

@@ -28,7 +28,7 @@ from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 TITLE = "What drift depends on: samples and noise, not solvers"
 SYSTEM: System = "drift"
 SEED = 14
-RATE, DURATION = 50.0, 15.0
+SAMPLING_RATE, DURATION = 50.0, 15.0
 """Sampling rate (Hz) of the runs by solver and their length (s): few samples, as adaptive solvers restart at each."""
 SOLVERS = (
     ("reference", "RK4", 1e-3),
@@ -64,7 +64,7 @@ SCHEMES = (("ExplicitEuler", 1, 2.5e-4), ("ExplicitMidpoint", 2, 1e-3), ("RK44",
 """Methods of Exudyn, their order and step (s). What is smoothed before the run goes through the reference's RK4, which
 is Exudyn's RK44 to rounding."""
 PATHS = 20
-WINDOW = (4.0, 8.0)
+GROWTH_WINDOW = (4.0, 8.0)
 """Times (s) between which the growth of the spread is measured: after the start, before the pitch tumbles."""
 SCORED = 5.0
 """Time (s) up to which section forces are compared, before drift-off."""
@@ -88,11 +88,11 @@ def _solvers(folder: Path, solvers: Any) -> list[Saved]:
     Every solver takes the undisturbed linear samples; the others are left to the tighter half of them, and noise to
     fixed steps.
     """
-    true = virtual_drive(folder, DURATION, 1 / RATE, 2.5e-4)
+    true = virtual_drive(folder, DURATION, 1 / SAMPLING_RATE, 2.5e-4)
     noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
     drifted = []
     tight = solvers[1::2]
-    fixed = tuple(each for each in tight if each[1] not in ADAPTIVE)
+    fixed = tuple(solver_record for solver_record in tight if solver_record[1] not in ADAPTIVE)
     inputs: tuple[tuple[str, str, Saved, Any], ...] = (
         ("linear", "linear", {}, solvers),
         ("smooth", "smooth", {}, tight),
@@ -107,13 +107,15 @@ def _solvers(folder: Path, solvers: Any) -> list[Saved]:
     return drifted
 
 
-def _drift(assembly: Assembly, engine: str, method: str, value: float, true: Result) -> dict[str, float]:
+def _drift(
+    assembly: Assembly, engine: str, method: str, step_or_tolerance: float, true_run: Result
+) -> dict[str, float]:
     """Drift-off time (s) of a run (its duration if it does not drift off), and its pitch error (rad) at the end."""
-    settings = Settings(method, value, DURATION)
+    settings = Settings(method, step_or_tolerance, DURATION)
     if method in ADAPTIVE:
-        settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, value)
+        settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, step_or_tolerance)
     run = build(engine, assembly, settings).run()
-    error = np.abs(run.states[:, 3] - np.interp(run.times, true.times, true["pitch"]))
+    error = np.abs(run.states[:, 3] - np.interp(run.times, true_run.times, true_run["pitch"]))
     time = GrowthCurve(run.times, error).passing_time()
     return {"drift-off": DURATION if time is None else time, "error": float(error[-1])}
 
@@ -134,25 +136,28 @@ def _smoothing(folder: Path) -> list[Saved]:
 
 
 def _record_of_solver(
-    name: str, true: Result, quiet: Assembly, cutoff: float | None, engine: str, method: str, step: float
+    name: str, true_run: Result, quiet_assembly: Assembly, cutoff: float | None, engine: str, method: str, step: float
 ) -> Saved:
-    forces = quiet.input
+    forces = quiet_assembly.input
     assert isinstance(forces, Sampled)
     settings = Settings(method, step, NOISY)
-    clean = _run(engine, quiet, forces.values, cutoff, settings)
-    rows = np.rint(np.array(WINDOW) / step).astype(int)
+    clean = _run(engine, quiet_assembly, forces.values, cutoff, settings)
+    rows = np.rint(np.array(GROWTH_WINDOW) / step).astype(int)
     spread = np.zeros(2)
     for path in range(PATHS):
         noise = NOISE * normal_samples(SEED, path, len(forces.values), 2)
-        spread += (_run(engine, quiet, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]) ** 2
-    spread, law = np.sqrt(spread / PATHS), _law(_low_pass(forces.values, cutoff), quiet)
-    growth, expected = (float(np.log(each[1] / each[0]) / np.diff(WINDOW)[0]) for each in (spread, law))
+        spread += (_run(engine, quiet_assembly, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]) ** 2
+    spread, law = np.sqrt(spread / PATHS), _law(_low_pass(forces.values, cutoff), quiet_assembly)
+    growth, expected = (
+        float(np.log(record_of_run[1] / record_of_run[0]) / np.diff(GROWTH_WINDOW)[0])
+        for record_of_run in (spread, law)
+    )
     return {
         "name": name,
         "law": expected,
         "growth": growth,
         "spread": float(spread[1]),
-        **_bias(clean[:: round(1e-3 / step)], true, quiet),
+        **_bias(clean[:: round(1e-3 / step)], true_run, quiet_assembly),
     }
 
 
@@ -172,11 +177,11 @@ def _low_pass(values: np.ndarray, cutoff: float | None) -> np.ndarray:
     return sosfiltfilt(butter(4, cutoff, fs=NOISY_RATE, output="sos"), values, axis=0)
 
 
-def _bias(states: np.ndarray, true: Result, assembly: Assembly) -> dict[str, float]:
+def _bias(states: np.ndarray, true_run: Result, assembly: Assembly) -> dict[str, float]:
     """Ratio of the pseudo-damage of the front section force to the true one, for both components, without noise and
     before drift-off."""
     end = round(SCORED * NOISY_RATE)
-    wanted = section_forces(*(true[name][::4][:end] for name in ("f3", "f4", "pitch")))
+    wanted = section_forces(*(true_run[name][::4][:end] for name in ("f3", "f4", "pitch")))
     f3, f4, _ = suspension_loads(states[:end].T, assembly.parameters, "exact")
     loads = section_forces(f3, f4, states[:end, 3])
     return {f"damage {name}": damage_ratio(loads[name], wanted[name]) for name in ("f3x", "f3z")}
@@ -187,34 +192,36 @@ def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
     forces (n, 2)."""
     p, period = assembly.parameters, 1 / NOISY_RATE
     rates = sinh_law_rate(pitch_rate_of_forces(forces, period, p), period, p)
-    at = np.rint(np.array(WINDOW) / period).astype(int)
-    return np.sqrt(pitch_variance(np.array(WINDOW), rates[at], rigid_pitch(p).noise_intensity(NOISE, period)))
+    at = np.rint(np.array(GROWTH_WINDOW) / period).astype(int)
+    return np.sqrt(pitch_variance(np.array(GROWTH_WINDOW), rates[at], rigid_pitch(p).noise_intensity(NOISE, period)))
 
 
 def _solver_rows(solvers: list[Saved]) -> list[Row]:
     """Rows on the drift-off times of the solvers."""
     rows = []
     for name in ("linear", "noisy"):
-        of_input = [each for each in solvers if each["input"] == name]
+        of_input = [solver_record for solver_record in solvers if solver_record["input"] == name]
         first = of_input[0]["drift-off"]
-        for each in of_input[1:]:
-            solver = f"{each['engine']} {each['method']} {each['value']:g}"
+        for solver_record in of_input[1:]:
+            solver = f"{solver_record['engine']} {solver_record['method']} {solver_record['value']:g}"
             rows.append(
                 Observed(
                     f"drift_solvers.{name}.{solver.replace(' ', '.')}",
                     SYSTEM,
                     f"ratio of the drift-off time of the {name} run to that of the first solver "
                     f"({first:.2f} s), {solver}",
-                    each["drift-off"] / first,
+                    solver_record["drift-off"] / first,
                     "",
                 ).within(
                     1.0,
-                    LOOSE_SHARE if each["value"] >= 1e-5 and each["method"] in ADAPTIVE else TIGHT_SHARE,
+                    LOOSE_SHARE
+                    if solver_record["value"] >= 1e-5 and solver_record["method"] in ADAPTIVE
+                    else TIGHT_SHARE,
                     "the samples make the error, so accurate solvers agree; a loose tolerance adds to it",
                     "native",
                 )
             )
-    smooth = [each["error"] for each in solvers if each["input"] == "smooth"]
+    smooth = [solver_record["error"] for solver_record in solvers if solver_record["input"] == "smooth"]
     linear = solvers[0]["error"]
     return [
         *rows,
@@ -232,62 +239,66 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
 def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
     """Rows: with every smoothing or scheme, the spread of the pitch grows by the closed law of the smoothed forces."""
     rows = []
-    for each in smoothing:
-        key = each["name"].replace(" ", "-").replace(",", "")
+    for smoothing_record in smoothing:
+        key = smoothing_record["name"].replace(" ", "-").replace(",", "")
         rows += [
             Observed(
                 f"drift_solvers.growth.{key}",
                 SYSTEM,
-                f"ratio of the growth of the pitch's spread from {WINDOW[0]:g} to {WINDOW[1]:g} s to "
-                f"the closed law, {each['name']}",
-                each["growth"] / each["law"],
+                f"ratio of the growth of the pitch's spread from {GROWTH_WINDOW[0]:g} to {GROWTH_WINDOW[1]:g} s to "
+                f"the closed law, {smoothing_record['name']}",
+                smoothing_record["growth"] / smoothing_record["law"],
                 "",
             ).within(1.0, 0.1, f"the same {PATHS} noise files in all; their own chance is 3 %", "closed form")
         ]
         for axis, what in (
             (
                 "f3z",
-                f"ratio of the damage of the front section force, body z, to the true damage, {each['name']}, no noise",
+                "ratio of the damage of the front section force, body z, to the true damage, "
+                f"{smoothing_record['name']}, no noise",
             ),
             (
                 "f3x",
-                f"ratio of the damage of the front section force, body x, to the true damage, {each['name']}, no noise",
+                "ratio of the damage of the front section force, body x, to the true damage, "
+                f"{smoothing_record['name']}, no noise",
             ),
         ):
-            id, damage = f"drift_solvers.bias.{key}.{axis}", each[f"damage {axis}"]
+            id, damage = f"drift_solvers.bias.{key}.{axis}", smoothing_record[f"damage {axis}"]
             rows.append(Observed(id, SYSTEM, what, damage, "").beside("1", "what smoothing takes away", "none"))
     return rows
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Drift-off by solver, and what smoothing and schemes do."""
     rows = tuple(
         (
-            each["input"],
-            each["engine"],
-            each["method"],
-            f"{each['value']:g}",
-            _drift_off_text(each),
-            f"{each['error']:.2e}",
+            solver_record["input"],
+            solver_record["engine"],
+            solver_record["method"],
+            f"{solver_record['value']:g}",
+            _drift_off_text(solver_record),
+            f"{solver_record['error']:.2e}",
         )
-        for each in data["solvers"]
+        for solver_record in case_data["solvers"]
     )
     note = (
-        f"Study road at 20 m/s, {RATE:g} Hz, {DURATION:g} s. Value: step (s), or relative tolerance of an adaptive "
+        f"Study road at 20 m/s, {SAMPLING_RATE:g} Hz, {DURATION:g} s. Value: step (s), or relative tolerance of "
+        "an adaptive "
         f"solver. Linear and smooth: undisturbed; noisy: {NOISE} N, linear."
     )
     heads = ("input", "engine", "method", "value", "drift-off [s]", "pitch error at the end [rad]")
     tables = [Table("Drift-off by solver and interpolation", note, heads, rows)]
-    if data["smoothing"]:
+    if case_data["smoothing"]:
         shown = {"growth": ".3f", "law": ".3f", "spread": ".4f", "damage f3z": ".3f", "damage f3x": ".3f"}
         lines = tuple(
-            (each["name"], *(f"{each[name]:{form}}" for name, form in shown.items())) for each in data["smoothing"]
+            (solver_record["name"], *(f"{solver_record[name]:{form}}" for name, form in shown.items()))
+            for solver_record in case_data["smoothing"]
         )
         columns = (
             "treatment",
             "growth of the spread [1/s]",
             "law [1/s]",
-            f"spread at {WINDOW[1]:g} s [rad]",
+            f"spread at {GROWTH_WINDOW[1]:g} s [rad]",
             "damage f3z / true damage",
             "damage f3x / true damage",
         )

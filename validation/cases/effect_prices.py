@@ -27,7 +27,7 @@ SYSTEM: System = "effects"
 STEPS = {True: 2000, False: 4000}
 """Steps of the runs that are timed against hand-built ones, by ``quick``: 4 s are a fifth of a study scene, and short
 enough for both of a pair to meet the machine in one mood."""
-ROUNDS, PRICED = {True: 7, False: 80}, {True: 5, False: 15}
+RATIO_ROUNDS, PRICE_ROUNDS = {True: 7, False: 80}, {True: 5, False: 15}
 """Rounds of these runs, and of those that tell what an effect adds, by ``quick``."""
 SELDOM = 4
 """Of how many rounds the unchecked run is in the first."""
@@ -50,11 +50,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     the rounds, and each effect in one of the three engines, in turn.
     """
     with tempfile.TemporaryDirectory() as name:
-        place = Path(name)
-        write_files(place)
-        ratios = {engine: _ratio(engine, place, STEPS[quick], ROUNDS[quick]) for engine in ("exudyn", "mujoco")}
+        files_folder = Path(name)
+        write_files(files_folder)
+        ratios = {
+            engine: _ratio(engine, files_folder, STEPS[quick], RATIO_ROUNDS[quick]) for engine in ("exudyn", "mujoco")
+        }
         price = [
-            _price(effect, engine, place, PRICED[quick])
+            _price(effect, engine, files_folder, PRICE_ROUNDS[quick])
             for i, effect in enumerate(EFFECTS)
             for j, engine in enumerate(ENGINES)
             if not quick or i % len(ENGINES) == j
@@ -72,7 +74,7 @@ def hand_built(engine: str, bare: Scene) -> Any:
     return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
 
 
-def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> Saved:
+def _ratio(engine: str, folder: Path, steps: int, round_count: int) -> Saved:
     """Ratio of computing times between twinrig's bare model and the hand-built one, and the largest difference of their
     states.
 
@@ -82,7 +84,7 @@ def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> Saved:
     ours, theirs, times = model(bare, engine), hand_built(engine, bare), STEP * np.arange(steps + 1)
     gap = float(np.abs(ours.run().states - theirs()).max())
     jobs = [ours.run, lambda: guard(engine, times, theirs(), bare.run.duration), theirs]
-    seconds = interleave(jobs, rounds, round_interval=(1, 1, SELDOM), clock=time.process_time)
+    seconds = interleave(jobs, round_count, round_interval=(1, 1, SELDOM), clock=time.process_time)
     return {
         "ratio": paired_ratio(seconds[0], seconds[1]),
         "gap": gap,
@@ -119,15 +121,17 @@ def _machinery(engine: str, machinery: Saved, steps: int) -> list[Row]:
     ]
 
 
-def ratio_row(row: str, title: str, ratio: tuple[float, float, float], why: str) -> Row:
+def ratio_row(row: str, title: str, ratio: tuple[float, float, float], tolerance_reason: str) -> Row:
     """Row with a ratio of computing times and its interval."""
     value, low, high = ratio
-    return Observed(row, SYSTEM, f"{title}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(DEAREST, why)
+    return Observed(row, SYSTEM, f"{title}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(
+        DEAREST, tolerance_reason
+    )
 
 
 def _wheelset(steps: int, quick: bool) -> list[Row]:
     """Rows: a free wheelset with linear creep on cones, compared with code written for this alone."""
-    gap, ratio = ratio_of_wheelsets(steps, ROUNDS[quick])
+    gap, ratio = ratio_of_wheelsets(steps, RATIO_ROUNDS[quick])
     return [
         Observed(
             "effect_prices.same.wheelset",
@@ -155,7 +159,7 @@ def _rides(quick: bool) -> list[Row]:
     """
     rows = []
     for engine, steps in RIDES.items():
-        gap, ratio = ratio_of_rides(engine, steps[quick], 3 if quick else ROUNDS[quick])
+        gap, ratio = ratio_of_rides(engine, steps[quick], 3 if quick else RATIO_ROUNDS[quick])
         rows += [
             Observed(
                 f"effect_prices.same.ride.{engine}",
@@ -184,7 +188,7 @@ def _cars(steps: int, quick: bool) -> list[Row]:
     MuJoCo's own step is the same and so is the march of the tyres' cells, three fifths of the time; what is
     left, a microsecond of every call of the forces, is the walk through a table that any vehicle has.
     """
-    gap, ratio = ratio_of_cars(steps, ROUNDS[quick])
+    gap, ratio = ratio_of_cars(steps, RATIO_ROUNDS[quick])
     return [
         Observed(
             "effect_prices.same.handling",
@@ -210,7 +214,7 @@ def _stops(quick: bool) -> list[Row]:
     A step compiled for any number of tyre tables and of their loads, where the written one has one of each,
     takes a third longer; asking for samples and recording them adds a tenth.
     """
-    gap, ratio = ratio_of_stops(3.0 if quick else 10.0, ROUNDS[quick])
+    gap, ratio = ratio_of_stops(3.0 if quick else 10.0, RATIO_ROUNDS[quick])
     return [
         Observed(
             "effect_prices.same.braking",
@@ -231,7 +235,7 @@ def _stops(quick: bool) -> list[Row]:
 
 def _contact(quick: bool) -> list[Row]:
     """Rows: FASTSIM on one ellipse without spin, called from Python, compared with code written for this alone."""
-    gap, ratio = ratio_of_contacts(ROUNDS[quick])
+    gap, ratio = ratio_of_contacts(RATIO_ROUNDS[quick])
     return [
         Observed(
             "effect_prices.same.contact",
@@ -252,20 +256,21 @@ def _contact(quick: bool) -> list[Row]:
 
 def _choice() -> Row:
     """Row: ratio of the time to choose the effects of a linear car to the time of its full covariance."""
-    (ratio, low, high), told = price_of_choice()
+    (ratio, low, high), predicted_seconds = price_of_choice()
     return Observed(
         "effect_prices.choice",
         SYSTEM,
         "ratio of the time of a linear choice of effects to that of the full covariance of the same scene, a car of 19 "
-        f"degrees of freedom, 95 % interval {low:.3g} to {high:.3g}; the time told beforehand is {told:.2g} times that",
+        f"degrees of freedom, 95 % interval {low:.3g} to {high:.3g}; the time told beforehand is "
+        f"{predicted_seconds:.2g} times that",
         ratio,
         "times",
     ).aim(20.0, "seconds of the processor, median of interleaved rounds")
 
 
-def _price(effect: str, engine: str, folder: Path, rounds: int) -> Saved:
+def _price(effect: str, engine: str, folder: Path, round_count: int) -> Saved:
     """One line of the price list: time per step in microseconds that an effect adds in an engine, with its counts."""
-    seconds = interleave([_job(bare, engine) for bare in pair(effect, TIMED_STEPS, folder)], rounds, 5e-3)
+    seconds = interleave([_job(bare, engine) for bare in pair(effect, TIMED_STEPS, folder)], round_count, 5e-3)
     added = (seconds[1] - seconds[0]) / TIMED_STEPS * 1e6
     return {
         "effect": effect,
@@ -284,7 +289,7 @@ def _job(bare: Scene, engine: str) -> Any:
     return lambda: output_channels(assembly, built.run(), built)
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """The price list of effects."""
     note = (
         "Each effect is added to the scene without it: wheel_forces, road, pitch_spring and the sensors to the "
@@ -295,16 +300,16 @@ def tables(data: Saved) -> list[Table]:
         "costs nothing."
     )
     headings = ("effect", "engine", "adds", "without it, us per step", "adds, us per step", "factor")
-    return [Table("Price list of effects", note, headings, tuple(_line(entry) for entry in data["price"]))]
+    return [Table("Price list of effects", note, headings, tuple(_line(entry) for entry in case_data["price"]))]
 
 
-def _line(entry: Saved) -> tuple[str, ...]:
-    value, low, high = entry["ratio"]
+def _line(saved_entry: Saved) -> tuple[str, ...]:
+    value, low, high = saved_entry["ratio"]
     return (
-        entry["effect"],
-        entry["engine"],
-        entry["adds"],
-        f"{entry['step']:.2f}",
-        f"{entry['us']['median']:+.2f} +/- {entry['us']['mad']:.2f}",
+        saved_entry["effect"],
+        saved_entry["engine"],
+        saved_entry["adds"],
+        f"{saved_entry['step']:.2f}",
+        f"{saved_entry['us']['median']:+.2f} +/- {saved_entry['us']['mad']:.2f}",
         f"{value:.2f} ({low:.2f} to {high:.2f})",
     )

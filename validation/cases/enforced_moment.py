@@ -24,9 +24,9 @@ SYSTEM: System = "pitch-plane"
 DURATION, QUICK_DURATION, ABRUPT_START, ROUGH_FACTOR = 4.0, 1.5, 1.0, 2.0
 """Of a manoeuvre, in full and in quick, of an abrupt start whose ringing must not be most of the run, and of the study
 road (s)."""
-PERIOD = 1e-3
+SAMPLE_PERIOD = 1e-3
 STEP = 1e-3
-BOUND = 1e-4
+MOMENT_BOUND = 1e-4
 GUIDE = {"prescribed_pitch": {"file": "pitch.csv"}}
 BEST_SETTINGS = {
     "exudyn": Settings("GeneralizedAlpha", STEP, DURATION, spectral_radius=0.6),
@@ -43,7 +43,7 @@ def manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
     """
     p = parameter_set(parameters, "", folder)
     rest = equilibrium(p)
-    t = PERIOD * np.arange(round(DURATION / PERIOD) + 1)
+    t = SAMPLE_PERIOD * np.arange(round(DURATION / SAMPLE_PERIOD) + 1)
     s = np.clip(t / 1.0, 0, 1)
     rise = s**3 * (10 - 15 * s + 6 * s**2)
     pitch = rise * (0.06 * np.sin(2 * np.pi * 1.2 * t) + 0.02 * np.sin(2 * np.pi * 2.7 * t))
@@ -52,25 +52,25 @@ def manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
     pitch = pitch + rest[3]
     front = p.k1 * rest[0] + rise * (900 * np.sin(2 * np.pi * 1.4 * t) + 300 * np.sin(2 * np.pi * 2.3 * t))
     rear = p.k2 * rest[1] + rise * 700 * np.sin(2 * np.pi * 1.7 * t + 1)
-    write_wheel_forces(folder, front, rear, PERIOD)
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, PERIOD)
+    write_wheel_forces(folder, front, rear, SAMPLE_PERIOD)
+    write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, SAMPLE_PERIOD)
 
 
 def moment(scene: Scene, engine: str, settings: Settings) -> np.ndarray:
     """Enforced moment (n,) in N m at every millisecond of a scene."""
     finer = replace(settings, duration=scene.run.duration)
-    return simulate(scene, engine, finer)["enforced_moment"][:: round(PERIOD / settings.step)]
+    return simulate(scene, engine, finer)["enforced_moment"][:: round(SAMPLE_PERIOD / settings.step)]
 
 
 def truth(scene: Scene) -> np.ndarray:
     """True enforced moment (n,) in N m, from the form without multiplier (eq. 39) by Runge-Kutta with steps of a
     sixteenth of the sampling period."""
-    return moment(scene, "reference", Settings("RK4", PERIOD / 16, scene.run.duration))
+    return moment(scene, "reference", Settings("RK4", SAMPLE_PERIOD / 16, scene.run.duration))
 
 
-def relative(computed: np.ndarray, true: np.ndarray) -> float:
+def relative(computed_values: np.ndarray, true_moment: np.ndarray) -> float:
     """Ratio of the rms difference to the rms of the true moment."""
-    return float(np.sqrt(np.mean((computed - true) ** 2) / np.mean(true**2)))
+    return float(np.sqrt(np.mean((computed_values - true_moment) ** 2) / np.mean(true_moment**2)))
 
 
 @on_paper_road()
@@ -103,7 +103,7 @@ def _manoeuvre(folder: Path, vehicles: tuple[str, ...], duration: float) -> list
                     relative(moment(scene, engine, settings), true),
                     "of its rms",
                 ).at_most(
-                    BOUND,
+                    MOMENT_BOUND,
                     f"the rms is {np.sqrt(np.mean(true**2)):.0f} N m; a second-order scheme leaves (2 pi f h)^2 / 12, "
                     "which is 2e-5 at 2.7 Hz and 1 ms",
                     "native",
@@ -112,17 +112,17 @@ def _manoeuvre(folder: Path, vehicles: tuple[str, ...], duration: float) -> list
     return rows
 
 
-def _uncertainty(scene: Scene, true: np.ndarray) -> Row:
+def _uncertainty(scene: Scene, true_moment: np.ndarray) -> Row:
     """Row: uncertainty of the true moment, as its difference from an adaptive solver of another family at a tolerance
     of 1e-11."""
-    other = moment(scene, "reference", Settings("DOP853", PERIOD, DURATION, 1e-11))
+    by_other_solver = moment(scene, "reference", Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-11))
     return Observed(
         "moment.reference",
         SYSTEM,
         "uncertainty of the moment of the eliminated form: Runge-Kutta at 1/16 ms against Dormand-Prince 8 at 1e-11",
-        relative(other, true),
+        relative(by_other_solver, true_moment),
         "of its rms",
-    ).at_most(BOUND / 100, "a hundredth of the bound that it has to judge", "shared kernel")
+    ).at_most(MOMENT_BOUND / 100, "a hundredth of the bound that it has to judge", "shared kernel")
 
 
 def _ringing(folder: Path) -> CaseAnswer:
@@ -177,10 +177,10 @@ def _inconsistent(scene: Scene, settings: Settings) -> np.ndarray:
 def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
     """Rows and table on the paper's guided run on the study road: error of the enforced moment at each step, divided by
     the rms of the moment."""
-    virtual_drive(folder, ROUGH_FACTOR + 0.1, PERIOD, PERIOD)
+    virtual_drive(folder, ROUGH_FACTOR + 0.1, SAMPLE_PERIOD, SAMPLE_PERIOD)
     paper = perturbed_parameters(PARAMETERS)
     scene = force_scene(
-        folder, step=PERIOD, duration=ROUGH_FACTOR, interpolation="smooth", override=paper, effects=GUIDE
+        folder, step=SAMPLE_PERIOD, duration=ROUGH_FACTOR, interpolation="smooth", override=paper, effects=GUIDE
     )
     true = truth(scene)
     table: list[list[Any]] = []
@@ -196,7 +196,7 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
             next(row[3] for row in table if row[0] == engine and row[2] == STEP),
             "of its rms",
         ).beside(
-            BOUND,
+            MOMENT_BOUND,
             "40 Hz of roughness at 1 ms: (2 pi f h)^2 / 12 is 5e-3 of I beta'', twenty times the moment; the "
             "table shows the step that it takes",
             "native",
@@ -206,11 +206,11 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
     return rows, table
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Error by step on the study road, where it was driven."""
-    if not data["table"]:
+    if not case_data["table"]:
         return []
-    rows = tuple((engine, name, f"{1e3 * step:g}", f"{error:.1e}") for engine, name, step, error in data["table"])
+    rows = tuple((engine, name, f"{1e3 * step:g}", f"{error:.1e}") for engine, name, step, error in case_data["table"])
     title = "Enforced moment on the study road, perturbed model, after the first 20 ms"
     note = (
         "Rms of the error / rms of the moment. The rows above use a manoeuvre of up to 2.7 Hz; roughness of 40 Hz "
@@ -219,12 +219,12 @@ def tables(data: Saved) -> list[Table]:
     return [Table(title, note, ("engine", "integrator", "step [ms]", "relative error"), rows)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot how the multiplier rings after an abrupt start."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 3.2))
-    paths = data["ringing"]
+    paths = case_data["ringing"]
     for i, (name, path) in enumerate((name, path) for name, path in paths.items() if name != "time"):
         style, width = ("--", 2) if name.startswith("consistent") else ("-", 1)
         axis.plot(1e3 * np.array(paths["time"]), path, style, label=name, color=f"C{i // 2}", linewidth=width)

@@ -35,7 +35,7 @@ SECONDS, MEMORY = 120.0, 2e9
 """Targets of the large ensemble on two cores."""
 STATE, MARKS = 8 * 8, 2 * 8
 """Bytes of a state that is kept, and of the times of drift-off and of failure of a path."""
-TIMES = (1.0, 2.0, 5.0, 10.0, 15.0)
+TABLE_TIMES = (1.0, 2.0, 5.0, 10.0, 15.0)
 """Times (s) of the table of spreads."""
 SAME_BITS = "the same bits"
 
@@ -142,14 +142,14 @@ def _killed_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
         time.sleep(0.02)
     child.kill()
     child.join()
-    kept = {path: path.stat().st_mtime_ns for path in blocks.glob("block*.npz")}
+    modification_times = {path: path.stat().st_mtime_ns for path in blocks.glob("block*.npz")}
     again = run_paths(job, RECOMPUTED_PATHS, blocks, blocks=Blocks(20))
     if (
-        not kept
-        or len(kept) == RECOMPUTED_PATHS // 20
-        or any(path.stat().st_mtime_ns != when for path, when in kept.items())
+        not modification_times
+        or len(modification_times) == RECOMPUTED_PATHS // 20
+        or any(path.stat().st_mtime_ns != when for path, when in modification_times.items())
     ):
-        raise AssertionError(f"not killed half-way, or computed again: {len(kept)} blocks were kept")
+        raise AssertionError(f"not killed half-way, or computed again: {len(modification_times)} blocks were kept")
     return _same_row(
         "resumed",
         f"{RECOMPUTED_PATHS} paths, killed half-way and resumed: the kept blocks are not touched, the "
@@ -179,36 +179,43 @@ def _large_ensemble(job: NoisePaths, many: int, blocks: Path) -> Saved:
     seconds = time.perf_counter() - start
     parent, child = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     busy = parent.ru_utime + parent.ru_stime + child.ru_utime + child.ru_stime
-    kept = sum(values.nbytes for values in paths.values()) / len(paths["drift_off"])
+    bytes_per_path = sum(values.nbytes for values in paths.values()) / len(paths["drift_off"])
     most = peak_memory() + 2048 * child.ru_maxrss
     return {
         "found": paths,
         "seconds": seconds,
         "busy": busy,
-        "kept": kept,
+        "kept": bytes_per_path,
         "bytes": most,
         "path-steps": len(paths["drift_off"]) * job.settings.steps,
         "failed": int((paths["failed"] >= 0).sum()),
     }
 
 
-def _scale_rows(large: Saved) -> list[Row]:
+def _scale_rows(large_ensemble: Saved) -> list[Row]:
     what = f"{LARGE_ENSEMBLE_PATHS:,} paths of {LARGE_ENSEMBLE_SECONDS:g} s at 1 kHz in the reference, 2 processes"
-    share = f"{50.0 * large['busy'] / large['seconds']:.0f} % of two cores"
+    share = f"{50.0 * large_ensemble['busy'] / large_ensemble['seconds']:.0f} % of two cores"
     counted = (
         (
             "path-steps",
             "steps of all paths",
-            float(large["path-steps"]),
+            float(large_ensemble["path-steps"]),
             "",
             LARGE_ENSEMBLE_PATHS * LARGE_ENSEMBLE_SECONDS / STEP,
             "a count",
         ),
-        ("failed", "paths that left all bounds", float(large["failed"]), "", 0.0, "a tumbling vehicle stays finite"),
+        (
+            "failed",
+            "paths that left all bounds",
+            float(large_ensemble["failed"]),
+            "",
+            0.0,
+            "a tumbling vehicle stays finite",
+        ),
         (
             "kept",
             "bytes of results, by paths",
-            large["kept"],
+            large_ensemble["kept"],
             "byte",
             STATE * (LARGE_ENSEMBLE_SECONDS + 1.0) + MARKS,
             "a count: a state of eight numbers every second, and when it drifts off or fails",
@@ -218,7 +225,7 @@ def _scale_rows(large: Saved) -> list[Row]:
         (
             "seconds",
             f"start of the processes to the last path, once, with {share}",
-            large["seconds"],
+            large_ensemble["seconds"],
             "s",
             SECONDS,
             "target on two free cores; what other programs take of them adds to it",
@@ -226,7 +233,7 @@ def _scale_rows(large: Saved) -> list[Row]:
         (
             "processor",
             "processor time of all processes by two cores, once",
-            large["busy"] / 2,
+            large_ensemble["busy"] / 2,
             "s",
             SECONDS,
             "what it takes on two free cores, whoever else uses them now",
@@ -234,13 +241,13 @@ def _scale_rows(large: Saved) -> list[Row]:
         (
             "memory",
             "largest memory of all processes together, once",
-            large["bytes"],
+            large_ensemble["bytes"],
             "byte",
             MEMORY,
             "target; libraries included, of which a machine's own are a part",
         ),
     )
-    steps, failed, kept = (
+    steps, failed, bytes_kept = (
         Observed(f"ensemble.scale.{id}", SYSTEM, f"{what}: {words}", value, unit).within(expected, 0.0, why, "none")
         for id, words, value, unit, expected, why in counted
     )
@@ -248,32 +255,35 @@ def _scale_rows(large: Saved) -> list[Row]:
         Observed(f"ensemble.scale.{id}", SYSTEM, f"{what}: {words}", value, unit).aim(bound, why)
         for id, words, value, unit, bound, why in aimed
     ]
-    return [steps, failed, *aims, kept]
+    return [steps, failed, *aims, bytes_kept]
 
 
 def _engines(
-    scene: Scene, truth: np.ndarray, times: np.ndarray, ensemble: Arrays, count: int, pool: Executor | None
+    scene: Scene, truth: np.ndarray, times: np.ndarray, ensemble: Arrays, path_count: int, pool: Executor | None
 ) -> tuple[list[Row], dict[str, float]]:
     """Rows on how well the first paths agree between engines, and the time (s) per path and step for each way of
     computing."""
     exudyn = noise_paths(scene, times, truth, engine="exudyn")
     single, two = (mujoco_threads(scene, times, truth, threads=threads) for threads in (1, 2))
-    ways: dict[str, Callable[[], Arrays]] = {
-        "mujoco, 1 thread": lambda: run_paths(single, count),
-        "mujoco, 2 threads": lambda: run_paths(two, count),
-        "exudyn, 2 processes" if pool else "exudyn": lambda: run_paths(exudyn, count, executor=pool, blocks=Blocks(1)),
+    seconds_by_method: dict[str, Callable[[], Arrays]] = {
+        "mujoco, 1 thread": lambda: run_paths(single, path_count),
+        "mujoco, 2 threads": lambda: run_paths(two, path_count),
+        "exudyn, 2 processes" if pool else "exudyn": lambda: run_paths(
+            exudyn, path_count, executor=pool, blocks=Blocks(1)
+        ),
     }
     rows, prices = [], {}
-    for way, job in ways.items():
+    for method_name, job in seconds_by_method.items():
         start = time.perf_counter()
         paths = job()
-        prices[way] = (time.perf_counter() - start) / (count * (len(truth) - 1))
+        prices[method_name] = (time.perf_counter() - start) / (path_count * (len(truth) - 1))
         what = (
-            f"largest difference of {count} paths in {way} from the reference before drift-off, over the largest state"
+            f"largest difference of {path_count} paths in {method_name} from the reference before drift-off, "
+            "over the largest state"
         )
         rows.append(
             Observed(
-                f"ensemble.engines.{_slug(way)}", SYSTEM, what, largest_difference(ensemble, paths, times), ""
+                f"ensemble.engines.{_slug(method_name)}", SYSTEM, what, largest_difference(ensemble, paths, times), ""
             ).at_most(1e-9, "the same tableau on the same samples: rounding, grown by the instability", "native")
         )
     return rows, prices
@@ -282,13 +292,13 @@ def _engines(
 def _price_rows(prices: dict[str, float]) -> list[Row]:
     return [
         Observed(
-            f"ensemble.price.{_slug(way)}",
+            f"ensemble.price.{_slug(method_name)}",
             SYSTEM,
-            f"wall time per path and step, {way}, measured once",
+            f"wall time per path and step, {method_name}, measured once",
             1e9 * price,
             "ns",
         ).beside("", "seconds are reported", "none")
-        for way, price in prices.items()
+        for method_name, price in prices.items()
     ]
 
 
@@ -312,12 +322,14 @@ def _half_step_row(forces: Path) -> Row:
     ).at_most(1e-4, "the samples are the same, so only the integrator's error differs", "shared kernel")
 
 
-def _data(truth: np.ndarray, times: np.ndarray, paths: Arrays, large: Saved, prices: dict[str, float]) -> Saved:
+def _data(
+    truth: np.ndarray, times: np.ndarray, paths: Arrays, large_ensemble: Saved, prices: dict[str, float]
+) -> Saved:
     """Saved numbers for the tables and the figure."""
     errors = paths["states"] - truth[:: round(1.0 / STEP)]
     spreads = [
         [when, *deviation_with_error(errors[:, round(when), 3]), *deviation_with_error(errors[:, round(when), 2])]
-        for when in TIMES
+        for when in TABLE_TIMES
     ]
     quantiles = [[level, *quantile_with_interval(paths["drift_off"], level)] for level in (0.05, 0.5, 0.95)]
     counts, edges = np.histogram(paths["drift_off"], bins=np.arange(0.0, 31.0, 0.5))
@@ -326,7 +338,7 @@ def _data(truth: np.ndarray, times: np.ndarray, paths: Arrays, large: Saved, pri
         "spreads": spreads,
         "quantiles": quantiles,
         "prices": prices,
-        "large": large,
+        "large": large_ensemble,
         "times": times[1:].tolist(),
         "counts": counts.tolist(),
         "edges": edges.tolist(),
@@ -334,9 +346,9 @@ def _data(truth: np.ndarray, times: np.ndarray, paths: Arrays, large: Saved, pri
     }
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Spreads, drift-off times and prices; none in the quick report."""
-    if not data:
+    if not case_data:
         return []
     paths = (
         f"{LARGE_ENSEMBLE_PATHS:,} paths of {LARGE_ENSEMBLE_SECONDS:g} s, noise {DEVIATION:g} N at 1 kHz "
@@ -344,15 +356,19 @@ def tables(data: Saved) -> list[Table]:
     )
     spreads = tuple(
         (f"{when:g}", f"{pitch:.4e} +- {e:.0e}", f"{heave:.4e} +- {o:.0e}")
-        for when, pitch, e, heave, o in data["spreads"]
+        for when, pitch, e, heave, o in case_data["spreads"]
     )
     times = tuple(
         (f"{100 * level:g} %", f"{value:.2f}", f"{low:.2f} to {high:.2f}")
-        for level, value, low, high in data["quantiles"]
+        for level, value, low, high in case_data["quantiles"]
     )
     prices = tuple(
-        (way, f"{1e9 * price:,.0f}", f"{price * LARGE_ENSEMBLE_PATHS * LARGE_ENSEMBLE_SECONDS / STEP / 60:,.1f}")
-        for way, price in data["prices"].items()
+        (
+            method_name,
+            f"{1e9 * price:,.0f}",
+            f"{price * LARGE_ENSEMBLE_PATHS * LARGE_ENSEMBLE_SECONDS / STEP / 60:,.1f}",
+        )
+        for method_name, price in case_data["prices"].items()
     )
     return [
         Table(
@@ -377,17 +393,17 @@ def tables(data: Saved) -> list[Table]:
     ]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Fan of the pitch error and histogram of the drift-off times."""
-    if not data:
+    if not case_data:
         return []
     from models.drawing.drift import draw_fan
     from models.drawing.figures import BLUE, COLUMN_WIDTH, add_heading, subplots
 
     figure, (fan, histogram) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6), width_ratios=(3, 2))
-    draw_fan(fan, np.array(data["times"]), np.array(data["fan"]))
+    draw_fan(fan, np.array(case_data["times"]), np.array(case_data["fan"]))
     fan.legend(loc="lower right")
-    histogram.stairs(data["counts"], data["edges"], fill=True, color=BLUE, alpha=0.6)
+    histogram.stairs(case_data["counts"], case_data["edges"], fill=True, color=BLUE, alpha=0.6)
     histogram.set_title("Drift-offs: paths per half second [-]")
     for axis in (fan, histogram):
         axis.set_xlabel("time [s]")

@@ -27,7 +27,7 @@ SEED = 41
 RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
 ELLIPSES = (0.1, *RATIOS, 10.0)
 """a/b of the ellipses that slide under spin."""
-KINDS = {
+CREEPAGE_KINDS = {
     "x": (1.0, 0.0, 0.0),
     "y": (0.0, 1.0, 0.0),
     "spin": (0.0, 0.0, 1.0),
@@ -41,7 +41,7 @@ LEVELS = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
 SLIDING = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
 """Levels from where all begins to slide."""
 LOAD, FRICTION, MEAN_AXIS = 80e3, 0.3, 5e-3
-PAIR = MaterialPair()
+MATERIAL_PAIR = MaterialPair()
 UNITS = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
 """Of fx, fy (N) and mz (N m)."""
 Contacts = dict[str, Any]
@@ -57,7 +57,7 @@ ALLOWED = {
     "similarity": EXACT_TO_ROUNDING,
     "power coarse": (1e-5, "a slender strip that sticks to its end, in the last half cell"),
 }
-WHY = "the same model with 321 cells per strip; a fifth of the model's own error"
+GRID_REASON = "the same model with 321 cells per strip; a fifth of the model's own error"
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -71,18 +71,20 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, data
     answers, data["model"] = _model()
-    timed, data["speed"] = speed(PAIR, LOAD, FRICTION, MEAN_AXIS)
+    timed, data["speed"] = speed(MATERIAL_PAIR, LOAD, FRICTION, MEAN_AXIS)
     return rows + answers + timed, data
 
 
-def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
+def creepages(kind_names: tuple[str, ...], creepage_levels: tuple[float, ...]) -> Contacts:
     """Contacts, as columns, for every axis ratio, kind and level of creepage. Creepages have the unit mu N / (G c^2 C),
     where C is C11, C22 or C23 c."""
-    ratio, kind, level = (grid.ravel() for grid in np.meshgrid(RATIOS, np.arange(len(kinds)), levels, indexing="ij"))
-    part = np.array([KINDS[name] for name in kinds])[kind] * level[:, None]
-    known, unit = coefficients(ratio, PAIR.nu), FRICTION * LOAD / (PAIR.G * MEAN_AXIS**2)
+    ratio, kind, level = (
+        grid.ravel() for grid in np.meshgrid(RATIOS, np.arange(len(kind_names)), creepage_levels, indexing="ij")
+    )
+    creepage_parts = np.array([CREEPAGE_KINDS[name] for name in kind_names])[kind] * level[:, None]
+    known, unit = coefficients(ratio, MATERIAL_PAIR.nu), FRICTION * LOAD / (MATERIAL_PAIR.G * MEAN_AXIS**2)
     scale = unit / np.stack([known.c11, known.c22, known.c23 * MEAN_AXIS], axis=1)
-    xi_x, xi_y, spin = (part * scale).T
+    xi_x, xi_y, spin = (creepage_parts * scale).T
     a, b = MEAN_AXIS * np.sqrt(ratio), MEAN_AXIS / np.sqrt(ratio)
     return {
         "a": a,
@@ -97,13 +99,13 @@ def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
 
 def _vector(columns: Contacts, **options: Any) -> Array:
     """Forces (n, 2) divided by mu N."""
-    answers = fastsim(RollingEllipse(**columns), PAIR, **options)
+    answers = fastsim(RollingEllipse(**columns), MATERIAL_PAIR, **options)
     return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION * LOAD)
 
 
 def _discretisation() -> tuple[list[Row], dict[str, Any]]:
     """Rows and data on the discretisation: mean and largest error on every grid, and order of convergence."""
-    columns = creepages(tuple(KINDS), LEVELS)
+    columns = creepages(tuple(CREEPAGE_KINDS), LEVELS)
     rows: list[Row] = []
     data: dict[str, Any] = {}
     for bound in POWERS:
@@ -120,7 +122,7 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
                     f"largest error of the force at 21 cells per strip, {bound} bound, {len(truth)} cases",
                     float(errors[1].max()),
                     "mu N",
-                ).at_most(0.004, WHY, "none")
+                ).at_most(0.004, GRID_REASON, "none")
             )
             mean = np.array([np.sqrt(np.mean(e**2)) for e in errors])
             order = float(np.log(mean[0] / mean[-1]) / np.log(CELLS[-1] / CELLS[0]))
@@ -142,12 +144,14 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
     return rows, {"cells": data}
 
 
-def _invariants(batch_count: int, count: int, first: int) -> list[Row]:
+def _invariants(batch_count: int, contact_count: int, first: int) -> list[Row]:
     """Rows on invariants of the forces, over random contacts."""
     answers: dict[str, float] = {}
     for i in range(batch_count):
         options = COMPUTED_OPTIONS[i % len(COMPUTED_OPTIONS)]
-        for name, value in worst_violation(random_contacts(SEED, first + i, count), options, PAIR).items():
+        for name, value in worst_violation(
+            random_contacts(SEED, first + i, contact_count), options, MATERIAL_PAIR
+        ).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
             answers[name] = max(answers.get(name, 0.0), value)
     what = {
@@ -164,7 +168,7 @@ def _invariants(batch_count: int, count: int, first: int) -> list[Row]:
         "similarity": "difference of the forces at eight times the load and twice the size from the law of similarity",
         "stick": "excess of the share of stick beyond 0 to 1",
     }
-    total = batch_count * count
+    total = batch_count * contact_count
     return [
         Observed(
             f"fastsim.always.{name.replace(' ', '_')}",
@@ -180,9 +184,9 @@ def _invariants(batch_count: int, count: int, first: int) -> list[Row]:
 def _limits() -> list[Row]:
     """Rows: agreement with the linear theory at small creepages, and direction of the force in full sliding."""
     columns = creepages(("x", "y", "spin"), (1e-6,))
-    answers = fastsim(RollingEllipse(**columns), PAIR)
+    answers = fastsim(RollingEllipse(**columns), MATERIAL_PAIR)
     linear = np.stack(
-        linear_forces(columns["a"], columns["b"], columns["xi_x"], columns["xi_y"], columns["spin"], PAIR)
+        linear_forces(columns["a"], columns["b"], columns["xi_x"], columns["xi_y"], columns["spin"], MATERIAL_PAIR)
     )
     size = np.hypot(linear[0], linear[1])
     slope = np.hypot(answers.fx - linear[0], answers.fy - linear[1]) / size
@@ -190,7 +194,7 @@ def _limits() -> list[Row]:
     turn = np.random.default_rng((SEED, 999)).uniform(-np.pi, np.pi, len(sliding["a"]))
     most = np.hypot(sliding["xi_x"], sliding["xi_y"])
     sliding["xi_x"], sliding["xi_y"] = most * np.cos(turn), most * np.sin(turn)
-    slid = fastsim(RollingEllipse(**sliding), PAIR)
+    slid = fastsim(RollingEllipse(**sliding), MATERIAL_PAIR)
     slides = slid.stick == 0.0
     off = np.abs(np.angle(-(slid.fx + 1j * slid.fy) * np.exp(-1j * turn), deg=True))[slides].max()
     short = np.abs(np.hypot(slid.fx, slid.fy) / (FRICTION * LOAD) - 1.0)[slides].max()
@@ -226,7 +230,7 @@ def _spun() -> list[Row]:
     rows = []
     for bound in POWERS:
         ellipse = RollingEllipse(a=a, b=b, load=LOAD, mu=FRICTION, xi_x=0.0, xi_y=0.0, spin=1e5)
-        spun = fastsim(ellipse, PAIR, bound=bound)
+        spun = fastsim(ellipse, MATERIAL_PAIR, bound=bound)
         beyond = float(np.max(np.abs(spun.mz) / most - 1.0))
         what = f"moment of sliding about the centre beyond that of Hertz's pressure, {bound} bound, a/b 0.1 to 10"
         name = f"fastsim.spun.{bound}"
@@ -246,9 +250,9 @@ def _spun() -> list[Row]:
 
 def _derivatives() -> list[Row]:
     """Rows: analytic derivatives of the forces compared with central differences."""
-    columns = creepages(tuple(KINDS), LEVELS)
+    columns = creepages(tuple(CREEPAGE_KINDS), LEVELS)
     scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_AXIS, "load": LOAD}
-    known, off = derivatives(RollingEllipse(**columns), PAIR), []
+    known, off = derivatives(RollingEllipse(**columns), MATERIAL_PAIR), []
     for k, (name, unit) in enumerate(scale.items()):
         ends = [_with_changed_column(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]
         off.append(np.abs((ends[0] - ends[1]) / 2e-6 - known.slopes[..., k] * unit) / UNITS)
@@ -276,7 +280,7 @@ def _with_changed_column(columns: Contacts, name: str, step: float) -> Array:
     if name == "load":
         grown = np.cbrt(moved["load"] / columns["load"])
         moved |= {"a": columns["a"] * grown, "b": columns["b"] * grown}
-    creep = fastsim(RollingEllipse(**moved), PAIR)
+    creep = fastsim(RollingEllipse(**moved), MATERIAL_PAIR)
     return np.stack([creep.fx, creep.fy, creep.mz], axis=1)
 
 
@@ -313,11 +317,11 @@ def _model() -> tuple[list[Row], list[list[Any]]]:
     ], table
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Errors by cells, and in full those of the model and the price."""
     rows = tuple(
         (name, *(f"{100 * mean:.2g} / {100 * most:.2g}" for mean, most in values))
-        for name, values in data["cells"].items()
+        for name, values in case_data["cells"].items()
     )
     answers = [
         Table(
@@ -328,35 +332,35 @@ def tables(data: dict[str, Any]) -> list[Table]:
             rows,
         )
     ]
-    if "model" in data:
+    if "model" in case_data:
         answers.append(
             Table(
                 "FASTSIM: error of the model",
                 "Converged, against the exact theory: force in % of mu N, "
                 "moment in % of mu N and the longer semi-axis.",
                 ("bound", "flexibilities", "mean", "largest", "moment, mean", "moment, largest"),
-                tuple((*row[:2], *(f"{100 * v:.2f}" for v in row[2:])) for row in data["model"]),
+                tuple((*row[:2], *(f"{100 * v:.2f}" for v in row[2:])) for row in case_data["model"]),
             )
         )
-    if "speed" in data:
+    if "speed" in case_data:
         answers.append(
             Table(
                 "FASTSIM: price",
                 "Beside the time that a root and a division per cell take on this "
                 "machine, its lower bound: median of rounds with its 95 % interval.",
                 ("what", "time", "time / bound"),
-                tuple(tuple(row) for row in data["speed"]),
+                tuple(tuple(row) for row in case_data["speed"]),
             )
         )
     return answers
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot the largest error over the number of cells."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.4))
-    for i, (name, values) in enumerate(data["cells"].items()):
+    for i, (name, values) in enumerate(case_data["cells"].items()):
         axis.loglog(
             CELLS,
             [100 * most for _, most in values],

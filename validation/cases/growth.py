@@ -38,11 +38,11 @@ SYSTEM: System = "drift"
 SEED = 11
 PATHS = 3000
 """Paths of the Monte Carlo: a standard deviation is known to 1/sqrt(2 N) = 1.3 %."""
-DEVIATION, RATE = 30.7, 1000.0
+DEVIATION, SAMPLING_RATE = 30.7, 1000.0
 """Noise of each sample (N), 0.2 % of the largest force, at this sampling rate (Hz)."""
-LENGTH = 10
+MONTE_CARLO_SECONDS = 10
 """Length (s) of the Monte Carlo."""
-WINDOW, WINDOWS = 20, 4
+WINDOW_SECONDS, WINDOW_COUNT = 20, 4
 """Length (s) and number of the windows in which the growth rate is measured."""
 STUDY = "20 m/s, Gd 2.4e-3"
 ROADS = {
@@ -56,7 +56,7 @@ LAW = "the averaged law holds to its next order in growth rate over frequency; 3
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Growth rate, spread of noise, and what neither step nor engine may change; quick: one road, no Monte Carlo."""
-    true = virtual_drive(folder, LENGTH)
+    true = virtual_drive(folder, MONTE_CARLO_SECONDS)
     spread = _spread(true, folder, quick)
     if quick:
         roads = {STUDY: _growth(folder, ROADS[STUDY], 2)}
@@ -72,29 +72,29 @@ def _noisy(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> 
     return force_scene(folder, step=step, duration=duration, effects=noise)
 
 
-def _spread(true: Result, folder: Path, quick: bool) -> Saved:
+def _spread(true_run: Result, folder: Path, quick: bool) -> Saved:
     """Standard deviations of pitch and heave at 1 to 10 s by three routes: Monte Carlo (full run only), covariance
     along the path, and closed laws."""
-    times, assembly = np.arange(1, LENGTH + 1), assembly_of_scene(_noisy(folder, LENGTH))
-    at = np.rint(times * RATE).astype(int)
-    p, quiet = assembly.parameters, assembly_of_scene(force_scene(folder, duration=LENGTH))
-    q = rigid_pitch(p).noise_intensity(DEVIATION, 1 / RATE)
+    times, assembly = np.arange(1, MONTE_CARLO_SECONDS + 1), assembly_of_scene(_noisy(folder, MONTE_CARLO_SECONDS))
+    at = np.rint(times * SAMPLING_RATE).astype(int)
+    p, quiet = assembly.parameters, assembly_of_scene(force_scene(folder, duration=MONTE_CARLO_SECONDS))
+    q = rigid_pitch(p).noise_intensity(DEVIATION, 1 / SAMPLING_RATE)
     carried = covariance(quiet, DEVIATION)
-    alone = pitch_rate_of_forces(_samples(quiet).values, 1 / RATE, p)
-    rates = {"run": true["pitch_rate"], "forces": alone}
+    alone = pitch_rate_of_forces(_samples(quiet).values, 1 / SAMPLING_RATE, p)
+    rates = {"run": true_run["pitch_rate"], "forces": alone}
     spreads = {
-        f"law, {name}": np.sqrt(pitch_variance(times, sinh_law_rate(rate, 1 / RATE, p)[at], q))
+        f"law, {name}": np.sqrt(pitch_variance(times, sinh_law_rate(rate, 1 / SAMPLING_RATE, p)[at], q))
         for name, rate in rates.items()
     }
     spreads |= {
         "time": times,
         "covariance": carried.deviation("pitch")[at],
         "t^1.5": np.sqrt(pitch_variance(times, 0.0, q)),
-        "heave law": np.sqrt(heave_variance(times, p, DEVIATION, 1 / RATE)),
+        "heave law": np.sqrt(heave_variance(times, p, DEVIATION, 1 / SAMPLING_RATE)),
         "heave covariance": carried.deviation("z3")[at],
     }
     if not quick:
-        job = noise_paths(_noisy(folder, LENGTH), times.astype(float), true["pitch"])
+        job = noise_paths(_noisy(folder, MONTE_CARLO_SECONDS), times.astype(float), true_run["pitch"])
         off = run_paths(job, PATHS)["states"] - path_of(quiet).carry_errors(np.zeros((1, 8)))[0][at]
         spreads["pitch"], spreads["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
     return {name: values.tolist() for name, values in spreads.items()}
@@ -105,43 +105,46 @@ def _samples(assembly: Assembly) -> Sampled:
     return assembly.input
 
 
-def _path(assembly: Assembly, start: np.ndarray, first: int, samples: int) -> ErrorPath:
-    """Error path over a section of a run that starts at sample ``first`` in the state ``start`` (8,)."""
+def _path(assembly: Assembly, start_state: np.ndarray, first: int, samples: int) -> ErrorPath:
+    """Error path over a section of a run that starts at sample ``first`` in the state ``start_state`` (8,)."""
     forces = replace(_samples(assembly), values=_samples(assembly).values[first : first + samples + 1])
-    return ErrorPath(replace(assembly, initial=start, input=forces), forces, 1, samples)
+    return ErrorPath(replace(assembly, initial=start_state, input=forces), forces, 1, samples)
 
 
-def _growth(folder: Path, road: Saved, windows: int = WINDOWS, parameters: str = "itwm_drift") -> Saved:
+def _growth(folder: Path, road: Saved, windows: int = WINDOW_COUNT, parameters: str = "itwm_drift") -> Saved:
     """Growth rates of the error on one road, by four routes: from the run, from its forces, with other cut-offs, and
     measured in time windows with forces in both frames."""
-    true = virtual_drive(folder, WINDOW * windows, parameters=parameters, road=road)
-    assembly = assembly_of_scene(force_scene(folder, parameters, 1e-3, WINDOW * windows))
+    true = virtual_drive(folder, WINDOW_SECONDS * windows, parameters=parameters, road=road)
+    assembly = assembly_of_scene(force_scene(folder, parameters, 1e-3, WINDOW_SECONDS * windows))
     p, rate = assembly.parameters, true["pitch_rate"]
-    alone = pitch_rate_of_forces(_samples(assembly).values, 1 / RATE, p)
-    starts = np.rint(np.arange(windows) * WINDOW * RATE).astype(int)
+    alone = pitch_rate_of_forces(_samples(assembly).values, 1 / SAMPLING_RATE, p)
+    starts = np.rint(np.arange(windows) * WINDOW_SECONDS * SAMPLING_RATE).astype(int)
     paths = {
-        mode: [_path(replace(assembly, mode=mode), true.states[i], i, round(WINDOW * RATE)) for i in starts]
+        mode: [
+            _path(replace(assembly, mode=mode), true.states[i], i, round(WINDOW_SECONDS * SAMPLING_RATE))
+            for i in starts
+        ]
         for mode in ("force", "force-body")
     }
     measured = {mode: np.array([measured_growth(path) for path in of_mode]).T for mode, of_mode in paths.items()}
     rigid = rigid_pitch(p)
     return {
-        "run": growth_rate(rate, 1 / RATE, p),
-        "forces": growth_rate(alone, 1 / RATE, p),
-        "cut-offs": [growth_rate(rate, 1 / RATE, p, FAST_PITCH_FREQUENCY * factor) for factor in (0.5, 2.0)],
+        "run": growth_rate(rate, 1 / SAMPLING_RATE, p),
+        "forces": growth_rate(alone, 1 / SAMPLING_RATE, p),
+        "cut-offs": [growth_rate(rate, 1 / SAMPLING_RATE, p, FAST_PITCH_FREQUENCY * factor) for factor in (0.5, 2.0)],
         "measured": float(measured["force"][0].mean()),
         "scatter": float(measured["force"][0].std(ddof=1)),
         "body": float(measured["force-body"][0].mean()),
         "body error": float(measured["force-body"][1].max()),
         "swing": float(np.mean([slow_swing_frequency(path) for path in paths["force-body"]])),
         "coupling": rigid.coupling,
-        "swing law": growth_rate(rate, 1 / RATE, p) * float(np.sqrt(rigid.wheel_inertia / rigid.inertia)),
+        "swing law": growth_rate(rate, 1 / SAMPLING_RATE, p) * float(np.sqrt(rigid.wheel_inertia / rigid.inertia)),
     }
 
 
-def _spread_rows(spread: Saved) -> list[Row]:
+def _spread_rows(spread_record: Saved) -> list[Row]:
     """Rows: spread of the pitch by noise at every second, compared with its closed laws."""
-    seen = "pitch" if "pitch" in spread else "covariance"
+    seen = "pitch" if "pitch" in spread_record else "covariance"
     by = f"Monte Carlo of {PATHS} paths" if seen == "pitch" else "covariance along the path"
     why = "5 % is asked; " + ("1.3 % is chance" if seen == "pitch" else "no chance in it")
     rows = [
@@ -152,19 +155,25 @@ def _spread_rows(spread: Saved) -> list[Row]:
             spread_then / expected,
             "",
         ).within(1.0, 0.05, why, "closed form")
-        for t, spread_then, expected in zip(spread["time"], spread[seen], spread["law, run"], strict=True)
+        for t, spread_then, expected in zip(
+            spread_record["time"], spread_record[seen], spread_record["law, run"], strict=True
+        )
     ]
-    miss = spread[seen][-1] / spread["t^1.5"][-1]
+    miss = spread_record[seen][-1] / spread_record["t^1.5"][-1]
     rows.append(
         Observed(
             "growth.spread.linear",
             SYSTEM,
-            f"ratio of the pitch's standard deviation at {spread['time'][-1]} s to t^1.5, the law without growth",
+            f"ratio of the pitch's standard deviation at {spread_record['time'][-1]} s to t^1.5, the law without "
+            "growth",
             miss,
             "",
         ).within(4.0, 0.5, "what the paper's law leaves out", "closed form")
     )
-    heave = np.array(spread["heave" if "heave" in spread else "heave covariance"]) / spread["heave law"]
+    heave = (
+        np.array(spread_record["heave" if "heave" in spread_record else "heave covariance"])
+        / spread_record["heave law"]
+    )
     rows.append(
         Observed(
             "growth.spread.heave",
@@ -174,7 +183,7 @@ def _spread_rows(spread: Saved) -> list[Row]:
             "",
         ).within(1.0, 0.05, "momentum alone moves the heave; 3.3 times the chance of 1.3 %", "closed form")
     )
-    alone = np.array(spread["covariance"]) / spread["law, forces"]
+    alone = np.array(spread_record["covariance"]) / spread_record["law, forces"]
     return [
         *rows,
         Observed(
@@ -252,9 +261,9 @@ def _twin_row(folder: Path) -> Row:
     """Row: the law of growth for a vehicle with unequal ends, whose lever arms count from the common centre of mass."""
     true = virtual_drive(folder, 5.0, parameters="asymmetric_twin")
     assembly = assembly_of_scene(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
-    p, at = assembly.parameters, round(5.0 * RATE)
-    q = rigid_pitch(p).noise_intensity(DEVIATION, 1 / RATE)
-    expected = np.sqrt(float(pitch_variance(5.0, sinh_law_rate(true["pitch_rate"], 1 / RATE, p)[at], q)))
+    p, at = assembly.parameters, round(5.0 * SAMPLING_RATE)
+    q = rigid_pitch(p).noise_intensity(DEVIATION, 1 / SAMPLING_RATE)
+    expected = np.sqrt(float(pitch_variance(5.0, sinh_law_rate(true["pitch_rate"], 1 / SAMPLING_RATE, p)[at], q)))
     deviation = covariance(assembly, DEVIATION).deviation("pitch")[at]
     what, why = (
         "asymmetric twin: ratio of the covariance along the path at 5 s to the closed law",
@@ -266,8 +275,10 @@ def _twin_row(folder: Path) -> Row:
 def _engine_rows(folder: Path) -> list[Row]:
     """Rows: largest difference between the engines' paths under one noise file, until the pitch error reaches 0.05
     rad."""
-    true = virtual_drive(folder, LENGTH)
-    runs = {engine: simulate(_noisy(folder, LENGTH), engine) for engine in ("reference", "exudyn", "mujoco")}
+    true = virtual_drive(folder, MONTE_CARLO_SECONDS)
+    runs = {
+        engine: simulate(_noisy(folder, MONTE_CARLO_SECONDS), engine) for engine in ("reference", "exudyn", "mujoco")
+    }
     base = runs["reference"]
     off = np.abs(base["pitch"] - true["pitch"]) > 0.05
     before = slice(0, int(off.argmax()) if off.any() else len(off))
@@ -290,7 +301,9 @@ def _engine_rows(folder: Path) -> list[Row]:
 def _step_row(folder: Path) -> Row:
     """Row: with half the step and the same noise, the change of the pitch divided by its spread."""
     runs = {
-        step: np.array([simulate(_noisy(folder, LENGTH, step, path), "reference").states[-1] for path in range(20)])
+        step: np.array(
+            [simulate(_noisy(folder, MONTE_CARLO_SECONDS, step, path), "reference").states[-1] for path in range(20)]
+        )
         for step in (5e-4, 2.5e-4)
     }
     gap = float(np.abs(runs[5e-4][:, 3] - runs[2.5e-4][:, 3]).max() / runs[5e-4][:, 3].std())
@@ -305,7 +318,7 @@ def _linear_row(folder: Path) -> Row:
     """Row: if vehicle and measurement are linearised, even the perturbed vehicle does not drift off."""
     linear = {"geometry": "linear"}
     true = simulate(changed_scene(road_scene(duration=60.0), vehicle=linear), "reference")
-    write_measurement(true, folder, 1 / RATE)
+    write_measurement(true, folder, 1 / SAMPLING_RATE)
     start = dict(zip(STATES, true.states[0, :4].tolist(), strict=True))
     wrong = force_scene(folder, duration=60.0, override=perturbed_parameters(PARAMETERS))
     run = simulate(changed_scene(wrong, vehicle=linear, start=start), "reference")
@@ -315,19 +328,20 @@ def _linear_row(folder: Path) -> Row:
     return Observed("growth.linear", SYSTEM, what, off, "rad").at_most(0.05, why, "none")
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Spread over time, and growth rates by road."""
-    spread = data["spread"]
+    spread = case_data["spread"]
     known = ("pitch", "covariance", "law, run", "law, forces", "t^1.5", "heave", "heave law")
     names = [name for name in known if name in spread]
     rows = tuple((str(t), *(f"{spread[name][i]:.4g}" for name in names)) for i, t in enumerate(spread["time"]))
     note = (
-        f"White noise of {DEVIATION} N at {RATE:g} Hz on the study road at 20 m/s. Law, run: with the growth rate "
+        f"White noise of {DEVIATION} N at {SAMPLING_RATE:g} Hz on the study road at 20 m/s. Law, run: with the "
+        "growth rate "
         "of the true run; law, forces: from the wheel forces alone."
     )
     heads = ("time [s]", *(f"{name} [{'m' if 'heave' in name else 'rad'}]" for name in names))
     keys = ("run", "forces", "measured", "scatter", "body", "swing", "swing law")
-    rates = tuple((name, *(f"{road[key]:.4f}" for key in keys)) for name, road in data["roads"].items())
+    rates = tuple((name, *(f"{road[key]:.4f}" for key in keys)) for name, road in case_data["roads"].items())
     columns = (
         "road or vehicle",
         "law, run [1/s]",
@@ -338,15 +352,15 @@ def tables(data: Saved) -> list[Table]:
         "its swing [rad/s]",
         "swing law [rad/s]",
     )
-    about = f"Measured by two tangent columns along the true path in {WINDOWS} windows of {WINDOW} s."
+    about = f"Measured by two tangent columns along the true path in {WINDOW_COUNT} windows of {WINDOW_SECONDS} s."
     return [Table("Spread of the noise", note, heads, rows), Table("Growth of a tilt error", about, columns, rates)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Spread of the pitch over time with its laws, on logarithmic axes."""
     from models.drawing.figures import add_heading, subplots
 
-    spread = data["spread"]
+    spread = case_data["spread"]
     figure, axis = subplots(figsize=(7.0, 3.6))
     marks = {
         "pitch": ("ok", f"Monte Carlo, {PATHS} paths"),

@@ -26,10 +26,10 @@ WRONG_SHARE = 1.0
 Runner = Callable[..., Any]
 
 
-def ending(attempt: Callable[[], Any]) -> str:
+def ending(attempt_run: Callable[[], Any]) -> str:
     """How an attempt ends: "refused" (InputError), "raised" (RunFailed) or "answered"."""
     try:
-        attempt()
+        attempt_run()
     except InputError:
         return "refused"
     except RunFailed:
@@ -85,11 +85,11 @@ def not_a_number(engine: str) -> dict[str, str]:
     interpolations."""
     base, endings = setups.vehicle(), {}
     for name in integrators(engine):
-        for held in (True, False):
-            forces = setups.static_forces(base, 102, 1e-3, held)
+        for is_held in (True, False):
+            forces = setups.static_forces(base, 102, 1e-3, is_held)
             forces.values[57, 0] = np.nan
             attempt = partial(setups.run, engine, setups.driven_by_forces(base, forces), 1e-3, 0.1, name)
-            endings[f"{name}, {'held' if held else 'linear'}"] = ending(attempt)
+            endings[f"{name}, {'held' if is_held else 'linear'}"] = ending(attempt)
     return endings
 
 
@@ -112,8 +112,8 @@ def constrained_unchecked() -> dict[str, str]:
 
 def _unexpected_endings(endings: dict[str, str], expected: str) -> str:
     """The expected word if all runs ended in this way; else a list of the runs that did not."""
-    other = [f"{name}: {ended}" for name, ended in endings.items() if ended != expected]
-    return "; ".join(other) or expected
+    unexpected = [f"{name}: {ended}" for name, ended in endings.items() if ended != expected]
+    return "; ".join(unexpected) or expected
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
@@ -203,8 +203,8 @@ def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
 def _input_rows(engine: str) -> list[Row]:
     numbers = not_a_number(engine)
     caught = {name: "caught" if ended in ("raised", "refused") else ended for name, ended in numbers.items()}
-    with TemporaryDirectory() as place:
-        file = ending(lambda: sampled_input.damaged(engine, Path(place)))
+    with TemporaryDirectory() as files_folder:
+        file = ending(lambda: sampled_input.damaged(engine, Path(files_folder)))
     return [
         behaviour_row(
             f"guards.nan-file.{engine}",
@@ -254,12 +254,12 @@ def _reduced_row(engine: str) -> Row:
     ).at_most(1e-4, "the project's bound at 1 ms", "closed form")
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """How the runs at unstable and stable steps end, with the check and past it."""
     words = ("right", "refused", "raised", "SILENT")
     rows = tuple(
         (engine, how, *(str(counts[word]) for word in words))
-        for engine, both in data["unstable"].items()
+        for engine, both in case_data["unstable"].items()
         for how, counts in both.items()
     )
     note = (

@@ -34,14 +34,14 @@ NO_DRAG = replace(R19, drags=())
 WHEELS = ("fl", "fr", "rl", "rr")
 LANE = Controls(steer=((0.0, 0.0), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)))
 SMALL_STEER = Controls(steer=tuple((time, 0.5 * angle) for time, angle in LANE.steer))
-LEVEL, SEED, SPEED = 4e-6, 3, 25.0
+ROAD_LEVEL, SEED, SPEED = 4e-6, 3, 25.0
 SLOPE, GENTLE = 0.1, 0.05
-ROUNDS = 60
+TIMING_ROUNDS = 60
 
 
 def lane_change(**changes: Any) -> Handling:
     """A lane change on a rough road."""
-    return Handling(R19, controls=LANE, waves=plane_waves(LEVEL, seed=SEED)).changed(**changes)
+    return Handling(R19, controls=LANE, waves=plane_waves(ROAD_LEVEL, seed=SEED)).changed(**changes)
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -235,14 +235,14 @@ def _energy_rows() -> list[Row]:
                 "mujoco", lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step
             )
             gaps[name, step] = float(np.abs(unaccounted(drive)).max())
-    whole = drive_energy(drive)[0]
+    start_energy = drive_energy(drive)[0]
     order = np.log2(gaps["held", 1e-3] / gaps["held", 5e-4])
     return [
         Observed(
             "handling.ledger",
             SYSTEM,
             "error of the energy balance of the lane change, relative to its total energy",
-            gaps["sliding", 1e-3] / whole,
+            gaps["sliding", 1e-3] / start_energy,
             "",
         ).at_most(
             1e-7,
@@ -304,7 +304,7 @@ def _price_row() -> Row:
     steps, (car, bare) = 50, (lane_change(waves=np.empty((0, 4))) for _ in range(2))
     bare.numbers[at.TYRES] = 0.0
     jobs = _march(car, steps), _march(bare, steps), lambda: _repeat_tyres(4 * steps)
-    full, none, kernel = interleave(jobs, ROUNDS, 0.001, clock=time.process_time)
+    full, none, kernel = interleave(jobs, TIMING_ROUNDS, 0.001, clock=time.process_time)
     ratio, low, high = median(full / (none + kernel) - 1.0)
     return Observed(
         "handling.price",
@@ -324,12 +324,12 @@ def _threads_row() -> Row:
     starts = np.array([np.concatenate(handling.straight(speed)) for speed in (20.0, 25.0, 30.0)])
     with installed(built.law):
         serial, both = (Marcher(built.model, threads).run(starts, 50) for threads in (1, 2))
-    said = "identical" if serial.tobytes() == both.tobytes() else f"{np.abs(serial - both).max():.1e} apart"
+    outcome = "identical" if serial.tobytes() == both.tobytes() else f"{np.abs(serial - both).max():.1e} apart"
     return behaviour_row(
         "handling.threads",
         SYSTEM,
         "three lane changes computed by MuJoCo in two threads and in one: equal to the last bit",
-        said,
+        outcome,
         "identical",
         "the callback writes nothing but its own run's forces",
         "none",
@@ -349,16 +349,16 @@ def _march(handling: Handling, steps: int) -> Callable[[], Any]:
     return job
 
 
-def _repeat_tyres(times: int) -> None:
+def _repeat_tyres(repeats: int) -> None:
     """Evaluate the forces of four slightly slipping tyres a number of times."""
     of = net(21)
     contacts, forces = np.zeros((4, 10)), np.empty((4, 4))
     contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9
     contacts[:, FIRST_FLEXIBILITY:] = 2e-8
-    _repeat_forces(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, times)
+    _repeat_forces(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, repeats)
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat_forces(contacts, slides, strips, cells, middle, forces, times):
-    for _ in range(times):
-        tyre_forces(contacts, slides, strips, cells, middle, forces)
+def _repeat_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces, repeats):
+    for _ in range(repeats):
+        tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces)

@@ -28,13 +28,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per case and implementation; quick: the last case of each family and every twenty-fourth before it."""
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()
     for family, case in quick_cases(known) if quick else known:
-        with TemporaryDirectory() as place:
-            outcomes = {name: judge(case, name, Path(place)) for name in case.judged()}
-            naive = case.naive(Path(place)) if case.naive else ""
+        with TemporaryDirectory() as files_folder:
+            outcomes = {name: judge(case, name, Path(files_folder)) for name in case.judged()}
+            naive = case.naive(Path(files_folder)) if case.naive else ""
         rows += [_row(case, name, outcome) for name, outcome in outcomes.items()]
-        told = {key: getattr(case, key) for key in ("name", "hard", "check", "unit", "tolerance")}
-        said = {name: asdict(outcome) for name, outcome in outcomes.items()}
-        data.append({"family": family, **told, "outcomes": said, "naive": naive})
+        told_errors = {key: getattr(case, key) for key in ("name", "hard", "check", "unit", "tolerance")}
+        sentence = {name: asdict(outcome) for name, outcome in outcomes.items()}
+        data.append({"family": family, **told_errors, "outcomes": sentence, "naive": naive})
     words = [[outcome["word"] for outcome in entry["outcomes"].values()] for entry in data]
     counted = sum(family not in FILES for family, _ in known)
     share = f"{len(data)} of {len(known)}" if quick else f"all {len(known)}"
@@ -43,14 +43,14 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             "hard.silent",
             SYSTEM,
             f"silent wrong answers in {share} hard cases, {sum(map(len, words))} outcomes",
-            sum(place.count("SILENT") for place in words),
+            sum(files_folder.count("SILENT") for files_folder in words),
             "",
         ).at_most(0.0, "a finite wrong answer without a word is never accepted", "none"),
         Observed(
             "hard.passed",
             SYSTEM,
             "hard cases in which every implementation gives a right answer, refuses, or reports its failure",
-            sum("SILENT" not in place for place in words),
+            sum("SILENT" not in files_folder for files_folder in words),
             "cases",
         ).within(len(data), 0, f"every one; {share} were run", "none"),
         Observed(
@@ -80,15 +80,15 @@ def _row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
     return behaviour_row(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.hard)
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """The catalogue, counts by family, and the one table of hard cases."""
-    return [_catalogue(data), _counts_by_family(data), _table_of_cases(data["cases"])]
+    return [_catalogue(case_data), _counts_by_family(case_data), _table_of_cases(case_data["cases"])]
 
 
-def _catalogue(data: Saved) -> Table:
+def _catalogue(case_data: Saved) -> Table:
     """Table of the catalogue's failure classes with the cases that belong to each."""
-    words = {name: ["in full"] for _, name in data["known"]}
-    words |= {entry["name"]: sorted({o["word"] for o in entry["outcomes"].values()}) for entry in data["cases"]}
+    words = {name: ["in full"] for _, name in case_data["known"]}
+    words |= {entry["name"]: sorted({o["word"] for o in entry["outcomes"].values()}) for entry in case_data["cases"]}
     rows = tuple(
         (str(number), what, "; ".join(f"{name} ({', '.join(words.get(name, ['missing']))})" for name in names))
         for number, (what, names) in COVERED_CLASSES.items()
@@ -103,12 +103,12 @@ def _catalogue(data: Saved) -> Table:
     )
 
 
-def _counts_by_family(data: Saved) -> Table:
+def _counts_by_family(case_data: Saved) -> Table:
     """Table with the number of cases, of cases that were run, and of their outcomes, for every family and for all."""
-    known = Counter(family for family, _ in data["known"])
-    groups = {name: [entry for entry in data["cases"] if entry["family"] == name] for name in known}
-    groups["all"] = data["cases"]
-    known["all"] = len(data["known"])
+    known = Counter(family for family, _ in case_data["known"])
+    groups = {name: [entry for entry in case_data["cases"] if entry["family"] == name] for name in known}
+    groups["all"] = case_data["cases"]
+    known["all"] = len(case_data["known"])
     ended = {
         name: Counter(o["word"] for entry in in_group for o in entry["outcomes"].values())
         for name, in_group in groups.items()
@@ -145,8 +145,8 @@ def _table_of_cases(entries: list[Saved]) -> Table:
     return Table(TITLE, note, ("case", "what is hard", "checked against", *IMPLEMENTATIONS, "without the guard"), rows)
 
 
-def _allowed(entry: Saved) -> str:
-    return f" (allowed {entry['tolerance']:.0e} {entry['unit']})" if entry["unit"] else ""
+def _allowed(saved_entry: Saved) -> str:
+    return f" (allowed {saved_entry['tolerance']:.0e} {saved_entry['unit']})" if saved_entry["unit"] else ""
 
 
 def _cell(outcome: Saved) -> str:

@@ -96,8 +96,8 @@ def _error(setting: Setting, stiffness: float, free_runs: FreeRuns, engine: str 
     """Largest pitch error (rad) of a run with a holding spring of a stiffness (N m/rad)."""
     free = free_runs.runs[setting.disturbed]
     damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(free_runs.runs[False].parameters).total_inertia)
-    held = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
-    return float(np.abs(simulate(free.scene, engine, assembly=held)["pitch"] - free_runs.pitch).max())
+    held_assembly = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
+    return float(np.abs(simulate(free.scene, engine, assembly=held_assembly)["pitch"] - free_runs.pitch).max())
 
 
 def _rows_of_limits(setting: Setting, free_runs: FreeRuns, engine: str) -> list[Row]:
@@ -145,11 +145,11 @@ def _found_row(index: int, name: str, stiffness: float, predicted_stiffness: flo
     )
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Table of the least stiffness that holds in each setting."""
     rows = tuple(
-        (name, "none below 1.3 of the law" if math.isnan(stiffness) else f"{stiffness:.1f}", f"{data['law']:.1f}")
-        for name, stiffness in data["found"]
+        (name, "none below 1.3 of the law" if math.isnan(stiffness) else f"{stiffness:.1f}", f"{case_data['law']:.1f}")
+        for name, stiffness in case_data["found"]
     )
     heads = ("setting", "smallest found [N m/rad]", "predicted [N m/rad]")
     note = f"Study road at 20 m/s, {DURATION:g} s; held is a pitch error of at most {HELD_PITCH} rad."

@@ -100,10 +100,10 @@ def _wrenches(vehicle: CutVehicle) -> Row:
     Jacobians."""
     (q, _), worst = random_states(vehicle, 3), 0.0
     for frame in ("hub", "inertial"):
-        hub_inputs = random_wrenches(vehicle, frame, guide=False)
+        hub_inputs = random_wrenches(vehicle, frame, has_guide=False)
         built, bare = (
-            build("mujoco", vehicle, replace(hub_inputs, hubs=part * hub_inputs.hubs), STEP, STEP)
-            for part in (1.0, 0.0)
+            build("mujoco", vehicle, replace(hub_inputs, hubs=force_factor * hub_inputs.hubs), STEP, STEP)
+            for force_factor in (1.0, 0.0)
         )
         expected = by_jacobians(built, q, hub_inputs.hubs[0], frame)
         off = np.abs(built.forces_at_rest(q) - bare.forces_at_rest(q) - expected).max()
@@ -348,20 +348,20 @@ def _faults(scene: HubScene) -> list[Row]:
     }
     rows, why = [], "the innovations of the filter tell"
     for i, (name, samples) in enumerate(planted.items()):
-        faulty, said = replace(clean, samples=samples.reshape(len(samples), -1)), "accepted"
+        faulty, outcome = replace(clean, samples=samples.reshape(len(samples), -1)), "accepted"
         try:
             estimate(vehicle, faulty, angles, Deviations(scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0))
         except InputError:
-            said = "refused"
+            outcome = "refused"
         expected, quantity = "accepted" if name == "nothing" else "refused", f"measurement with {name} planted"
-        rows.append(behaviour_row(f"hub_forces.fault_{i}", SYSTEM, quantity, said, expected, why))
+        rows.append(behaviour_row(f"hub_forces.fault_{i}", SYSTEM, quantity, outcome, expected, why))
     return rows
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Damage of every section force, run by run."""
     shown = []
-    for frame, of_runs in data.items():
+    for frame, of_runs in case_data.items():
         runs = {name: run["damage"] for name, run in of_runs.items() if "exudyn" not in name and "damage" in run}
         elements = next(iter(runs.values()))
         rows = tuple((element, *(f"{damages[element]:.3g}" for damages in runs.values())) for element in elements)

@@ -265,14 +265,14 @@ def _id(name: str) -> str:
     return name.replace(", ", ".").replace(" ", "_")
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Gaps from a wrong start by formulation, and errors by noise, in which all formulations lie on each other."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6))
-    for name, gap in data["gaps"].items():
+    for name, gap in case_data["gaps"].items():
         if max(map(abs, gap[1:])) > 1e-12:
-            left.semilogy(data["times"], [abs(value) for value in gap], label=name)
+            left.semilogy(case_data["times"], [abs(value) for value in gap], label=name)
     left.set(
         xlabel="time [s]",
         ylabel="|pitch - prescribed pitch| [rad]",
@@ -280,7 +280,7 @@ def draw(data: Saved) -> Drawn:
         title=f"Start off by {START_ERROR:g} rad and {START_RATE_ERROR:g} rad/s",
     )
     left.legend(title="projection, index 3, eliminated: 0", title_fontsize=8)
-    for i, (name, error) in enumerate(data["loose"].items()):
+    for i, (name, error) in enumerate(case_data["loose"].items()):
         right.plot([10 * STEP * j for j in range(len(error))], error, label=name, linewidth=4 - 1.5 * i)
     right.set(xlabel="time [s]", ylabel="pitch - true pitch [rad]", title="No guidance, noise on the forces")
     right.legend()
@@ -342,6 +342,6 @@ class IndexOne:
         return y - np.concatenate((along * (y[3] - u[2]), along * (y[7] - u[3])))
 
 
-def gap_law(times: np.ndarray, start: float, rate: float, alpha: float = 0.0) -> np.ndarray:
+def gap_law(times: np.ndarray, start_gap: float, rate: float, alpha: float = 0.0) -> np.ndarray:
     """Gap g (n,) in rad of g'' + 2 alpha g' + alpha^2 g = 0 from g(0) = start (rad) and g'(0) = rate (rad/s)."""
-    return (start + (rate + alpha * start) * times) * np.exp(-alpha * times)
+    return (start_gap + (rate + alpha * start_gap) * times) * np.exp(-alpha * times)

@@ -47,12 +47,12 @@ from validation.measured import recording
 
 TITLE = "Attitude from a gyro's rates"
 SYSTEM: System = "drift"
-LEVEL = 3.3
+STANDARD_ERRORS = 3.3
 """Standard errors within which a mean lies 999 times in 1,000."""
 UNEQUAL = np.array([0.1, 0.3, 0.6])
 """Random walk of each axis, rad per sqrt(s)."""
 EQUAL = 0.5
-PERIOD, SPAN = 5e-3, 2.0
+SAMPLE_PERIOD, RUN_SECONDS = 5e-3, 2.0
 """s, of the Monte Carlo runs; a step's share of the law is then some 1e-4 of it."""
 
 
@@ -70,7 +70,7 @@ def _attitude_from_exact_rates() -> list[Row]:
     """Rows: error of the attitude integrated from exact rates, about a fixed axis and about an axis that moves on a
     cone."""
     rate, h = np.array([0.3, -1.1, 0.7]), 1e-3
-    held = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START_ATTITUDE)
+    attitudes = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START_ATTITUDE)
     rates, true = coning_motion(h * np.arange(10_001))
     coned = integrate(rates, h, true[0])
     off = float(np.abs(np.linalg.norm(coned, axis=1) - 1).max())
@@ -79,7 +79,7 @@ def _attitude_from_exact_rates() -> list[Row]:
     order = "fourth order in the sampling period, without noise"
     return [
         _closed_form_row(
-            "clean.axis", fixed, largest_angle(held[-1], turned), "rad", "each step is the exact exponential"
+            "clean.axis", fixed, largest_angle(attitudes[-1], turned), "rad", "each step is the exact exponential"
         ),
         _closed_form_row("clean.cone", swept, largest_angle(coned, true), "rad", order),
         _closed_form_row(
@@ -88,9 +88,13 @@ def _attitude_from_exact_rates() -> list[Row]:
     ]
 
 
-def _closed_form_row(id: str, quantity: str, value: float, unit: str, why: str, bound: float = 1e-12) -> Row:
+def _closed_form_row(
+    id: str, quantity: str, error_value: float, unit: str, tolerance_reason: str, bound: float = 1e-12
+) -> Row:
     """Row for an error relative to a closed form."""
-    return Observed(f"inertial_unit.{id}", SYSTEM, quantity, value, unit).at_most(bound, why, "closed form")
+    return Observed(f"inertial_unit.{id}", SYSTEM, quantity, error_value, unit).at_most(
+        bound, tolerance_reason, "closed form"
+    )
 
 
 def _one_axis(paths: int) -> list[Row]:
@@ -98,8 +102,8 @@ def _one_axis(paths: int) -> list[Row]:
     motion."""
     rows = []
     for axis in range(3):
-        deviation = EQUAL / PERIOD**0.5 * np.eye(3)[axis]
-        turns = rotation_vector(attitude_errors(np.zeros((200, 3)), PERIOD, deviation, paths))
+        deviation = EQUAL / SAMPLE_PERIOD**0.5 * np.eye(3)[axis]
+        turns = rotation_vector(attitude_errors(np.zeros((200, 3)), SAMPLE_PERIOD, deviation, paths))
         spill = float(np.abs(np.delete(turns, axis, axis=1)).max())
         rows += [
             mean_square(
@@ -110,7 +114,7 @@ def _one_axis(paths: int) -> list[Row]:
                     float(np.mean(turns[:, axis] ** 2)),
                     "rad^2",
                 ),
-                EQUAL**2 * 200 * PERIOD,
+                EQUAL**2 * 200 * SAMPLE_PERIOD,
                 paths,
                 f"s^2 t; {paths:,} paths, seed {SEED}",
             ),
@@ -125,13 +129,14 @@ def _one_axis(paths: int) -> list[Row]:
     return rows
 
 
-def _mean(id: str, quantity: str, samples: np.ndarray, law: float, why: str) -> Row:
+def _mean(id: str, quantity: str, samples: np.ndarray, law: float, tolerance_reason: str) -> Row:
     """Row for a mean that must lie within LEVEL standard errors of its theoretical value."""
     error = float(samples.std(ddof=1) / math.sqrt(len(samples)))
     return Observed(f"inertial_unit.{id}", SYSTEM, quantity, float(samples.mean()), "").within(
         law,
-        LEVEL * error,
-        f"{why}; {len(samples):,} paths, seed {SEED}, within {LEVEL} standard errors of {error:.2g}",
+        STANDARD_ERRORS * error,
+        f"{tolerance_reason}; {len(samples):,} paths, seed {SEED}, within {STANDARD_ERRORS} standard errors of "
+        f"{error:.2g}",
         "closed form",
     )
 
@@ -139,43 +144,43 @@ def _mean(id: str, quantity: str, samples: np.ndarray, law: float, why: str) -> 
 def _three_axes(paths: int) -> list[Row]:
     """Rows on noise about three axes: with equal noise the mean trace of the error; with unequal noise on a turning
     body the mean error matrix and the mean quaternion."""
-    count = round(SPAN / PERIOD)
-    rates, root = turning_rates(count, PERIOD), PERIOD**0.5
-    equal = attitude_errors(rates, PERIOD, EQUAL / root * np.ones(3), paths)
-    wandered = attitude_errors(rates, PERIOD, UNEQUAL / root, paths)
+    count = round(RUN_SECONDS / SAMPLE_PERIOD)
+    rates, root = turning_rates(count, SAMPLE_PERIOD), SAMPLE_PERIOD**0.5
+    equal = attitude_errors(rates, SAMPLE_PERIOD, EQUAL / root * np.ones(3), paths)
+    wandered = attitude_errors(rates, SAMPLE_PERIOD, UNEQUAL / root, paths)
     trace, exact = (
         np.trace(rotation_matrix(equal), axis1=1, axis2=2),
-        mean_error(UNEQUAL, rates, PERIOD, START_ATTITUDE),
+        mean_error(UNEQUAL, rates, SAMPLE_PERIOD, START_ATTITUDE),
     )
-    resting = mean_error(UNEQUAL, np.zeros_like(rates), PERIOD, START_ATTITUDE)
+    resting = mean_error(UNEQUAL, np.zeros_like(rates), SAMPLE_PERIOD, START_ATTITUDE)
     all_equal = np.full(3, EQUAL)
-    same = float(np.trace(mean_error(all_equal, rates, PERIOD, START_ATTITUDE)))
+    same = float(np.trace(mean_error(all_equal, rates, SAMPLE_PERIOD, START_ATTITUDE)))
     return [
         _mean(
             "trace",
             "mean trace of the error's rotation matrix, three equal axes, turning body",
             trace,
-            mean_trace(EQUAL, SPAN),
+            mean_trace(EQUAL, RUN_SECONDS),
             "3 exp(-s^2 t)",
         ),
         _mean(
             "scalar",
             "mean scalar part q1 of the error's quaternion, three equal axes, turning body",
             equal[:, 0],
-            mean_scalar(all_equal, SPAN),
+            mean_scalar(all_equal, RUN_SECONDS),
             "exp(-3 s^2 t / 8), of the normalised quaternion",
         ),
         _mean(
             "scalar.unequal",
             "mean scalar part q1 of the error's quaternion, unequal axes, turning body",
             wandered[:, 0],
-            mean_scalar(UNEQUAL, SPAN),
+            mean_scalar(UNEQUAL, RUN_SECONDS),
             "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy",
         ),
         _closed_form_row(
             "matrix.equal",
             "difference of the matrix law with equal noise from 3 exp(-s^2 t)",
-            abs(same - mean_trace(EQUAL, SPAN)),
+            abs(same - mean_trace(EQUAL, RUN_SECONDS)),
             "",
             "both are exact",
         ),
@@ -186,7 +191,7 @@ def _three_axes(paths: int) -> list[Row]:
             "",
             f"{paths:,} paths, seed {SEED}; entries differ from the identity by "
             f"up to {np.abs(exact - np.eye(3)).max():.2f}",
-            LEVEL,
+            STANDARD_ERRORS,
         ),
         Observed(
             "inertial_unit.matrix.resting",
@@ -195,7 +200,7 @@ def _three_axes(paths: int) -> list[Row]:
             "rest, worst entry over its standard error",
             standard_errors(wandered, resting),
             "",
-        ).beside(f"far beyond {LEVEL}", "the rows above can tell the laws apart", "closed form"),
+        ).beside(f"far beyond {STANDARD_ERRORS}", "the rows above can tell the laws apart", "closed form"),
     ]
 
 
@@ -308,12 +313,16 @@ def _ten_minutes(paths: int) -> CaseAnswer:
     }
 
 
-def _path(path: int, rates: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Error angles (601, 3) in degrees of one noisy path, about the global axes, at the times of ``true`` (601, 4)."""
+def _path(path: int, rates: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
+    """Error angles (601, 3) in degrees of one noisy path, about the global axes, at the times of ``true_attitudes``
+    (601, 4).
+    """
     attitudes = measured_attitude(
         rates, 1 / SAMPLING_RATE, RATE_DEVIATION * np.ones(3), START_ATTITUDE, range(path, path + 1), SEED
     )
-    return np.degrees(rotation_vector(error_rotation(attitudes[:: len(rates) // (len(true) - 1), 0], true)))
+    return np.degrees(
+        rotation_vector(error_rotation(attitudes[:: len(rates) // (len(true_attitudes) - 1), 0], true_attitudes))
+    )
 
 
 def _bias(paths: int) -> list[Row]:
@@ -347,13 +356,13 @@ def _section_forces() -> list[Row]:
     """Rows: a slowly growing pitch error only rotates the section forces, shown with runs whose pitch is prescribed."""
     scene, size = road_scene(duration=10.0), 0.1
     with TemporaryDirectory() as name:
-        place = Path(name)
-        measured, follow = measure_road(scene), follower_builder(scene, place)
-        write_measurement(measured, place, scene.run.step)
+        run_folder = Path(name)
+        measured, follow = measure_road(scene), follower_builder(scene, run_folder)
+        write_measurement(measured, run_folder, scene.run.step)
         true = simulate(follow({}, {"prescribed_pitch": {"file": "pitch.csv"}}), "reference")
-        part = measured.times / scene.run.duration
-        wrong = measured["pitch"] + size * part**3 * (10 - 15 * part + 6 * part**2)
-        write_time_series(place / "wrong.csv", {"pitch": ("rad", wrong)}, scene.run.step)
+        section_part = measured.times / scene.run.duration
+        wrong = measured["pitch"] + size * section_part**3 * (10 - 15 * section_part + 6 * section_part**2)
+        write_time_series(run_folder / "wrong.csv", {"pitch": ("rad", wrong)}, scene.run.step)
         guided = simulate(follow({}, {"prescribed_pitch": {"file": "wrong.csv"}}), "reference")
     pairs = ((guided, guided), (true, guided), (true, true))
     corrected, turned, before = (section_forces(run["f3"], run["f4"], pitched["pitch"]) for run, pitched in pairs)
@@ -383,7 +392,7 @@ def _recording(paths: int) -> CaseAnswer:
         ], {}
     recorded = recording.read(path)
     off = np.degrees(recording.gyro_error(recorded))
-    rates, period = recorded.rates[::5], 5 * recording.PERIOD
+    rates, period = recorded.rates[::5], 5 * recording.SAMPLE_PERIOD
     deviation = np.array([0.02, 0.05, 0.1]) / period**0.5
     wandered = attitude_errors(rates, period, deviation, paths)
     law = mean_error(deviation * period**0.5, rates, period, START_ATTITUDE)
@@ -392,7 +401,7 @@ def _recording(paths: int) -> CaseAnswer:
             "inertial_unit.recording",
             SYSTEM,
             "a minute in a real car: difference of the gyro's attitude from the camera's after "
-            f"{recording.PERIOD * (len(off) - 1):.0f} s, gyro alone, its bias removed",
+            f"{recording.SAMPLE_PERIOD * (len(off) - 1):.0f} s, gyro alone, its bias removed",
             float(off[-1]),
             "deg",
         ).beside("nothing published", f"as of a bias of {off[-1] / 60 * 3600:.0f} deg/h: a telephone's grade", "none"),
@@ -402,6 +411,6 @@ def _recording(paths: int) -> CaseAnswer:
             standard_errors(wandered, law),
             "",
             f"the recorded rates, read each 50 ms, as the true motion; {paths:,} paths, seed {SEED}",
-            LEVEL,
+            STANDARD_ERRORS,
         ),
     ], {"off": off[::20].tolist()}

@@ -42,7 +42,7 @@ METHODS = {
 CURVES = tuple(f"{engine} {method}" for engine, methods in METHODS.items() for method in methods)
 STEPS = (40, 120)
 """Steps of the runs that are differenced."""
-BOUND = 1e-6
+COUNT_BOUND = 1e-6
 PROCESS_TIMEOUT = 900
 """Seconds until a process is given up."""
 ID, WHAT = "instruction_counts", f"instructions of {len(CURVES)} methods counted in two processes"
@@ -68,7 +68,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             float(largest.max()),
             "relative",
         ).at_most(
-            BOUND,
+            COUNT_BOUND,
             "the same instructions in the same order: seed of hashes and "
             "number of threads are set, and no clock's reading is printed while they are counted",
             "none",
@@ -119,9 +119,9 @@ def _total(dump: Path) -> int:
     return int(matched[1])
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Instructions per step, where they were counted."""
-    rows = tuple((curve_name(curve), f"{count / 1e3:,.1f}") for curve, count in data["instructions"].items())
+    rows = tuple((curve_name(curve), f"{count / 1e3:,.1f}") for curve, count in case_data["instructions"].items())
     note = (
         f"Linear pitch-plane vehicle, steps of {1e3 * instructions_run.STEP:g} ms, all forces from one Python "
         "function, which they include: the engine, the way into Python and a law there. The start of a run is "

@@ -30,7 +30,7 @@ TITLE = "The Kalman filter of the pitch"
 SYSTEM: System = "drift"
 SEED = 2000
 """First seed; the filter's settings were chosen on seeds 101 to 103."""
-LEVEL = 0.999
+BAND_PROBABILITY = 0.999
 """Of every band."""
 ENGINES = ("reference", "exudyn", "mujoco")
 SAMPLES, DURATION = 20, 30.0
@@ -50,36 +50,38 @@ SENSORS = {"angle": (PITCH,), "rate": (PITCH_RATE,), "angle and rate": (PITCH, P
 @allowing_breaches("without a measured pitch a run is lost, which is what is shown", "upright")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Consistency, gaps and a short stabilised run; in full also covariances, damage and a gyro alone."""
-    place = folder / "kalman"
-    place.mkdir(exist_ok=True)
+    run_folder = folder / "kalman"
+    run_folder.mkdir(exist_ok=True)
     if quick:
-        rows = _consistency_rows(place, 2, 4.0, ("right",)) + _gap_rows(place, 4.0, None, ("angle",))
-        return rows + _short_rows(place), {"damage": [], "deviations": []}
-    rows = _consistency_rows(place, 24, 12.0, tuple(FILTERS))
-    rows += _gap_rows(place, 40.0, OUTAGE, tuple(SENSORS))
-    loop_rows, deviations = _loop_rows(place)
-    gyro = gyro_alone(place, 600.0, SEED)
-    damage = [scores_of_stabilised(place, DURATION, SEED + i, ENGINES) for i in range(SAMPLES)]
-    right = [scores_of_stabilised(place, DURATION, SEED + i, ENGINES[:1], wrong=False)["reference"] for i in range(2)]
+        rows = _consistency_rows(run_folder, 2, 4.0, ("right",)) + _gap_rows(run_folder, 4.0, None, ("angle",))
+        return rows + _short_rows(run_folder), {"damage": [], "deviations": []}
+    rows = _consistency_rows(run_folder, 24, 12.0, tuple(FILTERS))
+    rows += _gap_rows(run_folder, 40.0, OUTAGE, tuple(SENSORS))
+    loop_rows, deviations = _loop_rows(run_folder)
+    gyro = gyro_alone(run_folder, 600.0, SEED)
+    damage = [scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES) for i in range(SAMPLES)]
+    right = [
+        scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES[:1], wrong=False)["reference"] for i in range(2)
+    ]
     rows += loop_rows + _gyro_rows(gyro) + _damage_rows(damage) + _moment_rows(damage, right)
     return rows, {"damage": damage, "deviations": deviations, "gyro": gyro}
 
 
-def _consistency_rows(folder: Path, count: int, duration: float, filters: tuple[str, ...]) -> list[Row]:
+def _consistency_rows(folder: Path, run_count: int, duration: float, filters: tuple[str, ...]) -> list[Row]:
     """Rows: mean NEES and NIS per degree of freedom. Filters with a wrong noise level are run in a quarter of the
     runs."""
     by_filter: dict[str, list[Any]] = {name: [] for name in filters}
-    for i in range(count):
-        scales = {name: FILTERS[name] for name in filters if name == "right" or i < count // 4}
+    for i in range(run_count):
+        scales = {name: FILTERS[name] for name in filters if name == "right" or i < run_count // 4}
         for name, consistent in runs.consistency(folder, duration, SEED + i, scales).items():
             by_filter[name].append(consistent)
     errors, surprises = (
         {name: np.concatenate([consistent[j] for consistent in some]) for name, some in by_filter.items()}
         for j in (0, 1)
     )
-    each, every = f"{count} runs, once a second", f"{count} runs, all innovations"
+    run_scores, every = f"{run_count} runs, once a second", f"{run_count} runs, all innovations"
     rows = [
-        _band_row("nees", "normalised error squared of 6 states", errors["right"], 6, each),
+        _band_row("nees", "normalised error squared of 6 states", errors["right"], 6, run_scores),
         _band_row("nis", "normalised innovation squared", surprises["right"], 1, every),
         *_named_rows([consistent[2] for consistent in by_filter["right"]]),
     ]
@@ -98,7 +100,7 @@ BIAS, SLUGGISH = 0.2, 0.3
 def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
     """Rows: number of correct filters that the consistency test rejects, and of wrong filters that it accepts."""
     count = len(innovations)
-    alarms = sum(not consistency(each, ("pitch",)).consistent for each in innovations)
+    alarms = sum(not consistency(innovation_series, ("pitch",)).consistent for innovation_series in innovations)
     planted: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         "larger by a quarter": lambda w: 1.25 * w,
         f"with a mean of {BIAS:g} deviations": lambda w: w + BIAS,
@@ -111,20 +113,20 @@ def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
         )
     ]
     for words, plant in planted.items():
-        silent = sum(consistency(plant(each), ("pitch",)).consistent for each in innovations)
+        silent = sum(consistency(plant(innovation_series), ("pitch",)).consistent for innovation_series in innovations)
         id, what = f"kalman.named.{words.split()[0]}", f"filters whose innovations are {words} and that are not named"
         rows.append(Observed(id, SYSTEM, what, silent, "").at_most(0, f"of {count} runs", "closed form"))
     return rows
 
 
-def _outside_row(name: str, words: str, noise: str, values: np.ndarray, freedom: int) -> Row:
+def _outside_row(name: str, quantity: str, noise: str, values: np.ndarray, freedom: int) -> Row:
     """Row: a filter that assumes a wrong variance must fall outside the band."""
     low, high = _band(freedom * len(values))
     mean = float(values.mean()) / freedom
     return behaviour_row(
         f"kalman.{name}",
         SYSTEM,
-        f"{words} of a filter that assumes 4 times the variance of the {noise}",
+        f"{quantity} of a filter that assumes 4 times the variance of the {noise}",
         "inside" if low <= mean <= high else "outside",
         "outside",
         f"mean per degree of freedom {mean:.3f}, band {low:.3f} to {high:.3f}",
@@ -134,20 +136,21 @@ def _outside_row(name: str, words: str, noise: str, values: np.ndarray, freedom:
 
 def _band(freedom: int) -> tuple[float, float]:
     """Confidence band for the mean of a chi-square sample, per degree of freedom."""
-    low, high = chi2.ppf([(1 - LEVEL) / 2, (1 + LEVEL) / 2], freedom) / freedom
+    low, high = chi2.ppf([(1 - BAND_PROBABILITY) / 2, (1 + BAND_PROBABILITY) / 2], freedom) / freedom
     return float(low), float(high)
 
 
-def _band_row(name: str, words: str, values: np.ndarray, freedom: int, sample: str) -> Row:
+def _band_row(name: str, quantity: str, values: np.ndarray, freedom: int, sample: str) -> Row:
     low, high = _band(freedom * len(values))
     mean = float(values.mean()) / freedom
     why = (
-        f"{100 * LEVEL:g} % band {low:.3f} to {high:.3f} of chi-square with {freedom * len(values)} degrees of "
+        f"{100 * BAND_PROBABILITY:g} % band {low:.3f} to {high:.3f} of chi-square with {freedom * len(values)} "
+        "degrees of "
         f"freedom: {sample}"
     )
-    return Observed(f"kalman.{name}", SYSTEM, f"{words}, mean per degree of freedom, no model error", mean, "").within(
-        (low + high) / 2, (high - low) / 2, why, "closed form"
-    )
+    return Observed(
+        f"kalman.{name}", SYSTEM, f"{quantity}, mean per degree of freedom, no model error", mean, ""
+    ).within((low + high) / 2, (high - low) / 2, why, "closed form")
 
 
 def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None, sensors: tuple[str, ...]) -> list[Row]:
@@ -155,11 +158,13 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
     rows = []
     for name in sensors:
         gaps = with_gaps(folder, duration, SEED, SENSORS[name], LOST, outage)
-        held = f"{LOST:.0%} of the samples lost" + (f", none from {outage[0]:g} to {outage[1]:g} s" if outage else "")
+        gaps_text = f"{LOST:.0%} of the samples lost" + (
+            f", none from {outage[0]:g} to {outage[1]:g} s" if outage else ""
+        )
         id, words = f"kalman.gaps.{name.replace(' ', '-')}", "largest ratio of the pitch error to its stated deviation"
         why = f"Gaussian: 5 deviations are left once in 1.7 million; deviation up to {gaps['deviation']:.2g} rad"
         rows.append(
-            Observed(id, SYSTEM, f"{words}, {name}, {held}", gaps["error by deviation"], "").at_most(
+            Observed(id, SYSTEM, f"{words}, {name}, {gaps_text}", gaps["error by deviation"], "").at_most(
                 5.0, why, "closed form"
             )
         )
@@ -184,7 +189,7 @@ def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
     force = at_period(35.0, COARSE_PERIOD)
     step, covariance = closed_loop(folder, force)
     errors = [loop_errors(folder, force, LOOP, SEED + i) for i in range(LOOP_RUNS)]
-    squares = np.mean([np.mean(each**2, axis=0) for each in errors], axis=0)
+    squares = np.mean([np.mean(error_series**2, axis=0) for error_series in errors], axis=0)
     spread = spread_of_mean_square(step, covariance, sum(map(len, errors)))
     names = ("z1 - z3", "z2 - z3", "pitch", "z1' - z3'", "z2' - z3'", "pitch rate")
     rows, table = [], []
@@ -243,7 +248,7 @@ def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
     rows = []
     for engine in ENGINES:
         for name in SECTION_FORCE_CHANNELS:
-            ratios = np.array([each[engine][name] for each in damage])
+            ratios = np.array([run_damage[engine][name] for run_damage in damage])
             why = (
                 f"wrong model, noise of 0.2 %, 0.1 degree white; {len(ratios)} noise samples, standard deviation "
                 f"{ratios.std(ddof=1):.2%}, from {ratios.min():.4f} to {ratios.max():.4f}"
@@ -261,13 +266,13 @@ LACKS = "the model lacks 5 % of the inertia"
 ESTIMATED = "mean share by which the estimated 1/I is above the model's"
 
 
-def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str, float]]) -> list[Row]:
+def _moment_rows(damage: list[dict[str, dict[str, float]]], right_model: list[dict[str, float]]) -> list[Row]:
     """Rows: ratio of the filter's artificial moments to the inertia moment I beta''. With a wrong model, the share that
     the inertia error does not explain is judged."""
-    reference = [each["reference"] for each in damage]
+    reference = [run_damage["reference"] for run_damage in damage]
     rows = []
     for name, words, some, key in (
-        ("right", "artificial moment, right model", right, "all"),
+        ("right", "artificial moment, right model", right_model, "all"),
         ("pull", "artificial moment without what the inertia lacks, wrong model", reference, "pull"),
     ):
         for band, range_ in (("", "all frequencies"), (", band", "up to 15 Hz")):
@@ -276,11 +281,11 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str
                     f"kalman.moment.{name}{band.replace(', ', '.')}",
                     SYSTEM,
                     f"ratio of {words} to the rms of I beta'', {range_}",
-                    max(each[key + band] for each in some),
+                    max(run_damage[key + band] for run_damage in some),
                     "",
                 ).at_most(0.02, "largest of all samples; 0.4 % were seen when the settings were chosen", "none")
             )
-    total, inertia = (np.array([each[key] for each in reference]) for key in ("all, band", "inertia"))
+    total, inertia = (np.array([run_damage[key] for run_damage in reference]) for key in ("all, band", "inertia"))
     shown = (
         ("moment.wrong", "all artificial moments, wrong model, up to 15 Hz", total, 0.05, 0.005, LACKS),
         ("inertia", ESTIMATED, inertia, -0.05, 3e-3, f"I is 5 % too small; samples spread by {np.std(inertia):.1e}"),
@@ -291,24 +296,24 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str
     ]
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Damage and moments per implementation, and the deviations of the linear closed loop."""
-    if not data["damage"]:
+    if not case_data["damage"]:
         return []
     keys = (*SECTION_FORCE_CHANNELS, "pull", "all, band", "pitch")
     rows = tuple(
         (
             engine,
             *(
-                f"{np.mean([each[engine][key] for each in data['damage']]):.4f} +- "
-                f"{np.std([each[engine][key] for each in data['damage']], ddof=1):.4f}"
+                f"{np.mean([run_damage[engine][key] for run_damage in case_data['damage']]):.4f} +- "
+                f"{np.std([run_damage[engine][key] for run_damage in case_data['damage']], ddof=1):.4f}"
                 for key in keys
             ),
         )
         for engine in ENGINES
     )
     note = (
-        f"Mean and standard deviation over {len(data['damage'])} noise samples of {DURATION:g} s: damage / true "
+        f"Mean and standard deviation over {len(case_data['damage'])} noise samples of {DURATION:g} s: damage / true "
         "damage, moments / I beta'' (rms), largest pitch error in rad."
     )
     heads = (
@@ -320,7 +325,7 @@ def tables(data: Saved) -> list[Table]:
     )
     loop = tuple(
         (("estimate", "run")[i // 6], str(i % 6), f"{law:.3e}", f"{stated:.3e}")
-        for i, (law, stated) in enumerate(data["deviations"])
+        for i, (law, stated) in enumerate(case_data["deviations"])
     )
     return [
         Table("Stabilised runs, wrong model and noisy forces", note, heads, rows),

@@ -35,7 +35,7 @@ SYSTEM: System = "pitch-plane"
 ENGINES = ("exudyn", "mujoco")
 IMPLEMENTATIONS = ("reference", *ENGINES)
 STATES = "m, rad, m/s, rad/s"
-START = {"z1": -0.3, "z2": -0.2, "z3": -0.4, "pitch": 0.05}
+START_MOTION = {"z1": -0.3, "z2": -0.2, "z3": -0.4, "pitch": 0.05}
 """m, rad: both wheels in the air, one higher."""
 DROPPED = "a vehicle is dropped so hard that its laws are met far out; the other side has the same laws"
 """Why bounces may break assumptions."""
@@ -70,7 +70,7 @@ def scene(
             "title": TITLE,
             "vehicle": {"parameters": parameters, "geometry": geometry, "override": override or {}},
             "run": {"duration": duration, "step": step},
-            "start": {} if road else START,
+            "start": {} if road else START_MOTION,
             "effects": {"lift_off": {}, **({"road": STUDY_ROAD} if road else {})},
         }
     )

@@ -30,7 +30,7 @@ TITLE = "The Manchester contact benchmark, cases A"
 SYSTEM: System = "contact"
 PLACE_BOUND, FORCE_BOUND = 0.3, 2.0
 """Bounds asked for: mm and %."""
-QUICK = (1.0, 6.5)
+QUICK_SHIFTS = (1.0, 6.5)
 """Shifts (mm) of case A-2 in the quick share."""
 FILES = (0.0, 2.0, 5.0, 6.0, 6.5, 10.0)
 """Shifts (mm) at which the built-in profiles are compared with the benchmark's files."""
@@ -42,8 +42,8 @@ WHEELS = {"right": 2, "left": 5}
 @allowing_breaches("the benchmark takes elastic steel, as its codes do", "elastic")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on case A-2 against what is published; in full also on case A-1 at every mm, searches, files, the price."""
-    published = CONTACT[np.isin(CONTACT[:, 0], QUICK)] if quick else CONTACT
-    placed, each = _timed_positions("A-2", published[:, 0])
+    published = CONTACT[np.isin(CONTACT[:, 0], QUICK_SHIFTS)] if quick else CONTACT
+    placed, position_seconds = _timed_positions("A-2", published[:, 0])
     rows = [row for wheel in WHEELS for row in _published_rows(wheel, placed, published)]
     rows.append(
         Observed(
@@ -54,17 +54,20 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             "",
         ).within(2.0, 0.0, "the gauge corner takes over from the head", "published")
     )
-    data: dict[str, Any] = {"A-2": [_table_of_patches(each) for each in placed], "published": published.tolist()}
+    data: dict[str, Any] = {
+        "A-2": [_table_of_patches(position_seconds) for position_seconds in placed],
+        "published": published.tolist(),
+    }
     if not quick:
         static, each_still = _timed_positions("A-1", CONTACT[::2, 0])
-        data["A-1"] = [_table_of_patches(each) for each in static]
+        data["A-1"] = [_table_of_patches(position_seconds) for position_seconds in static]
         rows += [
             *_static_rows(static),
             *_split_rows(placed[10]),
             *_file_rows(placed),
             _load_row(static),
             _axle_row(placed[0]),
-            *_price_rows({"A-1": each_still, "A-2": each}),
+            *_price_rows({"A-1": each_still, "A-2": position_seconds}),
         ]
     return rows, data
 
@@ -77,17 +80,17 @@ def _timed_positions(case: str, shifts: np.ndarray) -> tuple[list[WheelsetPlacem
     return placed_run.detail.placed, placed_run.seconds / len(shifts)
 
 
-def _published_rows(wheel: str, placed: list[WheelsetPlacement], published: np.ndarray) -> list[Row]:
+def _published_rows(wheel: str, placements: list[WheelsetPlacement], published: np.ndarray) -> list[Row]:
     published_sums = published[:, WHEELS[wheel] : WHEELS[wheel] + 3]
-    off = np.abs(np.array([patch_sums(position, wheel) for position in placed]) - published_sums)
-    place, _, _ = off.max(axis=0).tolist()
+    off = np.abs(np.array([patch_sums(position, wheel) for position in placements]) - published_sums)
+    patch, _, _ = off.max(axis=0).tolist()
     _, force, peak = (100.0 * off / published_sums).max(axis=0).tolist()
     rows = [
         Observed(
             f"manchester.places.{wheel}",
             SYSTEM,
             f"largest difference of the {wheel} wheel's mean place of contact",
-            place,
+            patch,
             "mm",
         ).at_most(PLACE_BOUND, PUBLISHED, "published"),
         Observed(
@@ -103,7 +106,7 @@ def _published_rows(wheel: str, placed: list[WheelsetPlacement], published: np.n
     ]
     if wheel == "right":
         why = "CONTACT's input, which another code found; on the flange its wheels do not stand equally low"
-        roll = np.abs(np.array([1e3 * position.roll for position in placed]) - published[:, 1])
+        roll = np.abs(np.array([1e3 * position.roll for position in placements]) - published[:, 1])
         rows.append(
             Observed("manchester.roll", SYSTEM, "largest difference of the roll", float(roll.max()), "mrad").beside(
                 0.0, why
@@ -112,15 +115,15 @@ def _published_rows(wheel: str, placed: list[WheelsetPlacement], published: np.n
     return rows
 
 
-def _static_rows(placed: list[WheelsetPlacement]) -> list[Row]:
+def _static_rows(placements: list[WheelsetPlacement]) -> list[Row]:
     """Rows: first contact points compared with a search over surface points, and contact compared with its mirror
     image."""
     contact, gaps = contact_of("A-1"), []
-    for position in placed:
-        for sign, places in ((1.0, position.right), (-1.0, position.left)):
-            for place in places:
-                y, u, angle = first_touch(contact.side, position, sign, place.wheel_y)
-                gaps.append((1e3 * abs(y - place.touch_y), 1e3 * abs(u - place.wheel_y), abs(angle - place.angle)))
+    for position in placements:
+        for sign, patches_of_wheel in ((1.0, position.right), (-1.0, position.left)):
+            for patch in patches_of_wheel:
+                y, u, angle = first_touch(contact.side, position, sign, patch.wheel_y)
+                gaps.append((1e3 * abs(y - patch.touch_y), 1e3 * abs(u - patch.wheel_y), abs(angle - patch.angle)))
     first, two = contact.at(4e-3, 3e-3), contact.at(-4e-3, -3e-3)
     mirror = max(
         abs(a / b - 1.0)
@@ -130,7 +133,7 @@ def _static_rows(placed: list[WheelsetPlacement]) -> list[Row]:
     )
     why = "search over points of the wheel's surface, straight between points of both profiles"
     asked, corner = f"{why}; the bound asked for", f"{why}, as far as an angle changes in 0.3 mm of the gauge corner"
-    told = (
+    found_facts = (
         ("rail", "first touch on the rail, case A-1", "mm", PLACE_BOUND, asked),
         ("wheel", "first touch on the wheel, case A-1", "mm", PLACE_BOUND, asked),
         ("angle", "angle there", "rad", 0.02, corner),
@@ -140,7 +143,7 @@ def _static_rows(placed: list[WheelsetPlacement]) -> list[Row]:
             Observed(f"manchester.search.{name}", SYSTEM, f"largest difference of {what}", float(gap), unit).at_most(
                 bound, why, "closed form"
             )
-            for (name, what, unit, bound, why), gap in zip(told, np.max(gaps, axis=0), strict=True)
+            for (name, what, unit, bound, why), gap in zip(found_facts, np.max(gaps, axis=0), strict=True)
         ),
         Observed(
             "manchester.mirror",
@@ -152,13 +155,14 @@ def _static_rows(placed: list[WheelsetPlacement]) -> list[Row]:
     ]
 
 
-def _axle_row(placed: WheelsetPlacement) -> Row:
+def _axle_row(placements: WheelsetPlacement) -> Row:
     """Row: the axle turns freely, so that the forces of each wheel must have no moment about it in the middle of the
     track."""
     moments = [
-        sum(p.fx * p.rolling_radius - p.mz * np.sin(p.angle) for p in wheel) for wheel in (placed.right, placed.left)
+        sum(p.fx * p.rolling_radius - p.mz * np.sin(p.angle) for p in wheel)
+        for wheel in (placements.right, placements.left)
     ]
-    most = SCENE.cases["A-2"].friction * SCENE.wheelset.load * placed.right[0].rolling_radius
+    most = SCENE.cases["A-2"].friction * SCENE.wheelset.load * placements.right[0].rolling_radius
     return Observed(
         "manchester.axle",
         SYSTEM,
@@ -172,15 +176,15 @@ def _axle_row(placed: WheelsetPlacement) -> Row:
     )
 
 
-def _split_rows(placed: WheelsetPlacement) -> list[Row]:
+def _split_rows(placements: WheelsetPlacement) -> list[Row]:
     """Rows: shares of the load on two patches at 5 mm, in case A-2."""
-    forces = [place.normal for place in placed.right]
+    forces = [patch.normal for patch in placements.right]
     total = sum(forces)
     contact = contact_of("A-2")
-    alone, (mean, _, plane) = patch_forces(contact, placed), on_one_plane(contact, placed)
+    alone, (mean, _, plane) = patch_forces(contact, placements), on_one_plane(contact, placements)
     far = {
-        name: 100.0 * max(abs(a - b) for a, b in zip(forces, other, strict=True)) / total
-        for name, other in (("apart", alone), ("one plane", plane))
+        name: 100.0 * max(abs(a - b) for a, b in zip(forces, other_contact, strict=True)) / total
+        for name, other_contact in (("apart", alone), ("one plane", plane))
     }
     return [
         Observed(
@@ -205,9 +209,9 @@ def _split_rows(placed: WheelsetPlacement) -> list[Row]:
 
 def _load_row(static: list[WheelsetPlacement]) -> Row:
     off = max(
-        abs(sum(place.vertical for place in wheel) / SCENE.wheelset.load - 1.0)
-        for each in static
-        for wheel in (each.right, each.left)
+        abs(sum(patch.vertical for patch in wheel) / SCENE.wheelset.load - 1.0)
+        for placement in static
+        for wheel in (placement.right, placement.left)
     )
     return Observed(
         "manchester.load",
@@ -218,7 +222,7 @@ def _load_row(static: list[WheelsetPlacement]) -> Row:
     ).at_most(1e-5, "patches share the load to the precision of the shares", "none")
 
 
-def _file_rows(placed: list[WheelsetPlacement]) -> list[Row]:
+def _file_rows(placements: list[WheelsetPlacement]) -> list[Row]:
     """Rows: contact with the built-in profiles, compared with the benchmark's own profile files; in these the rail lies
     inclined."""
     names = {"places": ("mm", PLACE_BOUND, 0), "forces": ("%", FORCE_BOUND, 1)}
@@ -229,23 +233,29 @@ def _file_rows(placed: list[WheelsetPlacement]) -> list[Row]:
         return [not_run(f"manchester.files.{name}", SYSTEM, f"{name}: {words}", reason) for name in names]
     rail = rail_in_track(read_profile(folder / RAIL_FILE, "rail"), Track(inclination=0.0))
     side = WheelAndRail(read_profile(folder / WHEEL_FILE, "wheel"), rail, Wheelset())
-    other = replace(contact_of("A-2"), side=side)
-    chosen = [(each, other.at(each.shift, each.yaw)) for each in placed if round(1e3 * each.shift, 6) in FILES]
-    pairs = [(patch_sums(each, wheel), patch_sums(theirs, wheel)) for each, theirs in chosen for wheel in WHEELS]
+    other_contact = replace(contact_of("A-2"), side=side)
+    chosen = [
+        (placement, other_contact.at(placement.shift, placement.yaw))
+        for placement in placements
+        if round(1e3 * placement.shift, 6) in FILES
+    ]
+    pairs = [
+        (patch_sums(placement, wheel), patch_sums(theirs, wheel)) for placement, theirs in chosen for wheel in WHEELS
+    ]
     off = [(abs(a[0] - b[0]), 100.0 * abs(a[1] / b[1] - 1.0)) for a, b in pairs]
     return [
         Observed(
             f"manchester.files.{name}",
             SYSTEM,
             f"{name}: largest difference of {words}",
-            max(each[k] for each in off),
+            max(placement[k] for placement in off),
             unit,
         ).at_most(bound, "the bound asked for", "published")
         for name, (unit, bound, k) in names.items()
     ]
 
 
-def _price_rows(each: dict[str, float]) -> list[Row]:
+def _price_rows(seconds_by_part: dict[str, float]) -> list[Row]:
     why = "geometry, roll, exact normal contact; rolling also the speed of spin"
     return [
         Observed(
@@ -255,23 +265,23 @@ def _price_rows(each: dict[str, float]) -> list[Row]:
             seconds,
             "s",
         ).beside("-", why)
-        for name, seconds in each.items()
+        for name, seconds in seconds_by_part.items()
     ]
 
 
-def _table_of_patches(placed: WheelsetPlacement) -> dict[str, Any]:
+def _table_of_patches(placements: WheelsetPlacement) -> dict[str, Any]:
     """For each shift (mm) and patch: contact position on rail and wheel (mm), angle (deg), force (kN) and peak pressure
     (MPa)."""
-    return {"shift": 1e3 * placed.shift} | {
+    return {"shift": 1e3 * placements.shift} | {
         wheel: [
             [1e3 * p.y, 1e3 * p.wheel_centre, float(np.degrees(-p.centre_angle)), p.normal / 1e3, p.peak / 1e6]
-            for p in getattr(placed, wheel)
+            for p in getattr(placements, wheel)
         ]
         for wheel in WHEELS
     }
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Every patch of every position."""
     heads = (
         "shift [mm]",
@@ -289,22 +299,22 @@ def tables(data: dict[str, Any]) -> list[Table]:
             note,
             heads,
             tuple(
-                (f"{each['shift']:g}", wheel, *(f"{value:.3f}" for value in patch[:4]), f"{patch[4]:.0f}")
-                for each in data[name]
+                (f"{position_row['shift']:g}", wheel, *(f"{value:.3f}" for value in patch[:4]), f"{patch[4]:.0f}")
+                for position_row in case_data[name]
                 for wheel in WHEELS
-                for patch in each[wheel]
+                for patch in position_row[wheel]
             ),
         )
         for name in ("A-1", "A-2")
-        if name in data
+        if name in case_data
     ]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot mean position and force of the right wheel, together with CONTACT's."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, GREY, add_heading, legend_below, subplots
 
-    published = np.array(data["published"])
+    published = np.array(case_data["published"])
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.5))
     for axis, value, column, scale in ((axes[0], 0, 2, 1.0), (axes[1], 3, 3, 1e-3)):
         axis.plot(
@@ -316,7 +326,11 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
             color=GREY,
             label="CONTACT, all patches together",
         )
-        points = [(each["shift"], patch[value]) for each in data["A-2"] for patch in each["right"]]
+        points = [
+            (position_row["shift"], patch[value])
+            for position_row in case_data["A-2"]
+            for patch in position_row["right"]
+        ]
         axis.plot(*np.array(points).T, "o", markersize=4, color=BLUE, label="every patch here")
         axis.set_xlabel("displacement of the wheelset [mm]")
     axes[0].set_ylabel("place of contact in the track [mm]")

@@ -39,12 +39,12 @@ SYSTEM: System = "drift"
 ROADS: tuple[Ride, ...] = (("A", 1, 30.0, 15.0), ("B", 2, 20.0, 5.0), ("C", 3, 20.0, 20.0), ("D", 5, 10.0, 15.0))
 """Of clean recordings."""
 SAMPLES = 4
-SHARE = 0.2
+SIZE_TOLERANCE = 0.2
 """Part of a planted size by which what is found may be off."""
 VERTICAL = tuple(f"{hub}_fz" for hub in ("fl", "fr", "rl", "rr"))
 DEGREES = 180 / np.pi
 DELAY = 3e-3
-QUICK = (
+QUICK_FAULTS = (
     PlantedMeasurementFault("3 ms late, one force", "shift", "fl_fz", DELAY, "s", faults={"delay": {"fl_fz": DELAY}}),
     PlantedMeasurementFault(
         "left and right front wheel swapped", "swapped", "fl with fr", 1.0, "", exchanged_hubs(("fl", "fr"))
@@ -93,7 +93,7 @@ LEVERS = {
     "moments about the contact patch, one wheel": (-0.34, ("rr",)),
     "moments referred to the hub twice, one axle": (0.3, ("fl", "fr")),
 }
-FULL = (
+FULL_FAULTS = (
     *(
         PlantedMeasurementFault(name, check, place, size, unit, faults={key: amounts})
         for name, check, place, size, unit, key, amounts in AMOUNTS
@@ -126,11 +126,11 @@ FULL = (
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Single faults on one road; in full also clean recordings on four, faults together, and other noise."""
     virtual = measurement(road=("C", 1, 20.0, 5.0)) if quick else measurement()
-    rows, said = [], dict[str, str]()
-    for fault in QUICK if quick else QUICK + FULL:
+    rows, finding_texts = [], dict[str, str]()
+    for fault in QUICK_FAULTS if quick else QUICK_FAULTS + FULL_FAULTS:
         findings = planted_findings(virtual, folder, fault.spoil, **fault.faults)
         rows += _rows(fault, findings)
-        said[fault.name] = findings[0].text if findings else "nothing"
+        finding_texts[fault.name] = findings[0].text if findings else "nothing"
     rows.append(_clean_recordings_row("quick", [planted_findings(virtual, folder)]))
     if not quick:
         rows += [
@@ -141,27 +141,27 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         ]
         size = 1e6 * _size(drifting_findings(virtual, 5e-4, folder), "drift")
         rows += [_sized("clocks", "drift between the clocks of two files", size, "1e-6", 500.0), *_moving_car(folder)]
-    return rows, {"said": said}
+    return rows, {"said": finding_texts}
 
 
-def _size(findings: Sequence[Finding], check: str, place: str = "") -> float:
+def _size(findings: Sequence[Finding], check: str, finding_place: str = "") -> float:
     """Size that the first finding of a check states at a place; NaN if there is no such finding."""
-    sizes = [finding.size for finding in findings if finding.check == check and place in finding.place]
+    sizes = [finding.size for finding in findings if finding.check == check and finding_place in finding.place]
     return float("nan") if not sizes or sizes[0] is None else sizes[0]
 
 
-def _sized(key: str, quantity: str, size: float, unit: str, planted_size: float) -> Row:
+def _sized(key: str, quantity: str, size_found: float, unit: str, planted_size: float) -> Row:
     """Row that compares a found size with the size of the planted fault."""
     id, why = f"measured_checks.{key}", "what was planted, 20 %"
-    return Observed(id, SYSTEM, quantity, size, unit).within(
-        planted_size, SHARE * abs(planted_size), why, "closed form"
+    return Observed(id, SYSTEM, quantity, size_found, unit).within(
+        planted_size, SIZE_TOLERANCE * abs(planted_size), why, "closed form"
     )
 
 
-def _row_of_no_findings(key: str, quantity: str, texts: list[str], why: str) -> Row:
+def _row_of_no_findings(key: str, quantity: str, texts: list[str], tolerance_reason: str) -> Row:
     """Row that passes if there are no findings."""
-    id, said = f"measured_checks.{key}", "; ".join(texts) or why
-    return Observed(id, SYSTEM, quantity, len(texts), "").within(0, 0, said, "closed form")
+    id, finding_text = f"measured_checks.{key}", "; ".join(texts) or tolerance_reason
+    return Observed(id, SYSTEM, quantity, len(texts), "").within(0, 0, finding_text, "closed form")
 
 
 def _rows(fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:
@@ -223,17 +223,19 @@ def _wrong_vehicles(folder: Path) -> list[Row]:
     what = "80 kg more on board than in the file: excess of weight"
     wanted, excess = 100 * 80 / (r19().loads.sum() / GRAVITY), _size(findings_by_car["loaded"], "weight")
     id, why = "measured_checks.loaded", "what was loaded, 20 %"
-    other = "errors named where the car is 80 kg heavier, has springs 20 % stiffer or dampers 30 % weaker than its file"
+    quantity = (
+        "errors named where the car is 80 kg heavier, has springs 20 % stiffer or dampers 30 % weaker than its file"
+    )
     return [
-        Observed(id, SYSTEM, what, excess, "%").within(wanted, SHARE * 6.6, why, "closed form"),
-        _row_of_no_findings("strangers", other, errors, "doubts are allowed, errors would stop a good recording"),
+        Observed(id, SYSTEM, what, excess, "%").within(wanted, SIZE_TOLERANCE * 6.6, why, "closed form"),
+        _row_of_no_findings("strangers", quantity, errors, "doubts are allowed, errors would stop a good recording"),
     ]
 
 
-def _three_faults_rows(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
+def _three_faults_rows(virtual_measurement: VirtualMeasurement, folder: Path) -> list[Row]:
     """Rows: three faults at once are all named."""
     spoil = exchanged_hubs(("fl", "fr")), scaled_channels(1e-3, "rr_fz")
-    findings = planted_findings(virtual, folder, *spoil, delay={"rl_fz": DELAY})
+    findings = planted_findings(virtual_measurement, folder, *spoil, delay={"rl_fz": DELAY})
     what, checks = (
         "wheels swapped, kN for N, 3 ms late at once: the findings",
         ", ".join(sorted({f.check for f in findings})),
@@ -246,9 +248,11 @@ def _three_faults_rows(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
     ]
 
 
-def _spread(virtual: VirtualMeasurement, folder: Path) -> Row:
+def _spread(virtual_measurement: VirtualMeasurement, folder: Path) -> Row:
     """Row: mean of the delay found in one channel over several noise samples, as a check of its bias."""
-    samples = [planted_findings(virtual, folder, seed=seed, **QUICK[0].faults) for seed in range(SAMPLES)]
+    samples = [
+        planted_findings(virtual_measurement, folder, seed=seed, **QUICK_FAULTS[0].faults) for seed in range(SAMPLES)
+    ]
     late = 1e3 * float(
         np.mean([_size(findings[:1], findings[0].check) if findings else np.nan for findings in samples])
     )
@@ -276,7 +280,7 @@ def _moving_car(folder: Path) -> list[Row]:
         name: {finding.place: finding for finding in ones if finding.weight == "error"}
         for name, ones in findings.items()
     }
-    turned = [finding for place, finding in errors["degrees"].items() if place == "q and pitch"]
+    turned = [finding for signal_names, finding in errors["degrees"].items() if signal_names == "q and pitch"]
     size = turned[0].size if turned and turned[0].size is not None else float("nan")
     what = "moving car with axes right and down, taken for left and up: faults named"
     return [
@@ -307,12 +311,12 @@ def _moving_car(folder: Path) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of the findings that the checks report to an engineer."""
-    rows = tuple((name, text) for name, text in data["said"].items())
+    rows = tuple((name, text) for name, text in case_data["said"].items())
     return [Table("What the checks say of planted faults", "The first sentence of each.", ("planted", "said"), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """No figure."""
     return []

@@ -19,7 +19,7 @@ SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 WRITTEN_DRIVE = SCENES / "single_track.csv"
 SENSORS = {"yaw rate": (3, 0.004), "side slip": (5, 0.0008)}
 """Column of the file, and standard deviation (rad/s, rad) of the noise that its maker put on it."""
-START = (0.8, 1.2)
+START_RATIOS = (0.8, 1.2)
 """Ratios of both axles' cornering stiffness from which the search begins; the truth is 1."""
 OUTER = 18.4
 """Of chi-square with 2 freedoms 99.99 % lie below."""
@@ -67,7 +67,7 @@ def _motion_rows(drive: Any) -> list[Row]:
 
 def _tyre_rows() -> list[Row]:
     keys = ["tyres.cornering.0=0.3:3", "tyres.cornering.1=0.3:3"]
-    known = uncertainty(fit(problem_of(_scene([0.0, 6.0], START), WRITTEN_DRIVE, keys, "mujoco", low_pass=5.0)))
+    known = uncertainty(fit(problem_of(_scene([0.0, 6.0], START_RATIOS), WRITTEN_DRIVE, keys, "mujoco", low_pass=5.0)))
     off = known.fit.values - 1.0
     scaled = off / known.fit.problem.scale
     return [

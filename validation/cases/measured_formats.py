@@ -30,18 +30,18 @@ FLOAT = 2.0**-24
 RESOLUTION = {".csv": 0.0, ".mf4": 0.0, ".rsp": FLOAT, ".tdms": 0.0}
 """Of a value, by format."""
 FORMATS = {".csv": "CSV", ".mf4": "MDF 4", ".rsp": "RPC III", ".tdms": "TDMS"}
-START = datetime(2026, 11, 21, 8, 0, 0, 123456, tzinfo=timezone(timedelta(hours=1)))
+START_DATE = datetime(2026, 11, 21, 8, 0, 0, 123456, tzinfo=timezone(timedelta(hours=1)))
 COMMENT = "Prüfgelände, Runde 3 <nass>\nFahrer & Beifahrer"
-NAMES = ("Kraft vorn links, Fz", "Größe µ", "a [x]")
+CHANNEL_NAMES = ("Kraft vorn links, Fz", "Größe µ", "a [x]")
 UNITS = ("kN", "°", "m/s^2")
 COMMENTS = ('Rad 1: "neu"', "", "zweite Zeile\nfolgt")
-COUNT, PERIOD, LENGTH = 5000, 1e-3, 1234
+SAMPLE_COUNT, SAMPLE_PERIOD, BLOCK_SAMPLES = 5000, 1e-3, 1234
 """Samples, s between them, samples of a block that is read."""
 
 
 def samples() -> np.ndarray:
     """Values (count, 3) of many sizes, with a gap."""
-    values = normal_samples(SEED, 0, COUNT, 3) * np.array([1e3, 1e-6, 1.0])
+    values = normal_samples(SEED, 0, SAMPLE_COUNT, 3) * np.array([1e3, 1e-6, 1.0])
     values[100:200, 1] = np.nan
     return values
 
@@ -49,7 +49,9 @@ def samples() -> np.ndarray:
 def written(path: Path, values: np.ndarray) -> Path:
     """Write the values to a file in blocks of 700 samples; returns its path."""
     blocks = (values[i : i + 700] for i in range(0, len(values), 700))
-    return write(path, [ChannelGroup(NAMES, UNITS, COMMENTS, PERIOD, len(values), blocks)], START, COMMENT)
+    return write(
+        path, [ChannelGroup(CHANNEL_NAMES, UNITS, COMMENTS, SAMPLE_PERIOD, len(values), blocks)], START_DATE, COMMENT
+    )
 
 
 def largest_difference(values: np.ndarray, truth: np.ndarray) -> float:
@@ -60,15 +62,16 @@ def largest_difference(values: np.ndarray, truth: np.ndarray) -> float:
     return float(np.nanmax(np.abs(values - truth) / np.abs(truth)))
 
 
-def is_kept(source: Source) -> dict[str, bool]:
+def is_kept(measurement_source: Source) -> dict[str, bool]:
     """Whether names, units, comments and start time are read back as they were written, and nothing else was
     reported."""
     return {
-        "names": tuple(channel.name for channel in source.channels) == NAMES,
-        "units": tuple(channel.unit for channel in source.channels) == UNITS,
-        "comments": tuple(channel.comment for channel in source.channels) == COMMENTS and source.comment == COMMENT,
-        "start": source.start == START,
-        "quiet": source.noticed == (),
+        "names": tuple(channel.name for channel in measurement_source.channels) == CHANNEL_NAMES,
+        "units": tuple(channel.unit for channel in measurement_source.channels) == UNITS,
+        "comments": tuple(channel.comment for channel in measurement_source.channels) == COMMENTS
+        and measurement_source.comment == COMMENT,
+        "start": measurement_source.start == START_DATE,
+        "quiet": measurement_source.noticed == (),
     }
 
 
@@ -93,25 +96,25 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"formats": lines}
 
 
-def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
+def round_trip(path: Path, file_extension: str) -> tuple[list[Row], dict[str, Any]]:
     """Rows: a file is written, read back block by block, and opened with the format's own library."""
-    truth, form = samples(), FORMATS[extension]
+    truth, form = samples(), FORMATS[file_extension]
     began = time.perf_counter()
     source = open_source(written(path, truth))
-    blocks = list(source.blocks(NAMES, LENGTH))
+    blocks = list(source.blocks(CHANNEL_NAMES, BLOCK_SAMPLES))
     seconds = time.perf_counter() - began
     values, times = (np.concatenate([getattr(block, key) for block in blocks]) for key in ("values", "times"))
-    library, reading = LIBRARIES[extension]
+    library, reading = LIBRARIES[file_extension]
     foreign = reading(path)
-    same = [foreign.get(name, (None, ""))[1] for name in NAMES] == list(UNITS)
-    there = np.column_stack([foreign[name][0] for name in NAMES]) if same else np.full_like(truth, np.inf)
+    same = [foreign.get(name, (None, ""))[1] for name in CHANNEL_NAMES] == list(UNITS)
+    there = np.column_stack([foreign[name][0] for name in CHANNEL_NAMES]) if same else np.full_like(truth, np.inf)
     error, off, by_library = (
         largest_difference(values, truth),
-        float(np.abs(times - PERIOD * np.arange(COUNT)).max()),
+        float(np.abs(times - SAMPLE_PERIOD * np.arange(SAMPLE_COUNT)).max()),
         largest_difference(there, truth),
     )
     lost = ", ".join(what for what, good in is_kept(source).items() if not good)
-    key, why = f"measured_formats.{extension[1:]}", "what the format can hold; every bit where it is 0"
+    key, why = f"measured_formats.{file_extension[1:]}", "what the format can hold; every bit where it is 0"
     return [
         Observed(
             f"{key}.values",
@@ -119,7 +122,7 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
             f"{form}: largest change of values that are written and read by block",
             error,
             "of the value",
-        ).at_most(RESOLUTION[extension], why, "closed form"),
+        ).at_most(RESOLUTION[file_extension], why, "closed form"),
         Observed(
             f"{key}.times", SYSTEM, f"{form}: largest change of times that are written and read", off, "s"
         ).at_most(1e-12, "a thousand millionth of a period; CSV writes times with 15 digits", "closed form"),
@@ -137,7 +140,7 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
             f"{form}: difference of the values from those that {library} reads",
             by_library,
             "of the value",
-        ).at_most(RESOLUTION[extension], f"{why}; names and units are compared, too", "native"),
+        ).at_most(RESOLUTION[file_extension], f"{why}; names and units are compared, too", "native"),
     ], {
         "format": form,
         "library": library,
@@ -145,11 +148,11 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
         "values": error,
         "times": off,
         "own": by_library,
-        "rate": COUNT * len(NAMES) / seconds,
+        "rate": SAMPLE_COUNT * len(CHANNEL_NAMES) / seconds,
     }
 
 
-def two_rates(path: Path, extension: str) -> Row:
+def two_rates(path: Path, file_extension: str) -> Row:
     """Largest change of times and values of two groups with different rates, written to one file and read back."""
     values = {("fast",): (1e-3, np.arange(4000.0)), ("slow",): (2e-2, np.arange(200.0) ** 2)}
     write(
@@ -166,9 +169,9 @@ def two_rates(path: Path, extension: str) -> Row:
         for k, truth in ((0, period * np.arange(len(values_of))), (1, values_of))
     ]
     return Observed(
-        f"measured_formats.{extension[1:]}.rates",
+        f"measured_formats.{file_extension[1:]}.rates",
         SYSTEM,
-        f"{FORMATS[extension]}: change of times and values of two groups, 1 kHz and 50 Hz, written and read",
+        f"{FORMATS[file_extension]}: change of times and values of two groups, 1 kHz and 50 Hz, written and read",
         max(errors),
         "s or N",
     ).at_most(1e-12, "each group has a clock of its own", "closed form")
@@ -237,8 +240,10 @@ def resolution(folder: Path) -> list[Row]:
     path = write(folder / "choice.rsp", [ChannelGroup(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
     floating = read(open_source(path))["Fz"][1]
     step = np.abs(load).max() / 32752
-    whole = step * np.round(load / step)
-    errors = [abs(pseudo_damage(damaged[:4500]) / pseudo_damage(load[:4500]) - 1.0) for damaged in (floating, whole)]
+    rounded_load = step * np.round(load / step)
+    errors = [
+        abs(pseudo_damage(damaged[:4500]) / pseudo_damage(load[:4500]) - 1.0) for damaged in (floating, rounded_load)
+    ]
     why = "slope 5, of the smooth road before a pothole that sets the scale of the whole numbers"
     return [
         Observed(
@@ -268,9 +273,9 @@ print(count, next(line for line in open("{STATUS}") if line.startswith("VmHWM"))
 """
 
 
-def memory(path: Path, extension: str) -> list[Row]:
+def memory(path: Path, file_extension: str) -> list[Row]:
     """Rows: peak memory of a fresh process that reads five minutes of sixty channels block by block."""
-    key, form = f"measured_formats.{extension[1:]}.memory", FORMATS[extension]
+    key, form = f"measured_formats.{file_extension[1:]}.memory", FORMATS[file_extension]
     if not STATUS.exists():
         return [not_run(key, SYSTEM, f"{form}: peak memory", "this system does not tell the peak of a process")]
     count, base = 300_000, 1e3 * normal_samples(SEED, 2, 60_000, 60)
@@ -294,23 +299,23 @@ def memory(path: Path, extension: str) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of what each file format preserves."""
     note = (
-        f"{COUNT:,} samples of three channels, values from 1e-6 to 1e3, written and read by block. Errors of "
+        f"{SAMPLE_COUNT:,} samples of three channels, values from 1e-6 to 1e3, written and read by block. Errors of "
         "values are by the size of each value; the format's own library opens the same file. CSV and RPC III "
         "have one sampling rate, MDF 4 and TDMS one per group."
     )
     rows = tuple(
         (
-            each["format"],
-            f"{each['values']:.1e}",
-            f"{each['times']:.1e}",
-            f"{each['library']}: {each['own']:.1e}",
-            f"{each['size'] / 1e3:.0f}",
-            f"{each['rate'] / 1e6:.1f}",
+            format_row["format"],
+            f"{format_row['values']:.1e}",
+            f"{format_row['times']:.1e}",
+            f"{format_row['library']}: {format_row['own']:.1e}",
+            f"{format_row['size'] / 1e3:.0f}",
+            f"{format_row['rate'] / 1e6:.1f}",
         )
-        for each in data["formats"]
+        for format_row in case_data["formats"]
     )
     headings = ("format", "values", "times, s", "own library", "kB", "million values per s, there and back, once")
     return [Table(TITLE, note, headings, rows)]

@@ -52,12 +52,12 @@ def _guides(quick: bool) -> list[Row]:
     engines' own sensors."""
     car, worst = cut(twin(), "body"), 0.0
     sections = Sections(car, "hub")
-    drive = random_wrenches(car, "hub", guide=False)
+    drive = random_wrenches(car, "hub", has_guide=False)
     numbers, wrenches = build("reference", car, drive, 1e-3, 1e-3).numbers, drive.hubs[0].reshape(-1, 6)
     for seed in range(1 if quick else 5):
         q, v = random_states(car, seed)
-        guided, other = _transmitted(sections, numbers, q, v), mujoco_guides(car, q, v, wrenches)
-        worst = max(worst, float(np.abs(guided - other).max() / np.abs(other).max()))
+        guided, by_mujoco = _transmitted(sections, numbers, q, v), mujoco_guides(car, q, v, wrenches)
+        worst = max(worst, float(np.abs(guided - by_mujoco).max() / np.abs(by_mujoco).max()))
     rows = [
         Observed(
             "measured_long.guides_mujoco",
@@ -73,8 +73,8 @@ def _guides(quick: bool) -> list[Row]:
     q, v = random_states(car, 0)
     for i, (body, freedom) in enumerate(car.tree.coordinates()):
         q[i] = 0.0 if body == "engine" and freedom.startswith("r") else q[i]
-    guided, other = _transmitted(sections, numbers, q, 0 * v), exudyn_guides(car, q, wrenches)
-    off = float(np.abs(guided - other).max() / np.abs(other).max())
+    guided, by_mujoco = _transmitted(sections, numbers, q, 0 * v), exudyn_guides(car, q, wrenches)
+    off = float(np.abs(guided - by_mujoco).max() / np.abs(by_mujoco).max())
     return [
         *rows,
         Observed(
@@ -88,9 +88,9 @@ def _guides(quick: bool) -> list[Row]:
     ]
 
 
-def _transmitted(sections: Sections, numbers: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def _transmitted(sections: Sections, table: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Forces and moments (guides, 6) that guides transmit; components in which a guide lets its body slide are 0."""
-    read = sections.read(numbers, np.concatenate((q, v))[None], 2)[0]
+    read = sections.read(table, np.concatenate((q, v))[None], 2)[0]
     values = {answer.name: value for answer, value in zip(sections.answers, read, strict=True)}
     return np.array(
         [
@@ -140,14 +140,14 @@ def _counting() -> list[Row]:
 
 def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
     """Row: number of channels that differ between a run in one block and a run in uneven blocks."""
-    place = folder / f"blocks {seconds}"
-    place.mkdir(exist_ok=True)
-    job = run_of(place, seconds, REPEATED, engine, AttitudeHold(method))  # type: ignore[arg-type]
+    run_folder = folder / f"blocks {seconds}"
+    run_folder.mkdir(exist_ok=True)
+    job = run_of(run_folder, seconds, REPEATED, engine, AttitudeHold(method))  # type: ignore[arg-type]
     bits = []
     for block in (60.0, 0.073):
         name = f"{engine} {method} {block}"
-        run(job, place / name, block=block)
-        bits.append(np.frombuffer(answers_of(place, name), np.int64))
+        run(job, run_folder / name, block=block)
+        bits.append(np.frombuffer(answers_of(run_folder, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
         f"measured_long.blocks_{engine}_{method}",
@@ -162,14 +162,14 @@ def _run_killed_twice(folder: Path) -> Row:
     """Row: number of channels that differ between a run that was killed twice and one that was not."""
     seconds, bits = 3.0, list[np.ndarray]()
     for times in (0, 2):
-        place = folder / f"killed {times}"
-        place.mkdir()
-        job = run_of(place, seconds, REPEATED)
+        run_folder = folder / f"killed {times}"
+        run_folder.mkdir()
+        job = run_of(run_folder, seconds, REPEATED)
         if times:
-            run_killed_process(place, seconds, REPEATED, 0.25, times)
+            run_killed_process(run_folder, seconds, REPEATED, 0.25, times)
         else:
-            run(job, place / "run")
-        bits.append(np.frombuffer(answers_of(place), np.int64))
+            run(job, run_folder / "run")
+        bits.append(np.frombuffer(answers_of(run_folder), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
         "measured_long.killed",
@@ -186,8 +186,8 @@ def _memory(folder: Path) -> list[Row]:
     run_of(folder, LONG_DURATION, REPEATED)
     words = map(str, (folder, LONG_DURATION, REPEATED, LONG_DURATION / 10, 2e-3))
     command = [sys.executable, "-m", "validation.measured.long_recording", *words]
-    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
-    lines = np.array([line.split() for line in told], float)  # of every block: seconds, memory, processor
+    output_lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    lines = np.array([line.split() for line in output_lines], float)  # of every block: seconds, memory, processor
     half, last = lines[len(lines) // 2], lines[-1]
     growth = (last[1] - half[1]) / (last[0] - half[0])
     return [
@@ -211,22 +211,24 @@ def _memory(folder: Path) -> list[Row]:
 
 def _handed_on(folder: Path) -> list[Row]:
     """Rows: section forces written in every format and read back; measured check channels compared with the run."""
-    place = folder / "handed on"
-    place.mkdir()
-    job = run_of(place, 2.0, REPEATED)
-    outcome = run(job, place / "run")
+    run_folder = folder / "handed on"
+    run_folder.mkdir()
+    job = run_of(run_folder, 2.0, REPEATED)
+    outcome = run(job, run_folder / "run")
     wanted = outcome.answers[:6]
     values = np.column_stack([outcome.samples(answer) for answer in wanted])
-    worst, said = 0.0, set()
-    for path in hand_on(outcome, place, ("csv", "mf4", "rsp", "tdms"), wanted, comment="Monday"):
+    worst, format_text = 0.0, set()
+    for path in hand_on(outcome, run_folder, ("csv", "mf4", "rsp", "tdms"), wanted, comment="Monday"):
         source = open_source(path)
         names = [channel.name for channel in source.channels if channel.name in {answer.name for answer in wanted}]
         read = np.vstack([block.values for block in source.blocks(names)])
         worst = max(worst, float(np.abs(read - values).max() / np.abs(values).max()))
-        said |= {(channel.name, channel.unit, channel.comment) for channel in source.channels if channel.name in names}
-    kept = said == {(answer.name, answer.unit, answer.comment) for answer in wanted}
+        format_text |= {
+            (channel.name, channel.unit, channel.comment) for channel in source.channels if channel.name in names
+        }
+    kept_share = format_text == {(answer.name, answer.unit, answer.comment) for answer in wanted}
     compared = [compare(job.recording, outcome, *pair) for pair in channels_to_compare(job)]
-    force = next(each for each in compared if each.signal.name == "front left_force")
+    force = next(channel_match for channel_match in compared if channel_match.signal.name == "front left_force")
     return [
         Observed(
             "measured_long.handed_on",
@@ -239,7 +241,7 @@ def _handed_on(folder: Path) -> list[Row]:
             "measured_long.handed_on_names",
             SYSTEM,
             "names, units and comments of section forces survive writing and reading",
-            str(kept),
+            str(kept_share),
             "True",
             "they say axes and signs",
         ),
@@ -253,11 +255,11 @@ def _handed_on(folder: Path) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """None: the rows say it all."""
     return []
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """None."""
     return []

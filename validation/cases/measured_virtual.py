@@ -45,7 +45,7 @@ NOISE = {"force": 8.0, "moment": 1.0, "angle": np.radians(0.1), "angular rate": 
 RECORDER_DELAY = 0.003
 """s, by which the inertial unit's recorder is late, which the scene states."""
 DAMAGE = 0.03
-RATE, DURATION = 500.0, 5.0
+SAMPLING_RATE, DURATION = 500.0, 5.0
 """Hz, s, of the proofs."""
 COPIES = 16
 """Paths of the ensembles beside a predicted time of trust."""
@@ -86,17 +86,22 @@ def own_vehicle(folder: Path) -> str:
     """A vehicle file of a user's own: R19-free with every spring, damper and mass another, none symmetric."""
     text, number = (SHIPPED / "r19_free.toml").read_text(encoding="utf-8"), count()
 
-    def scaled(match: re.Match[str]) -> str:
-        return f"{match[1]} = {float(match[2]) * (1.0 + 0.02 * (next(number) % 11 - 5))!r}"
+    def scaled(number_match: re.Match[str]) -> str:
+        return f"{number_match[1]} = {float(number_match[2]) * (1.0 + 0.02 * (next(number) % 11 - 5))!r}"
 
     (folder / "own.toml").write_text(re.sub(r"^(mass|stiffness|damping) = ([\d.e+]+)$", scaled, text, flags=re.M))
     return "own.toml"
 
 
-def measured(proof: Proof, folder: Path, duration: float) -> VirtualMeasurement:
+def measured(proof_case: Proof, folder: Path, duration: float) -> VirtualMeasurement:
     """The virtual measurement of a vehicle on its road; faults and noise are added to each sample later."""
-    table = {"duration": duration, "sampling_rate": RATE, "frame": proof.frame, "sections": ["front left"]}
-    vehicle = cut(load_vehicle(proof.vehicle, folder), "body")
+    table = {
+        "duration": duration,
+        "sampling_rate": SAMPLING_RATE,
+        "frame": proof_case.frame,
+        "sections": ["front left"],
+    }
+    vehicle = cut(load_vehicle(proof_case.vehicle, folder), "body")
     return virtual_measurement(vehicle, read(VirtualTable, table, ""), "mujoco")
 
 
@@ -134,48 +139,52 @@ def held_run(recording: Recording, vehicle: CutVehicle, hold: AttitudeHold, engi
     return SectionRun(vehicle, recording, Sections(vehicle), engine, hold)
 
 
-def _run_all_formats(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
+def _run_all_formats(proof_case: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
     """Rows and mean damage of ten noise samples through every file format, stabilised. The first sample is also run
     free and in the other engine."""
     folder.mkdir()
     own_vehicle(folder)
-    true, planted = measured(proof, folder, DURATION), faults(proof.bits)
-    ratios: dict[str, list[dict[str, float]]] = {form: [] for form in proof.formats}
-    off = dict.fromkeys(proof.formats, 0.0)
+    true, planted = measured(proof_case, folder, DURATION), faults(proof_case.bits)
+    ratios: dict[str, list[dict[str, float]]] = {form: [] for form in proof_case.formats}
+    off = dict.fromkeys(proof_case.formats, 0.0)
     for path in range(SAMPLES):
         samples, known = true.samples(planted, SEED, path), list[tuple[np.ndarray, dict[str, float]]]()
-        for form in proof.formats:
-            place = folder / f"{form}{path}"
-            recording = recorded(true, samples, proof.vehicle, form, place)
+        for form in proof_case.formats:
+            format_folder = folder / f"{form}{path}"
+            recording = recorded(true, samples, proof_case.vehicle, form, format_folder)
             off[form] = max(off[form], _largest_channel_change(recording, true, samples))
             values = recording.columns.block(recording.columns.names, 0, recording.count)
-            damage = next((damages for other, damages in known if _differ_by_rounding(values, other)), None)
+            damage = next(
+                (damages for other_format, damages in known if _differ_by_rounding(values, other_format)), None
+            )
             if damage is None:
-                damage = errors_of_run(march(held_run(recording, true.vehicle, proof.hold), place / "run"), true).damage
+                damage = errors_of_run(
+                    march(held_run(recording, true.vehicle, proof_case.hold), format_folder / "run"), true
+                ).damage
                 known.append((values, damage))
             ratios[form].append(damage)
     means = {
         form: {name: float(np.mean([damages[name] for damages in ratios_of])) for name in ratios_of[0]}
         for form, ratios_of in ratios.items()
     }
-    rows = [row for form in proof.formats for row in _rows(proof, form, off[form], means[form])]
-    first = recorded(true, true.samples(planted, SEED), proof.vehicle, "csv", folder / "beside")
-    return [*rows, *_rows_of_other_runs(proof, first, true, folder)], means
+    rows = [row for form in proof_case.formats for row in _rows(proof_case, form, off[form], means[form])]
+    first = recorded(true, true.samples(planted, SEED), proof_case.vehicle, "csv", folder / "beside")
+    return [*rows, *_rows_of_other_runs(proof_case, first, true, folder)], means
 
 
-def _differ_by_rounding(first: np.ndarray, two: np.ndarray) -> bool:
+def _differ_by_rounding(first: np.ndarray, second_samples: np.ndarray) -> bool:
     """Whether two recordings differ only by rounding from unit conversion, in which case a single run serves for
     both."""
     largest = np.maximum(np.nanmax(np.abs(first), axis=0), 1e-300)
-    return bool(np.allclose(first / largest, two / largest, rtol=0.0, atol=1e-12, equal_nan=True))
+    return bool(np.allclose(first / largest, second_samples / largest, rtol=0.0, atol=1e-12, equal_nan=True))
 
 
-def _largest_channel_change(recording: Recording, true: VirtualMeasurement, samples: np.ndarray) -> float:
+def _largest_channel_change(recording: Recording, true_measurement: VirtualMeasurement, samples: np.ndarray) -> float:
     """Largest change of a hub channel by writing, mapping and resampling, relative to the channel's largest value;
     infinite if other samples are missing."""
     largest_change = 0.0
-    for i, signal in enumerate(true.signals):
-        if signal.at in true.vehicle.hubs:
+    for i, signal in enumerate(true_measurement.signals):
+        if signal.at in true_measurement.vehicle.hubs:
             back = recording.samples(next(s for s in recording.signals if s.channel == signal.channel))
             gone = np.isnan(samples[:, i])
             if (np.isnan(back) != gone).any():
@@ -185,12 +194,12 @@ def _largest_channel_change(recording: Recording, true: VirtualMeasurement, samp
     return largest_change
 
 
-def _rows(proof: Proof, format_name: str, off: float, means: dict[str, float]) -> list[Row]:
+def _rows(proof_case: Proof, format_name: str, off: float, means: dict[str, float]) -> list[Row]:
     worst = max(means, key=lambda name: abs(means[name] - 1))
-    what = f"{proof.name}, frame {proof.frame!r}, {proof.bits} bit, through {format_name}"
+    what = f"{proof_case.name}, frame {proof_case.frame!r}, {proof_case.bits} bit, through {format_name}"
     return [
         Observed(
-            f"measured_virtual.values_{proof.name}_{format_name}",
+            f"measured_virtual.values_{proof_case.name}_{format_name}",
             SYSTEM,
             f"change of hub channels by writing, reading and mapping, relative to their largest value; {what}",
             off,
@@ -201,7 +210,7 @@ def _rows(proof: Proof, format_name: str, off: float, means: dict[str, float]) -
             "native",
         ),
         Observed(
-            f"measured_virtual.damage_{proof.name}_{format_name}",
+            f"measured_virtual.damage_{proof_case.name}_{format_name}",
             SYSTEM,
             f"ratio of the damage (slope 5) of {worst} to the true damage, the farthest of "
             f"{len(means)} springs, mounts and bars, mean of {SAMPLES} samples of noise; {what}",
@@ -211,10 +220,12 @@ def _rows(proof: Proof, format_name: str, off: float, means: dict[str, float]) -
     ]
 
 
-def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Path) -> list[Row]:
+def _rows_of_other_runs(
+    proof_case: Proof, first: Recording, true_measurement: VirtualMeasurement, folder: Path
+) -> list[Row]:
     """Rows: the recording run in both engines, free and stabilised, and the verdicts on these runs."""
-    free = held_run(first, true.vehicle, AttitudeHold("none"))
-    jobs = {engine: held_run(first, true.vehicle, proof.hold, engine) for engine in ENGINES[1:]}
+    free = held_run(first, true_measurement.vehicle, AttitudeHold("none"))
+    jobs = {engine: held_run(first, true_measurement.vehicle, proof_case.hold, engine) for engine in ENGINES[1:]}
     runs = {engine: march(job, folder / engine) for engine, job in jobs.items()}
     beside, two = (run.columns.block(run.columns.names, 0, run.done) for run in runs.values())
     apart = float((np.abs(beside - two).max(axis=0) / np.maximum(np.abs(beside).max(axis=0), 1e-6)).max())
@@ -222,37 +233,39 @@ def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement
     blind = judge(jobs[ENGINES[-1]], last_run)
     rows = [
         Observed(
-            f"measured_virtual.engines_{proof.name}",
+            f"measured_virtual.engines_{proof_case.name}",
             SYSTEM,
             "difference between the channels of Exudyn and MuJoCo, over the largest value of each; "
-            f"{proof.name}, stabilised, {first.duration:g} s",
+            f"{proof_case.name}, stabilised, {first.duration:g} s",
             apart,
             "1",
         ).at_most(1e-6, "same tableau, same step", "shared kernel"),
         behaviour_row(
-            f"measured_virtual.verdict_{proof.name}",
+            f"measured_virtual.verdict_{proof_case.name}",
             SYSTEM,
-            f"verdict of the stabilised run without the truth; {proof.name}",
+            f"verdict of the stabilised run without the truth; {proof_case.name}",
             blind.word,
             "accepted",
             f"{blind.reason}; beside the truth, 5 % for each damage of this one "
-            f"sample of noise: {judge_beside_truth(last_run, true, proof.hold).word}",
+            f"sample of noise: {judge_beside_truth(last_run, true_measurement, proof_case.hold).word}",
         ),
     ]
     level = Level(NOISE["force"], NOISE["moment"])
-    until = predicted_drift(true.vehicle, level, first.period, first.duration, proof.frame).trusted_time
+    until = predicted_drift(
+        true_measurement.vehicle, level, first.period, first.duration, proof_case.frame
+    ).trusted_time
     try:
         run = march(free, folder / "free")
     except RunFailed as error:
         assert isinstance(error.partial, SectionOutcome)
         run = error.partial
-    said = judge(free, run, trusted=until)
+    sentence = judge(free, run, trusted=until)
     rows.append(
         Observed(
-            f"measured_virtual.free_{proof.name}",
+            f"measured_virtual.free_{proof_case.name}",
             SYSTEM,
-            f"time at which the free vehicle's run ends on these forces, frame {proof.frame!r}; "
-            f"verdict: {said.word}, {said.reason}",
+            f"time at which the free vehicle's run ends on these forces, frame {proof_case.frame!r}; "
+            f"verdict: {sentence.word}, {sentence.reason}",
             (run.done - 1) * run.period,
             "s",
         ).beside(first.duration, "stated")
@@ -271,9 +284,11 @@ def _trust_times() -> list[Row]:
         ("tilt", "inertial", 1.6, Level(8.0, 1.0, tilt=(0.004, 0.0))),
     )
     for name, frame, duration, level in cases:
-        virtual = read(VirtualTable, {"duration": duration, "step": 2e-3, "sampling_rate": RATE, "frame": frame}, "")
+        virtual = read(
+            VirtualTable, {"duration": duration, "step": 2e-3, "sampling_rate": SAMPLING_RATE, "frame": frame}, ""
+        )
         true = virtual_measurement(vehicle, virtual, "mujoco")
-        predicted = predicted_drift(vehicle, level, 1 / RATE, duration, frame).passing_time()
+        predicted = predicted_drift(vehicle, level, 1 / SAMPLING_RATE, duration, frame).passing_time()
         assert predicted is not None
         drift_off = float(np.median([_drift_off(vehicle, true, level, path) for path in range(COPIES)]))
         rows.append(
@@ -289,23 +304,32 @@ def _trust_times() -> list[Row]:
     return rows
 
 
-def _drift_off(vehicle: CutVehicle, true: VirtualMeasurement, level: Level, path: int) -> float:
-    samples = true.run.wrenches.reshape(len(true.run.times), -1)
-    forces = HubForces(samples + (0.0 if level.bias is None else level.bias), true.step, true_frame(true))
-    deviation = np.tile(np.repeat([level.force, level.moment], 3), len(vehicle.hubs))
+def _drift_off(vehicle: CutVehicle, true_measurement: VirtualMeasurement, drift_level: Level, path: int) -> float:
+    samples = true_measurement.run.wrenches.reshape(len(true_measurement.run.times), -1)
+    forces = HubForces(
+        samples + (0.0 if drift_level.bias is None else drift_level.bias),
+        true_measurement.step,
+        true_frame(true_measurement),
+    )
+    deviation = np.tile(np.repeat([drift_level.force, drift_level.moment], 3), len(vehicle.hubs))
     start = np.zeros(2 * vehicle.size)
-    start[[ROLL, PITCH]] = level.tilt
+    start[[ROLL, PITCH]] = drift_level.tilt
     run = hub_model(
-        "mujoco", vehicle, forces.noisy(deviation, SEED, path), true.step, float(true.run.times[-1]), "smooth"
+        "mujoco",
+        vehicle,
+        forces.noisy(deviation, SEED, path),
+        true_measurement.step,
+        float(true_measurement.run.times[-1]),
+        "smooth",
     )
     states = run.marched(*np.split(start, 2)).states
-    off = np.abs((states - true.run.states[: len(states)])[:, [ROLL, PITCH]]).max(axis=1) > 0.05
-    return float(true.run.times[off.argmax()]) if off.any() else np.inf
+    off = np.abs((states - true_measurement.run.states[: len(states)])[:, [ROLL, PITCH]]).max(axis=1) > 0.05
+    return float(true_measurement.run.times[off.argmax()]) if off.any() else np.inf
 
 
-def true_frame(true: VirtualMeasurement) -> str:
+def true_frame(true_measurement: VirtualMeasurement) -> str:
     """Frame of the hub forces of a virtual measurement."""
-    return next(signal.frame for signal in true.signals if signal.at in true.vehicle.hubs)
+    return next(signal.frame for signal in true_measurement.signals if signal.at in true_measurement.vehicle.hubs)
 
 
 def _moving(folder: Path) -> list[Row]:
@@ -317,9 +341,9 @@ def _moving(folder: Path) -> list[Row]:
         return [not_run(id, SYSTEM, gyro, f"TWINRIG_DATA does not lead to {moving_car.RECORDING_FILE}")]
     scene = measured_car.scene(path, cut(load_vehicle("r19_free"), "body"), folder)
     recording = read_files(scene, folder)
-    said = check_recording(recording, None, scene.places, {})
-    ratio = next((f.size for f in said if f.check == "turning" and "pitch_rate" in f.place), None)
-    shift = next((f.size for f in said if f.check == "shift" and "roll_rate" in f.place), None)
+    findings = check_recording(recording, None, scene.places, {})
+    ratio = next((f.size for f in findings if f.check == "turning" and "pitch_rate" in f.place), None)
+    shift = next((f.size for f in findings if f.check == "shift" and "roll_rate" in f.place), None)
     up = [recording.samples(recording.find("acceleration", "phone", axis)[0]).mean() for axis in "xyz"]
     id, gyro = (
         "measured_virtual.moving",
@@ -373,10 +397,10 @@ def _quick(folder: Path) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Mean damage of every section force, through every format."""
     tables = []
-    for name, means in data.items():
+    for name, means in case_data.items():
         elements = next(iter(means.values()))
         rows = tuple((element, *(f"{of_form[element]:.4f}" for of_form in means.values())) for element in elements)
         tables.append(

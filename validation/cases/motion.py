@@ -34,12 +34,12 @@ from validation.spatial.spatial_motion import sensor_readings as readings_on_pat
 TITLE = "Motion from accelerometers"
 SYSTEM: System = "drift"
 SEED = 30
-BOUND = 1e-12
+CLOSED_FORM_BOUND = 1e-12
 HEIGHTS = {1.0: 0.69, 0.3: 1.9, 0.1: 5.8, 0.03: 18.9}
 """Height (m) of the fifth sensor over a floor of 2 m by 1.2 m -> known gain relative to the last sensor (1/m)."""
 NOISE = 0.3
 """m/s^2 on each sample of the drift rows."""
-PERIOD = 0.01
+SAMPLE_PERIOD = 0.01
 RIGID = {
     "front left": (1.1, -0.6, 0.2),
     "front right": (1.1, 0.6, 0.2),
@@ -83,7 +83,7 @@ def _rows_without_integration(name: str) -> list[Row]:
         ("consistency", "share of the readings that no rigid body explains", fit_quality(array, clean).share, ""),
     )
     return [
-        Observed(f"{key}.{id}", SYSTEM, f"{words}, {what}", value, unit).at_most(BOUND, why, "closed form")
+        Observed(f"{key}.{id}", SYSTEM, f"{words}, {what}", value, unit).at_most(CLOSED_FORM_BOUND, why, "closed form")
         for id, words, value, unit in shown
     ]
 
@@ -102,7 +102,9 @@ def _plain() -> Row:
         float(np.abs(plain - half).max()),
         "rad/s^2",
     ).at_most(
-        BOUND, "half of the true value plus a bias, without a word: this is why planes are detected", "closed form"
+        CLOSED_FORM_BOUND,
+        "half of the true value plus a bias, without a word: this is why planes are detected",
+        "closed form",
     )
 
 
@@ -140,15 +142,15 @@ def _tilt() -> Row:
     )
 
 
-def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
+def _gains(sample_count: int) -> tuple[list[list[float]], list[Row]]:
     """Noise of the angular acceleration by Monte Carlo and by its law, for several heights of the fifth sensor."""
     rows, lines = [], []
     for i, height in enumerate((*HEIGHTS, 0.0)):
         line = [height]
         for formula in ("spatial", "plane") if height else ("plane",):
             array = sensor_array(tilted_sensors(height, np.eye(3)), formula)
-            noise = normal_samples(SEED, i, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
-            alpha = angular_acceleration(spin_from_readings(array, noise), np.zeros((count, 3)))
+            noise = normal_samples(SEED, i, sample_count, 15, source=ACCELEROMETERS).reshape(sample_count, 5, 3)
+            alpha = angular_acceleration(spin_from_readings(array, noise), np.zeros((sample_count, 3)))
             axis = int(np.argmax(array.noise_gains()))
             law, variance = float(array.noise_gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
             key = f"motion.gain.{formula}.{height:g}"
@@ -163,8 +165,8 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
                         "1/m^2",
                     ),
                     law,
-                    count,
-                    f"{count:,} samples; gain {law**0.5:.3g} 1/m",
+                    sample_count,
+                    f"{sample_count:,} samples; gain {law**0.5:.3g} 1/m",
                 )
             )
             line += [law**0.5, variance**0.5]
@@ -221,7 +223,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
             float(np.abs(acceleration - true).max() / np.abs(true).max()),
             "",
         ).at_most(
-            BOUND,
+            CLOSED_FORM_BOUND,
             "the engine's acceleration beside eq. (38), as in the build audit",
             "shared kernel" if engine == "reference" else "native",
         ),
@@ -241,12 +243,12 @@ def _engine(engine: str, duration: float) -> list[Row]:
             f"share of the readings that no rigid body explains, five rigid mounts, {engine}",
             fit_quality(array, felt).share,
             "",
-        ).at_most(BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
+        ).at_most(CLOSED_FORM_BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
     ]
 
 
 def _recovered_errors(
-    rule: str,
+    integration_rule: str,
     engine: str,
     array: SensorArray,
     specific_forces: np.ndarray,
@@ -265,7 +267,7 @@ def _recovered_errors(
     words = "accelerometers alone" if rates is None else "accelerometers and a gyro"
     return [
         Observed(
-            f"motion.recovered.{rule}.{what}.{engine}",
+            f"motion.recovered.{integration_rule}.{what}.{engine}",
             SYSTEM,
             f"error of the {what} recovered from {words}, {engine}, {len(states) / 1e3:.0f} s at 1 kHz without noise",
             float(np.abs(error).max()),
@@ -275,9 +277,9 @@ def _recovered_errors(
     ]
 
 
-def _moving(count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
+def _moving(sample_count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
     """A body that turns all the time: true rates (n, 3), sensor array, and noise-free readings without gravity."""
-    t = PERIOD * np.arange(count)
+    t = SAMPLE_PERIOD * np.arange(sample_count)
     rates = np.column_stack([0.5 * np.sin(2 * t), 0.4 * np.cos(1.3 * t), 0.3 + 0.1 * np.sin(t)])
     alpha = np.column_stack([np.cos(2 * t), -0.52 * np.sin(1.3 * t), 0.1 * np.cos(t)])
     array = sensor_array(SENSOR_ARRANGEMENTS["5, one 1 m up"])
@@ -288,15 +290,18 @@ def _moving(count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
     )
 
 
-def _noise(path: int, count: int) -> np.ndarray:
-    return NOISE * normal_samples(SEED + 1, path, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
+def _noise(path: int, sample_count: int) -> np.ndarray:
+    return NOISE * normal_samples(SEED + 1, path, sample_count, 15, source=ACCELEROMETERS).reshape(sample_count, 5, 3)
 
 
 def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     """Row and curves: if rates are only integrated, their error grows with the square root of time."""
     count, array = 6001, sensor_array(SENSOR_ARRANGEMENTS["5, one 1 m up"])
     errors = np.array(
-        [integrate_rates(spin_from_readings(array, _noise(path, count)), PERIOD, np.zeros(3)) for path in range(paths)]
+        [
+            integrate_rates(spin_from_readings(array, _noise(path, count)), SAMPLE_PERIOD, np.zeros(3))
+            for path in range(paths)
+        ]
     )
     row = mean_square(
         Observed(
@@ -306,14 +311,14 @@ def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
             float(np.mean((errors[:, -1] / array.noise_gains()) ** 2)),
             "m^2/s^2",
         ),
-        NOISE**2 * PERIOD * (count - 1) * PERIOD,
+        NOISE**2 * SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD,
         3 * paths,
         f"{paths} paths of {NOISE:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time",
     )
     curves = {
-        "time": PERIOD * np.arange(count),
+        "time": SAMPLE_PERIOD * np.arange(count),
         "integrated": np.sqrt(np.mean(errors**2, axis=(0, 2))),
-        "law": NOISE * root_mean_square(array.noise_gains()) * np.sqrt(PERIOD**2 * np.arange(count)),
+        "law": NOISE * root_mean_square(array.noise_gains()) * np.sqrt(SAMPLE_PERIOD**2 * np.arange(count)),
     }
     return [row], {name: curve[::25].tolist() for name, curve in curves.items()}
 
@@ -323,15 +328,21 @@ def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
     count, paths = (1001, 1) if quick else (6001, 8)
     rates, array, clean = _moving(count)
     filtered = [
-        filter_rates(spin_from_readings(array, clean + _noise(path, count)), PERIOD, rates[0], NOISE)
+        filter_rates(spin_from_readings(array, clean + _noise(path, count)), SAMPLE_PERIOD, rates[0], NOISE)
         for path in range(paths)
     ]
-    squares = np.mean([np.mean((held - rates) ** 2, axis=1) for held, _ in filtered], axis=0)
+    squares = np.mean([np.mean((held_rates - rates) ** 2, axis=1) for held_rates, _ in filtered], axis=0)
     stated = np.sqrt(np.mean(filtered[0][1] ** 2, axis=1))
     curves["held"], curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
-    walked = NOISE * root_mean_square(array.noise_gains()) * np.sqrt(PERIOD * (count - 1) * PERIOD)
-    late, early = (float(np.sqrt(np.mean(part))) for part in (squares[-count // 3 :], squares[count // 6 : count // 3]))
-    why = f"{paths} paths of {PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended Kalman filter"
+    walked = NOISE * root_mean_square(array.noise_gains()) * np.sqrt(SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD)
+    late, early = (
+        float(np.sqrt(np.mean(covariance_part)))
+        for covariance_part in (squares[-count // 3 :], squares[count // 6 : count // 3])
+    )
+    why = (
+        f"{paths} paths of {SAMPLE_PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended "
+        "Kalman filter"
+    )
     rows = [
         Observed(
             "motion.held",
@@ -359,11 +370,11 @@ def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
     return [*rows, Observed("motion.held.growth", SYSTEM, what, late / early, "").within(1.0, 0.2, why, "closed form")]
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Table of the errors of a flat arrangement of sensors."""
     rows = tuple(
         (f"{height:g}", *(("half and a bias", "") if len(gains) == 2 else ()), *(f"{value:.3g}" for value in gains))
-        for height, *gains in data["gains"]
+        for height, *gains in case_data["gains"]
     )
     note = (
         "Four sensors at the corners of a floor of 2 m by 1.2 m, a fifth above its middle: standard deviation of "
@@ -374,7 +385,7 @@ def tables(data: Saved) -> list[Table]:
     return [Table("What sensors in nearly one plane cost", note, heads, rows)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Noise gain by height, and the error of the rate over time."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
@@ -383,14 +394,14 @@ def draw(data: Saved) -> Drawn:
     for formula, label in (("spatial", "plain formula"), ("plane", "formula for a plane")):
         arrays = [sensor_array(tilted_sensors(float(height), np.eye(3)), formula) for height in heights]  # type: ignore[arg-type]
         left.loglog(heights, [array.noise_gains().max() for array in arrays], label=label)
-    height, _, spatial, _, plane = zip(*(line for line in data["gains"] if len(line) == 5), strict=True)
+    height, _, spatial, _, plane = zip(*(line for line in case_data["gains"] if len(line) == 5), strict=True)
     left.plot(height, spatial, "ko", markersize=4, label="Monte Carlo")
     left.plot(height, plane, "ko", markersize=4)
     left.set(
         title="Noise of the angular acceleration\nper noise of the readings [1/m]",
         xlabel="height of the fifth sensor above the others [m]",
     )
-    curves = data["curves"]
+    curves = case_data["curves"]
     for key, style, label in (
         ("integrated", "C0-", "integration alone"),
         ("law", "k--", "its law, sqrt(t)"),

@@ -20,7 +20,7 @@ TITLE = "Springs, mounts and bars of the engines' own under hub forces"
 SYSTEM: System = "drift"
 STATES, STEPS = 100, 1000
 QUICK_STATES, QUICK_STEPS = 10, 50
-ROUNDS, TIMED = 5, 1000
+TIMING_ROUNDS, TIMED_STEPS = 5, 1000
 """Interleaved runs for the ratio of seconds, and the steps of each."""
 
 
@@ -84,9 +84,9 @@ def _seconds(car: CutVehicle) -> list[Row]:
     forces."""
     rows = []
     for engine, usual in (("exudyn", 3.0), ("mujoco", 1.2)):
-        models = {route: hub_model(engine, car, route, TIMED) for route in ("native", "compiled")}
+        models = {route: hub_model(engine, car, route, TIMED_STEPS) for route in ("native", "compiled")}
         best: dict[str, float] = {}
-        for _ in range(ROUNDS):
+        for _ in range(TIMING_ROUNDS):
             for route, built in models.items():
                 begun = time.process_time()
                 built.run()

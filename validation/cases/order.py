@@ -12,7 +12,7 @@ from validation.common.scenes import on_paper_road, road_scene
 TITLE = "Observed order of the largest state error on the study road"
 SYSTEM: System = "pitch-plane"
 DURATION = 2.0
-GRID = 1e-3
+COMPARED_GRID = 1e-3
 """Coarse grid (s) on which all runs are compared."""
 
 FAMILIES: tuple[tuple[str, str, dict[str, float], float, float], ...] = (
@@ -34,7 +34,7 @@ FAMILIES: tuple[tuple[str, str, dict[str, float], float, float], ...] = (
 STEPS = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5)
 QUICK_STEPS, QUICK_DURATION = STEPS[1:3], 0.5
 """Of the quick share: one halving over half a second."""
-WHY = "halvings inside the asymptotic range; the band leaves room for the next term of the error"
+ORDER_REASON = "halvings inside the asymptotic range; the band leaves room for the next term of the error"
 
 
 def errors(
@@ -51,7 +51,7 @@ def errors(
         run = simulate(
             road_scene(step=step, duration=duration), engine, Settings(integrator, step, duration, **options)
         )
-        errors_of_steps.append(float(np.abs(run.states[:: round(GRID / step)] - truth).max()))
+        errors_of_steps.append(float(np.abs(run.states[:: round(COMPARED_GRID / step)] - truth).max()))
     return errors_of_steps
 
 
@@ -65,7 +65,9 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per family; the truth is DOP853 at a tolerance of 1e-13; quick: one halving over half a second."""
     steps, duration = (QUICK_STEPS, QUICK_DURATION) if quick else (STEPS, DURATION)
     truth = simulate(
-        road_scene(step=GRID, duration=duration), "reference", Settings("DOP853", GRID, duration, 1e-13)
+        road_scene(step=COMPARED_GRID, duration=duration),
+        "reference",
+        Settings("DOP853", COMPARED_GRID, duration, 1e-13),
     ).states
     rows, table = [], []
     for engine, integrator, options, order, band in FAMILIES:
@@ -78,21 +80,21 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
                 f"observed order of {name} in {engine}",
                 fitted_order(steps, errors_of_steps),
                 "",
-            ).within(order, band, WHY, "closed form")
+            ).within(order, band, ORDER_REASON, "closed form")
         )
         table.append([engine, name, *errors_of_steps])
     return rows, {"table": table, "steps": steps, "duration": duration}
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Largest state error by step."""
-    heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in data["steps"]))
+    heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in case_data["steps"]))
     rows = tuple(
         (engine, name, *(f"{value:.2e}" for value in errors_of_steps))
-        for engine, name, *errors_of_steps in data["table"]
+        for engine, name, *errors_of_steps in case_data["table"]
     )
     note = (
-        f"Largest error of any state (m, rad, m/s, rad/s) over the first {data['duration']:g} s. Equal rows are "
+        f"Largest error of any state (m, rad, m/s, rad/s) over the first {case_data['duration']:g} s. Equal rows are "
         "the same method."
     )
     return [Table(TITLE, note, heads, rows)]

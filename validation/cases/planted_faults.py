@@ -40,7 +40,7 @@ CAMPAIGNS = (
     choosing.CAMPAIGN,
     advice.CAMPAIGN,
 )
-FEW = (DESCRIPTION_FAULTS[0], EQUATIONS_FAULTS[0])
+QUICK_FAULTS = (DESCRIPTION_FAULTS[0], EQUATIONS_FAULTS[0])
 QUICK_SPACING, FEWEST_FAULTS = 16, 40
 """Quick share of the campaigns; faults that there must be in all."""
 
@@ -48,7 +48,7 @@ QUICK_SPACING, FEWEST_FAULTS = 16, 40
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows on planted faults by system and, in full, over all systems; quick: every sixteenth fault of each system."""
     plane = (
-        pitch_plane.measure(FEW, CONTROLS_WITHOUT_FAULT[:1], (pitch_plane.ASYMMETRIC_SET,))
+        pitch_plane.measure(QUICK_FAULTS, CONTROLS_WITHOUT_FAULT[:1], (pitch_plane.ASYMMETRIC_SET,))
         if quick
         else pitch_plane.measure()
     )
@@ -60,43 +60,43 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return [*rows, *([] if quick else [_row_of_fault_count(data)])], data
 
 
-def _row_of_fault_count(data: Saved) -> Row:
-    caught = sum(line[3] != "none" for line in _lines(data))
+def _row_of_fault_count(case_data: Saved) -> Row:
+    caught = sum(line[3] != "none" for line in _lines(case_data))
     return Observed(
         "planted.count",
         FAULT_SYSTEM,
         f"shortfall of the number of faults that are caught in all systems from {FEWEST_FAULTS}",
         max(0, FEWEST_FAULTS - caught),
         "faults",
-    ).at_most(0, f"{caught} of {len(_lines(data))} are", "native")
+    ).at_most(0, f"{caught} of {len(_lines(case_data))} are", "native")
 
 
-def _lines(data: Saved) -> list[tuple[str, ...]]:
+def _lines(case_data: Saved) -> list[tuple[str, ...]]:
     """Table lines, one for each fault: system, the part with the fault, fault, checks that see it, checks that had
     missed it."""
     return [
-        *pitch_plane.lines(data["pitch-plane"]),
-        *(line for campaign in CAMPAIGNS for line in campaign.lines(data[campaign.id])),
+        *pitch_plane.lines(case_data["pitch-plane"]),
+        *(line for campaign in CAMPAIGNS for line in campaign.lines(case_data[campaign.id])),
     ]
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Table of all faults, then tables for each system with errors and descriptions of the checks."""
-    lines = _lines(data)
+    lines = _lines(case_data)
     systems = len({line[0] for line in lines})
     note = (
         f"{len(lines)} faults in {systems} systems, one at a time. Each check in the last column, had it been the "
         "only one, would have let the fault pass."
     )
     headings = ("system", "planted in", "fault", "caught by", "would have been missed by")
-    whole = Table("Planted faults of all systems", note, headings, tuple(lines))
+    overview = Table("Planted faults of all systems", note, headings, tuple(lines))
     return [
-        whole,
-        *pitch_plane.tables(data["pitch-plane"]),
-        *(campaign.table(data[campaign.id]) for campaign in CAMPAIGNS),
+        overview,
+        *pitch_plane.tables(case_data["pitch-plane"]),
+        *(campaign.table(case_data[campaign.id]) for campaign in CAMPAIGNS),
     ]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot how far above its tolerance each check's error is for every fault of the pitch plane."""
-    return pitch_plane.draw(data["pitch-plane"])
+    return pitch_plane.draw(case_data["pitch-plane"])

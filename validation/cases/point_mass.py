@@ -20,10 +20,10 @@ DAMPED = (0.0, 1e-8, 1e-4, 1e-2, 1.0, 100.0)
 """Damping times time."""
 LENGTHS = (10, 1_000_000)
 TIME = 10.0
-BOUND = 1e-10
+RELATIVE_BOUND = 1e-10
 
 Matrix = list[list[Decimal]]
-WHY = (
+BOUND_REASON = (
     "the linear equation of the covariance itself, stepped by squaring its matrix in 60 decimal digits: no sum, no "
     "integral and no digit shared with the closed form"
 )
@@ -42,7 +42,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             f"largest relative error of the covariance, {name}, product of damping and time {x:g}",
             error,
             "",
-        ).at_most(BOUND, WHY, "closed form")
+        ).at_most(RELATIVE_BOUND, BOUND_REASON, "closed form")
         for name, errors in exact.items()
         for x, error in zip(DAMPED, errors, strict=True)
     ]
@@ -89,10 +89,10 @@ def _exponential(matrix: Matrix) -> Matrix:
     return _power(total, 2**20)
 
 
-def _continuous_error(damped: float) -> float:
+def _continuous_error(damping_rate: float) -> float:
     """Relative error of the continuous covariance, which obeys d/dt (Pxx, Pxv, Pvv) = (2 Pxv, Pvv - eta Pxv, s^2 - 2
     eta Pvv)."""
-    eta = damped / TIME
+    eta = damping_rate / TIME
     with localcontext(prec=DIGITS):
         e, t = Decimal(eta), Decimal(TIME)
         gain = Decimal(DEVIATION) ** 2 * Decimal(STEP) / Decimal(MASS) ** 2
@@ -106,11 +106,11 @@ def _continuous_error(damped: float) -> float:
         return _largest_relative_error(continuous_covariance(TIME, DEVIATION, STEP, MASS, eta), truth)
 
 
-def _discrete_error(damped: float, steps: int) -> float:
+def _discrete_error(damping_rate: float, steps: int) -> float:
     """Relative error of the discrete covariance, compared with the matrix recursion of an Euler step in many digits.
     ``steps`` of these steps make TIME."""
     step = TIME / steps
-    eta = min(damped / TIME, 1.9 / step)
+    eta = min(damping_rate / TIME, 1.9 / step)
     with localcontext(prec=DIGITS):
         d = Decimal(step)
         r, kick = 1 - Decimal(eta) * d, (Decimal(DEVIATION) * d / Decimal(MASS)) ** 2
@@ -124,60 +124,60 @@ def _discrete_error(damped: float, steps: int) -> float:
         return _largest_relative_error(euler_covariance(steps, DEVIATION, step, MASS, eta), truth)
 
 
-def _largest_relative_error(computed: np.ndarray, truth: Sequence[Decimal]) -> float:
+def _largest_relative_error(computed_values: np.ndarray, truth: Sequence[Decimal]) -> float:
     return max(
         float(abs(Decimal(float(value)) / true - 1))
-        for value, true in zip(computed[[0, 0, 1], [0, 1, 1]], truth, strict=False)
+        for value, true in zip(computed_values[[0, 0, 1], [0, 1, 1]], truth, strict=False)
     )
 
 
-def _difference(damped: float, steps: int) -> float:
+def _difference(damping_rate: float, steps: int) -> float:
     """1 - ratio of the discrete to the continuous variance of the position."""
     step = TIME / steps
-    arguments = (DEVIATION, step, MASS, damped / TIME)
+    arguments = (DEVIATION, step, MASS, damping_rate / TIME)
     return 1 - float(euler_covariance(steps, *arguments)[0, 0] / continuous_covariance(TIME, *arguments)[0, 0])
 
 
-def _monte_carlo(damped: float, count: int) -> list[Row]:
+def _monte_carlo(damping_rate: float, path_count: int) -> list[Row]:
     """Rows: Monte Carlo variance of the position, and mean square of position and velocity together, weighted by the
     inverse covariance of the law."""
     steps = 1000
-    arguments = (DEVIATION, STEP, MASS, damped / (steps * STEP))
-    law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(count, steps, *arguments, seed=SEED)
+    arguments = (DEVIATION, STEP, MASS, damping_rate / (steps * STEP))
+    law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(path_count, steps, *arguments, seed=SEED)
     distance = float(np.mean(np.sum(drawn * np.linalg.solve(law, drawn.T).T, axis=1))) / 2
-    why = f"{count:,} paths of {steps} explicit Euler steps, seed {SEED}"
+    why = f"{path_count:,} paths of {steps} explicit Euler steps, seed {SEED}"
     return [
         mean_square(
             Observed(
-                f"point_mass.position.{damped:g}",
+                f"point_mass.position.{damping_rate:g}",
                 SYSTEM,
-                f"variance of the position by Monte Carlo, product of damping and time {damped:g}",
+                f"variance of the position by Monte Carlo, product of damping and time {damping_rate:g}",
                 float(np.mean(drawn[:, 0] ** 2)),
                 "m^2",
             ),
             float(law[0, 0]),
-            count,
+            path_count,
             why,
         ),
         mean_square(
             Observed(
-                f"point_mass.joint.{damped:g}",
+                f"point_mass.joint.{damping_rate:g}",
                 SYSTEM,
                 "half the mean squared distance, which tests the whole covariance by Monte Carlo, "
-                f"product of damping and time {damped:g}",
+                f"product of damping and time {damping_rate:g}",
                 distance,
                 "",
             ),
             1.0,
-            2 * count,
+            2 * path_count,
             why,
         ),
     ]
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Table of the relative errors of both covariances."""
-    rows = tuple((name, *(f"{error:.1e}" for error in errors)) for name, errors in data["errors"].items())
+    rows = tuple((name, *(f"{error:.1e}" for error in errors)) for name, errors in case_data["errors"].items())
     note = (
         f"Worst entry of the covariance against {DIGITS} digits, over damping times time. Ten steps cannot be "
         "stable at 100: there the damping is that of 1.9 per step."
@@ -185,7 +185,7 @@ def tables(data: Saved) -> list[Table]:
     return [Table("Relative error of the covariances", note, ("", *(f"{x:g}" for x in DAMPED)), rows)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Standard deviations over time, and how the Euler scheme nears them."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
@@ -193,13 +193,13 @@ def draw(data: Saved) -> Drawn:
     times = np.geomspace(0.01, 100.0, 81)
     for i, eta in enumerate((0.0, 0.1, 1.0)):
         exact = [continuous_covariance(t, DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for t in times]
-        whole = np.unique(np.geomspace(10, 1e5, 13).astype(int))
-        euler = [euler_covariance(int(n), DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for n in whole]
+        step_counts = np.unique(np.geomspace(10, 1e5, 13).astype(int))
+        euler = [euler_covariance(int(n), DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for n in step_counts]
         axes[0].loglog(times, exact, color=f"C{i}", label=f"damping {eta:g} 1/s")
-        axes[0].loglog(whole * STEP, euler, "o", color=f"C{i}", markersize=3.5)
+        axes[0].loglog(step_counts * STEP, euler, "o", color=f"C{i}", markersize=3.5)
     axes[0].set(title="Position: standard deviation [m]", xlabel="time [s]")
     axes[0].legend(title="line: eq. (11); dots: Euler scheme", loc="upper left")
-    steps, *columns = np.array(data["differences"]).T
+    steps, *columns = np.array(case_data["differences"]).T
     for x, column in zip((0, 1, 10), columns, strict=True):
         axes[1].loglog(steps, np.abs(column), "o-", markersize=3.5, label=f"damping times time {x}")
     axes[1].loglog(steps, 1.5 / steps, color="black", linestyle=":", label="3 / (2n)")

@@ -51,7 +51,7 @@ FULL_ONLY: tuple[Make, ...] = (
     contact_alone.problem,
 )
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
-ROUNDS = {True: 1, False: 15}
+TIMING_ROUNDS = {True: 1, False: 15}
 """Interleaved rounds of timing, by ``quick``, of settings whose seconds decide something."""
 SHORTEST_TURN = {True: 0.004, False: 0.005}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
@@ -76,7 +76,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of all problems, of the force calls, and of two claims about speed; quick: five of the eleven problems, a
     named share of their settings, and beside another case, where in full no more processes run than there are cores.
     """
-    rounds = ROUNDS[quick]
+    rounds = TIMING_ROUNDS[quick]
     if quick:
         priced, (beside, data) = [_priced(True, rounds, make) for make in PROBLEMS], _beside(True, rounds)
     else:
@@ -85,36 +85,38 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows + _road_rows(priced[0][1]) + beside, {"problems": [saved for _, saved in priced], **data}
 
 
-def _beside(quick: bool, rounds: int) -> CaseAnswer:
+def _beside(quick: bool, round_count: int) -> CaseAnswer:
     """Rows and data of price cases that are not problems for the common runner: ride, shares of a step, force calls,
     claims about speed."""
     road = assembly_of_scene(road_excited.scene())
-    rows, prices = ride.measure(quick, rounds, SHORTEST_TURN[True])
-    twice, least, duration = 2 * rounds, 2 * SHORTEST_TURN[quick], road_excited.DURATION
+    rows, prices = ride.measure(quick, round_count, SHORTEST_TURN[True])
+    twice, least, duration = 2 * round_count, 2 * SHORTEST_TURN[quick], road_excited.DURATION
     data: Saved = {
         "ride": prices,
-        "split": [] if quick else split.measure(rounds, SHORTEST_TURN[quick]),
+        "split": [] if quick else split.measure(round_count, SHORTEST_TURN[quick]),
         "callback": {name: speed.callback_cost(road, duration, name, twice, least) for name in ("RK4", "Euler")},
         "real time": speed.real_time(road, duration, twice, least),
     }
-    settings = dict.fromkeys(_at_1_ms(each) for each in road_excited.settings(quick) if each.method != "DVERK6")
+    settings = dict.fromkeys(
+        _at_1_ms(problem_rows) for problem_rows in road_excited.settings(quick) if problem_rows.method != "DVERK6"
+    )
     return rows + split.rows(data["split"]) + _counts([*settings], road) + _speed_rows(data), data
 
 
-def _priced(quick: bool, rounds: int, make_problem: Make) -> CaseAnswer:
+def _priced(quick: bool, round_count: int, make_problem: Make) -> CaseAnswer:
     """The rows and the saved data of a problem."""
     problem = make_problem(quick)
-    measured = runner.measure(problem, quick, rounds, SHORTEST_TURN[quick])
+    measured = runner.measure(problem, quick, round_count, SHORTEST_TURN[quick])
     return rows_of(problem, measured, quick), asdict(measured)
 
 
-def _in_processes(rounds: int) -> tuple[list[CaseAnswer], CaseAnswer]:
+def _in_processes(round_count: int) -> tuple[list[CaseAnswer], CaseAnswer]:
     """All problems and the further cases, computed by at most two processes. The first problem is computed last; only
     the road, which takes long, is started before."""
     with process_pool(min(2, os.cpu_count() or 1)) as pool:
-        first, *others = PROBLEMS + FULL_ONLY
-        road, beside = pool.submit(_priced, False, rounds, first), pool.submit(_beside, False, rounds)
-        priced = [*pool.map(partial(_priced, False, rounds), others[::-1])][::-1]
+        first, *other_problems = PROBLEMS + FULL_ONLY
+        road, beside = pool.submit(_priced, False, round_count, first), pool.submit(_beside, False, round_count)
+        priced = [*pool.map(partial(_priced, False, round_count), other_problems[::-1])][::-1]
         return [road.result(), *priced], beside.result()
 
 
@@ -158,9 +160,9 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
     rows = []
     for engine, how in (("exudyn", "calls of one load"), ("mujoco", "MuJoCo's own timers")):
         pairs = [
-            counted_calls(engine, assembly, road_excited.settings_of(each, COUNTED_DURATION))
-            for each in settings
-            if each.engine == engine
+            counted_calls(engine, assembly, road_excited.settings_of(counted_setting, COUNTED_DURATION))
+            for counted_setting in settings
+            if counted_setting.engine == engine
         ]
         what = (
             f"largest difference between force calls counted from outside ({how}) and those reported, {len(pairs)} runs"
@@ -170,7 +172,7 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
                 f"price.road.counts.{engine}",
                 SYSTEM,
                 what,
-                max(abs(outside - said) for outside, said in pairs),
+                max(abs(outside - quantity) for outside, quantity in pairs),
                 "calls",
             ).within(
                 0,
@@ -182,24 +184,24 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
     return rows
 
 
-def _speed_rows(data: Saved) -> list[Row]:
+def _speed_rows(case_data: Saved) -> list[Row]:
     """Rows on target speeds, reported with their intervals and without a verdict."""
     rows = [
         Observed(
             "price.callback.gap",
             SYSTEM,
             "MuJoCo RK4: difference between every force in a compiled callback and native springs",
-            data["callback"]["RK4"]["gap"],
+            case_data["callback"]["RK4"]["gap"],
             "m, rad, m/s, rad/s",
         ).at_most(1e-12, "the same forces at the same stages, written twice", "native")
     ]
-    for integrator, figures in data["callback"].items():
+    for integrator, figures in case_data["callback"].items():
         for key, words in CALLBACKS.items():
             ratio, low, high = figures[key]
             name = f"price.callback.{integrator}.{key.replace(' ', '-')}"
             what = f"MuJoCo {integrator}, {words}, paired seconds, 95 % interval {low:.3f} to {high:.3f}"
             rows.append(Observed(name, SYSTEM, what, ratio, "times").aim(1.2, ON_SECONDS))
-    return rows + [_real_time(key, data["real time"][key]) for key in ("with table", "without table")]
+    return rows + [_real_time(key, case_data["real time"][key]) for key in ("with table", "without table")]
 
 
 def _real_time(key: str, factors: tuple[float, float, float] | None) -> Row:
@@ -208,24 +210,24 @@ def _real_time(key: str, factors: tuple[float, float, float] | None) -> Row:
     if factors is None:
         return not_run(name, SYSTEM, what, "other work of the machine hid the difference")
     factor, low, high = factors
-    told = f"{what}, 95 % interval {low:,.0f} to {high:,.0f}"
-    return Observed(name, SYSTEM, told, factor, "times real time").aim(1000.0, ON_SECONDS, "at least")
+    quantity = f"{what}, 95 % interval {low:,.0f} to {high:,.0f}"
+    return Observed(name, SYSTEM, quantity, factor, "times real time").aim(1000.0, ON_SECONDS, "at least")
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Cheapest settings, losses, curves, failures and the parts of a step of every problem; the routes of ride."""
     tables = [
         table
-        for saved in data["problems"]
-        for table in (*cost_tables(runner.of_saved(saved)), *split.table(data["split"], saved["key"]))
+        for saved in case_data["problems"]
+        for table in (*cost_tables(runner.of_saved(saved)), *split.table(case_data["split"], saved["key"]))
     ]
-    return [*tables, ride.table(data["ride"])]
+    return [*tables, ride.table(case_data["ride"])]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """A work-precision figure per problem, and one of the routes of ride."""
-    problems = map(runner.of_saved, data["problems"])
-    return [*((_caption(measured), draw_figure(measured)) for measured in problems), ride.draw(data["ride"])]
+    problems = map(runner.of_saved, case_data["problems"])
+    return [*((_caption(measured), draw_figure(measured)) for measured in problems), ride.draw(case_data["ride"])]
 
 
 def _caption(measured_points: runner.MeasuredPoints) -> str:

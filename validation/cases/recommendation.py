@@ -18,7 +18,7 @@ Judged = tuple[list[Verdict], list[str]]
 
 TITLE = "What to recommend"
 SYSTEM: System = "cost"
-QUICK = 8
+QUICK_SCENE_NUMBER = 8
 """Number of the one scene that a quick run draws."""
 SCENES = {"pitch-plane": 88, "braking": 6, "wheelset": 4, "handling": 2}
 """How many scenes of each system a full run judges."""
@@ -38,7 +38,7 @@ error."""
 )
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Verdicts on all recommendations for all scenes; quick: those of one engine for one scene."""
-    both = [judged("pitch-plane", QUICK, folder, (ENGINE,))] if quick else _shared(folder)
+    both = [judged("pitch-plane", QUICK_SCENE_NUMBER, folder, (ENGINE,))] if quick else _shared(folder)
     verdicts, refused = [of_scene for of_scene, _ in both], [why for _, of_scene in both for why in of_scene]
     return _rows(verdicts, refused), {
         "verdicts": [[asdict(verdict) for verdict in of_scene] for of_scene in verdicts],
@@ -58,13 +58,13 @@ def _shared(folder: Path) -> list[Judged]:
         ]
 
 
-def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = ENGINES) -> Judged:
+def judged(system: str, scene_number: int, folder: Path, engines: tuple[str, ...] = ENGINES) -> Judged:
     """Verdicts on the recommendations for a random scene of a system, and the reasons of refusals. There are no
     verdicts if the scene was refused more than REDRAWS times."""
     refused: list[str] = []
-    for n in range(number, number + (REDRAWS + 1) * STRIDE, STRIDE):
+    for n in range(scene_number, scene_number + (REDRAWS + 1) * STRIDE, STRIDE):
         try:
-            told = (
+            reasons = (
                 judge(drawn(n, folder), engines)
                 if system == "pitch-plane"
                 else unseen_systems.judge(unseen_systems.drawn_scene_of_system(system, n))
@@ -72,7 +72,7 @@ def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = EN
         except (InputError, RunFailed) as error:
             refused.append(f"{system} {n}: {error}")
         else:
-            return told, refused
+            return reasons, refused
     return [], refused
 
 
@@ -80,7 +80,7 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
     """Rows on the three promises of a recommendation; a scene counts as kept if every recommended setting keeps its
     promise."""
     every = [verdict for of_scene in verdicts for verdict in of_scene]
-    held = sum(bool(of_scene) and all(verdict.meets for verdict in of_scene) for of_scene in verdicts)
+    kept_scenes = sum(bool(of_scene) and all(verdict.meets for verdict in of_scene) for of_scene in verdicts)
     factors = [verdict.factor for verdict in every]
     scenes, why = f"{len(verdicts)} scenes drawn at random", "judged by another solver than the search's, DOP853"
     return [
@@ -88,7 +88,7 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
             "recommendation.met",
             SYSTEM,
             f"share of {scenes} in which every recommended setting keeps its tolerance ({len(every)} settings)",
-            held / len(verdicts),
+            kept_scenes / len(verdicts),
             "",
         ).within(1.0, 1.0 - LEAST_MET_SHARE, why, "closed form"),
         Observed(
@@ -137,14 +137,14 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
     ]
 
 
-def _slower(every: list[Verdict], kind: str) -> int:
-    return sum(verdict.slower for verdict in every if verdict.kind == kind)
+def _slower(every: list[Verdict], cost_kind: str) -> int:
+    return sum(verdict.slower for verdict in every if verdict.kind == cost_kind)
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Every scene with what was recommended over all engines."""
     rows = []
-    for of_scene in data["verdicts"]:
+    for of_scene in case_data["verdicts"]:
         if not of_scene:
             continue
         verdict = of_scene[0]
@@ -166,12 +166,12 @@ def tables(data: Saved) -> list[Table]:
     return [Table("Recommendations for scenes drawn at random", note, heads, tuple(rows))]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Predicted over true error by tolerance."""
     from models.drawing.figures import COLOURS, DARK, LABELS, REJECTED_COLOUR, add_heading, subplots
 
     figure, ax = subplots(figsize=(6.0, 4.6))
-    every = [verdict for of_engine in data["verdicts"] for verdict in of_engine]
+    every = [verdict for of_engine in case_data["verdicts"] for verdict in of_engine]
     for engine in dict.fromkeys(verdict["curve"].split()[0] for verdict in every):
         of_engine = [verdict for verdict in every if verdict["curve"].startswith(engine)]
         ax.plot(
@@ -205,6 +205,6 @@ def draw(data: Saved) -> Drawn:
     )
     ax.legend(loc="upper left")
     add_heading(
-        figure, f"Settings recommended for scenes never seen ({len(data['verdicts'])}): errors predicted and true"
+        figure, f"Settings recommended for scenes never seen ({len(case_data['verdicts'])}): errors predicted and true"
     )
     return [("Errors of recommended settings: predicted by the search, and true by another solver.", figure)]

@@ -112,9 +112,9 @@ def _compared(
         stationary_covariance(vehicle_with_road(vehicle, road, speed)),
         variances_by_quadrature(analytic, road, speed),
     )
-    told = covariance.variance > SYMMETRY_ZERO * covariance.variance.max()
-    worst = largest_relative_error(covariance.deviation[told], np.sqrt(integrals.variance[told]))
-    return worst, covariance.error[told].max(), integrals.error[told].max(), int(told.sum())
+    is_finite = covariance.variance > SYMMETRY_ZERO * covariance.variance.max()
+    worst = largest_relative_error(covariance.deviation[is_finite], np.sqrt(integrals.variance[is_finite]))
+    return worst, covariance.error[is_finite].max(), integrals.error[is_finite].max(), int(is_finite.sum())
 
 
 def _closed_rows() -> list[Row]:
@@ -232,11 +232,11 @@ def _engine_row(engine: str) -> Row:
     ).at_most(1e-6, "asked", "native")
 
 
-def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
+def _fast(speeds: np.ndarray, vehicle_name: str) -> tuple[list[Row], dict[str, Any]]:
     """Rows and data on the fast route: five cases of correlation over many speeds with weighting, by the fast and the
     direct route, with processor times."""
     vehicle = _vehicle("r19_ride")
-    linear = linear_vehicle(vehicle, source)
+    linear = linear_vehicle(vehicle, vehicle_name)
     roads = five_cases(linear(20.0).wheels)
     variance_sweep(linear, roads, speeds[:1], FILTERS)  # what is loaded and linearised once is no part of the sweep
     start = time.process_time()
@@ -244,14 +244,14 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
     seconds = time.process_time() - start
     some = slice(None, None, max(1, len(speeds) // 6))
     slow = variance_sweep(linear, roads, speeds[some], FILTERS, fast=False)
-    told = slow.variance > SYMMETRY_ZERO * slow.variance.max()
+    is_finite = slow.variance > SYMMETRY_ZERO * slow.variance.max()
     rows = [
         Observed(
             "ride_covariance.fast.equal",
             SYSTEM,
             "difference of the variances by the fast route from the direct route, three weighted "
             "seats, worst of all outputs",
-            largest_relative_error(quick.variance[:, some][told], slow.variance[told]),
+            largest_relative_error(quick.variance[:, some][is_finite], slow.variance[is_finite]),
             "",
         ).at_most(1e-10, "asked", "none"),
         behaviour_row(
@@ -266,7 +266,7 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
             "ride_covariance.fast.time",
             SYSTEM,
             f"time of five cases at {len(speeds)} speeds with ISO weighting, from the linear vehicle "
-            f"of {source}, single core, measured once",
+            f"of {vehicle_name}, single core, measured once",
             seconds,
             "s",
         ).aim(2.0, "asked for 60 speeds; it counts this process's seconds and not other load"),
@@ -284,7 +284,7 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
 BODY_POINTS = ("body front", "body centre", "body rear")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of the agreement between two routes, with the error that each states."""
     rows = tuple(
         (
@@ -294,7 +294,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
             f"{route['worst']:.1e}",
             *(f"{error:.1e}" for error in route["errors"]),
         )
-        for route in data["routes"]
+        for route in case_data["routes"]
     )
     note = (
         "Largest relative difference of standard deviations over all outputs in the five cases of correlation; the "
@@ -304,17 +304,17 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Covariance against frequency quadrature", note, headings, rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviation of the vertical acceleration along the body over speed, one line per case."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
-    shown = data["figure"]
+    shown = case_data["figure"]
     figure, axes = subplots(1, 3, figsize=(COLUMN_WIDTH, 4.2), sharey=True)
-    for axis, place in zip(axes, BODY_POINTS, strict=True):
+    for axis, body_point in zip(axes, BODY_POINTS, strict=True):
         for i, case in enumerate(shown["cases"]):
             words = "left/right {}, front/rear {}".format(*CORRELATION_CASES[int(case)])
-            axis.plot(shown["speeds"], shown[place][i], label=f"{case}: {words}")
-        axis.set(title=place, xlabel="speed [m/s]")
+            axis.plot(shown["speeds"], shown[body_point][i], label=f"{case}: {words}")
+        axis.set(title=body_point, xlabel="speed [m/s]")
     axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s²]")
     axes[0].set_ylim(bottom=0.0)
     legend_below(figure, axes[0], columns=2)

@@ -69,19 +69,19 @@ def curved(vehicle: SpatialVehicle) -> SpatialVehicle:
     return replace(vehicle, springs=(*bent, *vehicle.springs[4:]))
 
 
-def difference(computed: LinearVehicle, expected: LinearVehicle) -> float:
+def difference(computed_values: LinearVehicle, expected: LinearVehicle) -> float:
     """Largest error of M, D, K, the road's columns and the outputs; each matrix is compared relative to its largest
     entry."""
     matrices = ("mass", "damping", "stiffness", "road_stiffness", "road_damping")
-    sides: list[tuple[Any, Any, tuple[str, ...]]] = [(computed, expected, matrices)]
-    sides += [(a, b, OutputRows._fields) for a, b in zip(computed.outputs, expected.outputs, strict=True)]
+    sides: list[tuple[Any, Any, tuple[str, ...]]] = [(computed_values, expected, matrices)]
+    sides += [(a, b, OutputRows._fields) for a, b in zip(computed_values.outputs, expected.outputs, strict=True)]
     return max(relative(getattr(a, name), getattr(b, name)) for a, b, names in sides for name in names)
 
 
-def relative(computed: np.ndarray, expected: np.ndarray) -> float:
+def relative(computed_values: np.ndarray, expected: np.ndarray) -> float:
     """Largest difference, divided by the largest expected magnitude unless that is 0."""
     size = float(np.abs(expected).max(initial=0.0))
-    return float(np.abs(computed - expected).max(initial=0.0)) / (size or 1.0)
+    return float(np.abs(computed_values - expected).max(initial=0.0)) / (size or 1.0)
 
 
 def random_state(vehicle: SpatialVehicle, path: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -163,8 +163,8 @@ def _path() -> tuple[list[Row], list[list[str]]]:
             runs[engine] = model.run(*random_state(vehicle, STATES)[:2])
             price.append([engine, what, f"{1e3 * (time.process_time() - start):.0f}", str(model.plan()["callbacks"])])
         gap = max(
-            np.abs(getattr(runs["exudyn"], part) - getattr(runs["mujoco"], part)).max()
-            for part in ("positions", "rates")
+            np.abs(getattr(runs["exudyn"], state_name) - getattr(runs["mujoco"], state_name)).max()
+            for state_name in ("positions", "rates")
         )
         rows.append(
             Observed(
@@ -246,13 +246,13 @@ def _without_curves() -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of computing times for one simulated second."""
-    if not data["price"]:
+    if not case_data["price"]:
         return []
     note = (
         "CPU milliseconds, once, per simulated second of R19-ride, RK4 at 1 ms on a random road, and functions "
         "called back."
     )
     heads = ("engine", "springs", "ms per s", "callbacks")
-    return [Table("R19-ride in time", note, heads, tuple(tuple(row) for row in data["price"]))]
+    return [Table("R19-ride in time", note, heads, tuple(tuple(row) for row in case_data["price"]))]

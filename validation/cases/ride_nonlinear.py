@@ -113,10 +113,11 @@ def _fixed_point() -> list[Row]:
     """Rows: statistical linearisation converges, to the same gains from another start; gravity has no effect on a
     vehicle that only moves vertically."""
     vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, 4.0)
-    first, other = (statistically_linear(vehicle, road, SPEED, scale) for scale in (1.0, 10.0))
+    first, from_other_start = (statistically_linear(vehicle, road, SPEED, scale) for scale in (1.0, 10.0))
     unloaded = statistically_linear(replace(vehicle, gravity=0.0), road, SPEED)
     apart = [
-        largest_relative_error(each.covariance.deviation, first.covariance.deviation) for each in (other, unloaded)
+        largest_relative_error(linearised.covariance.deviation, first.covariance.deviation)
+        for linearised in (from_other_start, unloaded)
     ]
     return [
         Observed(
@@ -144,13 +145,13 @@ def _fixed_point() -> list[Row]:
     ]
 
 
-def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
+def _level(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
     """Rows at one road level: deviations and mean travel by statistical linearisation, compared with Monte Carlo. The
     tolerance of each is the accuracy that the result's sentences state."""
-    vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, level)
+    vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, road_level)
     linear = statistically_linear(vehicle, road, SPEED)
     copies = copies_in_time(vehicle, road, SPEED, LASTING[not quick], copies=COPIES[not quick], seed=SEED)
-    rows, cells = [], [f"{level:g}"]
+    rows, cells = [], [f"{road_level:g}"]
     for i, name in enumerate(copies.names):
         error = float(linear.covariance.deviation[i] / copies.deviation[i] - 1.0)
         spread = float(copies.error[i] / copies.variance[i] / 2.0)
@@ -159,10 +160,10 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
         )
         rows.append(
             Observed(
-                f"ride_nonlinear.level.{level:g}.{name}",
+                f"ride_nonlinear.level.{road_level:g}.{name}",
                 SYSTEM,
                 f"relative difference of the deviation of {name} from {len(copies.moments[0])} copies "
-                f"of {copies.duration:.0f} s, {level:g} times the paper's road",
+                f"of {copies.duration:.0f} s, {road_level:g} times the paper's road",
                 abs(error),
                 "",
             ).at_most(
@@ -177,7 +178,7 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
     shift = float(linear.mean[travel] - copies.mean[travel]) / size
     rows.append(
         Observed(
-            f"ride_nonlinear.mean.{level:g}",
+            f"ride_nonlinear.mean.{road_level:g}",
             SYSTEM,
             f"difference of the mean travel, {1e3 * linear.mean[travel]:.2f} mm, from that of the "
             "copies, over its deviation",
@@ -210,7 +211,7 @@ def _alone() -> list[Row]:
     """Rows: each nonlinear law alone, at the road level at which statistical linearisation is least accurate."""
     vehicle, _ = vehicle_and_road(NONLINEAR_VEHICLE)
     spring = vehicle.springs[0]
-    others: dict[str, tuple[float, dict[str, Any]]] = {
+    law_cases: dict[str, tuple[float, dict[str, Any]]] = {
         "damper": (4.0, {"travel_force": None, "friction": 0.0}),
         "friction of 100 N": (
             0.25,
@@ -219,14 +220,14 @@ def _alone() -> list[Row]:
         "stops": (64.0, {"rate_force": None, "damping": MILD_DAMPING, "friction": 0.0}),
     }
     rows = []
-    for name, (level, laws) in others.items():
+    for name, (level, laws) in law_cases.items():
         alone = replace(vehicle, springs=(replace(spring, **laws),))
         road = vehicle_and_road(NONLINEAR_VEHICLE, level)[1]
         linear = statistically_linear(alone, road, SPEED)
         copies = copies_in_time(alone, road, SPEED, LASTING[1], copies=COPIES[1] // 2, seed=SEED)
         error = np.abs(linear.covariance.deviation / copies.deviation - 1.0)
-        kept = [promised_error(share) for share in linear.left_out] + 4.0 * copies.error / copies.variance / 2.0
-        worst = int((error / kept).argmax())
+        curve_kept = [promised_error(share) for share in linear.left_out] + 4.0 * copies.error / copies.variance / 2.0
+        worst = int((error / curve_kept).argmax())
         rows.append(
             Observed(
                 f"ride_nonlinear.alone.{name.split()[0]}",
@@ -236,7 +237,7 @@ def _alone() -> list[Row]:
                 float(error[worst]),
                 "",
             ).at_most(
-                float(kept[worst]),
+                float(curve_kept[worst]),
                 f"left out {100 * linear.left_out[worst]:.2g} %: the promise, and 4 standard errors",
                 "none",
             )
@@ -244,11 +245,13 @@ def _alone() -> list[Row]:
     return rows
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of the errors of statistical linearisation."""
     names = [output.name for output in vehicle_and_road(NONLINEAR_VEHICLE)[0].outputs]
     note = (
         "Error of each standard deviation beside Monte Carlo; in brackets what was left out of the variance, and "
         "the kurtosis, 3 for a Gaussian output. The road's level by that of the paper."
     )
-    return [Table("Statistical linearisation", note, ("level", *names), tuple(tuple(row) for row in data["levels"]))]
+    return [
+        Table("Statistical linearisation", note, ("level", *names), tuple(tuple(row) for row in case_data["levels"]))
+    ]

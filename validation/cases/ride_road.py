@@ -151,9 +151,9 @@ def _isotropic_rows() -> list[Row]:
     road, apart, k = road_of_level(HALF_TRACK), 2.0 * HALF_TRACK, np.array([0.05, 0.3, 1.0, 3.0])
     closed = isotropic_like(road, HALF_TRACK).cross_spectrum(k, apart)
     along = cross_spectrum_of(lambda r: float(road.covariance(np.array(r), HALF_TRACK, HALF_TRACK)), list(k), apart)
-    part = DensityPart(1e-5, 0.3, 2.6)
-    across = np.array([_by_surface_density(part, float(each), apart) for each in k])
-    hankel = part.density(k, apart)
+    density_part = DensityPart(1e-5, 0.3, 2.6)
+    across = np.array([_by_surface_density(density_part, float(wavenumber), apart) for wavenumber in k])
+    hankel = density_part.density(k, apart)
     return [
         Observed(
             "ride_road.isotropic.fourier",
@@ -203,7 +203,9 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
         stationary_covariance(vehicle_with_road(vehicle, road_excitation(road, vehicle.wheels), SPEED)).deviation,
         vehicle,
     )
-    by_frequency, isotropic = (_by_frequency(vehicle, each) for each in (road, isotropic_like(road, HALF_TRACK)))
+    by_frequency, isotropic = (
+        _by_frequency(vehicle, road_model) for road_model in (road, isotropic_like(road, HALF_TRACK))
+    )
     rows = [
         Observed(
             "ride_road.route",
@@ -310,9 +312,9 @@ def _weighted_rows() -> list[Row]:
     return rows
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """The five input covariances, the weightings beside the standard's table, and the fits."""
-    return [_inputs_table(), _weighting_table(), fits_table([data["made"], *data["measured"]])]
+    return [_inputs_table(), _weighting_table(), fits_table([case_data["made"], *case_data["measured"]])]
 
 
 def _inputs_table() -> Table:
@@ -337,6 +339,6 @@ def _weighting_table() -> Table:
     return Table("Weightings of ISO 2631-1", note, heads, tuple(rows))
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Spectra and coherency of model, made and measured roads."""
-    return [coherency_figure(HALF_TRACK, [data["made"], *data["measured"]])]
+    return [coherency_figure(HALF_TRACK, [case_data["made"], *case_data["measured"]])]

@@ -27,7 +27,7 @@ TITLE = "Ride at varying speed, through standstill, and by Monte Carlo"
 SYSTEM: System = "ride"
 SEED = 21
 COPIES = 4000
-POINTS = ("body front", "body centre", "body rear")
+BODY_POINTS = ("body front", "body centre", "body rear")
 DRIVES = {
     "accelerating": SpeedProfile((0.0, 25.0 / 3.0), (5.0, 30.0)),
     "braking": SpeedProfile((0.0, 3.0), (30.0, 6.0)),
@@ -86,7 +86,7 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
     settled, even = (varying_speed(vehicle, road, profile).deviation for profile in (change, CONSTANT_SPEED))
     often = np.linspace(stops.times[0], stops.times[-1], 41)
     stopped, fine = (
-        varying_speed(vehicle, road, stops, instants=often, reach=reach)
+        varying_speed(vehicle, road, stops, instants=often, largest_rate_times_step=reach)
         for reach in (LARGEST_RATE_TIMES_STEP, LARGEST_RATE_TIMES_STEP / 2)
     )
     step = np.abs(stopped.at(often) ** 2 - fine.at(often) ** 2) / stopped.deviation.max(axis=0) ** 2
@@ -143,13 +143,13 @@ def _damped() -> Row:
     moves."""
     varied = varying_speed(*ride("half_car", 100.0), SHORT_STOPS)
     force, moving = varied.of("tyre force front left"), varied.speed > 0.0
-    said = "infinite" if np.isinf(force[moving]).all() else "finite"
-    said += ", finite" if np.isfinite(force[~moving]).all() else ", infinite"
+    outcome = "infinite" if np.isinf(force[moving]).all() else "finite"
+    outcome += ", finite" if np.isfinite(force[~moving]).all() else ", infinite"
     return behaviour_row(
         "ride_varying_speed.damped",
         SYSTEM,
         "half_car with tyre damping: variance of the tyre force while driving, and at standstill",
-        said,
+        outcome,
         "infinite, finite",
         "white noise of the road's rate, which standstill turns off",
     )
@@ -163,7 +163,7 @@ def _drive(profile: SpeedProfile) -> dict[str, Any]:
     copies, slow = _timed(variances_along_drive, vehicle, road, profile, instants, copies=COPIES, seed=SEED)
     varied, fast = _timed(varying_speed, vehicle, road, profile, instants=copies.time)
     often = np.linspace(profile.times[0], profile.times[-1], 101)
-    columns = [varied.names.index(point) for point in POINTS]
+    columns = [varied.names.index(point) for point in BODY_POINTS]
     near = np.abs(varied.time[:, None] - often).argmin(axis=0)
     return {
         "time": varied.time[near].tolist(),
@@ -221,7 +221,7 @@ def _constant() -> list[Row]:
         / REPEATS
     )
     copies, slow = _timed(at_constant_speed, vehicle, road, STEADY_SPEED, LASTING, copies=STEADY_COPIES, seed=SEED)
-    columns = [copies.names.index(point) for point in POINTS]
+    columns = [copies.names.index(point) for point in BODY_POINTS]
     z = copies.z(exact.deviation[None])[0]
     error = float((copies.error[0] / 2.0 / copies.variance[0])[columns].max())
     return [
@@ -259,10 +259,10 @@ def _constant() -> list[Row]:
     ]
 
 
-def _timed(run: Callable[..., Any], *given: Any, **more: Any) -> tuple[Any, float]:
+def _timed(run: Callable[..., Any], *arguments: Any, **keywords: Any) -> tuple[Any, float]:
     """Result of a call, and its processor time (s)."""
     start = time.process_time()
-    return run(*given, **more), time.process_time() - start
+    return run(*arguments, **keywords), time.process_time() - start
 
 
 def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, output: str) -> float:
@@ -289,10 +289,10 @@ def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, 
             dense_output=True,
         )
         pieces[start, stop], seen = back.sol, back.y[:, -1]
-    places, weights = _path_points(profile, cuts, road.lengths)
-    response = np.zeros((len(places), at_1.B[0].shape[1]))
+    path_points, weights = _path_points(profile, cuts, road.lengths)
+    response = np.zeros((len(path_points), at_1.B[0].shape[1]))
     for B, length in zip(at_1.B, road.lengths, strict=True):
-        met = profile.time(places + length)
+        met = profile.time(path_points + length)
         for (start, stop), adjoint in pieces.items():
             then = np.flatnonzero((met > start) & (met < stop))
             if len(then):
@@ -310,28 +310,28 @@ def _path_points(profile: SpeedProfile, cuts: list[float], lengths: tuple[float,
     return (cells[:-1, None] + half * (points + 1.0)).ravel(), (half * weights).ravel()
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of the deviations of the Monte Carlo copies in standard errors (z), at each instant."""
     rows = [
         (name, f"{t:.2f} s", *(f"{value:.2f}" for value in z))
-        for name, drive in data.items()
+        for name, drive in case_data.items()
         for t, z in zip(drive["instants"], drive["z"], strict=True)
     ]
     if not rows:
         return []
     note = f"How many standard errors the variance over {COPIES} copies lies above the covariance along the drive."
-    return [Table("Monte Carlo at varying speed", note, ("drive", "time", *POINTS), tuple(rows))]
+    return [Table("Monte Carlo at varying speed", note, ("drive", "time", *BODY_POINTS), tuple(rows))]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot standard deviations over time, with the quasi-stationary solution for comparison."""
-    if not data:
+    if not case_data:
         return []
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9), sharey=True)
-    for axis, (name, drive) in zip(axes, data.items(), strict=True):
-        for column, point in enumerate(POINTS):
+    for axis, (name, drive) in zip(axes, case_data.items(), strict=True):
+        for column, point in enumerate(BODY_POINTS):
             pick = [row[column] for row in drive["deviation"]]
             (line,) = axis.plot(drive["time"], pick, label=point)
             colour = line.get_color()

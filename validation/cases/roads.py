@@ -17,7 +17,7 @@ from validation.common.scenes import COURSE_FILE, data_folder, largest_differenc
 
 TITLE = "Roads: formula, class, OpenCRG and CSV"
 SYSTEM: System = "pitch-plane"
-LENGTH, INCREMENT = 60.0, 0.05
+ROAD_LENGTH, INCREMENT = 60.0, 0.05
 SEED = 3
 """Of the class C road's phases."""
 
@@ -32,10 +32,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 @on_paper_road()
 def _round_trips(folder: Path) -> list[Row]:
     road = study_road()
-    write_opencrg(road, folder / "study.crg", LENGTH, INCREMENT)
+    write_opencrg(road, folder / "study.crg", ROAD_LENGTH, INCREMENT)
     _write_csv(road, folder / "study.csv")
     back = {"OpenCRG": read_opencrg(folder / "study.crg"), "CSV": read_csv_road(folder / "study.csv")}
-    station = INCREMENT * np.arange(round(LENGTH / INCREMENT) + 1)
+    station = INCREMENT * np.arange(round(ROAD_LENGTH / INCREMENT) + 1)
     true = road.height_and_slope(station)[0]
     rows = [
         Observed(
@@ -72,7 +72,7 @@ def _round_trips(folder: Path) -> list[Row]:
 
 def _write_csv(road: RoadProfile, path: Path) -> None:
     """Write road heights to a CSV file as a surveyor would: upward, in mm."""
-    station = INCREMENT * np.arange(round(LENGTH / INCREMENT) + 1)
+    station = INCREMENT * np.arange(round(ROAD_LENGTH / INCREMENT) + 1)
     up = -1e3 * road.height_and_slope(station)[0]
     np.savetxt(
         path,

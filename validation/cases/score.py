@@ -74,7 +74,7 @@ def _conventions() -> list[Row]:
 
     walk = normal_samples(SEED, 0, SAMPLES, 1)[:, 0].cumsum()
     white = normal_samples(SEED, 1, SAMPLES, 1)[:, 0]
-    whole = sum(count * span**WOEHLER_SLOPE for span, _, count, _, _ in extract_cycles(walk.tolist()))
+    library_damage = sum(count * span**WOEHLER_SLOPE for span, _, count, _, _ in extract_cycles(walk.tolist()))
     repeated = {name: _closed(load) / pseudo_damage(load) - 1 for name, load in (("walk", walk), ("white", white))}
     why = "the residue closed by repeating the load, instead of counted as half cycles: the convention must be stated"
     return [
@@ -83,14 +83,14 @@ def _conventions() -> list[Row]:
             SYSTEM,
             f"relative difference of the damage of a random walk of {SAMPLES:,} samples by its "
             "turning points alone from all samples",
-            abs(pseudo_damage(walk) / whole - 1),
+            abs(pseudo_damage(walk) / library_damage - 1),
             "",
         ).at_most(1e-12, "rainflow reads turning points only; the sum is in another order", "native"),
         *(
             Observed(f"score.damage.convention.{name}", SYSTEM, what, repeated[name], "").beside(
-                f"{told} between two libraries", why
+                f"{counting_text} between two libraries", why
             )
-            for name, what, told in (
+            for name, what, counting_text in (
                 ("walk", "damage of a random walk with its residue closed, difference", 0.34),
                 ("white", "damage of white noise with its residue closed, difference", 0.001),
             )
@@ -140,7 +140,7 @@ def _sinking(engine: str, folder: Path, duration: float) -> tuple[float, float]:
     """Heave error (m) of the sinking run, and its largest damage error."""
     scene = force_scene(folder, duration=duration)
     sinking = scene.model_copy(update={"start": dict.fromkeys(("z1_rate", "z2_rate", "z3_rate"), SINKING)})
-    still, moved = (simulate(each, engine) for each in (scene, sinking))
+    still, moved = (simulate(simulated_scene, engine) for simulated_scene in (scene, sinking))
     wrong = errors_of_run(moved, still)
     return wrong.heave_max, max(abs(ratio - 1) for ratio in wrong.damage.values())
 
@@ -175,7 +175,7 @@ def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
 def _study(folder: Path) -> list[Saved]:
     """All rows of the study with its defaults, in all engines."""
     (folder / "study").mkdir()
-    _, rows, failed = compare(load(SCENE), IMPLEMENTATIONS, folder / "study", lambda text, part: None)
+    _, rows, failed = compare(load(SCENE), IMPLEMENTATIONS, folder / "study", lambda text, progress_share: None)
     assert not failed, failed
     return rows
 
@@ -186,20 +186,20 @@ def _verdicts(studied: list[Saved]) -> list[Row]:
     rows = []
     for row in studied:
         name, word, alone = row["method"], row["verdict"], row["without truth"]
-        place = f"{row['engine']}, {row['road']}: {name}"
+        run_text = f"{row['engine']}, {row['road']}: {name}"
         if name in GOOD or name in BAD:
             id, wanted = f"score.verdict.{_id(row)}", "accepted" if name in GOOD else "rejected"
-            rows.append(behaviour_row(id, SYSTEM, f"{place}, by damage", word, wanted, row["reason"], "closed form"))
+            rows.append(behaviour_row(id, SYSTEM, f"{run_text}, by damage", word, wanted, row["reason"], "closed form"))
         if name in BAD:
             id, what, why = (
                 f"score.without-truth.{_id(row)}",
-                f"{place}, without the truth",
+                f"{run_text}, without the truth",
                 row["reason without truth"],
             )
-            told = "accepted" if alone == "accepted" else "not accepted"
-            rows.append(behaviour_row(id, SYSTEM, what, told, "not accepted", why, "none"))
+            verdict_text = "accepted" if alone == "accepted" else "not accepted"
+            rows.append(behaviour_row(id, SYSTEM, what, verdict_text, "not accepted", why, "none"))
         elif word != "accepted" and alone == "accepted":
-            id, what = f"score.unseen.{_id(row)}", f"{place}, damage ratio of f3x where the run itself shows nothing"
+            id, what = f"score.unseen.{_id(row)}", f"{run_text}, damage ratio of f3x where the run itself shows nothing"
             why = "what an engineer without the truth cannot know"
             rows.append(Observed(id, SYSTEM, what, row["damage f3x"], "").beside(word, why, "none"))
     return rows
@@ -249,11 +249,11 @@ def _scored(bench: Bench, name: str, engine: str = "reference") -> Saved:
     return bench.row(name, effects, bench.simulate(engine, effects))
 
 
-def _beside(long: list[Saved]) -> list[Row]:
+def _beside(long_runs: list[Saved]) -> list[Row]:
     """Rows: pitch errors and damage ratios over 60 s, reported next to the prototype's; a tumbled run has no damage
     ratio."""
     rows = []
-    for row in long:
+    for row in long_runs:
         pitch, upright, along = PROTOTYPE[row["method"]]
         name = _slug(row["method"])
         why = "the same road, model and levels of noise; other noise samples, and here the filter estimates the inertia"
@@ -272,10 +272,10 @@ def _beside(long: list[Saved]) -> list[Row]:
     return rows
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Tables of every stabiliser on both roads, and over 60 s compared with the prototype."""
     tables = []
-    shown = {"Stabilisers compared": data["study"], "Stabilisers over 60 s at 1 kHz": data["prototype"]}
+    shown = {"Stabilisers compared": case_data["study"], "Stabilisers over 60 s at 1 kHz": case_data["prototype"]}
     for title, rows in shown.items():
         if rows:
             note = (
@@ -317,13 +317,13 @@ def _cells(row: Saved) -> tuple[str, ...]:
     )
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot the study's score of the stabilisers."""
-    if not data["study"]:
+    if not case_data["study"]:
         return []
     from models.drawing.drift import decision_figure
 
     scene = load(SCENE)
     options = read(Options, scene.options, "", "options")
-    rows = [row for row in data["study"] if row["engine"] == "reference"]
+    rows = [row for row in case_data["study"] if row["engine"] == "reference"]
     return [("What each stabiliser leaves in the section forces", decision_figure(rows, options.limits, options.grade))]

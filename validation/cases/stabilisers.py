@@ -25,9 +25,9 @@ from validation.common.scenes import VEHICLE_SETS, on_paper_road, road_scene
 TITLE = "Stabilisers"
 SYSTEM: System = "drift"
 STEP = 1e-3
-MISSING, SHIFT = 0.05, 0.02
+MISSING_MASS_SHARE, CENTRE_SHIFT = 0.05, 0.02
 """Part of the chassis that the model lacks; how far (m) ahead of the truth its centre of mass lies."""
-BOUND = 1e-3
+MEAN_BOUND = 1e-3
 """Of the predicted mean: forces linear between samples of 1 ms leave 1e-4."""
 SEED, SENSOR = 37, np.deg2rad(0.1)
 """Seed of the noise on a measured pitch, and its standard deviation per sample (rad)."""
@@ -78,56 +78,59 @@ def guided(scene: Scene, engine: str) -> Result:
 
 
 def _missing_mass(
-    parameters: str, p: Parameters, measured_run: Result, follow: BuildFollower, folder: Path
+    parameters: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
 ) -> list[Row]:
     """Rows: if the model's chassis is 5 % too light, prescribing the heave takes a mean force of dm (g - z3'')."""
     write_motion(measured_run, folder)
-    scene = follow({"m3": (1 - MISSING) * p.m3}, RAILS)
+    scene = build_follower({"m3": (1 - MISSING_MASS_SHARE) * p.m3}, RAILS)
     rate = measured_run["z3_rate"]
     mean = (rate[-1] - rate[0]) / scene.run.duration
-    wanted = MISSING * p.m3 * (p.g - mean)
+    wanted = MISSING_MASS_SHARE * p.m3 * (p.g - mean)
     return [
         Observed(
             f"stabilisers.mass.{engine}.{parameters}",
             SYSTEM,
-            f"{engine}, {parameters}: mean force that prescribes the heave, {MISSING:.0%} of the "
-            f"chassis missing (0.05 m3 g = {MISSING * p.m3 * p.g:.1f} N)",
+            f"{engine}, {parameters}: mean force that prescribes the heave, {MISSING_MASS_SHARE:.0%} of the "
+            f"chassis missing (0.05 m3 g = {MISSING_MASS_SHARE * p.m3 * p.g:.1f} N)",
             float(guided(scene, engine)["enforced_force"].mean()),
             "N",
         ).within(
-            wanted, BOUND * wanted, f"0.05 m3 (g - z3''), down; z3'' is {mean:.3f} m/s^2 on average here", "closed form"
+            wanted,
+            MEAN_BOUND * wanted,
+            f"0.05 m3 (g - z3''), down; z3'' is {mean:.3f} m/s^2 on average here",
+            "closed form",
         )
         for engine in CONSTRAINED
     ]
 
 
 def _shifted_centre(
-    parameters: str, p: Parameters, measured_run: Result, follow: BuildFollower, folder: Path
+    parameters: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
 ) -> list[Row]:
     """Rows: if the model's centre of mass lies ahead of the true one, prescribing the motion takes a moment, nose
     up."""
-    write_motion(measured_run, folder, SHIFT)
-    scene = follow({"a": p.a + SHIFT, "b": p.b - SHIFT}, RAILS)
-    wanted = SHIFT * float(np.mean((measured_run["f3"] + measured_run["f4"]) * np.cos(measured_run["pitch"])))
+    write_motion(measured_run, folder, CENTRE_SHIFT)
+    scene = build_follower({"a": p.a + CENTRE_SHIFT, "b": p.b - CENTRE_SHIFT}, RAILS)
+    wanted = CENTRE_SHIFT * float(np.mean((measured_run["f3"] + measured_run["f4"]) * np.cos(measured_run["pitch"])))
     return [
         Observed(
             f"stabilisers.centre.{engine}.{parameters}",
             SYSTEM,
-            f"{engine}, {parameters}: mean moment that prescribes the pitch, centre of mass {SHIFT:g} "
-            f"m too far ahead (m3 g x = {SHIFT * p.m3 * p.g:.1f} N m)",
+            f"{engine}, {parameters}: mean moment that prescribes the pitch, centre of mass {CENTRE_SHIFT:g} "
+            f"m too far ahead (m3 g x = {CENTRE_SHIFT * p.m3 * p.g:.1f} N m)",
             float(guided(scene, engine)["enforced_moment"].mean()),
             "N m",
-        ).within(wanted, BOUND * wanted, "x (f3 + f4) cos(pitch) of the true drive, nose up", "closed form")
+        ).within(wanted, MEAN_BOUND * wanted, "x (f3 + f4) cos(pitch) of the true drive, nose up", "closed form")
         for engine in CONSTRAINED
     ]
 
 
-def _dead_band_and_moment(follow: BuildFollower, duration: float) -> list[Row]:
+def _dead_band_and_moment(build_follower: BuildFollower, duration: float) -> list[Row]:
     """Rows: a spring with a dead band, and an added moment, in both engines compared with the reference."""
-    assembly = assembly_of_scene(follow({}, BAND))
+    assembly = assembly_of_scene(build_follower({}, BAND))
     times = STEP * np.arange(round(duration / STEP) + 1)
     moment = Sampled(500.0 * np.sin(30.0 * times)[:, None], STEP, held=False)
-    free = assembly_of_scene(follow({}, {}))
+    free = assembly_of_scene(build_follower({}, {}))
     laws: dict[str, tuple[Assembly, str]] = {
         "dead_band": (assembly, "a pitch spring with a dead band of 0.01 rad"),
         "moment": (free.with_moment(moment), "an added moment of 500 N m at 30 rad/s"),
@@ -145,10 +148,10 @@ def _dead_band_and_moment(follow: BuildFollower, duration: float) -> list[Row]:
     ]
 
 
-def _high_pass(follow: BuildFollower) -> Row:
+def _high_pass(build_follower: BuildFollower) -> Row:
     """Rows on the high-pass: the slow pole of the linearised vehicle with the filter is the filter's own."""
     corner, ratio = 2 * np.pi * CUT_OFF, 0.7
-    vehicle = assembly_of_scene(follow({}, {"high_pass": {"cut_off": CUT_OFF, "damping_ratio": ratio}})).vehicle
+    vehicle = assembly_of_scene(build_follower({}, {"high_pass": {"cut_off": CUT_OFF, "damping_ratio": ratio}})).vehicle
     poles = np.linalg.eigvals(first_order(linearised(vehicle)))
     wanted = corner * complex(-ratio, np.sqrt(1 - ratio**2))
     off = float(np.abs(poles - wanted).min()) / corner
@@ -167,14 +170,15 @@ def _high_pass(follow: BuildFollower) -> Row:
     )
 
 
-def _bandwidth(measured_run: Result, follow: BuildFollower, folder: Path) -> list[Row]:
+def _bandwidth(measured_run: Result, build_follower: BuildFollower, folder: Path) -> list[Row]:
     """Rows: stabilising moment by a pitch with the white noise of an inertial unit, raw and smoothed."""
     noise = SENSOR * normal_samples(SEED, 0, len(measured_run.times), 1)[:, 0]
     write_time_series(folder / "measured.csv", {"pitch": ("rad", measured_run["pitch"] + noise)}, STEP)
     file = {"file": "measured.csv"}
     runs = {
         bandwidth: guided(
-            follow({}, {"prescribed_pitch": file | ({"bandwidth": bandwidth} if bandwidth else {})}), "reference"
+            build_follower({}, {"prescribed_pitch": file | ({"bandwidth": bandwidth} if bandwidth else {})}),
+            "reference",
         )
         for bandwidth in (None, *BANDWIDTHS)
     }

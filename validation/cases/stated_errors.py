@@ -23,15 +23,15 @@ SYSTEM: System = "cost"
 SEED = 21
 SYSTEMS = modules_of("validation.stated_errors.systems")
 """Modules that draw samples, by system."""
-COUNT = 60
+SAMPLES_OF_ALL = 60
 """Samples of all systems together, at least; as many of each."""
-QUICK = {"pitch-plane": 3}
+QUICK_SAMPLES = {"pitch-plane": 3}
 """Those of the quick share."""
 NEAR, FAR, TENTH = 3.0, 10.0, 0.1
 """Ratios of true to stated error: up to which it is right, from which it misleads, and below which it is useless."""
-SHARE, FEW, COST = 0.95, 0.1, 0.6
+LEAST_RIGHT_SHARE, LARGEST_USELESS_SHARE, LARGEST_COST = 0.95, 0.1, 0.6
 """Least share that is right, largest one that is useless, and largest cost of an estimate, by the run's."""
-EDGE = 1e-12
+ROUNDING_SHARE = 1e-12
 """True errors below this share of their channel are rounding."""
 
 
@@ -39,31 +39,31 @@ EDGE = 1e-12
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """All systems that have samples; the quick share has a few of the pitch plane, and judges no shares."""
     names = list(SYSTEMS)
-    counts = QUICK if quick else dict.fromkeys(names, -(-COUNT // len(names)))
+    counts = QUICK_SAMPLES if quick else dict.fromkeys(names, -(-SAMPLES_OF_ALL // len(names)))
     samples = [sample for of_system in _make_samples(counts) for sample in of_system]
     return [*_rows(samples, quick), *(row for name in counts for row in _of_system(name, samples))], {
         "samples": samples
     }
 
 
-def _make_samples(counts: dict[str, int]) -> list[list[Saved]]:
+def _make_samples(sample_counts: dict[str, int]) -> list[list[Saved]]:
     """Samples of each system, computed by at most two processes; by this process if there is only one system."""
-    if len(counts) == 1:
-        return [samples(name, count) for name, count in counts.items()]
+    if len(sample_counts) == 1:
+        return [samples(name, count) for name, count in sample_counts.items()]
     with process_pool(min(2, os.cpu_count() or 1)) as pool:
-        return list(pool.map(samples, counts, counts.values()))
+        return list(pool.map(samples, sample_counts, sample_counts.values()))
 
 
-def samples(name: str, count: int) -> list[Saved]:
+def samples(name: str, sample_count: int) -> list[Saved]:
     """Samples of a system in the form for JSON."""
-    drawn: Iterator[Sample] = import_module(SYSTEMS[name]).samples(count, SEED)
+    drawn: Iterator[Sample] = import_module(SYSTEMS[name]).samples(sample_count, SEED)
     return [_sample_as_table(name, sample) for sample in drawn]
 
 
 def _sample_as_table(system: str, sample: Sample) -> Saved:
     """A sample in the form for JSON; ``ratio``: ratio of the true to the stated error, None where no number is
     stated."""
-    told = {
+    sample_table = {
         "system": system,
         "name": sample.name,
         "engine": sample.engine,
@@ -71,9 +71,9 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
         "ratio": None,
     }
     if not sample.told:
-        return told
+        return sample_table
     stated, true = sample.told[sample.printed], sample.true[sample.printed]
-    return told | {
+    return sample_table | {
         "channel": sample.printed,
         "stated": stated.error,
         "true": true,
@@ -81,13 +81,13 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
         "share": stated.share,
         "warned": stated.warned,
         "ratio": ratio(true, stated.error),
-        "rounding": true <= EDGE * stated.error / stated.share if stated.share > 0.0 else true == 0.0,
+        "rounding": true <= ROUNDING_SHARE * stated.error / stated.share if stated.share > 0.0 else true == 0.0,
     }
 
 
-def ratio(true: float, stated: float) -> float:
+def ratio(true_error: float, stated: float) -> float:
     """Ratio of the true to the stated error."""
-    return true / stated if stated > 0.0 else (0.0 if true == 0.0 else math.inf)
+    return true_error / stated if stated > 0.0 else (0.0 if true_error == 0.0 else math.inf)
 
 
 def _rows(samples: list[Saved], quick: bool) -> list[Row]:
@@ -100,7 +100,10 @@ def _rows(samples: list[Saved], quick: bool) -> list[Row]:
     costs = [_cost(name, samples) for name in dict.fromkeys(sample["system"] for sample in samples)]
     near = f"share of {len(known)} samples whose true error is at most {NEAR:g} times the stated error"
     below = f"share of {len(known)} samples whose true error is below a tenth of the stated error"
-    asked, tenth = f"asked: {100 * SHARE:g} of 100", "asked: at most a tenth; below rounding no error tells anything"
+    asked, tenth = (
+        f"asked: {100 * LEAST_RIGHT_SHARE:g} of 100",
+        "asked: at most a tenth; below rounding no error tells anything",
+    )
     shares = (
         [
             Observed("stated_errors.near", SYSTEM, near, right, "").beside(1.0, asked, "none"),
@@ -108,8 +111,8 @@ def _rows(samples: list[Saved], quick: bool) -> list[Row]:
         ]
         if quick
         else [
-            Observed("stated_errors.near", SYSTEM, near, right, "").within(1.0, 1.0 - SHARE, asked, "none"),
-            Observed("stated_errors.useless", SYSTEM, below, useless, "").at_most(FEW, tenth, "none"),
+            Observed("stated_errors.near", SYSTEM, near, right, "").within(1.0, 1.0 - LEAST_RIGHT_SHARE, asked, "none"),
+            Observed("stated_errors.useless", SYSTEM, below, useless, "").at_most(LARGEST_USELESS_SHARE, tenth, "none"),
         ]
     )
     return [
@@ -129,7 +132,7 @@ def _rows(samples: list[Saved], quick: bool) -> list[Row]:
             "ratio of the force evaluations of the error estimate to those of the run, median of systems",
             float(np.median(costs)),
             "",
-        ).at_most(COST, "asked: about half the run again", "none"),
+        ).at_most(LARGEST_COST, "asked: about half the run again", "none"),
         Observed(
             "stated_errors.without",
             SYSTEM,
@@ -161,25 +164,27 @@ def _of_system(name: str, samples: list[Saved]) -> list[Row]:
     """Rows on the stated errors of one system, reported."""
     of_system = [sample for sample in samples if sample["system"] == name]
     known = [sample for sample in of_system if sample["ratio"] is not None]
-    told = f"{name}, {len(known)} of {len(of_system)} samples"
+    sample_text = f"{name}, {len(known)} of {len(of_system)} samples"
     near = _share_of_true(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
     middle = float(np.median([sample["ratio"] for sample in known])) if known else math.nan
     why = "all systems are judged together"
     shown = (
         ("near", f"share within {NEAR:g} times the stated error", near, 1.0),
         ("ratio", "median ratio of true to stated error", middle, 1.0),
-        ("cost", "median ratio of the cost of the estimate to that of the run", _cost(name, samples), COST),
+        ("cost", "median ratio of the cost of the estimate to that of the run", _cost(name, samples), LARGEST_COST),
     )
     return [
-        Observed(f"stated_errors.{name}.{id}", SYSTEM, f"{told}: {what}", value, "").beside(expected, why, "none")
+        Observed(f"stated_errors.{name}.{id}", SYSTEM, f"{sample_text}: {what}", value, "").beside(
+            expected, why, "none"
+        )
         for id, what, value, expected in shown
     ]
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Table of all samples, sorted by the ratio of the true to the stated error, largest first."""
     known = sorted(
-        (sample for sample in data["samples"] if sample["ratio"] is not None), key=lambda sample: -sample["ratio"]
+        (sample for sample in case_data["samples"] if sample["ratio"] is not None), key=lambda sample: -sample["ratio"]
     )
     rows = tuple(
         (
@@ -200,12 +205,12 @@ def tables(data: Saved) -> list[Table]:
     return [Table("Stated and true errors", note, heads, rows)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot true error over stated error, both divided by the channel's standard deviation."""
     from models.drawing.figures import CURVE_COLOURS, GREY, ORANGE, REJECTED_COLOUR, add_heading, subplots
 
     figure, axis = subplots(figsize=(6.5, 5.0))
-    known = [sample for sample in data["samples"] if sample["ratio"] is not None and sample["share"] > 0.0]
+    known = [sample for sample in case_data["samples"] if sample["ratio"] is not None and sample["share"] > 0.0]
     for name, colour in zip(
         dict.fromkeys(sample["system"] for sample in known), (*CURVE_COLOURS, REJECTED_COLOUR), strict=False
     ):

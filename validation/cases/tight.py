@@ -22,13 +22,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     duration = QUICK_DURATION if quick else DURATION
     scene = road_scene(step=STEP, duration=duration)
     tight = simulate(scene, "reference", Settings("DOP853", STEP, duration, TOLERANCE))
-    other = simulate(scene, "reference", Settings("LSODA", STEP, duration, TOLERANCE))
+    by_lsoda = simulate(scene, "reference", Settings("LSODA", STEP, duration, TOLERANCE))
     rows = [
         Observed(
             "tight.uncertainty",
             SYSTEM,
             "difference between the tight solutions by Dormand-Prince 8 and by Adams/BDF",
-            largest_difference(tight, other),
+            largest_difference(tight, by_lsoda),
             "m, rad, m/s, rad/s",
         ).at_most(1e-7, "a tenth of the bound that it has to judge", "shared kernel")
     ]

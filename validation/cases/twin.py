@@ -22,12 +22,12 @@ from validation.common.scenes import (
 TITLE = "Same tableau and step: whole paths against the reference"
 SYSTEM: System = "pitch-plane"
 STEPS = (2e-3, 1e-3, 5e-4)
-BOUND = 1e-12
+ENGINE_BOUND = 1e-12
 ROUGH_SAMPLES = 4_800
 """Samples of 0.5 ms before the course's rough part is well under both wheels."""
 OTHER_ROADS = (("belgian_block.crg", 6.0, "mirrored"), ("Horstwalde.crg", 60.0, "refused"))
 """Further measured roads: file, speed (m/s), how they go on beyond their end."""
-WHY = "RK4 with the same stages differs only by the order of additions: 1e-16 a step over at most 20,000 steps"
+BOUND_REASON = "RK4 with the same stages differs only by the order of additions: 1e-16 a step over at most 20,000 steps"
 
 
 @on_paper_road()
@@ -90,6 +90,6 @@ def _compare(title: str, scenes: list[Scene]) -> list[Row]:
                 largest_difference(simulate(scene, engine), truth) for scene, truth in zip(scenes, truths, strict=True)
             ),
             "m, rad, m/s, rad/s",
-        ).at_most(BOUND, WHY, "native")
+        ).at_most(ENGINE_BOUND, BOUND_REASON, "native")
         for engine in ("exudyn", "mujoco")
     ]

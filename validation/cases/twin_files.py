@@ -78,7 +78,7 @@ def _exported(folder: Path, name: str) -> ModelFile:
 def _agreement(name: str, file: ModelFile, quick: bool) -> Row:
     """Row: largest difference of accelerations from the model file, over all builds."""
     agreements = certificate(file.twin, QUICK_STATES if quick else STATES)
-    worst: Agreement = max(agreements, key=lambda each: each.acceleration)
+    worst: Agreement = max(agreements, key=lambda agreement: agreement.acceleration)
     return Observed(
         f"twin_files.{name}",
         SYSTEM,
@@ -133,8 +133,8 @@ def _planted(folder: Path, quick: bool) -> Row:
     for name, old, new, kind, owner, size in chosen:
         second = _read(folder, "planted", changed(JOINTED, name, old, new)).twin
         influential = compare(first, second, 3).influential
-        said = influential[0].sentence(("original", "planted")) if influential else ""
-        named += said.startswith(f"{kind} of {owner}: ") and size.replace("b.xml", "planted") in said
+        sentence = influential[0].sentence(("original", "planted")) if influential else ""
+        named += sentence.startswith(f"{kind} of {owner}: ") and size.replace("b.xml", "planted") in sentence
     quantity = f"planted differences of one number, of {len(chosen)}, whose element and size are named first"
     why = "all of them change accelerations"
     return Observed("twin_files.planted", SYSTEM, quantity, named, "differences").within(len(chosen), 0, why, "none")

@@ -29,7 +29,7 @@ from validation.faults import wheelset as faults
 
 TITLE = "A wheelset on straight track"
 SYSTEM: System = "rolling-vehicle"
-EDGE = 2e-3
+EDGE_RADIUS = 2e-3
 """Radius (m) of rails that are edges: Klingel's own wheelset."""
 STEP, DURATION = 5e-4, 1.0
 LIVELY = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
@@ -53,11 +53,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             _none_row("stiff", STIFF_WHEELSET, "stable"),
             *_fault_rows(),
         ]
-    kept = ("speed", "amplitude", "frequency", "error", "frequency_error")
+    orbit_fields = ("speed", "amplitude", "frequency", "error", "frequency_error")
     return rows, {
         "critical": speeds,
         "cycles": {
-            name: {engine: {key: float(getattr(orbit, key)) for key in kept} for engine, orbit in of_engine.items()}
+            name: {
+                engine: {key: float(getattr(orbit, key)) for key in orbit_fields} for engine, orbit in of_engine.items()
+            }
             for name, of_engine in cycles.items()
         },
     }
@@ -76,7 +78,7 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
         waves = {engine: wavelength(implementation(engine), wheelset) for engine in IMPLEMENTATION_MODULES}
         closed.append(max(abs(wave / klingel_wavelength(wheelset) - 1.0) for wave in waves.values()))
         among.append(_spread(waves.values()))
-        edge = wheelset.changed(head_radius=EDGE)
+        edge = wheelset.changed(head_radius=EDGE_RADIUS)
         plain = 2.0 * np.pi * np.sqrt(edge.radius * edge.half_gauge / edge.conicity)
         edges.append(abs(wavelength(Equations, edge) / plain - 1.0))
     count = f"of {len(wheelsets)} wheelsets without suspension at 0.2 m/s"
@@ -137,17 +139,17 @@ def _critical_rows(speeds: Speeds) -> list[Row]:
 
 def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
     """Row: all implementations find no critical speed for a wheelset that has none."""
-    said = set()
+    outcomes = set()
     for engine in IMPLEMENTATION_MODULES:
         try:
-            said.add(f"{critical_speed(wheelset, partial(largest_growth, implementation(engine))):.3g} m/s")
+            outcomes.add(f"{critical_speed(wheelset, partial(largest_growth, implementation(engine))):.3g} m/s")
         except NoCriticalSpeed as error:
-            said.add("unstable" if error.unstable else "stable")
+            outcomes.add("unstable" if error.unstable else "stable")
     return behaviour_row(
         f"wheelset.critical.{name}",
         SYSTEM,
         f"outcome of three implementations for a {name} wheelset at all speeds",
-        " or ".join(sorted(said)),
+        " or ".join(sorted(outcomes)),
         expected,
         "nothing holds it, or more than creep forces can drive",
     )
@@ -329,10 +331,10 @@ def _fault_rows() -> list[Row]:
     with faults.creep_law_patch(faults.spin_reversed)()():
         spin = largest_relative_difference(engine.rates(state), equations.rates(state))
     softer = CHOSEN_WHEELSET.changed(stiffness_x=0.99 * CHOSEN_WHEELSET.stiffness_x)
-    stiff, other = (
+    stiff, changed = (
         critical_speed(wheelset, partial(largest_growth, Equations)) for wheelset in (CHOSEN_WHEELSET, softer)
     )
-    seen = {"sign of the spin": right < 1e-10 < spin, "1 % of a stiffness": abs(other / stiff - 1.0) > 1e-6}
+    seen = {"sign of the spin": right < 1e-10 < spin, "1 % of a stiffness": abs(changed / stiff - 1.0) > 1e-6}
     return [
         behaviour_row(
             f"wheelset.fault.{name.split()[-1]}",
@@ -346,11 +348,11 @@ def _fault_rows() -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Critical speeds and limit cycles."""
     speeds = tuple(
         (name, *("none" if v is None else f"{v:.9g}" for v in of_engine.values()))
-        for name, of_engine in data["critical"].items()
+        for name, of_engine in case_data["critical"].items()
     )
     cycles = tuple(
         (
@@ -362,7 +364,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
             f"{o['frequency']:.8f}",
             f"{o['frequency_error']:.0e}",
         )
-        for name, of_engine in data["cycles"].items()
+        for name, of_engine in case_data["cycles"].items()
         for engine, o in of_engine.items()
     )
     note = "In m/s, with linear creep; parameters drawn at random but for the chosen ones."

@@ -22,22 +22,24 @@ from validation.spatial.written_equations import (
 TITLE = "Cars by plain equations that share no force with the engines"
 SYSTEM: System = "rolling-vehicle"
 ENGINES = ("mujoco", "exudyn")
-STATES, FEW = 100, 12
-INSTANT, PATH, LAW = 1e-12, 1e-10, 1e-12
-WHY = "the description alone is shared: mass matrix, kinematics, preloads and every force are written twice"
-DURATION, SHORT = 1.0, 0.02
+STATES, QUICK_STATES = 100, 12
+INSTANT_BOUND, PATH_BOUND, LAW_BOUND = 1e-12, 1e-10, 1e-12
+INDEPENDENCE_NOTE = (
+    "the description alone is shared: mass matrix, kinematics, preloads and every force are written twice"
+)
+DURATION, QUICK_DURATION = 1.0, 0.02
 """s, in full and in quick: the plain equations of a car on tyres take about 20 s for each."""
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of both systems; quick: fewer states, paths of some steps."""
-    states, duration = (FEW, SHORT) if quick else (STATES, DURATION)
+    states, duration = (QUICK_STATES, QUICK_DURATION) if quick else (STATES, DURATION)
     return [*_laws(states), *_hubs(states, duration), *_rolling(states, duration)], {}
 
 
-def _row(id: str, quantity: str, value: float, unit: str, bound: float) -> Row:
+def _row(id: str, quantity: str, largest_error: float, unit: str, bound: float) -> Row:
     """Row that compares the plain equations with another implementation of the same laws."""
-    return Observed(f"written.{id}", SYSTEM, quantity, value, unit).at_most(bound, WHY, "native")
+    return Observed(f"written.{id}", SYSTEM, quantity, largest_error, unit).at_most(bound, INDEPENDENCE_NOTE, "native")
 
 
 def _laws(states: int) -> list[Row]:
@@ -48,14 +50,15 @@ def _laws(states: int) -> list[Row]:
             f"largest difference of the creep forces of {states} random patches, over the load",
             bristles_gap(states),
             "1",
-            LAW,
+            LAW_BOUND,
         )
     ]
     for name, car in rolling_cars().items():
-        held = preloads(car.vehicle)
+        preloads_of = preloads(car.vehicle)
         plain = held_at_rest(car.vehicle, CARRIER)
         gap = max(
-            largest_relative_difference(other, list(known.values())) for known, other in zip(held, plain, strict=True)
+            largest_relative_difference(other, list(known.values()))
+            for known, other in zip(preloads_of, plain, strict=True)
         )
         rows.append(
             _row(
@@ -63,7 +66,7 @@ def _laws(states: int) -> list[Row]:
                 f"largest difference of the preloads and static loads of {name}, over the largest",
                 gap,
                 "1",
-                LAW,
+                LAW_BOUND,
             )
         )
     return rows
@@ -78,13 +81,17 @@ def _hubs(states: int, duration: float) -> list[Row]:
                 f"largest difference of {name}'s accelerations on hub forces and on a road "
                 f"in {engine}, {states} random states"
             )
-            rows.append(_row(f"hubs.{engine}.{name}", what, hub_gap(car, engine, states), "of the largest", INSTANT))
+            rows.append(
+                _row(f"hubs.{engine}.{name}", what, hub_gap(car, engine, states), "of the largest", INSTANT_BOUND)
+            )
         what = f"largest difference of {name}'s section forces, wrenches and holding moments at random states"
-        rows.append(_row(f"hubs.inside.{name}", what, inside_gap(car, 4), "of the largest", INSTANT))
+        rows.append(_row(f"hubs.inside.{name}", what, inside_gap(car, 4), "of the largest", INSTANT_BOUND))
         for kind, rough in (("road", True), ("noise", False)):
             what = f"largest difference of {name}'s coordinates and rates in MuJoCo, {duration:g} s of {kind}"
             rows.append(
-                _row(f"hubs.{kind}.{name}", what, hub_path_gap(car, "mujoco", duration, rough), "m, rad, 1/s", PATH)
+                _row(
+                    f"hubs.{kind}.{name}", what, hub_path_gap(car, "mujoco", duration, rough), "m, rad, 1/s", PATH_BOUND
+                )
             )
     return rows
 
@@ -96,12 +103,12 @@ def _rolling(states: int, duration: float) -> list[Row]:
         for engine in ENGINES:
             what = f"largest difference of {name}'s accelerations on tyres in {engine}, {states} random states"
             gap = rolling_gap(car, engine, states)
-            rows.append(_row(f"tyres.{engine}.{name}", what, gap, "of the largest", INSTANT))
+            rows.append(_row(f"tyres.{engine}.{name}", what, gap, "of the largest", INSTANT_BOUND))
         what = (
             f"largest difference of the tyre reports and ledgers of {name} at random states, over the largest of each"
         )
-        rows.append(_row(f"tyres.reports.{name}", what, report_gap(car, states), "1", INSTANT))
+        rows.append(_row(f"tyres.reports.{name}", what, report_gap(car, states), "1", INSTANT_BOUND))
         what = f"largest difference of {name}'s positions and rates in MuJoCo, {duration:g} s of a turn on a rough road"
         gap = rolling_path_gap(car, "mujoco", duration)
-        rows.append(_row(f"tyres.path.{name}", what, gap, "m, rad, 1/s", PATH))
+        rows.append(_row(f"tyres.path.{name}", what, gap, "m, rad, 1/s", PATH_BOUND))
     return rows

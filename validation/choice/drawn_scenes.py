@@ -37,74 +37,81 @@ def draw_scene(system: str, seed: int) -> ChoiceQuestion:
 SEED = 2210
 
 
-def _pitch_plane(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
+def _pitch_plane(generator: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
     """A random half car on a road, with a pitch spring of random strength and a gyro; half of them start away from
     rest."""
     road = [
-        {"source": "study", "speed": float(rng.uniform(8.0, 30.0))},
+        {"source": "study", "speed": float(generator.uniform(8.0, 30.0))},
         {
             "source": "iso8608",
-            "road_class": str(rng.choice(list("ABCD"))),
-            "speed": float(rng.uniform(8.0, 30.0)),
-            "seed": int(rng.integers(1000)),
+            "road_class": str(generator.choice(list("ABCD"))),
+            "speed": float(generator.uniform(8.0, 30.0)),
+            "seed": int(generator.integers(1000)),
         },
-    ][int(rng.integers(2))]
+    ][int(generator.integers(2))]
     effects: dict[str, Any] = {"road": road}
-    if rng.random() < 0.7:
-        stiffness = float(10.0 ** rng.uniform(0.5, 4.5))
-        effects["pitch_spring"] = {"stiffness": stiffness, "damping": stiffness * float(rng.uniform(0.0, 0.05))}
-    if rng.random() < 0.5:
+    if generator.random() < 0.7:
+        stiffness = float(10.0 ** generator.uniform(0.5, 4.5))
+        effects["pitch_spring"] = {"stiffness": stiffness, "damping": stiffness * float(generator.uniform(0.0, 0.05))}
+    if generator.random() < 0.5:
         effects["gyro"] = {"deviation": 1e-3, "sampling_rate": 100.0}
-    start = {"pitch": float(rng.uniform(-0.1, 0.1))} if rng.random() < 0.5 else {}
-    step = float(rng.choice([1e-4, 2.5e-4, 5e-4]))
-    asked = rng.choice(["f1", "f2", "f3", "z3", "pitch", "rms f1", "max f2", "rms pitch_rate"], 2, replace=False)
-    return {"run": {"duration": 2.0, "step": step}, "start": start, "effects": effects}, tuple(map(str, asked))
+    start = {"pitch": float(generator.uniform(-0.1, 0.1))} if generator.random() < 0.5 else {}
+    step = float(generator.choice([1e-4, 2.5e-4, 5e-4]))
+    drawn_quantities = generator.choice(
+        ["f1", "f2", "f3", "z3", "pitch", "rms f1", "max f2", "rms pitch_rate"], 2, replace=False
+    )
+    return {"run": {"duration": 2.0, "step": step}, "start": start, "effects": effects}, tuple(
+        map(str, drawn_quantities)
+    )
 
 
-def _random_wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
+def _random_wheelset(generator: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
     """A random wheelset scene at a speed below or above critical, with a displacement from small up to flange
     contact."""
-    factors = {name: float(np.exp(rng.uniform(-0.7, 0.7))) for name in ("stiffness_x", "damping_x", "damping_y")}
+    factors = {name: float(np.exp(generator.uniform(-0.7, 0.7))) for name in ("stiffness_x", "damping_x", "damping_y")}
     usual = {"stiffness_x": 2e5, "damping_x": 1e3, "damping_y": 1e3}
-    displacement = float(10.0 ** rng.uniform(-4.0, -2.2))
-    asked = rng.choice(["y", "yaw", "rms y", "max fy", "rms power", "rms fx"], 2, replace=False)
+    displacement = float(10.0 ** generator.uniform(-4.0, -2.2))
+    drawn_quantities = generator.choice(["y", "yaw", "rms y", "max fy", "rms power", "rms fx"], 2, replace=False)
     return {
         "wheelset": {"override": {name: usual[name] * factor for name, factor in factors.items()}},
         "contact": {"law": "fastsim"},
         "speeds": {"values": [10.0]},
         "run": {
             "duration": 0.24,
-            "step": float(rng.choice([1e-4, 2e-4])),
+            "step": float(generator.choice([1e-4, 2e-4])),
             "displacement": displacement,
-            "speeds": [float(rng.uniform(5.0, 60.0))],
+            "speeds": [float(generator.uniform(5.0, 60.0))],
         },
-    }, tuple(map(str, asked))
+    }, tuple(map(str, drawn_quantities))
 
 
-def _random_stop(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
+def _random_stop(generator: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
     """A truck that stops on one of four surfaces, with and without anti-lock control."""
-    push_out = float(rng.uniform(0.05, 0.8))
+    push_out = float(generator.uniform(0.05, 0.8))
     table: dict[str, Any] = {
-        "road": {"stretches": [{"left": str(rng.choice(["dry", "wet", "snow", "ice"]))}]},
+        "road": {"stretches": [{"left": str(generator.choice(["dry", "wet", "snow", "ice"]))}]},
         "brakes": {
-            "supply": float(rng.uniform(3.0, 7.0)),
+            "supply": float(generator.uniform(3.0, 7.0)),
             "front": {
-                "gradient": float(rng.uniform(1000.0, 2000.0)),
+                "gradient": float(generator.uniform(1000.0, 2000.0)),
                 "push_out": push_out,
-                "release": push_out * float(rng.uniform(0.5, 1.0)),
+                "release": push_out * float(generator.uniform(0.5, 1.0)),
             },
-            "rear": {"gradient": float(rng.uniform(800.0, 1600.0)), "push_out": float(rng.uniform(0.0, 0.3))},
+            "rear": {
+                "gradient": float(generator.uniform(800.0, 1600.0)),
+                "push_out": float(generator.uniform(0.0, 0.3)),
+            },
         },
-        "controller": {"kind": str(rng.choice(["none", "slip_bang_bang", "slip_pi"]))},
-        "procedures": {"straight": {"kind": "straight", "speed": float(rng.uniform(5.0, 9.0))}},
+        "controller": {"kind": str(generator.choice(["none", "slip_bang_bang", "slip_pi"]))},
+        "procedures": {"straight": {"kind": "straight", "speed": float(generator.uniform(5.0, 9.0))}},
         "run": {"duration": 12.0, "substeps": 8},
     }
-    if rng.random() < 0.7:
-        table["load_transfer"] = {"front": float(rng.uniform(0.2, 0.4))}
-    if rng.random() < 0.7:
-        table["pressure"] = {"fill": float(rng.uniform(0.01, 0.2)), "empty": float(rng.uniform(0.01, 0.2))}
-    asked = rng.choice(["stopping distance [m]", "stopping time [s]", "MFDD [m/s^2]", "mean slip"], 1)
-    return table, tuple(map(str, asked))
+    if generator.random() < 0.7:
+        table["load_transfer"] = {"front": float(generator.uniform(0.2, 0.4))}
+    if generator.random() < 0.7:
+        table["pressure"] = {"fill": float(generator.uniform(0.01, 0.2)), "empty": float(generator.uniform(0.01, 0.2))}
+    drawn_quantities = generator.choice(["stopping distance [m]", "stopping time [s]", "MFDD [m/s^2]", "mean slip"], 1)
+    return table, tuple(map(str, drawn_quantities))
 
 
 DRAWN_SYSTEMS = {"pitch-plane": _pitch_plane, "wheelset": _random_wheelset, "braking": _random_stop}

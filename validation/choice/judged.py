@@ -42,8 +42,8 @@ def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
     """Changes (quantities,) at the speed at which they are largest, by frequency responses."""
     left = reduced_without(chooser.scene, choice.left_out)
     ratios = [
-        _by_frequency(whole, left, chooser.rows) / _by_frequency(whole, chooser.scene, chooser.rows)
-        for whole in chooser.full_scenes
+        _by_frequency(full_scene, left, chooser.rows) / _by_frequency(full_scene, chooser.scene, chooser.rows)
+        for full_scene in chooser.full_scenes
     ]
     return largest_changes(np.sqrt(ratios) - 1)
 
@@ -51,22 +51,24 @@ def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
 def _by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -> np.ndarray:
     """Variances (quantities,) from sums over frequencies with the matrices M, D, K. No state space is built, so that M
     may be singular."""
-    rest = full_scene.reduced(scene)
-    densities = spectral_densities(rest.vehicle, rest.excitation, full_scene.speed, ANGULAR_FREQUENCIES)[:, rows]
+    reduced = full_scene.reduced(scene)
+    densities = spectral_densities(reduced.vehicle, reduced.excitation, full_scene.speed, ANGULAR_FREQUENCIES)[:, rows]
     return 2 * np.trapezoid(densities, ANGULAR_FREQUENCIES, axis=0)
 
 
 def worst_nearby(chooser: Chooser, omitted_effects: EffectSet, draws: int, seed: int) -> float:
     """Ratio of the largest change to the tolerance, over random speeds in the range with random errors of all
     parameters."""
-    random, rest, worst = np.random.default_rng(seed), chooser.rest(omitted_effects), 0.0
+    random, reduced_scene, worst = np.random.default_rng(seed), chooser.rest(omitted_effects), 0.0
     low, high = chooser.full_scenes[0].speed, chooser.full_scenes[-1].speed
     names = uncertain_parameters(chooser.scene.vehicle)
     for _ in range(draws):
         factors = dict(zip(names, 1.0 + PARAMETER_ERROR * random.uniform(-1.0, 1.0, len(names)), strict=True))
-        full, left = (replace(scene, vehicle=scaled_vehicle(scene.vehicle, factors)) for scene in (chooser.scene, rest))
-        whole = FullScene(full, float(random.uniform(low, high)))
-        ratio = exact_variances(whole.reduced(left), chooser.rows) / exact_variances(whole.full, chooser.rows)
+        full, left = (
+            replace(scene, vehicle=scaled_vehicle(scene.vehicle, factors)) for scene in (chooser.scene, reduced_scene)
+        )
+        full_scene = FullScene(full, float(random.uniform(low, high)))
+        ratio = exact_variances(full_scene.reduced(left), chooser.rows) / exact_variances(full_scene.full, chooser.rows)
         worst = max(worst, float(abs(np.sqrt(ratio) - 1.0).max()))
     return worst / chooser.tolerance
 
@@ -104,8 +106,10 @@ def judged_of(request: ChoiceQuestion, system: str, engine: str) -> JudgedByRuns
     choice, runs = chooser.choose(), chooser.whole.variants
     full_run = runs.system.computed_quantities(request.scene(), engine)
     reduced_run = runs.system.computed_quantities(runs.changed(frozenset(choice.left_out), choice.times), engine)
-    again = [largest_change(full_run.of(name).cases, reduced_run.of(name).cases) for name in request.quantities]
-    return JudgedByRuns(system, engine, request, choice, np.array(again))
+    confirmed_changes = [
+        largest_change(full_run.of(name).cases, reduced_run.of(name).cases) for name in request.quantities
+    ]
+    return JudgedByRuns(system, engine, request, choice, np.array(confirmed_changes))
 
 
 def largest_change(full_cases: tuple[np.ndarray, ...], reduced_cases: tuple[np.ndarray, ...]) -> float:

@@ -19,7 +19,7 @@ ASKED_SCENE = {
     "tolerance": 0.03,
     "speeds": {"values": [10.0, 15.0, 20.0, 25.0, 30.0]},
 }
-ROUNDS = 5
+TIMING_ROUNDS = 5
 """Pairs of a choice and a full covariance."""
 
 
@@ -38,5 +38,5 @@ def price_of_choice() -> tuple[tuple[float, float, float], float]:
             Chooser.of(scene).choose()
 
     jobs = (choose, lambda: run(scene, "reference", error=scene.error))
-    seconds = interleave(jobs, ROUNDS, 1e-3, clock=time.process_time)
+    seconds = interleave(jobs, TIMING_ROUNDS, 1e-3, clock=time.process_time)
     return paired_ratio(seconds[0], seconds[1]), estimate(scene).seconds / float(seconds[0].mean())

@@ -46,10 +46,14 @@ class Sampled:
 
     def _shared(self, i: int, j: int) -> np.ndarray:
         """Covariances (q,) between the responses of the quantities to the road at axle i and at axle j."""
-        seen, (by_i, by_j), late = self.march.motions[1], (self._by_road(i), self._by_road(j)), self._axle_lag(i, j)
-        motions = np.einsum("ql,lm,qm->q", seen, self._motions(i, j), seen.conj())
-        with_road = np.einsum("ql,lm,qm->q", seen, self._with_road(i, late), by_j)
-        back = np.einsum("ql,lm,qm->q", seen, self._with_road(j, -late), by_i)
+        read_modes, (by_i, by_j), late = (
+            self.march.motions[1],
+            (self._by_road(i), self._by_road(j)),
+            self._axle_lag(i, j),
+        )
+        motions = np.einsum("ql,lm,qm->q", read_modes, self._motions(i, j), read_modes.conj())
+        with_road = np.einsum("ql,lm,qm->q", read_modes, self._with_road(i, late), by_j)
+        back = np.einsum("ql,lm,qm->q", read_modes, self._with_road(j, -late), by_i)
         road = np.einsum("ql,lm,qm->q", by_i, self._road(-late), by_j)
         return (motions + with_road + back + road).real
 
@@ -81,8 +85,8 @@ class Sampled:
     def _by_road(self, axle: int) -> np.ndarray:
         """Matrix (q, m) that gives the quantities from the states of the road filters of one axle."""
         m = len(self._rate)
-        at = self.march.vehicle + axle * m
-        return self.march.read[:, at : at + m]
+        first_column = self.march.vehicle + axle * m
+        return self.march.read[:, first_column : first_column + m]
 
     @cached_property
     def _motion_covariance(self) -> np.ndarray:
@@ -118,32 +122,32 @@ class Sampled:
         earlier if negative."""
         steps = max(int(np.ceil(-delay / self.step)), 0)
         begin = delay + steps * self.step
-        value, given = self._state_by_filters(axle) @ expm(self._rate.T * begin), np.zeros(())
+        value, driven_part = self._state_by_filters(axle) @ expm(self._rate.T * begin), np.zeros(())
         sooner = np.linalg.solve(self._variance, self._road(self.step))
         for i in range(steps):
-            given = given @ sooner if i > 1 else self._driven(axle, begin - i * self.step)
-            value = self._motion_covariance[:, None] * value + given
+            driven_part = driven_part @ sooner if i > 1 else self._driven(axle, begin - i * self.step)
+            value = self._motion_covariance[:, None] * value + driven_part
         return value
 
     def _state_by_filters(self, axle: int) -> np.ndarray:
         """Covariance (n, m) of an axle's response x with the filter states that it meets at the same time."""
-        kept, given = expm(self._rate.T * self.step), self._driven(axle, self.step)
+        decay, driven = expm(self._rate.T * self.step), self._driven(axle, self.step)
         return np.array(
             [
-                np.linalg.solve((np.eye(len(kept)) - grown * kept).T, row)
-                for grown, row in zip(self._motion_covariance, given, strict=True)
+                np.linalg.solve((np.eye(len(decay)) - grown * decay).T, row)
+                for grown, row in zip(self._motion_covariance, driven, strict=True)
             ]
         )
 
     def _motions(self, i: int, j: int) -> np.ndarray:
         """Covariance (n, n) of the responses x to axles i and j."""
-        given = self._motion_covariance[:, None] * self._state_by_forces(i, j)
-        given += (self._motion_covariance[:, None] * self._state_by_forces(j, i)).conj().T
-        given += sum(
+        covariances = self._motion_covariance[:, None] * self._state_by_forces(i, j)
+        covariances += (self._motion_covariance[:, None] * self._state_by_forces(j, i)).conj().T
+        covariances += sum(
             B @ self._driven(j, share * self.step + self._axle_lag(j, i)).conj().T
             for B, share in zip(self._input_matrix(i), STEP_SHARES, strict=True)
         )
-        return given / (1 - self._motion_covariance[:, None] * self._motion_covariance.conj())
+        return covariances / (1 - self._motion_covariance[:, None] * self._motion_covariance.conj())
 
     def _state_by_forces(self, i: int, j: int) -> np.ndarray:
         """Covariance (n, n) of the response x to axle i at a step's start with the forcing by axle j in this step."""

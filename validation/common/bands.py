@@ -8,7 +8,7 @@ CONFIDENCE_LEVEL = 0.999
 """Chance that a true law passes; the seeds are fixed, so a row either always passes or never does."""
 
 
-def mean_square(observed: Observed, expected: float, freedom: int, why: str) -> Row:
+def mean_square(observed: Observed, expected: float, freedom: int, tolerance_reason: str) -> Row:
     """Row for a mean square of ``freedom`` independent normal values with the variance ``expected``, by the chi-square
     distribution.
 
@@ -16,10 +16,11 @@ def mean_square(observed: Observed, expected: float, freedom: int, why: str) -> 
     central band of CONFIDENCE_LEVEL, and says how wide that is.
     """
     low, high = (
-        float(chi2.ppf(part, freedom)) / freedom for part in ((1 - CONFIDENCE_LEVEL) / 2, (1 + CONFIDENCE_LEVEL) / 2)
+        float(chi2.ppf(probability, freedom)) / freedom
+        for probability in ((1 - CONFIDENCE_LEVEL) / 2, (1 + CONFIDENCE_LEVEL) / 2)
     )
     note = (
-        f"{why}; {100 * CONFIDENCE_LEVEL:g} % band of {freedom:,} degrees of freedom: {low:.4f} to "
+        f"{tolerance_reason}; {100 * CONFIDENCE_LEVEL:g} % band of {freedom:,} degrees of freedom: {low:.4f} to "
         f"{high:.4f} times the law"
     )
     middle, half = expected * (low + high) / 2, expected * (high - low) / 2

@@ -35,10 +35,10 @@ class Bounces:
         }
         self.moves = {states: expm(rate * step) for states, rate in self.rates.items()}
 
-    def path(self, start: np.ndarray, count: int) -> np.ndarray:
+    def path(self, start_state: np.ndarray, state_count: int) -> np.ndarray:
         """States (count + 1, 8) at intervals of ``step`` (s), from the initial state (8,)."""
-        states = [np.append(start, 1.0)]
-        for _ in range(count):
+        states = [np.append(start_state, 1.0)]
+        for _ in range(state_count):
             states.append(self._state_after_step(states[-1]))
         return np.array(states)[:, :8]
 
@@ -46,22 +46,22 @@ class Bounces:
         """The state (9,) a step later."""
         left, states = self.step, self._states(x)
         while True:
-            after = (self.moves[states] if left == self.step else expm(self.rates[states] * left)) @ x
-            if self._states(after) == states:
-                return after
+            state_after = (self.moves[states] if left == self.step else expm(self.rates[states] * left)) @ x
+            if self._states(state_after) == states:
+                return state_after
             passed, x = self._switch(x, states, left)
             left, states = left - passed, self._states(x)
 
-    def _switch(self, x: np.ndarray, states: Pair, longest: float) -> tuple[float, np.ndarray]:
+    def _switch(self, x: np.ndarray, states: Pair, longest_step: float) -> tuple[float, np.ndarray]:
         """Time (s) at which a tyre changes its contact state, and the vehicle's state at that time."""
-        before, after = 0.0, longest
+        time_before, time_after = 0.0, longest_step
         for _ in range(SWITCH_BISECTIONS):
-            middle = 0.5 * (before + after)
+            middle = 0.5 * (time_before + time_after)
             if self._states(expm(self.rates[states] * middle) @ x) == states:
-                before = middle
+                time_before = middle
             else:
-                after = middle
-        return after, expm(self.rates[states] * after) @ x
+                time_after = middle
+        return time_after, expm(self.rates[states] * time_after) @ x
 
     def _states(self, x: np.ndarray) -> Pair:
         """Contact state of each tyre."""
@@ -75,9 +75,12 @@ def _contact_state(spring: float, damper: float) -> int:
     return JUST_HIT if damper > spring else PRESSED
 
 
-def _tyre_laws(p: Parameters, states: Pair) -> list[tuple[float, float]]:
+def _tyre_laws(parameters: Parameters, states: Pair) -> list[tuple[float, float]]:
     """Stiffness (N/m) and damping (N s/m) of both tyres in their contact states."""
-    laws = [((0.0, 0.0), (k, d), (2.0 * k, 0.0)) for k, d in ((p.k1, p.d1), (p.k2, p.d2))]
+    laws = [
+        ((0.0, 0.0), (k, d), (2.0 * k, 0.0))
+        for k, d in ((parameters.k1, parameters.d1), (parameters.k2, parameters.d2))
+    ]
     return [law[state] for law, state in zip(laws, states, strict=True)]
 
 

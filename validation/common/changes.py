@@ -41,31 +41,35 @@ def _misread_text(error: Exception) -> str:
     return f"{error} is missing" if isinstance(error, KeyError) else str(error)
 
 
-def _rows_by_id(content: Saved) -> dict[str, Saved]:
+def _rows_by_id(report_content: Saved) -> dict[str, Saved]:
     """Rows by id; raises ValueError if two rows have the same id, because only one of them would be compared."""
-    saved = map(of_saved, content["rows"])
+    saved = map(of_saved, report_content["rows"])
     rows = {row["id"]: {name: row[name] for name in Row.__dataclass_fields__} for row in saved}
-    if len(rows) < len(content["rows"]):
+    if len(rows) < len(report_content["rows"]):
         raise ValueError("an id stands there twice")
     return rows
 
 
-def _provenance_tables(content: Saved) -> Saved:
+def _provenance_tables(report_content: Saved) -> Saved:
     """Provenance of the rows, as tables."""
-    kept = dict(content["provenance"])
-    return kept | {name: dict(kept.get(name) or {}) for name in ("versions", "seeds")}
+    tables = dict(report_content["provenance"])
+    return tables | {name: dict(tables.get(name) or {}) for name in ("versions", "seeds")}
 
 
-def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], source: Saved) -> Saved:
+def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], report_source: Saved) -> Saved:
     """Comparison with an earlier report, for ``results.json``: the earlier file and commit, notes, and all changed
     rows.
 
-    source : provenance of the rows; the notes say where that of the earlier report differs in what numbers depend on.
+    report_source : provenance of the rows; the notes say where that of the earlier report differs in what numbers
+    depend on.
     """
     was = earlier_report["provenance"]
-    old, new = (("quick" if report.get("quick") else "full") for report in (was, source))
+    old, new = (("quick" if report.get("quick") else "full") for report in (was, report_source))
     notes = [] if old == new else [f"the earlier report is the {old} one and this the {new} one"]
-    notes += [f"{name} {before} -> {now}" for name, before, now in _differing_environment(was, source)]
+    notes += [
+        f"{name} {earlier_text} -> {current_text}"
+        for name, earlier_text, current_text in _differing_environment(was, report_source)
+    ]
     return {
         "file": earlier_report["file"],
         "commit": str(was.get("commit", "unknown")),
@@ -74,19 +78,19 @@ def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], source: Sa
     }
 
 
-def _differing_environment(was: Saved, source: Saved) -> Iterator[tuple[str, Any, Any]]:
+def _differing_environment(was: Saved, report_source: Saved) -> Iterator[tuple[str, Any, Any]]:
     """Versions, seeds, Python, machine and system in which both reports differ, in the order of the earlier report."""
     for name in ("versions", "seeds"):
-        old, new = was.get(name) or {}, source.get(name) or {}
+        old, new = was.get(name) or {}, report_source.get(name) or {}
         yield from (
             (f"{name[:-1]} of {key}", old.get(key), new.get(key))
             for key in {**old, **new}
             if old.get(key) != new.get(key)
         )
     yield from (
-        (name, was.get(name), source.get(name))
+        (name, was.get(name), report_source.get(name))
         for name in ("python", "machine", "system")
-        if was.get(name) != source.get(name)
+        if was.get(name) != report_source.get(name)
     )
 
 
@@ -108,56 +112,60 @@ def _status_rank(status: Any) -> int:
     return STATUSES.index(status) if status in STATUSES else 0
 
 
-def _changes_of_row(id: str, old: Saved | None, new: Saved | None) -> Iterator[Change]:
-    row = new or old or {}
+def _changes_of_row(id: str, old_row: Saved | None, new_row: Saved | None) -> Iterator[Change]:
+    row = new_row or old_row or {}
 
-    def change(kind: str, old_value: Any, new_value: Any, size: float = 0.0) -> Change:
+    def change(change_kind: str, old_value: Any, new_value: Any, change_size: float = 0.0) -> Change:
         return {
             "id": id,
-            "kind": kind,
+            "kind": change_kind,
             "quantity": row["quantity"],
             "unit": row["unit"],
             "before": old_value,
             "after": new_value,
-            "size": size,
-            "reason": row["reason"] if kind in ("status", "new") else "",
+            "size": change_size,
+            "reason": row["reason"] if change_kind in ("status", "new") else "",
         }
 
-    if old is None or new is None:
-        yield change("new" if old is None else "gone", old and old["status"], new and new["status"])
+    if old_row is None or new_row is None:
+        yield change("new" if old_row is None else "gone", old_row and old_row["status"], new_row and new_row["status"])
         return
-    if old["status"] != new["status"]:
-        yield change("status", old["status"], new["status"])
+    if old_row["status"] != new_row["status"]:
+        yield change("status", old_row["status"], new_row["status"])
     for name in ("expected", "tolerance"):
-        if _values_differ(old[name], new[name]):
-            yield change("expected", f"{name} {old[name]}", f"{name} {new[name]}")
-    size = _size_of_change(old, new)
+        if _values_differ(old_row[name], new_row[name]):
+            yield change("expected", f"{name} {old_row[name]}", f"{name} {new_row[name]}")
+    size = _size_of_change(old_row, new_row)
     if size > 0.0:
-        yield change("value", old["value"], new["value"], size)
+        yield change("value", old_row["value"], new_row["value"], size)
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+def _is_number(row_value: Any) -> bool:
+    return isinstance(row_value, int | float) and not isinstance(row_value, bool)
 
 
-def _values_differ(old: Any, new: Any) -> bool:
-    if not (_is_number(old) and _is_number(new)):
-        return old != new
-    both_none = old != old and new != new  # neither is a number
-    return not (both_none or old == new or abs(new - old) <= ROUNDING_SHARE * max(abs(old), abs(new)))
+def _values_differ(old_value: Any, new_value: Any) -> bool:
+    if not (_is_number(old_value) and _is_number(new_value)):
+        return old_value != new_value
+    both_none = old_value != old_value and new_value != new_value  # neither is a number
+    return not (
+        both_none
+        or old_value == new_value
+        or abs(new_value - old_value) <= ROUNDING_SHARE * max(abs(old_value), abs(new_value))
+    )
 
 
-def _size_of_change(old: Saved, new: Saved) -> float:
+def _size_of_change(old_row: Saved, new_row: Saved) -> float:
     """Change of a value as a share of its tolerance, or of the value if there is no tolerance; 0 for mere rounding."""
-    was, now, tolerance = old["value"], new["value"], new["tolerance"]
-    if not _values_differ(was, now):
+    was, current_value, tolerance = old_row["value"], new_row["value"], new_row["tolerance"]
+    if not _values_differ(was, current_value):
         return 0.0
-    if not (_is_number(was) and _is_number(now)) or not abs(now - was) < float("inf"):
+    if not (_is_number(was) and _is_number(current_value)) or not abs(current_value - was) < float("inf"):
         return float("inf")
     if tolerance and _is_number(tolerance):
-        share = abs(now - was) / tolerance
-        return 0.0 if new["expected"] == 0 and share < NEGLIGIBLE_SHARE else share
-    return abs(now - was) / max(abs(was), abs(now))
+        share = abs(current_value - was) / tolerance
+        return 0.0 if new_row["expected"] == 0 and share < NEGLIGIBLE_SHARE else share
+    return abs(current_value - was) / max(abs(was), abs(current_value))
 
 
 def change_lines(compared: Saved) -> list[str]:
@@ -166,15 +174,15 @@ def change_lines(compared: Saved) -> list[str]:
     names = zip(CHANGE_KINDS, ("of status", "gone", "new", "judged otherwise", "of value"), strict=True)
     counts = ", ".join(f"{sum(change['kind'] == kind for change in changed)} {text}" for kind, text in names)
     head = f"against {compared['file']} (commit {compared['commit']}): {len(changed)} changes: {counts}"
-    told = [
+    lines = [
         f"  {change['kind']}: {change['id']}: {change['quantity']}: "
         f"{_value_text(change['before'])} -> {_value_text(change['after'])}"
         f"{' ' + change['unit'] if change['kind'] == 'value' and change['unit'] else ''}"
         f"{': ' + change['reason'] if change['reason'] else ''}"
         for change in changed
     ]
-    return [head, *([f"  note: {compared['note']}"] if compared["note"] else []), *told]
+    return [head, *([f"  note: {compared['note']}"] if compared["note"] else []), *lines]
 
 
-def _value_text(value: Any) -> str:
-    return "-" if value is None else f"{value:.6g}" if _is_number(value) else str(value)
+def _value_text(row_value: Any) -> str:
+    return "-" if row_value is None else f"{row_value:.6g}" if _is_number(row_value) else str(row_value)

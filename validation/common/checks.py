@@ -31,9 +31,9 @@ def engine(name: str) -> Make:
     return partial(build, name)
 
 
-def random_states(count: int = 100) -> np.ndarray:
-    """The random states (count, 8) at which accelerations are compared; the same at every call."""
-    return np.random.default_rng(SEED).uniform(-1, 1, (count, 8)) * STATE_HALF_WIDTHS
+def random_states(state_count: int = 100) -> np.ndarray:
+    """The random states (state_count, 8) at which accelerations are compared; the same at every call."""
+    return np.random.default_rng(SEED).uniform(-1, 1, (state_count, 8)) * STATE_HALF_WIDTHS
 
 
 def accelerations(make_engine: Make, assembly: Assembly, settings: Settings, states: np.ndarray) -> np.ndarray:
@@ -45,16 +45,16 @@ def accelerations(make_engine: Make, assembly: Assembly, settings: Settings, sta
     )
 
 
-def acceleration_gap(make_engine: Make, assembly: Assembly, settings: Settings, count: int = 100) -> float:
+def acceleration_gap(make_engine: Make, assembly: Assembly, settings: Settings, state_count: int = 100) -> float:
     """Largest difference from the accelerations of the paper's equations, relative to the largest acceleration."""
-    states = random_states(count)
+    states = random_states(state_count)
     hand = accelerations(engine("reference"), assembly, by_hand(settings), states)
     return relative_difference(accelerations(make_engine, assembly, settings, states), hand)
 
 
-def relative_difference(computed: np.ndarray, hand: np.ndarray) -> float:
+def relative_difference(computed_values: np.ndarray, hand: np.ndarray) -> float:
     """Largest difference divided by the largest expected magnitude."""
-    return float(np.abs(computed - hand).max() / np.abs(hand).max())
+    return float(np.abs(computed_values - hand).max() / np.abs(hand).max())
 
 
 def run(make_engine: Make, assembly: Assembly, settings: Settings) -> Trajectory | None:
@@ -79,8 +79,8 @@ def state_gap(path: Trajectory | None, other_trajectory: Trajectory) -> float:
     factor."""
     if path is None:
         return float("inf")
-    every = (len(other_trajectory.times) - 1) // (len(path.times) - 1)
-    return float(np.abs(path.states - other_trajectory.states[::every]).max())
+    stride = (len(other_trajectory.times) - 1) // (len(path.times) - 1)
+    return float(np.abs(path.states - other_trajectory.states[::stride]).max())
 
 
 def order_gap(make_engine: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
@@ -96,7 +96,7 @@ def order_gap(make_engine: Make, assembly: Assembly, settings: Settings, truth: 
 def observed_order(make_engine: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
     """log2 of the ratio of the largest state errors at the settings' step and its half."""
     halved = replace(settings, step=settings.step / 2)
-    coarse, fine = (state_gap(run(make_engine, assembly, each), truth) for each in (settings, halved))
+    coarse, fine = (state_gap(run(make_engine, assembly, run_settings), truth) for run_settings in (settings, halved))
     return float(np.log2(coarse / fine)) if np.isfinite([coarse, fine]).all() and fine > 0 else float("-inf")
 
 
@@ -108,8 +108,8 @@ def equilibrium_gap(make_engine: Make, assembly: Assembly, settings: Settings) -
     trajectory = run(make_engine, assembly, settings)
     if trajectory is None:
         return float("inf")
-    rest = pitch_plane.equilibrium(assembly.parameters, assembly.vehicle.geometry)
-    return float(np.abs(trajectory.states - rest).max())
+    rest_state = pitch_plane.equilibrium(assembly.parameters, assembly.vehicle.geometry)
+    return float(np.abs(trajectory.states - rest_state).max())
 
 
 def momentum_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
@@ -135,8 +135,8 @@ def _force_impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
     signal, h, n = assembly.input, settings.step, settings.steps
     assert signal is not None
     force = signal.sample(0.0, h, n + 1)[:, :2].sum(axis=1)
-    part = force[:-1] if signal.held else 0.5 * (force[:-1] + force[1:])
-    return np.concatenate(([0.0], np.cumsum(h * part)))
+    mean_force = force[:-1] if signal.held else 0.5 * (force[:-1] + force[1:])
+    return np.concatenate(([0.0], np.cumsum(h * mean_force)))
 
 
 def enforced_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
@@ -154,6 +154,6 @@ def by_hand(settings: Settings) -> Settings:
     return replace(settings, integrator=RECOMMENDED["reference"])
 
 
-def largest_relative_difference(computed: Any, expected: Any) -> float:
+def largest_relative_difference(computed_values: Any, expected: Any) -> float:
     """Largest difference divided by the largest expected magnitude."""
-    return float(np.abs(np.asarray(computed) - expected).max() / np.abs(expected).max())
+    return float(np.abs(np.asarray(computed_values) - expected).max() / np.abs(expected).max())

@@ -21,10 +21,10 @@ MOMENTS_TRIED = 20
 
 
 @contextmanager
-def files_of_at_most(size: int) -> Iterator[None]:
-    """Context in which no file of this process can grow beyond ``size`` bytes."""
+def files_of_at_most(byte_limit: int) -> Iterator[None]:
+    """Context in which no file of this process can grow beyond ``byte_limit`` bytes."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (byte_limit, hard))
     try:
         yield
     finally:
@@ -36,9 +36,9 @@ def damaged_moments(folder: Path) -> int:
     result = simulate(road_scene(duration=0.05), "reference")
     (folder / "whole").mkdir()
     _save_until_full(result, folder / "whole")
-    whole = file_sizes(folder / "whole")
+    complete_sizes = file_sizes(folder / "whole")
     shares = np.linspace(0.0, 0.99, MOMENTS_TRIED)
-    return sum(_is_damaged(result, folder / f"{i}", share, whole) for i, share in enumerate(shares))
+    return sum(_is_damaged(result, folder / f"{i}", share, complete_sizes) for i, share in enumerate(shares))
 
 
 def file_sizes(folder: Path) -> dict[str, int]:

@@ -47,25 +47,25 @@ class Grounds:
         for broken in broken_of(run):
             self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY_ASSUMPTION, "")))
 
-    def rest(self, allowed: bool) -> str:
+    def rest(self, is_allowed: bool) -> str:
         """Text on the broken assumptions on which the current row rests: the allowed ones, or those that are not."""
         same_part = self.part == _instruction_index()
         self.rows_rest_on_them, self.is_closed = True, self.is_closed or same_part
-        return "" if self.is_closed and not same_part else self.told(allowed)
+        return "" if self.is_closed and not same_part else self.told(is_allowed)
 
-    def told(self, allowed: bool) -> str:
+    def told(self, is_allowed: bool) -> str:
         """Text on each broken assumption (allowed or not): number of runs, longest share of time, and why it is
         allowed."""
         by_name: dict[str, list[Breach]] = {}
-        for each in self.breaches:
-            if bool(each.permission) == allowed:
-                by_name.setdefault(each.assumption.name, []).append(each)
-        return "; ".join(_assumption_text(same) for same in by_name.values())
+        for breach in self.breaches:
+            if bool(breach.permission) == is_allowed:
+                by_name.setdefault(breach.assumption.name, []).append(breach)
+        return "; ".join(_assumption_text(similar_breaches) for similar_breaches in by_name.values())
 
 
-def _assumption_text(same: list[Breach]) -> str:
-    worst = max(same, key=lambda each: each.assumption.share)
-    runs = f"{len(same)} runs, the longest " if len(same) > 1 else ""
+def _assumption_text(similar_breaches: list[Breach]) -> str:
+    worst = max(similar_breaches, key=lambda breach: breach.assumption.share)
+    runs = f"{len(similar_breaches)} runs, the longest " if len(similar_breaches) > 1 else ""
     return f"{worst.assumption.fact()} ({runs}{worst.run}){f': {worst.permission}' if worst.permission else ''}"
 
 
@@ -80,13 +80,13 @@ def measured_rows(measure: Callable[[], Answer]) -> tuple[Answer, str]:
     """Rows of a case with the broken assumptions of its runs, and the assumptions that were broken without permission
     after its last row."""
     grounds = Grounds()
-    before = _CURRENT_GROUNDS.set(grounds)
+    token = _CURRENT_GROUNDS.set(grounds)
     try:
         with watching(grounds.note):
             answer = measure()
     finally:
-        _CURRENT_GROUNDS.reset(before)
-    return answer, "" if grounds.rows_rest_on_them else grounds.told(allowed=False)
+        _CURRENT_GROUNDS.reset(token)
+    return answer, "" if grounds.rows_rest_on_them else grounds.told(is_allowed=False)
 
 
 def _instruction_index() -> int:
@@ -99,22 +99,24 @@ def _instruction_index() -> int:
 
 
 @contextmanager
-def allowing_breaches(why: str, *names: str) -> Iterator[None]:
+def allowing_breaches(tolerance_reason: str, *names: str) -> Iterator[None]:
     """Context in which runs may break the named assumptions, or any if none is named; it can decorate a function."""
-    before = _ALLOWED_ASSUMPTIONS.set(_ALLOWED_ASSUMPTIONS.get() | dict.fromkeys(names or (ANY_ASSUMPTION,), why))
+    token = _ALLOWED_ASSUMPTIONS.set(
+        _ALLOWED_ASSUMPTIONS.get() | dict.fromkeys(names or (ANY_ASSUMPTION,), tolerance_reason)
+    )
     try:
         yield
     finally:
-        _ALLOWED_ASSUMPTIONS.reset(before)
+        _ALLOWED_ASSUMPTIONS.reset(token)
 
 
 def forbidden_breaches() -> str:
     """Broken assumptions that are not allowed and on which the current row rests."""
     grounds = _CURRENT_GROUNDS.get()
-    return "" if grounds is None else grounds.rest(allowed=False)
+    return "" if grounds is None else grounds.rest(is_allowed=False)
 
 
 def allowed_breaches() -> str:
     """Allowed broken assumptions on which the current row rests."""
     grounds = _CURRENT_GROUNDS.get()
-    return "" if grounds is None else grounds.rest(allowed=True)
+    return "" if grounds is None else grounds.rest(is_allowed=True)

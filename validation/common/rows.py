@@ -95,52 +95,72 @@ class Observed:
     value: float
     unit: str
 
-    def within(self, expected: float, tolerance: float, why: str, independence: Independence) -> Row:
+    def within(self, expected: float, tolerance: float, tolerance_reason: str, independence: Independence) -> Row:
         """Row that passes if |value - expected| <= tolerance; a value that is not a number fails."""
         passed = abs(self.value - expected) <= tolerance
         reason = "" if passed else f"off by {abs(self.value - expected):.3g}, allowed {tolerance:.3g}"
-        return self._row(expected, tolerance, why, independence, "passed" if passed else "failed", reason)
+        return self._row(expected, tolerance, tolerance_reason, independence, "passed" if passed else "failed", reason)
 
-    def at_most(self, bound: float, why: str, independence: Independence) -> Row:
+    def at_most(self, bound: float, tolerance_reason: str, independence: Independence) -> Row:
         """Row for an error or a ratio that must not exceed a bound: expected 0, tolerance the bound."""
-        return self.within(0.0, bound, why, independence)
+        return self.within(0.0, bound, tolerance_reason, independence)
 
-    def beside(self, expected: float | str, why: str, independence: Independence = "published") -> Row:
+    def beside(self, expected: float | str, tolerance_reason: str, independence: Independence = "published") -> Row:
         """Row that reports a value next to a published value without a verdict."""
-        return self._row(expected, None, why, independence, "reported")
+        return self._row(expected, None, tolerance_reason, independence, "reported")
 
-    def aim(self, bound: float, why: str, side: Side = "at most", independence: Independence = "none") -> Row:
+    def aim(
+        self, bound: float, tolerance_reason: str, side: Side = "at most", independence: Independence = "none"
+    ) -> Row:
         """Row of a stated aim that decides no verdict: reported where it is reached, missed otherwise or for no number.
 
         So are figures that the machine decides, as seconds, their ratios and memory, and aims that the method is known
-        not to reach: ``why`` says for which of the two reasons.
+        not to reach: ``tolerance_reason`` says for which of the two reasons.
         """
         reached = self.value <= bound if side == "at most" else self.value >= bound
         wanted = f"{side} {bound:,.4g}"
         missed = f"{self.value:,.4g}{f' {self.unit}' if self.unit else ''}; the aim is {wanted}"
-        return self._row(wanted, None, why, independence, *(("reported", "") if reached else ("missed", missed)))
+        return self._row(
+            wanted, None, tolerance_reason, independence, *(("reported", "") if reached else ("missed", missed))
+        )
 
     def _row(
         self,
         expected: float | str,
         tolerance: float | None,
-        why: str,
+        tolerance_reason: str,
         independence: Independence,
         status: Status,
         reason: str = "",
     ) -> Row:
-        given = (self.id, self.system, self.quantity, self.value, self.unit)
-        return Row(*given, expected, tolerance, why, independence, status, reason)
+        identity = (self.id, self.system, self.quantity, self.value, self.unit)
+        return Row(*identity, expected, tolerance, tolerance_reason, independence, status, reason)
 
 
 def behaviour_row(
-    id: str, system: System, quantity: str, outcome: str, expected: str, why: str, independence: Independence = "none"
+    id: str,
+    system: System,
+    quantity: str,
+    outcome: str,
+    expected: str,
+    tolerance_reason: str,
+    independence: Independence = "none",
 ) -> Row:
     """Row for a behaviour, such as "refused": passes if found and expected are the same word."""
     passed = outcome == expected
     reason = "" if passed else f"found {outcome!r}"
     return Row(
-        id, system, quantity, outcome, "", expected, None, why, independence, "passed" if passed else "failed", reason
+        id,
+        system,
+        quantity,
+        outcome,
+        "",
+        expected,
+        None,
+        tolerance_reason,
+        independence,
+        "passed" if passed else "failed",
+        reason,
     )
 
 
@@ -159,10 +179,10 @@ def rows_on_grounds(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
 
     What runs after the last row broke has a row of its own.
     """
-    (rows, data), last = grounds.measured_rows(measure)
+    (rows, data), remaining_breaches = grounds.measured_rows(measure)
     rows = [row.with_grounds() for row in rows]
-    if last:
-        rows.append(failed_row(f"{name}.assumptions", f"runs of case {name} after its last row", last))
+    if remaining_breaches:
+        rows.append(failed_row(f"{name}.assumptions", f"runs of case {name} after its last row", remaining_breaches))
     return rows, data
 
 

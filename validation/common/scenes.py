@@ -49,15 +49,16 @@ def road_scene(
 def virtual_drive(
     folder: Path,
     duration: float,
-    period: float = 1e-3,
+    sample_period: float = 1e-3,
     step: float = 1e-3,
     parameters: str = "itwm_drift",
     road: dict[str, Any] | None = None,
 ) -> Result:
-    """Virtual measurement on a road in the reference; its files, sampled every ``period`` (s), are written to the
-    folder."""
+    """Virtual measurement on a road in the reference; its files, sampled every ``sample_period`` (s), are written to
+    the folder.
+    """
     measured = run(road_scene(parameters, step, duration, road), "reference")
-    write_measurement(measured, folder, period)
+    write_measurement(measured, folder, sample_period)
     return measured
 
 

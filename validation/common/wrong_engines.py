@@ -18,14 +18,14 @@ class Right:
 
     order, adaptive = 8, True
 
-    def integrate(self, f: Any, times: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
+    def integrate(self, rate_function: Any, times: np.ndarray, start_state: np.ndarray, tolerance: float) -> np.ndarray:
         """States (len(times), 8) of y' = f(t, y)."""
 
         def rate(t: float, y: np.ndarray) -> np.ndarray:
-            return self.weighed(f(t, y))
+            return self.weighed(rate_function(t, y))
 
         solution = solve_ivp(
-            rate, times[[0, -1]], start, "DOP853", times, rtol=tolerance, atol=tolerance, max_step=0.01
+            rate, times[[0, -1]], start_state, "DOP853", times, rtol=tolerance, atol=tolerance, max_step=0.01
         )
         return self.told(solution.y.T)
 
@@ -51,11 +51,11 @@ class Boastful:
 
     order, adaptive = 4, False
 
-    def integrate(self, f: Any, times: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
+    def integrate(self, rate_function: Any, times: np.ndarray, start_state: np.ndarray, tolerance: float) -> np.ndarray:
         """States by one Euler step between each two times."""
-        states = [start]
+        states = [start_state]
         for begin, end in pairwise(times):
-            states.append(states[-1] + (end - begin) * f(begin, states[-1]))
+            states.append(states[-1] + (end - begin) * rate_function(begin, states[-1]))
         return np.array(states)
 
 
@@ -78,20 +78,20 @@ class Weak(Right):
 WRONG_ENGINES = (Still, Boastful, Swapped, Weak)
 
 
-def integrators_that_pass(kinds: tuple[type, ...] = WRONG_ENGINES, duration: float = 0.5) -> list[str]:
+def integrators_that_pass(integrator_kinds: tuple[type, ...] = WRONG_ENGINES, duration: float = 0.5) -> list[str]:
     """Names of the integrators whose run on a road ends without an error being raised."""
     tables: tuple[dict[str, Any], ...] = (CATALOGUE, RECOMMENDED, OUTSIDE)
-    before = [dict(table) for table in tables]
+    saved_tables = [dict(table) for table in tables]
     try:
-        return [kind.__name__ for kind in kinds if _gives_answer(kind, duration)]
+        return [kind.__name__ for kind in integrator_kinds if _gives_answer(kind, duration)]
     finally:
-        for table, kept in zip(tables, before, strict=True):
+        for table, saved_table in zip(tables, saved_tables, strict=True):
             table.clear()
-            table.update(kept)
+            table.update(saved_table)
 
 
-def _gives_answer(kind: type, duration: float) -> bool:
-    name = f"{__name__}:{kind.__name__}"
+def _gives_answer(integrator_kind: type, duration: float) -> bool:
+    name = f"{__name__}:{integrator_kind.__name__}"
     register(name)
     try:
         simulate(road_scene(duration=duration), name)

@@ -32,7 +32,7 @@ CREEPAGE_KINDS = {
     },
 }
 """Parts of the creepages; lateral creepage with and against spin, where theories differ most, by angles in degrees."""
-SIZE, LOAD, FRICTION, PAIR = 5e-3, 8e4, 0.3, MaterialPair()
+CONTACT_SIZE, LOAD, FRICTION, MATERIAL_PAIR = 5e-3, 8e4, 0.3, MaterialPair()
 """sqrt(ab) in m, N, coefficient of friction and materials with which the set is computed."""
 SEED, DRAWN_CONTACTS, SIZE_RANGE = 43, 300, (0.2, 10.0)
 """Of the drawn contacts: seed, how many in each part, and their sizes."""
@@ -53,7 +53,7 @@ def regular_contacts() -> list[ContactCase]:
     return [
         case
         for ratio in AXIS_RATIOS
-        for case in ellipse_cases(*_semi_axes(ratio), LOAD, FRICTION, PAIR, CREEPAGE_SIZES, CREEPAGE_KINDS)
+        for case in ellipse_cases(*_semi_axes(ratio), LOAD, FRICTION, MATERIAL_PAIR, CREEPAGE_SIZES, CREEPAGE_KINDS)
     ]
 
 
@@ -61,13 +61,18 @@ def drawn_contacts(part_number: int) -> list[ContactCase]:
     """One part of the randomly drawn contacts, with no forces computed; all directions of the scaled creepages are
     equally likely."""
     return _draw_contacts(
-        part_number, DRAWN_CONTACTS, (AXIS_RATIOS[0], AXIS_RATIOS[-1]), SIZE_RANGE, f"drawn {part_number}", [PAIR]
+        part_number,
+        DRAWN_CONTACTS,
+        (AXIS_RATIOS[0], AXIS_RATIOS[-1]),
+        SIZE_RANGE,
+        f"drawn {part_number}",
+        [MATERIAL_PAIR],
     )
 
 
 def wide_contacts(part_number: int) -> list[ContactCase]:
     """One part of the contacts with wide ranges of shape and material, with no forces computed."""
-    bodies = [Material(E=PAIR.wheel.E, nu=nu) for nu in POISSON]
+    bodies = [Material(E=MATERIAL_PAIR.wheel.E, nu=nu) for nu in POISSON]
     pairs, first = [MaterialPair(body, body) for body in bodies], 2 + len(WIDE_CONTACTS[FITTED_PART]) * part_number
     streams = enumerate(WIDE_CONTACTS[part_number], first)
     return [
@@ -78,23 +83,30 @@ def wide_contacts(part_number: int) -> list[ContactCase]:
 
 
 def _draw_contacts(
-    stream: int, count: int, ratios: Ends, sizes: Ends, kind: str, pairs: list[MaterialPair], absent: float = 0.0
+    stream: int,
+    count: int,
+    ratios: Ends,
+    size_ends: Ends,
+    contact_kind: str,
+    material_pairs: list[MaterialPair],
+    absent: float = 0.0,
 ) -> list[ContactCase]:
     """Random contacts from a stream of numbers, with the material pairs in turn. Each creepage is zero in a share of
     the contacts, but never all three."""
     rng = np.random.default_rng((SEED, stream))
-    ratio, level = (np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (ratios, sizes))
+    ratio, level = (np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (ratios, size_ends))
     directions, present = rng.normal(size=(count, 3)), rng.uniform(size=(count, 3)) >= absent
     present[~present.any(axis=1)] = True
     parts = map(tuple, (directions * present).tolist())
-    drawn = zip(ratio, level, parts, cycle(pairs), strict=False)
+    drawn = zip(ratio, level, parts, cycle(material_pairs), strict=False)
     return [
-        ContactCase(*_semi_axes(a_by_b), LOAD, FRICTION, pair, kind, part, size) for a_by_b, size, part, pair in drawn
+        ContactCase(*_semi_axes(a_by_b), LOAD, FRICTION, pair, contact_kind, part, size)
+        for a_by_b, size, part, pair in drawn
     ]
 
 
 def _semi_axes(ratio: float) -> tuple[float, float]:
-    return SIZE * ratio**0.5, SIZE / ratio**0.5
+    return CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5
 
 
 def read_contacts() -> list[ContactCase]:

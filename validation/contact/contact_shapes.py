@@ -16,7 +16,7 @@ from models.contact.undeformed_distance import Distance, from_function
 from models.contact.wheel_on_rail import TouchingPlace, wheel_on_rail
 from models.core.errors import InputError, RunFailed
 
-PAIR = MaterialPair()
+MATERIAL_PAIR = MaterialPair()
 FRICTION = 0.3
 CURVATURE = 1.0 / 0.92
 """A of a wheel of 0.46 m radius (1/m)."""
@@ -200,7 +200,7 @@ def exact_placed(wheelset: PlacedWheelset, normal_contact: NormalContact, cells:
         x, y = (x0 + x1) / 2 + centres(cells, step_x), (y0 + y1) / 2 + centres(2 * cells, step_y)
         heights = np.min([_height(touch.patch, x, y) for touch in wheelset.touches], axis=0)
         try:
-            return solve_normal(heights * slope, step_x, step_y, PAIR, load=wheelset.load / slope)
+            return solve_normal(heights * slope, step_x, step_y, MATERIAL_PAIR, load=wheelset.load / slope)
         except InputError as error:  # the contact reaches the edge of the grid
             refused = error
     raise refused
@@ -220,19 +220,19 @@ def _height(patch: Patch, x: Array, y: Array) -> Array:
     return heights
 
 
-def exact_normal(shape: Shape, cells: int, box: Box) -> NormalSolution:
+def exact_normal(contact_shape: Shape, cells: int, box: Box) -> NormalSolution:
     """Exact normal contact on a grid of cells x cells over the box x0, x1, y0, y1 (m)."""
     x0, x1, y0, y1 = box
     x, y = (low + (np.arange(cells) + 0.5) / cells * (high - low) for low, high in ((x0, x1), (y0, y1)))
-    heights = shape.distance.at(x[None, :], y[:, None])
-    solution = solve_normal(heights, x[1] - x[0], y[1] - y[0], PAIR, load=shape.load)
+    heights = contact_shape.distance.at(x[None, :], y[:, None])
+    solution = solve_normal(heights, x[1] - x[0], y[1] - y[0], MATERIAL_PAIR, load=contact_shape.load)
     return replace(solution, x=x, y=y)
 
 
 def creepages(area: float, load: float) -> dict[tuple[str, float], tuple[float, float, float]]:
     """Creepages and spin (1/m) of every kind and level for a contact of this area (m^2) and load (N)."""
     c = np.sqrt(area / np.pi)
-    scale = FRICTION * load / (4.0 * PAIR.G * c**2)
+    scale = FRICTION * load / (4.0 * MATERIAL_PAIR.G * c**2)
     return {
         (name, level): (level * scale * x, level * scale * y, level * scale * spin / c)
         for name, (x, y, spin) in CREEPAGE_KINDS.items()
@@ -243,6 +243,6 @@ def creepages(area: float, load: float) -> dict[tuple[str, float], tuple[float, 
 def exact_rolling(normal: NormalSolution, creepage: tuple[float, float, float]) -> RollingSolution | None:
     """Exact rolling solution; None if the exact solver did not converge."""
     try:
-        return solve_rolling(normal, FRICTION, *creepage, PAIR)
+        return solve_rolling(normal, FRICTION, *creepage, MATERIAL_PAIR)
     except RunFailed:
         return None

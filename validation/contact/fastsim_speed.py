@@ -18,7 +18,7 @@ from validation.common.rows import Observed, Row, System
 
 SYSTEM: System = "contact"
 CELLS = 21
-ROUNDS, REPEATS = 300, 30
+TIMING_ROUNDS, REPEATS = 300, 30
 CONTACTS = 400
 TIMING_NOTE = "median of interleaved rounds, seconds of the processor"
 
@@ -81,7 +81,7 @@ def _processor_times(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[s
     """Processor time (s) per unit of every job; the jobs take turns over several rounds."""
     for job, _ in jobs.values():
         job()
-    seconds = np.empty((ROUNDS, len(jobs)))
+    seconds = np.empty((TIMING_ROUNDS, len(jobs)))
     for row in seconds:
         for j, (job, units) in enumerate(jobs.values()):
             start = time.process_time()

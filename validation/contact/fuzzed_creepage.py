@@ -75,8 +75,8 @@ def worst_violation(
     still, power = (motion == 0.0) | (limit == 0.0), least * np.where(motion > 0.0, motion, 1.0)
     net = {name: options[name] for name in ("cells", "bound") if name in options}
 
-    def relative(values: Creep, sizes: tuple[float, ...]) -> Array:
-        parts = zip((values.fx, values.fy, values.mz), sizes, (least, least, least * arm), strict=True)
+    def relative(values: Creep, value_sizes: tuple[float, ...]) -> Array:
+        parts = zip((values.fx, values.fy, values.mz), value_sizes, (least, least, least * arm), strict=True)
         return np.array([value / size / unit for value, size, unit in parts])
 
     def unlike(name: str) -> float:

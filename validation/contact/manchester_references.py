@@ -36,7 +36,7 @@ CELL, DEEPEST = 1e-4, 1e-3
 """m: of the exact theory on this plane, and more than the bodies reach into each other."""
 PATCH_LOAD_TOLERANCE, SINKING_TOLERANCE = 1e-4, 1e-8
 """Of the load, to which two patches that sink each other are followed; m, to which their approach is found."""
-SEARCH_REACH, GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
+SEARCH_REACH, SEARCH_GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
 """Reach of the search along the profile (m) and round the axle (rad), its grid, how often it shrinks to a quarter; step
 (m) over which the rail's angle is taken."""
 
@@ -113,12 +113,14 @@ def _load_of_patch(distance: Distance, approach: float, material_pair: MaterialP
     return solve_normal(heights, 2e-4, 1e-4, material_pair, approach=approach).load if heights.min() < approach else 0.0
 
 
-def _lowered_pose(side: WheelAndRail, placed: WheelsetPlacement) -> Pose:
+def _lowered_pose(wheel_and_rail: WheelAndRail, placed: WheelsetPlacement) -> Pose:
     pose = Pose(placed.shift, placed.yaw, placed.roll, 0.0)
-    return Pose(placed.shift, placed.yaw, placed.roll, side.clearance(pose))
+    return Pose(placed.shift, placed.yaw, placed.roll, wheel_and_rail.clearance(pose))
 
 
-def first_touch(side: WheelAndRail, placed: WheelsetPlacement, sign: float, guess: float) -> tuple[float, float, float]:
+def first_touch(
+    wheel_and_rail: WheelAndRail, placed: WheelsetPlacement, sign: float, position_guess: float
+) -> tuple[float, float, float]:
     """First contact point of a wheel near a guess (m from the taping line), by a search over points of its surface.
 
     sign : 1 for the right wheel, -1 for the left one in its mirror. Both profiles are straight between their points.
@@ -127,13 +129,13 @@ def first_touch(side: WheelAndRail, placed: WheelsetPlacement, sign: float, gues
     roll, yaw = sign * placed.roll, sign * placed.yaw
     ahead, reach_u, reach_a = 0.0, SEARCH_REACH[0], SEARCH_REACH[1]
     for _ in range(HALVINGS):
-        u, a = np.meshgrid(guess + reach_u * GRID, ahead + reach_a * GRID)
-        radius = side.wheelset.radius + np.interp(u, side.wheel.y, side.wheel.z)
-        x, y, z = radius * np.sin(a), side.wheelset.arm + u, radius * np.cos(a)
+        u, a = np.meshgrid(position_guess + reach_u * SEARCH_GRID, ahead + reach_a * SEARCH_GRID)
+        radius = wheel_and_rail.wheelset.radius + np.interp(u, wheel_and_rail.wheel.y, wheel_and_rail.wheel.z)
+        x, y, z = radius * np.sin(a), wheel_and_rail.wheelset.arm + u, radius * np.cos(a)
         y, z = y * math.cos(roll) - z * math.sin(roll), y * math.sin(roll) + z * math.cos(roll)
         y = x * math.sin(yaw) + y * math.cos(yaw) + sign * placed.shift
-        k = np.argmin(np.interp(y, side.rail.y, side.rail.z) - z)
-        place, guess, ahead = float(y.flat[k]), float(u.flat[k]), float(a.flat[k])
+        k = np.argmin(np.interp(y, wheel_and_rail.rail.y, wheel_and_rail.rail.z) - z)
+        place, position_guess, ahead = float(y.flat[k]), float(u.flat[k]), float(a.flat[k])
         reach_u, reach_a = reach_u / 4.0, reach_a / 4.0
-    low, high = np.interp([place - STEP, place + STEP], side.rail.y, side.rail.z)
-    return place, guess, math.atan(float(high - low) / (2.0 * STEP))
+    low, high = np.interp([place - STEP, place + STEP], wheel_and_rail.rail.y, wheel_and_rail.rail.z)
+    return place, position_guess, math.atan(float(high - low) / (2.0 * STEP))

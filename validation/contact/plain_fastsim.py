@@ -124,15 +124,15 @@ def flexibilities(a: float, b: float, shear: float, nu: float) -> tuple[float, f
     return along, across, max(math.pi * a * math.sqrt(a / b) / (4.0 * shear * c23), least)
 
 
-def stiffnesses(ellipse: PlainEllipse, peak: float, kind: str) -> Array:
+def stiffnesses(ellipse: PlainEllipse, peak: float, flexibility_kind: str) -> Array:
     """1/L along x, along y and in spin (3,); peak : bound in the middle (Pa)."""
     three, creep = (
         1.0 / np.array(ellipse.flexible),
         np.array([ellipse.xi_x, ellipse.xi_y, ellipse.spin * ellipse.mean_semi_axis]),
     )
-    if kind == "three" or not creep.any():
+    if flexibility_kind == "three" or not creep.any():
         return three
-    if kind == "one":
+    if flexibility_kind == "one":
         return np.full(3, np.linalg.norm(creep) / (np.abs(creep) @ ellipse.flexible))
     square = creep**2
     mean = square.sum() / (square @ ellipse.flexible)
@@ -200,15 +200,15 @@ def _strip_tractions(
     return tractions, slips
 
 
-def _direction_after_step(p: complex, rigid: complex, turning: float, dx: float, bound: float) -> complex:
+def _direction_after_step(p: complex, rigid: complex, spin_slip: float, dx: float, bound: float) -> complex:
     """Direction of the traction in a slipping cell after a step dx. rigid : rigid slip divided by the flexibility at
-    mid-step; turning : change of its lateral component per m of x; bound : traction bound (Pa).
+    mid-step; spin_slip : change of its lateral component per m of x; bound : traction bound (Pa).
 
     tan(psi/2), psi between traction and -rigid, shrinks by exp(|rigid| dx / bound), the exponential an eighth power of
     its series and the slip taken a little after the middle, both as ``fastsim_kernels`` says.
     """
     eighth = (abs(rigid.real) + abs(rigid.imag)) * dx / bound / 8.0
-    against = -(rigid - 1j * turning * dx * min(0.5 * eighth, 0.12 + 0.2 * eighth, 0.47))
+    against = -(rigid - 1j * spin_slip * dx * min(0.5 * eighth, 0.12 + 0.2 * eighth, 0.47))
     h = min(abs(against) * dx / bound / 8.0, 50.0)
     grown = (1.0 + h + h**2 / 2.0 + h**3 / 6.0) ** 8
     psi = 2.0 * math.atan(math.tan(cmath.phase(p / against) / 2.0) / grown)

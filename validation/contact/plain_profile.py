@@ -25,26 +25,28 @@ def rail_of(profile: LaidProfile) -> PPoly:
     return PPoly(np.array([knots[name][:-1] for name in ("c3", "c2", "c1", "c0")]), knots["y"], extrapolate=False)
 
 
-def circle_contacts(side: int, pose: Pose, profile: LaidProfile) -> tuple[Array, Array, Array]:
+def circle_contacts(wheel_side: int, pose: Pose, profile: LaidProfile) -> tuple[Array, Array, Array]:
     """For each circle of the wheel: penetration (n,), and its nearest point relative to the wheelset's centre and the
     rail's normal there, both (n, 3)."""
     head, nodes, rail = profile.head[0], profile.nodes, rail_of(profile)
     turn = Rotation.from_euler("ZX", [pose.yaw, pose.roll]).as_matrix()
     # A point (r sin phi, side (arm + y), r cos phi) has the normal (sin phi, -side slope, cos phi) in the wheelset.
     along, across, down = turn[0]
-    phase = np.arcsin(across * side * nodes["slope"] / np.hypot(along, down)) - np.arctan2(down, along)
+    phase = np.arcsin(across * wheel_side * nodes["slope"] / np.hypot(along, down)) - np.arctan2(down, along)
     radius = nodes["radius"]
-    points = np.column_stack([radius * np.sin(phase), side * (head.arm + nodes["y"]), radius * np.cos(phase)]) @ turn.T
+    points = (
+        np.column_stack([radius * np.sin(phase), wheel_side * (head.arm + nodes["y"]), radius * np.cos(phase)]) @ turn.T
+    )
     y = pose.y + points[:, 1]
-    slope = side * rail(side * y, 1)
+    slope = wheel_side * rail(wheel_side * y, 1)
     normals = np.column_stack([np.zeros(y.size), -slope, np.ones(y.size)]) / np.hypot(1.0, slope)[:, None]
-    depth = (pose.z + head.level + points[:, 2] - rail(side * y)) * normals[:, 2]
+    depth = (pose.z + head.level + points[:, 2] - rail(wheel_side * y)) * normals[:, 2]
     return np.where(np.isfinite(depth), depth, -1.0), points, normals
 
 
-def touches_of(side: int, pose: Pose, profile: LaidProfile, modulus: float) -> Array:
+def touches_of(wheel_side: int, pose: Pose, profile: LaidProfile, modulus: float) -> Array:
     """Contacts TOUCH (zones,) of a wheel; modulus : E* (Pa)."""
-    depth, points, normals = circle_contacts(side, pose, profile)
+    depth, points, normals = circle_contacts(wheel_side, pose, profile)
     zone, length = profile.nodes["zone"], np.arange(depth.size) * profile.head[0].spacing
     radial = Rotation.from_euler("ZX", [pose.yaw, pose.roll]).as_matrix()[:, 2]
     touches = np.zeros(int(profile.head[0].zones), TOUCH)

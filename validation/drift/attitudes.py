@@ -19,21 +19,25 @@ PATHS_IN_MEMORY = 500
 START_ATTITUDE = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def turning_rates(count: int, period: float) -> np.ndarray:
-    """Local rates (count, 3) in rad/s of a body that turns about all axes by one or two radians in two seconds."""
-    t = period * np.arange(count)
+def turning_rates(sample_count: int, sample_period: float) -> np.ndarray:
+    """Local rates (sample_count, 3) in rad/s of a body that turns about all axes by one or two radians in two
+    seconds.
+    """
+    t = sample_period * np.arange(sample_count)
     return np.column_stack([0.5 + 0.4 * np.sin(2.1 * t), 0.2 - 0.3 * np.cos(1.7 * t), 0.8 + 0.2 * np.cos(1.3 * t)])
 
 
 def coning_motion(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Local rates (n, 3) and attitude (n, 4) of S = Rz(W t) Rx(c) Rz(-W t), W = 2 rad/s, c = 0.3: W (S^T e_z - e_z)."""
     spin, half = 2.0, 0.3
-    about = exponential(spin * t[:, None] * np.array([0.0, 0.0, 1.0]))
+    turn_about_vertical = exponential(spin * t[:, None] * np.array([0.0, 0.0, 1.0]))
     tilt = exponential(np.array([half, 0.0, 0.0]))
     rates = spin * np.column_stack(
         [-math.sin(half) * np.sin(spin * t), math.sin(half) * np.cos(spin * t), np.full_like(t, math.cos(half) - 1)]
     )
-    return rates, quaternion_product(quaternion_product(about, tilt), conjugate_quaternion(about))
+    return rates, quaternion_product(
+        quaternion_product(turn_about_vertical, tilt), conjugate_quaternion(turn_about_vertical)
+    )
 
 
 def largest_angle(first: np.ndarray, other_attitudes: np.ndarray) -> float:
@@ -41,11 +45,11 @@ def largest_angle(first: np.ndarray, other_attitudes: np.ndarray) -> float:
     return float(np.abs(rotation_vector(quaternion_product(conjugate_quaternion(first), other_attitudes))).max())
 
 
-def attitude_errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
+def attitude_errors(rates: np.ndarray, sample_period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
     """Rotations (paths, 4) between true and noisy attitude at the end, for noisy paths of one true motion."""
-    true = true_attitude(rates, period, START_ATTITUDE)[-1]
+    true = true_attitude(rates, sample_period, START_ATTITUDE)[-1]
     chunks = [range(first, min(first + PATHS_IN_MEMORY, paths)) for first in range(0, paths, PATHS_IN_MEMORY)]
-    ends = [measured_attitude(rates, period, deviation, START_ATTITUDE, chunk, SEED)[-1] for chunk in chunks]
+    ends = [measured_attitude(rates, sample_period, deviation, START_ATTITUDE, chunk, SEED)[-1] for chunk in chunks]
     return error_rotation(np.concatenate(ends), true)
 
 

@@ -47,23 +47,25 @@ JUDGED_BAND = 15.0
 """Hz, up to which the artificial moment is judged."""
 
 
-def at_period(deviation: float, period: float) -> float:
+def at_period(deviation: float, sample_period: float) -> float:
     """Standard deviation per sample at a sampling period, such that the noise intensity is that of ``deviation`` at 1
     kHz."""
-    return deviation * float(np.sqrt(1e-3 / period))
+    return deviation * float(np.sqrt(1e-3 / sample_period))
 
 
 @cache
-def measured_drive(folder: Path, duration: float, period: float) -> Result:
-    """Virtual measurement on the study road with rows ``period`` (s) apart; its files are written to the folder."""
-    path = simulate(road_scene(step=min(period, 1e-3) / 2, duration=duration), "reference")
-    write_measurement(path, folder, period)
-    return path.every(period)
+def measured_drive(folder: Path, duration: float, sample_period: float) -> Result:
+    """Virtual measurement on the study road with rows ``sample_period`` (s) apart; its files are written to the
+    folder.
+    """
+    path = simulate(road_scene(step=min(sample_period, 1e-3) / 2, duration=duration), "reference")
+    write_measurement(path, folder, sample_period)
+    return path.every(sample_period)
 
 
-def force_deviation(true: Result) -> float:
+def force_deviation(true_run: Result) -> float:
     """Standard deviation of the force noise: 0.2 % of the largest wheel force (N)."""
-    return FORCE_NOISE_SHARE * float(max(np.abs(true["f1"]).max(), np.abs(true["f2"]).max()))
+    return FORCE_NOISE_SHARE * float(max(np.abs(true_run["f1"]).max(), np.abs(true_run["f2"]).max()))
 
 
 def driven_vehicle(
@@ -81,10 +83,10 @@ def noise_of(deviation: float, seed: int) -> dict[str, Any]:
     return {"force_noise": {"deviation": deviation, "seed": seed}}
 
 
-def free_run(assembly: Assembly, duration: float, period: float) -> np.ndarray:
-    """States (n, 8) of a run without stabiliser in the reference, ``period`` (s) apart."""
+def free_run(assembly: Assembly, duration: float, sample_period: float) -> np.ndarray:
+    """States (n, 8) of a run without stabiliser in the reference, ``sample_period`` (s) apart."""
     states = build("reference", assembly, Settings("RK4", 1e-3, duration)).run().states
-    return states[:: round(period / 1e-3)]
+    return states[:: round(sample_period / 1e-3)]
 
 
 def consistency(folder: Path, duration: float, seed: int, scales: dict[str, tuple[float, float]]) -> dict[str, Any]:
@@ -100,11 +102,11 @@ def consistency(folder: Path, duration: float, seed: int, scales: dict[str, tupl
     p, start = clean.parameters, clean.initial.copy()
     start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
     states = free_run(replace(clean, initial=start), duration, COARSE_PERIOD)
-    seen = states[:, 3] + angle * normal_samples(seed, 0, len(states), 1, source=PITCH_SENSOR)[:, 0]
+    measured_pitch = states[:, 3] + angle * normal_samples(seed, 0, len(states), 1, source=PITCH_SENSOR)[:, 0]
     noisy = assembly_of_scene(driven_vehicle(folder, duration, noise_of(force, seed)))
     figures = {}
     for name, (q, r) in scales.items():
-        measurement = Measurement(seen[:, None], COARSE_PERIOD, (PITCH,), (angle * np.sqrt(r),))
+        measurement = Measurement(measured_pitch[:, None], COARSE_PERIOD, (PITCH,), (angle * np.sqrt(r),))
         filtered = estimate(noisy, measurement, force * np.sqrt(q), start_deviation=START_DEVIATION)
         first = round(1 / COARSE_PERIOD)
         figures[name] = (
@@ -176,9 +178,9 @@ def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarr
     block = np.zeros((n + 2 * m, n + 2 * m))
     block[:n, :n], block[:n, n : n + m] = a, b
     block[n : n + m, n + m :] = np.eye(m) / COARSE_PERIOD
-    moved = expm(block * COARSE_PERIOD)
-    late = moved[:n, n + m :]
-    return moved[:n, :n], moved[:n, n : n + m] - late, late
+    transition = expm(block * COARSE_PERIOD)
+    late = transition[:n, n + m :]
+    return transition[:n, :n], transition[:n, n : n + m] - late, late
 
 
 def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> np.ndarray:
@@ -188,14 +190,14 @@ def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> n
     deviation : N, at COARSE_PERIOD. The true vehicle rests, because the interpolation of a moving estimate between its
     samples would add an error that is no noise.
     """
-    rest = assembly_of_scene(
+    rest_assembly = assembly_of_scene(
         build_scene({"title": "kalman", "vehicle": {"geometry": "linear"}, "run": {"duration": 1.0}})
     )
-    p, start, angle = rest.parameters, rest.initial, at_period(ANGLE_DEVIATION, COARSE_PERIOD)
+    p, start, angle = rest_assembly.parameters, rest_assembly.initial, at_period(ANGLE_DEVIATION, COARSE_PERIOD)
     count = round(duration / COARSE_PERIOD) + 1
     write_wheel_forces(folder, np.full(count, p.k1 * start[0]), np.full(count, p.k2 * start[1]), COARSE_PERIOD)
-    seen = start[3] + angle * normal_samples(seed, 0, count, 1, source=PITCH_SENSOR)[:, 0]
-    write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, COARSE_PERIOD)
+    measured_pitch = start[3] + angle * normal_samples(seed, 0, count, 1, source=PITCH_SENSOR)[:, 0]
+    write_time_series(folder / "read.csv", {"pitch": ("rad", measured_pitch)}, COARSE_PERIOD)
     effect = {"file": "read.csv", "force_deviation": deviation, "pitch_deviation": angle}
     noise = noise_of(deviation, seed)
     drawn = driven_vehicle(folder, duration, noise | {"kalman_filter": effect}, geometry="linear")
@@ -207,16 +209,16 @@ def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> n
     return errors[round(2 / COARSE_PERIOD) :]
 
 
-def spread_of_mean_square(step: np.ndarray, covariance: np.ndarray, count: int) -> np.ndarray:
-    """Relative standard deviation of the mean square of each error over ``count`` correlated samples.
+def spread_of_mean_square(step: np.ndarray, covariance: np.ndarray, sample_count: int) -> np.ndarray:
+    """Relative standard deviation of the mean square of each error over ``sample_count`` correlated samples.
 
     For Gaussian errors: 2/N times the sum over all lags of the squared autocorrelation.
     """
-    lags, total, carried = min(count, 2000), np.zeros(len(step)), covariance.copy()
+    lags, total, carried = min(sample_count, 2000), np.zeros(len(step)), covariance.copy()
     for lag in range(lags):
         total += (2.0 if lag else 1.0) * np.square(carried.diagonal() / covariance.diagonal())
         carried = step @ carried
-    return np.sqrt(2.0 * total / count)
+    return np.sqrt(2.0 * total / sample_count)
 
 
 def scores_of_stabilised(
@@ -225,8 +227,10 @@ def scores_of_stabilised(
     """Scores of the runs of each engine that the Kalman filter stabilises, for one noise sample: damage ratios, shares
     of the artificial moment, and pitch error."""
     true = measured_drive(folder, duration, 1e-3)
-    seen = true["pitch"] + ANGLE_DEVIATION * normal_samples(seed, 0, len(true.times), 1, source=PITCH_SENSOR)[:, 0]
-    write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, 1e-3)
+    measured_pitch = (
+        true["pitch"] + ANGLE_DEVIATION * normal_samples(seed, 0, len(true.times), 1, source=PITCH_SENSOR)[:, 0]
+    )
+    write_time_series(folder / "read.csv", {"pitch": ("rad", measured_pitch)}, 1e-3)
     force = force_deviation(true)
     effect = {
         "file": "read.csv",
@@ -242,16 +246,19 @@ INERTIA_UNCERTAINTY = 0.05
 """What the filter is told of the model: its inertia may be 5 % wrong."""
 
 
-def _scores_of_run(true: Result, run: Result) -> dict[str, float]:
-    wanted, had = (section_forces(each["f3"], each["f4"], each["pitch"]) for each in (true, run))
+def _scores_of_run(true_run: Result, run: Result) -> dict[str, float]:
+    wanted, had = (
+        section_forces(compared_run["f3"], compared_run["f4"], compared_run["pitch"])
+        for compared_run in (true_run, run)
+    )
     scores = {name: damage_ratio(had[name], wanted[name]) for name in SECTION_FORCE_CHANNELS}
-    term = PARAMETERS.I * np.gradient(true["pitch_rate"], true.times)
+    term = PARAMETERS.I * np.gradient(true_run["pitch_rate"], true_run.times)
     moments = {"pull": run["kalman_moment"], "all": run["kalman_moment"] + run["inertia_moment"]}
-    low = butter(4, JUDGED_BAND, fs=1 / float(true.times[1]), output="sos")
+    low = butter(4, JUDGED_BAND, fs=1 / float(true_run.times[1]), output="sos")
     for name, moment in moments.items():
         scores[name] = root_mean_square(moment) / root_mean_square(term)
         scores[f"{name}, band"] = root_mean_square(sosfiltfilt(low, moment)) / root_mean_square(sosfiltfilt(low, term))
-    scores["pitch"] = float(np.abs(run["pitch"] - true["pitch"]).max())
+    scores["pitch"] = float(np.abs(run["pitch"] - true_run["pitch"]).max())
     scores["inertia"] = float(run["inertia_share"][-1])
     return scores
 
@@ -269,8 +276,8 @@ def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
     force, gyro = at_period(force_deviation(true), COARSE_PERIOD), at_period(GYRO_DEVIATION, COARSE_PERIOD)
     assembly = assembly_of_scene(driven_vehicle(folder, duration, noise_of(force, seed)))
     clean = true.states
-    seen = clean[:, 7] + gyro * normal_samples(seed, 0, len(clean), 1, source=PITCH_SENSOR)[:, 0]
-    estimated = estimate(assembly, Measurement(seen[:, None], COARSE_PERIOD, (PITCH_RATE,), (gyro,)), force)
+    measured_rate = clean[:, 7] + gyro * normal_samples(seed, 0, len(clean), 1, source=PITCH_SENSOR)[:, 0]
+    estimated = estimate(assembly, Measurement(measured_rate[:, None], COARSE_PERIOD, (PITCH_RATE,), (gyro,)), force)
     p, sure = assembly.parameters, np.sqrt(estimated.errors()[:, PITCH, PITCH])
     inertia = p.I + p.m1 * p.b**2 + p.m2 * p.a**2
     growth = root_mean_square(true["pitch_rate"]) * np.sqrt(p.I / inertia)
@@ -315,13 +322,13 @@ def with_gaps(
         effect[key] = deviations[column]
     write_time_series(folder / "read.csv", table, COARSE_PERIOD)
     run = simulate(driven_vehicle(folder, duration, noise_of(force, seed) | {"kalman_filter": effect}), "reference")
-    every = round(COARSE_PERIOD / 1e-3)
-    wrong = run["pitch_estimate"][::every] - clean[:, 3]
-    sure = run["pitch_deviation"][::every]
+    stride = round(COARSE_PERIOD / 1e-3)
+    wrong = run["pitch_estimate"][::stride] - clean[:, 3]
+    sure = run["pitch_deviation"][::stride]
     return {
         "error by deviation": float(np.abs(wrong[1:] / sure[1:]).max()),
         "error": float(np.abs(wrong).max()),
-        "run's error": float(np.abs(run["pitch"][::every] - clean[:, 3]).max()),
+        "run's error": float(np.abs(run["pitch"][::stride] - clean[:, 3]).max()),
         "deviation": float(sure.max()),
         "miscounted": float(abs(run["kalman_missed"][-1] - lost.sum() * len(columns))),
         "missed": float(run["kalman_missed"][-1]),

@@ -79,14 +79,16 @@ class Swing:
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
         """Times and values of the solution, and number of force calls."""
         n = round(duration / setting.value)
-        places, weights = METHOD_STAGES.get(setting.method, METHOD_STAGES["Euler"])
+        stage_positions, weights = METHOD_STAGES.get(setting.method, METHOD_STAGES["Euler"])
         values = [1.0]
         for i in range(n):
-            values.append(_step(i * setting.value, values[-1], setting.value, places, weights))
-        CLOCK.now += CALL_SECONDS * len(places) * n
-        times = setting.value * np.arange(n + 1)
-        swing = np.where(times < 0.1, np.exp(np.sin(times)), np.nan) if setting.method == "broken" else values
-        return times, np.array(swing), len(places) * n
+            values.append(_step(i * setting.value, values[-1], setting.value, stage_positions, weights))
+        CLOCK.now += CALL_SECONDS * len(stage_positions) * n
+        sample_times = setting.value * np.arange(n + 1)
+        swing = (
+            np.where(sample_times < 0.1, np.exp(np.sin(sample_times)), np.nan) if setting.method == "broken" else values
+        )
+        return sample_times, np.array(swing), len(stage_positions) * n
 
     def answer(self, solution: tuple[np.ndarray, np.ndarray, int]) -> PricedRun:
         """The quantity y of a solution."""
@@ -98,19 +100,19 @@ class Swing:
         return [setting.label()]
 
 
-def _step(t: float, y: float, h: float, places: tuple[float, ...], weights: tuple[float, ...]) -> float:
+def _step(t: float, y: float, step: float, stage_positions: tuple[float, ...], weights: tuple[float, ...]) -> float:
     slope = total = 0.0
-    for place, weight in zip(places, weights, strict=True):
-        slope = (y + place * h * slope) * math.cos(t + place * h)
+    for stage_position, weight in zip(stage_positions, weights, strict=True):
+        slope = (y + stage_position * step * slope) * math.cos(t + stage_position * step)
         total += weight * slope
-    return y + h * total
+    return y + step * total
 
 
 @cache
 def _error(setting: Setting) -> float:
     """True error over the complete run; infinite if a value is not finite."""
-    times, values, _ = Swing().solve(setting, Swing.whole)
-    worst = float(np.abs(values - np.exp(np.sin(times))).max())
+    sample_times, values, _ = Swing().solve(setting, Swing.whole)
+    worst = float(np.abs(values - np.exp(np.sin(sample_times))).max())
     return worst if math.isfinite(worst) else math.inf
 
 
@@ -135,16 +137,17 @@ def _choice_for(tolerance: float) -> Recommendation:
 
 
 def _largest_winner(
-    size: Callable[[SettingChoice, float], float], kind: str = "", tolerances: tuple[float, ...] = (TIGHT_TOLERANCE,)
+    size_of: Callable[[SettingChoice, float], float], kind: str = "", tolerances: tuple[float, ...] = (TIGHT_TOLERANCE,)
 ) -> float:
-    """Largest ``size`` among the recommended settings of one kind of cost, over all tolerances; infinite where none is
-    recommended."""
+    """Largest ``size_of`` among the recommended settings of one kind of cost, over all tolerances; infinite where none
+    is recommended.
+    """
     return max(
         max(
             (
-                size(choice, tolerance)
-                for (_, by), choice in _choice_for(tolerance).winners.items()
-                if by.startswith(kind)
+                size_of(choice, tolerance)
+                for (_, cost_kind), choice in _choice_for(tolerance).winners.items()
+                if cost_kind.startswith(kind)
             ),
             default=math.inf,
         )
@@ -194,19 +197,19 @@ def _in_module(name: str, change: Callable[[Any], Any], module: str = "recommend
 def _tenfold_smaller_errors(original: Any) -> Any:
     """Fault: errors of the recommended settings are reported ten times too small."""
 
-    def told(*arguments: Any) -> Any:
+    def planted(*arguments: Any) -> Any:
         known, timed, winners = original(*arguments)
         return known, timed, {key: replace(choice, error=choice.error / 10.0) for key, choice in winners.items()}
 
-    return told
+    return planted
 
 
-def _by_error(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
-    return min(timed, key=lambda choice: choice.error, default=None)
+def _by_error(timed_choices: list[SettingChoice], engine: str, cost_kind: str) -> SettingChoice | None:
+    return min(timed_choices, key=lambda choice: choice.error, default=None)
 
 
-def _dearest_choice(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
-    return max(timed, key=lambda choice: choice.calls, default=None)
+def _dearest_choice(timed_choices: list[SettingChoice], engine: str, cost_kind: str) -> SettingChoice | None:
+    return max(timed_choices, key=lambda choice: choice.calls, default=None)
 
 
 def _mean_error(self: ReferenceTruth, other_answer: PricedRun) -> float:
@@ -220,7 +223,7 @@ def _numbers_alone(self: ReferenceTruth, other_answer: PricedRun) -> float:
 
 
 def _first_rung(
-    scene: Any, ladder: SettingLadder, tolerance: float, duration: float, rung: int, executor: object
+    scene: Any, ladder: SettingLadder, tolerance: float, duration: float, first_rung: int, executor: object
 ) -> Any:
     return scene.answer(scene.solve(ladder.setting(0), duration)), 0, 0.0, 0.0, {}
 

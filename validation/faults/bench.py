@@ -123,8 +123,8 @@ class Bench:
 
     def _swell(self, frequency: float) -> np.ndarray:
         """Samples that rise smoothly from 0 to 1 and fall back, periodically with a frequency in rad/s."""
-        times = SAMPLING_PERIOD * np.arange(round(self.duration / SAMPLING_PERIOD) + 4)
-        return 0.5 * (1 - np.cos(frequency * times))
+        sample_times = SAMPLING_PERIOD * np.arange(round(self.duration / SAMPLING_PERIOD) + 4)
+        return 0.5 * (1 - np.cos(frequency * sample_times))
 
     def _forces(self) -> np.ndarray:
         """Wheel forces (n, 2) in N: the static ones, raised periodically by up to 20 % in front and 15 % behind."""

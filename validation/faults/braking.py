@@ -97,8 +97,8 @@ def _hysteresis_area_error() -> float:
     brakes = brake.of_wheels(brake.Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
     pressures = np.concatenate((np.linspace(0.0, 5.0, 401), np.linspace(5.0, 0.0, 401)))
     torques = brake.torques_of_pressures(pressures, brakes)
-    top, down = 1400.0 * 4.2, 1500.0
-    left = 0.3 + top / down
+    top, released_torque = 1400.0 * 4.2, 1500.0
+    left = 0.3 + top / released_torque
     wanted = 0.5 * top * (left - 0.3) + top * (5.0 - left) - 0.5 * top * 4.2
     return float(abs(-np.trapezoid(torques, pressures) / wanted - 1.0))
 
@@ -152,7 +152,7 @@ def _truck_patch(**change: Callable[[np.ndarray], np.ndarray]) -> Patch:
 
 
 def _changed_plane(plane: Plane, change: dict[str, Callable[[np.ndarray], np.ndarray]]) -> Plane:
-    parts: dict[str, Any] = {name: of(getattr(plane, name)) for name, of in change.items()}
+    parts: dict[str, Any] = {name: change_field(getattr(plane, name)) for name, change_field in change.items()}
     return plane._replace(**parts)
 
 
@@ -163,17 +163,21 @@ def _brakes_patch(change: Callable[[Any], Any]) -> Patch:
 def _force_of_step_start(original: Any) -> Any:
     """Fault: each step of the vehicle uses the tyre force at the step's start."""
 
-    def stop(quarter: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
-        way = stopping_distance(LITERAL, quarter, tyre[0], torque, speed, STEP)[0]
-        none = np.zeros(2)
-        return QuarterStop(QuarterPath(none, np.array([0.0, way]), np.array([speed, 0.0]), none, none), 1)
+    def stop(quarter_car: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
+        distance = stopping_distance(LITERAL, quarter_car, tyre[0], torque, speed, STEP)[0]
+        zeros = np.zeros(2)
+        return QuarterStop(QuarterPath(zeros, np.array([0.0, distance]), np.array([speed, 0.0]), zeros, zeros), 1)
 
     return stop
 
 
-def _tables_patch(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+def _tables_patch(stacked_tables: Callable[[np.ndarray], np.ndarray]) -> Patch:
     def stacked(original: Any) -> Any:
-        return lambda tables: (lambda of: of._replace(mu_x=np.ascontiguousarray(change(of.mu_x))))(original(tables))
+        return lambda tables: (
+            lambda stacked_tables: stacked_tables._replace(
+                mu_x=np.ascontiguousarray(stacked_tables(stacked_tables.mu_x))
+            )
+        )(original(tables))
 
     return attribute_patch("models.tyre.tyre_table:stacked_tables", stacked)
 
@@ -195,7 +199,7 @@ def _spin_inertia_patch(factor: float) -> Patch:
 
 def _one_bit_less(original: Any) -> Any:
     """Fault: a signal is converted with one bit less than stated."""
-    return lambda table, *rest: original(table.model_copy(update={"bits": table.bits - 1}), *rest)
+    return lambda table, *further: original(table.model_copy(update={"bits": table.bits - 1}), *further)
 
 
 FAULTS = (

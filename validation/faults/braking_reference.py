@@ -27,10 +27,10 @@ DIFFERENCE_BOUND = 1e-10
 
 
 def _law_difference_check(
-    sides: Callable[[int], tuple[np.ndarray, np.ndarray]], count: int = 60
+    sides: Callable[[int], tuple[np.ndarray, np.ndarray]], state_count: int = 60
 ) -> Callable[[], float]:
-    """Check's function: largest difference between compiled and plain code at ``count`` states."""
-    return lambda: laws.largest_difference(*sides(count))
+    """Check's function: largest difference between compiled and plain code at ``state_count`` states."""
+    return lambda: laws.largest_difference(*sides(state_count))
 
 
 def _accelerations() -> float:
@@ -83,10 +83,11 @@ def _table(change: Callable[[Handling], None]) -> Patch:
     return attribute_patch("models.brake.sprung:Handling", packed)
 
 
-def _section_rows(handling: Handling, first: int, count: int, width: int) -> np.ndarray:
-    """View of the rows (count, width) of one section of the car's table; ``first`` and ``count`` are the places in the
-    table's head that hold its start and number of rows."""
-    begin, rows = int(handling.numbers[first]), int(handling.numbers[count])
+def _section_rows(handling: Handling, first: int, count_index: int, width: int) -> np.ndarray:
+    """View of the rows (count_index, width) of one section of the car's table; ``first`` and ``count_index`` are the
+    places in the table's head that hold its start and number of rows.
+    """
+    begin, rows = int(handling.numbers[first]), int(handling.numbers[count_index])
     return handling.numbers[begin : begin + width * rows].reshape(rows, width)
 
 
@@ -146,7 +147,7 @@ def _first_larger(values: dict[str, float]) -> dict[str, float]:
 
 def _march_patch(change: Callable[[Any, Any, np.ndarray, np.ndarray], Any]) -> Patch:
     """Patch of an engine's step under constant tyre forces; change(step, engine, q, v) replaces it."""
-    return attribute_patch("models.brake.sprung_step:march", lambda real: lambda *given: change(real, *given))
+    return attribute_patch("models.brake.sprung_step:march", lambda real: lambda *arguments: change(real, *arguments))
 
 
 def _euler_step(march: Any, engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
@@ -187,16 +188,16 @@ def _with_friction(tables: Tables, change: Callable[[Tables], tuple[np.ndarray, 
 
 def _heavy_wheel(original: Any) -> Any:
     """Fault: a wheel's inertia is 1 % too large."""
-    return lambda tables, under, motion, load, of: original(
-        tables, under, motion, load, replace(of, inertia=1.01 * of.inertia)
+    return lambda tables, under, motion, load, braked: original(
+        tables, under, motion, load, replace(braked, inertia=1.01 * braked.inertia)
     )
 
 
 def _other_share(original: Any) -> Any:
     """Fault: the shares of the first and second stretch of road are exchanged."""
 
-    def under(*given: Any) -> np.ndarray:
-        surface: np.ndarray = original(*given)
+    def under(*arguments: Any) -> np.ndarray:
+        surface: np.ndarray = original(*arguments)
         mixed = surface[:, 0] != surface[:, 1]
         surface[mixed, 2] = 1.0 - surface[mixed, 2]
         return surface
@@ -207,9 +208,9 @@ def _other_share(original: Any) -> Any:
 def _more_torque(original: Any) -> Any:
     """Fault: torques are 1 % too large."""
 
-    def planted(*given: Any) -> None:
-        original(*given)
-        given[-1][:] *= 1.01
+    def planted(*arguments: Any) -> None:
+        original(*arguments)
+        arguments[-1][:] *= 1.01
 
     return planted
 
@@ -217,9 +218,9 @@ def _more_torque(original: Any) -> Any:
 def _late_torque(original: Any) -> Any:
     """Fault: torques at a step's end are those at its start."""
 
-    def planted(*given: Any) -> None:
-        original(*given)
-        given[-1][1:] = given[-1][:-1].copy()
+    def planted(*arguments: Any) -> None:
+        original(*arguments)
+        arguments[-1][1:] = arguments[-1][:-1].copy()
 
     return planted
 
@@ -227,9 +228,9 @@ def _late_torque(original: Any) -> Any:
 def _quick_valves(original: Any) -> Any:
     """Fault: valves have no delay within a sample."""
 
-    def planted(states: Any, sample: Any, air: Any, chambers: Any, *rest: Any) -> None:
+    def planted(states: Any, sample: Any, air: Any, chambers: Any, *further: Any) -> None:
         whole_samples = sample * int(chambers.delay / sample)
-        original(states, sample, air, chambers._replace(delay=whole_samples), *rest)
+        original(states, sample, air, chambers._replace(delay=whole_samples), *further)
 
     return planted
 
@@ -241,19 +242,21 @@ def _longer_relaxation(original: Any) -> Any:
 
 def _relaxation_patch(change: Callable[..., tuple[Any, ...]]) -> Patch:
     """Patch that changes how the slip lag of tyres is advanced on a suspension."""
-    return attribute_patch("models.brake.sprung_relaxation:relax", lambda real: lambda *given: real(*change(*given)))
+    return attribute_patch(
+        "models.brake.sprung_relaxation:relax", lambda real: lambda *arguments: real(*change(*arguments))
+    )
 
 
-def _half_as_far(contacts: Any, half: float, *rest: Any) -> tuple[Any, ...]:
+def _half_as_far(contacts: Any, half: float, *further: Any) -> tuple[Any, ...]:
     """Fault: the lag is advanced without the half of the step before."""
-    lag = rest[1]
+    lag = further[1]
     lag.behind[0] = 0.0
-    return contacts, half, *rest
+    return contacts, half, *further
 
 
-def _faster_lag(contacts: Any, *rest: Any) -> tuple[Any, ...]:
+def _faster_lag(contacts: Any, *further: Any) -> tuple[Any, ...]:
     """Fault: the lag is advanced by speeds along the wheels that are 1 % too large."""
-    return contacts._replace(along=1.01 * contacts.along), *rest
+    return contacts._replace(along=1.01 * contacts.along), *further
 
 
 PLAIN_BENCH_MODULE, COMPILED_MODULE = "validation.braking.plain_brakes", "validation.braking.compiled_brakes"

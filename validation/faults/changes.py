@@ -26,9 +26,9 @@ def vehicle(change: Callable[[Vehicle], Vehicle]) -> Change:
 def replaced_struts(change: Callable[[Strut, dict[str, Strut]], Strut]) -> Change:
     """Fault: change(strut, struts) replaces each strut; it knows all struts of the vehicle by name."""
 
-    def changed(original: Vehicle) -> Vehicle:
-        named = {strut.name: strut for strut in original.struts}
-        return replace(original, struts=tuple(change(strut, named) for strut in original.struts))
+    def changed(original_vehicle: Vehicle) -> Vehicle:
+        named = {strut.name: strut for strut in original_vehicle.struts}
+        return replace(original_vehicle, struts=tuple(change(strut, named) for strut in original_vehicle.struts))
 
     return vehicle(changed)
 
@@ -36,9 +36,9 @@ def replaced_struts(change: Callable[[Strut, dict[str, Strut]], Strut]) -> Chang
 def bodies(change: Callable[[Body, dict[str, Body]], Body]) -> Change:
     """Fault: change(body, bodies) replaces each body; it knows all bodies of the vehicle by name."""
 
-    def changed(original: Vehicle) -> Vehicle:
-        named = {body.name: body for body in original.bodies}
-        return replace(original, bodies=tuple(change(body, named) for body in original.bodies))
+    def changed(original_vehicle: Vehicle) -> Vehicle:
+        named = {body.name: body for body in original_vehicle.bodies}
+        return replace(original_vehicle, bodies=tuple(change(body, named) for body in original_vehicle.bodies))
 
     return vehicle(changed)
 
@@ -48,12 +48,12 @@ def with_moved_points(position_of: Callable[[float, float, float], float]) -> Ch
 
     def changed(assembly: Assembly) -> Assembly:
         p, changed_vehicle = assembly.parameters, assembly.vehicle
-        held = tuple(
+        moved_struts = tuple(
             replace(strut, upper=_point_moved_to(strut.upper, position_of(strut.upper.x, p.a, p.b)))
             for strut in changed_vehicle.struts
         )
         axles = tuple(replace(axle, x=position_of(axle.x, p.a, p.b)) for axle in changed_vehicle.axles)
-        return replace(assembly, vehicle=replace(changed_vehicle, struts=held, axles=axles))
+        return replace(assembly, vehicle=replace(changed_vehicle, struts=moved_struts, axles=axles))
 
     return changed
 
@@ -84,8 +84,8 @@ def undamped_tyre(strut: Strut, struts: dict[str, Strut]) -> Strut:
 
 def swapped_wheel(body: Body, bodies: dict[str, Body]) -> Body:
     """Fault: a wheel has the mass of the other wheel."""
-    other = {"wheel1": "wheel2", "wheel2": "wheel1"}.get(body.name, body.name)
-    return replace(body, mass=bodies[other].mass)
+    other_wheel = {"wheel1": "wheel2", "wheel2": "wheel1"}.get(body.name, body.name)
+    return replace(body, mass=bodies[other_wheel].mass)
 
 
 def mixed_inertia(body: Body, bodies: dict[str, Body]) -> Body:
@@ -98,8 +98,8 @@ def inertia_about_axle(assembly: Assembly) -> Assembly:
     b = assembly.parameters.b
 
     def change(body: Body, bodies: dict[str, Body]) -> Body:
-        about = None if body.pitch_inertia is None else body.pitch_inertia + body.mass * b**2
-        return replace(body, pitch_inertia=about)
+        axle_inertia = None if body.pitch_inertia is None else body.pitch_inertia + body.mass * b**2
+        return replace(body, pitch_inertia=axle_inertia)
 
     return bodies(change)(assembly)
 
@@ -130,9 +130,9 @@ class AlteredSignal:
     def __getattr__(self, name: str) -> Any:
         return getattr(self.signal, name)
 
-    def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values at start + i step, shape (count, channels)."""
-        return self.change(self.signal.sample(start - self.late, step, count))
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values at start_time + i step, shape (sample_count, channels)."""
+        return self.change(self.signal.sample(start_time - self.late, step, sample_count))
 
     def at(self, time: float) -> np.ndarray:
         """Values at one time (s), shape (channels,)."""
@@ -143,9 +143,9 @@ class AlteredSignal:
 class HeldStages(AlteredSignal):
     """Fault: a signal's value in the middle of a step is that at the step's start."""
 
-    def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values (count, channels) at start + i step, where every second one repeats the one before."""
-        values = self.signal.sample(start, step, count)
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values (sample_count, channels) at start_time + i step, where every second one repeats the one before."""
+        values = self.signal.sample(start_time, step, sample_count)
         values[1::2] = values[:-1:2]
         return values
 
@@ -154,9 +154,11 @@ class HeldStages(AlteredSignal):
 class OtherTrack(AlteredSignal):
     """Fault: the road is one track instead of the mean of both; it differs from the mean by a class A road."""
 
-    def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values (count, 4) of the road at start + i step: heights, then their rates."""
-        return self.signal.sample(start, step, count) + self._other_profile().sample(start, step, count)
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values (sample_count, 4) of the road at start_time + i step: heights, then their rates."""
+        return self.signal.sample(start_time, step, sample_count) + self._other_profile().sample(
+            start_time, step, sample_count
+        )
 
     def at(self, time: float) -> np.ndarray:
         """Road at one time (s), shape (4,): heights under the front and the rear wheel (m), then their rates (m/s)."""
@@ -186,10 +188,10 @@ def multiplied_channels(factors: dict[int, float]) -> Values:
     """Function that multiplies some channels, given by number, by a factor; other channels stay."""
 
     def change(values: np.ndarray) -> np.ndarray:
-        out = values.copy()
+        changed_values = values.copy()
         for channel, factor in factors.items():
-            out[:, channel] *= factor
-        return out
+            changed_values[:, channel] *= factor
+        return changed_values
 
     return change
 

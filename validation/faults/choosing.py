@@ -119,17 +119,17 @@ CHECKS = {
 
 
 def _other_sign(original: Any) -> Any:
-    def predicted(screen: LinearScreen, reduced: Any) -> np.ndarray:
-        C = screen.base.system.C[screen.rows]
-        full = np.einsum("ki,ij,kj->k", C, screen.P, C)
-        return np.maximum(2 * full - original(screen, reduced), 0.0)
+    def predicted(linear_screen: LinearScreen, reduced: Any) -> np.ndarray:
+        C = linear_screen.base.system.C[linear_screen.rows]
+        full = np.einsum("ki,ij,kj->k", C, linear_screen.P, C)
+        return np.maximum(2 * full - original(linear_screen, reduced), 0.0)
 
     return predicted
 
 
 def _any_tolerance(original: Any) -> Any:
-    def init(chooser: Any, first: Any, two: Any, quantities: Any, tolerance: float, *more: Any) -> None:
-        original(chooser, first, two, quantities, 0.9, *more)
+    def init(chooser: Any, first: Any, second_argument: Any, quantities: Any, tolerance: float, *further: Any) -> None:
+        original(chooser, first, second_argument, quantities, 0.9, *further)
 
     return init
 
@@ -138,9 +138,9 @@ def _unconfirmed_report(change: Callable[[Chooser, frozenset[str], int], np.ndar
     """Fault: predicted changes are reported as confirmed without a run."""
 
     def confirm(chooser: Chooser, omitted_effects: frozenset[str]) -> np.ndarray:
-        times = chooser.reach(omitted_effects)
-        shares = change(chooser, omitted_effects, times)
-        chooser._confirmed[omitted_effects] = times, shares, np.zeros_like(shares)
+        step_factor = chooser.reach(omitted_effects)
+        shares = change(chooser, omitted_effects, step_factor)
+        chooser._confirmed[omitted_effects] = step_factor, shares, np.zeros_like(shares)
         return shares
 
     return lambda real: confirm

@@ -18,7 +18,7 @@ from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
 
-PAIR = MaterialPair()
+MATERIAL_PAIR = MaterialPair()
 LOAD, RADIUS, FRICTION = 1e4, 0.3, 0.3
 A, B = 6e-3, 4e-3
 CELLS, CELL_LENGTH, CELL_WIDTH = (21, 31), 3.0e-4, 4.2e-4
@@ -36,13 +36,13 @@ def _ball_contact() -> tuple[float, float, float]:
 
 def _hertz_errors() -> float:
     """Errors of Hertz's theory for a ball on a plane: radius, approach, peak pressure."""
-    answer = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, LOAD, PAIR)
+    answer = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, LOAD, MATERIAL_PAIR)
     return largest_relative_difference(np.array([answer.a, answer.approach, answer.p0]) / _ball_contact(), np.ones(3))
 
 
 def _ellipse_errors() -> float:
     """Errors for an ellipse: its load against the integral of its pressure, 2/3 pi a b p0, and which axis is longer."""
-    answer = hertz.by_load(2.0, 1.0, LOAD, PAIR)
+    answer = hertz.by_load(2.0, 1.0, LOAD, MATERIAL_PAIR)
     balanced = abs(float(2.0 / 3.0 * np.pi * answer.a * answer.b * answer.p0) / LOAD - 1.0)
     return balanced if answer.b > answer.a else np.inf
 
@@ -50,7 +50,7 @@ def _ellipse_errors() -> float:
 def _normal_solution() -> NormalSolution:
     y, x = centres(CELLS[0], CELL_WIDTH), centres(CELLS[1], CELL_LENGTH)
     away = (x**2 + y[:, None] ** 2) / (2.0 * RADIUS)
-    return normal_problem.solve_normal(away, CELL_LENGTH, CELL_WIDTH, PAIR, load=LOAD)
+    return normal_problem.solve_normal(away, CELL_LENGTH, CELL_WIDTH, MATERIAL_PAIR, load=LOAD)
 
 
 def _normal_solution_errors() -> float:
@@ -75,13 +75,15 @@ def _kalker_errors() -> float:
 def _against_linear_theory() -> float:
     """Errors of forces on an ellipse with 41 cells at small creepages, against the linear theory."""
     motion = (1e-7, 0.7e-7, 2e-5)
-    answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, FRICTION, *motion), PAIR, cells=41)
-    return largest_relative_difference(np.array([answer.fx, answer.fy]), np.array(forces(A, B, *motion, PAIR)[:2]))
+    answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, FRICTION, *motion), MATERIAL_PAIR, cells=41)
+    return largest_relative_difference(
+        np.array([answer.fx, answer.fy]), np.array(forces(A, B, *motion, MATERIAL_PAIR)[:2])
+    )
 
 
 def _sliding_errors() -> float:
     """Errors in gross sliding: force against mu N, and its direction."""
-    answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, FRICTION, 0.03, 0.04, 0.0), PAIR)
+    answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, FRICTION, 0.03, 0.04, 0.0), MATERIAL_PAIR)
     return largest_relative_difference(np.array([answer.fx, answer.fy]), -FRICTION * LOAD * np.array([0.6, 0.8]))
 
 
@@ -89,20 +91,20 @@ def _theory_difference() -> float:
     """Difference between exact theory and FASTSIM for contacts that slip in part, divided by mu N."""
     pressed, a = _normal_solution(), _ball_contact()[0]
     motion = (1.2e-3, -0.8e-3, 0.2)
-    exact = rolling_problem.solve_rolling(pressed, FRICTION, *motion, PAIR)
-    answer = creep.fastsim(creep.RollingEllipse(a, a, LOAD, FRICTION, *motion), PAIR)
+    exact = rolling_problem.solve_rolling(pressed, FRICTION, *motion, MATERIAL_PAIR)
+    answer = creep.fastsim(creep.RollingEllipse(a, a, LOAD, FRICTION, *motion), MATERIAL_PAIR)
     return float(np.hypot(exact.fx - answer.fx, exact.fy - answer.fy) / (FRICTION * LOAD))
 
 
 @cache
 def _forces_at_small_creepage() -> Array:
     a = _ball_contact()[0]
-    return np.array(forces(a, a, 2e-5, 1e-5, 0.0, PAIR)[:2])
+    return np.array(forces(a, a, 2e-5, 1e-5, 0.0, MATERIAL_PAIR)[:2])
 
 
 def _exact_against_linear() -> float:
     """Difference between the exact theory at small creepages and the linear theory."""
-    exact = rolling_problem.solve_rolling(_normal_solution(), FRICTION, 2e-5, 1e-5, 0.0, PAIR)
+    exact = rolling_problem.solve_rolling(_normal_solution(), FRICTION, 2e-5, 1e-5, 0.0, MATERIAL_PAIR)
     return largest_relative_difference(np.array([exact.fx, exact.fy]), _forces_at_small_creepage())
 
 
@@ -122,12 +124,12 @@ def _contacts_patch(change: Callable[[Array], None]) -> Patch:
     """Patch that changes FASTSIM's input CONTACT (n,) in place."""
 
     def contacts(original: Any) -> Any:
-        def made(*given: Any) -> Any:
+        def planted(*given: Any) -> Any:
             answer, shape = original(*given)
             change(answer)
             return answer, shape
 
-        return made
+        return planted
 
     return attribute_patch("models.contact.fastsim:contacts_of", contacts)
 
@@ -139,9 +141,9 @@ def _multiplication_patch(name: str, factor: float) -> Patch:
     return _contacts_patch(change)
 
 
-def _exchange_patch(first: str, second: str) -> Patch:
+def _exchange_patch(first_field: str, second_field: str) -> Patch:
     def change(contacts: Array) -> None:
-        contacts[first], contacts[second] = contacts[second].copy(), contacts[first].copy()
+        contacts[first_field], contacts[second_field] = contacts[second_field].copy(), contacts[first_field].copy()
 
     return _contacts_patch(change)
 

@@ -31,10 +31,12 @@ def fault_map(
     for axis, (vehicle, values) in zip(np.atleast_1d(axes), ratios.items(), strict=True):
         image = _draw_cells(axis, np.array(values), checks)
         axis.set_title(titles[vehicle])
-    first, last = np.atleast_1d(axes)[[0, -1]]
-    first.set_yticks(range(len(faults)), faults, fontsize=SMALL_TEXT)
+    first_axis, last_axis = np.atleast_1d(axes)[[0, -1]]
+    first_axis.set_yticks(range(len(faults)), faults, fontsize=SMALL_TEXT)
     for row in np.flatnonzero(hidden):
-        last.text(len(checks) / 2 - 0.5, row, "hidden", ha="center", va="center", fontsize=SMALL_TEXT, color="#b03000")
+        last_axis.text(
+            len(checks) / 2 - 0.5, row, "hidden", ha="center", va="center", fontsize=SMALL_TEXT, color="#b03000"
+        )
     bar = figure.colorbar(image, ax=axes, shrink=0.4, aspect=30, pad=0.01)
     bar.set_label("size of what it sees / tolerance [decades]")
     return figure

@@ -35,8 +35,8 @@ def _jacobian_difference() -> float:
 
 def _accelerations_at_rest() -> float:
     """Largest acceleration at rest under the static loads (m/s^2, rad/s^2), which should be 0."""
-    rest = np.zeros(r19().size)
-    return float(np.abs(_driven_model(static_forces(r19(), 3).hubs).acceleration(0.0, rest, rest)).max())
+    rest_state = np.zeros(r19().size)
+    return float(np.abs(_driven_model(static_forces(r19(), 3).hubs).acceleration(0.0, rest_state, rest_state)).max())
 
 
 CHECKS = {
@@ -49,12 +49,12 @@ def read(change: Callable[[np.ndarray], np.ndarray] | None = None, frame: str = 
     """Fault: wrenches (rows, hubs, 6) are changed as they are read, or read in another frame."""
 
     def table(original: Any) -> Any:
-        def made(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> Any:
+        def planted(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> Any:
             parts = hub_inputs.hubs.reshape(len(hub_inputs.hubs), -1, WRENCH)
             rows = parts if change is None else change(parts)
             return original(vehicle, replace(hub_inputs, hubs=rows.reshape(hub_inputs.hubs.shape), frame=frame), step)
 
-        return made
+        return planted
 
     return attribute_patch("models.engines.cut_vehicle:table", table)
 

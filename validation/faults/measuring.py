@@ -23,7 +23,7 @@ STANDARD_LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
 """Figure 6 of ASTM E1049-85, whose cycles are printed there: 0.5 of 3, 1.5 of 4, 0.5 of 6, 1 of 8, 0.5 of 9."""
 PRINTED_CYCLES = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
 SENSOR_PLACES = {"a": (1.2, 0.3, 0.1), "b": (-0.9, 0.5, 0.4), "c": (0.2, -0.8, -0.3), "d": (0.1, 0.2, 0.9)}
-PERIOD, SAMPLE_COUNT = 5e-3, 400
+SAMPLE_PERIOD, SAMPLE_COUNT = 5e-3, 400
 UNIT_FACTORS = {
     ("kN", "force"): 1e3,
     ("deg/s", "angular rate"): np.pi / 180,
@@ -40,7 +40,10 @@ def _stream_correlation() -> float:
         for path in (0, 1)
         for source in (noise.FORCES, noise.GYRO)
     ]
-    return max(abs(float(first @ two)) / noise.SAMPLES_PER_BLOCK**0.5 for first, two in combinations(streams, 2))
+    return max(
+        abs(float(first @ second_stream)) / noise.SAMPLES_PER_BLOCK**0.5
+        for first, second_stream in combinations(streams, 2)
+    )
 
 
 def _variance() -> float:
@@ -93,16 +96,16 @@ def _resampling_error() -> float:
     """Error, relative to the amplitude, of a 2 Hz sine resampled from 200 Hz and from 4 kHz to 1 kHz."""
     grid, worst = np.arange(1000) / 1000.0 + 0.2, 0.0
     for rate in (200.0, 4000.0):
-        times = np.arange(round(1.5 * rate)) / rate
-        values = resampling.resample_to(times, np.sin(4 * np.pi * times), 1.0 / rate, grid)
+        sample_times = np.arange(round(1.5 * rate)) / rate
+        values = resampling.resample_to(sample_times, np.sin(4 * np.pi * sample_times), 1.0 / rate, grid)
         worst = max(worst, float(np.abs(values - np.sin(4 * np.pi * grid)).max()))
     return worst
 
 
 def _points_in_gap() -> float:
     """Number of resampled points inside a gap of nine missing samples that are finite; it should be 0."""
-    times = np.delete(np.arange(100) / 100.0, np.arange(40, 49))
-    values = resampling.resample_to(times, times, 0.01, np.arange(41, 48) / 100.0)
+    sample_times = np.delete(np.arange(100) / 100.0, np.arange(40, 49))
+    values = resampling.resample_to(sample_times, sample_times, 0.01, np.arange(41, 48) / 100.0)
     return float(np.isfinite(values).sum())
 
 
@@ -118,21 +121,21 @@ def _section_force_error() -> float:
 def _turning_body() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
     """Sensors on a body that pitches and heaves: their array, readings (n, 4, 3), pitch (n,) and vertical
     acceleration."""
-    t = PERIOD * np.arange(SAMPLE_COUNT)
+    t = SAMPLE_PERIOD * np.arange(SAMPLE_COUNT)
     pitch, rate, turn = (0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t))
     heave = 2.0 * np.cos(3 * t)
-    none = np.zeros(SAMPLE_COUNT)
-    S = rotation_matrix(from_cardan(none, pitch, none))
-    felt = np.einsum("nji,nj->ni", S, np.column_stack([none, none, heave - 9.81]))
-    w, alpha = (np.column_stack([none, component, none]) for component in (rate, turn))
+    no_angles = np.zeros(SAMPLE_COUNT)
+    S = rotation_matrix(from_cardan(no_angles, pitch, no_angles))
+    felt = np.einsum("nji,nj->ni", S, np.column_stack([no_angles, no_angles, heave - 9.81]))
+    w, alpha = (np.column_stack([no_angles, component, no_angles]) for component in (rate, turn))
     return sensor_array(SENSOR_PLACES), in_space(np.array(list(SENSOR_PLACES.values())), felt, w, alpha), pitch, heave
 
 
 def _motion_errors() -> float:
     """Errors of the rates and the vertical acceleration of this body that are computed from the readings."""
     array, read, _, heave = _turning_body()
-    moved_body = body.recovered_motion(array, read, PERIOD, body.StartState(rates=(0.0, 0.6, 0.0)))
-    rate = 0.6 * np.cos(2 * PERIOD * np.arange(SAMPLE_COUNT))
+    moved_body = body.recovered_motion(array, read, SAMPLE_PERIOD, body.StartState(rates=(0.0, 0.6, 0.0)))
+    rate = 0.6 * np.cos(2 * SAMPLE_PERIOD * np.arange(SAMPLE_COUNT))
     return max(
         largest_relative_difference(moved_body.rates[:, 1], rate),
         largest_relative_difference(moved_body.acceleration[:, 2], heave),
@@ -220,8 +223,8 @@ def _readings_patch(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     )
 
 
-def _second_scaled(read: np.ndarray) -> np.ndarray:
-    return read * np.array([1.0, 1.01, 1.0, 1.0])[:, None]
+def _second_scaled(readings: np.ndarray) -> np.ndarray:
+    return readings * np.array([1.0, 1.01, 1.0, 1.0])[:, None]
 
 
 def _every_way(original: Any) -> Any:

@@ -35,9 +35,9 @@ def _in_model(change: Callable[[Any], None]) -> Patch:
     """Fault: MuJoCo's compiled model is changed after its force laws were written into it."""
 
     def set_laws(original: Any) -> Any:
-        def written(model: Any, parts: Any) -> None:
-            original(model, parts)
-            if parts:
+        def written(model: Any, native_parts: Any) -> None:
+            original(model, native_parts)
+            if native_parts:
                 change(model)
 
         return written
@@ -86,10 +86,10 @@ def _element_law_patch(**factors: float) -> Patch:
     """Fault: stiffness, damping or preload of Exudyn's first element is multiplied by a factor."""
 
     def add_parts(original: Any) -> Any:
-        def added(built: Any, node: Any, parts: Any) -> None:
-            first = parts[0].element
+        def added(built: Any, node: Any, native_parts: Any) -> None:
+            first = native_parts[0].element
             changed = replace(first, **{name: factor * getattr(first, name) for name, factor in factors.items()})
-            original(built, node, (replace(parts[0], element=changed), *parts[1:]))
+            original(built, node, (replace(native_parts[0], element=changed), *native_parts[1:]))
 
         return added
 
@@ -100,8 +100,8 @@ def _bar_factor(original: Any) -> Any:
     """Fault: the coefficient of the first coordinate in a bar is 1 % too large."""
 
     def add(self: Any, element: Any, travel: Any) -> None:
-        first, *others = travel.factors
-        scaled = replace(travel, factors=(1.01 * first, *others))
+        first, *other_factors = travel.factors
+        scaled = replace(travel, factors=(1.01 * first, *other_factors))
         original(self, element, scaled if element.name.endswith("bar") else travel)
 
     return add

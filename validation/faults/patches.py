@@ -38,19 +38,19 @@ def attribute_patch(path: str, change: Callable[[Any], Any]) -> Patch:
 def _owner_and_name(path: str) -> tuple[Any, str]:
     from importlib import import_module
 
-    module, _, rest = path.partition(":")
-    *parents, name = rest.split(".")
+    module, _, qualified_name = path.partition(":")
+    *parents, name = qualified_name.split(".")
     owner: Any = import_module(module)
     for parent in parents:
         owner = getattr(owner, parent)
     return owner, name
 
 
-def with_globals(function: Callable[..., Any], **others: Any) -> Callable[..., Any]:
+def with_globals(function: Callable[..., Any], **other_globals: Any) -> Callable[..., Any]:
     """A copy of the function with other globals; each must be one that its file has."""
-    if unknown := others.keys() - function.__globals__.keys():
+    if unknown := other_globals.keys() - function.__globals__.keys():
         raise AttributeError(f"{function.__module__} has no {', '.join(sorted(unknown))}")
-    return FunctionType(function.__code__, function.__globals__ | others, function.__name__)
+    return FunctionType(function.__code__, function.__globals__ | other_globals, function.__name__)
 
 
 # Exudyn
@@ -69,10 +69,10 @@ def index_of_the_end(original: Any) -> Any:
 def truncated_time(original: Any) -> Any:
     """Fault: in the table of half steps the row number is truncated instead of rounded."""
 
-    def reader(clock: Any, column: int, scale: float) -> Any:
+    def reader(clock: Any, column: int, time_scale: float) -> Any:
         if not clock.table:
-            return original(clock, column, scale)
-        return lambda mbs, t, load: scale * clock.table[column][int(t * clock.per_time)]
+            return original(clock, column, time_scale)
+        return lambda mbs, t, load: time_scale * clock.table[column][int(t * clock.per_time)]
 
     return reader
 
@@ -196,12 +196,12 @@ def damper_without_cosine() -> Any:
 
 def stale_state() -> Any:
     """Fault: suspension forces are computed from the state of the previous evaluation."""
-    original, before = equations.suspension, []
+    original, states_seen = equations.suspension, []
 
     def suspension(y: Any, p: Any, sine: float, cosine: float) -> Any:
-        before.append(y.copy())
-        old = before[-2] if len(before) > 1 else y
-        del before[:-1]
+        states_seen.append(y.copy())
+        old = states_seen[-2] if len(states_seen) > 1 else y
+        del states_seen[:-1]
         return original(old, p, math.sin(old[3]), math.cos(old[3]))
 
     return suspension

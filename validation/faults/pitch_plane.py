@@ -51,8 +51,8 @@ def _error_ratios(fault: EngineFault, benches: list[Bench]) -> Saved:
         }
         for bench in benches
     }
-    place = next((name for name, group in FAULTS_BY_PLACE.items() if fault in group), "nowhere")
-    return {"fault": fault.name, "place": place, "engines": fault.engines, "ratios": ratios}
+    place_of_fault = next((name for name, group in FAULTS_BY_PLACE.items() if fault in group), "nowhere")
+    return {"fault": fault.name, "place": place_of_fault, "engines": fault.engines, "ratios": ratios}
 
 
 def _error_ratio(fault: EngineFault, engine: str, name: str, bench: Bench) -> float | None:
@@ -89,10 +89,10 @@ def is_caught(record: Saved, vehicle: str = ASYMMETRIC_SET) -> bool:
     return all(any(ratio is None or ratio > 1 for ratio in ratios.values()) for ratios in engines)
 
 
-def rows(data: Saved) -> list[Row]:
+def rows(case_data: Saved) -> list[Row]:
     """Rows: faults caught, false alarms, faults that the symmetric vehicle hides (if both vehicles ran), and faults
     that only one check catches."""
-    clean, faulty = data["clean"], data["faults"]
+    clean, faulty = case_data["clean"], case_data["faults"]
     alarms = sum(
         ratio is None or ratio > 1
         for record in clean
@@ -101,7 +101,9 @@ def rows(data: Saved) -> list[Row]:
         for ratio in ratios.values()
     )
     single = [record for record in faulty if sum(is_seen(record, name) for name in CHECKS) == 1]
-    told = [f"{record['fault']} ({next(name for name in CHECKS if is_seen(record, name))})" for record in single]
+    single_catches = [
+        f"{record['fault']} ({next(name for name in CHECKS if is_seen(record, name))})" for record in single
+    ]
     return [
         Observed(
             "planted.caught",
@@ -119,16 +121,18 @@ def rows(data: Saved) -> list[Row]:
             alarms,
             "alarms",
         ).within(0, 0, "a check that cries without a fault is no check", "native"),
-        *([_hidden_faults_row(faulty)] if _has_symmetric_vehicle(data) else []),
+        *([_hidden_faults_row(faulty)] if _has_symmetric_vehicle(case_data) else []),
         Observed(
             "planted.single", FAULT_SYSTEM, "planted faults that a single check catches", len(single), "faults"
-        ).beside("few", "what would pass if that check were dropped: " + (", ".join(told) or "none"), "native"),
+        ).beside(
+            "few", "what would pass if that check were dropped: " + (", ".join(single_catches) or "none"), "native"
+        ),
     ]
 
 
-def _has_symmetric_vehicle(data: Saved) -> bool:
+def _has_symmetric_vehicle(case_data: Saved) -> bool:
     """Whether the symmetric vehicle ran, too."""
-    return all(SYMMETRIC_SET in record["ratios"] for record in data["faults"])
+    return all(SYMMETRIC_SET in record["ratios"] for record in case_data["faults"])
 
 
 def _hidden_faults_row(faulty: list[Saved]) -> Row:
@@ -143,7 +147,7 @@ def _hidden_faults_row(faulty: list[Saved]) -> Row:
     ).within(len(HIDDEN_BY_SYMMETRY), 0, why, "native")
 
 
-def lines(data: Saved) -> list[tuple[str, ...]]:
+def lines(case_data: Saved) -> list[tuple[str, ...]]:
     """Table lines, one for each fault: system, the part with the fault, fault, checks that see it, checks that had
     missed it."""
     return [
@@ -154,25 +158,25 @@ def lines(data: Saved) -> list[tuple[str, ...]]:
             ", ".join(name for name in CHECKS if is_seen(record, name)) or "none",
             ", ".join(name for name in CHECKS if not is_seen(record, name)),
         )
-        for record in data["faults"]
+        for record in case_data["faults"]
     ]
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Tables of the checks with their tolerances, and of every fault with the checks that see it."""
-    return [_check_table(data), _fault_table(data)]
+    return [_check_table(case_data), _fault_table(case_data)]
 
 
-def _check_table(data: Saved) -> Table:
+def _check_table(case_data: Saved) -> Table:
     lines = []
     for name, check in CHECKS.items():
         worst = max(
             ratio or 0.0
-            for record in data["clean"]
+            for record in case_data["clean"]
             for vehicle in record["ratios"]
             for ratio in _ratios_of_check(record, name, vehicle)
         )
-        catches = sum(is_seen(record, name) for record in data["faults"])
+        catches = sum(is_seen(record, name) for record in case_data["faults"])
         limits = sorted({check.tolerance(engine) for engine in ("exudyn", "mujoco")})
         lines.append(
             (
@@ -182,7 +186,7 @@ def _check_table(data: Saved) -> Table:
                 check.unit,
                 check.why,
                 f"{worst:.2g}",
-                f"{catches} of {len(data['faults'])}",
+                f"{catches} of {len(case_data['faults'])}",
             )
         )
     headings = ("check", "compares", "tolerance", "unit", "because", "worst without a fault", "faults seen")
@@ -190,16 +194,16 @@ def _check_table(data: Saved) -> Table:
     return Table("The checks", note, headings, tuple(lines))
 
 
-def _fault_table(data: Saved) -> Table:
+def _fault_table(case_data: Saved) -> Table:
     lines = tuple(
         (
             record["fault"],
             f"{record['place']} ({', '.join(record['engines'])})",
             ", ".join(f"{name} {_size_text(record, name)}" for name in CHECKS if is_seen(record, name)),
             ", ".join(name for name in CHECKS if not is_seen(record, name)) or "-",
-            "not run" if not _has_symmetric_vehicle(data) else "no" if is_caught(record, SYMMETRIC_SET) else "yes",
+            "not run" if not _has_symmetric_vehicle(case_data) else "no" if is_caught(record, SYMMETRIC_SET) else "yes",
         )
-        for record in data["faults"]
+        for record in case_data["faults"]
     )
     note = (
         "Sizes on the asymmetric vehicle, in the unit of the check, the smaller one where a fault was planted in "
@@ -219,18 +223,24 @@ def _size_text(record: Saved, name: str) -> str:
         math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
         for engine, ratios in record["ratios"][ASYMMETRIC_SET].items()
     ]
-    least = min(sizes)
-    return "refused" if least == math.inf else f"{least:.0e}" if least < 0.01 else f"{least:.2g}"
+    smallest_error = min(sizes)
+    return (
+        "refused"
+        if smallest_error == math.inf
+        else f"{smallest_error:.0e}"
+        if smallest_error < 0.01
+        else f"{smallest_error:.2g}"
+    )
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot how far above its tolerance each check's error is for every fault, on both vehicles if both ran."""
-    if not _has_symmetric_vehicle(data):
+    if not _has_symmetric_vehicle(case_data):
         return []
     from validation.faults.figure import fault_map
 
     vehicles = {ASYMMETRIC_SET: "asymmetric vehicle", SYMMETRIC_SET: "symmetric vehicle (the paper's)"}
-    records = data["faults"]
+    records = case_data["faults"]
     depth = {
         vehicle: [[smallest_ratio(record, name, vehicle) for name in CHECKS] for record in records]
         for vehicle in vehicles

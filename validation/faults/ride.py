@@ -101,11 +101,13 @@ def _whole_inertia() -> float:
     entry."""
     vehicle = vehicle_file.load_vehicle("r19_free")
     parts = [vehicle.body(name) for name in ("body", "engine")]
-    centre = sum(part.mass * np.array(part.position) for part in parts) / sum(part.mass for part in parts)
+    centre = sum(body_part.mass * np.array(body_part.position) for body_part in parts) / sum(
+        body_part.mass for body_part in parts
+    )
     total = np.zeros((3, 3))
-    for part in parts:
-        arm = np.array(part.position) - centre
-        total += np.array(part.inertia) + part.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    for body_part in parts:
+        arm = np.array(body_part.position) - centre
+        total += np.array(body_part.inertia) + body_part.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     return float(np.abs(total - PUBLISHED_INERTIA).max() / PUBLISHED_INERTIA.max())
 
 
@@ -185,9 +187,9 @@ def _reversed(original: Any) -> Any:
 
 
 def _on_front_track(original: Any) -> Any:
-    def row(wheel: WheelPosition, mean: Any, roll: Any, word: str, wheels: tuple[WheelPosition, ...]) -> Any:
+    def row(wheel: WheelPosition, mean: Any, roll: Any, left_right_word: str, wheels: tuple[WheelPosition, ...]) -> Any:
         y = np.copysign(abs(wheels[0].y), wheel.y)
-        return original(replace(wheel, y=y), mean, roll, word, wheels)
+        return original(replace(wheel, y=y), mean, roll, left_right_word, wheels)
 
     return row
 
@@ -200,8 +202,8 @@ def _mirrored_body(vehicle: SpatialVehicle) -> SpatialVehicle:
     """Fault: the heaviest body's centre of mass is as far behind the middle as it was ahead of it."""
     heavy = max(vehicle.bodies, key=lambda body: body.mass)
     x, y, z = heavy.position
-    moved = replace(heavy, position=(vehicle.axles[0] + vehicle.axles[-1] - x, y, z))
-    return replace(vehicle, bodies=tuple(moved if body is heavy else body for body in vehicle.bodies))
+    moved_body = replace(heavy, position=(vehicle.axles[0] + vehicle.axles[-1] - x, y, z))
+    return replace(vehicle, bodies=tuple(moved_body if body is heavy else body for body in vehicle.bodies))
 
 
 def _other_products(vehicle: SpatialVehicle) -> SpatialVehicle:

@@ -20,15 +20,15 @@ def car_in_a_turn(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray
     """The vehicle R19-free steered into a turn at 25 m/s, and a state within the turn."""
     car = Handling(load_vehicle("r19_free"), controls=Controls(steer=((0.0, steer),)))
     q, v = car.straight(25.0)
-    places, part = car.vehicle.coordinates(), np.sign(steer)
+    coordinates, direction = car.vehicle.coordinates(), np.sign(steer)
     for name, freedom, move, rate in (
         ("carrier", "y", 0.1, 0.4),
         ("carrier", "rz", 0.02, 0.3),
         ("sway", "rx", 0.01, 0.05),
     ):
-        k = places.index((name, freedom))
-        q[k], v[k] = part * move, part * rate
-    q[places.index(("sway", "z"))], v[places.index(("sway", "z"))] = -5e-3, 0.1
+        k = coordinates.index((name, freedom))
+        q[k], v[k] = direction * move, direction * rate
+    q[coordinates.index(("sway", "z"))], v[coordinates.index(("sway", "z"))] = -5e-3, 0.1
     return car, q, v
 
 
@@ -59,8 +59,8 @@ def _energy_balance_error() -> float:
     car, q, v = car_in_a_turn()
     a, (report, ledger) = build("mujoco", car).acceleration(0.0, q, v), _read_report(car, q, v)
     ends = [
-        bodies_energy(car, here, rate) + _read_report(car, here, rate)[1][at.POTENTIAL]
-        for here, rate in ((q + part * v, v + part * a) for part in (1e-5, -1e-5))
+        bodies_energy(car, state, rate) + _read_report(car, state, rate)[1][at.POTENTIAL]
+        for state, rate in ((q + time_shift * v, v + time_shift * a) for time_shift in (1e-5, -1e-5))
     ]
     power = ledger[at.DISSIPATED] + ledger[at.TORQUE_POWER] + ledger[at.STEER_POWER] + report[:, at.POWER].sum()
     return float(abs((ends[0] - ends[1]) / 2e-5 - power) / np.abs(report[:, at.POWER]).max())
@@ -92,18 +92,18 @@ CHECKS = {
 ALL_WHEELS = (0, 1, 2, 3)
 
 
-def tyre(column: int, factor: float, index: tuple[int, ...] = (0,), offset: float = 0.0) -> Patch:
+def tyre(column: int, factor: float, index: tuple[int, ...] = (0,), shift: float = 0.0) -> Patch:
     """Fault: a number of the tyres is multiplied by a factor and shifted by an offset in the table."""
 
     def table(original: Any) -> Any:
-        def made(car: Handling) -> np.ndarray:
+        def planted(car: Handling) -> np.ndarray:
             numbers: np.ndarray = original(car)
             for i in index:
-                place = int(numbers[at.OF_TYRES]) + at.PER_TYRE * i + column
-                numbers[place] = factor * numbers[place] + offset
+                index_in_table = int(numbers[at.OF_TYRES]) + at.PER_TYRE * i + column
+                numbers[index_in_table] = factor * numbers[index_in_table] + shift
             return numbers
 
-        return made
+        return planted
 
     return attribute_patch("models.multibody.numbers:table", table)
 
@@ -116,7 +116,7 @@ FAULTS = tuple(
         ("friction of all tyres 1 % off", tyre(at.GRIP, 1.01, ALL_WHEELS)),
         ("one wheel steered the other way", tyre(at.STEERED, -1.0)),
         ("load of one tyre at rest 1 % off", tyre(at.STATIC, 1.01)),
-        ("inclination of one wheel, which has none, by half a degree", tyre(at.INCLINED, 1.0, offset=9e-3)),
+        ("inclination of one wheel, which has none, by half a degree", tyre(at.INCLINED, 1.0, shift=9e-3)),
     )
 )
 

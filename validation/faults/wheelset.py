@@ -73,13 +73,14 @@ def _energy_balance_error() -> float:
 
     The change of kinetic, spring and potential energy is taken by central differences along the motion.
     """
-    written, there = equations(), states()
-    rates, powers = rates_and_powers(written, there)
-    ahead, behind = (
-        np.sum(energies_at_states(written, there + part * HALF_DIFFERENCE_TIME * rates), axis=0) for part in (1.0, -1.0)
+    written, state_rows = equations(), states()
+    rates, powers = rates_and_powers(written, state_rows)
+    energy_ahead, behind = (
+        np.sum(energies_at_states(written, state_rows + direction * HALF_DIFFERENCE_TIME * rates), axis=0)
+        for direction in (1.0, -1.0)
     )
     stored, driven, *lost = powers.T
-    missing = (ahead - behind) / (2.0 * HALF_DIFFERENCE_TIME) + stored - driven + sum(lost)
+    missing = (energy_ahead - behind) / (2.0 * HALF_DIFFERENCE_TIME) + stored - driven + sum(lost)
     return float(np.abs(missing).max() / np.abs(powers).max())
 
 
@@ -98,10 +99,13 @@ def _friction() -> float:
 
 def _spin_and_load_at_rest() -> float:
     """Errors of the spin and the carried load at rest."""
-    rest = equations().rest
-    report = _contact_report(rest)
-    up = report["load"] * np.cos(report["angle"]) - report["fy"] * np.sin(report["angle"])
-    return max(abs(rest[eq.SPIN] * CHOSEN_WHEELSET.radius / SPEED + 1.0), abs(up.sum() / CHOSEN_WHEELSET.load - 1.0))
+    rest_state = equations().rest
+    report = _contact_report(rest_state)
+    vertical_force = report["load"] * np.cos(report["angle"]) - report["fy"] * np.sin(report["angle"])
+    return max(
+        abs(rest_state[eq.SPIN] * CHOSEN_WHEELSET.radius / SPEED + 1.0),
+        abs(vertical_force.sum() / CHOSEN_WHEELSET.load - 1.0),
+    )
 
 
 def _linear_law_error() -> float:
@@ -136,8 +140,8 @@ def plain_python_patch(**functions: Any) -> Patch:
     def prepare() -> Context:
         @contextmanager
         def context() -> Iterator[None]:
-            each = with_globals(wf.patch_by_patch.py_func, **functions)
-            faulty = with_globals(wf.wheel_forces.py_func, LINEAR=None, patch_by_patch=each)
+            faulty_patches = with_globals(wf.patch_by_patch.py_func, **functions)
+            faulty = with_globals(wf.wheel_forces.py_func, LINEAR=None, patch_by_patch=faulty_patches)
             plain = {name: getattr(eq, name).py_func for name in ("rates", "set_rates", "room_for", "rails_in")}
             with mock.patch.multiple(eq, wheel_forces=faulty, **plain):
                 yield
@@ -151,9 +155,9 @@ def after_rates_patch(change: Callable[..., None]) -> Patch:
     """Patch that changes the time derivatives after their computation by change(state, body, rates)."""
 
     def with_change(original: Any) -> Any:
-        def rates(state: Any, speed: Any, body: Any, *rest: Any) -> None:
-            original(state, speed, body, *rest)
-            change(state, eq.Body(*body), rest[-2])
+        def rates(state: Any, speed: Any, body: Any, *further: Any) -> None:
+            original(state, speed, body, *further)
+            change(state, eq.Body(*body), further[-2])
 
         return rates
 
@@ -164,10 +168,10 @@ def creep_law_patch(change: Callable[[Any, Any], None], speed: float = 1.0) -> P
     """Patch of the creep law: contacts and slip are changed by change(contacts, slip) before it, or the speed is
     multiplied by a factor."""
 
-    def creep(contacts: Any, slip: Any, velocity: float, *rest: Any) -> None:
+    def creep(contacts: Any, slip: Any, velocity: float, *further: Any) -> None:
         contacts, slip = contacts.copy(), slip.copy()
         change(contacts, slip)
-        wf.fill_creep_forces(contacts, slip, speed * velocity, *rest)
+        wf.fill_creep_forces(contacts, slip, speed * velocity, *further)
 
     return plain_python_patch(fill_creep_forces=creep)
 
@@ -198,10 +202,10 @@ def _share_contact(contacts: Any, slip: Any) -> None:
     contacts["load"] = contacts["load"].mean()
 
 
-def _turned_back(contacts: Any, slip: Any, *rest: Any) -> None:
+def _turned_back(contacts: Any, slip: Any, *further: Any) -> None:
     """Fault: the creep law gives the spin moment the opposite sign."""
-    wf.fill_creep_forces(contacts, slip, *rest)
-    rest[-1].forces["mz"] *= -1.0
+    wf.fill_creep_forces(contacts, slip, *further)
+    further[-1].forces["mz"] *= -1.0
 
 
 def _swap_contacts(touches: Any) -> None:
@@ -223,10 +227,10 @@ def _one_gyroscope(state: Any, body: Any, rates: Any) -> None:
 
 
 def _damped_twice(original: Any) -> Any:
-    def rates(state: Any, speed: Any, body: Any, *rest: Any) -> None:
-        given = eq.Body(*body)
-        x, y, z = given.damping
-        original(state, speed, tuple(given._replace(damping=(2.0 * x, 2.0 * y, 2.0 * z))), *rest)
+    def rates(state: Any, speed: Any, body: Any, *further: Any) -> None:
+        body_record = eq.Body(*body)
+        x, y, z = body_record.damping
+        original(state, speed, tuple(body_record._replace(damping=(2.0 * x, 2.0 * y, 2.0 * z))), *further)
 
     return rates
 

@@ -74,12 +74,12 @@ def _preload_patch(module: str) -> Patch:
     """Fault: the preload of one spring is 1 % too large."""
 
     def changed(original: Any) -> Any:
-        def made(vehicle: SpatialVehicle) -> Preloads:
+        def planted(vehicle: SpatialVehicle) -> Preloads:
             parts, tyres = original(vehicle)
             first = max(parts, key=lambda name: abs(parts[name]))
             return Preloads(parts | {first: 1.01 * parts[first]}, tyres)
 
-        return made
+        return planted
 
     return attribute_patch(f"{module}:preloads", changed)
 
@@ -87,38 +87,38 @@ def _preload_patch(module: str) -> Patch:
 def _scaled_wave(original: Any) -> Any:
     """Fault: the first wave of the road has a 1 % larger amplitude in the table."""
 
-    def made(car: Any) -> np.ndarray:
+    def planted(car: Any) -> np.ndarray:
         numbers: np.ndarray = original(car)
         first = int(numbers[at.OF_WAVES])
         numbers[first + 2 : first + 4] *= 1.01
         return numbers
 
-    return made
+    return planted
 
 
 def _raised_sample(original: Any) -> Any:
     """Fault: the road under the first hub is read 0.1 mm too high."""
 
-    def made(vehicle: Any, hub_inputs: HubInputs, step: float) -> np.ndarray:
+    def planted(vehicle: Any, hub_inputs: HubInputs, step: float) -> np.ndarray:
         hubs = hub_inputs.hubs.copy()
         hubs[:, 0] += 1e-4
         return np.asarray(original(vehicle, replace(hub_inputs, hubs=hubs), step))
 
-    return made
+    return planted
 
 
-def _of_towed(section: int, count: int, per_row: int, column: int) -> Callable[[Any], Any]:
+def _of_towed(section: int, count_index: int, per_row: int, column: int) -> Callable[[Any], Any]:
     """Fault: for all tyres or parts, the table's column that marks what belongs to a trailer is 0."""
 
     def changed(original: Any) -> Any:
-        def made(car: Any) -> np.ndarray:
+        def planted(car: Any) -> np.ndarray:
             numbers: np.ndarray = original(car)
             first = int(numbers[section])
-            rows = numbers[first : first + int(numbers[count]) * per_row].reshape(-1, per_row)
+            rows = numbers[first : first + int(numbers[count_index]) * per_row].reshape(-1, per_row)
             rows[:, column] = 0.0
             return numbers
 
-        return made
+        return planted
 
     return changed
 
@@ -126,23 +126,23 @@ def _of_towed(section: int, count: int, per_row: int, column: int) -> Callable[[
 def _stiff_bars(original: Any) -> Any:
     """Fault: anti-roll bars of a car on tyres are 1 % too stiff."""
 
-    def made(*arguments: Any) -> Iterator[Any]:
+    def planted(*arguments: Any) -> Iterator[Any]:
         for row, curves in original(*arguments):
             yield [1.01 * row[0], *row[1:]], curves
 
-    return made
+    return planted
 
 
-def _swapped_numbers(first: int, second: int) -> Callable[[Any], Any]:
+def _swapped_numbers(first_index: int, second_index: int) -> Callable[[Any], Any]:
     """Fault: two numbers in a row of the table are exchanged."""
 
     def changed(original: Any) -> Any:
-        def made(*arguments: Any) -> list[float]:
+        def planted(*arguments: Any) -> list[float]:
             row = list(original(*arguments))
-            row[first], row[second] = row[second], row[first]
+            row[first_index], row[second_index] = row[second_index], row[first_index]
             return row
 
-        return made
+        return planted
 
     return changed
 
@@ -150,27 +150,27 @@ def _swapped_numbers(first: int, second: int) -> Callable[[Any], Any]:
 def _turned_bar(original: Any) -> Any:
     """Fault: anti-roll bars of a cut car act in the opposite direction."""
 
-    def made(element: Any, joined: Any) -> list[float]:
+    def planted(element: Any, joined: Any) -> list[float]:
         row: list[float] = original(element, joined)
         if not np.isclose(np.linalg.norm(element.axis), 1.0):
             row[cut_at.AXIS : cut_at.AXIS + 3] = [-value for value in row[cut_at.AXIS : cut_at.AXIS + 3]]
         return row
 
-    return made
+    return planted
 
 
 def _other_inertia(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Any], Any]:
     """Fault: the heaviest body has another inertia in the engine."""
 
     def changed(original: Any) -> Any:
-        def made(vehicle: SpatialVehicle, *others: Any) -> Any:
+        def planted(vehicle: SpatialVehicle, *arguments: Any) -> Any:
             heavy = max(vehicle.bodies, key=lambda body: body.mass)
             x, y, z = change(np.array(heavy.inertia)).tolist()
-            other = replace(heavy, inertia=(tuple(x), tuple(y), tuple(z)))
-            bodies = tuple(other if body is heavy else body for body in vehicle.bodies)
-            return original(replace(vehicle, bodies=bodies), *others)
+            other_body = replace(heavy, inertia=(tuple(x), tuple(y), tuple(z)))
+            bodies = tuple(other_body if body is heavy else body for body in vehicle.bodies)
+            return original(replace(vehicle, bodies=bodies), *arguments)
 
-        return made
+        return planted
 
     return changed
 

@@ -28,7 +28,7 @@ from validation.hard_cases.setups import (
     vehicle,
 )
 
-PERIOD, NOISE = 1e-3, 0.1
+SAMPLE_PERIOD, NOISE = 1e-3, 0.1
 FLOOR_SENSORS = {
     "fl": (1.1, -0.6, 0.2),
     "fr": (1.1, 0.6, 0.2),
@@ -43,7 +43,7 @@ BRACKET_SENSORS = {"battery": {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"freque
 
 def _readings_of_run(
     engine: str,
-    places: dict[str, Any],
+    sensor_positions: dict[str, Any],
     extra: dict[str, Any] | None = None,
     noise: float = 0.0,
     initial: np.ndarray | None = None,
@@ -52,14 +52,18 @@ def _readings_of_run(
 
     After a kick on a flat road, or in free fall from an initial state.
     """
-    sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in places.items()} | (extra or {})
+    sensors = {name: dict(zip("xyz", position, strict=True)) for name, position in sensor_positions.items()} | (
+        extra or {}
+    )
     start = vehicle().initial + np.array([0, 0, 0, 0, 0, 0, 0.5, 1.5])
     base = vehicle(
         initial=start if initial is None else initial,
-        effects={"accelerometers": {"sampling_rate": 1 / PERIOD, "sensors": sensors, "deviation": noise}},
+        effects={"accelerometers": {"sampling_rate": 1 / SAMPLE_PERIOD, "sensors": sensors, "deviation": noise}},
     )
-    assembly = base if initial is None else driven_by_forces(base, Sampled(np.zeros((400, 2)), PERIOD, held=True))
-    engine_settings = settings(engine, PERIOD, 0.3)
+    assembly = (
+        base if initial is None else driven_by_forces(base, Sampled(np.zeros((400, 2)), SAMPLE_PERIOD, held=True))
+    )
+    engine_settings = settings(engine, SAMPLE_PERIOD, 0.3)
     model = build(engine, assembly, engine_settings)
     run = simulate(assembly.scene, engine, engine_settings, assembly)
     felt = readings_of(run, assembly.scene.effects["accelerometers"])
@@ -72,9 +76,9 @@ def _angular_velocities(states: np.ndarray) -> np.ndarray:
     return states[:, 7:] * [0.0, 1.0, 0.0]
 
 
-def _pitch_acceleration(places: dict[str, Any], specific_forces: np.ndarray) -> np.ndarray:
+def _pitch_acceleration(sensor_positions: dict[str, Any], specific_forces: np.ndarray) -> np.ndarray:
     """Pitch acceleration by eq. (18) as printed, by numpy's pseudo-inverse without any checks."""
-    positions = np.array(list(places.values()))
+    positions = np.array(list(sensor_positions.values()))
     relative = np.swapaxes(specific_forces - specific_forces[:, -1:], 1, 2)[:, :, :-1]
     m = relative @ np.linalg.pinv((positions[:-1] - positions[-1]).T)
     return 0.5 * (m[:, 0, 2] - m[:, 2, 0])
@@ -92,8 +96,8 @@ def plane(engine: str, folder: Path) -> float:
 def plane_naive(folder: Path) -> str:
     """The printed formula on the same readings."""
     felt, _, true = _readings_of_run("reference", FLOOR_SENSORS)
-    part = root_mean_square(_pitch_acceleration(FLOOR_SENSORS, felt)) / root_mean_square(true)
-    return f"the printed formula gives {part:.2f} of the pitch acceleration"
+    ratio = root_mean_square(_pitch_acceleration(FLOOR_SENSORS, felt)) / root_mean_square(true)
+    return f"the printed formula gives {ratio:.2f} of the pitch acceleration"
 
 
 def nearly_plane(engine: str, folder: Path) -> float:
@@ -102,8 +106,8 @@ def nearly_plane(engine: str, folder: Path) -> float:
     felt, states, true = _readings_of_run(engine, LIFTED_SENSORS, noise=NOISE)
     array = sensor_array(LIFTED_SENSORS)
     computed = angular_acceleration(spin_from_readings(array, felt), _angular_velocities(states))[:, 1]
-    least = array.noise_gains(planar=True)[1]
-    return root_mean_square(computed - true) / (NOISE * least)
+    least_gain = array.noise_gains(planar=True)[1]
+    return root_mean_square(computed - true) / (NOISE * least_gain)
 
 
 def nearly_plane_naive(folder: Path) -> str:
@@ -116,11 +120,11 @@ def nearly_plane_naive(folder: Path) -> str:
 def bracket(engine: str, folder: Path) -> float:
     """Case: five rigid sensors and one on a flexible bracket, which must be left out."""
     felt, states, true = _readings_of_run(engine, ROOF_SENSORS, BRACKET_SENSORS)
-    places = ROOF_SENSORS | {"battery": (0.6, 0.3, 0.0)}
-    loose = fit_quality(sensor_array(places), felt).suspect
-    keep = [name != loose for name in places]
-    rest = sensor_array({name: place for name, place in places.items() if name != loose})
-    computed = angular_acceleration(spin_from_readings(rest, felt[:, keep]), _angular_velocities(states))[:, 1]
+    sensor_positions = ROOF_SENSORS | {"battery": (0.6, 0.3, 0.0)}
+    loose = fit_quality(sensor_array(sensor_positions), felt).suspect
+    keep = [name != loose for name in sensor_positions]
+    rigid_array = sensor_array({name: position for name, position in sensor_positions.items() if name != loose})
+    computed = angular_acceleration(spin_from_readings(rigid_array, felt[:, keep]), _angular_velocities(states))[:, 1]
     return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
@@ -138,7 +142,7 @@ def gap(engine: str, folder: Path) -> float:
     felt, states, _ = _readings_of_run(engine, ROOF_SENSORS)
     felt[100, 2, 0] = np.nan
     return largest_magnitude(
-        recovered_motion(sensor_array(ROOF_SENSORS), felt, PERIOD).rates - _angular_velocities(states)
+        recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD).rates - _angular_velocities(states)
     )
 
 
@@ -161,16 +165,20 @@ def _free_fall(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.n
 def tumbling(engine: str, folder: Path) -> float:
     """Case: the nose passes through the vertical, which an orientation by matrices must stand."""
     felt, states, start = _free_fall(engine, 1.4, 3.0)
-    orientation = recovered_motion(sensor_array(ROOF_SENSORS), felt, PERIOD, start).orientation
-    none = np.zeros(len(states))
-    return largest_magnitude(rotation_matrix(orientation) - rotation_matrix(from_cardan(none, states[:, 3], none)))
+    orientation = recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD, start).orientation
+    no_angles = np.zeros(len(states))
+    return largest_magnitude(
+        rotation_matrix(orientation) - rotation_matrix(from_cardan(no_angles, states[:, 3], no_angles))
+    )
 
 
 def locked(engine: str, folder: Path) -> float:
     """Case: the nose points straight up, where roll and yaw are not unique. Error: largest roll or yaw that is
     given."""
     felt, _, start = _free_fall(engine, np.pi / 2, 0.0)
-    return largest_magnitude(recovered_motion(sensor_array(ROOF_SENSORS), felt, PERIOD, start).angles()[:, [0, 2]])
+    return largest_magnitude(
+        recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD, start).angles()[:, [0, 2]]
+    )
 
 
 def locked_naive(folder: Path) -> str:

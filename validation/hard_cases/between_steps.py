@@ -65,11 +65,11 @@ def handled(**manoeuvre: Any) -> Callable[[str, Path], float]:
     return error
 
 
-def refused_case(answer: Callable[[], Any]) -> Callable[[str, Path], float]:
+def refused_case(answer_anyway: Callable[[], Any]) -> Callable[[str, Path], float]:
     """Case that must be refused; any answer is wrong."""
 
     def error(implementation: str, folder: Path) -> float:
-        answer()
+        answer_anyway()
         return np.inf
 
     return error
@@ -94,11 +94,11 @@ def driven_over_waves(implementation: str, folder: Path) -> float:
     step) to the stated one in the worst channel; infinite unless the stated error is a warning."""
     if implementation == "reference":
         raise InputError("", "engine", implementation, "handling is marched by engines")
-    told = run(car(speed=1000.0, rough=True), implementation, error=True)
-    name, estimate = max(errors_of(told).items(), key=lambda each: each[1].share)
+    stated_run = run(car(speed=1000.0, rough=True), implementation, error=True)
+    name, estimate = max(errors_of(stated_run).items(), key=lambda each: each[1].share)
     fine = principal_series(run(car(1e-4, speed=1000.0, rough=True), implementation).detail).channels[name][::10]
-    off = principal_series(told.detail).channels[name] - fine
-    return float(np.sqrt(np.mean(off**2))) / estimate.error if estimate.warned else np.inf
+    error_of_values = principal_series(stated_run.detail).channels[name] - fine
+    return float(np.sqrt(np.mean(error_of_values**2))) / estimate.error if estimate.warned else np.inf
 
 
 def crossings(implementation: str, folder: Path) -> float:

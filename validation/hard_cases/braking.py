@@ -39,14 +39,16 @@ def slippery_brake() -> None:
         raise InputError("", "release", 0.7, str(error)) from None
 
 
-def stops(name: str, hard: str, error: wheels.Error, tolerance: float = 1e-6) -> Case:
+def stops(name: str, difficulty: str, error: wheels.Error, tolerance: float = 1e-6) -> Case:
     """Case of a wheel that is held at constant slip."""
-    return Case(name, hard, "m v^2 / (2 F)", "", tolerance, "the step in which it stops", error)
+    return Case(name, difficulty, "m v^2 / (2 F)", "", tolerance, "the step in which it stops", error)
 
 
-def fails(name: str, hard: str, error: wheels.Error) -> Case:
+def fails(name: str, difficulty: str, error: wheels.Error) -> Case:
     """Case in which every implementation must raise an error."""
-    return Case(name, hard, "fails, and says when", "", 0.0, "exact", error, dict.fromkeys(IMPLEMENTATIONS, "raised"))
+    return Case(
+        name, difficulty, "fails, and says when", "", 0.0, "exact", error, dict.fromkeys(IMPLEMENTATIONS, "raised")
+    )
 
 
 LINE = bent_friction((0.0, 0.0), (1.0, 0.9))

@@ -14,13 +14,13 @@ from models.contact.linear_theory import forces
 from models.contact.material import MaterialPair
 from validation.hard_cases.case import Case
 
-PAIR = MaterialPair()
+MATERIAL_PAIR = MaterialPair()
 A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
 
 
 def no_creepage(implementation: str, folder: Path) -> float:
     """Case: no creepage. Error: largest force; infinite if a derivative is not finite."""
-    answer = derivatives(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 0.0), PAIR)
+    answer = derivatives(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 0.0), MATERIAL_PAIR)
     return float(np.abs(answer.forces).max() + (0.0 if np.isfinite(answer.slopes).all() else np.inf))
 
 
@@ -35,9 +35,12 @@ def next_to_none(implementation: str, folder: Path) -> float:
     """Case: creepages from 1e-300 to 1e-12. Error: difference from the linear theory."""
     small = 10.0 ** np.arange(-300.0, -11.0, 12.0)
     motion = (small, -0.5 * small, 30.0 * small)
-    answer, linear = fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR), forces(A, B, *motion, PAIR)
-    off = np.hypot(answer.fx / linear[0] - 1.0, (answer.fy - linear[1]) / np.abs(linear[0]))
-    return float(np.abs(off).max())
+    answer, linear = (
+        fastsim(RollingEllipse(A, B, LOAD, MU, *motion), MATERIAL_PAIR),
+        forces(A, B, *motion, MATERIAL_PAIR),
+    )
+    relative_errors = np.hypot(answer.fx / linear[0] - 1.0, (answer.fy - linear[1]) / np.abs(linear[0]))
+    return float(np.abs(relative_errors).max())
 
 
 def against(implementation: str, folder: Path) -> float:
@@ -45,7 +48,7 @@ def against(implementation: str, folder: Path) -> float:
     that with 201, divided by mu N."""
     pole = np.linspace(-1.0, 1.0, 41)
     motion = (np.zeros(41), -0.5 * A * pole, np.full(41, 0.5))
-    coarse, fine = (fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR, cells=cells) for cells in (21, 201))
+    coarse, fine = (fastsim(RollingEllipse(A, B, LOAD, MU, *motion), MATERIAL_PAIR, cells=cells) for cells in (21, 201))
     return float(np.hypot(coarse.fx - fine.fx, coarse.fy - fine.fy).max() / (MU * LOAD))
 
 
@@ -53,8 +56,8 @@ def against_naive(folder: Path) -> str:
     """Without the remedy: the march of 1982 on the same cells."""
     motion = (0.0, -0.25 * A, 0.5)
     plain, fine = (
-        fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR, march="plain"),
-        fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR, cells=201),
+        fastsim(RollingEllipse(A, B, LOAD, MU, *motion), MATERIAL_PAIR, march="plain"),
+        fastsim(RollingEllipse(A, B, LOAD, MU, *motion), MATERIAL_PAIR, cells=201),
     )
     return f"the plain march is {100 * abs(plain.fy - fine.fy) / (MU * LOAD):.1f} % of mu N off on as many cells"
 
@@ -63,8 +66,8 @@ def lift_off(implementation: str, folder: Path) -> float:
     """Case: loads from large to zero and negative in full sliding. Error: difference of the force from mu N, or from 0
     without load, divided by the largest mu N."""
     load = np.concatenate((10.0 ** np.arange(-12.0, 5.0), [0.0, -1.0, -1e3]))
-    contact = hertz.by_load(1.1, 0.8, load, PAIR)
-    answer = fastsim(RollingEllipse(contact.a, contact.b, load, MU, 0.02, 0.0, 0.0), PAIR)
+    contact = hertz.by_load(1.1, 0.8, load, MATERIAL_PAIR)
+    answer = fastsim(RollingEllipse(contact.a, contact.b, load, MU, 0.02, 0.0, 0.0), MATERIAL_PAIR)
     return float(np.abs(answer.fx + MU * np.maximum(load, 0.0)).max() / (MU * load.max()))
 
 
@@ -72,7 +75,7 @@ def flipping(implementation: str, folder: Path) -> float:
     """Case: a creep curve at 2001 creepages. Error: largest second difference divided by mu N, which is small for a
     smooth curve."""
     creep = np.linspace(0.0, 4e-3, 2001)
-    force = fastsim(RollingEllipse(A, B, LOAD, MU, creep, 0.5 * creep, 50.0 * creep), PAIR).fx / (MU * LOAD)
+    force = fastsim(RollingEllipse(A, B, LOAD, MU, creep, 0.5 * creep, 50.0 * creep), MATERIAL_PAIR).fx / (MU * LOAD)
     return float(np.abs(np.diff(force, 2)).max())
 
 
@@ -80,7 +83,7 @@ def locked(implementation: str, folder: Path) -> float:
     """Case: a locked wheel, and a spin of 1000 per metre. Error: amount by which the force exceeds mu N, relative to
     it."""
     ellipses = RollingEllipse(A, B, LOAD, [1e-6, 0.3, 1.0], [[1.0], [0.0], [-1.0]], [[0.0], [1.0], [1.0]], 1e3)
-    answer = fastsim(ellipses, PAIR)
+    answer = fastsim(ellipses, MATERIAL_PAIR)
     return float(np.max(np.hypot(answer.fx, answer.fy) / (np.array([1e-6, 0.3, 1.0]) * LOAD) - 1.0, initial=0.0))
 
 

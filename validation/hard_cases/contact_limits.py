@@ -14,16 +14,18 @@ from models.contact.material import MaterialPair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 
-PAIR = MaterialPair()
+MATERIAL_PAIR = MaterialPair()
 A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
 SMALL_CREEPAGE = 1e-7
 CELL, RADIUS, SPHERE = 1.5e-4, 0.3, 1e4
 """m, m, N: two balls of that radius, each pressed by that load, on a grid of such cells."""
 
 
-def _linear_error(cells: int, march: March) -> float:
-    answer = fastsim(RollingEllipse(A, B, LOAD, MU, SMALL_CREEPAGE, 0.0, 0.0), PAIR, cells=cells, march=march)
-    return abs(float(answer.fx / forces(A, B, SMALL_CREEPAGE, 0.0, 0.0, PAIR)[0]) - 1.0)
+def _linear_error(cells: int, march_name: March) -> float:
+    answer = fastsim(
+        RollingEllipse(A, B, LOAD, MU, SMALL_CREEPAGE, 0.0, 0.0), MATERIAL_PAIR, cells=cells, march=march_name
+    )
+    return abs(float(answer.fx / forces(A, B, SMALL_CREEPAGE, 0.0, 0.0, MATERIAL_PAIR)[0]) - 1.0)
 
 
 def few_cells(implementation: str, folder: Path) -> float:
@@ -37,42 +39,49 @@ def few_cells_naive(folder: Path) -> str:
     return f"a whole first step makes the force {100 * _linear_error(8, 'plain'):.1f} % too large by 8 cells"
 
 
-def _draw_creepages(count: int = 400) -> np.ndarray:
+def _draw_creepages(draw_count: int = 400) -> np.ndarray:
     """Random creepages and spin (3, count), from sticking to full sliding."""
     draw = np.random.default_rng(8)
-    return draw.uniform(-1.0, 1.0, (3, count)) * 10.0 ** draw.uniform(-5.0, -1.0, count) * [[1.0], [1.0], [100.0]]
+    return (
+        draw.uniform(-1.0, 1.0, (3, draw_count))
+        * 10.0 ** draw.uniform(-5.0, -1.0, draw_count)
+        * [[1.0], [1.0], [100.0]]
+    )
 
 
 def reversed_signs(implementation: str, folder: Path) -> float:
     """Case: all creepages reversed. Error: largest deviation of the forces from the reversed ones, divided by mu N."""
-    along, across, spin = _draw_creepages()
-    ellipses = (RollingEllipse(A, B, LOAD, MU, s * along, s * across, s * spin) for s in (1.0, -1.0))
-    first, second = (fastsim(ellipse, PAIR) for ellipse in ellipses)
+    creepage_along, across, spin = _draw_creepages()
+    ellipses = (RollingEllipse(A, B, LOAD, MU, s * creepage_along, s * across, s * spin) for s in (1.0, -1.0))
+    first, second = (fastsim(ellipse, MATERIAL_PAIR) for ellipse in ellipses)
     return float(max(np.abs(first.fx + second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
 def mirrored(implementation: str, folder: Path) -> float:
     """Case: left and right exchanged, so that lateral creepage, spin and lateral force change sign. Error: largest
     deviation divided by mu N."""
-    along, across, spin = _draw_creepages()
-    first, second = (fastsim(RollingEllipse(A, B, LOAD, MU, along, s * across, s * spin), PAIR) for s in (1.0, -1.0))
+    creepage_along, across, spin = _draw_creepages()
+    first, second = (
+        fastsim(RollingEllipse(A, B, LOAD, MU, creepage_along, s * across, s * spin), MATERIAL_PAIR)
+        for s in (1.0, -1.0)
+    )
     return float(max(np.abs(first.fx - second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
 def power_gained(implementation: str, folder: Path) -> float:
     """Largest energy that a contact gains per metre, divided by mu N times the creepage, on 21 cells."""
-    along, across, spin = _draw_creepages()
-    size = MU * LOAD * (np.hypot(along, across) + A * np.abs(spin))
-    lost = fastsim(RollingEllipse(A, B, LOAD, MU, along, across, spin), PAIR).dissipation
+    creepage_along, across, spin = _draw_creepages()
+    size = MU * LOAD * (np.hypot(creepage_along, across) + A * np.abs(spin))
+    lost = fastsim(RollingEllipse(A, B, LOAD, MU, creepage_along, across, spin), MATERIAL_PAIR).dissipation
     return float(max(np.max(-lost / size), 0.0))
 
 
 def only_spin(implementation: str, folder: Path) -> float:
     """Case: pure spin. Error: the larger of the longitudinal force divided by mu N and, for small spin, the relative
     error of the lateral force against the linear theory."""
-    small = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 1e-6), PAIR)
-    large = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, [0.1, 1.0, 10.0, 1e3]), PAIR)
-    wanted = float(forces(A, B, 0.0, 0.0, 1e-6, PAIR)[1])
+    small = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 1e-6), MATERIAL_PAIR)
+    large = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, [0.1, 1.0, 10.0, 1e3]), MATERIAL_PAIR)
+    wanted = float(forces(A, B, 0.0, 0.0, 1e-6, MATERIAL_PAIR)[1])
     return max(abs(float(small.fy) / wanted - 1.0), float(np.abs(large.fx).max()) / (MU * LOAD))
 
 
@@ -80,7 +89,7 @@ def _balls(centre_distance: float, load: float, cells: tuple[int, int] = (41, 10
     """Exact normal contact of two balls side by side at a distance (m) between their centres."""
     y, x = (centres(n, CELL) for n in cells)
     away = np.minimum((x - centre_distance / 2) ** 2, (x + centre_distance / 2) ** 2) + y[:, None] ** 2
-    return solve_normal(away / (2.0 * RADIUS), CELL, CELL, PAIR, load=load)
+    return solve_normal(away / (2.0 * RADIUS), CELL, CELL, MATERIAL_PAIR, load=load)
 
 
 def two_patches(implementation: str, folder: Path) -> float:
@@ -88,15 +97,17 @@ def two_patches(implementation: str, folder: Path) -> float:
     that of single balls beyond the cells along the edges."""
     draw = _balls(9e-3, 2.0 * SPHERE)
     left = float(draw.pressure[:, : draw.x.size // 2].sum() * CELL**2)
-    alone = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, SPHERE, PAIR)
-    edge = CELL * 2.0 * np.pi * float(alone.a)
-    return max(abs(left / SPHERE - 1.0), abs(draw.area / 2.0 - np.pi * float(alone.a) ** 2) / edge - 1.0, 0.0)
+    single_contact = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, SPHERE, MATERIAL_PAIR)
+    edge = CELL * 2.0 * np.pi * float(single_contact.a)
+    return max(abs(left / SPHERE - 1.0), abs(draw.area / 2.0 - np.pi * float(single_contact.a) ** 2) / edge - 1.0, 0.0)
 
 
 def merging(implementation: str, folder: Path) -> float:
     """Case: two balls approach each other in steps of a fifth of a cell. Error: largest second difference of the
     approach, relative to it."""
-    answer = [_balls(apart, 2.0 * SPHERE, (41, 81)).approach for apart in np.linspace(4.0e-3, 3.4e-3, 21)]
+    answer = [
+        _balls(ball_distance, 2.0 * SPHERE, (41, 81)).approach for ball_distance in np.linspace(4.0e-3, 3.4e-3, 21)
+    ]
     return float(np.abs(np.diff(answer, 2)).max() / answer[0])
 
 

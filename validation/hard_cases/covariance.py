@@ -12,27 +12,29 @@ from models.systems.pitch_plane.tangent import noise_covariances
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 
-PERIOD, SAMPLES, STEP = 0.05, 10, 1e-3
+SAMPLE_PERIOD, SAMPLES, STEP = 0.05, 10, 1e-3
 """Of the held samples (s), their number, and the step (s): 35 times the decay time of the fastest pole per sample."""
 
 
 def _base_assembly(values: np.ndarray) -> Assembly:
     """The linearised vehicle under its weight, with these errors (n, 2) in N added to its force samples."""
     base = setups.vehicle(geometry="linear")
-    forces = setups.static_forces(base, SAMPLES, PERIOD)
+    forces = setups.static_forces(base, SAMPLES, SAMPLE_PERIOD)
     return setups.driven_by_forces(base, replace(forces, values=forces.values + values))
 
 
 def held_noise(engine: str, folder: Path) -> float:
     """Case: an error of 1 N in each single sample is run through the engine. Error: relative difference of the summed
     squares of the responses from the covariance recursion."""
-    quiet = setups.run(engine, _base_assembly(np.zeros((SAMPLES, 2))), STEP, PERIOD * SAMPLES).states[-1]
+    quiet = setups.run(engine, _base_assembly(np.zeros((SAMPLES, 2))), STEP, SAMPLE_PERIOD * SAMPLES).states[-1]
     responses = []
     for sample in range(SAMPLES):
         for wheel in range(2):
             values = np.zeros((SAMPLES, 2))
             values[sample, wheel] = 1.0
-            responses.append(setups.run(engine, _base_assembly(values), STEP, PERIOD * SAMPLES).states[-1] - quiet)
+            responses.append(
+                setups.run(engine, _base_assembly(values), STEP, SAMPLE_PERIOD * SAMPLES).states[-1] - quiet
+            )
     covariance, expected = np.array(responses).T @ np.array(responses), _covariance_recursion()
     return setups.largest_magnitude(covariance - expected) / setups.largest_magnitude(expected)
 
@@ -40,7 +42,7 @@ def held_noise(engine: str, folder: Path) -> float:
 def _covariance_recursion() -> np.ndarray:
     assembly = _base_assembly(np.zeros((SAMPLES, 2)))
     assert isinstance(assembly.input, Sampled)
-    return noise_covariances(ErrorPath(assembly, assembly.input, round(PERIOD / STEP), SAMPLES), 1.0)[-1]
+    return noise_covariances(ErrorPath(assembly, assembly.input, round(SAMPLE_PERIOD / STEP), SAMPLES), 1.0)[-1]
 
 
 def van_loan_naive(folder: Path) -> str:
@@ -55,12 +57,12 @@ def van_loan_naive(folder: Path) -> str:
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
     smallest = []
     with np.errstate(all="ignore"):
-        for length in (PERIOD, 20 * PERIOD):
+        for length in (SAMPLE_PERIOD, 20 * SAMPLE_PERIOD):
             noise = van_loan_discretization(first_order(linear), pushes, length)[1]
             smallest.append(float(np.linalg.eigvalsh(0.5 * (noise + noise.T)).min() / np.abs(noise).max()))
     return (
         f"filterpy's van Loan gives a covariance with a negative eigenvalue of {smallest[0]:.0e} of its size over "
-        f"{PERIOD:g} s and {smallest[1]:.0e} over {20 * PERIOD:g} s, without a word"
+        f"{SAMPLE_PERIOD:g} s and {smallest[1]:.0e} over {20 * SAMPLE_PERIOD:g} s, without a word"
     )
 
 

@@ -173,10 +173,12 @@ def before_drift(engine: str, folder: Path) -> float:
     """Case: noisy run compared with another implementation until drift-off. Error: largest difference relative to the
     largest state."""
     scene = follow(folder, measured(), {"force_noise": {"deviation": HEAVY_NOISE}})
-    other = "mujoco" if engine == "reference" else "reference"
-    first, two = (simulate(scene, name) for name in (engine, other))
-    held = slice(None, _first_row_off(first, measured()))
-    return largest_magnitude(first.states[held] - two.states[held]) / largest_magnitude(two.states[held])
+    other_engine = "mujoco" if engine == "reference" else "reference"
+    first, second_run = (simulate(scene, name) for name in (engine, other_engine))
+    rows_before = slice(None, _first_row_off(first, measured()))
+    return largest_magnitude(first.states[rows_before] - second_run.states[rows_before]) / largest_magnitude(
+        second_run.states[rows_before]
+    )
 
 
 def _first_row_off(run: Result, truth: Result) -> int | None:
@@ -193,8 +195,8 @@ def before_drift_naive(folder: Path) -> str:
     scene = force_scene(folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY_NOISE}})
     coarse, fine = (simulate(scene, "reference", Settings("RK4", step, 30.0)) for step in (1e-3, 5e-4))
     gap = np.abs(coarse["pitch"] - fine["pitch"][::2])
-    before = gap[: _first_row_off(coarse, truth)].max()
-    return f"two step sizes of the reference differ by {before:.0e} rad before, {gap.max():.0e} after"
+    gap_before = gap[: _first_row_off(coarse, truth)].max()
+    return f"two step sizes of the reference differ by {gap_before:.0e} rad before, {gap.max():.0e} after"
 
 
 CASES = (

@@ -16,15 +16,15 @@ TOLERANCE = 1e-6
 """Of the adaptive solvers; at a tenth of it LSODA, too, chases that rounding, in 140,000 steps instead of 300."""
 
 
-def _raised_vehicle(base: Assembly) -> Assembly:
+def _raised_vehicle(base_assembly: Assembly) -> Assembly:
     """The vehicle with its chassis 10 mm above its equilibrium."""
-    return replace(base, initial=base.initial - np.array([0, 0, 0.01, 0, 0, 0, 0, 0]))
+    return replace(base_assembly, initial=base_assembly.initial - np.array([0, 0, 0.01, 0, 0, 0, 0, 0]))
 
 
-def _distance_from_equilibrium(engine: str, base: Assembly, integrator: str = "") -> float:
+def _distance_from_equilibrium(engine: str, base_assembly: Assembly, integrator: str = "") -> float:
     """Distance from the equilibrium after 3 s, relative to the initial distance."""
-    end = run(engine, _raised_vehicle(base), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
-    return largest_magnitude(end - base.initial) / 0.01
+    end = run(engine, _raised_vehicle(base_assembly), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
+    return largest_magnitude(end - base_assembly.initial) / 0.01
 
 
 def undamped(engine: str, folder: Path) -> float:

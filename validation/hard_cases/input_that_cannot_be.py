@@ -18,7 +18,7 @@ from models.vehicles.plausible_plane import plausible_plane
 from validation.common.scenes import road_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 
-PERIOD, DURATION = 1e-3, 20.0
+SAMPLE_PERIOD, DURATION = 1e-3, 20.0
 WHEELS = np.array([TWIN.m1, TWIN.m2]) * TWIN.g
 LOADS = TWIN.m3 * TWIN.g * np.array([TWIN.a, TWIN.b]) / (TWIN.a + TWIN.b) + WHEELS
 Change = Callable[[np.ndarray], np.ndarray]
@@ -57,7 +57,7 @@ QUERIED: dict[str, dict[str, float]] = {
 def true_forces() -> np.ndarray:
     """Wheel forces (n, 2) in N of the asymmetric vehicle on hills."""
     road = {"source": "hills", "speed": 20.0}
-    run = simulate(road_scene("asymmetric_twin", PERIOD, DURATION, road), "reference")
+    run = simulate(road_scene("asymmetric_twin", SAMPLE_PERIOD, DURATION, road), "reference")
     return np.column_stack([run["f1"], run["f2"]])
 
 
@@ -67,11 +67,11 @@ def error_texts(change: Change) -> list[str]:
         Signal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
     )
     forces = np.ascontiguousarray(change(true_forces()))
-    findings = check(AxleForces(forces, PERIOD, TWIN, ((front,), (rear,)), DURATION, IN_FILE))
-    errors = [each.text for each in findings if each.weight == "error"]
+    findings = check(AxleForces(forces, SAMPLE_PERIOD, TWIN, ((front,), (rear,)), DURATION, IN_FILE))
+    errors = [finding.text for finding in findings if finding.weight == "error"]
     if errors:
         raise InputError("forces.csv", "", None, " ".join(errors))
-    return [each.text for each in findings if each.weight == "doubt"]
+    return [finding.text for finding in findings if finding.weight == "doubt"]
 
 
 def _forces(change: Change, doubted: bool, _: str, folder: Path) -> float:

@@ -115,10 +115,10 @@ def momentum(engine: str, folder: Path) -> float:
     pushed = np.vstack((np.zeros(2), np.cumsum(forces.values * 1e-3, axis=0)))
     angular = rates @ np.array([-p.m1 * p.b, p.m2 * p.a, 0.0, p.I])
     linear = rates @ np.array([p.m1, p.m2, p.m3, 0.0])
-    turned = pushed @ np.array([p.b, -p.a]) + (p.a * p.m2 - p.b * p.m1) * p.g * t[:, 0]
+    angular_impulse = pushed @ np.array([p.b, -p.a]) + (p.a * p.m2 - p.b * p.m1) * p.g * t[:, 0]
     fallen = (p.m1 + p.m2 + p.m3) * p.g * t[:, 0] - pushed.sum(axis=1)
     return max(
-        largest_magnitude(angular - turned) / largest_magnitude(turned - turned[0]),
+        largest_magnitude(angular - angular_impulse) / largest_magnitude(angular_impulse - angular_impulse[0]),
         largest_magnitude(linear - fallen) / largest_magnitude(pushed),
     )
 
@@ -146,7 +146,7 @@ def _spinning_assembly(geometry: str) -> Assembly:
     base = vehicle("asymmetric_twin", geometry)
     start = base.initial.copy()
     start[7] = 6.0
-    return driven_by_forces(replace(base, initial=start), static_forces(base, 2, 2.0, held=False))
+    return driven_by_forces(replace(base, initial=start), static_forces(base, 2, 2.0, is_held=False))
 
 
 @cache
@@ -183,15 +183,15 @@ def _measured_forces() -> Sampled:
     return Sampled(np.column_stack([result["f1"], result["f2"]]), 1e-3, held=False)
 
 
-def growth(engine: str, mode: Mode) -> float:
+def growth(engine: str, drive_mode: Mode) -> float:
     """Factor by which a pitch error of 1e-6 rad grows over the drive."""
     base = vehicle()
     start = base.initial.copy()
     start[3] += 1e-6
     ends = [
-        run(engine, driven_by_forces(replace(base, initial=y), _measured_forces(), mode), 1e-3, DRIVE_DURATION).states[
-            -1, 3
-        ]
+        run(
+            engine, driven_by_forces(replace(base, initial=y), _measured_forces(), drive_mode), 1e-3, DRIVE_DURATION
+        ).states[-1, 3]
         for y in (base.initial, start)
     ]
     return abs(ends[1] - ends[0]) / 1e-6

@@ -20,28 +20,30 @@ from validation.drift.kalman_runs import relative_state_matrices
 from validation.hard_cases.case import Case
 from validation.hard_cases.setups import REFUSED, driven_by_forces, largest_magnitude, static_forces, vehicle
 
-PERIOD, DURATION = 5e-3, 6.0
-FORCE, ANGLE, TURN = 16.0, 8e-4, 0.2
+SAMPLE_PERIOD, DURATION = 5e-3, 6.0
+FORCE, ANGLE, START_TURN = 16.0, 8e-4, 0.2
 """Deviations: N per force sample, rad per angle, rad of a start that is not known."""
 SLOW_PERIOD = 0.1
 """s between force samples that are 70 time constants of the wheels apart."""
 
 
-def _largest_pitch_error(engine: str, folder: Path, lost: slice, turn: float = 0.0, **options: Any) -> float:
+def _largest_pitch_error(
+    engine: str, folder: Path, lost_samples: slice, turn_deviation: float = 0.0, **options: Any
+) -> float:
     """Ratio of the largest pitch error to its stated deviation for a vehicle at rest, with the pitch missing in the
-    ``lost`` samples.
+    ``lost_samples`` samples.
 
-    The filter starts from a pitch that is ``turn`` (rad) wrong.
+    The filter starts from a pitch that is ``turn_deviation`` (rad) wrong.
     """
-    count = round(DURATION / PERIOD) + 1
+    count = round(DURATION / SAMPLE_PERIOD) + 1
     base = vehicle()
-    forces = static_forces(base, count, PERIOD, held=False).values
-    write_wheel_forces(folder, forces[:, 0], forces[:, 1], PERIOD)
-    seen = base.initial[3] + ANGLE * normal_samples(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
-    seen[lost] = np.nan
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", seen)}, PERIOD)
+    forces = static_forces(base, count, SAMPLE_PERIOD, is_held=False).values
+    write_wheel_forces(folder, forces[:, 0], forces[:, 1], SAMPLE_PERIOD)
+    measured_pitch = base.initial[3] + ANGLE * normal_samples(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
+    measured_pitch[lost_samples] = np.nan
+    write_time_series(folder / "pitch.csv", {"pitch": ("rad", measured_pitch)}, SAMPLE_PERIOD)
     p, start = base.parameters, base.initial.copy()
-    start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
+    start[[0, 1, 3]] += turn_deviation * np.array([-p.b, p.a, 1.0])
     scene = build(
         {
             "title": "kalman",
@@ -57,7 +59,7 @@ def _largest_pitch_error(engine: str, folder: Path, lost: slice, turn: float = 0
         folder,
     )
     run = simulate(scene, engine)
-    ended = PERIOD * (lost.stop or 0)
+    ended = SAMPLE_PERIOD * (lost_samples.stop or 0)
     late = (run.times < ended) | (run.times > ended + 1.0)  # the moment takes a while to draw the vehicle back
     return largest_magnitude(((run["pitch"] - base.initial[3]) / run["pitch_deviation"])[late & (run.times > 0.1)])
 
@@ -77,7 +79,7 @@ def outage_naive(folder: Path) -> str:
 
 def wrong_start(engine: str, folder: Path) -> float:
     """Case: the initial pitch is wrong by one stated deviation."""
-    return _largest_pitch_error(engine, folder, slice(0, 0), TURN, start_deviation=TURN)
+    return _largest_pitch_error(engine, folder, slice(0, 0), START_TURN, start_deviation=START_TURN)
 
 
 def certain_start(engine: str, folder: Path) -> float:
@@ -85,23 +87,25 @@ def certain_start(engine: str, folder: Path) -> float:
     stated deviation; infinite for a negative variance."""
     count, exact = 400, 1e-9
     base = vehicle()
-    forces = static_forces(base, count + 1, PERIOD, held=False)
+    forces = static_forces(base, count + 1, SAMPLE_PERIOD, is_held=False)
     assembly = driven_by_forces(base, forces)
     assembly = replace(
         assembly,
         scene=assembly.scene.model_copy(
-            update={"run": assembly.scene.run.model_copy(update={"duration": count * PERIOD})}
+            update={"run": assembly.scene.run.model_copy(update={"duration": count * SAMPLE_PERIOD})}
         ),
     )
-    seen = base.initial[3] + exact * normal_samples(7, 0, count + 1, 1, source=PITCH_SENSOR)
-    estimated = estimate(assembly, Measurement(seen, PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0)
+    measured_pitch = base.initial[3] + exact * normal_samples(7, 0, count + 1, 1, source=PITCH_SENSOR)
+    estimated = estimate(
+        assembly, Measurement(measured_pitch, SAMPLE_PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0
+    )
     P = estimated.errors()
     scale = np.sqrt(np.diagonal(P, axis1=1, axis2=2).clip(1e-300))
     values = np.linalg.eigvalsh(P / (scale[:, :, None] * scale[:, None, :]))
     if not np.isfinite(values).all() or values.min() < -1e-6:
         return np.inf
-    off = estimated.states[1:, PITCH] - base.initial[3]
-    return float(np.abs(off / np.sqrt(P[1:, PITCH, PITCH])).max())
+    error_of_values = estimated.states[1:, PITCH] - base.initial[3]
+    return float(np.abs(error_of_values / np.sqrt(P[1:, PITCH, PITCH])).max())
 
 
 def empty_column(engine: str, folder: Path) -> float:
@@ -132,10 +136,13 @@ def stiff_naive(folder: Path) -> str:
     """Without the remedy: this process noise by filterpy's discretisation."""
     a, b, wanted = _exact_response()
     noise = van_loan_discretization(a, b * np.sqrt(SLOW_PERIOD), SLOW_PERIOD)[1]
-    times, least = noise[2, 2] / (wanted @ wanted.T)[2, 2], np.linalg.eigvalsh((noise + noise.T) / 2).min()
+    variance_ratio, least_eigenvalue = (
+        noise[2, 2] / (wanted @ wanted.T)[2, 2],
+        np.linalg.eigvalsh((noise + noise.T) / 2).min(),
+    )
     return (
-        f"filterpy's van_loan_discretization gives a pitch variance {times:.1e} times the right one, and an "
-        f"eigenvalue of {least:.1e}, unwarned"
+        f"filterpy's van_loan_discretization gives a pitch variance {variance_ratio:.1e} times the right one, and an "
+        f"eigenvalue of {least_eigenvalue:.1e}, unwarned"
     )
 
 

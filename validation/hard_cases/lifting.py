@@ -41,20 +41,20 @@ FALLING_STATE = np.array([-0.3, -0.2, -0.4, 0.05, 0.0, 0.0, 0.0, 0.0])
 Error = Callable[[str, Path], float]
 
 
-def vehicle(start: np.ndarray, geometry: str, override: dict[str, float]) -> Assembly:
+def vehicle(start_state: np.ndarray, geometry: str, override: dict[str, float]) -> Assembly:
     """The half car without symmetry on tyres that can lift off, above a flat road."""
-    return setups.vehicle(TWIN, geometry, start, {"lift_off": {}}, **override)
+    return setups.vehicle(TWIN, geometry, start_state, {"lift_off": {}}, **override)
 
 
-def exactly(step: float = STEP, start: np.ndarray = FALLING_STATE, **override: float) -> Error:
+def exactly(step: float = STEP, start_state: np.ndarray = FALLING_STATE, **override: float) -> Error:
     """Case: a bouncing vehicle. Error: largest difference (m, rad, m/s, rad/s) from the exact path."""
 
     def error(engine: str, folder: Path) -> float:
-        assembly = vehicle(start, "linear", override)
+        assembly = vehicle(start_state, "linear", override)
         states = setups.run(engine, assembly, step, LONGEST_DURATION).states
-        every = max(1, round(step / STEP))
-        exact = Bounces(assembly, STEP if every > 1 else step).path(assembly.initial, every * (len(states) - 1))
-        return setups.largest_magnitude(states - exact[::every])
+        stride = max(1, round(step / STEP))
+        exact = Bounces(assembly, STEP if stride > 1 else step).path(assembly.initial, stride * (len(states) - 1))
+        return setups.largest_magnitude(states - exact[::stride])
 
     return error
 
@@ -84,7 +84,7 @@ def at_the_switch(engine: str, folder: Path) -> float:
 def thrown_up(engine: str, folder: Path) -> float:
     """Case: wheels thrown up from rest at 5 m/s."""
     start = setups.vehicle(TWIN, "linear").initial + np.array([0, 0, 0, 0, -5.0, -5.0, 0, 0])
-    return exactly(start=start)(engine, folder)
+    return exactly(start_state=start)(engine, folder)
 
 
 def on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -> Assembly:
@@ -113,9 +113,9 @@ def beside_tight(engine: str, assembly: Assembly, step: float, duration: float) 
     return setups.largest_magnitude(states - exact) if air.any() else np.inf
 
 
-def _road_heights(road: Signal | None, step: float, count: int) -> np.ndarray:
+def _road_heights(road: Signal | None, step: float, sample_count: int) -> np.ndarray:
     """Road heights (m, down) under the front wheel."""
-    return np.zeros(count) if road is None else road.sample(0.0, step, count)[:, 0]
+    return np.zeros(sample_count) if road is None else road.sample(0.0, step, sample_count)[:, 0]
 
 
 def coarse_road(engine: str, folder: Path) -> float:
@@ -179,8 +179,8 @@ def linear_naive(folder: Path) -> str:
 def hard_naive(folder: Path) -> str:
     """Without the guard: a stable step that jumps over landings, without the check after the run."""
     with mock.patch.object(protocol, "check_resolved", lambda *_: None):
-        off = exactly(2e-3, k1=2e7, k2=2e7)("reference", folder)
-    return f"stable, finite, a wheel's velocity off by {off:.2g} m/s"
+        velocity_error = exactly(2e-3, k1=2e7, k2=2e7)("reference", folder)
+    return f"stable, finite, a wheel's velocity off by {velocity_error:.2g} m/s"
 
 
 THROWN_REASON = "a corner of the force within a step costs its square"
@@ -190,7 +190,12 @@ UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
 HIGH_START = np.array([-5.0, -5.0, -5.0, 0.0, 12.0, 12.0, 12.0, 0.0])
 EXACT: tuple[tuple[str, str, float, Error], ...] = (
     ("both wheels in the air", "no tyre holds anything", 1e-4, exactly()),
-    ("fall from five metres", "lands at 15 m/s, many times the tyres' depth at rest", 1e-3, exactly(start=HIGH_START)),
+    (
+        "fall from five metres",
+        "lands at 15 m/s, many times the tyres' depth at rest",
+        1e-3,
+        exactly(start_state=HIGH_START),
+    ),
     ("tyres without damping", "every landing is thrown back", 1e-4, exactly(d1=0.0, d2=0.0)),
     (
         "tyre dampers of 5 kN s/m",

@@ -20,13 +20,13 @@ CHECKS = {
 def cut_number(folder: Path) -> str:
     """What numpy reads in place of a number that was cut off."""
     path = raw(csv.whole()[:-3].encode())(folder)
-    last = np.genfromtxt(path, delimiter=",", skip_header=1)[-1, 2]
-    return f"numpy reads the last value as {last:g}, which was {FX[-1]:g}"
+    last_value = np.genfromtxt(path, delimiter=",", skip_header=1)[-1, 2]
+    return f"numpy reads the last value as {last_value:g}, which was {FX[-1]:g}"
 
 
 def invalid_samples(folder: Path) -> str:
     """What asammdf reads in place of samples that are marked as invalid."""
-    path = next(each for each in mdf4.FILES if each.name == "MDF 4 with invalid samples").make(folder)
+    path = next(odd_file for odd_file in mdf4.FILES if odd_file.name == "MDF 4 with invalid samples").make(folder)
     with mdf4_opened(path) as file:
         samples = file.get(group=0, index=1, samples_only=True, data=next(file._mdf._load_data(file.groups[0])))[0]
     return f"asammdf hands over {len(samples)} of {len(FZ)} samples of a block, those after a gap moved up"

@@ -46,13 +46,13 @@ def far_below(implementation: str, folder: Path) -> float:
 
     The longer waves reach up to 10 m, from which cars that began at 0 would fall.
     """
-    ways = [_run_copies(corner).deviation for corner in (1e-6, 0.1)]
-    return float(np.abs(ways[0] / ways[1] - 1.0).max())
+    deviations = [_run_copies(corner).deviation for corner in (1e-6, 0.1)]
+    return float(np.abs(deviations[0] / deviations[1] - 1.0).max())
 
 
 def _run_copies(corner: float) -> Any:
     vehicle, road = _vehicle_and_road(corner)
-    return copies_in_time(vehicle, road, 5.0, 1.0, copies=20, seed=1, longest=2e-3)
+    return copies_in_time(vehicle, road, 5.0, 1.0, copies=20, seed=1, longest_step=2e-3)
 
 
 def _vehicle_and_road(corner: float) -> tuple[SpatialVehicle, Excitation]:
@@ -77,12 +77,15 @@ def slender(a: float, b: float) -> Callable[[str, Path], float]:
         pair = MaterialPair()
         hertz, motion = by_axes(a, b, pair, load=1e5), (0.0, 1e-3, 0.5)
         choices: dict[str, Any] = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
-        (fast, told), (exact, rest) = (
+        (fast, error_of_fast), (exact, error_of_exact) = (
             rolled(theory, motion, CELLS)
             for theory in (Fastsim(hertz, FRICTION, pair, **choices), ExactOnEllipse(hertz, FRICTION, pair))
         )
         force, moment = float(np.linalg.norm(fast.force - exact.force)), abs(fast.mz - exact.mz)
-        return max(force / (told.total + rest.cells), moment / (told.moment + rest.moment_cells))
+        return max(
+            force / (error_of_fast.total + error_of_exact.cells),
+            moment / (error_of_fast.moment + error_of_exact.moment_cells),
+        )
 
     return error
 
@@ -104,7 +107,7 @@ def certain_filter(implementation: str, folder: Path) -> float:
         estimate(vehicle, forces, angles, Deviations(np.full(forces.samples.shape[1], noise), (1e-12, 1e-12), 10.0))
         for noise in (1.0, 8.0)
     ]
-    return max(float(np.nan_to_num(each.deviations / 1e-12, nan=np.inf).max()) for each in fits)
+    return max(float(np.nan_to_num(fit.deviations / 1e-12, nan=np.inf).max()) for fit in fits)
 
 
 def flipped(implementation: str, folder: Path) -> float:

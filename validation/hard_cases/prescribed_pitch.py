@@ -29,7 +29,7 @@ from validation.hard_cases.setups import (
 
 DURATION = 0.5
 NOISE = 1e-6
-PERIOD = 1e-3
+SAMPLE_PERIOD = 1e-3
 AMPLITUDE, RATE = 0.02, 12.0
 """Pitch 0.02 sin(12 t + 1) rad: its second derivative does not vanish at the start, on purpose."""
 
@@ -39,42 +39,43 @@ def angle(t: np.ndarray) -> np.ndarray:
     return AMPLITUDE * np.sin(RATE * t + 1.0)
 
 
-def scene(period: float = PERIOD, noise: float = 0.0) -> Assembly:
-    """The vehicle under its weight with a prescribed pitch, sampled every ``period`` (s), with noise (rad) on the
-    samples."""
+def scene(sample_period: float = SAMPLE_PERIOD, noise: float = 0.0) -> Assembly:
+    """The vehicle under its weight with a prescribed pitch, sampled every ``sample_period`` (s), with noise (rad) on
+    the samples.
+    """
     base = vehicle()
-    samples = angle(period * np.arange(round(DURATION / period) + 1))
+    samples = angle(sample_period * np.arange(round(DURATION / sample_period) + 1))
     samples = samples + noise * np.random.default_rng(5).standard_normal(len(samples))
-    return setups.guided_vehicle(_settled_assembly(base), _weight_forces(), smooth_pitch(samples, period))
+    return setups.guided_vehicle(_settled_assembly(base), _weight_forces(), smooth_pitch(samples, sample_period))
 
 
 def _weight_forces() -> Sampled:
-    return static_forces(vehicle(), 2, DURATION, held=False)
+    return static_forces(vehicle(), 2, DURATION, is_held=False)
 
 
 @cache
 def _settled_state() -> np.ndarray:
     """State in which the fast suspension modes have decayed, so that only multipliers are compared."""
     base = vehicle()
-    samples = angle(PERIOD * np.arange(-500, 2))
-    before = setups.guided_vehicle(base, _weight_forces(), smooth_pitch(samples, PERIOD))
-    return tight_solution(before, PERIOD, DURATION).states[-1]
+    samples = angle(SAMPLE_PERIOD * np.arange(-500, 2))
+    unsettled = setups.guided_vehicle(base, _weight_forces(), smooth_pitch(samples, SAMPLE_PERIOD))
+    return tight_solution(unsettled, SAMPLE_PERIOD, DURATION).states[-1]
 
 
-def _settled_assembly(base: Assembly) -> Assembly:
-    base.initial[:] = _settled_state()
-    return base
+def _settled_assembly(base_assembly: Assembly) -> Assembly:
+    base_assembly.initial[:] = _settled_state()
+    return base_assembly
 
 
 @cache
-def solution(period: float = PERIOD, noise: float = 0.0) -> Trajectory:
+def solution(sample_period: float = SAMPLE_PERIOD, noise: float = 0.0) -> Trajectory:
     """Solution in which the pitch is eliminated, by order 8 at a tolerance of 1e-12, with rows every 1 ms."""
-    return tight_solution(scene(period, noise), PERIOD, DURATION)
+    return tight_solution(scene(sample_period, noise), SAMPLE_PERIOD, DURATION)
 
 
-def truth(period: float = PERIOD, noise: float = 0.0) -> np.ndarray:
+def truth(sample_period: float = SAMPLE_PERIOD, noise: float = 0.0) -> np.ndarray:
     """True enforced moment (n,) in N m, from that solution."""
-    moment = solution(period, noise).moment
+    moment = solution(sample_period, noise).moment
     assert moment is not None
     return moment
 
@@ -86,8 +87,8 @@ def moment_error(path: Trajectory, exact_moment: np.ndarray) -> float:
     it: 6 N m that shrink by 0.6 per step, which the enforced-moment case shows on its own.
     """
     assert path.moment is not None
-    every = (len(path.moment) - 1) // (len(exact_moment) - 1)
-    return root_mean_square((path.moment[::every] - exact_moment)[20:])
+    stride = (len(path.moment) - 1) // (len(exact_moment) - 1)
+    return root_mean_square((path.moment[::stride] - exact_moment)[20:])
 
 
 def recommended(engine: str, folder: Path) -> float:
@@ -183,16 +184,18 @@ def noisy_fine(engine: str, folder: Path) -> float:
 
 def _noisy_moment(engine: str, step: float) -> float:
     path = run(engine, scene(noise=NOISE), step, DURATION, CONSTRAINED_INTEGRATORS[engine])
-    return moment_error(path, truth()) / (vehicle().parameters.I * NOISE * np.sqrt(6) / PERIOD**2)
+    return moment_error(path, truth()) / (vehicle().parameters.I * NOISE * np.sqrt(6) / SAMPLE_PERIOD**2)
 
 
 def noisy_naive(folder: Path) -> str:
     """Without the remedy: Exudyn's default on noisy samples that are interpolated linearly."""
     base = vehicle()
-    samples = angle(PERIOD * np.arange(501)) + NOISE * np.random.default_rng(5).standard_normal(501)
-    assembly = setups.guided_vehicle(_settled_assembly(base), _weight_forces(), StraightLinePitch(samples, PERIOD))
+    samples = angle(SAMPLE_PERIOD * np.arange(501)) + NOISE * np.random.default_rng(5).standard_normal(501)
+    assembly = setups.guided_vehicle(
+        _settled_assembly(base), _weight_forces(), StraightLinePitch(samples, SAMPLE_PERIOD)
+    )
     path = as_it_comes(assembly, 1e-3)
-    expected = base.parameters.I * NOISE * np.sqrt(6) / PERIOD**2
+    expected = base.parameters.I * NOISE * np.sqrt(6) / SAMPLE_PERIOD**2
     return (
         f"Exudyn's default on straight lines: {moment_error(path, truth()) / 1e3:.0f} kN m, "
         f"finite differences would give {expected / 1e3:.1f}"
@@ -214,12 +217,12 @@ class StraightLinePitch:
         """Sampling period (s) of the prescribed pitch."""
         return self.period
 
-    def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Angle, rate and 0 (for the second derivative) at start + i step."""
-        place = np.round((start + step * np.arange(count)) / self.period, 9)
-        index = np.minimum(place.astype(int), len(self.angles) - 2)
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Angle, rate and 0 (for the second derivative) at start_time + i step."""
+        position = np.round((start_time + step * np.arange(sample_count)) / self.period, 9)
+        index = np.minimum(position.astype(int), len(self.angles) - 2)
         slope = np.diff(self.angles)[index]
-        return np.column_stack([self.angles[index] + (place - index) * slope, slope / self.period, 0 * slope])
+        return np.column_stack([self.angles[index] + (position - index) * slope, slope / self.period, 0 * slope])
 
     def at(self, time: float) -> np.ndarray:
         """The straight line's values at one time."""
@@ -242,7 +245,7 @@ def refined_naive(folder: Path) -> str:
     """Without the remedy: Exudyn with noise-free samples that are interpolated linearly."""
     errors = []
     for step in (1e-3, 5e-4):
-        pitch = StraightLinePitch(angle(PERIOD * np.arange(501)), PERIOD)
+        pitch = StraightLinePitch(angle(SAMPLE_PERIOD * np.arange(501)), SAMPLE_PERIOD)
         assembly = setups.guided_vehicle(_settled_assembly(vehicle()), _weight_forces(), pitch)
         errors.append(moment_error(as_it_comes(assembly, step), truth()))
     return f"Exudyn on straight lines between clean samples: {errors[0]:.1f} N m at 1 ms, {errors[1]:.2g} at 0.5 ms"
@@ -258,16 +261,16 @@ def explicit_naive(folder: Path) -> str:
     """Without the guard: Exudyn's explicit solver with a constraint, check bypassed."""
     path = as_it_comes(scene(), 1e-3, "RK44")
     assert path.moment is not None
-    off = largest_magnitude(path.states[:, 3] - angle(path.times))
+    pitch_error = largest_magnitude(path.states[:, 3] - angle(path.times))
     moment = largest_magnitude(path.moment[1:])
-    return f"Exudyn RK44 ends without a word: moment {moment:.1f} N m, pitch off by {off:.3f} rad"
+    return f"Exudyn RK44 ends without a word: moment {moment:.1f} N m, pitch off by {pitch_error:.3f} rad"
 
 
 def fed_back(engine: str, folder: Path) -> float:
     """Case: the pitch of a free run is prescribed. Error: rms of the enforced moment, which should be 0, divided by
     that of the inertia moment."""
     base = vehicle("asymmetric_twin")
-    forces: Signal = static_forces(base, 2, DURATION, held=False)
+    forces: Signal = static_forces(base, 2, DURATION, is_held=False)
     base.initial[3] += 0.05
     free = tight_solution(driven_by_forces(base, forces), 2.5e-4, DURATION).states
     guided = setups.guided_vehicle(base, forces, smooth_pitch(free[:, 3], 2.5e-4))
@@ -291,8 +294,8 @@ def gap_naive(folder: Path) -> str:
     assembly = scene()
     path = run("exudyn", assembly, 1e-3, DURATION, "GeneralizedAlpha")
     assert assembly.input is not None
-    off = largest_magnitude(path.states[:, 7] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 3])
-    return f"Exudyn enforces the angle alone: its rate is off by {off:.1e} rad/s"
+    rate_error = largest_magnitude(path.states[:, 7] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 3])
+    return f"Exudyn enforces the angle alone: its rate is off by {rate_error:.1e} rad/s"
 
 
 NO_RADIUS = "Exudyn alone has the setting; the others eliminate the pitch"

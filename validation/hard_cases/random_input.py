@@ -36,7 +36,7 @@ from validation.hard_cases.setups import driven_by_forces, largest_magnitude, se
 NORMAL_LIMIT = 3.29
 """Standard errors that a normal value exceeds once in a thousand."""
 CORNER, Q, SPEED = 0.3, 1e-4, 31.0
-WALK, PATHS, SAMPLES, RATE = 0.5, 600, 100, 50.0
+WALK, PATHS, SAMPLES, SAMPLING_RATE = 0.5, 600, 100, 50.0
 """Angle random walk (rad/sqrt(s)), paths, samples of each and their rate (Hz): E[tr E] falls from 3 to 1.8."""
 
 
@@ -47,10 +47,10 @@ def asked_again(engine: str, folder: Path) -> float:
     forces = static_forces(base, 200, 1e-3, noise=800.0)
     model = build(engine, driven_by_forces(base, forces), settings(engine, 1e-3, 0.1))
     states = base.initial + 1e-3 * np.random.default_rng(3).standard_normal((40, 8))
-    asked = [(2e-3 * i, state[:4], state[4:]) for i, state in enumerate(states)]
-    once = [model.acceleration(*arguments).copy() for arguments in asked]
-    again = [model.acceleration(*arguments).copy() for arguments in reversed(asked)][::-1]
-    return largest_magnitude(np.array(once) - again)
+    arguments_of_calls = [(2e-3 * i, state[:4], state[4:]) for i, state in enumerate(states)]
+    once = [model.acceleration(*arguments).copy() for arguments in arguments_of_calls]
+    reversed_answers = [model.acceleration(*arguments).copy() for arguments in reversed(arguments_of_calls)][::-1]
+    return largest_magnitude(np.array(once) - reversed_answers)
 
 
 def streams(implementation: str, folder: Path) -> float:
@@ -65,14 +65,16 @@ def streams(implementation: str, folder: Path) -> float:
         normal_samples(0, 0, SAMPLES_PER_BLOCK, 1, first=SAMPLES_PER_BLOCK)[:, 0],
         *normal_samples(5, 0, SAMPLES_PER_BLOCK, 2).T,
     ]
-    worst = max(abs(float(first @ two)) / SAMPLES_PER_BLOCK**0.5 for first, two in combinations(paths, 2))
+    worst = max(
+        abs(float(first @ second_path)) / SAMPLES_PER_BLOCK**0.5 for first, second_path in combinations(paths, 2)
+    )
     return worst / 4.75  # one pair of 105 beyond 4.75 errors once in 5000
 
 
 def pieces_of_stream(implementation: str, folder: Path) -> float:
     """Case: a noise stream read in pieces of odd lengths, the last first. Error: difference from the complete
     stream."""
-    whole, edges = (
+    complete_stream, edges = (
         normal_samples(9, 4, 3 * SAMPLES_PER_BLOCK, 3),
         [
             0,
@@ -85,7 +87,7 @@ def pieces_of_stream(implementation: str, folder: Path) -> float:
         ],
     )
     parts = [normal_samples(9, 4, end - start, 3, first=start) for start, end in reversed(list(pairwise(edges)))]
-    return float(np.abs(np.concatenate(parts[::-1]) - whole).max())
+    return float(np.abs(np.concatenate(parts[::-1]) - complete_stream).max())
 
 
 def _one_state() -> Excitation:
@@ -95,9 +97,11 @@ def _one_state() -> Excitation:
 def any_step(implementation: str, folder: Path) -> float:
     """Error of the road's variance q / (2 corner) for half steps of 1e-3 to 30 corner lengths, in standard errors."""
     worst = 0.0
-    for part in (1e-3, 0.1, 0.9, 2.5, 30.0):
-        keeps = np.exp(-2.0 * part)  # squared correlation of neighbours: n samples count as n (1 - keeps) / (1 + keeps)
-        road = RoadPath(_one_state(), SPEED, part / (CORNER * SPEED)).table(20_000, seed=12)[:, 0]
+    for step_share in (1e-3, 0.1, 0.9, 2.5, 30.0):
+        keeps = np.exp(
+            -2.0 * step_share
+        )  # squared correlation of neighbours: n samples count as n (1 - keeps) / (1 + keeps)
+        road = RoadPath(_one_state(), SPEED, step_share / (CORNER * SPEED)).table(20_000, seed=12)[:, 0]
         error = (2.0 / len(road) * (1.0 + keeps) / (1.0 - keeps)) ** 0.5
         worst = max(worst, abs(float(np.mean(road**2)) / (Q / (2.0 * CORNER)) - 1.0) / error)
     return worst
@@ -133,21 +137,21 @@ def attitude(implementation: str, folder: Path) -> float:
     """Error of the mean trace of a noisy gyro's attitude error on a rotating body, against 3 exp(-s^2 t), in standard
     errors."""
     rates = np.tile([0.0, 0.0, 2.0], (SAMPLES, 1))
-    start, deviation = np.array([1.0, 0.0, 0.0, 0.0]), np.full(3, WALK * RATE**0.5)
-    attitudes = measured_attitude(rates, 1.0 / RATE, deviation, start, range(PATHS), seed=5)[-1]
-    true = measured_attitude(rates, 1.0 / RATE, np.zeros(3), start, range(1))[-1]
+    start, deviation = np.array([1.0, 0.0, 0.0, 0.0]), np.full(3, WALK * SAMPLING_RATE**0.5)
+    attitudes = measured_attitude(rates, 1.0 / SAMPLING_RATE, deviation, start, range(PATHS), seed=5)[-1]
+    true = measured_attitude(rates, 1.0 / SAMPLING_RATE, np.zeros(3), start, range(1))[-1]
     traces = np.trace(rotation_matrix(error_rotation(attitudes, true)), axis1=-2, axis2=-1)
-    wanted = mean_trace(random_walk(deviation[0], RATE), SAMPLES / RATE)
+    wanted = mean_trace(random_walk(deviation[0], SAMPLING_RATE), SAMPLES / SAMPLING_RATE)
     return abs(float(traces.mean()) - wanted) / (float(traces.std()) / PATHS**0.5)
 
 
 def attitude_naive(folder: Path) -> str:
     """Without the remedy: norm of a quaternion that is integrated by explicit Euler."""
-    turns = WALK / RATE**0.5 * np.stack([normal_samples(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
+    turns = WALK / SAMPLING_RATE**0.5 * np.stack([normal_samples(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
     q = euler_quaternions(turns, np.array([1.0, 0.0, 0.0, 0.0]))
     return (
         f"explicit Euler's quaternion has a mean square of {float((q**2).sum(axis=-1).mean()):.3f} "
-        f"({euler_mean_square(WALK, 3, 1.0 / RATE, SAMPLES):.3f} by its law): its matrix is no rotation"
+        f"({euler_mean_square(WALK, 3, 1.0 / SAMPLING_RATE, SAMPLES):.3f} by its law): its matrix is no rotation"
     )
 
 

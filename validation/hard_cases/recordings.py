@@ -18,16 +18,20 @@ SIZE = 0.2
 
 
 def spoilt(
-    check: str, place: str, size: float | None, spoil: bench.Spoil | None = None, **faults: Any
+    check: str, expected_place: str, fault_size: float | None, spoil: bench.Spoil | None = None, **faults: Any
 ) -> Callable[[str, Path], float]:
     """Case: a recording with one fault. Error: that of the size found; infinite unless ``check`` reports it first, and
-    all findings name ``place``."""
+    all findings name ``expected_place``."""
 
     def error(implementation: str, folder: Path) -> float:
         findings = bench.planted_findings(bench.measurement(road=ROAD), folder, spoil, **faults)
-        if not findings or findings[0].check != check or not all(place in finding.place for finding in findings):
+        if (
+            not findings
+            or findings[0].check != check
+            or not all(expected_place in finding.place for finding in findings)
+        ):
             return np.inf
-        return 0.0 if size is None else abs((findings[0].size or 0.0) / size - 1.0)
+        return 0.0 if fault_size is None else abs((findings[0].size or 0.0) / fault_size - 1.0)
 
     return error
 

@@ -76,8 +76,8 @@ def drifting(implementation: str, folder: Path) -> float:
     covariance = stationary_covariance(system)
     if covariance.status != (DIFFUSING, DIFFUSING) or covariance.power.tolist() != [1, 3]:
         return np.inf
-    after_1, two = after_hours(system)
-    grown = (two - after_1) / (2.0**covariance.power - 1.0) / 3600.0**covariance.power
+    after_1, after_2 = after_hours(system)
+    grown = (after_2 - after_1) / (2.0**covariance.power - 1.0) / 3600.0**covariance.power
     return largest_relative_error(grown, covariance.rate)
 
 
@@ -140,26 +140,26 @@ def _refused_by_growth(vehicle: LinearVehicle) -> float:
         try:
             route()
         except Unstable as error:
-            said = error
+            refusal = error
             if largest_relative_error(error.growth, growing) > 1e-9:
                 return np.inf
         else:
             return np.inf
-    raise said
+    raise refusal
 
 
 def crawling(implementation: str, folder: Path) -> float:
     """Case: a delay of 26,000 s between the axles. Error: relative difference from independent axles."""
     vehicle = linear(load_vehicle("half_car"), implementation)
-    late, apart = (_deviations_of_ride(vehicle, 1e-4, word) for word in ("delayed", "uncorrelated"))
-    return largest_relative_error(late, apart)
+    late, independent = (_deviations_of_ride(vehicle, 1e-4, word) for word in ("delayed", "uncorrelated"))
+    return largest_relative_error(late, independent)
 
 
 def axles_at_one_place(implementation: str, folder: Path) -> float:
     """Case: two axles at the same x, without delay. Error: relative difference from one common input."""
     vehicle = linear(load_vehicle("half_car"), implementation)
-    here = replace(vehicle, wheels=tuple(replace(wheel, x=0.0) for wheel in vehicle.wheels))
-    delayed, equal = (_deviations_of_ride(here, SPEED, word) for word in ("delayed", "equal"))
+    at_one_place = replace(vehicle, wheels=tuple(replace(wheel, x=0.0) for wheel in vehicle.wheels))
+    delayed, equal = (_deviations_of_ride(at_one_place, SPEED, word) for word in ("delayed", "equal"))
     return largest_relative_error(delayed, equal)
 
 
@@ -211,13 +211,13 @@ def no_speed(implementation: str, folder: Path) -> float:
         try:
             _deviations_of_ride(vehicle, speed)
         except InputError as error:
-            said = error
+            refusal = error
         else:
             return np.inf
-    raise said
+    raise refusal
 
 
-def bad(change: Change, place: str) -> Callable[..., float]:
+def bad(change: Change, expected_place: str) -> Callable[..., float]:
     """Case: the half car's file with one wrong entry must be refused with the entry's name."""
 
     def error(implementation: str, folder: Path) -> float:
@@ -226,7 +226,7 @@ def bad(change: Change, place: str) -> Callable[..., float]:
         try:
             vehicle = build_vehicle(table, "half_car.toml")
         except InputError as refusal:
-            if place not in refusal.place:
+            if expected_place not in refusal.place:
                 return np.inf
             raise
         return float(np.isfinite(_deviations_of_ride(linear(vehicle, implementation))).all()) + 1.0

@@ -74,9 +74,11 @@ def reversal(implementation: str, folder: Path) -> float:
     regularisation."""
     jumps = []
     for middle in (-wf.REGULAR, 0.0, wf.REGULAR):
-        below, above = (built_wheelset(implementation, CHOSEN_WHEELSET, middle + part) for part in (-1e-9, 1e-9))
+        rates_below, rates_above = (
+            built_wheelset(implementation, CHOSEN_WHEELSET, middle + speed_offset) for speed_offset in (-1e-9, 1e-9)
+        )
         state = np.array([2e-3, 5e-5, 1e-4, 1e-3, 0.0, 1e-3, 0.0, 1e-3, 1e-3, 0.1])
-        jumps.append(np.abs(above.rates(state) - below.rates(state)).max())
+        jumps.append(np.abs(rates_above.rates(state) - rates_below.rates(state)).max())
     return float(max(jumps) * CHOSEN_WHEELSET.mass / (CHOSEN_WHEELSET.friction * CHOSEN_WHEELSET.load))
 
 
@@ -107,12 +109,12 @@ def energies(motion: Motion, w: Wheelset) -> np.ndarray:
     return 0.5 * (w.mass * (vy**2 + vz**2) + turning) - w.load * z + pressed
 
 
-def falling(implementation: str, folder: Path, **moved: float) -> float:
+def falling(implementation: str, folder: Path, **displacements: float) -> float:
     """Case: an elastic wheelset without friction is released above its rails. Error: gained energy, divided by that of
     a fall by 1 mm."""
     elastic = FREE_WHEELSET.changed(friction=0.0, contact_damping=0.0, flange_clearance=0.1)
     wheelset = built_wheelset(implementation, elastic)
-    motion = wheelset.run(displaced_state(wheelset, **moved), 0.06, 5e-5)
+    motion = wheelset.run(displaced_state(wheelset, **displacements), 0.06, 5e-5)
     loads = motion.contacts["load"]
     if not ((loads == 0.0).any(axis=0) & (loads > 0.0).any(axis=0)).all():
         return np.inf  # nothing has lifted off, or nothing has landed
@@ -140,8 +142,8 @@ def light_wheelset_load(implementation: str, folder: Path, mass: float) -> float
     if beyond_friction(motion, toy.friction) > 1e-12:
         return np.inf
     contact = motion.contacts[-1]
-    up = contact["load"] * np.cos(contact["angle"]) - contact["fy"] * np.sin(contact["angle"])
-    return float(abs(up.sum() / toy.load - 1.0))
+    vertical_force = contact["load"] * np.cos(contact["angle"]) - contact["fy"] * np.sin(contact["angle"])
+    return float(abs(vertical_force.sum() / toy.load - 1.0))
 
 
 def frictions(implementation: str, folder: Path) -> float:
@@ -176,9 +178,10 @@ def halved(implementation: str, folder: Path, wheelset: Wheelset, speed: float, 
 
 def crawling(implementation: str, folder: Path) -> float:
     """Relative difference of the displacement at a speed of 1e-6 m/s from that of a standing wheelset."""
-    rest = built_wheelset(implementation, HEAVY_WHEELSET, 0.0).rest
+    rest_state = built_wheelset(implementation, HEAVY_WHEELSET, 0.0).rest
     runs = (
-        built_wheelset(implementation, HEAVY_WHEELSET, speed, lean=0.1).run(rest, 0.01, 8e-5) for speed in (0.0, 1e-6)
+        built_wheelset(implementation, HEAVY_WHEELSET, speed, lean=0.1).run(rest_state, 0.01, 8e-5)
+        for speed in (0.0, 1e-6)
     )
     still, slow = (motion.states[-1, eq.Y] for motion in runs)
     return float(abs(slow / still - 1.0))
@@ -195,16 +198,16 @@ def mirrored(implementation: str, folder: Path) -> float:
     """Case: a start and its mirror image, with one wheel in the air. Error: difference of the mirrored paths."""
     equations = built_wheelset(implementation)
     start = displaced_state(equations, Y=2e-3, Z=-7e-4, ROLL=1e-3, YAW=2e-3, ROLL_RATE=0.05, YAW_RATE=0.1)
-    straight, other = (equations.run(state, 0.05, 1e-4).states for state in (start, MIRROR * start))
-    return float(np.abs(straight - MIRROR * other).max())
+    straight, other_path = (equations.run(state, 0.05, 1e-4).states for state in (start, MIRROR * start))
+    return float(np.abs(straight - MIRROR * other_path).max())
 
 
-def refused(implementation: str, folder: Path, place: str, run: Callable[[str], Any]) -> float:
-    """Case that must be refused with the name ``place``."""
+def refused(implementation: str, folder: Path, expected_place: str, run: Callable[[str], Any]) -> float:
+    """Case that must be refused with the name ``expected_place``."""
     try:
         run(implementation)
     except InputError as refusal:
-        if place in refusal.place:
+        if expected_place in refusal.place:
             raise
     return np.inf
 
@@ -216,17 +219,17 @@ def ran(
     step: float = STEP,
     stride: int = 1,
     speed: float = 40.0,
-    **moved: float,
+    **displacements: float,
 ) -> Motion:
     """A run that starts displaced from rest."""
     wheelset = built_wheelset(implementation, speed=speed)
-    return wheelset.run(displaced_state(wheelset, **moved), duration, step, stride)
+    return wheelset.run(displaced_state(wheelset, **displacements), duration, step, stride)
 
 
-def fails(implementation: str, folder: Path, **moved: Any) -> float:
+def fails(implementation: str, folder: Path, **displacements: Any) -> float:
     """A hard case whose run must fail within its first half, with the time in the message."""
     try:
-        ran(implementation, duration=0.1, **moved)
+        ran(implementation, duration=0.1, **displacements)
     except RunFailed as failure:
         if failure.time is not None and 0.0 <= failure.time < 0.05:
             raise
@@ -396,7 +399,7 @@ CASES = (
             "",
             0.0,
             "exact",
-            partial(refused, place=place, run=run),
+            partial(refused, expected_place=place, run=run),
             REFUSED,
         )
         for name, place, run in (

@@ -80,8 +80,8 @@ def jumps(implementation: str, folder: Path) -> float:
     """Largest change of a force, divided by mu N, where the speed passes 0 and the limits of the regularisation."""
     shares = []
     for middle in (-REGULAR, 0.0, REGULAR):
-        backwards, other = (Wheels(cells=7, speed=middle + part) for part in (-1e-9, 1e-9))
-        change = on_rig(implementation, other, SLIDES) - on_rig(implementation, backwards, SLIDES)
+        backwards, forwards_wheels = (Wheels(cells=7, speed=middle + speed_offset) for speed_offset in (-1e-9, 1e-9))
+        change = on_rig(implementation, forwards_wheels, SLIDES) - on_rig(implementation, backwards, SLIDES)
         shares.append(np.abs(change[:, :2]).max() / (backwards.mu * backwards.load))
     return float(max(shares))
 
@@ -136,18 +136,18 @@ def is_wrong(run: Drive) -> bool:
 
 def left_open(run: Drive) -> float:
     """Error of the energy balance over a run with equal steps, divided by the initial energy."""
-    times, ends = run.run.times, [0, -1]
-    few = Trajectory(times[ends], run.run.states[ends])
-    first, last = drive_energy(Drive(run.handling, few, run.tyres[ends], run.ledger[ends]))
-    return float(abs(last - first - simpson(run.power(), x=times)) / first)
+    run_times, ends = run.run.times, [0, -1]
+    run_ends = Trajectory(run_times[ends], run.run.states[ends])
+    first_energy, last_energy = drive_energy(Drive(run.handling, run_ends, run.tyres[ends], run.ledger[ends]))
+    return float(abs(last_energy - first_energy - simpson(run.power(), x=run_times)) / first_energy)
 
 
 def leaping(implementation: str, folder: Path) -> float:
     """Case: a car leaves a ramp with all wheels and lands. Error: that of its energy balance."""
     run = drive(implementation, Handling(R19, Tyres(cells=7), waves=RAMP), 25.0, 0.5, 5e-4)
     loads = run["load"]
-    up = (loads == 0.0).all(axis=1)
-    if is_wrong(run) or not up.any() or (loads[-1] == 0.0).any():
+    in_air = (loads == 0.0).all(axis=1)
+    if is_wrong(run) or not in_air.any() or (loads[-1] == 0.0).any():
         return np.inf
     return left_open(run)
 
@@ -167,8 +167,8 @@ def locked(implementation: str, folder: Path) -> float:
 def back(implementation: str, folder: Path) -> float:
     """Case: a car rolls up a slope, stops and rolls back. Error: that of its energy balance."""
     run = drive(implementation, Handling(R19, Tyres(cells=7), slope=0.3), 0.005, 0.006, 4e-5)
-    ahead = run.velocity()[:, 0]
-    if is_wrong(run) or not ahead[0] > 0.0 > ahead[-1]:
+    forward_speed = run.velocity()[:, 0]
+    if is_wrong(run) or not forward_speed[0] > 0.0 > forward_speed[-1]:
         return np.inf
     return left_open(run)
 

@@ -36,19 +36,19 @@ from validation.hard_cases.setups import (
 )
 
 
-def momentum_error(engine: str, interpolation: str, values: np.ndarray, period: float, step: float) -> float:
+def momentum_error(engine: str, interpolation: str, values: np.ndarray, sample_period: float, step: float) -> float:
     """Error of the momentum sum m z' against the exact impulse of the forces, divided by the largest impulse."""
     base = vehicle("asymmetric_twin")
-    forces = Sampled(values, period, held=interpolation == "held")
-    steps = round((len(values) - 1) * period / step)
+    forces = Sampled(values, sample_period, held=interpolation == "held")
+    steps = round((len(values) - 1) * sample_period / step)
     path = run(engine, setups.driven_by_forces(base, forces), step, steps * step)
-    p, every = base.parameters, round(period / step)
+    p, stride = base.parameters, round(sample_period / step)
     masses = np.array([p.m1, p.m2, p.m3])
     total = values.sum(axis=1)
-    held = np.concatenate(([0.0], np.cumsum(total[:-1] * period)))
-    impulse = held if forces.held else held + period * (total - total[0]) / 2
-    truth = masses.sum() * p.g * period * np.arange(len(values)) - impulse
-    return largest_magnitude(path.states[::every, 4:7] @ masses - truth) / largest_magnitude(impulse)
+    impulse_so_far = np.concatenate(([0.0], np.cumsum(total[:-1] * sample_period)))
+    impulse = impulse_so_far if forces.held else impulse_so_far + sample_period * (total - total[0]) / 2
+    truth = masses.sum() * p.g * sample_period * np.arange(len(values)) - impulse
+    return largest_magnitude(path.states[::stride, 4:7] @ masses - truth) / largest_magnitude(impulse)
 
 
 def ramp(engine: str, folder: Path) -> float:
@@ -61,8 +61,8 @@ def ramp_naive(folder: Path) -> str:
     """Without the remedy: share of steps that read the wrong sample if the accumulated time is truncated."""
     shares = []
     for step in (1e-3, 2e-3, 5.5e-3):
-        times = np.cumsum(np.full(2000, step)) - step
-        shares.append(np.mean((times / step).astype(int) != np.arange(2000)))
+        accumulated_times = np.cumsum(np.full(2000, step)) - step
+        shares.append(np.mean((accumulated_times / step).astype(int) != np.arange(2000)))
     return (
         "int(t / dt) with accumulated t reads the wrong sample in "
         + ", ".join(f"{x:.0%}" for x in shares)
@@ -81,8 +81,8 @@ def impulse_naive(folder: Path) -> str:
     base = vehicle()
     values = static_forces(base, 1002, 2e-3, noise=800.0).values
     ends = [
-        run("reference", setups.driven_by_forces(base, Sampled(values, 2e-3, held)), 1e-3, 2.0).states[-1, 3]
-        for held in (True, False)
+        run("reference", setups.driven_by_forces(base, Sampled(values, 2e-3, is_held)), 1e-3, 2.0).states[-1, 3]
+        for is_held in (True, False)
     ]
     return f"held and linear end {abs(ends[0] - ends[1]) / abs(ends[0]):.1%} apart in pitch: half a sample of shift"
 
@@ -102,9 +102,9 @@ class ByTime(Sampled):
     """Faulty held samples: every stage reads the sample at its own time, so that the last stage of a step reads the
     next sample."""
 
-    def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values at start + i step."""
-        periods = (start + step * np.arange(count)) / self.period
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values at start_time + i step."""
+        periods = (start_time + step * np.arange(sample_count)) / self.period
         return self.values[np.floor(periods + SNAP_SHARE).astype(int).clip(0, len(self.values) - 1)]
 
 
@@ -267,15 +267,15 @@ def _over_waves(engine: str, step: float, error: bool = False) -> Result:
 def passed_over(engine: str, folder: Path) -> float:
     """Case: the study road at 560 m/s in steps of 2 ms, or 1.1 m. Error: ratio of the true to the stated error.
     Infinite unless this error is a warning, and the steps that the warnings name lead to a run without one."""
-    told = _over_waves(engine, 2e-3, error=True)
-    name, estimate = max(errors_of(told).items(), key=lambda each: each[1].share)
+    stated_run = _over_waves(engine, 2e-3, error=True)
+    name, estimate = max(errors_of(stated_run).items(), key=lambda each: each[1].share)
     cured: Estimate | None = estimate
     for _ in range(3):
         cured = worst_of(_over_waves(engine, cured.step, error=True)) if cured and cured.warned else cured
     if not estimate.warned or cured is None or cured.warned:
         return np.inf
-    off = told[name] - _over_waves(engine, 1e-4)[name][::20]
-    return float(np.sqrt(np.mean(off**2))) / estimate.error
+    error_of_values = stated_run[name] - _over_waves(engine, 1e-4)[name][::20]
+    return float(np.sqrt(np.mean(error_of_values**2))) / estimate.error
 
 
 def passed_over_naive(folder: Path) -> str:

@@ -45,31 +45,38 @@ def vehicle(
     return assembly if initial is None else replace(assembly, initial=np.array(initial, dtype=float))
 
 
-def driven_by_forces(base: Assembly, forces: Signal, mode: Mode = "force") -> Assembly:
+def driven_by_forces(base_assembly: Assembly, forces: Signal, drive_mode: Mode = "force") -> Assembly:
     """The vehicle without its road, driven by two wheel forces (N)."""
-    return base.without_tyres().with_input(mode, forces)
+    return base_assembly.without_tyres().with_input(drive_mode, forces)
 
 
-def guided_vehicle(base: Assembly, forces: Signal, pitch: Signal) -> Assembly:
+def guided_vehicle(base_assembly: Assembly, forces: Signal, pitch: Signal) -> Assembly:
     """The vehicle driven by forces, with a prescribed pitch signal that has two derivatives; its start is
     consistent."""
-    start = base.initial.copy()
+    start = base_assembly.initial.copy()
     start[[3, 7]] = pitch.at(0.0)[:2]
-    return replace(base.without_tyres().with_input("pitch", Stacked((forces, pitch))), initial=start)
+    return replace(base_assembly.without_tyres().with_input("pitch", Stacked((forces, pitch))), initial=start)
 
 
-def smooth_pitch(angles: np.ndarray, period: float) -> Smooth:
+def smooth_pitch(angles: np.ndarray, sample_period: float) -> Smooth:
     """Pitch samples (rad) in the form in which a scene reads them: a quintic spline with two derivatives."""
-    return Smooth(angles[:, None], period, derivatives=2, degree=5)
+    return Smooth(angles[:, None], sample_period, derivatives=2, degree=5)
 
 
 def static_forces(
-    base: Assembly, count: int, period: float, held: bool = True, noise: float = 0.0, seed: int = 1
+    base_assembly: Assembly,
+    sample_count: int,
+    sample_period: float,
+    is_held: bool = True,
+    noise: float = 0.0,
+    seed: int = 1,
 ) -> Sampled:
     """Wheel forces (N) that carry the vehicle, with independent noise of a standard deviation (N) on each sample."""
-    p, z = base.parameters, base.initial
+    p, z = base_assembly.parameters, base_assembly.initial
     carried = np.array([p.k1 * z[0], p.k2 * z[1]])
-    return Sampled(carried + noise * np.random.default_rng(seed).standard_normal((count, 2)), period, held)
+    return Sampled(
+        carried + noise * np.random.default_rng(seed).standard_normal((sample_count, 2)), sample_period, is_held
+    )
 
 
 def settings(engine: str, step: float, duration: float, integrator: str = "", **options: float) -> Settings:
@@ -98,32 +105,32 @@ def tight_solution(assembly: Assembly, step: float, duration: float) -> Trajecto
     return run("reference", assembly, step, duration, "DOP853", tolerance=1e-12)
 
 
-def exact_states(assembly: Assembly, step: float, count: int, forces: np.ndarray | None = None) -> np.ndarray:
+def exact_states(assembly: Assembly, step: float, step_count: int, forces: np.ndarray | None = None) -> np.ndarray:
     """Exact states (count + 1, 8) of the linearised vehicle, by the matrix exponential.
 
-    forces (count, 2) in N are held over each step; None is the vehicle on the flat road.
+    forces (step_count, 2) in N are held over each step; None is the vehicle on the flat road.
     """
     linear = linearised(assembly.vehicle)
-    push = np.zeros((count, 4))
+    push = np.zeros((step_count, 4))
     push[:, :3] = [body.mass * assembly.vehicle.gravity for body in assembly.vehicle.bodies]
     if forces is not None:
         push[:, :2] -= forces
     block = np.zeros((16, 16))
     block[:8, :8], block[:8, 8:] = first_order(linear), np.eye(8)
-    moved = expm(block * step)
+    transition = expm(block * step)
     states = [assembly.initial]
     for row in push:
         rate = np.concatenate((np.zeros(4), row / linear[0].diagonal()))
-        states.append(moved[:8, :8] @ states[-1] + moved[:8, 8:] @ rate)
+        states.append(transition[:8, :8] @ states[-1] + transition[:8, 8:] @ rate)
     return np.array(states)
 
 
 def exact_decay(assembly: Assembly, times: np.ndarray) -> np.ndarray:
     """Exact states (n, 8) of the linearised vehicle on a flat road at any times (n,) in s."""
     poles, shapes = np.linalg.eig(first_order(linearised(assembly.vehicle)))
-    rest = vehicle(geometry="linear").initial
-    shares = np.linalg.solve(shapes, assembly.initial - rest)
-    return rest + ((np.exp(np.outer(times, poles)) * shares) @ shapes.T).real
+    rest_state = vehicle(geometry="linear").initial
+    shares = np.linalg.solve(shapes, assembly.initial - rest_state)
+    return rest_state + ((np.exp(np.outer(times, poles)) * shares) @ shapes.T).real
 
 
 def largest_magnitude(difference: np.ndarray) -> float:

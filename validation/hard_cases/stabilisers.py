@@ -43,7 +43,7 @@ def sprung(band: float) -> Assembly:
     base = vehicle("asymmetric_twin")
     start = base.initial.copy()
     start[7] = 0.4
-    assembly = driven_by_forces(base, static_forces(base, 2, DURATION, held=False))
+    assembly = driven_by_forces(base, static_forces(base, 2, DURATION, is_held=False))
     spring = PitchSpring("chassis", STIFFNESS, 0.0, band)
     return replace(assembly, initial=start, vehicle=replace(assembly.vehicle, pitch_springs=(spring,)))
 
@@ -85,8 +85,8 @@ def never_left(engine: str, folder: Path) -> float:
     """Case: a dead band wider than the motion. Error: difference from a run without the spring."""
     tied = sprung(1.0)
     free = replace(tied, vehicle=replace(tied.vehicle, pitch_springs=()))
-    between, other = (run(engine, assembly, STEP, DURATION).states for assembly in (tied, free))
-    return largest_magnitude(between - other)
+    between, free_states = (run(engine, assembly, STEP, DURATION).states for assembly in (tied, free))
+    return largest_magnitude(between - free_states)
 
 
 def beside_held(moment_held: bool = False) -> Assembly:
@@ -126,7 +126,7 @@ def _free_motion() -> np.ndarray:
     """States every 0.25 ms of the vehicle under its weight, released from a tilted position."""
     base = vehicle("asymmetric_twin")
     base.initial[[2, 3]] += 0.02, 0.05
-    assembly = driven_by_forces(base, static_forces(vehicle("asymmetric_twin"), 2, DURATION, held=False))
+    assembly = driven_by_forces(base, static_forces(vehicle("asymmetric_twin"), 2, DURATION, is_held=False))
     return tight_solution(assembly, 2.5e-4, DURATION).states
 
 
@@ -136,7 +136,7 @@ def on_rails(noise: float = 0.0, mass: float = 1.0) -> Assembly:
     states = _free_motion()
     motion = states[:, 2:4] + noise * np.random.default_rng(7).standard_normal((len(states), 2))
     base = vehicle("asymmetric_twin")
-    forces = static_forces(base, 2, DURATION, held=False)
+    forces = static_forces(base, 2, DURATION, is_held=False)
     signal = Stacked((forces, Smooth(motion, 2.5e-4, derivatives=2, degree=5)))
     assembly = vehicle("asymmetric_twin", initial=states[0], m3=mass * base.parameters.m3)
     assembly.initial[[2, 3, 6, 7]] = signal.at(0.0)[2:6]
@@ -158,8 +158,11 @@ def missing_mass(engine: str, folder: Path) -> float:
 
 def missing_mass_naive(folder: Path) -> str:
     """Difference between the states of guided runs with the true and a wrong mass, as a sentence."""
-    whole, other = (_guided_run("reference", on_rails(mass=mass)).states for mass in (1.0, 0.95))
-    return f"the states of the guided run differ by {largest_magnitude(whole - other):.1e}: only the force can tell"
+    states_of_true, states_of_wrong = (_guided_run("reference", on_rails(mass=mass)).states for mass in (1.0, 0.95))
+    return (
+        f"the states of the guided run differ by {largest_magnitude(states_of_true - states_of_wrong):.1e}: "
+        "only the force can tell"
+    )
 
 
 def rough_rails(engine: str, folder: Path) -> float:

@@ -82,11 +82,11 @@ def reset_naive(folder: Path) -> str:
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     data = mujoco.MjData(model)
     data.qpos[:] = _displaced_vehicle("exact").initial[:4]
-    resets, before = 0, 0.0
+    resets, time_before = 0, 0.0
     with without_warnings():
         for _ in range(250):
             mujoco.mj_step(model, data)
-            resets, before = resets + (data.time <= before), data.time
+            resets, time_before = resets + (data.time <= time_before), data.time
     return f"MuJoCo resets itself {resets} times, ends at t = {data.time:.3f} s of 2 s, all finite, no exception"
 
 
@@ -100,9 +100,9 @@ def huge_naive(folder: Path) -> str:
     """Without the guard: Exudyn's own success flag, and the largest finite state."""
     assembly = vehicle(geometry="linear", initial=_displaced_vehicle().initial)
     model = exudyn_engine.build(assembly, settings("exudyn", 5e-3, 2.0, "ExplicitEuler"))
-    said = not solve(model.built.mbs, model.settings)
+    flag = not solve(model.built.mbs, model.settings)
     _, states = model._recorded()
-    return f"Exudyn returns {said} with states of up to {largest_magnitude(states[np.isfinite(states)]):.0e}"
+    return f"Exudyn returns {flag} with states of up to {largest_magnitude(states[np.isfinite(states)]):.0e}"
 
 
 def sudden(engine: str, folder: Path) -> float:
@@ -126,10 +126,10 @@ def sudden_naive(folder: Path) -> str:
     assembly, forces = _step_force()
     path = unchecked_run("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
     truth = exact_states(assembly, 10e-3, 20, forces.values)
-    off = (path.states - truth)[6:9, 4]
+    velocity_errors = (path.states - truth)[6:9, 4]
     return (
         "Exudyn's default at 10 ms overshoots: front wheel velocity off by "
-        f"{', '.join(f'{value:+.3f}' for value in off)} m/s (peak {largest_magnitude(truth[:, 4]):.3f})"
+        f"{', '.join(f'{value:+.3f}' for value in velocity_errors)} m/s (peak {largest_magnitude(truth[:, 4]):.3f})"
     )
 
 
@@ -153,9 +153,11 @@ def restart(engine: str, folder: Path) -> float:
     uninterrupted run."""
     base = vehicle()
     forces = static_forces(base, 400, 1e-3, noise=500.0)
-    whole = run(engine, driven_by_forces(base, forces), 1e-3, 0.4).states
-    rest = driven_by_forces(replace(base, initial=whole[200].copy()), Sampled(forces.values[200:], 1e-3, True))
-    return largest_magnitude(run(engine, rest, 1e-3, 0.2).states - whole[200:])
+    full_states = run(engine, driven_by_forces(base, forces), 1e-3, 0.4).states
+    second_half = driven_by_forces(
+        replace(base, initial=full_states[200].copy()), Sampled(forces.values[200:], 1e-3, True)
+    )
+    return largest_magnitude(run(engine, second_half, 1e-3, 0.2).states - full_states[200:])
 
 
 def stamps(engine: str, folder: Path) -> float:
@@ -171,10 +173,10 @@ def stamps_naive(folder: Path) -> str:
     """Without the remedy: error if row numbers are used as times."""
     assembly = _displaced_vehicle()
     path = run("exudyn", assembly, 1e-3, 0.2, "DOPRI5")
-    off = np.abs(path.times - 1e-3 * np.arange(len(path.times)))
+    time_errors = np.abs(path.times - 1e-3 * np.arange(len(path.times)))
     truth = exact_states(assembly, 1e-3, len(path.times) - 1)
     return (
-        f"Exudyn's rows lie up to {off.max() * 1e3:.2g} ms off the grid: compared row by row the same run "
+        f"Exudyn's rows lie up to {time_errors.max() * 1e3:.2g} ms off the grid: compared row by row the same run "
         f"shows an error of {largest_magnitude(path.states - truth):.0e}"
     )
 

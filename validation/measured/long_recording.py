@@ -20,7 +20,7 @@ from models.systems.measured.virtual import VirtualTable, virtual_measurement
 from validation.common.peak_memory import peak_memory
 from validation.spatial.cars import r19
 
-PERIOD, SEAM_SAMPLES, BLOCK = 1e-3, 1000, 60_000
+SAMPLE_PERIOD, SEAM_SAMPLES, BLOCK = 1e-3, 1000, 60_000
 """s; samples over which a repetition fades into the next; samples made at once."""
 SENSOR_PLACES = {
     "acc fl": (1.2, 0.6, 0.6),
@@ -40,7 +40,7 @@ def repeated_pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndar
     names = [element.name for element in car.elements]
     table = VirtualTable(
         duration=seconds,
-        accelerometers={name: list(place) for name, place in SENSOR_PLACES.items()},
+        accelerometers={name: list(sensor_position) for name, sensor_position in SENSOR_PLACES.items()},
         travels=names[:10],
         sections=names[:9],
     )
@@ -49,50 +49,53 @@ def repeated_pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndar
     return virtual.signals, virtual.samples(Faults(), 1)
 
 
-def sample_blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray]:
+def sample_blocks(seconds: float, pattern_seconds: float = 20.0) -> Iterator[np.ndarray]:
     """Samples (n, 60) of a recording of a length (s), one block after the other."""
-    signals, whole = repeated_pattern(repeated)
+    signals, pattern = repeated_pattern(pattern_seconds)
     deviation = np.array([NOISE[signal.quantity] for signal in signals])
-    length, count = len(whole) - SEAM_SAMPLES, round(seconds / PERIOD) + 1
+    length, count = len(pattern) - SEAM_SAMPLES, round(seconds / SAMPLE_PERIOD) + 1
     fade = np.linspace(0.0, 1.0, SEAM_SAMPLES, endpoint=False)[:, None]
-    once = whole[:length].copy()
-    once[:SEAM_SAMPLES] = fade * whole[:SEAM_SAMPLES] + (1 - fade) * whole[length:]
+    once = pattern[:length].copy()
+    once[:SEAM_SAMPLES] = fade * pattern[:SEAM_SAMPLES] + (1 - fade) * pattern[length:]
     for first in range(0, count, BLOCK):
-        at = np.arange(first, min(first + BLOCK, count))
-        values = once[at % length]
+        sample_numbers = np.arange(first, min(first + BLOCK, count))
+        values = once[sample_numbers % length]
         if first == 0:
-            values[: min(SEAM_SAMPLES, count)] = whole[: min(SEAM_SAMPLES, count)]  # begins at rest
-        yield values + normal_samples(SEED, 0, len(at), 60, first) * deviation
+            values[: min(SEAM_SAMPLES, count)] = pattern[: min(SEAM_SAMPLES, count)]  # begins at rest
+        yield values + normal_samples(SEED, 0, len(sample_numbers), 60, first) * deviation
 
 
-def long_recording(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
+def long_recording(seconds: float, path: Path, pattern_seconds: float = 20.0) -> Recording:
     """The long recording as an object, with no files read or mapped. Its samples are at ``path``, and are made if they
     are missing."""
-    signals, _ = repeated_pattern(repeated)
-    columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / PERIOD) + 1)
-    for values in sample_blocks(seconds, repeated) if columns.done == 0 else ():
+    signals, _ = repeated_pattern(pattern_seconds)
+    columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / SAMPLE_PERIOD) + 1)
+    for values in sample_blocks(seconds, pattern_seconds) if columns.done == 0 else ():
         columns.write(columns.done, values)
     assert columns.done == columns.count
-    return Recording(signals, columns, PERIOD)
+    return Recording(signals, columns, SAMPLE_PERIOD)
 
 
 def recorded_sections() -> Sections:
     """All sections in which forces are computed, and the positions of the accelerometers."""
     return Sections(
-        r19(), points=tuple(AccelerometerPoint(name, "body", place) for name, place in SENSOR_PLACES.items())
+        r19(),
+        points=tuple(
+            AccelerometerPoint(name, "body", sensor_position) for name, sensor_position in SENSOR_PLACES.items()
+        ),
     )
 
 
 def run_of(
     folder: Path,
     seconds: float,
-    repeated: float = 20.0,
+    pattern_seconds: float = 20.0,
     engine: str = "mujoco",
     hold: AttitudeHold | None = None,
     step: float | None = None,
 ) -> SectionRun:
     """A run of a recording in this folder; the recording is made if it is missing."""
-    recording = long_recording(seconds, folder / "recording.f64", repeated)
+    recording = long_recording(seconds, folder / "recording.f64", pattern_seconds)
     return SectionRun(r19(), recording, recorded_sections(), engine, hold or AttitudeHold(), step)
 
 
@@ -102,10 +105,10 @@ def answers_of(folder: Path, name: str = "run") -> bytes:
 
 
 def run_killed_process(
-    folder: Path, seconds: float, repeated: float, block: float, times: int, lasting: float = 1.0
+    folder: Path, seconds: float, pattern_seconds: float, block: float, kill_count: int, lasting: float = 1.0
 ) -> int:
-    """Run in a separate process, which is killed (signal 9) ``times`` times at random moments and restarted until it
-    ends; returns the number of starts.
+    """Run in a separate process, which is killed (signal 9) ``kill_count`` times at random moments and restarted until
+    it ends; returns the number of starts.
 
     Moments are drawn from the ``lasting`` s after the first line of progress.
     """
@@ -114,14 +117,14 @@ def run_killed_process(
         sys.executable,
         "-m",
         "validation.measured.long_recording",
-        *map(str, (folder, seconds, repeated, block)),
+        *map(str, (folder, seconds, pattern_seconds, block)),
     ]
     while True:
         runs += 1
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             process.stdout.readline()
-            if kills < times:
+            if kills < kill_count:
                 time.sleep(float(rng.uniform(0.0, lasting)))
                 process.kill()
                 kills += 1
@@ -131,14 +134,14 @@ def run_killed_process(
                 raise RuntimeError(f"the run ended with {process.returncode}")
 
 
-def _main(folder: str, seconds: str, repeated: str, block: str, step: str = "") -> None:
+def _main(folder: str, seconds: str, pattern_seconds: str, block: str, step: str = "") -> None:
     """Start or continue a run. Prints a line per block: seconds done, peak memory (bytes), processor time (s)."""
 
-    def told(completed: float, of: float) -> None:
+    def report_block(completed: float, total: float) -> None:
         print(completed, peak_memory(), time.process_time(), flush=True)
 
-    job = run_of(Path(folder), float(seconds), float(repeated), step=float(step) if step else None)
-    run(job, Path(folder) / "run", told, float(block))
+    job = run_of(Path(folder), float(seconds), float(pattern_seconds), step=float(step) if step else None)
+    run(job, Path(folder) / "run", report_block, float(block))
 
 
 if __name__ == "__main__":

@@ -39,16 +39,19 @@ def samples(path: Path) -> np.ndarray:
     read_car = car.read(path)
     with np.load(path) as data:
         begin, end = (side([data["gyro_t"][i], data["frame_t"][i]]) for side, i in ((max, 0), (min, -1)))
-        clock = np.arange(begin, end, car.PERIOD)
+        clock = np.arange(begin, end, car.SAMPLE_PERIOD)
         felt = np.column_stack([np.interp(clock, data["acc_t"], column) for column in data["acc"].T])
-        place = data["frame_p"].mean(axis=0)
-    up = np.einsum("nji,j->ni", rotation_matrix(read_car.pose), place / np.linalg.norm(place)) * TELEPHONE_TO_CAR
+        frame_origin = data["frame_p"].mean(axis=0)
+    upward = (
+        np.einsum("nji,j->ni", rotation_matrix(read_car.pose), frame_origin / np.linalg.norm(frame_origin))
+        * TELEPHONE_TO_CAR
+    )
     return np.column_stack(
         [
             felt * TELEPHONE_TO_CAR,
             read_car.rates * TELEPHONE_TO_CAR,
-            np.arctan2(up[:, 1], up[:, 2]),
-            -np.arcsin(up[:, 0]),
+            np.arctan2(upward[:, 1], upward[:, 2]),
+            -np.arcsin(upward[:, 0]),
         ]
     )
 
@@ -58,9 +61,10 @@ def recording(values: np.ndarray, path: Path) -> Recording:
     columns = Columns(path, tuple(name for name, *_ in CHANNELS), len(values))
     columns.write(0, values)
     signals = tuple(
-        Signal(name, "", name, what, "body", component, "body", 1, "", 1.0) for name, what, component in CHANNELS
+        Signal(name, "", name, quantity, "body", component, "body", 1, "", 1.0)
+        for name, quantity, component in CHANNELS
     )
-    return Recording(signals, columns, car.PERIOD)
+    return Recording(signals, columns, car.SAMPLE_PERIOD)
 
 
 def scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredScene:
@@ -72,12 +76,12 @@ def scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredScene:
     with np.load(path) as data:
         start, count = data["acc_t"][0], int((data["acc_t"][-1] - data["acc_t"][0]) * 100)
         camera = Rotation.from_quat(data["frame_q"], scalar_first=True).as_matrix()
-        down = -data["frame_p"] / np.linalg.norm(data["frame_p"], axis=1, keepdims=True)
-        forward, right, below = np.einsum("nij,ni->jn", camera, down)
+        downward = -data["frame_p"] / np.linalg.norm(data["frame_p"], axis=1, keepdims=True)
+        forward, right, along_down = np.einsum("nij,ni->jn", camera, downward)
         rates = data["gyro"] - data["gyro_bias"]
         tables = {
             "hubs": (np.arange(count) / 100, [np.full(count, load) for load in vehicle.loads]),
-            "camera": (data["frame_t"] - start, [np.arctan2(right, below), -np.arcsin(forward)]),
+            "camera": (data["frame_t"] - start, [np.arctan2(right, along_down), -np.arcsin(forward)]),
             "phone": (data["acc_t"] - start, [*rates.T, *data["acc"].T]),
         }
     turns, signs = ("roll", "pitch", "yaw"), (1, -1, -1)
@@ -99,9 +103,11 @@ def scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredScene:
         ],
     }
     keys = ("channel", "quantity", "at", "component", "frame", "sign", "unit")
-    for name, (times, columns) in tables.items():
+    for name, (clock_times, columns) in tables.items():
         header = ",".join(("time [s]", *(f"{row[0]} [{row[-1]}]" for row in rows[name])))
-        np.savetxt(folder / f"{name}.csv", np.column_stack([times, *columns]), "%.9g", ",", header=header, comments="")
+        np.savetxt(
+            folder / f"{name}.csv", np.column_stack([clock_times, *columns]), "%.9g", ",", header=header, comments=""
+        )
     files = [
         {"file": f"{name}.csv", "channels": [dict(zip(keys, row, strict=True)) for row in rows_of_file]}
         for name, rows_of_file in rows.items()

@@ -39,10 +39,10 @@ def column_numbers(virtual: VirtualMeasurement, *names: str) -> list[int]:
 def spoiling_function(change: Callable[..., None]) -> Callable[..., Spoil]:
     """Decorator: the function is called with its settings alone and returns a change of a recording's samples."""
 
-    def made(*settings: Any, **named: Any) -> Spoil:
-        return lambda virtual, samples: change(virtual, samples, *settings, **named)
+    def make_spoil(*settings: Any, **named_settings: Any) -> Spoil:
+        return lambda virtual, samples: change(virtual, samples, *settings, **named_settings)
 
-    return wraps(change)(made)
+    return wraps(change)(make_spoil)
 
 
 @spoiling_function
@@ -54,9 +54,9 @@ def scaled_channels(
 
 
 @spoiling_function
-def exchanged_hubs(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tuple[str, str]) -> None:
+def exchanged_hubs(virtual: VirtualMeasurement, samples: np.ndarray, *hub_pairs: tuple[str, str]) -> None:
     """Fault: all channels of two hubs are exchanged."""
-    for pair in pairs:
+    for pair in hub_pairs:
         first, second = (
             column_numbers(virtual, *(f"{hub}_{name.lower()}" for name, *_ in HUB_COMPONENTS)) for hub in pair
         )
@@ -64,16 +64,16 @@ def exchanged_hubs(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tup
 
 
 @spoiling_function
-def drop_samples(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
-    """Fault: a channel is NaN for ``length`` (s) from ``begin`` (s) on."""
-    first = round(begin / virtual.period)
+def drop_samples(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin_time: float, length: float) -> None:
+    """Fault: a channel is NaN for ``length`` (s) from ``begin_time`` (s) on."""
+    first = round(begin_time / virtual.period)
     samples[first : first + round(length / virtual.period), column_numbers(virtual, name)] = np.nan
 
 
 @spoiling_function
-def hold_sample(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
-    """Fault: a channel keeps its value for ``length`` (s) from ``begin`` (s) on."""
-    first, (column,) = round(begin / virtual.period), column_numbers(virtual, name)
+def hold_sample(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin_time: float, length: float) -> None:
+    """Fault: a channel keeps its value for ``length`` (s) from ``begin_time`` (s) on."""
+    first, (column,) = round(begin_time / virtual.period), column_numbers(virtual, name)
     samples[first : first + round(length / virtual.period), column] = samples[first, column]
 
 
@@ -131,29 +131,33 @@ def measurement(
 def _vehicle(name: str) -> CutVehicle:
     """Variants of R19-free by name: unchanged; without symmetry (twin); with 80 kg more (loaded); with springs 20 %
     stiffer (stiff); with dampers 30 % weaker (worn)."""
-    whole = load_vehicle("r19_free")
-    body, *others = whole.bodies
+    full_vehicle = load_vehicle("r19_free")
+    body, *other_bodies = full_vehicle.bodies
     vehicles = {
-        "r19_free": whole,
+        "r19_free": full_vehicle,
         "twin": twin(),
-        "loaded": replace(whole, bodies=(replace(body, mass=body.mass + 80), *others)),
-        "stiff": _suspended_vehicle(whole, 1.2, 1.0),
-        "worn": _suspended_vehicle(whole, 1.0, 0.7),
+        "loaded": replace(full_vehicle, bodies=(replace(body, mass=body.mass + 80), *other_bodies)),
+        "stiff": _suspended_vehicle(full_vehicle, 1.2, 1.0),
+        "worn": _suspended_vehicle(full_vehicle, 1.0, 0.7),
     }
     return cut(vehicles[name], "body")
 
 
-def _suspended_vehicle(vehicle: SpatialVehicle, stiffer: float, damped: float) -> SpatialVehicle:
-    springs = tuple(replace(s, stiffness=stiffer * s.stiffness, damping=damped * s.damping) for s in vehicle.springs)
+def _suspended_vehicle(vehicle: SpatialVehicle, stiffer: float, damping_factor: float) -> SpatialVehicle:
+    springs = tuple(
+        replace(s, stiffness=stiffer * s.stiffness, damping=damping_factor * s.damping) for s in vehicle.springs
+    )
     return replace(vehicle, springs=springs)
 
 
 def errors_and_doubts(virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> tuple[Finding, ...]:
     """Errors and doubts that the checks find in samples (m, signals)."""
     spoilt = recording_of_samples(virtual, samples, folder / f"{len(list(folder.iterdir()))}.columns")
-    places = {name: TransducerPlace("body", (x, y, z)) for name, (x, y, z) in SENSORS.items()}
+    transducers = {name: TransducerPlace("body", (x, y, z)) for name, (x, y, z) in SENSORS.items()}
     claimed = {s.name: NOISE[s.quantity] for s in virtual.signals}
-    return tuple(finding for finding in check(spoilt, virtual.vehicle, places, claimed) if finding.weight != "note")
+    return tuple(
+        finding for finding in check(spoilt, virtual.vehicle, transducers, claimed) if finding.weight != "note"
+    )
 
 
 def planted_findings(

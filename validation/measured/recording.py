@@ -11,7 +11,7 @@ from validation.common.scenes import data_folder
 
 RECORDING_FILE = "comma2k19_example_60s.npz"
 """Not part of the repository. Both frames are x forward, y right, z down; the pose turns them to the earth's."""
-PERIOD = 0.01
+SAMPLE_PERIOD = 0.01
 """s; the clock of the recording wanders by 0.6 % and is read on this one."""
 
 
@@ -33,15 +33,15 @@ def find() -> Path | None:
 def read(path: Path) -> Recording:
     """Rates and poses on a common clock. Rates are interpolated linearly, poses along the shortest rotation."""
     with np.load(path) as data:
-        times, seen = data["gyro_t"], data["frame_t"]
-        clock = np.arange(max(times[0], seen[0]), min(times[-1], seen[-1]), PERIOD)
+        gyro_times, frame_times = data["gyro_t"], data["frame_t"]
+        clock = np.arange(max(gyro_times[0], frame_times[0]), min(gyro_times[-1], frame_times[-1]), SAMPLE_PERIOD)
         free = data["gyro"] - data["gyro_bias"]
-        rates = np.column_stack([np.interp(clock, times, free[:, i]) for i in range(3)])
-        pose = Slerp(seen, Rotation.from_quat(data["frame_q"], scalar_first=True))(clock)
+        rates = np.column_stack([np.interp(clock, gyro_times, free[:, i]) for i in range(3)])
+        pose = Slerp(frame_times, Rotation.from_quat(data["frame_q"], scalar_first=True))(clock)
     return Recording(rates, pose.as_quat(scalar_first=True))
 
 
 def gyro_error(recording: Recording) -> np.ndarray:
     """Angle (n,) in rad between the attitude by the gyro alone, started at the camera's attitude, and the camera's."""
-    attitudes = integrate(recording.rates, PERIOD, recording.pose[0], "mean")
+    attitudes = integrate(recording.rates, SAMPLE_PERIOD, recording.pose[0], "mean")
     return np.linalg.norm(rotation_vector(quaternion_product(conjugate_quaternion(recording.pose), attitudes)), axis=1)

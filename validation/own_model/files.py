@@ -119,8 +119,8 @@ def chain(count: int, seed: int = 1) -> str:
     """A model file of a chain of hinges and slides with springs, dampers and armatures; all numbers are random."""
     draw = np.random.default_rng(seed)
 
-    def row(low: float, high: float, size: int) -> str:
-        return " ".join(f"{number:.4g}" for number in draw.uniform(low, high, size))
+    def row(low: float, high: float, value_count: int) -> str:
+        return " ".join(f"{number:.4g}" for number in draw.uniform(low, high, value_count))
 
     text = ""
     for i in range(count):
@@ -143,8 +143,8 @@ def tree(count: int, seed: int) -> str:
     for i in range(1, count):
         children.setdefault(int(draw.integers(i)), []).append(i)
 
-    def row(low: float, high: float, size: int) -> str:
-        return " ".join(f"{number:.4g}" for number in draw.uniform(low, high, size))
+    def row(low: float, high: float, value_count: int) -> str:
+        return " ".join(f"{number:.4g}" for number in draw.uniform(low, high, value_count))
 
     def body(i: int) -> str:
         kind = "free" if i == 0 else str(draw.choice(["hinge", "hinge", "slide", "ball"]))

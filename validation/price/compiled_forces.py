@@ -24,19 +24,19 @@ PARAMETERS = 17
 
 def _compile_law(numeric, passive, time, position, velocity):
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
-    def law(model, data):
+    def law(model, case_data):
         header = carray(array_at(model, numeric), (PARAMETERS,))
-        row = int(np.rint(carray(double_at(data, time), (1,))[0] * header[0]))
+        row = int(np.rint(carray(double_at(case_data, time), (1,))[0] * header[0]))
         if not 0 <= row < int(header[1]):
             return
         road = carray(array_at(model, numeric), (PARAMETERS + 4 * int(header[1]),))
-        q, v = carray(array_at(data, position), (4,)), carray(array_at(data, velocity), (4,))
-        force = carray(array_at(data, passive), (4,))
-        at = PARAMETERS + 4 * row
+        q, v = carray(array_at(case_data, position), (4,)), carray(array_at(case_data, velocity), (4,))
+        force = carray(array_at(case_data, passive), (4,))
+        road_index = PARAMETERS + 4 * row
         a, b = header[2], header[3]
         sine, cosine = np.sin(q[3]), np.cos(q[3])
-        f1 = header[8] * (q[0] - road[at]) + header[12] * (v[0] - road[at + 2])
-        f2 = header[9] * (q[1] - road[at + 1]) + header[13] * (v[1] - road[at + 3])
+        f1 = header[8] * (q[0] - road[road_index]) + header[12] * (v[0] - road[road_index + 2])
+        f2 = header[9] * (q[1] - road[road_index + 1]) + header[13] * (v[1] - road[road_index + 3])
         f3 = header[10] * (q[2] - q[0] - b * sine) + header[14] * (v[2] - v[0] - b * v[3] * cosine)
         f4 = header[11] * (q[2] - q[1] + a * sine) + header[15] * (v[2] - v[1] + a * v[3] * cosine)
         force[0] += f3 - f1

@@ -83,7 +83,7 @@ def draw(measured_points: MeasuredPoints) -> Figure:
     axes[0].set_ylim(0.3 * measured_points.uncertainty[measured_points.quantity], 15 * top)
     for ax, kind in zip(axes, measured_points.costs, strict=True):
         _mark_defaults(ax, measured_points, kind)
-    alike = "; ".join(curve_name(group[0], [group]) for group in measured_points.coinciding_curves())
+    curve_groups = "; ".join(curve_name(group[0], [group]) for group in measured_points.coinciding_curves())
     add_heading(figure, f"What accuracy costs: {measured_points.title}")
     longest = max(map(len, map(curve_name, styles)))
     figure.legend(
@@ -93,8 +93,8 @@ def draw(measured_points: MeasuredPoints) -> Figure:
         fontsize=SMALL_TEXT,
         handlelength=2.6,
         columnspacing=1.2,
-        title=wrapped_text(f"Same error at the same setting: {alike}.", 1.1 * COLUMN_WIDTH, SMALL_TEXT)
-        if alike
+        title=wrapped_text(f"Same error at the same setting: {curve_groups}.", 1.1 * COLUMN_WIDTH, SMALL_TEXT)
+        if curve_groups
         else None,
         title_fontsize=SMALL_TEXT,
         alignment="left",
@@ -117,24 +117,28 @@ def _curve_styles(measured_points: MeasuredPoints) -> dict[str, Style]:
 def _engine_colour(point: Point, measured_points: MeasuredPoints) -> str:
     """Colour of the engine of a point; engines without a colour of their own get one of FAMILY_COLOURS."""
     engine = point.setting.engine
-    others = [name for name in dict.fromkeys(p.setting.engine for p in measured_points.points) if name not in COLOURS]
-    return COLOURS[engine] if engine in COLOURS else FAMILY_COLOURS[others.index(engine) % len(FAMILY_COLOURS)]
+    other_engines = [
+        name for name in dict.fromkeys(p.setting.engine for p in measured_points.points) if name not in COLOURS
+    ]
+    return COLOURS[engine] if engine in COLOURS else FAMILY_COLOURS[other_engines.index(engine) % len(FAMILY_COLOURS)]
 
 
-def _plot_curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], kind: str, style: Style) -> None:
+def _plot_curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], cost_kind: str, style: Style) -> None:
     """Plot one curve. Points below the accuracy of the reference are hollow, and points timed once are small."""
-    places = [(p.cost(kind), measured_points.error(p)) for p in points]
-    ax.plot(*zip(*places, strict=True), **{**style, "marker": "none"}, alpha=0.75)
-    alike = defaultdict(list)
-    for p, place in zip(points, places, strict=True):
-        alike[place[1] < measured_points.judging_floor(), kind == "seconds" and p.changed is None].append(place)
-    for (hollow, once), some in alike.items():
+    point_positions = [(p.cost(cost_kind), measured_points.error(p)) for p in points]
+    ax.plot(*zip(*point_positions, strict=True), **{**style, "marker": "none"}, alpha=0.75)
+    points_by_look = defaultdict(list)
+    for p, point_position in zip(points, point_positions, strict=True):
+        points_by_look[
+            point_position[1] < measured_points.judging_floor(), cost_kind == "seconds" and p.changed is None
+        ].append(point_position)
+    for (hollow, once), points_alike in points_by_look.items():
         look = {**style, "linestyle": "none", "markersize": style["markersize"] * (SINGLE_RUN_MARKER if once else 1.0)}
         face = "white" if hollow else style["color"]
-        ax.plot(*zip(*some, strict=True), **look, markerfacecolor=face, markeredgewidth=0.9)
-    for p, place in zip(points, places, strict=True):
+        ax.plot(*zip(*points_alike, strict=True), **look, markerfacecolor=face, markeredgewidth=0.9)
+    for p, point_position in zip(points, point_positions, strict=True):
         if p.broken:
-            ax.plot(*place, **BROKEN_STYLE)
+            ax.plot(*point_position, **BROKEN_STYLE)
 
 
 def _shade_floor(ax: Axes, measured_points: MeasuredPoints) -> None:
@@ -142,34 +146,36 @@ def _shade_floor(ax: Axes, measured_points: MeasuredPoints) -> None:
     known = measured_points.uncertainty[measured_points.quantity]
     for low, high, alpha in ((1e-30, known, 0.6), (known, measured_points.judging_floor(), 0.25)):
         ax.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
-    told = f"reference known to {known:.1g} {measured_points.unit} (dark);\nbelow ten times that: hollow"
-    ax.text(0.015, 0.012, told, transform=ax.transAxes, ha="left", va="bottom", fontsize=SMALL_TEXT, color=GREY)
+    floor_text = f"reference known to {known:.1g} {measured_points.unit} (dark);\nbelow ten times that: hollow"
+    ax.text(0.015, 0.012, floor_text, transform=ax.transAxes, ha="left", va="bottom", fontsize=SMALL_TEXT, color=GREY)
 
 
-def _plot_front(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
+def _plot_front(ax: Axes, measured_points: MeasuredPoints, cost_kind: str) -> None:
     """Plot the Pareto front, the settings that no other one beats, as a broad pale line behind the curves."""
-    front = measured_points.front(kind)
-    costs = [p.cost(kind) for p in front]
+    front = measured_points.front(cost_kind)
+    costs = [p.cost(cost_kind) for p in front]
     ax.plot(costs, list(map(measured_points.error, front)), **FRONT_STYLE, solid_capstyle="round", zorder=1)
 
 
-def _mark_defaults(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
+def _mark_defaults(ax: Axes, measured_points: MeasuredPoints, cost_kind: str) -> None:
     """Mark each engine's default setting with a ring, and write its name where the panel has most space."""
-    taken, names = _line_points(ax), list[np.ndarray]()
+    taken_positions, names = _line_points(ax), list[np.ndarray]()
     ring: Style = {"markersize": 11, "markerfacecolor": "none", "markeredgecolor": DARK, "markeredgewidth": 1.2}
     for owner, p in measured_points.defaults.items():
         if p.status != "ok":
             continue
-        place = (p.cost(kind), measured_points.error(p))
-        ax.plot(*place, "o", **ring, zorder=5)
-        around = _fractions_of_panel(ax, [place])[0]
-        corner = _emptiest_corner(taken, around, names)
+        default_position = (p.cost(cost_kind), measured_points.error(p))
+        ax.plot(*default_position, "o", **ring, zorder=5)
+        around = _fractions_of_panel(ax, [default_position])[0]
+        corner = _emptiest_corner(taken_positions, around, names)
         names.append(corner + LABEL_SIZE * np.array([0.5, 0.0]))
-        way = around + np.linspace(0.0, 1.0, 9)[:, None] * (names[-1] - around)
-        taken = np.vstack([taken, corner + LABEL_SIZE * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), way])
+        leader_line = around + np.linspace(0.0, 1.0, 9)[:, None] * (names[-1] - around)
+        taken_positions = np.vstack(
+            [taken_positions, corner + LABEL_SIZE * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), leader_line]
+        )
         ax.annotate(
             f"{owner} default:\n{p.setting.method},\n{p.setting.label()}",
-            place,
+            default_position,
             fontsize=SMALL_TEXT,
             xytext=(float(corner[0]), float(corner[1])),
             textcoords="axes fraction",
@@ -180,9 +186,9 @@ def _mark_defaults(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None
         )
 
 
-def _fractions_of_panel(ax: Axes, places: Any) -> np.ndarray:
+def _fractions_of_panel(ax: Axes, data_positions: Any) -> np.ndarray:
     """Positions (n, 2) as fractions of the panel, from positions (n, 2) in data units."""
-    return np.asarray((ax.transData - ax.transAxes).transform(np.asarray(places, float)))
+    return np.asarray((ax.transData - ax.transAxes).transform(np.asarray(data_positions, float)))
 
 
 def _line_points(ax: Axes) -> np.ndarray:
@@ -194,17 +200,17 @@ def _line_points(ax: Axes) -> np.ndarray:
     return np.vstack(points)
 
 
-def _emptiest_corner(taken: np.ndarray, places: np.ndarray, names: list[np.ndarray]) -> np.ndarray:
+def _emptiest_corner(taken_positions: np.ndarray, setting_position: np.ndarray, names: list[np.ndarray]) -> np.ndarray:
     """The corner of LABEL_PLACES at which a name covers no line; if several are free, the one near its setting.
 
     names : middles of names that stand already, through which no line to this one shall lead.
     """
     middles = LABEL_PLACES + LABEL_SIZE * np.array([0.5, 0.0])
-    apart = np.abs(middles[:, None] - taken) / (0.5 * LABEL_SIZE)
-    clear = np.minimum(apart.max(axis=2).min(axis=1), 1.8)
-    far = np.hypot(*(middles - places).T)
-    ways = places + np.linspace(0.0, 1.0, 17)[:, None, None] * (middles - places)
-    crossed = [(np.abs(ways - name) < 0.55 * LABEL_SIZE).all(axis=2).any(axis=0) for name in names]
+    distances = np.abs(middles[:, None] - taken_positions) / (0.5 * LABEL_SIZE)
+    clear = np.minimum(distances.max(axis=2).min(axis=1), 1.8)
+    far = np.hypot(*(middles - setting_position).T)
+    leader_lines = setting_position + np.linspace(0.0, 1.0, 17)[:, None, None] * (middles - setting_position)
+    crossed = [(np.abs(leader_lines - name) < 0.55 * LABEL_SIZE).all(axis=2).any(axis=0) for name in names]
     return np.asarray(LABEL_PLACES[np.argmax(clear - 0.3 * far - 2.0 * np.sum(crossed, axis=0))])
 
 
@@ -235,15 +241,15 @@ def _expected_calls(p: Point, measured_points: MeasuredPoints) -> float:
 
 def _methods_text(failed: list[Point], status: str) -> str:
     """Text that names the methods with failed settings; methods without any answer are marked."""
-    alike = [p for p in failed if p.status == status]
+    failed_alike = [p for p in failed if p.status == status]
     if status == "flagged":
-        return ", ".join(dict.fromkeys(f"{p.setting.curve} (cross, see table)" for p in alike))
-    unstable = sum(not p.setting.adaptive for p in alike)
-    what = "beyond stability, steps" if status == "refused" else "settings"
-    parts = [f"{what}: {unstable} (crosses)"] if unstable else []
+        return ", ".join(dict.fromkeys(f"{p.setting.curve} (cross, see table)" for p in failed_alike))
+    unstable = sum(not p.setting.adaptive for p in failed_alike)
+    subject = "beyond stability, steps" if status == "refused" else "settings"
+    parts = [f"{subject}: {unstable} (crosses)"] if unstable else []
     parts += [
         f"{p.setting.method} ({'not implemented' if 'not implemented' in p.reason else 'see table'})"
-        for p in alike
+        for p in failed_alike
         if p.setting.adaptive
     ]
     return ", ".join(parts)

@@ -23,8 +23,8 @@ def _counted_loads() -> Iterator[list[int]]:
     calls = [0]
 
     class CountingClock(exudyn.SignalClock):
-        def reader(self, column: int, scale: float) -> Any:
-            read = super().reader(column, scale)
+        def reader(self, column: int, time_scale: float) -> Any:
+            read = super().reader(column, time_scale)
             if column:
                 return read
 
@@ -49,8 +49,8 @@ def counted_calls(engine: str, assembly: Assembly, settings: Settings) -> tuple[
     """Force calls of one run in Exudyn or MuJoCo: as counted from outside, and as twinrig reports them."""
     if engine == "mujoco":
         model: Any = build(engine, assembly, settings)
-        said = model.run().counts["force calls"]
-        return _mujoco_calls(model), said
+        reported_calls = model.run().counts["force calls"]
+        return _mujoco_calls(model), reported_calls
     with _counted_loads() as calls:
-        said = build(engine, assembly, settings).run().counts["force calls"]
-    return calls[0] - AT_START.get(settings.integrator, 0), said
+        reported_calls = build(engine, assembly, settings).run().counts["force calls"]
+    return calls[0] - AT_START.get(settings.integrator, 0), reported_calls

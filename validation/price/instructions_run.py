@@ -77,8 +77,8 @@ def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
     )
     data = mujoco.MjData(model)
 
-    def passive(model: Any, data: Any) -> None:
-        data.qfrc_passive[:] = law(data.qpos.tolist(), data.qvel.tolist())
+    def passive(model: Any, case_data: Any) -> None:
+        case_data.qfrc_passive[:] = law(case_data.qpos.tolist(), case_data.qvel.tolist())
 
     def march(method: str, steps: int) -> None:
         model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{method.upper()}")
@@ -116,20 +116,20 @@ def start_counting() -> None:
         raise SystemExit("valgrind could not be told to begin")
 
 
-def copied(marches: list[Callable[[int], None]], numbers: list[int]) -> None:
+def copied(marches: list[Callable[[int], None]], step_counts: list[int]) -> None:
     """Run ``counted`` in a forked copy of the process, so that nothing changes in this one."""
     copy = os.fork()
     if copy == 0:
-        counted(marches, numbers)
+        counted(marches, step_counts)
     if os.waitpid(copy, 0)[1] != 0:
         raise SystemExit("a copy failed")
 
 
-def counted(marches: list[Callable[[int], None]], numbers: list[int]) -> None:
+def counted(marches: list[Callable[[int], None]], step_counts: list[int]) -> None:
     """Run every march for each number of steps, with a system call as mark before each and at the end; then exit the
     process."""
     for march in marches:
-        for steps in numbers:
+        for steps in step_counts:
             os.getpgid(0)
             march(steps)
     os.getpgid(0)

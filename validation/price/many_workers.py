@@ -82,19 +82,19 @@ def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerSha
     seconds = ensemble.seconds * np.random.default_rng(SEED).normal(1.0, TIME_SCATTER, blocks).clip(0.5, 1.5)
     half, waiting, free = ensemble.stations["command"] / 2.0, list[int](), workers
     idle, events, order = dict.fromkeys(("command", "link", "disk"), 0.0), list[tuple[float, int, str, int]](), count()
-    kept, first, sent, now = set[int](), 0, 0, 0.0
-    ahead = max(BLOCKS_AHEAD, 2 * workers)
+    saved_blocks, first, sent, current_time = set[int](), 0, 0, 0.0
+    blocks_ahead = max(BLOCKS_AHEAD, 2 * workers)
 
-    def serve(station: str, takes: float, then: str, block: int) -> None:
+    def serve(station_name: str, takes: float, then: str, block: int) -> None:
         """Let a station serve a block as soon as it is idle."""
-        idle[station] = max(idle[station], now) + takes
-        heappush(events, (idle[station], next(order), then, block))
+        idle[station_name] = max(idle[station_name], current_time) + takes
+        heappush(events, (idle[station_name], next(order), then, block))
 
-    while len(kept) < blocks:
-        while sent < min(blocks, first + ahead) and sent - len(kept) < ahead:
+    while len(saved_blocks) < blocks:
+        while sent < min(blocks, first + blocks_ahead) and sent - len(saved_blocks) < blocks_ahead:
             serve("command", half, "sent", sent)
             sent += 1
-        now, _, event, block = heappop(events)
+        current_time, _, event, block = heappop(events)
         if event == "sent":
             waiting.append(block)
         elif event == "computed":
@@ -105,15 +105,15 @@ def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerSha
         elif event == "taken":
             serve("disk", ensemble.stations["disk"], "kept", block)
         else:
-            kept.add(block)
-            while first in kept:
+            saved_blocks.add(block)
+            while first in saved_blocks:
                 first += 1
         while free and waiting:
             free -= 1
-            begun = waiting.pop(0)
-            heappush(events, (now + float(seconds[begun]), next(order), "computed", begun))
-    busy = {name: blocks * takes / now for name, takes in ensemble.stations.items()}
-    return WorkerShares(float(seconds.sum()) / (workers * now), busy, blocks / now)
+            start_time = waiting.pop(0)
+            heappush(events, (current_time + float(seconds[start_time]), next(order), "computed", start_time))
+    busy = {name: blocks * takes / current_time for name, takes in ensemble.stations.items()}
+    return WorkerShares(float(seconds.sum()) / (workers * current_time), busy, blocks / current_time)
 
 
 SETTINGS = {
@@ -125,11 +125,11 @@ SETTINGS = {
 """Ensembles of the table, by what a user types."""
 
 
-def table(rounds: int = 20) -> Iterator[str]:
+def table(round_count: int = 20) -> Iterator[str]:
     """Rows of the table in the docs: share of time for which workers compute, and the busiest station with the most
-    workers. rounds : number of blocks per worker."""
+    workers. round_count : number of blocks per worker."""
     for name, ensemble in SETTINGS.items():
-        outcomes = [simulated_shares(ensemble, workers, rounds * workers) for workers in WORKERS]
+        outcomes = [simulated_shares(ensemble, workers, round_count * workers) for workers in WORKERS]
         shares = " | ".join(f"{100.0 * outcome.workers:.0f} %" for outcome in outcomes)
         sent = outcomes[-1].rate * ensemble.bytes / 1e6
         yield f"| {name} | {shares} | {outcomes[-1].bottleneck} | {sent:.0f} MB/s | {ensemble.most_workers:.0f} |"

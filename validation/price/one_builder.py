@@ -42,7 +42,7 @@ from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre, Ve
 from models.vehicles.vehicle_file import load_vehicle
 
 SEED, STEP, STEPS = 43, 1e-3, 200
-UP: Vector = (0.0, 0.0, 1.0)
+UPWARD: Vector = (0.0, 0.0, 1.0)
 Acceleration = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -55,11 +55,11 @@ class TwoBuilds:
     free: FreeModel
     sign: float = 1.0
 
-    def gap(self, count: int) -> float:
+    def gap(self, state_count: int) -> float:
         """Largest difference of the accelerations at random states, divided by the largest acceleration of the
         state."""
         rng, worst = np.random.default_rng(SEED), 0.0
-        for _ in range(count):
+        for _ in range(state_count):
             q, v = rng.uniform(-0.05, 0.05, self.free.size), rng.uniform(-0.5, 0.5, self.free.size)
             expected = self.system.acceleration(0.0, q, v)
             free = self.sign * self.free.acceleration(0.0, self.sign * q, self.sign * v)
@@ -88,7 +88,7 @@ def pitch_plane(engine: str) -> TwoBuilds:
     return TwoBuilds(in_plane(engine, assembly, settings), free, -1.0)
 
 
-def _vehicle_in_space(plane: Vehicle) -> SpatialVehicle:
+def _vehicle_in_space(plane_vehicle: Vehicle) -> SpatialVehicle:
     """A pitch-plane vehicle described as a vehicle in space."""
     bodies = tuple(
         Body(body.name, body.mass, (0.0, 0.0, 0.0), ("z",))
@@ -96,18 +96,25 @@ def _vehicle_in_space(plane: Vehicle) -> SpatialVehicle:
         else Body(
             body.name, body.mass, (0.0, 0.0, 0.0), ("z", "ry"), ((0, 0, 0), (0, body.pitch_inertia, 0), (0, 0, 0))
         )
-        for body in plane.bodies
+        for body in plane_vehicle.bodies
     )
-    inside = [strut for strut in plane.struts if strut.lower.body is not None]
+    struts_between_bodies = [strut for strut in plane_vehicle.struts if strut.lower.body is not None]
     springs = tuple(
         SpringDamper(
-            s.name, str(s.lower.body), s.upper.body, (s.lower.x, 0, 0), (s.upper.x, 0, 0), UP, s.stiffness, s.damping
+            s.name,
+            str(s.lower.body),
+            s.upper.body,
+            (s.lower.x, 0, 0),
+            (s.upper.x, 0, 0),
+            UPWARD,
+            s.stiffness,
+            s.damping,
         )
-        for s in inside
+        for s in struts_between_bodies
     )
     tyres = tuple(
         Tyre(s.name, str(s.upper.body), (s.upper.x, 0.0, 0.0), i, s.stiffness, s.damping)
-        for i, s in enumerate(plane.tyres)
+        for i, s in enumerate(plane_vehicle.tyres)
     )
     return SpatialVehicle("pitch plane", bodies, springs, tyres, (0.0,))
 
@@ -125,9 +132,9 @@ def _force_table(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
         _spring_element(s.name, s.first_body, str(s.second_body), s, s.first_point, s.second_point, s.axis)
         for s in vehicle.springs
     ]
-    tyres = [_spring_element(t.name, t.body, t.body, t, t.point, t.point, UP) for t in vehicle.tyres]
-    whole = CutVehicle(vehicle.bodies[0].name, tree, tree, (*springs, *tyres), np.zeros(0))
-    numbers = table(whole, HubInputs(np.zeros((3, 0))), STEP)
+    tyres = [_spring_element(t.name, t.body, t.body, t, t.point, t.point, UPWARD) for t in vehicle.tyres]
+    cut_vehicle = CutVehicle(vehicle.bodies[0].name, tree, tree, (*springs, *tyres), np.zeros(0))
+    numbers = table(cut_vehicle, HubInputs(np.zeros((3, 0))), STEP)
     rows, numbers[CHASSIS] = parts(numbers)[3], -1.0
     rows[:, AXIS_JOINT] = -1.0
     for row, tyre in zip(rows[len(springs) :], vehicle.tyres, strict=True):
@@ -136,10 +143,16 @@ def _force_table(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
 
 
 def _spring_element(
-    name: str, first: str, second: str, law: SpringDamper | Tyre, start: Vector, end: Vector, axis: Vector
+    name: str,
+    first_body: str,
+    second_body: str,
+    law: SpringDamper | Tyre,
+    start_point: Vector,
+    end_point: Vector,
+    axis: Vector,
 ) -> Element:
-    places = (np.array(start, float), np.array(end, float), np.array(axis, float))
-    return Element(name, first, second, *places, law.stiffness, law.damping, 0.0, second)
+    vectors = (np.array(start_point, float), np.array(end_point, float), np.array(axis, float))
+    return Element(name, first_body, second_body, *vectors, law.stiffness, law.damping, 0.0, second_body)
 
 
 @contextmanager
@@ -150,7 +163,7 @@ def one_tree() -> Iterator[None]:
         yield
 
 
-def time_ratios(rounds: int, minimum_seconds: float) -> dict[str, tuple[float, float, float]]:
+def time_ratios(round_count: int, minimum_seconds: float) -> dict[str, tuple[float, float, float]]:
     """Ratios of a run's processor time with another builder to that with the present one, each with its interval."""
     jobs, names = list[Callable[[], Any]](), list[str]()
     for engine in INTEGRATORS:
@@ -159,9 +172,9 @@ def time_ratios(rounds: int, minimum_seconds: float) -> dict[str, tuple[float, f
             names.append(f"{system}, {engine}: the free builder to today's")
     with one_tree():
         jobs += [built_ride("exudyn").system.run]
-    seconds = interleave(jobs, rounds, minimum_seconds, clock=time.process_time)
-    told = {name: paired_ratio(seconds[2 * i + 1], seconds[2 * i]) for i, name in enumerate(names)}
-    return told | {"ride, exudyn: one tree, springs of today, to today's": paired_ratio(seconds[-1], seconds[0])}
+    seconds = interleave(jobs, round_count, minimum_seconds, clock=time.process_time)
+    ratios = {name: paired_ratio(seconds[2 * i + 1], seconds[2 * i]) for i, name in enumerate(names)}
+    return ratios | {"ride, exudyn: one tree, springs of today, to today's": paired_ratio(seconds[-1], seconds[0])}
 
 
 if __name__ == "__main__":

@@ -72,9 +72,9 @@ class PricedRide:
 
     def errors(self, deviations: np.ndarray) -> dict[str, float]:
         """Largest relative error of the standard deviations (p,), by kind of output."""
-        off = np.abs(deviations / self.truth - 1.0)
+        relative_errors = np.abs(deviations / self.truth - 1.0)
         return {
-            name: float(max(e for e, o in zip(off, self.vehicle.outputs, strict=True) if o.kind == kind))
+            name: float(max(e for e, o in zip(relative_errors, self.vehicle.outputs, strict=True) if o.kind == kind))
             for name, kind in KINDS.items()
         }
 
@@ -92,47 +92,51 @@ def direct_deviations(ride: PricedRide) -> np.ndarray:
     return stationary_covariance(vehicle_with_road(ride.vehicle, ride.road, SPEED)).deviation
 
 
-def swept_deviations(ride: PricedRide, count: int) -> np.ndarray:
-    """Standard deviations at SPEED, from a sweep by eigenvectors over five cases of correlation and ``count``
+def swept_deviations(ride: PricedRide, speed_count: int) -> np.ndarray:
+    """Standard deviations at SPEED, from a sweep by eigenvectors over five cases of correlation and ``speed_count``
     speeds."""
-    speeds = [*np.linspace(5.0, 50.0, count - 1), SPEED]
+    speeds = [*np.linspace(5.0, 50.0, speed_count - 1), SPEED]
     return variance_sweep(lambda speed: ride.vehicle, ride.roads, speeds).deviation[list(ride.roads).index("3"), -1]
 
 
-def deviations_on_grid(ride: PricedRide, count: int, highest_frequency: float, even: bool = False) -> np.ndarray:
+def deviations_on_grid(
+    ride: PricedRide, frequency_count: int, highest_frequency: float, even: bool = False
+) -> np.ndarray:
     """Standard deviations by the trapezoidal rule on a frequency grid up to ``highest_frequency`` (Hz), evenly spaced
     in frequency or in its logarithm."""
     frequency = (
-        np.linspace(highest_frequency / count, highest_frequency, count)
+        np.linspace(highest_frequency / frequency_count, highest_frequency, frequency_count)
         if even
-        else np.geomspace(LOWEST, highest_frequency, count)
+        else np.geomspace(LOWEST, highest_frequency, frequency_count)
     )
     omega = 2 * np.pi * frequency
     return np.sqrt(2 * np.trapezoid(spectral_densities(ride.vehicle, ride.road, SPEED, omega), omega, axis=0))
 
 
-def measure(quick: bool, rounds: int, minimum_seconds: float) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, round_count: int, minimum_seconds: float) -> tuple[list[Row], dict[str, Any]]:
     """Rows and data of all routes; counts and errors are judged, times are not."""
     ride = problem()
     swept = 3 if quick else SWEPT_SPEEDS
     points = [_lyapunov_point(ride), _route_point_of_sweep(ride, swept)]
     jobs: list[Callable[[], Any]] = [partial(direct_deviations, ride), partial(swept_deviations, ride, swept)]
-    for count, last, even in (*((*net, False) for net in FREQUENCY_GRIDS[quick]), (*UNIFORM_GRID, True)):
-        name = f"{'uniform' if even else 'logarithmic'} grid to {last:g} Hz"
-        begun = time.perf_counter()
-        errors = ride.errors(deviations_on_grid(ride, count, last, even))
-        points.append(RoutePoint(name, "frequencies", count, errors, time.perf_counter() - begun))
-        jobs.append(partial(deviations_on_grid, ride, count, last, even))
+    for count, highest_frequency, even in (*((*net, False) for net in FREQUENCY_GRIDS[quick]), (*UNIFORM_GRID, True)):
+        name = f"{'uniform' if even else 'logarithmic'} grid to {highest_frequency:g} Hz"
+        start_time = time.perf_counter()
+        errors = ride.errors(deviations_on_grid(ride, count, highest_frequency, even))
+        points.append(RoutePoint(name, "frequencies", count, errors, time.perf_counter() - start_time))
+        jobs.append(partial(deviations_on_grid, ride, count, highest_frequency, even))
     for copies, lasting in COPIES[quick]:
         jobs.append(partial(at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED))
-        begun = time.perf_counter()
+        start_time = time.perf_counter()
         estimate: VarianceEstimate = jobs[-1]()
         errors, z = ride.errors(np.sqrt(estimate.variance[0])), float(np.abs(estimate.z(ride.truth[None])).max())
-        name, seconds = f"Monte Carlo, {lasting:g} s each", time.perf_counter() - begun
+        name, seconds = f"Monte Carlo, {lasting:g} s each", time.perf_counter() - start_time
         points.append(RoutePoint(name, "copies", copies, errors, seconds, z))
-    few = [i for i, p in enumerate(points) if p.unit != "copies" and p.count < 10_000]
-    for i, times in zip(few, interleave([jobs[i] for i in few], rounds, minimum_seconds), strict=True):
-        points[i] = replace(points[i], seconds=float(np.median(times)))
+    quick_points = [i for i, p in enumerate(points) if p.unit != "copies" and p.count < 10_000]
+    for i, seconds_of_rounds in zip(
+        quick_points, interleave([jobs[i] for i in quick_points], round_count, minimum_seconds), strict=True
+    ):
+        points[i] = replace(points[i], seconds=float(np.median(seconds_of_rounds)))
     points[1] = replace(points[1], seconds=points[1].seconds / (5 * swept))  # of the sweep a point
     return judging_rows(ride, points), {"points": [asdict(p) for p in points], "uncertainty": ride.uncertainty}
 
@@ -148,10 +152,10 @@ def _lyapunov_point(ride: PricedRide) -> RoutePoint:
 def _route_point_of_sweep(ride: PricedRide, speeds: int) -> RoutePoint:
     from models.ride import sweep as module
 
-    with mock.patch.object(module, "modes", wraps=module.modes) as made:
+    with mock.patch.object(module, "modes", wraps=module.modes) as watched_modes:
         deviations = swept_deviations(ride, speeds)
     return RoutePoint(
-        f"sweep, one of {5 * speeds} points", "decompositions", made.call_count, ride.errors(deviations), 0.0
+        f"sweep, one of {5 * speeds} points", "decompositions", watched_modes.call_count, ride.errors(deviations), 0.0
     )
 
 
@@ -220,7 +224,7 @@ def judging_rows(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
     return rows
 
 
-def table(data: dict[str, Any]) -> Table:
+def table(case_data: dict[str, Any]) -> Table:
     """Table of all routes with errors, counts and times."""
     lines = tuple(
         (
@@ -229,7 +233,7 @@ def table(data: dict[str, Any]) -> Table:
             *(f"{p['errors'][kind]:.1e}" for kind in KINDS),
             f"{1e3 * p['seconds']:.3g}",
         )
-        for p in data["points"]
+        for p in case_data["points"]
     )
     note = (
         "Largest relative error of a standard deviation over all outputs of the kind. Part of a grid's error in "
@@ -239,17 +243,17 @@ def table(data: dict[str, Any]) -> Table:
     return Table(f"Standard deviations of R19-ride at {SPEED:g} m/s", note, ("route", "count", *KINDS, "ms"), lines)
 
 
-def draw(data: dict[str, Any]) -> tuple[str, Figure]:
+def draw(case_data: dict[str, Any]) -> tuple[str, Figure]:
     """Plot error over computing time (ms), with a panel per kind of output."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, axes = subplots(1, len(KINDS), figsize=(COLUMN_WIDTH, 4.4), sharey=True)
     markers = {"solves": "*", "decompositions": "D", "frequencies": "o", "copies": "s"}
     for ax, kind in zip(axes, KINDS, strict=True):
-        for p in data["points"]:
+        for p in case_data["points"]:
             x, y = 1e3 * p["seconds"], max(p["errors"][kind], np.finfo(float).eps)
             ax.plot(x, y, markers[p["unit"]], markersize=8, label=f"{p['name']}, {p['count']:,} {p['unit']}")
-        ax.axhspan(1e-30, data["uncertainty"], color="#bbbbbb", alpha=0.4, linewidth=0)
+        ax.axhspan(1e-30, case_data["uncertainty"], color="#bbbbbb", alpha=0.4, linewidth=0)
         ax.set(xscale="log", yscale="log", xlabel="time [ms] (median)", title=kind)
         ax.set_ylim(1e-16, 1.0)
     axes[0].set_ylabel("largest relative error\nof a standard deviation [-]")

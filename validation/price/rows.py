@@ -53,10 +53,12 @@ def _label(p: Point) -> str:
     return f"{p.setting.curve} {p.setting.label()}"
 
 
-def _none_of(name: str, what: str, those: list[str], why: str) -> Row:
+def _none_of(name: str, offence: str, offending: list[str], tolerance_reason: str) -> Row:
     """Row that passes if a list of offending settings is empty; it names them otherwise."""
-    offenders = f": {', '.join(those)}" if those else ""
-    return Observed(name, SYSTEM, what + offenders, len(those), "settings").within(0, 0, why, "closed form")
+    offenders = f": {', '.join(offending)}" if offending else ""
+    return Observed(name, SYSTEM, offence + offenders, len(offending), "settings").within(
+        0, 0, tolerance_reason, "closed form"
+    )
 
 
 def _reference_row(problem: Problem, measured_points: MeasuredPoints) -> Row:
@@ -121,10 +123,12 @@ def _rows_of_promises(problem: Problem, measured_points: MeasuredPoints) -> Row:
     )
 
 
-def _runnable_setting(problem: Problem, measured_points: MeasuredPoints, curve: str, least: ToleranceCost) -> Setting:
+def _runnable_setting(
+    problem: Problem, measured_points: MeasuredPoints, curve: str, cheapest: ToleranceCost
+) -> Setting:
     """The setting that the table names; a fixed step is changed to the nearest one that divides the run."""
     like = measured_points.curves()[curve][0].setting
-    value = least.value if like.adaptive else problem.duration / round(problem.duration / least.value)
+    value = cheapest.value if like.adaptive else problem.duration / round(problem.duration / cheapest.value)
     return problem.setting(like.engine, like.method, value)
 
 
@@ -136,16 +140,16 @@ def _sweep_row(measured_points: MeasuredPoints) -> Row:
         errors, setting = list(map(measured_points.error, points)), points[0].setting
         wide = errors[0] >= 1e4 * errors[-1] or setting.value >= 1e4 * points[-1].setting.value
         ended = tried[curve][0].status != "ok" or setting.cells
-        whole = ended and errors[-1] <= min(measured_points.tolerances)
+        reaches_tolerance = ended and errors[-1] <= min(measured_points.tolerances)
         settled = len(points) > 1 and errors[-1] >= SETTLED_RATIO * errors[-2]
         low = 0 < (setting.order or setting.nominal) < 4
-        if len(points) < 6 or not (wide or whole or settled or low):
+        if len(points) < 6 or not (wide or reaches_tolerance or settled or low):
             short.append(curve)
-    what = (
+    requirement = (
         "methods with fewer than 6 settings that answered, or from order 4 up with fewer than 4 decades of them or "
         "of error although coarser settings answer, or the finest tolerance is not met and the error still falls"
     )
-    return _none_of(f"price.{measured_points.key}.sweep", what, short, "what the study was asked to cover")
+    return _none_of(f"price.{measured_points.key}.sweep", requirement, short, "what the study was asked to cover")
 
 
 def _loss_rows(measured_points: MeasuredPoints) -> list[Row]:
@@ -154,23 +158,30 @@ def _loss_rows(measured_points: MeasuredPoints) -> list[Row]:
         row
         for owner, p in measured_points.defaults.items()
         if p.status == "ok"
-        for among, words in ((p.setting.engine, f"{owner}'s own cheapest"), ("", "the cheapest of all"))
+        for engine_filter, words in ((p.setting.engine, f"{owner}'s own cheapest"), ("", "the cheapest of all"))
         for kind in measured_points.costs
-        for row in _rows_of_loss(measured_points, owner, among, words, kind)
+        for row in _rows_of_loss(measured_points, owner, engine_filter, words, kind)
     ]
 
 
-def _rows_of_loss(measured_points: MeasuredPoints, owner: str, engine: str, words: str, kind: str) -> list[Row]:
-    target, unit, p = measured_points.middle, measured_points.unit, measured_points.defaults[owner]
-    lost = measured_points.loss(target, kind, p.setting.curve, engine)
+def _rows_of_loss(
+    measured_points: MeasuredPoints, owner_of_default: str, engine: str, loss_words: str, cost_kind: str
+) -> list[Row]:
+    target, unit, p = measured_points.middle, measured_points.unit, measured_points.defaults[owner_of_default]
+    lost = measured_points.loss(target, cost_kind, p.setting.curve, engine)
     if lost is None:
         return []
-    how = ", extrapolated by its order" if lost.how == "extrapolated" else ""
+    extrapolation_text = ", extrapolated by its order" if lost.how == "extrapolated" else ""
     shared = [default.setting.engine for default in measured_points.defaults.values()].count(p.setting.engine) > 1
-    whose = f"{p.setting.engine}.{owner}" if shared else p.setting.engine
-    name = f"price.{measured_points.key}.default.{whose}.{'own' if engine else 'all'}.{kind}".replace(" ", "-")
-    told = f"95 % interval {lost.low:.3g} to {lost.high:.3g}" if lost.low <= lost.high else "too few rounds to tell"
-    bounds = told if kind == "seconds" else "exact"
-    what = f"ratio of {kind}: {owner}'s default, {p.setting.method}, refined to {target:g} {unit}{how}, to {words}"
+    whose = f"{p.setting.engine}.{owner_of_default}" if shared else p.setting.engine
+    name = f"price.{measured_points.key}.default.{whose}.{'own' if engine else 'all'}.{cost_kind}".replace(" ", "-")
+    interval_text = (
+        f"95 % interval {lost.low:.3g} to {lost.high:.3g}" if lost.low <= lost.high else "too few rounds to tell"
+    )
+    bounds = interval_text if cost_kind == "seconds" else "exact"
+    quantity = (
+        f"ratio of {cost_kind}: {owner_of_default}'s default, {p.setting.method}, refined to {target:g} "
+        f"{unit}{extrapolation_text}, to {loss_words}"
+    )
     why = f"at its default {p.setting.label()} its error is {measured_points.error(p):.3g} {unit}"
-    return [Observed(name, SYSTEM, what, lost.factor, "times").beside(bounds, why, "none")]
+    return [Observed(name, SYSTEM, quantity, lost.factor, "times").beside(bounds, why, "none")]

@@ -17,42 +17,46 @@ STEP = 1e-3
 
 
 def callback_cost(
-    driven: Assembly, duration: float, integrator: str, rounds: int, minimum_seconds: float
+    driven_assembly: Assembly, duration: float, integrator: str, round_count: int, minimum_seconds: float
 ) -> dict[str, Any]:
     """Ratios of computing time between variants of a MuJoCo model: bare; with native springs and dampers; on a road;
     with all forces in one callback.
 
-    driven : a vehicle on a road, whose input enters through a compiled callback.
+    driven_assembly : a vehicle on a road, whose input enters through a compiled callback.
     Values are (ratio, low, high) with a bootstrap 95 % interval, and medians in s. ``gap`` is the largest
     difference of states between the native route and the one with every force in the callback.
     """
     flat = assembly_of_scene(build_scene({"title": "no input", "run": {"duration": duration, "step": STEP}}))
     bare = replace(flat, vehicle=replace(flat.vehicle, struts=()))
     settings = Settings(integrator, STEP, duration)
-    models = [build("mujoco", assembly, settings) for assembly in (bare, flat, driven)]
-    compiled = CompiledForces(driven, settings)
+    models = [build("mujoco", assembly, settings) for assembly in (bare, flat, driven_assembly)]
+    compiled = CompiledForces(driven_assembly, settings)
     runs: list[Callable[[], Any]] = [model.run for model in models]
-    seconds = interleave([*runs, compiled.coast, compiled.run], rounds, minimum_seconds)
+    seconds = interleave([*runs, compiled.coast, compiled.run], round_count, minimum_seconds)
     names = ("without forces", "springs and dampers", "with callback", "bare", "all in the callback")
     return {
         "gap": float(np.abs(compiled.run() - models[2].run().states).max()),
         "all compiled to no forces": paired_ratio(seconds[4], seconds[3]),
         "callbacks": [model.plan()["callbacks"] for model in models],
-        "seconds": {name: describe(times) for name, times in zip(names, seconds, strict=True)},
+        "seconds": {
+            name: describe(seconds_of_variant) for name, seconds_of_variant in zip(names, seconds, strict=True)
+        },
         "to no forces": paired_ratio(seconds[2], seconds[0]),
         "to no callback": paired_ratio(seconds[2], seconds[1]),
     }
 
 
-def real_time(driven: Assembly, duration: float, rounds: int, minimum_seconds: float) -> dict[str, Any]:
+def real_time(driven_assembly: Assembly, duration: float, round_count: int, minimum_seconds: float) -> dict[str, Any]:
     """Ratio of simulated time to computing time of the reference at 1 ms, with and without making its road table.
 
     The road is timed by itself beside the run and subtracted within each round.
     """
-    signal, steps = driven.input, round(duration / STEP)
+    signal, steps = driven_assembly.input, round(duration / STEP)
     assert signal is not None
-    model = build("reference", driven, Settings("RK4", STEP, duration))
-    run, table = interleave([model.run, lambda: signal.sample(0.0, STEP / 2, 2 * steps + 1)], rounds, minimum_seconds)
+    model = build("reference", driven_assembly, Settings("RK4", STEP, duration))
+    run, table = interleave(
+        [model.run, lambda: signal.sample(0.0, STEP / 2, 2 * steps + 1)], round_count, minimum_seconds
+    )
     known = (run > table).all()  # else the machine's other work is larger than what is told
     return {
         "with table": median(duration / run),

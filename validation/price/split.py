@@ -43,9 +43,9 @@ Of = Callable[[Any, Any], Any]
 
 
 @njit(cache=True, error_model="numpy")
-def add_weak_damper(numbers, t, q, v, f):
-    """Add a weak damper's forces on four coordinates to ``f``; all but the time are pointers to doubles."""
-    rate, force = carray(v, (4,)), carray(f, (4,))
+def add_weak_damper(numbers, t, q, v, force_pointer):
+    """Add a weak damper's forces on four coordinates to ``force_pointer``; all but the time are pointers to doubles."""
+    rate, force = carray(v, (4,)), carray(force_pointer, (4,))
     for i in range(4):
         force[i] -= WEAK_DAMPING * rate[i]
 
@@ -76,13 +76,13 @@ def _road_exudyn() -> Runs:
     masses = [assembly.parameters.m1, assembly.parameters.m2, assembly.parameters.m3, assembly.parameters.I]
     derivative, scale = derivative_of("road", assembly.vehicle.geometry), np.array(masses)
 
-    def of(positions: Any, rates: Any) -> list[float]:
+    def forces_of(positions: Any, rates: Any) -> list[float]:
         y[:4], y[4:] = positions, rates
         return (scale * derivative(y, road, p)[4:]).tolist()
 
     return [
         partial(exudyn_marches(masses, law, [METHODS["exudyn"]])[0], STEPS["road"])
-        for law in (zero_forces, listed(4, np.zeros(0), handed_damper), of)
+        for law in (zero_forces, listed(4, np.zeros(0), handed_damper), forces_of)
     ]
 
 
@@ -98,8 +98,8 @@ def _road_mujoco() -> Runs:
 def _wheel_exudyn() -> Runs:
     wheels, steps, step = _wheels()
     return [
-        partial(Rolling(wheels, of).run, *wheels.state(), steps, step, METHODS["exudyn"])
-        for of in (zero_forces, listed(4, np.zeros(0), handed_damper), Forces(wheels).of)
+        partial(Rolling(wheels, force_function).run, *wheels.state(), steps, step, METHODS["exudyn"])
+        for force_function in (zero_forces, listed(4, np.zeros(0), handed_damper), Forces(wheels).of)
     ]
 
 
@@ -130,9 +130,9 @@ MARCHES_OF_PROBLEM = {
 """What makes the three runs, by problem and engine."""
 
 
-def measure(rounds: int, minimum_seconds: float) -> list[Saved]:
+def measure(round_count: int, minimum_seconds: float) -> list[Saved]:
     """Times (s) of the three runs (empty, cheap and real forces) in every round, by problem and engine."""
-    seconds = interleave([job for make in MARCHES_OF_PROBLEM.values() for job in make()], rounds, minimum_seconds)
+    seconds = interleave([job for make in MARCHES_OF_PROBLEM.values() for job in make()], round_count, minimum_seconds)
     return [
         {"problem": problem, "engine": engine, "seconds": dict(zip(RUNS, rows.tolist(), strict=True))}
         for (problem, engine), rows in zip(
@@ -141,19 +141,21 @@ def measure(rounds: int, minimum_seconds: float) -> list[Saved]:
     ]
 
 
-def step_parts(saved: Saved) -> np.ndarray:
+def step_parts(timed_march: Saved) -> np.ndarray:
     """Time per step in microseconds of engine, bridge and kernel (3,), from the medians of the rounds."""
-    empty, cheap, real = (1e6 * float(np.median(saved["seconds"][run])) / STEPS[saved["problem"]] for run in RUNS)
+    empty, cheap, real = (
+        1e6 * float(np.median(timed_march["seconds"][run])) / STEPS[timed_march["problem"]] for run in RUNS
+    )
     return np.array([empty, cheap - empty, real - cheap])
 
 
-def bridge_share(saved: Saved) -> tuple[float, float, float]:
+def bridge_share(timed_march: Saved) -> tuple[float, float, float]:
     """Share of the bridge in the time of a step, in % with its 95 % interval, from medians over resampled rounds."""
-    empty, cheap, real = (np.array(saved["seconds"][run]) for run in RUNS)
+    empty, cheap, real = (np.array(timed_march["seconds"][run]) for run in RUNS)
     return median(100.0 * (cheap - empty) / real)
 
 
-def rows(data: list[Saved]) -> list[Row]:
+def rows(case_data: list[Saved]) -> list[Row]:
     """Rows on the share of the bridge, without a verdict."""
     return [
         Observed(
@@ -163,19 +165,19 @@ def rows(data: list[Saved]) -> list[Row]:
             middle,
             "%",
         ).beside(f"95 % interval {low:.0f} to {high:.0f}", "seconds are reported and never gated", "none")
-        for saved in data
+        for saved in case_data
         for middle, low, high in [bridge_share(saved)]
     ]
 
 
-def _engine_text(saved: Saved) -> str:
-    return f"{LABELS[saved['engine']]} {METHODS[saved['engine']]}"
+def _engine_text(timed_march: Saved) -> str:
+    return f"{LABELS[timed_march['engine']]} {METHODS[timed_march['engine']]}"
 
 
-def table(data: list[Saved], problem: str) -> list[Table]:
+def table(case_data: list[Saved], problem: str) -> list[Table]:
     """Table of the parts of a step's time of a problem; none where the step was not split."""
     lines = []
-    for saved in data:
+    for saved in case_data:
         if saved["problem"] == problem:
             _, low, high = bridge_share(saved)
             values = (f"{value:.2f}" for value in step_parts(saved))

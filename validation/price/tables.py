@@ -23,8 +23,8 @@ def tables(measured_points: MeasuredPoints) -> list[Table]:
 
 def curve_name(curve: str, groups: list[tuple[str, ...]] | None = None) -> str:
     """Name of a curve for readers, followed by the names of curves that coincide with it."""
-    alike = next((group for group in groups or [] if curve in group), (curve,))
-    return " = ".join(map(_plain_name, sorted(alike, key=lambda other: other != curve)))
+    coinciding = next((group for group in groups or [] if curve in group), (curve,))
+    return " = ".join(map(_plain_name, sorted(coinciding, key=lambda curve_key: curve_key != curve)))
 
 
 def _plain_name(curve: str) -> str:
@@ -41,7 +41,7 @@ def cheapest_table(measured_points: MeasuredPoints) -> Table:
     rows = []
     for target in measured_points.tolerances:
         calls, seconds = (measured_points.reaches(target, kind) for kind in measured_points.costs)
-        timed = (_text_of_winner(measured_points, seconds, among, "ms") for among in ("", *rivals))
+        timed = (_text_of_winner(measured_points, seconds, engine_filter, "ms") for engine_filter in ("", *rivals))
         rows.append((f"{target:g}", _text_of_winner(measured_points, calls, "", work.split()[-1], groups), *timed))
     note = (
         "Fixed steps are interpolated log-log between neighbouring settings; methods without one order count at "
@@ -63,12 +63,15 @@ def rounds_of(points: list[Point]) -> str:
     answered = [p for p in points if p.status == "ok"]
     in_rounds = [p.seconds for p in answered if p.changed is not None]
     numbers = Counter(map(len, in_rounds))
-    told = " and ".join(f"{n} interleaved rounds for {count}" for n, count in sorted(numbers.items(), reverse=True))
+    rounds_text = " and ".join(
+        f"{n} interleaved rounds for {count}" for n, count in sorted(numbers.items(), reverse=True)
+    )
     if not in_rounds:
         return "Seconds are those of one run each."
-    spread = float(np.median([times["mad"] / times["median"] for times in map(describe, in_rounds)]))
+    spread = float(np.median([statistics["mad"] / statistics["median"] for statistics in map(describe, in_rounds)]))
     return (
-        f"Seconds are medians of {told} settings whose seconds decide something (fewer where a run is longer than "
+        f"Seconds are medians of {rounds_text} settings whose seconds decide something (fewer where a run is "
+        "longer than "
         f"{1e3 * runner.SLOW_RUN_SECONDS:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for "
         f"{len(answered) - len(in_rounds)} that "
         f"are far from the cheapest, or longer than {1e3 * runner.LONG_RUN_SECONDS:g} ms and not for the middle "
@@ -86,9 +89,9 @@ def _text_of_winner(
     best = runner.cheapest_curve(reaches, engine)
     if best is None:
         return "none of those tried"
-    curve, least = best
-    label = replace(measured_points.curves()[curve][0].setting, value=least.value).label() + _coarsest_text(least)
-    paid = f"{1e3 * least.cost:.3g} ms" if unit == "ms" else f"{least.cost:,.0f} {unit}"
+    curve, cheapest = best
+    label = replace(measured_points.curves()[curve][0].setting, value=cheapest.value).label() + _coarsest_text(cheapest)
+    paid = f"{1e3 * cheapest.cost:.3g} ms" if unit == "ms" else f"{cheapest.cost:,.0f} {unit}"
     return f"{curve_name(curve, groups)}, {label}: {paid}"
 
 
@@ -103,18 +106,18 @@ def loss_table(measured_points: MeasuredPoints) -> Table:
         (
             f"{target:g}",
             *(
-                _text_of_loss(measured_points.loss(target, kind, usual.setting.curve, among))
+                _text_of_loss(measured_points.loss(target, kind, usual.setting.curve, engine_filter))
                 for usual in owners.values()
-                for among in (usual.setting.engine, "")
+                for engine_filter in (usual.setting.engine, "")
                 for kind in measured_points.costs
             ),
         )
         for target in measured_points.tolerances
     )
     heads = (
-        f"{owner} by best of {among}: {kind}"
+        f"{owner} by best of {engine_filter}: {kind}"
         for owner in owners
-        for among in (owner, "all")
+        for engine_filter in (owner, "all")
         for kind in measured_points.costs
     )
     as_is = "; ".join(
@@ -142,8 +145,8 @@ def _text_of_loss(loss: Loss | None) -> str:
         return "-"
     factor, low, high = (f"{x:,.0f}" if x >= 100 else f"{x:.3g}" for x in (loss.factor, loss.low, loss.high))
     mark = "*" if loss.how == "extrapolated" else ""
-    told = f" [{low}, {high}]" if loss.low < loss.high else ""  # none of a count, or after too few rounds
-    return f"{factor}{mark}{told}"
+    interval_text = f" [{low}, {high}]" if loss.low < loss.high else ""  # none of a count, or after too few rounds
+    return f"{factor}{mark}{interval_text}"
 
 
 def every_curve(measured_points: MeasuredPoints) -> Table:
@@ -199,11 +202,11 @@ def _mark_of_single_runs(points: list[Point], cheapest_reach: ToleranceCost | No
     )
 
 
-def _cost_text(cheapest_reach: ToleranceCost | None, scale: float, form: str) -> str:
+def _cost_text(cheapest_reach: ToleranceCost | None, unit_scale: float, form: str) -> str:
     return (
         "not met"
         if cheapest_reach is None
-        else format(scale * cheapest_reach.cost, form) + _coarsest_text(cheapest_reach)
+        else format(unit_scale * cheapest_reach.cost, form) + _coarsest_text(cheapest_reach)
     )
 
 

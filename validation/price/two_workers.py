@@ -48,9 +48,9 @@ def ensemble_job(duration: float = 60.0) -> Any:
         return noise_paths(scene, np.linspace(0.0, duration, 121))
 
 
-def compute_blocks(job: Any, numbers: list[int]) -> None:
+def compute_blocks(job: Any, block_numbers: list[int]) -> None:
     """Compute some blocks of an ensemble one after the other in a single process."""
-    for number in numbers:
+    for number in block_numbers:
         job(BLOCKS_OF_TURN.block(number, PATHS_PER_TURN))
 
 
@@ -80,9 +80,9 @@ def cost_of_blocks(executor: Executor) -> dict[int, float]:
     costs = {}
     for numbers in NUMBERS_SENT:
         run_paths(Sender(numbers), 4, executor=executor, blocks=Blocks(1))
-        begun = time.process_time()
+        start_time = time.process_time()
         run_paths(Sender(numbers), EMPTY_BLOCKS, executor=executor, blocks=Blocks(1))
-        costs[numbers] = (time.process_time() - begun) / EMPTY_BLOCKS
+        costs[numbers] = (time.process_time() - start_time) / EMPTY_BLOCKS
     return costs
 
 
@@ -94,23 +94,23 @@ def worker_pools() -> Iterator[dict[str, Executor]]:
         with suppress(ImportError):
             from distributed import LocalCluster
 
-            here = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
-            local = stack.enter_context(here)
+            local_cluster = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
+            local = stack.enter_context(local_cluster)
             pools["Dask"] = stack.enter_context(dask_workers(local.scheduler_address))
         yield pools
 
 
-def measured_pools(rounds: int = ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]:
+def measured_pools(round_count: int = ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]:
     """Measurement of each crew: ``efficiency`` relative to two separate processes and ``seconds`` of a run, both with
     intervals; ``cost`` of a block (s)."""
     job = ensemble_job() if job is None else job
     with ExitStack() as stack, worker_pools() as pools:
-        alone: list[Executor] = [stack.enter_context(process_pool(1)) for _ in range(2)]
-        turns: list[Callable[[], Any]] = [partial(compute_in_two_processes, alone, job)]
+        single_pools: list[Executor] = [stack.enter_context(process_pool(1)) for _ in range(2)]
+        turns: list[Callable[[], Any]] = [partial(compute_in_two_processes, single_pools, job)]
         turns += [
             partial(run_paths, job, PATHS_PER_TURN, executor=pool, blocks=BLOCKS_OF_TURN) for pool in pools.values()
         ]
-        seconds = interleave(turns, rounds)
+        seconds = interleave(turns, round_count)
         return {
             name: {
                 "efficiency": paired_ratio(seconds[0], took),

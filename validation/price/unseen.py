@@ -91,27 +91,27 @@ class Verdict:
     def factor(self) -> float:
         """Ratio of predicted to true error, or its inverse if this is above 1; errors below the floor are replaced by
         the floor."""
-        first, other = max(self.predicted, self.floor), max(self.true, self.floor)
-        if first == other:
+        first, larger_true = max(self.predicted, self.floor), max(self.true, self.floor)
+        if first == larger_true:
             return 1.0
-        return max(first, other) / min(first, other) if min(first, other) > 0.0 else math.inf
+        return max(first, larger_true) / min(first, larger_true) if min(first, larger_true) > 0.0 else math.inf
 
 
-def drawn(number: int, folder: Path) -> DrawnScene:
+def drawn(scene_number: int, folder: Path) -> DrawnScene:
     """The random scene with this number; its files are written to ``folder``."""
-    rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
-    kind = SCENE_KINDS[number % len(SCENE_KINDS)]
-    name, effects, more = kind(rng, folder, number)
+    rng = np.random.Generator(np.random.Philox(key=[SEED, scene_number]))
+    kind = SCENE_KINDS[scene_number % len(SCENE_KINDS)]
+    name, effects, further_tables = kind(rng, folder, scene_number)
     override = {
         key: float(np.exp(rng.uniform(-0.5, 0.5))) * getattr(PARAMETERS, key)
         for key in map(str, rng.choice(CHANGED_PARAMETERS, 4, replace=False))
     }
     table = {
-        "title": f"scene {number}, {name}",
+        "title": f"scene {scene_number}, {name}",
         "vehicle": {"geometry": str(rng.choice(["exact", "linear"])), "override": override},
-        "run": {"duration": float(more.pop("duration", round(rng.uniform(0.1, 0.3), 2))), "step": 1e-3},
+        "run": {"duration": float(further_tables.pop("duration", round(rng.uniform(0.1, 0.3), 2))), "step": 1e-3},
         "effects": effects,
-        **more,
+        **further_tables,
     }
     quantity, common = "enforced_moment", ["pitch", "z3", "f3,f4"]
     if "prescribed_pitch" not in effects:
@@ -126,37 +126,44 @@ Kind = tuple[str, dict[str, Any], dict[str, Any]]
 """Name, effects, and further tables of a scene."""
 
 
-def _iso_road(rng: Random, folder: Path, number: int) -> Kind:
+def _iso_road(generator: Random, folder: Path, scene_number: int) -> Kind:
     road = {
         "source": "iso8608",
-        "road_class": str(rng.choice(list("ABCDE"))),
-        "seed": number,
-        "speed": float(round(rng.uniform(5.0, 35.0), 1)),
+        "road_class": str(generator.choice(list("ABCDE"))),
+        "seed": scene_number,
+        "speed": float(round(generator.uniform(5.0, 35.0), 1)),
     }
     return "rough road", {"road": road}, {}
 
 
-def _study_road(rng: Random, folder: Path, number: int) -> Kind:
-    source = str(rng.choice(["study", "hills"]))
-    return f"{source} road", {"road": {"source": source, "speed": float(round(rng.uniform(5.0, 35.0), 1))}}, {}
+def _study_road(generator: Random, folder: Path, scene_number: int) -> Kind:
+    source = str(generator.choice(["study", "hills"]))
+    return f"{source} road", {"road": {"source": source, "speed": float(round(generator.uniform(5.0, 35.0), 1))}}, {}
 
 
-def _random_release(rng: Random, folder: Path, number: int) -> Kind:
+def _random_release(generator: Random, folder: Path, scene_number: int) -> Kind:
     start = {"z1": 2e-2, "z3": 5e-2, "pitch": 5e-2, "pitch_rate": 0.3, "z2_rate": 0.3}
-    drawn = {key: float(size * rng.uniform(-1, 1)) for key, size in start.items()}
-    return "release", {}, {"start": drawn, "duration": float(rng.choice([0.2, 0.4, 2.5]))}
+    drawn = {key: float(size * generator.uniform(-1, 1)) for key, size in start.items()}
+    return "release", {}, {"start": drawn, "duration": float(generator.choice([0.2, 0.4, 2.5]))}
 
 
-def _forces(rng: Random, folder: Path, number: int) -> Kind:
-    how, period = str(rng.choice(["linear", "held", "smooth"])), float(rng.choice([1e-2, 5e-3, 2e-3]))
-    file = _write_wheel_forces(rng, folder, number, period)
-    return f"{how} forces", {"wheel_forces": {"file": file, "interpolation": how}}, {"duration": 0.2}
+def _forces(generator: Random, folder: Path, scene_number: int) -> Kind:
+    interpolation, period = (
+        str(generator.choice(["linear", "held", "smooth"])),
+        float(generator.choice([1e-2, 5e-3, 2e-3])),
+    )
+    file = _write_wheel_forces(generator, folder, scene_number, period)
+    return (
+        f"{interpolation} forces",
+        {"wheel_forces": {"file": file, "interpolation": interpolation}},
+        {"duration": 0.2},
+    )
 
 
-def _random_guided(rng: Random, folder: Path, number: int) -> Kind:
-    file, pitch = _write_wheel_forces(rng, folder, number, 5e-3), f"pitch{number}.csv"
-    times = 5e-3 * np.arange(101)
-    wave = rng.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * rng.uniform(0.5, 3.0) * times))
+def _random_guided(generator: Random, folder: Path, scene_number: int) -> Kind:
+    file, pitch = _write_wheel_forces(generator, folder, scene_number, 5e-3), f"pitch{scene_number}.csv"
+    sample_times = 5e-3 * np.arange(101)
+    wave = generator.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * generator.uniform(0.5, 3.0) * sample_times))
     write_time_series(folder / pitch, {"pitch": ("rad", wave)}, 5e-3)
     effects = {"wheel_forces": {"file": file, "interpolation": "smooth"}, "prescribed_pitch": {"file": pitch}}
     return "prescribed pitch", effects, {"duration": 0.2}
@@ -176,19 +183,19 @@ SCENE_KINDS: tuple[Callable[[Random, Path, int], Kind], ...] = (
 )
 
 
-def _write_wheel_forces(rng: Random, folder: Path, number: int, period: float) -> str:
+def _write_wheel_forces(generator: Random, folder: Path, scene_number: int, sample_period: float) -> str:
     """Write a file of wheel forces: weight, two sine waves, and noise on each sample."""
-    times, name = period * np.arange(round(0.5 / period) + 1), f"forces{number}.csv"
+    sample_times, name = sample_period * np.arange(round(0.5 / sample_period) + 1), f"forces{scene_number}.csv"
     forces = {
         wheel: (
             "N",
             3825.9
-            + 500 * np.sin(2 * np.pi * rng.uniform(1, 10) * times + rng.uniform(0, 6))
-            + 200 * rng.standard_normal(len(times)),
+            + 500 * np.sin(2 * np.pi * generator.uniform(1, 10) * sample_times + generator.uniform(0, 6))
+            + 200 * generator.standard_normal(len(sample_times)),
         )
         for wheel in ("front", "rear")
     }
-    write_time_series(folder / name, forces, period)
+    write_time_series(folder / name, forces, sample_period)
     return name
 
 
@@ -243,9 +250,9 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
     return {setting: exact[parts[setting]].error(run) for setting, run in runs.items()}
 
 
-def _fine_multiple(scene: PricedPitchPlane, parts: int) -> int:
-    """A multiple of ``parts`` for which rows are no further apart than COARSE_SPACING."""
-    return parts * math.ceil(scene.base / parts / COARSE_SPACING * (1 - 1e-9))
+def _fine_multiple(scene: PricedPitchPlane, part_count: int) -> int:
+    """A multiple of ``part_count`` for which rows are no further apart than COARSE_SPACING."""
+    return part_count * math.ceil(scene.base / part_count / COARSE_SPACING * (1 - 1e-9))
 
 
 def _exact_answer(scene: PricedPitchPlane, spacing: float) -> PricedRun:
@@ -266,16 +273,16 @@ def _coarsest_defaults(recommendation: Recommendation) -> list[TriedSetting]:
     settings count, as the recommendation may have missed one."""
     if not recommendation.whole:
         return [
-            each.refined.tried
-            for each in recommendation.defaults.values()
-            if each.refined is not None and not each.extrapolated
+            tried.refined.tried
+            for tried in recommendation.defaults.values()
+            if tried.refined is not None and not tried.extrapolated
         ]
-    held = recommendation.tolerance - recommendation.search_truth.uncertainty
+    error_bound = recommendation.tolerance - recommendation.search_truth.uncertainty
     able = sorted(
-        (each for each in recommendation.tried if each.setting.default and each.error <= held),
-        key=lambda each: each.setting.value,
+        (tried for tried in recommendation.tried if tried.setting.default and tried.error <= error_bound),
+        key=lambda tried: tried.setting.value,
     )
-    return list({each.setting.curve: each for each in able}.values())
+    return list({tried.setting.curve: tried for tried in able}.values())
 
 
 def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, rival: TriedSetting) -> bool:

@@ -39,55 +39,58 @@ Asked = tuple[dict[str, Any], list[str]]
 """Tables of a scene, and the quantities that may be asked about."""
 
 
-def drawn_scene_of_system(system: str, number: int) -> DrawnScene:
+def drawn_scene_of_system(system: str, scene_number: int) -> DrawnScene:
     """A random scene of a system for a number, with a quantity and a tolerance."""
-    rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
+    rng = np.random.Generator(np.random.Philox(key=[SEED, scene_number]))
     table, quantities = {"wheelset": _random_wheelset, "handling": _random_handling, "braking": _random_braking}[
         system
     ](rng)
-    table |= {"title": f"{system} {number}", "system": system}
+    table |= {"title": f"{system} {scene_number}", "system": system}
     quantity = str(rng.choice(quantities))
     low, high = np.log(TOLERANCE_RANGES[quantity])
     scene = import_module(SYSTEMS[system].scene).build(table, "", Path())
     return DrawnScene(scene, quantity, float(np.exp(rng.uniform(low, high))))
 
 
-def _random_wheelset(rng: Random) -> Asked:
+def _random_wheelset(generator: Random) -> Asked:
     override = {
-        "conicity": float(rng.uniform(0.02, 0.2)),
-        "stiffness_x": float(rng.uniform(1e5, 1e6)),
-        "friction": float(rng.uniform(0.1, 0.5)),
+        "conicity": float(generator.uniform(0.02, 0.2)),
+        "stiffness_x": float(generator.uniform(1e5, 1e6)),
+        "friction": float(generator.uniform(0.1, 0.5)),
     }
     run = {
         "duration": 0.1,
         "step": 5e-4,
-        "displacement": float(rng.uniform(1e-3, 5e-3)),
-        "speeds": [float(round(rng.uniform(10.0, 60.0), 1))],
+        "displacement": float(generator.uniform(1e-3, 5e-3)),
+        "speeds": [float(round(generator.uniform(10.0, 60.0), 1))],
     }
-    law = str(rng.choice(["fastsim", "fastsim", "linear"]))
+    law = str(generator.choice(["fastsim", "fastsim", "linear"]))
     speeds = {"values": [10.0]}
     return {"wheelset": {"override": override}, "contact": {"law": law}, "run": run, "speeds": speeds}, ["y", "fy"]
 
 
-def _random_handling(rng: Random) -> Asked:
+def _random_handling(generator: Random) -> Asked:
     manoeuvre = {
-        "speed": float(rng.uniform(12.0, 30.0)),
+        "speed": float(generator.uniform(12.0, 30.0)),
         "duration": 0.5,
-        "rough": bool(rng.integers(2)),
-        "steer": [[0.05, 0.0], [float(rng.uniform(0.2, 0.4)), float(rng.uniform(-0.06, 0.06))]],
+        "rough": bool(generator.integers(2)),
+        "steer": [[0.05, 0.0], [float(generator.uniform(0.2, 0.4)), float(generator.uniform(-0.06, 0.06))]],
     }
-    tyres = {"friction": float(rng.uniform(0.4, 1.0))}
+    tyres = {"friction": float(generator.uniform(0.4, 1.0))}
     return {"tyres": tyres, "manoeuvres": {"drawn": manoeuvre}}, ["yaw_rate", "load"]
 
 
-def _random_braking(rng: Random) -> Asked:
-    kind, surface = str(rng.choice(["straight", "j_turn", "split"])), str(rng.choice(["snow", "wet", "ice"]))
-    procedure: dict[str, Any] = {"kind": kind, "speed": float(rng.uniform(4.0, 9.0))}
+def _random_braking(generator: Random) -> Asked:
+    kind, surface = (
+        str(generator.choice(["straight", "j_turn", "split"])),
+        str(generator.choice(["snow", "wet", "ice"])),
+    )
+    procedure: dict[str, Any] = {"kind": kind, "speed": float(generator.uniform(4.0, 9.0))}
     if kind == "j_turn":
-        procedure["steer"] = float(rng.uniform(0.01, 0.05))
+        procedure["steer"] = float(generator.uniform(0.01, 0.05))
     if kind == "split":
         procedure["right"] = "ice"
-    controller = {"kind": str(rng.choice(["none", "slip_bang_bang", "slip_pi"]))}
+    controller = {"kind": str(generator.choice(["none", "slip_bang_bang", "slip_pi"]))}
     quantities = ["stopping_distance"] if kind == "straight" else ["stopping_distance", "yaw"]
     return {
         "controller": controller,

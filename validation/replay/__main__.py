@@ -23,7 +23,7 @@ from validation.replay.answers import (
 )
 
 
-def main(words: list[str]) -> int:
+def main(command_words: list[str]) -> int:
     """Record or check answers of all jobs. The exit code is 1 if a value, an exit code or a channel differs."""
     parser = argparse.ArgumentParser(prog="python -m validation.replay", description=__doc__)
     parser.add_argument("what", choices=("record", "check"))
@@ -34,10 +34,10 @@ def main(words: list[str]) -> int:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--bound", type=float, default=0.0, help="allowed change, by a channel's largest number")
     parser.add_argument("--renamed", type=Path, help="TOML of earlier names of channels and later ones")
-    given = parser.parse_args(words)
-    if given.what == "record":
-        return _record_answers(given)
-    return _check_answers(given)
+    arguments = parser.parse_args(command_words)
+    if arguments.what == "record":
+        return _record_answers(arguments)
+    return _check_answers(arguments)
 
 
 def _record_answers(arguments: argparse.Namespace) -> int:
@@ -45,26 +45,28 @@ def _record_answers(arguments: argparse.Namespace) -> int:
     if not (arguments.folder / JOBS_FILE).exists():
         write_jobs(arguments.folder, asked.replay_jobs(arguments.command))
     left = [job for job in _chosen_jobs(arguments) if load(arguments.folder, job.name) is None]
-    for job, now in _answers_of_jobs(left, arguments):
-        save(arguments.folder, job.name, now)
-        codes = ", ".join(map(str, now.codes))
-        print(f"{now.seconds:7.1f} s  {len(now.arrays):4} arrays  {job.name}: {codes}", flush=True)
+    for job, current_answer in _answers_of_jobs(left, arguments):
+        save(arguments.folder, job.name, current_answer)
+        codes = ", ".join(map(str, current_answer.codes))
+        print(
+            f"{current_answer.seconds:7.1f} s  {len(current_answer.arrays):4} arrays  {job.name}: {codes}", flush=True
+        )
     return 0
 
 
 def _check_answers(arguments: argparse.Namespace) -> int:
     renamed = tomllib.loads(arguments.renamed.read_text()) if arguments.renamed else {}
     counts = {"same": 0, "differ": 0, "other words": 0}
-    for job, now in _answers_of_jobs(_chosen_jobs(arguments), arguments):
-        before = load(arguments.folder, job.name)
-        if before is None:
+    for job, current_answer in _answers_of_jobs(_chosen_jobs(arguments), arguments):
+        recorded_answer = load(arguments.folder, job.name)
+        if recorded_answer is None:
             print(f"{job.name}: was not recorded")
             continue
-        told = answer_difference(before, now, arguments.bound, renamed)
-        counts["differ" if told.wrong else "other words" if told.tolerated else "same"] += 1
-        for text in (told.wrong or told.tolerated)[:5]:
-            print(f"{job.name}: {'DIFFERS: ' if told.wrong else ''}{text}", flush=True)
-    print(", ".join(f"{count} {what}" for what, count in counts.items()))
+        difference = answer_difference(recorded_answer, current_answer, arguments.bound, renamed)
+        counts["differ" if difference.wrong else "other words" if difference.tolerated else "same"] += 1
+        for text in (difference.wrong or difference.tolerated)[:5]:
+            print(f"{job.name}: {'DIFFERS: ' if difference.wrong else ''}{text}", flush=True)
+    print(", ".join(f"{count} {outcome}" for outcome, count in counts.items()))
     return 1 if counts["differ"] else 0
 
 

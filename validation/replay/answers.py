@@ -48,35 +48,36 @@ def answer_of_job(job: ReplayJob, command: str, folder: Path) -> CommandAnswer:
     for file in BASE_SCENES.glob("*.[!t]*"):
         shutil.copy(file, folder)
     (folder / "scene.toml").write_text(job.scene)
-    given = {path.name for path in folder.iterdir()}
-    now = CommandAnswer([], "", 0.0)
+    given_files = {path.name for path in folder.iterdir()}
+    job_answer = CommandAnswer([], "", 0.0)
     for words in job.commands:
-        _run_command([command, *words], folder, now)
-    now.arrays |= dict(_arrays_of_files(folder, given))
+        _run_command([command, *words], folder, job_answer)
+    job_answer.arrays |= dict(_arrays_of_files(folder, given_files))
     shutil.rmtree(folder)
-    return now
+    return job_answer
 
 
-def _run_command(words: list[str], folder: Path, answer: CommandAnswer) -> None:
+def _run_command(command_words: list[str], folder: Path, job_answer: CommandAnswer) -> None:
     """Run one command, and add its exit code, message and printed tables to the answer."""
-    begun = time.monotonic()
-    code, said, wrong = _run(words, folder)
-    answer.seconds += time.monotonic() - begun
-    printed = _parsed_json(said)
+    start_time = time.monotonic()
+    code, printed_output, wrong = _run(command_words, folder)
+    job_answer.seconds += time.monotonic() - start_time
+    printed = _parsed_json(printed_output)
     if printed is not None:
-        answer.arrays |= {
-            f": {len(answer.codes)}{place}": np.array(value) for place, value in _values_with_places(printed)
+        job_answer.arrays |= {
+            f": {len(job_answer.codes)}{path_in_table}": np.array(value)
+            for path_in_table, value in _values_with_places(printed)
         }
-        said = ""
-    answer.codes.append(code)
-    answer.message += _masked_message(said + wrong)
+        printed_output = ""
+    job_answer.codes.append(code)
+    job_answer.message += _masked_message(printed_output + wrong)
 
 
-def _run(words: list[str], folder: Path) -> tuple[int, str, str]:
+def _run(command_words: list[str], folder: Path) -> tuple[int, str, str]:
     surroundings = os.environ | {"COLUMNS": "200", "NO_COLOR": "1", "MPLBACKEND": "agg"}
     try:
-        done = subprocess.run(
-            words,
+        completed_process = subprocess.run(
+            command_words,
             cwd=folder,
             env=surroundings,
             capture_output=True,
@@ -87,7 +88,7 @@ def _run(words: list[str], folder: Path) -> tuple[int, str, str]:
         )
     except subprocess.TimeoutExpired:
         return -1, "", f"ended after {COMMAND_SECONDS:g} s"
-    return done.returncode, done.stdout, done.stderr
+    return completed_process.returncode, completed_process.stdout, completed_process.stderr
 
 
 def _parsed_json(text: str) -> Any:
@@ -97,16 +98,16 @@ def _parsed_json(text: str) -> Any:
         return None
 
 
-def _values_with_places(value: Any, place: str = "") -> Iterator[tuple[str, float | str]]:
+def _values_with_places(nested_value: Any, path_in_table: str = "") -> Iterator[tuple[str, float | str]]:
     """Numbers and texts of a nested table, each with its place in the table."""
-    if isinstance(value, dict | list):
-        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
+    if isinstance(nested_value, dict | list):
+        for key, inner in nested_value.items() if isinstance(nested_value, dict) else enumerate(nested_value):
             if key not in UNWATCHED_KEYS:
-                yield from _values_with_places(inner, f"{place}/{key}")
-    elif isinstance(value, bool | int | float):
-        yield place, float(value)
-    elif value is not None:
-        yield place, _masked_message(str(value))
+                yield from _values_with_places(inner, f"{path_in_table}/{key}")
+    elif isinstance(nested_value, bool | int | float):
+        yield path_in_table, float(nested_value)
+    elif nested_value is not None:
+        yield path_in_table, _masked_message(str(nested_value))
 
 
 def _masked_message(text: str) -> str:
@@ -128,7 +129,7 @@ def _netcdf_channels(path: Path) -> Iterator[tuple[str, np.ndarray]]:
 
     with h5py.File(path) as file:
         sets: dict[str, np.ndarray] = {}
-        file.visititems(lambda name, each: sets.update({name: each[()]}) if isinstance(each, h5py.Dataset) else None)
+        file.visititems(lambda name, item: sets.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
     for name, values in sets.items():
         array = np.asarray(values)
         yield name, array if array.dtype.kind in "fiub" else array.astype(str)
@@ -158,16 +159,21 @@ def write_jobs(folder: Path, jobs: list[ReplayJob]) -> None:
 def read_jobs(folder: Path) -> list[ReplayJob]:
     """The jobs that are saved in a recording."""
     return [
-        ReplayJob(each["name"], tuple(map(tuple, each["commands"])), each["scene"])
-        for each in json.loads((folder / JOBS_FILE).read_text())
+        ReplayJob(job_table["name"], tuple(map(tuple, job_table["commands"])), job_table["scene"])
+        for job_table in json.loads((folder / JOBS_FILE).read_text())
     ]
 
 
-def save(folder: Path, name: str, answer: CommandAnswer) -> None:
+def save(folder: Path, name: str, job_answer: CommandAnswer) -> None:
     """Save an answer; its summary is written last, as a mark that it is complete."""
-    arrays = {str(i): array for i, array in enumerate(answer.arrays.values())}
+    arrays = {str(i): array for i, array in enumerate(job_answer.arrays.values())}
     np.savez_compressed(folder / f"{name}.npz", allow_pickle=False, **arrays)
-    note = {"codes": answer.codes, "message": answer.message, "seconds": answer.seconds, "arrays": list(answer.arrays)}
+    note = {
+        "codes": job_answer.codes,
+        "message": job_answer.message,
+        "seconds": job_answer.seconds,
+        "arrays": list(job_answer.arrays),
+    }
     (folder / f"{name}.json").write_text(json.dumps(note, indent=1))
 
 
@@ -192,30 +198,34 @@ class AnswerDifference:
 
 
 def answer_difference(
-    recorded: CommandAnswer, current: CommandAnswer, bound: float, renamed: Mapping[str, str]
+    recorded: CommandAnswer, current_answer: CommandAnswer, bound: float, renamed: Mapping[str, str]
 ) -> AnswerDifference:
     """Differences of an answer from the recorded one.
 
     bound : largest change of a number by the largest one of its channel; 0 asks for the same bits. renamed : earlier
     names of channels to later ones; a channel that is in another file now is looked for by its name.
     """
-    told = AnswerDifference()
-    if recorded.codes != current.codes:
-        told.wrong.append(f"exit codes {recorded.codes} are {current.codes}: {current.message.strip()[-200:]}")
-    if recorded.message != current.message:
-        told.tolerated.append(f"message {recorded.message.strip()[:200]!r} is {current.message.strip()[:200]!r}")
+    difference = AnswerDifference()
+    if recorded.codes != current_answer.codes:
+        difference.wrong.append(
+            f"exit codes {recorded.codes} are {current_answer.codes}: {current_answer.message.strip()[-200:]}"
+        )
+    if recorded.message != current_answer.message:
+        difference.tolerated.append(
+            f"message {recorded.message.strip()[:200]!r} is {current_answer.message.strip()[:200]!r}"
+        )
     matched = set()
     for name, array in recorded.arrays.items():
         if not {*re.split(r"[:/ ]+", name)}.isdisjoint(UNWATCHED_KEYS):
             continue
-        if (later := _renamed_channel(name, current.arrays, renamed)) is None:
-            told.wrong.append(f"{name} is gone")
+        if (later := _renamed_channel(name, current_answer.arrays, renamed)) is None:
+            difference.wrong.append(f"{name} is gone")
             continue
         matched.add(later)
-        if text := _change_text(array, current.arrays[later], bound):
-            (told.tolerated if array.dtype.kind == "U" else told.wrong).append(f"{name}: {text}")
-    told.tolerated += [f"{name} is new" for name in current.arrays if name not in matched]
-    return told
+        if text := _change_text(array, current_answer.arrays[later], bound):
+            (difference.tolerated if array.dtype.kind == "U" else difference.wrong).append(f"{name}: {text}")
+    difference.tolerated += [f"{name} is new" for name in current_answer.arrays if name not in matched]
+    return difference
 
 
 def _renamed_channel(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, str]) -> str | None:
@@ -224,22 +234,25 @@ def _renamed_channel(name: str, arrays: Mapping[str, np.ndarray], renamed: Mappi
     if (name_then := renamed.get(name, name)) in arrays:
         return name_then
     channel = name_then.partition(": ")[2]
-    others = [other for other in arrays if other.partition(": ")[2] == channel]
-    return others[0] if len(others) == 1 else None
+    other_names = [other_name for other_name in arrays if other_name.partition(": ")[2] == channel]
+    return other_names[0] if len(other_names) == 1 else None
 
 
-def _change_text(recorded: np.ndarray, current: np.ndarray, bound: float) -> str:
+def _change_text(recorded: np.ndarray, current_values: np.ndarray, bound: float) -> str:
     """Text on how an array changed; "" if no change exceeds the bound."""
-    if recorded.dtype.kind == current.dtype.kind == "U" and recorded.size == current.size == 1:
-        return "" if recorded == current else f"{recorded} is {current}"
-    if recorded.shape != current.shape or recorded.dtype != current.dtype:
-        return f"{recorded.dtype} {recorded.shape} is {current.dtype} {current.shape}"
-    if recorded.tobytes() == current.tobytes():
+    if recorded.dtype.kind == current_values.dtype.kind == "U" and recorded.size == current_values.size == 1:
+        return "" if recorded == current_values else f"{recorded} is {current_values}"
+    if recorded.shape != current_values.shape or recorded.dtype != current_values.dtype:
+        return f"{recorded.dtype} {recorded.shape} is {current_values.dtype} {current_values.shape}"
+    if recorded.tobytes() == current_values.tobytes():
         return ""
     if recorded.dtype.kind != "f" or not bound:
-        return "other values" if recorded.size > 1 else f"{recorded} is {current}"
+        return "other values" if recorded.size > 1 else f"{recorded} is {current_values}"
     known = np.isfinite(recorded)
-    if not np.array_equal(recorded[~known], current[~known], equal_nan=True) or not np.isfinite(current[known]).all():
+    if (
+        not np.array_equal(recorded[~known], current_values[~known], equal_nan=True)
+        or not np.isfinite(current_values[known]).all()
+    ):
         return "numbers are finite elsewhere"
-    share = abs(recorded - current)[known].max(initial=0.0) / max(abs(recorded)[known].max(initial=0.0), 1e-300)
+    share = abs(recorded - current_values)[known].max(initial=0.0) / max(abs(recorded)[known].max(initial=0.0), 1e-300)
     return "" if share <= bound else f"a number changed by {share:.2g} of the largest"

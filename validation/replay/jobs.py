@@ -46,13 +46,13 @@ def replay_jobs(command: str) -> list[ReplayJob]:
 def _shipped_jobs(command: str) -> Iterator[ReplayJob]:
     """Jobs for every listed scene: one shows it, one runs it."""
     shorter = tomllib.loads(SHORT_RUN_SETTINGS.read_text())
-    said = subprocess.run([command, "list"], capture_output=True, text=True, check=True).stdout
-    for line in said.splitlines()[1:]:
+    listing = subprocess.run([command, "list"], capture_output=True, text=True, check=True).stdout
+    for line in listing.splitlines()[1:]:
         if not line.startswith("  "):
             return
         name = line.split()[0]
-        less = [word for change in shorter.get(name, ()) for word in ("--set", change)]
-        yield ReplayJob(f"shipped-{name}", (("show", name), ("run", name, *less, "--json", "--out", "out")))
+        shortening = [word for change in shorter.get(name, ()) for word in ("--set", change)]
+        yield ReplayJob(f"shipped-{name}", (("show", name), ("run", name, *shortening, "--json", "--out", "out")))
 
 
 def _written_jobs() -> Iterator[ReplayJob]:
@@ -94,8 +94,8 @@ def _draw_scene(name: str, scene: Table, random: np.random.Generator) -> ReplayJ
     engine = str(random.choice(engines)) if engines else ""
     _drop_key(scene, random)
     if random.random() < CHANGED_CHANCE:
-        for place in random.permutation(list(_places_of_numbers(scene)))[:3]:
-            _change_number(scene, str(place), float(random.uniform(*FACTOR_RANGE)))
+        for number_path in random.permutation(list(_places_of_numbers(scene)))[:3]:
+            _change_number(scene, str(number_path), float(random.uniform(*FACTOR_RANGE)))
     if random.random() < MISTAKE_CHANCE:
         engine = _make_mistake(scene, engine, random)
     return ReplayJob(name, (_run_command(engine),), dumps(scene))
@@ -109,37 +109,37 @@ def _drop_key(scene: Table, random: np.random.Generator) -> None:
                 del table[key]
 
 
-def _places_of_numbers(table: Table, above: str = "") -> Iterator[str]:
+def _places_of_numbers(table: Table, path_prefix: str = "") -> Iterator[str]:
     """Paths (keys joined by /) of all numbers that are not integers."""
     for key, value in table.items():
         if isinstance(value, dict):
-            yield from _places_of_numbers(value, f"{above}{key}/")
+            yield from _places_of_numbers(value, f"{path_prefix}{key}/")
         elif isinstance(value, float):
-            yield f"{above}{key}"
+            yield f"{path_prefix}{key}"
 
 
-def _table_and_key(scene: Table, place: str) -> tuple[Table, str]:
-    *above, key = place.split("/")
-    for part in above:
-        scene = scene[part]
+def _table_and_key(scene: Table, number_path: str) -> tuple[Table, str]:
+    *parent_keys, key = number_path.split("/")
+    for parent_key in parent_keys:
+        scene = scene[parent_key]
     return scene, key
 
 
-def _change_number(scene: Table, place: str, factor: float) -> None:
-    table, key = _table_and_key(scene, place)
+def _change_number(scene: Table, number_path: str, factor: float) -> None:
+    table, key = _table_and_key(scene, number_path)
     table[key] = float(f"{factor * table[key]:.4g}")
 
 
 def _make_mistake(scene: Table, engine: str, random: np.random.Generator) -> str:
     """Put a typical user's mistake into a scene; returns the engine to ask for, which may be the mistake."""
-    before = copy.deepcopy(scene)
-    places = sorted(_places_of_numbers(before))
+    original_scene = copy.deepcopy(scene)
+    number_paths = sorted(_places_of_numbers(original_scene))
     kind = int(random.integers(5))
-    if kind == 0 or not places:
+    if kind == 0 or not number_paths:
         scene["vehicel"] = {}
     elif kind == 4:
         return "exodyn"
     else:
-        table, key = _table_and_key(scene, str(random.choice(places)))
+        table, key = _table_and_key(scene, str(random.choice(number_paths)))
         table[key] = {1: "a text", 2: -abs(table[key]) - 1.0, 3: float("nan")}[kind]
     return engine

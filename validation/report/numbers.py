@@ -12,38 +12,42 @@ PLAIN_MAGNITUDES = (1e-3, 1e5)
 """Magnitudes that are written without a power of ten."""
 
 
-def number_markup(value: Any, digits: int = 4) -> Markup:
+def number_markup(table_value: Any, digits: int = 4) -> Markup:
     """Text of a number with ``digits`` significant digits, such as ``0.0123`` or ``8.9e-16``; text stays as it is, None
     becomes a dash."""
-    if value is None or value == "":
+    if table_value is None or table_value == "":
         return Markup("–")
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return escape(value)
-    if not math.isfinite(value):
-        return Markup("not a number") if math.isnan(value) else Markup("infinite" if value > 0 else "-infinite")
-    if isinstance(value, int) and abs(value) < 10**7:
-        return Markup(value)
-    if value == 0 or PLAIN_MAGNITUDES[0] <= abs(value) < PLAIN_MAGNITUDES[1]:
-        return Markup(_significant(value, digits))
-    return Markup(_scientific_text(value, digits))
+    if isinstance(table_value, bool) or not isinstance(table_value, int | float):
+        return escape(table_value)
+    if not math.isfinite(table_value):
+        return (
+            Markup("not a number")
+            if math.isnan(table_value)
+            else Markup("infinite" if table_value > 0 else "-infinite")
+        )
+    if isinstance(table_value, int) and abs(table_value) < 10**7:
+        return Markup(table_value)
+    if table_value == 0 or PLAIN_MAGNITUDES[0] <= abs(table_value) < PLAIN_MAGNITUDES[1]:
+        return Markup(_significant(table_value, digits))
+    return Markup(_scientific_text(table_value, digits))
 
 
-def error(value: Any) -> Markup:
+def error(table_value: Any) -> Markup:
     """Text of an error or tolerance, with four significant digits in fixed notation, and two in powers of ten."""
-    plain = isinstance(value, int | float) and PLAIN_MAGNITUDES[0] <= abs(value) < PLAIN_MAGNITUDES[1]
-    return number_markup(value, 4 if plain else 2)
+    plain = isinstance(table_value, int | float) and PLAIN_MAGNITUDES[0] <= abs(table_value) < PLAIN_MAGNITUDES[1]
+    return number_markup(table_value, 4 if plain else 2)
 
 
-def _scientific_text(value: float, digits: int) -> str:
+def _scientific_text(number: float, digits: int) -> str:
     """Text in scientific notation such as ``8.9e-16``, without leading zeros in the exponent."""
-    mantissa, power = f"{value:.{digits - 1}e}".split("e")
+    mantissa, power = f"{number:.{digits - 1}e}".split("e")
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(power)}"
 
 
-def _significant(value: float, digits: int) -> str:
+def _significant(number: float, digits: int) -> str:
     """Text in fixed notation with ``digits`` significant digits, without trailing zeros."""
-    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value)))) if value else 0
-    text = f"{value:.{decimals}f}"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(number)))) if number else 0
+    text = f"{number:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
@@ -56,15 +60,15 @@ def margin_of_row(row: dict[str, Any]) -> float | None:
     return abs(value - expected) / tolerance
 
 
-def share_markup(value: float | None) -> Markup:
+def share_markup(tolerance_share: float | None) -> Markup:
     """Text of a margin: per cent of the tolerance, or how many times it is exceeded."""
-    if value is None or math.isnan(value):
+    if tolerance_share is None or math.isnan(tolerance_share):
         return Markup("–")
-    if value > 10:
-        return number_markup(value, 2) + Markup(" times")
-    if 0 < value < 1e-4:
+    if tolerance_share > 10:
+        return number_markup(tolerance_share, 2) + Markup(" times")
+    if 0 < tolerance_share < 1e-4:
         return Markup("&lt; 0.01 %")
-    return Markup(f"{_significant(100 * value, 2) if value else '0'} %")
+    return Markup(f"{_significant(100 * tolerance_share, 2) if tolerance_share else '0'} %")
 
 
 def duration(seconds: float) -> str:

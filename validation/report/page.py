@@ -206,7 +206,7 @@ def read(path: Path) -> Saved:
         raise InputError(path, "", None, f"not the results of a validation: {error}") from None
 
 
-def page_text(results: Saved, data: Path, each: Callable[..., Iterable[Any]] = map) -> str:
+def page_text(results: Saved, case_data: Path, each: Callable[..., Iterable[Any]] = map) -> str:
     """The page as text."""
     environment = environment_of(Path(__file__).parent)
     environment.filters |= {
@@ -220,7 +220,7 @@ def page_text(results: Saved, data: Path, each: Callable[..., Iterable[Any]] = m
     }
     environment.globals |= {"margin": margin_of_row, "case_of": case_of}
     names = list(dict.fromkeys(map(case_of, results["rows"])))
-    drawn = dict(zip(names, each(partial(case_on_page, data), names), strict=True))
+    drawn = dict(zip(names, each(partial(case_on_page, case_data), names), strict=True))
     return environment.get_template(PAGE_TEMPLATE).render(
         verdict=report_verdict(results),
         against=results.get("against"),

@@ -76,10 +76,12 @@ def drawn_ride(seed: int, tolerance: float | None = None, detailed: bool = True)
     scene = _scene("drawn", name, {} if cutoff is None else {"cutoff": cutoff}, speed, vehicle)
     ride = stationary_covariance(FullScene(scene, speed).full.system)
     silent = 1e-9 * max(abs(v) for v in ride.variance if np.isfinite(v))
-    told = [n for n, s, v in zip(ride.names, ride.status, ride.variance, strict=True) if s == FINITE and v > silent]
-    count = min(len(told), int(rng.integers(1, 3)))
-    asked = tuple(map(str, rng.choice(told, count, replace=False)))
-    return DrawnRide(scene, speed, asked, tolerance or draw.between(0.005, 0.1))
+    finite_names = [
+        n for n, s, v in zip(ride.names, ride.status, ride.variance, strict=True) if s == FINITE and v > silent
+    ]
+    count = min(len(finite_names), int(rng.integers(1, 3)))
+    drawn_quantities = tuple(map(str, rng.choice(finite_names, count, replace=False)))
+    return DrawnRide(scene, speed, drawn_quantities, tolerance or draw.between(0.005, 0.1))
 
 
 def _scene(title: str, file: str, road: dict[str, float], speed: float, vehicle: SpatialVehicle) -> ReducedScene:
@@ -101,32 +103,32 @@ def _vehicle(vehicle: SpatialVehicle, generator: Draw, detailed: bool) -> Spatia
         axis = (float(np.cos(lean)), 0.0, float(np.sin(lean)))
         for i, body in enumerate(bodies):
             if body.name in wheels:
-                bodies[i], at = replace(body, freedoms=("x", "z")), body.position
+                bodies[i], position = replace(body, freedoms=("x", "z")), body.position
                 c = 0.1 * float(np.sqrt(k * body.mass))
-                springs.append(SpringDamper(f"{body.name} bush", "body", body.name, at, at, axis, k, c))
+                springs.append(SpringDamper(f"{body.name} bush", "body", body.name, position, position, axis, k, c))
     if detailed or rng.random() < 0.6:
         chassis = next(b for b in bodies if b.name == "body")
         m = chassis.mass * between(0.002, 0.02 if detailed else 0.15)
-        at = (chassis.position[0] + float(rng.uniform(-1, 1)), *chassis.position[1:])
+        position = (chassis.position[0] + float(rng.uniform(-1, 1)), *chassis.position[1:])
         k = m * (2 * np.pi * between(20.0 if detailed else 3.0, 200.0)) ** 2
-        bodies.append(Body("part", m, at, ("z",)))
-        springs.append(SpringDamper("part", "part", "body", at, at, UP, k, 0.2 * float(np.sqrt(k * m))))
+        bodies.append(Body("part", m, position, ("z",)))
+        springs.append(SpringDamper("part", "part", "body", position, position, UP, k, 0.2 * float(np.sqrt(k * m))))
         if not detailed:
-            outputs.append(PointOutput("part", "acceleration", "part", at, UP))
+            outputs.append(PointOutput("part", "acceleration", "part", position, UP))
     tyres = tuple(replace(tyre, damping=damping) for tyre in vehicle.tyres)
     return replace(vehicle, bodies=tuple(bodies), springs=tuple(springs), tyres=tyres, outputs=tuple(outputs))
 
 
-def drawn_bent(number: int) -> BentRide:
+def drawn_bent(scene_number: int) -> BentRide:
     """The random scene with nonlinear springs for a number."""
-    draw = Draw([SEED, number])
-    name = BENT_VEHICLES[number % len(BENT_VEHICLES)]
+    draw = Draw([SEED, scene_number])
+    name = BENT_VEHICLES[scene_number % len(BENT_VEHICLES)]
     vehicle = load_vehicle(name)
     springs = tuple(_bent_spring(spring, draw) for spring in vehicle.springs)
     level, speed = draw.between(1e-5, 1.5e-4), float(draw.random.uniform(10.0, 35.0))
-    asked = draw.random.choice([output.name for output in vehicle.outputs], 2, replace=False)
-    scene = _scene(f"bent {number}", name, {"level": level}, speed, replace(vehicle, springs=springs))
-    return BentRide(scene, tuple(map(str, asked)), TOLERANCES[number % len(TOLERANCES)])
+    drawn_quantities = draw.random.choice([output.name for output in vehicle.outputs], 2, replace=False)
+    scene = _scene(f"bent {scene_number}", name, {"level": level}, speed, replace(vehicle, springs=springs))
+    return BentRide(scene, tuple(map(str, drawn_quantities)), TOLERANCES[scene_number % len(TOLERANCES)])
 
 
 def _bent_spring(spring: SpringDamper, generator: Draw) -> SpringDamper:

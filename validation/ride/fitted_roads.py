@@ -39,29 +39,30 @@ def fitted_made_road(length: float) -> tuple[list[Row], dict[str, Any]]:
         raise RuntimeError("a roll process that was put in was not found")
     rows = [
         Observed(
-            f"ride_road.fit.{name}.{what}",
+            f"ride_road.fit.{name}.{filter_parameter}",
             SYSTEM,
-            f"ratio of {what} of the {name} process fitted to {length / 1e3:g} km of made road to the true value",
-            getattr(process.filter, what) / getattr(true, what),
+            f"ratio of {filter_parameter} of the {name} process fitted to {length / 1e3:g} km of made road to the "
+            "true value",
+            getattr(process.filter, filter_parameter) / getattr(true, filter_parameter),
             "",
         ).within(
             1.0,
-            4.0 * getattr(process, f"{what}_error") + 0.02,
+            4.0 * getattr(process, f"{filter_parameter}_error") + 0.02,
             "four of the fit's own standard errors, and 2 % for sampling at 5 cm and the window's width",
             "closed form",
         )
         for name, true, process in (("mean", road.mean, fitted.mean), ("roll", road.roll, fitted.roll))
-        for what in ("corner", "intensity")
+        for filter_parameter in ("corner", "intensity")
     ]
     return rows, _figure_numbers(tracks, fitted)
 
 
-def _first_order_samples(f: ShapeFilter, noise: np.ndarray, step: float) -> np.ndarray:
+def _first_order_samples(shape_filter: ShapeFilter, noise: np.ndarray, step: float) -> np.ndarray:
     """Samples of a stationary first-order process from unit noise, exact at the stations."""
-    kept = math.exp(-f.corner * step)
-    driven = noise * math.sqrt((1.0 - kept**2) * f.intensity / (2.0 * f.corner))
-    driven[0] = noise[0] * math.sqrt(f.intensity / (2.0 * f.corner))
-    return lfilter([1.0], [1.0, -kept], driven)
+    decay = math.exp(-shape_filter.corner * step)
+    driven = noise * math.sqrt((1.0 - decay**2) * shape_filter.intensity / (2.0 * shape_filter.corner))
+    driven[0] = noise[0] * math.sqrt(shape_filter.intensity / (2.0 * shape_filter.corner))
+    return lfilter([1.0], [1.0, -decay], driven)
 
 
 def measured_road_rows() -> tuple[list[Row], list[dict[str, Any]]]:
@@ -70,8 +71,8 @@ def measured_road_rows() -> tuple[list[Row], list[dict[str, Any]]]:
     if data is None:
         return [not_run("ride_road.measured", SYSTEM, "measured two-track roads", "TWINRIG_DATA names no folder")], []
     rows, shown = [], []
-    for name, (first, last) in ROAD_SECTIONS.items():
-        tracks = read_tracks(data / name, first=first, last=last)
+    for name, (first_station, last_station) in ROAD_SECTIONS.items():
+        tracks = read_tracks(data / name, first_station=first_station, last_station=last_station)
         fitted = fit_road(tracks)
         if name == "belgian_block.crg":
             rows.append(
@@ -100,7 +101,7 @@ def measured_road_rows() -> tuple[list[Row], list[dict[str, Any]]]:
 def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any]:
     """Saved numbers for the figure and the table."""
     spectra = fitted.spectra
-    some = np.unique(np.geomspace(1, len(spectra.wavenumber), 160).astype(int)) - 1
+    drawn_rows = np.unique(np.geomspace(1, len(spectra.wavenumber), 160).astype(int)) - 1
     fits = [
         fit
         and [
@@ -118,7 +119,7 @@ def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any
         "length": tracks.length,
         "half_track": tracks.half_track,
         "fits": fits,
-        **{key: getattr(spectra, key)[some].tolist() for key in ("wavenumber", "left", "coherency")},
+        **{key: getattr(spectra, key)[drawn_rows].tolist() for key in ("wavenumber", "left", "coherency")},
         "chance": spectra.chance_coherency(),
         "notes": fitted.notes,
     }
@@ -189,11 +190,11 @@ def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) ->
     add_heading(
         figure, "A road of mean and roll process: both tracks move together in long waves and part in short ones"
     )
-    said = (
+    caption = (
         f"Tracks {2 * half_track:g} m apart with the values read from the paper; its vehicle and measurements are "
         "not recoverable. Dotted levels: what chance alone shows in 95 % of the windowed estimates."
     )
-    return said, figure
+    return caption, figure
 
 
 def _label(road: dict[str, Any]) -> str:

@@ -33,10 +33,14 @@ SAME_LAWS = "the same tableau, road and laws; the sums are taken in another orde
 
 
 @cache
-def vehicle_and_road(name: str, level: float = 1.0, gravity: float = GRAVITY) -> tuple[SpatialVehicle, Excitation]:
-    """A shipped vehicle and a road of ``level`` times the paper's; a vehicle without a track width has one track."""
+def vehicle_and_road(
+    name: str, level_factor: float = 1.0, gravity: float = GRAVITY
+) -> tuple[SpatialVehicle, Excitation]:
+    """A shipped vehicle and a road of ``level_factor`` times the paper's; a vehicle without a track width has one
+    track.
+    """
     vehicle = replace(load_vehicle(name), gravity=gravity)
-    return vehicle, paper_road(wheels(vehicle), level=level * TRACK_DENSITY_LEVEL)
+    return vehicle, paper_road(wheels(vehicle), level_factor=level_factor * TRACK_DENSITY_LEVEL)
 
 
 def bent_in_engines(quick: bool) -> list[Row]:
@@ -90,13 +94,13 @@ def bent_in_engines(quick: bool) -> list[Row]:
     return rows
 
 
-def _engine_difference_row(id: str, what: str, runs: dict[str, Ride]) -> Row:
-    first, other = (runs[engine].run for engine in ENGINES)
-    gap = max(np.abs(first.positions - other.positions).max(), np.abs(first.rates - other.rates).max())
+def _engine_difference_row(id: str, run_description: str, runs: dict[str, Ride]) -> Row:
+    first, other_run = (runs[engine].run for engine in ENGINES)
+    gap = max(np.abs(first.positions - other_run.positions).max(), np.abs(first.rates - other_run.rates).max())
     return Observed(
         f"ride_nonlinear.path.{id}",
         SYSTEM,
-        f"largest difference of all states between Exudyn and MuJoCo, {what} on the same random road",
+        f"largest difference of all states between Exudyn and MuJoCo, {run_description} on the same random road",
         float(gap),
         "m, rad, m/s, rad/s",
     ).at_most(1e-12, SAME_LAWS, "native")
@@ -154,13 +158,13 @@ def _spectral_densities(runs: dict[str, Ride], linear: LinearVehicle, excitation
     }
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot spectra of both engines' runs over the model's own."""
-    if not data["spectra"]:
+    if not case_data["spectra"]:
         return []
     from models.drawing.figures import COLOURS, COLUMN_WIDTH, DARK, LABELS, add_heading, legend_below, subplots
 
-    shown = data["spectra"]
+    shown = case_data["spectra"]
     units = ("(m/s²)²/Hz", "(m/s²)²/Hz", "m²/Hz", "N²/Hz")
     figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 6.0), sharex=True)
     for axis, name, unit in zip(axes.ravel(), SHOWN_OUTPUTS, units, strict=True):

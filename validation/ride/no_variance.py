@@ -29,14 +29,14 @@ def weighting_rows(seed: int) -> list[Row]:
             system_with_weightings(vehicle_with_road(vehicle, road, 20.0), {"left occupant": name})
         ).deviation[-1]
         integrals = variances_by_quadrature(vehicle, road, 20.0, {"left occupant": WEIGHTINGS[name].response})
-        at = vehicle.names.index("left occupant")
+        output_index = vehicle.names.index("left occupant")
         rows.append(
             Observed(
                 f"ride_covariance.weighting.{name}",
                 SYSTEM,
                 f"difference of {name} of a seat, as states behind the vehicle, from its frequency "
                 "response in the quadrature",
-                deviation / integrals.variance[at] ** 0.5 - 1,
+                deviation / integrals.variance[output_index] ** 0.5 - 1,
                 "",
             ).at_most(1e-8, "asked of the cascade; as one polynomial it is 2e-4 off", "native")
         )
@@ -52,17 +52,17 @@ def _white_rows() -> list[Row]:
     """Rows on damped tyres: outputs without finite variance are reported with the reason, and the others are right."""
     vehicle = quarter_car_vehicle([(0.0, CORNER)], tyre_damping=100.0)
     covariance = stationary_covariance(vehicle_with_road(vehicle, one_track((0.0,), 0.3), 20.0))
-    other = variances_by_quadrature(vehicle, one_track((0.0,), 0.3), 20.0)
+    by_quadrature = variances_by_quadrature(vehicle, one_track((0.0,), 0.3), 20.0)
     rows = [
         behaviour_row(
             f"ride_covariance.white.{name}",
             SYSTEM,
-            f"tyre damping under a road of first order: {what}",
+            f"tyre damping under a road of first order: {quantity}",
             covariance.status[i],
             expected,
             covariance.reason[i],
         )
-        for name, what, i, expected in (
+        for name, quantity, i, expected in (
             ("body", "body acceleration", 0, "finite"),
             ("load", "wheel load", 4, "infinite"),
             ("wheel", "wheel acceleration", 5, "infinite"),
@@ -74,7 +74,7 @@ def _white_rows() -> list[Row]:
             "ride_covariance.white.value",
             SYSTEM,
             "difference of the outputs that stay finite from quadrature",
-            largest_relative_error(covariance.variance[:4], other.variance[:4]),
+            largest_relative_error(covariance.variance[:4], by_quadrature.variance[:4]),
             "",
         ).at_most(1e-10, "both routes at their best", "native"),
     ]
@@ -88,14 +88,14 @@ def _free_rows() -> list[Row]:
     road = paper_road(vehicle.wheels)
     system = vehicle_with_road(vehicle, road, 20.0)
     split, covariance = split_marginal(system.A), stationary_covariance(system)
-    same = np.array_equal(_with_slycot(system), covariance.variance)
+    same_bits = np.array_equal(_with_slycot(system), covariance.variance)
     steer = {"fl": 0.05, "fr": 0.05}
     forces = tuple(replace(force, roll_steer=steer.get(force.name, 0.0)) for force in free.side_forces)
     turning = linearise(replace(free, side_forces=forces), 20.0)
     walking = stationary_covariance(vehicle_with_road(turning, road, 20.0))
     side = walking.names.index("lateral position")
-    others = {status for i, status in enumerate(walking.status) if i != side}
-    rate, after = walking.rate[side], float(np.sqrt(walking.rate[side] * 100.0 ** walking.power[side]))
+    other_statuses = {status for i, status in enumerate(walking.status) if i != side}
+    rate, deviation_after = walking.rate[side], float(np.sqrt(walking.rate[side] * 100.0 ** walking.power[side]))
     omega = 1e-3  # a place that grows as c t per unit of noise has the density c^2 / (2 pi w^4) at low frequencies
     density = spectral_densities(turning, road, 20.0, np.array([omega]))[0, side]
     return [
@@ -114,7 +114,7 @@ def _free_rows() -> list[Row]:
             "ride_covariance.free.slycot",
             SYSTEM,
             "R19-free gives the same bits where slycot seems installed",
-            "same" if same else "different",
+            "same" if same_bits else "different",
             "same",
             "the method is named; its routines would raise here",
         ),
@@ -122,7 +122,7 @@ def _free_rows() -> list[Row]:
             "ride_covariance.free.steered",
             SYSTEM,
             "front roll steer 0.05: variance of the lateral position",
-            walking.status[side] if others == {FINITE} else "others too",
+            walking.status[side] if other_statuses == {FINITE} else "others too",
             "diffusing",
             walking.reason[side],
         ),
@@ -130,7 +130,7 @@ def _free_rows() -> list[Row]:
             "ride_covariance.free.walk",
             SYSTEM,
             "standard deviation of the lateral position after 100 s, front roll steer 0.05",
-            after,
+            deviation_after,
             "m",
         ).within(7.0, 0.5, "known to one digit, from the same law worked out beforehand", "closed form"),
         Observed(
@@ -149,22 +149,22 @@ def _with_slycot(system: DelayedSystem) -> np.ndarray:
     import control.exception as installed
     import control.mateqn as solvers
 
-    kept = installed.slycot_installed, solvers.sb03md, solvers.sb04md
+    original_routines = installed.slycot_installed, solvers.sb03md, solvers.sb04md
     installed.slycot_installed, solvers.sb03md, solvers.sb04md = True, None, None
     try:
         return stationary_covariance(system).variance
     finally:
-        installed.slycot_installed, solvers.sb03md, solvers.sb04md = kept
+        installed.slycot_installed, solvers.sb03md, solvers.sb04md = original_routines
 
 
 def _unstable_row() -> Row:
-    said, why = "answered", "it swings up"
+    outcome, why = "answered", "it swings up"
     try:
         stationary_covariance(
             vehicle_with_road(quarter_car_vehicle([(0.0, replace(CORNER, c=-5.0))]), one_track((0.0,), 0.3), 20.0)
         )
     except Unstable as error:
         why = str(error)
-        said = "refused" if "swings at 11.8" in why and "grows" in why else "refused without its mode"
-    what = "a quarter car with a damper of -5 N s/m"
-    return behaviour_row("ride_covariance.unstable", SYSTEM, what, said, "refused", why)
+        outcome = "refused" if "swings at 11.8" in why and "grows" in why else "refused without its mode"
+    quantity = "a quarter car with a damper of -5 N s/m"
+    return behaviour_row("ride_covariance.unstable", SYSTEM, quantity, outcome, "refused", why)

@@ -82,21 +82,26 @@ def largest_relative_error(values: ArrayLike, expected: ArrayLike) -> float:
     return float(np.abs(np.asarray(values) / np.asarray(expected) - 1.0).max())
 
 
-def one_track(places: tuple[float, ...], corner: float = 0.0) -> Excitation:
-    """One track under axles at positions ``places`` (m); its height obeys z' = -corner z + w with white noise w."""
-    heights = tuple(np.eye(len(places))[:, [i]] for i in range(len(places)))
+def one_track(axle_positions: tuple[float, ...], corner: float = 0.0) -> Excitation:
+    """One track under axles at positions ``axle_positions`` (m); its height obeys z' = -corner z + w with white noise
+    w.
+    """
+    heights = tuple(np.eye(len(axle_positions))[:, [i]] for i in range(len(axle_positions)))
     filter_ = np.array([[-corner]]), np.array([[ROAD_INTENSITY**0.5]])
-    return Excitation(*filter_, heights, tuple(places[0] - x for x in places))
+    return Excitation(*filter_, heights, tuple(axle_positions[0] - x for x in axle_positions))
 
 
 def paper_road(
-    wheels: Sequence[WheelPosition], *words: str, level: float = TRACK_DENSITY_LEVEL, cutoff: float | None = None
+    wheels: Sequence[WheelPosition],
+    *correlation_words: str,
+    level_factor: float = TRACK_DENSITY_LEVEL,
+    cutoff: float | None = None,
 ) -> Excitation:
     """The paper's road under wheels, with a case of correlation in words; wheels without a track width have one
     track."""
     y = half_track(wheels)
     placed = wheels if y else on_track(wheels, 1.0)
-    return road_excitation(road_of_level(y or 1.0, level, cutoff=cutoff), placed, *words)
+    return road_excitation(road_of_level(y or 1.0, level_factor, cutoff=cutoff), placed, *correlation_words)
 
 
 def five_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
@@ -106,7 +111,7 @@ def five_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None
 
 
 def quarter_car_vehicle(
-    places: Sequence[tuple[float, QuarterCar]], mass: np.ndarray | None = None, tyre_damping: float = 0.0
+    corner_positions: Sequence[tuple[float, QuarterCar]], mass: np.ndarray | None = None, tyre_damping: float = 0.0
 ) -> LinearVehicle:
     """Linear vehicle of quarter-car corners (x in m, quarter car), one per axle, under a body with a mass matrix of
     heave, or of heave and pitch.
@@ -114,29 +119,29 @@ def quarter_car_vehicle(
     tyre_damping in N s/m. Outputs: body acceleration; travel, tyre deflection, body height; load and acceleration of
     the first wheel.
     """
-    body = np.array([[places[0][1].m_s]]) if mass is None else mass
-    b, w = len(body), len(places)
+    body = np.array([[corner_positions[0][1].m_s]]) if mass is None else mass
+    b, w = len(body), len(corner_positions)
     n = b + w
-    M = np.diag([*np.diag(body), *(corner.m_u for _, corner in places)])
+    M = np.diag([*np.diag(body), *(corner.m_u for _, corner in corner_positions)])
     D, K, R, S = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, w)), np.zeros((n, w))
-    for i, (x, corner) in enumerate(places):
+    for i, (x, corner) in enumerate(corner_positions):
         travel = np.array([*[1.0, -x][:b], *(-np.eye(w)[i])])
         K += corner.k * np.outer(travel, travel)
         D += corner.c * np.outer(travel, travel)
         K[b + i, b + i] += corner.k_t
         D[b + i, b + i] += tyre_damping
         R[b + i, i], S[b + i, i] = corner.k_t, tyre_damping
-    unit, no, none, first = np.eye(n), np.zeros(n), np.zeros(w), np.eye(w)[0]
+    unit, no, no_heights, first = np.eye(n), np.zeros(n), np.zeros(w), np.eye(w)[0]
     k_t, c_t = R[b, 0], S[b, 0]
     outputs = (
-        Output("body", "m/s2", "acceleration", unit[0], no, no, none, none),
-        Output("travel", "m", "travel", no, no, unit[0] - unit[b], none, none),
-        Output("tyre", "m", "deflection", no, no, unit[b], -first, none),
-        Output("height", "m", "displacement", no, no, unit[0], none, none),
+        Output("body", "m/s2", "acceleration", unit[0], no, no, no_heights, no_heights),
+        Output("travel", "m", "travel", no, no, unit[0] - unit[b], no_heights, no_heights),
+        Output("tyre", "m", "deflection", no, no, unit[b], -first, no_heights),
+        Output("height", "m", "displacement", no, no, unit[0], no_heights, no_heights),
         Output("load", "N", "force", no, -c_t * unit[b], -k_t * unit[b], k_t * first, c_t * first),
-        Output("wheel", "m/s2", "acceleration", unit[b], no, no, none, none),
+        Output("wheel", "m/s2", "acceleration", unit[b], no, no, no_heights, no_heights),
     )
-    wheels = tuple(WheelPosition(f"wheel {i}", x, 0.0, i) for i, (x, _) in enumerate(places))
+    wheels = tuple(WheelPosition(f"wheel {i}", x, 0.0, i) for i, (x, _) in enumerate(corner_positions))
     return LinearVehicle(M, D, K, R, S, tuple(("body", str(i)) for i in range(n)), wheels, outputs)
 
 
@@ -148,8 +153,8 @@ def changed_vehicle(vehicle: SpatialVehicle, seed: int) -> SpatialVehicle:
     """The vehicle with its masses, stiffnesses and dampings changed by up to LARGEST_CHANGE each, named a twin."""
     rng = np.random.default_rng(seed)
 
-    def changed(value: float) -> float:
-        return value * (1 + LARGEST_CHANGE * rng.uniform(-1, 1))
+    def changed(parameter_value: float) -> float:
+        return parameter_value * (1 + LARGEST_CHANGE * rng.uniform(-1, 1))
 
     bodies = []
     for body in vehicle.bodies:

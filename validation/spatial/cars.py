@@ -30,14 +30,14 @@ def r19() -> CutVehicle:
 
 def twin() -> SpatialVehicle:
     """R19-free without any symmetry: every spring, mount and wheel differs from every other, left from right."""
-    whole = load_vehicle("r19_free")
+    full_vehicle = load_vehicle("r19_free")
     springs = tuple(
         replace(s, stiffness=s.stiffness * (1 + 0.02 * i), damping=s.damping * (1.3 - 0.02 * i))
-        for i, s in enumerate(whole.springs)
+        for i, s in enumerate(full_vehicle.springs)
     )
-    bodies = tuple(replace(b, mass=b.mass * (1 + 0.03 * i)) for i, b in enumerate(whole.bodies))
+    bodies = tuple(replace(b, mass=b.mass * (1 + 0.03 * i)) for i, b in enumerate(full_vehicle.bodies))
     chassis = replace(bodies[0], inertia=((200.0, 15.0, -10.0), (15.0, 1390.0, 8.0), (-10.0, 8.0, 1617.0)))
-    return replace(whole, springs=springs, bodies=(chassis, *bodies[1:]))
+    return replace(full_vehicle, springs=springs, bodies=(chassis, *bodies[1:]))
 
 
 @cache
@@ -46,22 +46,22 @@ def rough_car() -> CutVehicle:
 
     One wheel moves in all three directions, on a spring along none of them; one seat has no spring but a curve.
     """
-    whole, skew = twin(), tuple((np.array([0.2, 0.95, -0.3]) / np.linalg.norm([0.2, 0.95, -0.3])).tolist())
-    wheel = whole.tyres[0]
-    bodies = tuple(replace(b, freedoms=("x", "y", "z")) if b.name == wheel.body else b for b in whole.bodies)
+    full_vehicle, skew = twin(), tuple((np.array([0.2, 0.95, -0.3]) / np.linalg.norm([0.2, 0.95, -0.3])).tolist())
+    wheel = full_vehicle.tyres[0]
+    bodies = tuple(replace(b, freedoms=("x", "y", "z")) if b.name == wheel.body else b for b in full_vehicle.bodies)
     lateral = SpringDamper("lateral", "body", wheel.body, wheel.point, wheel.point, skew, 2e5, 800.0)
     seat = Curve((-0.1, 0.1), (-1500.0, 1500.0))
     stop = Curve((-0.08, -0.02, 0.0, 0.015, 0.05), (-3000.0, -200.0, 0.0, 100.0, 2500.0))
     damper = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-900.0, -300.0, 0.0, 200.0, 500.0))
-    more: tuple[dict[str, Any], ...] = (
+    law_sets: tuple[dict[str, Any], ...] = (
         {"travel_force": stop},
         {"rate_force": damper},
         {"friction": 80.0, "friction_rate": 0.02},
         {},
     )
-    springs = [replace(s, **more[i % 4]) for i, s in enumerate(whole.springs)]
+    springs = [replace(s, **law_sets[i % 4]) for i, s in enumerate(full_vehicle.springs)]
     springs[-1] = replace(springs[-1], stiffness=0.0, travel_force=seat)
-    return cut(replace(whole, bodies=bodies, springs=(*springs, lateral)), "body")
+    return cut(replace(full_vehicle, bodies=bodies, springs=(*springs, lateral)), "body")
 
 
 def static_forces(vehicle: CutVehicle, rows: int, frame: str = "hub") -> HubInputs:
@@ -79,12 +79,12 @@ def random_states(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarra
     return q, v
 
 
-def random_wrenches(vehicle: CutVehicle, frame: str, guide: bool) -> HubInputs:
-    """Random forces and moments on every hub, with or without a prescribed attitude (``guide``)."""
+def random_wrenches(vehicle: CutVehicle, frame: str, has_guide: bool) -> HubInputs:
+    """Random forces and moments on every hub, with or without a prescribed attitude (``has_guide``)."""
     rng = np.random.default_rng(SEED)
     hub_inputs = static_forces(vehicle, 3, frame)
     hubs = hub_inputs.hubs + rng.normal(0, 500.0, hub_inputs.hubs.shape[1])
-    return replace(hub_inputs, hubs=hubs, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if guide else None)
+    return replace(hub_inputs, hubs=hubs, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if has_guide else None)
 
 
 def by_jacobians(hub_model: HubModel, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
@@ -118,9 +118,9 @@ def cornering_error(handling: Handling, slip: float = 1e-7) -> float:
 
 def mirrored_coordinates(handling: Handling, values: np.ndarray) -> np.ndarray:
     """Values (..., n) of a car's coordinates in its mirror image, with left and right exchanged."""
-    places = handling.vehicle.coordinates()
-    swap = [places.index((_opposite_body(name), freedom)) for name, freedom in places]
-    return np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in places]) * values[..., swap]
+    coordinates = handling.vehicle.coordinates()
+    swap = [coordinates.index((_opposite_body(name), freedom)) for name, freedom in coordinates]
+    return np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in coordinates]) * values[..., swap]
 
 
 def _opposite_body(name: str) -> str:

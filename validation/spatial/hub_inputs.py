@@ -45,7 +45,11 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
             "hub_forces.own_steps_centre",
             SYSTEM,
             f"centre of mass by {names}, which pick their own steps: largest distance from its parabolas",
-            max(centre_gap(vehicle, m, how, name) for name, m in methods.items() for how in ("held", "linear")),
+            max(
+                centre_gap(vehicle, m, interpolation_name, name)
+                for name, m in methods.items()
+                for interpolation_name in ("held", "linear")
+            ),
             "m",
         ).at_most(1e-10, f"a tolerance of {SOLVER_TOLERANCE:g} per step", "closed form"),
         Observed(
@@ -74,25 +78,25 @@ def settings(integrator: str = FIXED) -> Settings:
 
 def samples(vehicle: CutVehicle) -> HubForces:
     """Hub force samples in axes fixed in space: static loads with random parts of 400 N and 40 N m."""
-    rest = static_forces(vehicle, SAMPLES, "inertial")
+    static_inputs = static_forces(vehicle, SAMPLES, "inertial")
     deviations = np.tile([400.0] * 3 + [40.0] * 3, len(vehicle.hubs))
-    return HubForces(rest.hubs, STEPS_PER_SAMPLE * STEP, "inertial").noisy(deviations, SEED)
+    return HubForces(static_inputs.hubs, STEPS_PER_SAMPLE * STEP, "inertial").noisy(deviations, SEED)
 
 
 def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED) -> float:
     """Largest error (m) of the centre of mass at the sample times, against the closed form, over all axes."""
-    forces, how = samples(vehicle), settings(integrator)
-    run = HubModel(engine, vehicle, forces.hub_inputs(STEP, how.steps, interpolation), how).run()  # type: ignore[arg-type]
-    moved = centres_of_mass(vehicle, run.positions[::STEPS_PER_SAMPLE])
-    return float(np.abs(moved - moved[0] - _falling_path(vehicle, forces, interpolation == "held")).max())
+    forces, run_settings = samples(vehicle), settings(integrator)
+    run = HubModel(engine, vehicle, forces.hub_inputs(STEP, run_settings.steps, interpolation), run_settings).run()  # type: ignore[arg-type]
+    centre_path = centres_of_mass(vehicle, run.positions[::STEPS_PER_SAMPLE])
+    return float(np.abs(centre_path - centre_path[0] - _falling_path(vehicle, forces, interpolation == "held")).max())
 
 
 def centres_of_mass(vehicle: CutVehicle, positions: np.ndarray) -> np.ndarray:
     """Centre of mass (m, 3) in m of all bodies at coordinates (m, n)."""
     bodies, tree = vehicle.tree.bodies, Bodies(vehicle.tree)
     points, masses = tree.points([(body.name, body.position) for body in bodies]), [body.mass for body in bodies]
-    places = [tree.move(q, 0.0 * q).at(points)[:, PLACE] for q in positions]
-    return np.array([np.average(each, axis=0, weights=masses) for each in places])
+    point_positions = [tree.move(q, 0.0 * q).at(points)[:, PLACE] for q in positions]
+    return np.array([np.average(positions_of_row, axis=0, weights=masses) for positions_of_row in point_positions])
 
 
 def _falling_path(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) -> np.ndarray:
@@ -107,16 +111,16 @@ def _falling_path(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) ->
     return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
 
-def instants_gap(vehicle: CutVehicle, count: int) -> float:
+def instants_gap(vehicle: CutVehicle, state_count: int) -> float:
     """Relative difference between compiled and plain accelerations at random states and times, with random hub forces
     and guides that are interpolated between their rows."""
     rng, rows, worst = np.random.default_rng(SEED), 7, 0.0
-    for i in range(count):
+    for i in range(state_count):
         hubs = static_forces(vehicle, rows).hubs + rng.normal(0.0, 500.0, (rows, WRENCH * len(vehicle.hubs)))
         hub_inputs = HubInputs(hubs, FRAMES[i % 3], guide=rng.normal(0.0, 0.1, (rows, 6)))
-        how = Settings("DOP853", STEP, (rows // 2) * STEP)
-        compiled, plain = (HubModel(engine, vehicle, hub_inputs, how) for engine in ("reference", PLAIN))
-        state, time = random_states(vehicle, i), rng.uniform(0.0, how.duration)
+        run_settings = Settings("DOP853", STEP, (rows // 2) * STEP)
+        compiled, plain = (HubModel(engine, vehicle, hub_inputs, run_settings) for engine in ("reference", PLAIN))
+        state, time = random_states(vehicle, i), rng.uniform(0.0, run_settings.duration)
         expected = plain.acceleration(time, *state)
         gap = np.abs(compiled.acceleration(time, *state) - expected).max() / np.abs(expected).max()
         worst = max(worst, float(gap))
@@ -126,8 +130,13 @@ def instants_gap(vehicle: CutVehicle, count: int) -> float:
 def path_gap(vehicle: CutVehicle, engine: str, integrator: str) -> float:
     """Largest difference of any coordinate or rate between a run by an adaptive integrator and one by Runge-Kutta 4
     with an eighth of the step; forces are linear between their samples."""
-    forces, how = samples(vehicle), settings(integrator)
-    fine = Settings(FIXED, STEP / 8.0, how.duration)
-    hub_inputs, finer = (forces.hub_inputs(each.step, each.steps) for each in (how, fine))
-    run, truth = HubModel(engine, vehicle, hub_inputs, how).run(), HubModel("reference", vehicle, finer, fine).run()
+    forces, run_settings = samples(vehicle), settings(integrator)
+    fine = Settings(FIXED, STEP / 8.0, run_settings.duration)
+    hub_inputs, finer = (
+        forces.hub_inputs(settings_of_run.step, settings_of_run.steps) for settings_of_run in (run_settings, fine)
+    )
+    run, truth = (
+        HubModel(engine, vehicle, hub_inputs, run_settings).run(),
+        HubModel("reference", vehicle, finer, fine).run(),
+    )
     return float(np.abs(run.states - truth.states[::8]).max())

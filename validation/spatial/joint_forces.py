@@ -44,8 +44,8 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
     objects, centres, sensors = dict[str, Any](), dict[str, Any](), list[Any]()
     for body in vehicle.uncut.bodies:
         i, (a, b, c) = loaded.ids[body.name], np.array(body.inertia, float) + 1e-6 * np.eye(3)
-        place = [*loaded.data.xpos[i], *RotationMatrix2EulerParameters(loaded.data.xmat[i].reshape(3, 3))]
-        node = mbs.AddNode(items.NodeRigidBodyEP(referenceCoordinates=place))
+        pose = [*loaded.data.xpos[i], *RotationMatrix2EulerParameters(loaded.data.xmat[i].reshape(3, 3))]
+        node = mbs.AddNode(items.NodeRigidBodyEP(referenceCoordinates=pose))
         objects[body.name] = mbs.AddObject(
             items.ObjectRigidBody(mass=body.mass, inertia=[a[0], b[1], c[2], b[2], a[2], a[1]], nodeNumber=node)
         )
@@ -103,9 +103,9 @@ class _Loaded:
         """Position and velocity in space of a point fixed to a body."""
         number, jacobian = self.ids[body], np.zeros((3, self.model.nv))
         arm = design - np.array(self.vehicle.tree.body(body).position)
-        place = self.data.xpos[number] + self.data.xmat[number].reshape(3, 3) @ arm
-        mujoco.mj_jac(self.model, self.data, jacobian, None, place, number)
-        return place, jacobian @ self.data.qvel
+        position = self.data.xpos[number] + self.data.xmat[number].reshape(3, 3) @ arm
+        mujoco.mj_jac(self.model, self.data, jacobian, None, position, number)
+        return position, jacobian @ self.data.qvel
 
     def _add(self, body: str, point: np.ndarray, force: np.ndarray, moment: np.ndarray | float = 0.0) -> None:
         """Add a force at a point and a moment, both in space, to a body."""
@@ -116,8 +116,8 @@ class _Loaded:
     def _load_hubs(self, wrenches: np.ndarray) -> None:
         for tyre, wrench in zip(self.vehicle.uncut.tyres, wrenches, strict=True):
             turn = self.data.xmat[self.ids[tyre.body]].reshape(3, 3)
-            place, _ = self._point(tyre.body, np.array(tyre.point))
-            self._add(tyre.body, place, turn @ wrench[:3], turn @ wrench[3:])
+            position, _ = self._point(tyre.body, np.array(tyre.point))
+            self._add(tyre.body, position, turn @ wrench[:3], turn @ wrench[3:])
 
     def _load_elements(self) -> None:
         """Apply the forces of springs, mounts and bars; travel rates are relative to the rotating chassis."""
@@ -126,14 +126,17 @@ class _Loaded:
         mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, chassis, spin, 0)
         for e in self.vehicle.elements:
             axis = turn @ e.axis
-            (from_point, fast_one), (two, fast_two) = (
+            (from_point, fast_one), (second_position, fast_two) = (
                 self._point(e.first_body, e.first_point),
                 self._point(e.second_body, e.second_point),
             )
-            travel = axis @ (two - from_point) - e.axis @ (e.second_point - e.first_point)
-            rate = axis @ (fast_two - fast_one - np.cross(spin[:3], two - from_point))
+            travel = axis @ (second_position - from_point) - e.axis @ (e.second_point - e.first_point)
+            rate = axis @ (fast_two - fast_one - np.cross(spin[:3], second_position - from_point))
             force = (e.held + e.stiffness * travel + e.damping * rate) * axis
-            for body, place, part in ((e.first_body, from_point, force), (e.second_body, two, -force)):
+            for body, point_position, signed_force in (
+                (e.first_body, from_point, force),
+                (e.second_body, second_position, -force),
+            ):
                 if body != self.vehicle.chassis:
-                    self._add(body, place, part)
-                    self._add(self.vehicle.chassis, place, -part)
+                    self._add(body, point_position, signed_force)
+                    self._add(self.vehicle.chassis, point_position, -signed_force)

@@ -16,20 +16,23 @@ SEED, STEP = 37, 1e-3
 State = tuple[np.ndarray, np.ndarray]
 
 
-def random_states(vehicle: CutVehicle, count: int) -> list[State]:
+def random_states(vehicle: CutVehicle, state_count: int) -> list[State]:
     """Random coordinates and rates (n,): any heading, roll and pitch up to 0.3 rad, other rotations up to 0.05 rad,
     slides up to 0.08 m."""
     rng, turns = np.random.default_rng(SEED), np.array([f.startswith("r") for _, f in vehicle.tree.coordinates()])
-    most = np.where(turns, 0.05, 0.08)
-    most[:6] = 5.0, 5.0, 5.0, np.pi, 0.3, 0.3
+    ranges = np.where(turns, 0.05, 0.08)
+    ranges[:6] = 5.0, 5.0, 5.0, np.pi, 0.3, 0.3
     n = vehicle.size
-    return [(most * rng.uniform(-1.0, 1.0, n), rng.uniform(-0.5, 0.5, n)) for _ in range(count)]
+    return [(ranges * rng.uniform(-1.0, 1.0, n), rng.uniform(-0.5, 0.5, n)) for _ in range(state_count)]
 
 
 def shaken_drive(vehicle: CutVehicle, rows: int) -> HubInputs:
     """Input of static wheel loads and a random force and moment on every hub at every half step, in the hubs' axes."""
-    rest = static_forces(vehicle, rows)
-    return replace(rest, hubs=rest.hubs + np.random.default_rng(SEED).normal(0.0, 300.0, rest.hubs.shape))
+    static_inputs = static_forces(vehicle, rows)
+    return replace(
+        static_inputs,
+        hubs=static_inputs.hubs + np.random.default_rng(SEED).normal(0.0, 300.0, static_inputs.hubs.shape),
+    )
 
 
 def hub_model(engine: str, vehicle: CutVehicle, route: Route, steps: int = 1) -> HubModel:
@@ -41,7 +44,7 @@ def acceleration_error(engine: str, vehicle: CutVehicle, states: list[State]) ->
     """Largest difference between accelerations of a native build and by compiled forces, relative to each coordinate's
     largest."""
     native, compiled = hub_model(engine, vehicle, "native"), hub_model("mujoco", vehicle, "compiled")
-    return _relative_difference([[each.acceleration(0.0, *state) for state in states] for each in (native, compiled)])
+    return _relative_difference([[built.acceleration(0.0, *state) for state in states] for built in (native, compiled)])
 
 
 def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
@@ -59,8 +62,10 @@ def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
 def hand_written_equations(vehicle: CutVehicle) -> SpatialReference:
     """Hand-written equations of a cut vehicle without hub forces: bodies with springs, anti-roll bars, preloads and
     weight."""
-    whole = vehicle.uncut
-    equations = SpatialReference(replace(vehicle.tree, springs=whole.springs, bars=whole.bars, gravity=0.0))
+    full_vehicle = vehicle.uncut
+    equations = SpatialReference(
+        replace(vehicle.tree, springs=full_vehicle.springs, bars=full_vehicle.bars, gravity=0.0)
+    )
     equations.vehicle = replace(equations.vehicle, gravity=GRAVITY)
     equations.held = equations.held._replace(parts={element.name: element.held for element in vehicle.elements})
     return equations

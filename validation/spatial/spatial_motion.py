@@ -25,25 +25,25 @@ class Path:
     period: float
 
 
-def path(count: int = 2001, period: float = 1e-3) -> Path:
+def path(sample_count: int = 2001, sample_period: float = 1e-3) -> Path:
     """Motion with roll, pitch and yaw of some tenths of a radian at different frequencies, and a moving reference
     point.
 
     Rates follow from the Cardan angles by the closed form w = E(roll, pitch) (roll', pitch', yaw'), and alpha by its
     derivative: nothing of the algorithm under test is used.
     """
-    t = period * np.arange(count)
+    t = sample_period * np.arange(sample_count)
     angles, speeds, changes = _sine_waves(t, np.array([[0.3, 1.7, 0.2], [0.25, 2.3, 0.9], [0.6, 0.8, 0.4]]))
     (roll, pitch, yaw), (droll, dpitch, _) = angles.T, speeds.T
-    ones, none = np.ones_like(t), np.zeros_like(t)
+    ones, zeros = np.ones_like(t), np.zeros_like(t)
     sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
-    turn = np.moveaxis(np.array([[ones, none, -sp], [none, cr, sr * cp], [none, -sr, cr * cp]]), 2, 0)
+    turn = np.moveaxis(np.array([[ones, zeros, -sp], [zeros, cr, sr * cp], [zeros, -sr, cr * cp]]), 2, 0)
     change = np.moveaxis(
         np.array(
             [
-                [none, none, -cp * dpitch],
-                [none, -sr * droll, cr * cp * droll - sr * sp * dpitch],
-                [none, -cr * droll, -sr * cp * droll - cr * sp * dpitch],
+                [zeros, zeros, -cp * dpitch],
+                [zeros, -sr * droll, cr * cp * droll - sr * sp * dpitch],
+                [zeros, -cr * droll, -sr * cp * droll - cr * sp * dpitch],
             ]
         ),
         2,
@@ -52,14 +52,14 @@ def path(count: int = 2001, period: float = 1e-3) -> Path:
     rates = np.einsum("nij,nj->ni", turn, speeds)
     alpha = np.einsum("nij,nj->ni", change, speeds) + np.einsum("nij,nj->ni", turn, changes)
     orientation = from_cardan(roll, pitch, yaw)
-    places, velocities, accelerations = _sine_waves(t, np.array([[1.0, 1.1, 0.0], [0.5, 1.9, 0.7], [0.1, 5.0, 0.3]]))
-    rows = (tuple(values[0].tolist()) for values in (rates, orientation, velocities, places))
-    return Path(alpha, rates, orientation, accelerations, places, StartState(*rows), period)
+    positions, velocities, accelerations = _sine_waves(t, np.array([[1.0, 1.1, 0.0], [0.5, 1.9, 0.7], [0.1, 5.0, 0.3]]))
+    rows = (tuple(values[0].tolist()) for values in (rates, orientation, velocities, positions))
+    return Path(alpha, rates, orientation, accelerations, positions, StartState(*rows), sample_period)
 
 
-def _sine_waves(t: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _sine_waves(t: np.ndarray, wave_shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sine waves (n, 3) and their first two derivatives; shapes: rows of amplitude, angular frequency and phase."""
-    size, speed, phase = shapes.T
+    size, speed, phase = wave_shapes.T
     angle = np.outer(t, speed) + phase
     return size * np.sin(angle), size * speed * np.cos(angle), -size * speed**2 * np.sin(angle)
 
@@ -67,19 +67,19 @@ def _sine_waves(t: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarr
 PATH = path()
 
 
-def sensor_readings(places: np.ndarray, motion: Path = PATH) -> np.ndarray:
+def sensor_readings(sensor_positions: np.ndarray, motion: Path = PATH) -> np.ndarray:
     """Specific forces (n, sensors, 3) in m/s^2 that sensors at local positions (sensors, 3) in m read, by eqs (16) and
     (17)."""
     lever = skew_matrix(motion.alpha) + skew_matrix(motion.rates) @ skew_matrix(motion.rates)
     felt = np.einsum("nji,nj->ni", rotation_matrix(motion.orientation), motion.acceleration - GRAVITY)
-    return felt[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(places))
+    return felt[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(sensor_positions))
 
 
-def tilted_sensors(height: float, turn: np.ndarray) -> Places:
+def tilted_sensors(height: float, rotation: np.ndarray) -> Places:
     """Positions of five sensors, rotated and shifted: four at the corners of a floor of 2 m by 1.2 m, and one above its
     middle."""
     floor = np.array([[1, 0.6, 0], [1, -0.6, 0], [-1, 0.6, 0], [-1, -0.6, 0], [0, 0, -height]])
-    return {f"s{i + 1}": (float(x), float(y), float(z)) for i, (x, y, z) in enumerate(floor @ turn.T)}
+    return {f"s{i + 1}": (float(x), float(y), float(z)) for i, (x, y, z) in enumerate(floor @ rotation.T)}
 
 
 TURN = rotation_matrix(from_cardan(0.3, 0.4, 0.5))

@@ -61,8 +61,10 @@ def _bodies() -> tuple[Body, ...]:
     )
 
 
-def _twin_spring(name: str, from_body: str, two: str, point: Vector, axis: Vector, k: float, c: float) -> SpringDamper:
-    return SpringDamper(name, from_body, two, point, point, axis, k, c)
+def _twin_spring(
+    name: str, from_body: str, second_body: str, point: Vector, axis: Vector, k: float, c: float
+) -> SpringDamper:
+    return SpringDamper(name, from_body, second_body, point, point, axis, k, c)
 
 
 def _twin_springs() -> tuple[SpringDamper, ...]:

@@ -81,7 +81,7 @@ def final_headings(drive: Drive) -> list[float]:
     yaws = {
         name: float(drive.run.positions[-1, free.coordinates().index((hitch_of(name), "rz"))]) for name in free.towed
     }
-    return [sum(yaws[each] for each in free.chain(name) if each in yaws) for name in free.towed]
+    return [sum(yaws[body_name] for body_name in free.chain(name) if body_name in yaws) for name in free.towed]
 
 
 def circle_error(steer: float = 0.15, speed: float = 3.0) -> float:

@@ -41,8 +41,12 @@ def train() -> SpatialVehicle:
     hook, and the box yaws on the drawbar. Springs have curves, friction and skew axes; one connects drawbar and car
     beside the hook."""
     car = twin()
-    tyres = tuple(Tyre(name, name, place, 2 + (of == BOX), 2.1e5) for name, (of, place, _, _) in WHEELS.items())
-    sides = tuple(SideForce(name, of, (x, y, 0.0), of, 4.2e4) for name, (of, (x, y, _), _, _) in WHEELS.items())
+    tyres = tuple(
+        Tyre(name, name, position, 2 + (carrier == BOX), 2.1e5) for name, (carrier, position, _, _) in WHEELS.items()
+    )
+    sides = tuple(
+        SideForce(name, carrier, (x, y, 0.0), carrier, 4.2e4) for name, (carrier, (x, y, _), _, _) in WHEELS.items()
+    )
     bar = AntiRollBar("trailer's bar", BOX, "bl", "br", WHEELS["bl"][1], WHEELS["br"][1], 3000.0, 20.0, BOX)
     tie = SpringDamper(TIE, "body", DRAWBAR, (-2.2, 0.4, 0.5), (-2.5, 0.45, 0.4), (1.0, 0.0, 0.0), 3e3, 50.0)
     return replace(
@@ -64,9 +68,9 @@ def train_without_tie() -> SpatialVehicle:
     Closed forms of a turn know none. A box that cannot pitch beside a drawbar that rolls with the car yaws by its
     weight: its axis leans.
     """
-    whole = train()
-    bodies = (replace(b, freedoms=("ry", "rz")) if b.name == hitch_of(BOX) else b for b in whole.bodies)
-    return replace(whole, bodies=tuple(bodies), springs=tuple(s for s in whole.springs if s.name != TIE))
+    full_vehicle = train()
+    bodies = (replace(b, freedoms=("ry", "rz")) if b.name == hitch_of(BOX) else b for b in full_vehicle.bodies)
+    return replace(full_vehicle, bodies=tuple(bodies), springs=tuple(s for s in full_vehicle.springs if s.name != TIE))
 
 
 def _bodies() -> tuple[Body, ...]:
@@ -78,19 +82,32 @@ def _bodies() -> tuple[Body, ...]:
         Body(DRAWBAR, 90.0, (-3.8, 0.03, 0.5), (), light, hitch_of(DRAWBAR)),
         Body(hitch_of(BOX), 0.0, TURNTABLE, ("rz",), parent=DRAWBAR),
         Body(BOX, 620.0, (-5.7, -0.04, 0.9), (), inertia, hitch_of(BOX)),
-        *(Body(name, mass, place, freedoms, parent=of) for name, (of, place, mass, freedoms) in WHEELS.items()),
+        *(
+            Body(name, mass, position, freedoms, parent=carrier)
+            for name, (carrier, position, mass, freedoms) in WHEELS.items()
+        ),
     )
 
 
 def _springs() -> tuple[SpringDamper, ...]:
     """Springs of the trailer's wheels, with axes fixed in the body that carries them."""
-    up: Vector = (0.06, 0.0, 0.9981984772580131)
+    upward: Vector = (0.06, 0.0, 0.9981984772580131)
     dampers = {"dl": DAMPER, "br": DAMPER}
     upright = tuple(
         SpringDamper(
-            f"spring {name}", of, name, (x, y, z + 0.3), (x, y, z), up, 3.2e4, 1800.0, STOP, dampers.get(name), 60.0
+            f"spring {name}",
+            carrier,
+            name,
+            (x, y, z + 0.3),
+            (x, y, z),
+            upward,
+            3.2e4,
+            1800.0,
+            STOP,
+            dampers.get(name),
+            60.0,
         )
-        for name, (of, (x, y, z), _, _) in WHEELS.items()
+        for name, (carrier, (x, y, z), _, _) in WHEELS.items()
     )
     bushes = tuple(
         SpringDamper(f"bush {name}", BOX, name, WHEELS[name][1], WHEELS[name][1], (1.0, 0.0, 0.0), 2e5, 700.0)

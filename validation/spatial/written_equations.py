@@ -70,46 +70,46 @@ def rolling_cars() -> dict[str, Handling]:
     }
 
 
-def rolling_states(car: Handling, count: int) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
+def rolling_states(car: Handling, state_count: int) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
     """Random times (s), coordinates and rates (n,): any heading, rolled and pitched, at speeds from standing to 25
     m/s."""
-    rng, places = np.random.default_rng(SEED), car.vehicle.coordinates()
+    rng, coordinates = np.random.default_rng(SEED), car.vehicle.coordinates()
     towing = ("sway", *map(hitch_of, car.vehicle.towed))
-    leans = [i for i, (name, freedom) in enumerate(places) if name in towing and freedom in ("rx", "ry")]
-    folds = [i for i, (name, freedom) in enumerate(places) if name in towing and freedom == "rz"]
-    for i in range(count):
+    leans = [i for i, (name, freedom) in enumerate(coordinates) if name in towing and freedom in ("rx", "ry")]
+    folds = [i for i, (name, freedom) in enumerate(coordinates) if name in towing and freedom == "rz"]
+    for i in range(state_count):
         speed = (0.0, 0.05, 25.0)[i % 3] * rng.uniform()
-        q, v = rng.uniform(-0.03, 0.03, len(places)), rng.uniform(-0.5, 0.5, len(places))
+        q, v = rng.uniform(-0.03, 0.03, len(coordinates)), rng.uniform(-0.5, 0.5, len(coordinates))
         q[:3] = *rng.uniform(-5.0, 5.0, 2), rng.uniform(-3.1, 3.1)
         q[leans], q[folds] = (
             rng.uniform(-LARGEST_TILT, LARGEST_TILT, len(leans)),
             rng.uniform(-LARGEST_FOLD, LARGEST_FOLD, len(folds)),
         )
-        ahead = car.straight(speed)[1]
-        v = v * min(1.0, 0.1 + speed) + ahead
+        start_rates = car.straight(speed)[1]
+        v = v * min(1.0, 0.1 + speed) + start_rates
         v[:2] += speed * np.array([np.cos(q[2]) - 1.0, np.sin(q[2])])
         yield rng.uniform(0.0, 1.0), q, v
 
 
-def rolling_gap(car: Handling, engine: str, count: int) -> float:
+def rolling_gap(car: Handling, engine: str, state_count: int) -> float:
     """Largest difference between the accelerations of an engine and of the plain equations, divided by the largest of
     the state."""
     plain, model = build(REFERENCE, car), build(engine, car)
-    states = rolling_states(car, count)
+    states = rolling_states(car, state_count)
     return max(
         largest_relative_difference(model.acceleration(t, q, v), plain.acceleration(t, q, v)) for t, q, v in states
     )
 
 
-def report_gap(car: Handling, count: int) -> float:
+def report_gap(car: Handling, state_count: int) -> float:
     """Largest difference of the tyre reports and energy ledgers from the plain equations, each column divided by its
     largest value."""
     plain, numbers, worst = PlainRolling(car), car.numbers, 0.0
-    states = list(rolling_states(car, count))
-    times, q, v = (np.array(column) for column in zip(*states, strict=True))
-    tyres, ledgers = np.empty((count, len(car.vehicle.tyres), at.REPORTED)), np.empty((count, at.LEDGER))
-    at.reports(numbers, times, q, v, tyres, ledgers)
-    for ours, theirs in zip((tyres, ledgers), plain.report(times, q, v), strict=True):
+    states = list(rolling_states(car, state_count))
+    state_times, q, v = (np.array(column) for column in zip(*states, strict=True))
+    tyres, ledgers = np.empty((state_count, len(car.vehicle.tyres), at.REPORTED)), np.empty((state_count, at.LEDGER))
+    at.reports(numbers, state_times, q, v, tyres, ledgers)
+    for ours, theirs in zip((tyres, ledgers), plain.report(state_times, q, v), strict=True):
         shape = -1, ours.shape[-1]
         gap, size = np.abs(ours - theirs).reshape(shape).max(0), np.abs(theirs).reshape(shape).max(0)
         worst = max(worst, float((gap / np.maximum(size, 1e-300)).max()))
@@ -134,7 +134,7 @@ def hub_input_sets(vehicle: CutVehicle) -> list[HubInputs]:
     rng, rows = np.random.default_rng(SEED), static_forces(vehicle, 3).hubs
     hubs = rows + rng.normal(0.0, 500.0, rows.shape)
     guide, pull = rng.normal(0.0, 0.1, (3, 6)), (2e4, 3e3, 5e4, 4e3)
-    wrenches = [HubInputs(hubs, frame, guide=held) for frame in FRAMES for held in (None, guide)]
+    wrenches = [HubInputs(hubs, frame, guide=guide_values) for frame in FRAMES for guide_values in (None, guide)]
     road = HubInputs(rng.normal(0.0, 0.01, (3, 2 * len(vehicle.hubs))), speed=SPEED)
     return [*wrenches, HubInputs(hubs, guide=guide, pull=pull), road, replace(road, frame="inertial")]
 
@@ -147,27 +147,27 @@ def cut_state(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return q, v
 
 
-def hub_gap(vehicle: CutVehicle, engine: str, count: int) -> float:
+def hub_gap(vehicle: CutVehicle, engine: str, state_count: int) -> float:
     """Largest difference between the accelerations of an engine and of the plain equations, divided by the largest of
     the state."""
     worst, input_sets = 0.0, hub_input_sets(vehicle)
     for i, hub_inputs in enumerate(input_sets):
         models = [hub_model(name, vehicle, hub_inputs, STEP, STEP) for name in (engine, PLAIN)]
-        for seed in range(i, count, len(input_sets)):
+        for seed in range(i, state_count, len(input_sets)):
             q, v = cut_state(vehicle, seed)
             time = 0.5 * STEP * (seed % 3)
             worst = max(worst, largest_relative_difference(*(model.acceleration(time, q, v) for model in models)))
     return worst
 
 
-def inside_gap(vehicle: CutVehicle, count: int) -> float:
+def inside_gap(vehicle: CutVehicle, state_count: int) -> float:
     """Largest difference of section forces, hub wrenches and stabilising moments from the plain equations, each divided
     by its largest value."""
     worst = 0.0
     for hub_inputs in hub_input_sets(vehicle):
         models = [hub_model(name, vehicle, hub_inputs, STEP, STEP) for name in ("reference", PLAIN)]
-        states = np.array([np.concatenate(cut_state(vehicle, seed)) for seed in range(count)])
-        ours, theirs = (model.reported(0.5 * STEP * np.arange(count), states) for model in models)
+        states = np.array([np.concatenate(cut_state(vehicle, seed)) for seed in range(state_count)])
+        ours, theirs = (model.reported(0.5 * STEP * np.arange(state_count), states) for model in models)
         for name in ("elements", "wrenches", "moments"):
             gap, size = np.abs(getattr(ours, name) - getattr(theirs, name)).max(), np.abs(getattr(theirs, name)).max()
             worst = max(worst, float(gap / max(size, 1e-300)))
@@ -192,11 +192,11 @@ def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough: bool)
     return float(np.abs(paths[0] - paths[1]).max())
 
 
-def bristles_gap(count: int) -> float:
+def bristles_gap(state_count: int) -> float:
     """Largest difference of creep forces and moments of random brush contact patches from plain code; forces are
     divided by the load, moments by load times half width."""
     rng, worst, width = np.random.default_rng(SEED), 0.0, 0.09
-    for i in range(count):
+    for i in range(state_count):
         load, mu, half = rng.uniform(50.0, 8000.0), rng.uniform(0.1, 1.2), rng.uniform(0.02, 0.12)
         stiffness, cells = rng.uniform(1e7, 1e8), int(rng.integers(3, 40))
         slides = rng.normal(0.0, 1.0, (8, 4)) * 10.0 ** rng.uniform(-4.0, 1.0, (8, 1))

@@ -37,16 +37,17 @@ class Sample:
 
 
 def drawn_samples(
-    count: int, seed: int | Sequence[int], draw: Callable[[np.random.Generator], Sample | None]
+    sample_count: int, seed: int | Sequence[int], draw: Callable[[np.random.Generator], Sample | None]
 ) -> Iterator[Sample]:
-    """Samples from ``draw``, ``count`` of them; it is called again where a scene is refused, a run fails, or it gives
-    nothing."""
-    random, made = np.random.default_rng(seed), 0
-    while made < count:
+    """Samples from ``draw``, ``sample_count`` of them; it is called again where a scene is refused, a run fails, or it
+    gives nothing.
+    """
+    random, samples_made = np.random.default_rng(seed), 0
+    while samples_made < sample_count:
         try:
             sample = draw(random)
         except (InputError, RunFailed):
             continue
         if sample is not None:
-            made += 1
+            samples_made += 1
             yield sample

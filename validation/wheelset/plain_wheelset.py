@@ -54,50 +54,54 @@ class PatchForces(NamedTuple):
 def axle_of(state: np.ndarray, speed: float) -> PlainAxle:
     """Motion of the wheelset for a state (10,) of ``models.rail.equations``."""
     y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
-    ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    forward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
     axle = np.cos(roll) * np.array([-np.sin(yaw), np.cos(yaw), 0.0]) + np.array([0.0, 0.0, np.sin(roll)])
-    frame = roll_rate * ahead + np.array([0.0, 0.0, yaw_rate])
+    frame = roll_rate * forward + np.array([0.0, 0.0, yaw_rate])
     turning = frame + (spin - frame @ axle) * axle
-    return PlainAxle(np.array([0.0, y, z]), np.array([speed, y_rate, z_rate]), axle, ahead, turning)
+    return PlainAxle(np.array([0.0, y, z]), np.array([speed, y_rate, z_rate]), axle, forward, turning)
 
 
-def contact_of_wheel(wheelset: Wheelset, side: float, axle: PlainAxle) -> Touch:
-    """Contact of a conical wheel with its rail; side : 1 right, -1 left.
+def contact_of_wheel(wheelset: Wheelset, wheel_side: float, axle: PlainAxle) -> Touch:
+    """Contact of a conical wheel with its rail; wheel_side : 1 right, -1 left.
 
     The tangent plane's normal n, square to x, is inclined to the axle by the cone's half angle: n . axle = side sin.
     The generator of that plane runs from the apex; the place is where it crosses the head's axis as seen along n.
     """
     w, (sine, cosine) = wheelset, wheelset.slant
-    outward = side * axle.axle
+    outward = wheel_side * axle.axle
     size, phase = np.hypot(outward[1], outward[2]), np.arctan2(outward[1], outward[2])
     angle = phase - np.arccos(sine / size) if outward[1] > 0.0 else phase + np.arccos(sine / size)
     normal = np.array([0.0, np.sin(angle), np.cos(angle)])
     apex = axle.centre + (w.half_gauge + w.radius / w.conicity) * outward
-    middle = np.array([0.0, side * (w.half_gauge + w.head_radius * sine), w.radius + w.head_radius * cosine])
+    middle = np.array([0.0, wheel_side * (w.half_gauge + w.head_radius * sine), w.radius + w.head_radius * cosine])
     radial = (normal - sine * outward) / cosine
     inward = -cosine * outward + sine * radial
-    aside = np.cross(np.array([1.0, 0.0, 0.0]), normal)
-    way = ((middle - apex) @ aside) / (inward @ aside)
+    across_normal = np.cross(np.array([1.0, 0.0, 0.0]), normal)
+    distance_to_rail = ((middle - apex) @ across_normal) / (inward @ across_normal)
     depth = w.head_radius - float(normal @ (middle - apex))
-    return Touch(depth, normal, apex + way * inward - axle.centre, float(cosine / (2.0 * way * sine)))
+    return Touch(
+        depth, normal, apex + distance_to_rail * inward - axle.centre, float(cosine / (2.0 * distance_to_rail * sine))
+    )
 
 
-def hertz_force(depth: float, along: float, across: float, modulus: float) -> tuple[float, float, float]:
+def hertz_force(
+    depth: float, curvature_along: float, curvature_across: float, modulus: float
+) -> tuple[float, float, float]:
     """Force (N) and semi-axes along and across (m) at a penetration (m) by Hertz' theory, K. L. Johnson, Contact
     mechanics (1985), eqs (4.26) to (4.33); curvatures of z = along x^2 + across y^2 (1/m), modulus E* (Pa)."""
     if depth <= 0.0:
         return 0.0, 0.0, 0.0
-    flat, steep = sorted((along, across))
+    flat, steep = sorted((curvature_along, curvature_across))
 
     def shape(m: float) -> float:
         return float((ellipe(m) / (1.0 - m) - ellipk(m)) * flat - (ellipk(m) - ellipe(m)) * steep)
 
     m = brentq(shape, LEAST_ECCENTRICITY, 1.0 - LEAST_ECCENTRICITY, xtol=1e-16) if steep > flat else 0.0
-    part = (ellipk(m) - ellipe(m)) / m if m > 1e-6 else np.pi / 4.0
-    long = np.sqrt(depth * part / (ellipk(m) * flat))
+    elliptic_ratio = (ellipk(m) - ellipe(m)) / m if m > 1e-6 else np.pi / 4.0
+    long = np.sqrt(depth * elliptic_ratio / (ellipk(m) * flat))
     short = long * np.sqrt(1.0 - m)
     force = 2.0 * np.pi / 3.0 * long * depth * modulus / ellipk(m)
-    return float(force), *((long, short) if along <= across else (short, long))
+    return float(force), *((long, short) if curvature_along <= curvature_across else (short, long))
 
 
 def creep_forces(
@@ -108,36 +112,44 @@ def creep_forces(
     if a == 0.0:
         return np.zeros(3)
     if law == "linear":
-        return np.array([float(part) for part in linear_forces(a, b, slip[0], slip[1], slip[2], wheelset.pair)])
+        return np.array([float(force) for force in linear_forces(a, b, slip[0], slip[1], slip[2], wheelset.pair)])
     creep = fastsim(
         RollingEllipse(a, b, load, wheelset.friction, slip[0], slip[1], slip[2]), wheelset.pair, cells=cells
     )
     return np.array([float(creep.fx), float(creep.fy), float(creep.mz)])
 
 
-def patch_forces(wheelset: Wheelset, side: float, axle: PlainAxle, law: str, cells: int) -> PatchForces:
+def patch_forces(wheelset: Wheelset, wheel_side: float, axle: PlainAxle, law: str, cells: int) -> PatchForces:
     """Force and moment of one rail on the wheelset."""
-    w, speed, at = wheelset, axle.velocity[0], contact_of_wheel(wheelset, side, axle)
-    across = np.cross(at.normal, np.array([1.0, 0.0, 0.0]))
-    velocity = axle.velocity + np.cross(axle.turning, at.place)
-    slip, approach = np.array([velocity[0], velocity @ across, axle.turning @ at.normal]), velocity @ at.normal
-    elastic, a, b = hertz_force(at.depth, at.along, 0.5 / w.head_radius, w.pair.modulus)
+    w, speed, touch = wheelset, axle.velocity[0], contact_of_wheel(wheelset, wheel_side, axle)
+    across = np.cross(touch.normal, np.array([1.0, 0.0, 0.0]))
+    velocity = axle.velocity + np.cross(axle.turning, touch.place)
+    slip, approach = np.array([velocity[0], velocity @ across, axle.turning @ touch.normal]), velocity @ touch.normal
+    elastic, a, b = hertz_force(touch.depth, touch.along, 0.5 / w.head_radius, w.pair.modulus)
     load = elastic * max(0.0, 1.0 + w.contact_damping * approach)
-    forwards, by = float(np.clip(0.5 + 0.5 * speed / SLOWEST_SPEED, 0.0, 1.0)), max(abs(speed), SLOWEST_SPEED)
+    forwards, reference_speed = (
+        float(np.clip(0.5 + 0.5 * speed / SLOWEST_SPEED, 0.0, 1.0)),
+        max(abs(speed), SLOWEST_SPEED),
+    )
     mirror, creep = np.array([-1.0, 1.0, -1.0]), np.zeros(3)
     if forwards > 0.0:
-        creep += forwards * creep_forces(w, (load, a, b), slip / by, law, cells)
+        creep += forwards * creep_forces(w, (load, a, b), slip / reference_speed, law, cells)
     if forwards < 1.0:
-        creep += (1.0 - forwards) * mirror * creep_forces(w, (load, a, b), mirror * slip / by, law, cells)
-    beyond = max(0.0, side * axle.centre[1] - w.flange_clearance)
-    push = np.array([0.0, -side * w.flange_stiffness * beyond, 0.0])
-    force = np.array([creep[0], 0.0, 0.0]) + creep[1] * across - load * at.normal + push
-    told = {"load": load, "fx": creep[0], "fy": creep[1], "mz": creep[2], "a": a, "b": b, "depth": at.depth}
-    told |= {"xi_x": slip[0] / by, "xi_y": slip[1] / by, "spin": slip[2] / by, "power": float(creep @ slip)}
-    told |= {"x": at.place[0], "y": at.place[1], "z": at.place[2], "flange_force": push[1]}
-    told |= {"angle": float(np.arcsin(-at.normal[1])), "damping_power": (elastic - load) * approach}
-    told["elastic_power"] = float(push @ velocity) - elastic * approach
-    return PatchForces(force, np.cross(at.place, force) + creep[2] * at.normal, told)
+        creep += (1.0 - forwards) * mirror * creep_forces(w, (load, a, b), mirror * slip / reference_speed, law, cells)
+    beyond = max(0.0, wheel_side * axle.centre[1] - w.flange_clearance)
+    push = np.array([0.0, -wheel_side * w.flange_stiffness * beyond, 0.0])
+    force = np.array([creep[0], 0.0, 0.0]) + creep[1] * across - load * touch.normal + push
+    report = {"load": load, "fx": creep[0], "fy": creep[1], "mz": creep[2], "a": a, "b": b, "depth": touch.depth}
+    report |= {
+        "xi_x": slip[0] / reference_speed,
+        "xi_y": slip[1] / reference_speed,
+        "spin": slip[2] / reference_speed,
+        "power": float(creep @ slip),
+    }
+    report |= {"x": touch.place[0], "y": touch.place[1], "z": touch.place[2], "flange_force": push[1]}
+    report |= {"angle": float(np.arcsin(-touch.normal[1])), "damping_power": (elastic - load) * approach}
+    report["elastic_power"] = float(push @ velocity) - elastic * approach
+    return PatchForces(force, np.cross(touch.place, force) + creep[2] * touch.normal, report)
 
 
 class PlainWheelset:
@@ -172,8 +184,8 @@ class PlainWheelset:
         force, moment = np.zeros(3), np.zeros(3)
         for side in (1.0, -1.0):
             arm = side * w.half_spacing * axle.axle
-            off = axle.centre + arm - np.array([0.0, side * w.half_spacing, self.sunk])
-            pull = -stiffness * off - damping * (moving + np.cross(axle.turning, arm))
+            extension = axle.centre + arm - np.array([0.0, side * w.half_spacing, self.sunk])
+            pull = -stiffness * extension - damping * (moving + np.cross(axle.turning, arm))
             force, moment = force + pull, moment + np.cross(arm, pull)
         return force, moment
 
@@ -182,7 +194,10 @@ class PlainWheelset:
         without the spin."""
         w, axle = self.wheelset, axle_of(state, self.speed)
         roll, (roll_rate, yaw_rate, spin) = state[2], state[7:]
-        sums = [by_rails + held for by_rails, held in zip(self.by_rails(state), self.by_suspension(state), strict=True)]
+        sums = [
+            by_rails + suspension_part
+            for by_rails, suspension_part in zip(self.by_rails(state), self.by_suspension(state), strict=True)
+        ]
         weight = w.load * np.array([0.0, self.lean, 1.0])
         acceleration = (sums[0] + weight) / w.mass
         upright = np.cross(axle.ahead, axle.axle)
@@ -194,8 +209,8 @@ class PlainWheelset:
         axes = np.array([roll_rate, yaw_rate * np.sin(roll), yaw_rate * np.cos(roll)])
         gained = (moments - np.cross(axes, inertia * turning)) / inertia
         yawing = (gained[2] + yaw_rate * roll_rate * np.sin(roll)) / np.cos(roll)
-        moved = [state[5], state[6], roll_rate, yaw_rate, spin - yaw_rate * np.sin(roll)]
-        return np.array([*moved, acceleration[1], acceleration[2], gained[0], yawing, gained[1]])
+        position_rates = [state[5], state[6], roll_rate, yaw_rate, spin - yaw_rate * np.sin(roll)]
+        return np.array([*position_rates, acceleration[1], acceleration[2], gained[0], yawing, gained[1]])
 
     def on_joints(self, state: np.ndarray) -> np.ndarray:
         """Generalised forces (5,) of both rails on y, z, yaw, roll and spin about the axle (N, N m), by virtual
@@ -203,13 +218,13 @@ class PlainWheelset:
         axle, (force, moment) = axle_of(state, self.speed), self.by_rails(state)
         return np.array([force[1], force[2], moment[2], moment @ axle.ahead, moment @ axle.axle])
 
-    def run(self, state: np.ndarray, step: float, count: int) -> np.ndarray:
+    def run(self, state: np.ndarray, step: float, step_count: int) -> np.ndarray:
         """States (count + 1, 10) by steps (s) of the classical Runge-Kutta method."""
         states = [np.asarray(state, float)]
-        for _ in range(count):
-            here = states[-1]
-            k1 = self.rates(here)
-            k2 = self.rates(here + 0.5 * step * k1)
-            k3 = self.rates(here + 0.5 * step * k2)
-            states.append(here + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + self.rates(here + step * k3)))
+        for _ in range(step_count):
+            last_state = states[-1]
+            k1 = self.rates(last_state)
+            k2 = self.rates(last_state + 0.5 * step * k1)
+            k3 = self.rates(last_state + 0.5 * step * k2)
+            states.append(last_state + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + self.rates(last_state + step * k3)))
         return np.array(states)

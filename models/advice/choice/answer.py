@@ -50,8 +50,8 @@ class RunQuantities:
         """A quantity by its name, or the "rms" or "max" of one; InputError for an unknown name."""
         if name in self.quantities:
             return self.quantities[name]
-        word, _, rest = name.partition(" ")
-        path = self.quantities.get(rest)
+        word, _, base_name = name.partition(" ")
+        path = self.quantities.get(base_name)
         if word in SCALAR_OF_PATH and path is not None and not path.sampled:
             return Quantity(path.unit, tuple(np.array([SCALAR_OF_PATH[word](case)]) for case in path.cases))
         allowed = (
@@ -70,36 +70,36 @@ def scale_of_cases(full_results: Sequence[np.ndarray]) -> np.ndarray:
     return np.maximum(amounts, SMALLEST_CASE_SHARE * amounts.max(initial=0.0))
 
 
-def rounding_floor(answer: RunQuantities, unit: str) -> float:
+def rounding_floor(run_quantities: RunQuantities, unit: str) -> float:
     """Size below which changes of quantities with this unit are only rounding."""
-    alike = [
+    sizes = [
         np.sqrt(case.max()) if quantity.sampled else abs(case).max(initial=0.0)
-        for quantity in answer.quantities.values()
+        for quantity in run_quantities.quantities.values()
         if quantity.unit == unit
         for case in quantity.cases
     ]
-    return max(ABSOLUTE_ROUNDING, ROUNDING_SHARE * float(max(alike, default=0.0)))
+    return max(ABSOLUTE_ROUNDING, ROUNDING_SHARE * float(max(sizes, default=0.0)))
 
 
 CONFIDENCE_PROBABILITY = 0.9985
 """Probability that chance adds no more to either side than is said of it."""
 
 
-def by_chance(change: Cases, full_results: Cases) -> tuple[float, float]:
+def by_chance(differences: Cases, full_results: Cases) -> tuple[float, float]:
     """Largest relative change of a sampled quantity, and the statistical error of this change.
 
     The ratio of two means over m samples that met the same roads, and its standard error by what each sample differs
     from it, times Student's t for m - 1.
     """
     worst = 0.0, 0.0
-    for moved, unmoved in zip(change, full_results, strict=True):
-        ratio = 1.0 + moved.mean() / unmoved.mean()
+    for difference, unmoved in zip(differences, full_results, strict=True):
+        ratio = 1.0 + difference.mean() / unmoved.mean()
         if not ratio > 0.0:  # nothing is left, or no mean square at all
-            return (1.0, 0.0) if not (moved + unmoved).any() else (np.inf, np.inf)
-        rest, m = moved - (ratio - 1.0) * unmoved, len(unmoved)
+            return (1.0, 0.0) if not (difference + unmoved).any() else (np.inf, np.inf)
+        residual, m = difference - (ratio - 1.0) * unmoved, len(unmoved)
         error = (
             float(stdtrit(m - 1, CONFIDENCE_PROBABILITY))
-            * rest.std(ddof=1)
+            * residual.std(ddof=1)
             / (np.sqrt(m) * unmoved.mean())
             / (2.0 * np.sqrt(ratio))
         )
@@ -112,8 +112,8 @@ def difference_of_runs(run: Cases, full_results: Cases) -> Cases:
 
     Raises InputError where the runs have no common times, as those that end by themselves.
     """
-    for few, many in (sorted(map(len, pair)) for pair in zip(run, full_results, strict=True)):
-        if few != many and (few < 2 or (many - 1) % (few - 1)):
+    for shorter_run, longer_run in (sorted(map(len, pair)) for pair in zip(run, full_results, strict=True)):
+        if shorter_run != longer_run and (shorter_run < 2 or (longer_run - 1) % (shorter_run - 1)):
             raise InputError(
                 "",
                 "quantities",
@@ -126,8 +126,8 @@ def difference_of_runs(run: Cases, full_results: Cases) -> Cases:
 
 def _at_common_times(*paths: np.ndarray) -> list[np.ndarray]:
     """The paths at those times that all of them have."""
-    few = min(map(len, paths))
-    return [path[:: (len(path) - 1) // max(few - 1, 1) or 1] for path in paths]
+    row_count = min(map(len, paths))
+    return [path[:: (len(path) - 1) // max(row_count - 1, 1) or 1] for path in paths]
 
 
 def sum_of_differences(*changes: Cases) -> Cases:
@@ -135,11 +135,13 @@ def sum_of_differences(*changes: Cases) -> Cases:
     return tuple(np.sum(_at_common_times(*parts), axis=0) for parts in zip(*changes, strict=True))
 
 
-def largest_relative_change(change: Cases, size: np.ndarray) -> float:
+def largest_relative_change(differences: Cases, full_size: np.ndarray) -> float:
     """Largest relative change among the cases: the rms difference of a path, or the difference of a number, divided by
     its size.
     """
-    moved = np.array([float(np.sqrt(np.mean(difference**2))) for difference in change])
+    largest_differences = np.array([float(np.sqrt(np.mean(difference**2))) for difference in differences])
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(size > 0.0, moved / size, np.where(moved > 0.0, np.inf, 0.0))
-    return float(share.max()) if np.isfinite(moved).all() else np.inf
+        share = np.where(
+            full_size > 0.0, largest_differences / full_size, np.where(largest_differences > 0.0, np.inf, 0.0)
+        )
+    return float(share.max()) if np.isfinite(largest_differences).all() else np.inf

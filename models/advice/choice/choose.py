@@ -105,10 +105,10 @@ class Chooser:
         self.tolerance, self.progress = tolerance, progress
         self.whole = Screen(Variants(scene, engine, executor), quantities)
         self.alike = self.whole.sampled == set(quantities)
-        part = self._part_screen()
-        self.step_factor, self.error = self._longest_screen_step(part)
+        partial_screen = self._part_screen()
+        self.step_factor, self.error = self._longest_screen_step(partial_screen)
         self.teller = self._coarse_screen(self.whole)
-        self.screen = self._coarse_screen(part) if self.alike else self.teller
+        self.screen = self._coarse_screen(partial_screen) if self.alike else self.teller
         self.lengths = [self.step_factor * k for k in self.screen.variants.lengths()]
         self.effects = self.whole.variants.effects
         self._reach: dict[EffectSet, int] = {}
@@ -118,11 +118,13 @@ class Chooser:
 
     def _part_screen(self) -> Screen:
         """Screen of the first part of the scene, or of a few of its samples."""
-        whole = self.whole.variants
-        if not whole.system.WINDOWED:
+        all_variants = self.whole.variants
+        if not all_variants.system.WINDOWED:
             return self.whole
-        part = whole.window(math.ceil(STEP_SEARCH_SHARE * whole.system.steps(whole.scene)))
-        return self.whole if part is whole else Screen(part, self.whole.quantities)
+        partial_variants = all_variants.window(
+            math.ceil(STEP_SEARCH_SHARE * all_variants.system.steps(all_variants.scene))
+        )
+        return self.whole if partial_variants is all_variants else Screen(partial_variants, self.whole.quantities)
 
     def _coarse_screen(self, screen: Screen) -> Screen:
         """Screen of the same runs in longer steps, by the factor ``step_factor``."""
@@ -134,16 +136,16 @@ class Chooser:
         """Longest steps that are allowed for the screen, as a multiple of the scene's own, and the relative changes
         (quantities,) that they cause.
         """
-        whole = self.whole.variants
-        lengths = [k for k in whole.lengths() if k in screen.variants.lengths()]
+        all_variants = self.whole.variants
+        lengths = [k for k in all_variants.lengths() if k in screen.variants.lengths()]
         allowed = (SAMPLED_STEP_SHARE if self.alike else SCREENED_STEP_SHARE) * self.tolerance
         longest, error = self._longest_allowed(screen, frozenset(), lengths, allowed)
-        while whole.of(times=longest) is None:  # its run fails after that part
+        while all_variants.of(step_factor=longest) is None:  # its run fails after that part
             longest = max(k for k in lengths if k < longest)
         return longest, error
 
     def _longest_allowed(
-        self, screen: Screen, omitted_effects: EffectSet, lengths: list[int], allowed: float
+        self, screen: Screen, omitted_effects: EffectSet, lengths: list[int], largest_change: float
     ) -> tuple[int, np.ndarray]:
         """Longest step of ``lengths`` whose relative changes (quantities,) are allowed, and these changes. It is found
         by bisection; the first step is always allowed.
@@ -152,7 +154,7 @@ class Chooser:
         while high - low > 1:
             middle = (low + high) // 2
             tried = screen.of_step(omitted_effects, lengths[middle] // lengths[0])
-            low, high, shares = (middle, high, tried) if (tried <= allowed).all() else (low, middle, shares)
+            low, high, shares = (middle, high, tried) if (tried <= largest_change).all() else (low, middle, shares)
         return lengths[low], shares
 
     def share(self, omitted_effects: EffectSet) -> float:
@@ -176,7 +178,7 @@ class Chooser:
         if len(omitted_effects) <= 2:
             return bool(runs.newly_broken(omitted_effects))
         return any(
-            all(runs.newly_broken(frozenset([effect, other])) for other in omitted_effects - {effect})
+            all(runs.newly_broken(frozenset([effect, other_effect])) for other_effect in omitted_effects - {effect})
             for effect in omitted_effects
         )
 
@@ -197,13 +199,17 @@ class Chooser:
         """
         if omitted_effects not in self._confirmed:
             longest = self.reach(omitted_effects)
-            for times in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][: 1 + STEP_REDUCTION]:
+            for step_factor in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][
+                : 1 + STEP_REDUCTION
+            ]:
                 self.rounds += 1
-                change = self.whole.between(self.whole.variants.of(omitted_effects, times), self.whole.variants.of())
+                change = self.whole.between(
+                    self.whole.variants.of(omitted_effects, step_factor), self.whole.variants.of()
+                )
                 shares, chance = self.whole.relative_changes(change), self.whole.statistical_errors(change)
-                if self.whole.variants.newly_broken(omitted_effects, times):
+                if self.whole.variants.newly_broken(omitted_effects, step_factor):
                     shares = np.full_like(shares, np.inf)
-                self._confirmed[omitted_effects] = times, shares, chance
+                self._confirmed[omitted_effects] = step_factor, shares, chance
                 if self.within_tolerance(shares + chance):
                     break
                 if (shares < self.tolerance).all():
@@ -214,35 +220,35 @@ class Chooser:
         """Whether all changes are within the tolerance."""
         return bool((changes <= self.tolerance).all())
 
-    def is_better(self, further: EffectSet, current: EffectSet) -> bool:
+    def is_better(self, larger_set: EffectSet, current_set: EffectSet) -> bool:
         """Whether leaving out ``change_if_left_out_too`` is confirmed, and takes less work than leaving out
-        ``current``, each in its confirmed step.
+        ``current_set``, each in its confirmed step.
         """
-        if not self.within_tolerance(self.confirm(further)):
+        if not self.within_tolerance(self.confirm(larger_set)):
             return False
-        work = [self.whole.variants.work(effects, self._confirmed[effects][0]) for effects in (further, current)]
+        work = [self.whole.variants.work(effects, self._confirmed[effects][0]) for effects in (larger_set, current_set)]
         return work[0] < work[1]
 
     def choose(self) -> Choice:
         """The greedy choice, confirmed over the whole run."""
-        none: EffectSet = frozenset()
-        if not self.within_tolerance(self.confirm(none)):
-            self._confirmed[none] = 1, *np.zeros((2, len(self.whole.quantities)))
-        kept, banned = [none], set[EffectSet]()
+        no_effects: EffectSet = frozenset()
+        if not self.within_tolerance(self.confirm(no_effects)):
+            self._confirmed[no_effects] = 1, *np.zeros((2, len(self.whole.quantities)))
+        steps_taken, banned = [no_effects], set[EffectSet]()
         while self.rounds < MOST_CONFIRMATIONS and not self.ended:
-            path = self.path(kept, banned)
-            if path == kept:
+            path = self.path(steps_taken, banned)
+            if path == steps_taken:
                 break
-            if self.is_better(path[-1], kept[-1]):
-                kept = path
+            if self.is_better(path[-1], steps_taken[-1]):
+                steps_taken = path
                 continue
-            low, high = len(kept) - 1, len(path) - 1  # path[low] is kept, path[high] is not
+            low, high = len(steps_taken) - 1, len(path) - 1  # path[low] is kept, path[high] is not
             while high - low > 1:
                 middle = (low + high) // 2
-                low, high = (middle, high) if self.is_better(path[middle], kept[-1]) else (low, middle)
+                low, high = (middle, high) if self.is_better(path[middle], steps_taken[-1]) else (low, middle)
             banned.add(path[high] - path[low])
-            kept = path[: low + 1]
-        return self._choice_with_fresh_samples(self._choice(kept[-1]))
+            steps_taken = path[: low + 1]
+        return self._choice_with_fresh_samples(self._choice(steps_taken[-1]))
 
     def _choice_with_fresh_samples(self, choice: Choice) -> Choice:
         """The choice; InputError if nothing can be left out only because the statistical errors are too large."""
@@ -258,22 +264,22 @@ class Chooser:
         )
 
     def _choice(self, omitted_effects: EffectSet) -> Choice:
-        times, shares, chance = self._confirmed[omitted_effects]
-        none: EffectSet = frozenset()
-        shown = [(none, 1), (none, self._confirmed[none][0]), (omitted_effects, times)]
+        step_factor, shares, chance = self._confirmed[omitted_effects]
+        no_effects: EffectSet = frozenset()
+        shown = [(no_effects, 1), (no_effects, self._confirmed[no_effects][0]), (omitted_effects, step_factor)]
         calls = [run.counts["calls"] for key in shown if (run := self.whole.variants.of(*key)) is not None]
-        each = [self.screen.variants.per_call(left_out) for left_out, _ in shown]
+        seconds_per_call = [self.screen.variants.per_call(left_out) for left_out, _ in shown]
         return Choice(
             self.effects,
             tuple(sorted(omitted_effects)),
-            times,
-            self.told(omitted_effects, times),
+            step_factor,
+            self.told(omitted_effects, step_factor),
             self.teller.higher_order_estimate(omitted_effects),
             shares,
             chance,
             self.within_tolerance(shares + chance),
             tuple(calls),
-            tuple(count * seconds for count, seconds in zip(calls, each, strict=True)),
+            tuple(count * seconds for count, seconds in zip(calls, seconds_per_call, strict=True)),
             self.rounds,
             self._calls_so_far(),
             min(self._doubtful, default=0.0),
@@ -293,21 +299,24 @@ class Chooser:
         self.progress(min(share, 1.0))
         return self.ended
 
-    def told(self, omitted_effects: EffectSet, times: int) -> np.ndarray:
+    def told(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
         """Predicted changes (quantities,) if effects are left out and the step is lengthened as well. What the step
         changes comes from a comparison with a shorter step.
         """
         screen, runs = self.teller, self.whole.variants
         change = screen.predicted_difference(omitted_effects) if omitted_effects else None
-        if times == 1:
+        if step_factor == 1:
             return screen.predicted_change(omitted_effects)
         shorter = [
-            k for k in reversed(runs.lengths()) if times % k == 0 and (STEP_CHECK_REFINEMENT * k <= times or k == 1)
+            k
+            for k in reversed(runs.lengths())
+            if step_factor % k == 0 and (STEP_CHECK_REFINEMENT * k <= step_factor or k == 1)
         ]
         step = screen.between(
-            runs.of(omitted_effects, times), next(filter(None, (runs.of(omitted_effects, k) for k in shorter)), None)
+            runs.of(omitted_effects, step_factor),
+            next(filter(None, (runs.of(omitted_effects, k) for k in shorter)), None),
         )
-        if change is None or step is None or times % self.step_factor:
+        if change is None or step is None or step_factor % self.step_factor:
             return screen.predicted_change(omitted_effects) + screen.relative_changes(step)
         return screen.relative_changes(
             {name: sum_of_differences(change[name], step[name]) for name in screen.quantities}
@@ -319,16 +328,18 @@ class Chooser:
 
         Only those that may go, and whose going would save anything at the same step.
         """
-        shares, times = {}, self.reach(omitted_effects) // self.step_factor
+        shares, step_factor = {}, self.reach(omitted_effects) // self.step_factor
         for effect in self.effects:
             further = omitted_effects | {effect}
-            if effect not in omitted_effects and self.screen.variants.work(further, times) < self.work(omitted_effects):
+            if effect not in omitted_effects and self.screen.variants.work(further, step_factor) < self.work(
+                omitted_effects
+            ):
                 shares[effect] = self.share(further) * self.tolerance
         return {effect: change for effect, change in shares.items() if math.isfinite(change)}
 
-    def path(self, start: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
-        """Path of sets of effects that extends ``start``, one step at a time, as far as predictions allow."""
-        path = list(start)
+    def path(self, first_sets: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
+        """Path of sets of effects that extends ``first_sets``, one step at a time, as far as predictions allow."""
+        path = list(first_sets)
         while True:
             step = self._best_step(path[-1], banned, [frozenset([effect]) for effect in self.effects])
             step = step or self._best_step(path[-1], banned, self._promising_pairs())
@@ -339,24 +350,24 @@ class Chooser:
     def _promising_pairs(self) -> list[EffectSet]:
         """Pairs of effects of which at least one exceeds the budget alone, while both together keep to it."""
         if self._pairs is None:
-            alone = {effect: self.share(frozenset([effect])) for effect in self.effects}
+            change_alone = {effect: self.share(frozenset([effect])) for effect in self.effects}
             pairs = [
                 pair
                 for pair in combinations(self.effects, 2)
-                if max(alone[effect] for effect in pair) > PREDICTION_SHARE
+                if max(change_alone[effect] for effect in pair) > PREDICTION_SHARE
             ]
-            pairs.sort(key=lambda pair: sum(alone[effect] for effect in pair))
+            pairs.sort(key=lambda pair: sum(change_alone[effect] for effect in pair))
             self._pairs = self._pairs_within_budget([frozenset(pair) for pair in pairs])
         return self._pairs
 
-    def _pairs_within_budget(self, pairs: list[EffectSet]) -> list[EffectSet]:
+    def _pairs_within_budget(self, effect_pairs: list[EffectSet]) -> list[EffectSet]:
         """Pairs of effects that keep to the error budget, as far as the budget of calls lets them be tested."""
         within = list[EffectSet]()
-        for i, pair in enumerate(pairs):
+        for i, pair in enumerate(effect_pairs):
             if self._budget_spent():
                 break
             if i % PAIRS_IN_ADVANCE == 0:
-                self.screen.ahead(pairs[i : i + PAIRS_IN_ADVANCE])
+                self.screen.ahead(effect_pairs[i : i + PAIRS_IN_ADVANCE])
             within += [pair] if self.share(pair) <= PREDICTION_SHARE else []
         return within
 
@@ -364,8 +375,8 @@ class Chooser:
         """The step that saves the most work for what it adds to the predicted error; empty where no step keeps to the
         budget.
         """
-        best, most = frozenset[str](), 0.0
-        now, work = self.share(omitted_effects), self.work(omitted_effects)
+        best, best_score = frozenset[str](), 0.0
+        current_share, work = self.share(omitted_effects), self.work(omitted_effects)
         steps = [
             step
             for step in steps
@@ -379,7 +390,7 @@ class Chooser:
                 break
             share = self.share(further)
             saved = math.log(work / self.work(further)) if share <= PREDICTION_SHARE else 0.0
-            score = saved / max(share - now, NEGLIGIBLE_SHARE) if saved > 0.0 else 0.0
-            if score > most:
-                best, most = step - omitted_effects, score
+            score = saved / max(share - current_share, NEGLIGIBLE_SHARE) if saved > 0.0 else 0.0
+            if score > best_score:
+                best, best_score = step - omitted_effects, score
         return best

@@ -56,8 +56,8 @@ class Screen:
                 why = f"by one sample of {m}, so that chance decides: ask for more or longer ones"
                 self._refuse(name, f"is made up to {100 * share:.0f} % {why}")
 
-    def _refuse(self, name: str, why: str) -> NoReturn:
-        raise InputError(self.variants.scene.file, f"quantities.{name}", None, why)
+    def _refuse(self, name: str, reason: str) -> NoReturn:
+        raise InputError(self.variants.scene.file, f"quantities.{name}", None, reason)
 
     def between(self, run: RunQuantities | None, other_answer: RunQuantities | None) -> Changes | None:
         """Differences of two runs in each quantity; None where one of the runs is missing."""
@@ -72,22 +72,22 @@ class Screen:
                 return None  # what is left has no such quantity
             raise
 
-    def relative_changes(self, change: Changes | None) -> np.ndarray:
+    def relative_changes(self, differences: Changes | None) -> np.ndarray:
         """Relative changes (quantities,); infinite where ``predicted_difference`` is None."""
-        return self._changes_with_errors(change)[0]
+        return self._changes_with_errors(differences)[0]
 
-    def statistical_errors(self, change: Changes | None) -> np.ndarray:
+    def statistical_errors(self, differences: Changes | None) -> np.ndarray:
         """Statistical errors (quantities,) of predicted changes; zero for a quantity that is no mean of samples."""
-        return self._changes_with_errors(change)[1]
+        return self._changes_with_errors(differences)[1]
 
-    def _changes_with_errors(self, change: Changes | None) -> np.ndarray:
+    def _changes_with_errors(self, differences: Changes | None) -> np.ndarray:
         """Relative changes and their statistical errors (2, quantities)."""
-        if change is None:
+        if differences is None:
             return np.outer((np.inf, 0.0), np.ones(len(self.quantities)))
         pairs = [
-            by_chance(change[name], self.full[name])
+            by_chance(differences[name], self.full[name])
             if name in self.sampled
-            else (largest_relative_change(change[name], self.sizes[name]), 0.0)
+            else (largest_relative_change(differences[name], self.sizes[name]), 0.0)
             for name in self.quantities
         ]
         return np.array(pairs).T
@@ -99,17 +99,20 @@ class Screen:
     def second(self, first: str, second_effect: str) -> Changes | None:
         """Second-order difference e of a pair: the change without both, less the changes without each alone."""
         sets = map(frozenset, ((first, second_effect), (first,), (second_effect,)))
-        both, *singles = (self.predicted_difference(effects) for effects in sets)
-        known = [part for part in singles if part is not None]
-        if both is None or len(known) < 2:
+        change_without_both, *singles = (self.predicted_difference(effects) for effects in sets)
+        known = [change_of_single for change_of_single in singles if change_of_single is not None]
+        if change_without_both is None or len(known) < 2:
             return None
         return {
-            name: sum_of_differences(both[name], *(_negated(part[name]) for part in known)) for name in self.quantities
+            name: sum_of_differences(
+                change_without_both[name], *(_negated(change_of_single[name]) for change_of_single in known)
+            )
+            for name in self.quantities
         }
 
     def ahead(self, sets: Iterable[EffectSet]) -> None:
         """Compute in advance the runs that ``predicted_difference`` needs for these sets."""
-        self.variants.ahead((part, 1) for chosen in sets for part in _sets_needed(chosen))
+        self.variants.ahead((subset, 1) for chosen in sets for subset in _sets_needed(chosen))
 
     def predicted_difference(self, omitted_effects: EffectSet) -> Changes | None:
         """Predicted differences if a set of effects is left out; None where they cannot be predicted."""
@@ -121,7 +124,10 @@ class Screen:
             ]
         if None in parts:
             return self.between(self.variants.of(omitted_effects), self.variants.of())
-        return {name: sum_of_differences(*(part[name] for part in parts if part)) for name in self.quantities}
+        return {
+            name: sum_of_differences(*(difference[name] for difference in parts if difference))
+            for name in self.quantities
+        }
 
     def predicted_change(self, omitted_effects: EffectSet) -> np.ndarray:
         """Predicted relative changes (quantities,) if a set of effects is left out, without the
@@ -137,23 +143,23 @@ class Screen:
         """Estimate (quantities,) of changes of third and higher order: the second order, reduced by the ratio of the
         second order to the first.
         """
-        none = np.zeros(len(self.quantities))
+        no_change = np.zeros(len(self.quantities))
         if len(omitted_effects) <= 2:
-            return none
+            return no_change
         first = np.sum([self.relative_changes(self.first_order_change(effect)) for effect in omitted_effects], axis=0)
         second = np.sum(
             [self.relative_changes(self.second(*pair)) for pair in combinations(sorted(omitted_effects), 2)], axis=0
         )
         if not (np.isfinite(first).all() and np.isfinite(second).all()):
-            return none  # the set was run itself
+            return no_change  # the set was run itself
         return second * np.minimum(1.0, second / np.maximum(first, 1e-300))
 
-    def of_step(self, omitted_effects: EffectSet, times: int) -> np.ndarray:
+    def of_step(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
         """Relative changes (quantities,) that longer steps alone cause in a run without these effects."""
-        if times == 1:
+        if step_factor == 1:
             return np.zeros(len(self.quantities))
         return self.relative_changes(
-            self.between(self.variants.of(omitted_effects, times), self.variants.of(omitted_effects))
+            self.between(self.variants.of(omitted_effects, step_factor), self.variants.of(omitted_effects))
         )
 
 
@@ -161,7 +167,7 @@ def _sets_needed(omitted_effects: EffectSet) -> list[EffectSet]:
     """Sets of effects whose runs are needed to predict the changes for a set."""
     if len(omitted_effects) <= 2:
         return [omitted_effects]
-    return [frozenset(few) for count in (1, 2) for few in combinations(sorted(omitted_effects), count)]
+    return [frozenset(subset) for count in (1, 2) for subset in combinations(sorted(omitted_effects), count)]
 
 
 def _negated(cases: Cases) -> Cases:

@@ -100,12 +100,12 @@ class Variants:
 
     def sentence_on_effect(self, name: str) -> str:
         """Sentence that describes an effect, or what leaving it out means."""
-        told = self.scene.said if self._knows_effects else {}
-        return str(told.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
+        sentences = self.scene.said if self._knows_effects else {}
+        return str(sentences.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
 
-    def of(self, omitted_effects: Iterable[str] = (), times: int = 1) -> RunQuantities | None:
-        """Quantities of the run without these effects, in steps ``times`` as long; None if it fails."""
-        key = (frozenset(omitted_effects), times)
+    def of(self, omitted_effects: Iterable[str] = (), step_factor: int = 1) -> RunQuantities | None:
+        """Quantities of the run without these effects, in steps ``step_factor`` as long; None if it fails."""
+        key = (frozenset(omitted_effects), step_factor)
         if key not in self._kept:
             answer, self._assumptions_broken[key] = (
                 self._computed_in_advance.pop(key) if key in self._computed_in_advance else self.run(key)
@@ -127,51 +127,55 @@ class Variants:
         with collected_breaches() as broken:
             return self._run(*key), broken
 
-    def _run(self, omitted_effects: EffectSet, times: int) -> RunQuantities | None:
+    def _run(self, omitted_effects: EffectSet, step_factor: int) -> RunQuantities | None:
         try:
-            answer: RunQuantities = self.system.computed_quantities(self.changed(omitted_effects, times), self.engine)
+            answer: RunQuantities = self.system.computed_quantities(
+                self.changed(omitted_effects, step_factor), self.engine
+            )
         except (InputError, RunFailed):
             return None
         return answer
 
-    def newly_broken(self, omitted_effects: EffectSet, times: int = 1) -> list[BrokenAssumption]:
+    def newly_broken(self, omitted_effects: EffectSet, step_factor: int = 1) -> list[BrokenAssumption]:
         """Assumptions that the scene itself keeps, and that the run without these effects breaks."""
-        if self.of(omitted_effects, times) is None or self.of() is None:
+        if self.of(omitted_effects, step_factor) is None or self.of() is None:
             return []
         known = self._assumptions_broken[frozenset(), 1]
         return [
-            broken for name, broken in self._assumptions_broken[omitted_effects, times].items() if name not in known
+            broken
+            for name, broken in self._assumptions_broken[omitted_effects, step_factor].items()
+            if name not in known
         ]
 
-    def stated(self, omitted_effects: EffectSet, times: int = 1) -> list[Result]:
+    def stated(self, omitted_effects: EffectSet, step_factor: int = 1) -> list[Result]:
         """Results of a variant together with the errors that they state; its runs are repeated, with error
         estimates.
         """
         results: list[Result] = []
         with suppress(RunFailed), watching(results.append):  # raised where an error is as large as what it is of
-            self.system.computed_quantities(self.changed(omitted_effects, times), self.engine, error=True)
+            self.system.computed_quantities(self.changed(omitted_effects, step_factor), self.engine, error=True)
         return results
 
-    def changed(self, omitted_effects: EffectSet, times: int = 1) -> Any:
+    def changed(self, omitted_effects: EffectSet, step_factor: int = 1) -> Any:
         """The scene of a variant; InputError where there can be no such scene."""
         if self._knows_effects:
-            return self.scene.without(omitted_effects).in_longer_steps(times)
+            return self.scene.without(omitted_effects).in_longer_steps(step_factor)
         scene = scene_without(self.scene, *sorted(omitted_effects)) if omitted_effects else self.scene
-        if times == 1:
+        if step_factor == 1:
             return scene
         table = own_table(scene)
-        self.system.coarsen(table, scene, times)
+        self.system.coarsen(table, scene, step_factor)
         return rebuilt_scene(table, scene)
 
-    def work(self, omitted_effects: EffectSet, times: int = 1) -> float:
+    def work(self, omitted_effects: EffectSet, step_factor: int = 1) -> float:
         """Work of a run, from counts alone, so that it repeats exactly: calls times the sum of states, terms and
         remaining effects; infinite where the run fails.
         """
-        run = self.of(omitted_effects, times)
+        run = self.of(omitted_effects, step_factor)
         if run is None:
             return math.inf
-        each = run.counts["states"] + run.counts.get("terms", 0) + len(set(self.effects) - omitted_effects)
-        return float(run.counts["calls"] * max(each, 1))
+        size_of_call = run.counts["states"] + run.counts.get("terms", 0) + len(set(self.effects) - omitted_effects)
+        return float(run.counts["calls"] * max(size_of_call, 1))
 
     def per_call(self, omitted_effects: EffectSet) -> float:
         """CPU seconds of one call, the least of a few runs in this process; infinite where no run succeeds."""
@@ -190,7 +194,9 @@ class Variants:
     def lengths(self) -> list[int]:
         """Factors by which the step may be lengthened, so that whole numbers of steps fit into the run."""
         count = self.system.parts(self.scene)
-        return [times for times in range(1, min(count, LARGEST_STEP_FACTOR) + 1) if count % times == 0]
+        return [
+            step_factor for step_factor in range(1, min(count, LARGEST_STEP_FACTOR) + 1) if count % step_factor == 0
+        ]
 
     def window(self, steps: int) -> "Variants":
         """Variants of the first part of the run, of at least ``steps`` steps; of the whole run where this is hardly
@@ -201,9 +207,9 @@ class Variants:
         if self._knows_effects:
             return Variants(self.scene.with_fewer_copies(steps), self.engine, self.executor)
         count = self.system.steps(self.scene)
-        for few in (n for n in range(steps, count) if n % SHORTEST_PART_STEPS == 0 or count % n == 0):
+        for part_steps in (n for n in range(steps, count) if n % SHORTEST_PART_STEPS == 0 or count % n == 0):
             table = own_table(self.scene)
-            self.system.shorten(table, self.scene, few)
+            self.system.shorten(table, self.scene, part_steps)
             with suppress(InputError):
                 return Variants(rebuilt_scene(table, self.scene), self.engine, self.executor)
         return self

@@ -14,16 +14,16 @@ EQUAL_ERROR_SHARE = 0.01
 """Errors within this part of each other count as the same."""
 
 
-def slope(sizes: Sequence[float], errors: Sequence[float]) -> float:
+def slope(step_sizes: Sequence[float], errors: Sequence[float]) -> float:
     """Least-squares slope of log error over log size; not a number for fewer than two points."""
-    if len(sizes) < 2:
+    if len(step_sizes) < 2:
         return float("nan")
-    return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
+    return float(np.polyfit(np.log(step_sizes), np.log(errors), 1)[0])
 
 
-def observed_order(sizes: Sequence[float], errors: Sequence[float], floor: float) -> float:
+def observed_order(step_sizes: Sequence[float], errors: Sequence[float], floor: float) -> float:
     """Observed order: slope of log error over the finest points whose errors are above ``floor``."""
-    clear = sorted((h, e) for h, e in zip(sizes, errors, strict=True) if e >= floor)[:FITTED_POINTS]
+    clear = sorted((h, e) for h, e in zip(step_sizes, errors, strict=True) if e >= floor)[:FITTED_POINTS]
     return slope(*zip(*clear, strict=True)) if len(clear) > 1 else float("nan")
 
 
@@ -62,11 +62,11 @@ def reach(
     values: Sequence[float],
     errors: Sequence[float],
     costs: Sequence[float],
-    target: float,
+    target_error: float,
     order: int = 0,
     extrapolate: bool = False,
 ) -> ToleranceCost | None:
-    """Cost at which the error of a curve falls below ``target`` and stays there.
+    """Cost at which the error of a curve falls below ``target_error`` and stays there.
 
     Points are taken from coarse to fine by ``values``. With the declared ``order`` of a fixed-step method the
     answer is interpolated log-log between two settings, and, with ``extrapolate``, carried beyond the finest
@@ -74,20 +74,20 @@ def reach(
     settings that were tried count. None where the target is not met.
     """
     table = np.array(sorted(zip(values, errors, costs, strict=True), reverse=True))
-    above = np.flatnonzero(table[:, 1] > target)
-    if not len(above):
+    rows_above = np.flatnonzero(table[:, 1] > target_error)
+    if not len(rows_above):
         return ToleranceCost(float(table[0, 2]), float(table[0, 0]), "coarsest")
-    last = int(above[-1])
-    if last + 1 < len(table) and not order:
-        return ToleranceCost(float(table[last + 1, 2]), float(table[last + 1, 0]), "tried")
-    if last + 1 < len(table):
-        logs = np.log(table[last : last + 2])
-        part = (logs[0, 1] - np.log(target)) / (logs[0, 1] - logs[1, 1])
-        value, _, cost = np.exp(logs[0] + part * (logs[1] - logs[0]))
+    last_above = int(rows_above[-1])
+    if last_above + 1 < len(table) and not order:
+        return ToleranceCost(float(table[last_above + 1, 2]), float(table[last_above + 1, 0]), "tried")
+    if last_above + 1 < len(table):
+        logs = np.log(table[last_above : last_above + 2])
+        fraction = (logs[0, 1] - np.log(target_error)) / (logs[0, 1] - logs[1, 1])
+        value, _, cost = np.exp(logs[0] + fraction * (logs[1] - logs[0]))
         return ToleranceCost(float(cost), float(value), "interpolated")
     if not (extrapolate and order):
         return None
-    finer = (table[-1, 1] / target) ** (1 / order)
+    finer = (table[-1, 1] / target_error) ** (1 / order)
     return ToleranceCost(float(table[-1, 2] * finer), float(table[-1, 0] / finer), "extrapolated")
 
 

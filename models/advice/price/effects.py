@@ -27,7 +27,7 @@ from models.systems.ride.of_scene import goes_in_time
 
 MOST_PRICED_STEPS = 960
 """Of every run, so many are priced."""
-ROUNDS, LEAST_ROUNDS, LONG_ROUNDS_SECONDS = 7, 3, 10.0
+TIMING_ROUNDS, LEAST_ROUNDS, LONG_ROUNDS_SECONDS = 7, 3, 10.0
 """Turns in which every variant runs once; fewer where all of them would take longer than so many CPU seconds."""
 SEED = 11
 
@@ -104,14 +104,16 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     first, whys, keeps = {"": base}, dict[str, str](), dict[str, tuple[str, ...]]()
     for name in names:
         try:
-            other = variants.changed(frozenset([name])) if name in variants.effects else variants.beside(name)
-            with collected_breaches() as others:
+            changed_scene = variants.changed(frozenset([name])) if name in variants.effects else variants.beside(name)
+            with collected_breaches() as breaches:
                 first[name], runs[name] = (
-                    system.computed_quantities(other, engine),
-                    partial(system.computed_quantities, other, engine),
+                    system.computed_quantities(changed_scene, engine),
+                    partial(system.computed_quantities, changed_scene, engine),
                 )
-            without, beside = (others, broken_alone) if name in variants.effects else (broken_alone, others)
-            keeps[name] = tuple(assumption.says for key, assumption in without.items() if key not in beside)
+            without, broken_in_changed = (
+                (breaches, broken_alone) if name in variants.effects else (broken_alone, breaches)
+            )
+            keeps[name] = tuple(assumption.says for key, assumption in without.items() if key not in broken_in_changed)
         except (InputError, RunFailed) as error:
             whys[name] = getattr(error, "why", "") or getattr(error, "allowed", "") or str(error)
     micros = _microseconds_by_turn(runs)
@@ -136,9 +138,9 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
 def _microseconds_by_turn(runs: dict[str, Callable[[], RunQuantities]]) -> dict[str, np.ndarray]:
     """CPU microseconds of a step (turns,) for every run; the runs take turns in random order."""
     micros = dict[str, list[float]]({name: [] for name in runs})
-    order, names, begun = np.random.default_rng(SEED), list(runs), time.process_time()
-    for i in range(ROUNDS):
-        if i >= LEAST_ROUNDS and (time.process_time() - begun) * (i + 1) > i * LONG_ROUNDS_SECONDS:
+    order, names, start_time = np.random.default_rng(SEED), list(runs), time.process_time()
+    for i in range(TIMING_ROUNDS):
+        if i >= LEAST_ROUNDS and (time.process_time() - start_time) * (i + 1) > i * LONG_ROUNDS_SECONDS:
             break
         for j in order.permutation(len(names)):
             outcome = runs[names[j]]()
@@ -148,43 +150,45 @@ def _microseconds_by_turn(runs: dict[str, Callable[[], RunQuantities]]) -> dict[
 
 def median_and_deviation(values: np.ndarray) -> tuple[float, float]:
     """Median and median absolute deviation of values."""
-    told = describe(values.tolist())
-    return told["median"], told["mad"]
+    statistics = describe(values.tolist())
+    return statistics["median"], statistics["mad"]
 
 
 def _price_of_effect(
     variants: Variants,
     name: str,
-    base: RunQuantities,
+    scene_quantities: RunQuantities,
     other_answer: RunQuantities | None,
     took: np.ndarray | None,
     unchanged: np.ndarray,
-    why: str,
+    reason: str,
 ) -> EffectPrice:
-    there, says = name in variants.effects, variants.sentence_on_effect(name)
+    is_present, says = name in variants.effects, variants.sentence_on_effect(name)
     if other_answer is None or took is None:
-        return EffectPrice(name, there, says, why)
-    before, after = (other_answer, base) if there else (base, other_answer)
-    slow, fast = (unchanged, took) if there else (took, unchanged)
+        return EffectPrice(name, is_present, says, reason)
+    quantities_without, quantities_with = (
+        (other_answer, scene_quantities) if is_present else (scene_quantities, other_answer)
+    )
+    slow, fast = (unchanged, took) if is_present else (took, unchanged)
     seconds = np.maximum(slow, 1e-9), np.maximum(fast, 1e-9)
-    gone = tuple(key for key in after.quantities if key not in before.quantities)
+    gone = tuple(key for key in quantities_with.quantities if key not in quantities_without.quantities)
     return EffectPrice(
         name,
-        there,
+        is_present,
         says,
         "",
-        (before.counts, after.counts),
+        (quantities_without.counts, quantities_with.counts),
         median_and_deviation(slow - fast),
         paired_ratio(*seconds),
-        _quantity_changes(base, other_answer),
+        _quantity_changes(scene_quantities, other_answer),
         gone,
     )
 
 
-def _quantity_changes(base: RunQuantities, other_answer: RunQuantities) -> tuple[QuantityChange, ...]:
+def _quantity_changes(scene_quantities: RunQuantities, other_answer: RunQuantities) -> tuple[QuantityChange, ...]:
     """Changes of the quantities that both runs have, relative to their size in the scene."""
     changed = []
-    for name, quantity in base.quantities.items():
+    for name, quantity in scene_quantities.quantities.items():
         if name in other_answer.quantities:
             try:
                 change = difference_of_runs(other_answer.quantities[name].cases, quantity.cases)
@@ -195,9 +199,14 @@ def _quantity_changes(base: RunQuantities, other_answer: RunQuantities) -> tuple
                 share, chance = by_chance(change, quantity.cases)
                 changed.append(QuantityChange(name, quantity.unit, share * float(size.max()), share, chance))
                 continue
-            most = max(float(np.sqrt(np.mean(difference**2))) for difference in change)
-            moved = most > rounding_floor(base, quantity.unit)
+            largest_difference = max(float(np.sqrt(np.mean(difference**2))) for difference in change)
+            is_changed = largest_difference > rounding_floor(scene_quantities, quantity.unit)
             changed.append(
-                QuantityChange(name, quantity.unit, most, largest_relative_change(change, size) if moved else 0.0)
+                QuantityChange(
+                    name,
+                    quantity.unit,
+                    largest_difference,
+                    largest_relative_change(change, size) if is_changed else 0.0,
+                )
             )
     return tuple(sorted(changed, key=lambda difference: -difference.relative))

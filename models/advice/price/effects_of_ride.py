@@ -8,7 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price.effects import ROUNDS, SEED, EffectPrice, PriceList, QuantityChange, median_and_deviation
+from models.advice.price.effects import (
+    SEED,
+    TIMING_ROUNDS,
+    EffectPrice,
+    PriceList,
+    QuantityChange,
+    median_and_deviation,
+)
 from models.advice.ride_choice.march import cost
 from models.advice.ride_choice.reduced import FullScene, Reduced
 from models.advice.ride_choice.screen import exact_variances
@@ -30,21 +37,28 @@ def price_list_of_ride(scene: Any) -> PriceList:
         raise InputError(scene.file, "drive", None, "has no effects priced in closed form: give [speeds]")
     speeds = scene.speeds.all()
     with scene_errors(scene):
-        whole = FullScene(ReducedScene.complete(scene), float(speeds[len(speeds) // 2]))
-        effects = effects_of(whole.scene)
-        rests = {effect.name: _without_effect(whole, effect) for effect in effects}
-    more = {name: _with_one_more(scene, name, whole.speed) for name in absent_effects(scene)}
-    systems = {name: rest for name, rest in ({"": whole.full} | rests | more).items() if isinstance(rest, Reduced)}
+        full = FullScene(ReducedScene.complete(scene), float(speeds[len(speeds) // 2]))
+        effects = effects_of(full.scene)
+        rests = {effect.name: _without_effect(full, effect) for effect in effects}
+    with_added_effect = {name: _with_one_more(scene, name, full.speed) for name in absent_effects(scene)}
+    systems = {
+        name: system
+        for name, system in ({"": full.full} | rests | with_added_effect).items()
+        if isinstance(system, Reduced)
+    }
     micros = _microseconds_by_turn(systems)
     says = effect_sentences(scene.system)
-    prices = [_price_of_effect(whole, effect.name, effect.says, rests[effect.name], micros) for effect in effects]
-    prices += [_price_of_effect(whole, name, says[name], more[name], micros, is_present=False) for name in more]
+    prices = [_price_of_effect(full, effect.name, effect.says, rests[effect.name], micros) for effect in effects]
+    prices += [
+        _price_of_effect(full, name, says[name], with_added_effect[name], micros, is_present=False)
+        for name in with_added_effect
+    ]
     return PriceList(
-        f"{scene.title} (at {whole.speed:g} m/s)",
+        f"{scene.title} (at {full.speed:g} m/s)",
         "closed form",
         TIMED_STEPS,
         TIMED_STEPS,
-        _counts_of_scene(whole.full),
+        _counts_of_scene(full.full),
         median_and_deviation(micros[""]),
         tuple(prices),
     )
@@ -79,8 +93,8 @@ def _counts_of_scene(system: Reduced) -> dict[str, int]:
 
 def _microseconds_by_turn(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
     """CPU microseconds of a step (ROUNDS,) for every system; the systems take turns in random order."""
-    micros, order = {name: np.empty(ROUNDS) for name in systems}, np.random.default_rng(SEED)
-    for i in range(ROUNDS):
+    micros, order = {name: np.empty(TIMING_ROUNDS) for name in systems}, np.random.default_rng(SEED)
+    for i in range(TIMING_ROUNDS):
         for j in order.permutation(len(systems)):
             name, system = list(systems.items())[j]
             micros[name][i] = _step_microseconds(system.system.A[: system.states, : system.states])
@@ -90,24 +104,24 @@ def _microseconds_by_turn(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
 def _step_microseconds(A: np.ndarray) -> float:
     """CPU microseconds of one step with the state matrix A."""
     x, step = np.ones(len(A)), 1e-6
-    begun = time.process_time()
+    start_time = time.process_time()
     for _ in range(TIMED_STEPS):
         x = step_on(lambda _, state: A @ state, 0.0, x, step)
-    return 1e6 * (time.process_time() - begun) / TIMED_STEPS
+    return 1e6 * (time.process_time() - start_time) / TIMED_STEPS
 
 
 def _price_of_effect(
     full_scene: FullScene,
     name: str,
     description: str,
-    other: Reduced | str,
+    changed_system: Reduced | str,
     micros: dict[str, np.ndarray],
     is_present: bool = True,
 ) -> EffectPrice:
-    """Price of an effect. If it ``is_present``, ``other`` is the scene without it, else the scene with it."""
-    if isinstance(other, str):
-        return EffectPrice(name, is_present, description, other)
-    without_it, with_it = ((other, micros[name]), (full_scene.full, micros[""]))[:: 1 if is_present else -1]
+    """Price of an effect. If it ``is_present``, ``changed_system`` is the scene without it, else the scene with it."""
+    if isinstance(changed_system, str):
+        return EffectPrice(name, is_present, description, changed_system)
+    without_it, with_it = ((changed_system, micros[name]), (full_scene.full, micros[""]))[:: 1 if is_present else -1]
     gone = tuple(key for key in with_it[0].system.names if key not in without_it[0].system.names)
     return EffectPrice(
         name,
@@ -117,7 +131,7 @@ def _price_of_effect(
         (_counts_of_scene(without_it[0]), _counts_of_scene(with_it[0])),
         median_and_deviation(with_it[1] - without_it[1]),
         paired_ratio(with_it[1].tolist(), without_it[1].tolist()),
-        _deviation_changes(full_scene, other),
+        _deviation_changes(full_scene, changed_system),
         gone,
     )
 

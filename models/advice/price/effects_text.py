@@ -18,10 +18,11 @@ ROUNDING_CHANGE = 1e-12
 def price_list_lines(prices: PriceList, quantities: list[str]) -> list[str]:
     """Text of a price list: the cost of the scene, then every effect with its cost and the changes that it makes."""
     counts = ", ".join(f"{value:,} {name}" for name, value in prices.counts.items())
-    part = "" if prices.each >= prices.whole else f", {prices.each:,} of {prices.whole:,} steps priced"
+    priced_steps_text = "" if prices.each >= prices.whole else f", {prices.each:,} of {prices.whole:,} steps priced"
     return [
         prices.title,
-        f"  {prices.engine}, {counts}{part}; {_microseconds_text(prices.micros)} a step, CPU, median and its deviation",
+        f"  {prices.engine}, {counts}{priced_steps_text}; {_microseconds_text(prices.micros)} a step, CPU, "
+        "median and its deviation",
         "",
         "  effects of the scene: what each adds to it, and what leaving it out changes",
         *(line for price in prices.prices if price.there for line in _effect_lines(price, quantities)),
@@ -41,8 +42,8 @@ def _absent_effect_lines(prices: PriceList, quantities: list[str]) -> list[str]:
     return ["", "  effects that it could have, at usual values: the same of putting it in", *rows] if rows else []
 
 
-def _microseconds_text(spread: tuple[float, float]) -> str:
-    return f"{_number_text(spread[0], 3)} +- {_number_text(spread[1], 1)} us"
+def _microseconds_text(median_and_deviation: tuple[float, float]) -> str:
+    return f"{_number_text(median_and_deviation[0], 3)} +- {_number_text(median_and_deviation[1], 1)} us"
 
 
 def _number_text(value: float, digits: int) -> str:
@@ -68,24 +69,35 @@ def _effect_lines(price: EffectPrice, quantities: list[str]) -> list[str]:
 
 def _counts_text(price: EffectPrice) -> str:
     """Text of the counts that an effect changes."""
-    before, after = price.counts
-    told = [f"{after[name] - before[name]:+,} {name}" for name in after if after[name] != before[name]]
-    return "; " + ", ".join(told) if told else ""
+    counts_without, counts_with = price.counts
+    count_texts = [
+        f"{counts_with[name] - counts_without[name]:+,} {name}"
+        for name in counts_with
+        if counts_with[name] != counts_without[name]
+    ]
+    return "; " + ", ".join(count_texts) if count_texts else ""
 
 
 def _changes_text(price: EffectPrice, quantities: list[str]) -> str:
     """Text on the changes of the requested quantities, or of those that change most."""
-    asked = [change for change in price.changes if change.name in quantities]
-    shown = asked or [change for change in price.changes if change.relative > ROUNDING_CHANGE][:SHOWN_QUANTITIES]
+    requested_changes = [change for change in price.changes if change.name in quantities]
+    shown = (
+        requested_changes
+        or [change for change in price.changes if change.relative > ROUNDING_CHANGE][:SHOWN_QUANTITIES]
+    )
     return "changes " + ("; ".join(map(_changed_quantity_text, shown)) or "nothing")
 
 
-def _changed_quantity_text(change: QuantityChange) -> str:
-    unit = f" {change.unit}" if change.unit and change.unit != "1" else ""
-    name = change.name.partition(" [")[0]
-    beside = f" +- {_number_text(100 * change.chance, 2)} %" if change.chance else ""
-    share = f"{_number_text(100 * change.relative, 2)} %{beside}" if np.isfinite(change.relative) else "from nothing"
-    return f"{name} by {_number_text(change.absolute, 3)}{unit} ({share})"
+def _changed_quantity_text(quantity_change: QuantityChange) -> str:
+    unit = f" {quantity_change.unit}" if quantity_change.unit and quantity_change.unit != "1" else ""
+    name = quantity_change.name.partition(" [")[0]
+    error_text = f" +- {_number_text(100 * quantity_change.chance, 2)} %" if quantity_change.chance else ""
+    share = (
+        f"{_number_text(100 * quantity_change.relative, 2)} %{error_text}"
+        if np.isfinite(quantity_change.relative)
+        else "from nothing"
+    )
+    return f"{name} by {_number_text(quantity_change.absolute, 3)}{unit} ({share})"
 
 
 def as_dict(prices: PriceList) -> dict[str, Any]:
@@ -94,11 +106,11 @@ def as_dict(prices: PriceList) -> dict[str, Any]:
     return plain
 
 
-def _json_value(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _json_value(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_json_value(inner) for inner in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value
+def _json_value(table_value: Any) -> Any:
+    if isinstance(table_value, dict):
+        return {key: _json_value(inner) for key, inner in table_value.items()}
+    if isinstance(table_value, list | tuple):
+        return [_json_value(inner) for inner in table_value]
+    if isinstance(table_value, float | np.floating):
+        return float(table_value) if np.isfinite(table_value) else None
+    return table_value

@@ -26,9 +26,9 @@ OTHER_TOLERANCE = 1e-8
 """Relative tolerance of the second solver, which has its own steps."""
 
 
-def first_part(duration: float, longest: float) -> float:
-    """Duration (s) of the first part of a run: at most ``longest``, and a whole fraction of the run."""
-    return duration / math.ceil(duration / longest * (1 - 1e-9))
+def first_part(duration: float, longest_part: float) -> float:
+    """Duration (s) of the first part of a run: at most ``longest_part``, and a whole fraction of the run."""
+    return duration / math.ceil(duration / longest_part * (1 - 1e-9))
 
 
 @dataclass(frozen=True)
@@ -136,28 +136,30 @@ class MeshedScene(ABC):
     def answer(self, solution: Any) -> PricedRun:
         """The quantity along a run, with the number of cells that were evaluated."""
         cells, run = solution
-        times, values, asked = self.read(run)
-        return PricedRun(times, values, {"force calls": asked, "contact cells": asked * cells**2})
+        times, values, calls = self.read(run)
+        return PricedRun(times, values, {"force calls": calls, "contact cells": calls * cells**2})
 
-    def _step_tied_to_cells(self, rung: int) -> float:
-        return self._longest_fraction(self.longest) / 2 ** (max(0, rung) // 2)
+    def _step_tied_to_cells(self, rung_index: int) -> float:
+        return self._longest_fraction(self.longest) / 2 ** (max(0, rung_index) // 2)
 
     def _longest_fraction(self, step: float) -> float:
         """The longest whole fraction (s) of ``first`` that is at most ``step`` (s)."""
         return self.first / math.ceil(self.first / step * (1 - 1e-9))
 
 
-def checked_quantity(quantity: str, known: dict[str, Any]) -> str:
+def checked_quantity(quantity: str, known_names: dict[str, Any]) -> str:
     """The name of a quantity that a scene has; InputError for an unknown one."""
-    if quantity not in known:
-        raise InputError("--quantity", "", quantity, "is no quantity of this scene: one of them", tuple(known))
+    if quantity not in known_names:
+        raise InputError("--quantity", "", quantity, "is no quantity of this scene: one of them", tuple(known_names))
     return quantity
 
 
-def run_and_quantity(quantity: str | None, usual: str, runs: dict[str, Any], kind: str) -> tuple[str, str]:
+def run_and_quantity(
+    quantity: str | None, default_quantity: str, runs: dict[str, Any], run_kind: str
+) -> tuple[str, str]:
     """Names of the run and of the quantity, which a user gives as RUN.QUANTITY; the first run where none is named."""
-    name, _, asked = (quantity or usual).rpartition(".")
+    name, _, quantity_name = (quantity or default_quantity).rpartition(".")
     name = name or next(iter(runs))
     if name not in runs:
-        raise InputError("--quantity", "", quantity, f"names no {kind} of this scene", tuple(runs))
-    return name, asked
+        raise InputError("--quantity", "", quantity, f"names no {run_kind} of this scene", tuple(runs))
+    return name, quantity_name

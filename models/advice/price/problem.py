@@ -70,7 +70,7 @@ class Problem(Protocol):
         """All settings to try, or the few that quick runs use."""
         ...
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
+    def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
         """The setting of this problem that has this engine, this method, and this step (s) or tolerance."""
         ...
 

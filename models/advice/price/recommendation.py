@@ -115,7 +115,7 @@ def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str
     if not (plain_number and math.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
     to_price = priced_scene(scene, quantity, engines)
-    with Crew.of(scene, usual=1).at_work(UNTIMED_RUNS_AT_ONCE, *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(UNTIMED_RUNS_AT_ONCE, *places_of(scene)) as pool:
         return recommend(to_price, tolerance, pool)
 
 
@@ -165,8 +165,13 @@ def _timed_settings(search: Search) -> list[SettingChoice]:
     if not curves:
         return []
     attempts = list(curves.values())
-    taken, longer = _interleaved_seconds(search, _fastest_candidates(attempts)), search.scene.whole / search.duration
-    seconds = [tuple(longer * taken.get(attempt.setting, np.array([attempt.seconds]))) for attempt in attempts]
+    seconds_by_setting, longer = (
+        _interleaved_seconds(search, _fastest_candidates(attempts)),
+        search.scene.whole / search.duration,
+    )
+    seconds = [
+        tuple(longer * seconds_by_setting.get(attempt.setting, np.array([attempt.seconds]))) for attempt in attempts
+    ]
     return [
         SettingChoice(attempt, attempt.error, longer * attempt.calls, float(np.median(took)), False, took)
         for attempt, took in zip(attempts, seconds, strict=True)
@@ -177,12 +182,13 @@ def _fastest_candidates(attempts: list[TriedSetting]) -> list[TriedSetting]:
     """Settings that may be an engine's fastest, or the fastest of all; none where there is only one candidate."""
     rivals = dict[TriedSetting, None]()
     for engine in ("", *dict.fromkeys(attempt.setting.engine for attempt in attempts)):
-        alike = [attempt for attempt in attempts if attempt.setting.engine.startswith(engine)]
-        least = min(attempt.seconds for attempt in alike)
+        attempts_of_engine = [attempt for attempt in attempts if attempt.setting.engine.startswith(engine)]
+        least_seconds = min(attempt.seconds for attempt in attempts_of_engine)
         near = [
             attempt
-            for attempt in alike
-            if attempt.seconds <= (DEFAULT_SECONDS_RATIO if attempt.setting.default else CLOSE_SECONDS_RATIO) * least
+            for attempt in attempts_of_engine
+            if attempt.seconds
+            <= (DEFAULT_SECONDS_RATIO if attempt.setting.default else CLOSE_SECONDS_RATIO) * least_seconds
         ]
         rivals |= dict.fromkeys(near if len(near) > 1 else [])
     return list(rivals)
@@ -192,64 +198,67 @@ def _interleaved_seconds(search: Search, rivals: list[TriedSetting]) -> dict[Set
     """Seconds of each setting in a few rounds, and in more rounds for those that are not far behind the fastest."""
     seconds = _seconds_by_round(search, rivals, FEWEST_ROUNDS)
     middle = {attempt.setting: float(np.median(seconds[attempt.setting])) for attempt in rivals}
-    least: dict[str, float] = {}
+    least_by_engine: dict[str, float] = {}
     for setting, took in middle.items():
-        least[setting.engine] = min(took, least.get(setting.engine, took))
+        least_by_engine[setting.engine] = min(took, least_by_engine.get(setting.engine, took))
     left = [
         attempt
         for attempt in rivals
         if middle[attempt.setting]
-        <= (DEFAULT_DROPPED_RATIO if attempt.setting.default else DROPPED_SECONDS_RATIO) * least[attempt.setting.engine]
+        <= (DEFAULT_DROPPED_RATIO if attempt.setting.default else DROPPED_SECONDS_RATIO)
+        * least_by_engine[attempt.setting.engine]
     ]
-    more = (
+    further_rounds = (
         min(TIMING_ROUNDS, int(LONG_ROUNDS_SECONDS / max(sum(middle[attempt.setting] for attempt in left), 1e-9)))
         - FEWEST_ROUNDS
     )
-    further = _seconds_by_round(search, left, more) if more > 0 and len(left) > 1 else {}
+    further = _seconds_by_round(search, left, further_rounds) if further_rounds > 0 and len(left) > 1 else {}
     return seconds | {
         setting: np.concatenate((seconds[setting], seconds_again)) for setting, seconds_again in further.items()
     }
 
 
-def _seconds_by_round(search: Search, rivals: list[TriedSetting], rounds: int) -> dict[Setting, np.ndarray]:
+def _seconds_by_round(search: Search, rivals: list[TriedSetting], round_count: int) -> dict[Setting, np.ndarray]:
     jobs = [partial(search.scene.solve, attempt.setting, search.duration) for attempt in rivals]
     lasted = [attempt.seconds for attempt in rivals]
-    taken = interleave(jobs, rounds, SHORTEST_TURN, lasted=lasted, clock=time.process_time)
-    return dict(zip((attempt.setting for attempt in rivals), taken, strict=True))
+    seconds_by_setting = interleave(jobs, round_count, SHORTEST_TURN, lasted=lasted, clock=time.process_time)
+    return dict(zip((attempt.setting for attempt in rivals), seconds_by_setting, strict=True))
 
 
-def _cheapest_by_key(timed: list[SettingChoice], keys: Iterable[tuple[str, str]]) -> Winners:
+def _cheapest_by_key(timed_choices: list[SettingChoice], keys: Iterable[tuple[str, str]]) -> Winners:
     """The cheapest setting for every pair of engine and cost in ``keys`` that has any."""
-    return {key: best for key in keys if (best := _cheapest(timed, *key)) is not None}
+    return {key: best for key in keys if (best := _cheapest(timed_choices, *key)) is not None}
 
 
-def _cheapest(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
+def _cheapest(timed_choices: list[SettingChoice], engine: str, cost_kind: str) -> SettingChoice | None:
     """The setting of an engine with the least cost. By seconds, which scatter, a default method is preferred unless it
     is clearly slower.
     """
-    able = [choice for choice in timed if choice.tried.setting.engine.startswith(engine)]
+    able = [choice for choice in timed_choices if choice.tried.setting.engine.startswith(engine)]
     if not able:
         return None
-    best = min(able, key=lambda choice: getattr(choice, kind))
+    best = min(able, key=lambda choice: getattr(choice, cost_kind))
     usual = [
-        choice for choice in able if choice.tried.setting.default and kind == "seconds" and not _is_slower(choice, best)
+        choice
+        for choice in able
+        if choice.tried.setting.default and cost_kind == "seconds" and not _is_slower(choice, best)
     ]
     return min(usual, key=lambda choice: choice.seconds) if usual else best
 
 
 def _is_slower(choice: SettingChoice, best: SettingChoice) -> bool:
     """Whether a setting takes longer than another: significantly so, where both were timed in the same rounds."""
-    both = min(len(choice.rounds), len(best.rounds))
-    if both < FEWEST_ROUNDS:
+    common_rounds = min(len(choice.rounds), len(best.rounds))
+    if common_rounds < FEWEST_ROUNDS:
         return choice.seconds > best.seconds
-    return paired_ratio(choice.rounds[:both], best.rounds[:both])[1] > SLOWER_RATIO
+    return paired_ratio(choice.rounds[:common_rounds], best.rounds[:common_rounds])[1] > SLOWER_RATIO
 
 
 TruthAndOutcomes = tuple[ReferenceTruth, list[SettingChoice], Winners]
 
 
 def _confirmed_over_whole_run(
-    search: Search, timed: list[SettingChoice], winners: Winners, executor: Executor | None
+    search: Search, timed_choices: list[SettingChoice], winners: Winners, executor: Executor | None
 ) -> TruthAndOutcomes:
     """The winners and defaults after runs over the whole scene, refined until they meet the tolerance there; with the
     truth.
@@ -258,18 +267,20 @@ def _confirmed_over_whole_run(
     rung = max(0, search.truth.rung - 1)
     known = reference_truth(scene, search.tolerance, scene.whole, rung, second_method=False, executor=executor)
     ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.ladders()}
-    able = {choice.tried.setting: choice for choice in _winners_and_defaults(timed, winners)}
-    over = Search(scene, known, search.tolerance, scene.whole)
+    able = {choice.tried.setting: choice for choice in _winners_and_defaults(timed_choices, winners)}
+    full_search = Search(scene, known, search.tolerance, scene.whole)
     blocks = [(ladders[setting.curve], choice) for setting, choice in able.items()]
-    confirmed = block_results(partial(_valid_over_run, over), blocks, executor)
-    held = [each.choice for each in confirmed if each.choice is not None]
-    search.tried += [attempt for each in confirmed for attempt in each.failed]
-    return known, held, _cheapest_by_key(held, winners)
+    confirmed = block_results(partial(_valid_over_run, full_search), blocks, executor)
+    confirmed_choices = [confirmation.choice for confirmation in confirmed if confirmation.choice is not None]
+    search.tried += [attempt for confirmation in confirmed for attempt in confirmation.failed]
+    return known, confirmed_choices, _cheapest_by_key(confirmed_choices, winners)
 
 
-def _winners_and_defaults(timed: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
+def _winners_and_defaults(timed_choices: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
     """The winners and the settings of default methods, each once."""
-    return list(dict.fromkeys([*winners.values(), *(choice for choice in timed if choice.tried.setting.default)]))
+    return list(
+        dict.fromkeys([*winners.values(), *(choice for choice in timed_choices if choice.tried.setting.default)])
+    )
 
 
 @dataclass(frozen=True)
@@ -291,13 +302,15 @@ def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) 
     i, first = ladder.values.index(choice.tried.setting.value), choice.tried
     for _ in range(MOST_CONFIRMATIONS):
         ratio = ladder.work(first.setting.value, ladder.values[i])
-        now = search.attempt(ladder.setting(i))
-        now = replace(now, seconds=ratio * choice.seconds) if now.seconds else now
-        failed += [now] if now.status != "ok" else []
-        if search.meets(now):
+        tried = search.attempt(ladder.setting(i))
+        tried = replace(tried, seconds=ratio * choice.seconds) if tried.seconds else tried
+        failed += [tried] if tried.status != "ok" else []
+        if search.meets(tried):
             rounds = tuple(ratio * s for s in choice.rounds)
-            return _ConfirmedSetting(SettingChoice(now, now.error, now.calls, now.seconds, True, rounds), failed)
-        finer = (now.error / search.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0
+            return _ConfirmedSetting(
+                SettingChoice(tried, tried.error, tried.calls, tried.seconds, True, rounds), failed
+            )
+        finer = (tried.error / search.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(tried.error) else 2.0
         wanted = ladder.values[i] / finer
         i = next((k for k in range(i + 1, len(ladder.values)) if ladder.values[k] <= wanted * (1 + 1e-9)), -1)
         if i < 0:
@@ -306,24 +319,28 @@ def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) 
 
 
 def _with_finer_truth(
-    scene: PricedScene, truth: ReferenceTruth, timed: list[SettingChoice], winners: Winners, executor: Executor | None
+    scene: PricedScene,
+    truth: ReferenceTruth,
+    timed_choices: list[SettingChoice],
+    winners: Winners,
+    executor: Executor | None,
 ) -> TruthAndOutcomes:
     """A truth that is more exact than the winners and the defaults, and these with their errors from it: a setting may
     be far better than its tolerance asks, and as good as the reference that it was compared with.
     """
-    shown = _winners_and_defaults(timed, winners)
+    shown = _winners_and_defaults(timed_choices, winners)
     errors = {choice.tried.setting: choice.error for choice in shown}
     if _is_blurred(truth, errors):
         answers = dict(zip(errors, block_results(partial(_whole_answer, scene), errors, executor), strict=True))
         truth, errors = _finer_truth(scene, truth, answers, executor)
-    told = {
+    choices_with_errors = {
         choice.tried.setting: replace(choice, error=max(errors[choice.tried.setting], truth.uncertainty))
         for choice in shown
     }
     return (
         truth,
-        [told.get(choice.tried.setting, choice) for choice in timed],
-        {key: told[choice.tried.setting] for key, choice in winners.items()},
+        [choices_with_errors.get(choice.tried.setting, choice) for choice in timed_choices],
+        {key: choices_with_errors[choice.tried.setting] for key, choice in winners.items()},
     )
 
 
@@ -342,30 +359,30 @@ def _is_blurred(truth: ReferenceTruth, errors: dict[Setting, float]) -> bool:
 
 
 def _finer_truth(
-    scene: PricedScene, known: ReferenceTruth, answers: dict[Setting, PricedRun], executor: Executor | None
+    scene: PricedScene, truth: ReferenceTruth, priced_runs: dict[Setting, PricedRun], executor: Executor | None
 ) -> tuple[ReferenceTruth, dict[Setting, float]]:
     """A truth that is exact enough for the errors of all answers, or the best that time allows, and these errors."""
-    errors = {setting: known.error(answer) for setting, answer in answers.items()}
-    while _is_blurred(known, errors):
+    errors = {setting: truth.error(answer) for setting, answer in priced_runs.items()}
+    while _is_blurred(truth, errors):
         try:
-            tolerance = scene.reference().confirmation_divisor * known.uncertainty
-            finer = reference_truth(scene, tolerance, scene.whole, known.rung, second_method=False, executor=executor)
+            tolerance = scene.reference().confirmation_divisor * truth.uncertainty
+            finer = reference_truth(scene, tolerance, scene.whole, truth.rung, second_method=False, executor=executor)
         except (InputError, RunFailed):
             break  # as well known as rounding and the reference's finest step let it be
-        if not finer.uncertainty < known.uncertainty:
+        if not finer.uncertainty < truth.uncertainty:
             break
-        known, errors = finer, {setting: finer.error(answer) for setting, answer in answers.items()}
-    return known, errors
+        truth, errors = finer, {setting: finer.error(answer) for setting, answer in priced_runs.items()}
+    return truth, errors
 
 
-def _default_cost(search: Search, ladder: SettingLadder, timed: list[SettingChoice]) -> Default | None:
+def _default_cost(search: Search, ladder: SettingLadder, timed_choices: list[SettingChoice]) -> Default | None:
     """Error and cost of an engine's default settings, and the cost at which they meet the tolerance."""
     curve = f"{ladder.engine} {ladder.method}"
     tried = [attempt for attempt in search.tried if attempt.setting.curve == curve]
     if not tried:
         return None
     as_it_is = min(tried, key=lambda attempt: abs(np.log(attempt.setting.value / ladder.default)))
-    met = next((attempt for attempt in timed if attempt.tried.setting.curve == curve), None)
+    met = next((attempt for attempt in timed_choices if attempt.tried.setting.curve == curve), None)
     clear = [attempt for attempt in tried if attempt.status == "ok"]
     if met is not None or not clear:
         return Default(as_it_is, met, False)

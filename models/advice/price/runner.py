@@ -67,9 +67,9 @@ class Point:
     changed: bool | None = None
     broken: tuple[str, ...] = ()
 
-    def cost(self, kind: str) -> float:
+    def cost(self, cost_kind: str) -> float:
         """Cost of this kind: a count, or the median of the seconds."""
-        return float(np.median(self.seconds)) if kind == "seconds" else float(self.counts[kind])
+        return float(np.median(self.seconds)) if cost_kind == "seconds" else float(self.counts[cost_kind])
 
 
 @dataclass(frozen=True)
@@ -144,12 +144,12 @@ class MeasuredPoints:
                 points_of[p.setting.curve].append(p)
         return points_of
 
-    def front(self, kind: str) -> list[Point]:
+    def front(self, cost_kind: str) -> list[Point]:
         """Points that no other point beats in both cost and error, in the order of rising cost, without errors below
         ``judging_floor``.
         """
         clear = [p for p in self.points if p.status == "ok" and self.error(p) >= self.judging_floor()]
-        return [clear[i] for i in pareto([p.cost(kind) for p in clear], list(map(self.error, clear)))]
+        return [clear[i] for i in pareto([p.cost(cost_kind) for p in clear], list(map(self.error, clear)))]
 
     def observed_orders(self, quantity: str) -> dict[str, float]:
         """Observed order of convergence of each curve: in the step, or in 1 / force calls for adaptive methods."""
@@ -175,8 +175,8 @@ class MeasuredPoints:
             steps = round(self.duration / p.setting.value)
             calls = p.setting.stages * steps
             if p.status == "ok" and p.setting.stages and (p.counts["steps"], p.counts["force calls"]) != (steps, calls):
-                told = f"{p.counts['force calls']} instead of {calls}"
-                wrong.append(f"{p.setting.curve} {p.setting.label()}: {told}")
+                count_text = f"{p.counts['force calls']} instead of {calls}"
+                wrong.append(f"{p.setting.curve} {p.setting.label()}: {count_text}")
         return wrong
 
     def reaches(self, target: float, kind: str, extrapolate: bool = False) -> CostsAtTolerance:
@@ -185,42 +185,44 @@ class MeasuredPoints:
             curve: self._cost_at_tolerance(points, target, [p.cost(kind) for p in points], extrapolate)
             for curve, points in self.curves().items()
         }
-        return {curve: least for curve, least in reaches.items() if least is not None}
+        return {curve: cheapest for curve, cheapest in reaches.items() if cheapest is not None}
 
     def _cost_at_tolerance(
-        self, points: list[Point], target: float, costs: Sequence[float], extrapolate: bool = True
+        self, points: list[Point], target_error: float, costs: Sequence[float], extrapolate: bool = True
     ) -> ToleranceCost | None:
         """Cost at which the points of one curve meet a target, by ``curves.reach``."""
         order = 0 if points[0].setting.adaptive else points[0].setting.order
         values = [p.setting.value for p in points]
-        return reach(values, list(map(self.error, points)), costs, target, order, extrapolate)
+        return reach(values, list(map(self.error, points)), costs, target_error, order, extrapolate)
 
-    def loss(self, target: float, kind: str, default: str, engine: str = "") -> Loss | None:
+    def loss(self, target_error: float, cost_kind: str, default: str, engine: str = "") -> Loss | None:
         """Loss of the curve ``default`` compared with the cheapest curve of ``engine`` ("" for all engines); None if no
         curve meets the target.
         """
-        best = cheapest_curve(self.reaches(target, kind), engine)
-        usual = self.reaches(target, kind, extrapolate=True).get(default)
+        best = cheapest_curve(self.reaches(target_error, cost_kind), engine)
+        usual = self.reaches(target_error, cost_kind, extrapolate=True).get(default)
         if best is None or usual is None:
             return None
         factor = low = high = usual.cost / best[1].cost
-        if kind == "seconds" and best[0] != default:
-            pair = [bracketing_points(self.curves()[curve], least) for curve, least in ((default, usual), best)]
+        if cost_kind == "seconds" and best[0] != default:
+            pair = [bracketing_points(self.curves()[curve], cheapest) for curve, cheapest in ((default, usual), best)]
             rounds = min(len(p.seconds) for side in pair for p in side)
             if rounds < FEWEST_ROUNDS:
                 return Loss(factor, math.nan, math.nan, usual.how)
-            sides = [self._bootstrapped_seconds(side, target, rounds) for side in pair]
+            sides = [self._bootstrapped_seconds(side, target_error, rounds) for side in pair]
             factor, low, high = interval(sides[0] / sides[1])
         return Loss(factor, low, high, usual.how)
 
-    def _bootstrapped_seconds(self, side: list[Point], target: float, rounds: int) -> np.ndarray:
+    def _bootstrapped_seconds(self, bracketing: list[Point], target_error: float, round_count: int) -> np.ndarray:
         """Seconds that a curve needs to meet a target, from the points that its interpolation uses, one value per
         bootstrap sample of the rounds that both have.
         """
-        kept = [np.array(p.seconds)[:: len(p.seconds) // rounds][:rounds] for p in side]
-        medians = np.array([np.median(seconds[resamples(rounds, BOOTSTRAP_DRAWS)], axis=1) for seconds in kept])
-        cheapest_reaches = [self._cost_at_tolerance(side, target, costs) for costs in medians.T]
-        return np.array([least.cost for least in cheapest_reaches if least is not None])
+        timed_rounds = [np.array(p.seconds)[:: len(p.seconds) // round_count][:round_count] for p in bracketing]
+        medians = np.array(
+            [np.median(seconds[resamples(round_count, BOOTSTRAP_DRAWS)], axis=1) for seconds in timed_rounds]
+        )
+        cheapest_reaches = [self._cost_at_tolerance(bracketing, target_error, costs) for costs in medians.T]
+        return np.array([cheapest.cost for cheapest in cheapest_reaches if cheapest is not None])
 
     def points_to_time(self) -> list[Point]:
         """Points that are timed in several rounds because their seconds in a single run are decisive: default settings,
@@ -238,15 +240,19 @@ class MeasuredPoints:
             for engine in ("", *COMPARED_ENGINES, *(p.setting.engine for p in usual)):
                 near |= _nearly_cheapest(met, engine)
             near |= {p.setting.curve: refined[p.setting.curve] for p in usual if p.setting.curve in refined}
-            rests = (p for curve, least in near.items() for p in bracketing_points(curves[curve], least))
+            rests = (p for curve, cheapest in near.items() for p in bracketing_points(curves[curve], cheapest))
             chosen += [p for p in rests if target == self.middle or p.cost("seconds") <= LONG_RUN_SECONDS]
         return list({p.setting: p for p in chosen}.values())
 
 
 def measured_points(problem: Problem, points: Iterable[Point]) -> MeasuredPoints:
     """The points of a problem, with the facts about it."""
-    told = {each.name: getattr(problem, each.name) for each in fields(MeasuredPoints) if each.name != "points"}
-    return MeasuredPoints(**told, points=list(points))
+    problem_facts = {
+        problem_field.name: getattr(problem, problem_field.name)
+        for problem_field in fields(MeasuredPoints)
+        if problem_field.name != "points"
+    }
+    return MeasuredPoints(**problem_facts, points=list(points))
 
 
 TUPLE_KEYS = ("seconds", "broken")
@@ -266,11 +272,11 @@ def attempt(problem: Problem, setting: Setting) -> Point:
     """Try one setting. Its status is ok, raised (the run failed with a message), refused (it was not run), flagged (the
     solution has a ``doubt``), or SILENT (the answer is not finite, or absurd, without any message).
     """
-    begun = PROCESSOR_CLOCK()
+    start_time = PROCESSOR_CLOCK()
     try:
         with collected_breaches() as broken:
             solution = problem.build(setting).run()
-            seconds, errors = PROCESSOR_CLOCK() - begun, problem.errors(solution)
+            seconds, errors = PROCESSOR_CLOCK() - start_time, problem.errors(solution)
     except InputError as error:
         return Point(setting, "refused", str(error))
     except RunFailed as error:
@@ -297,9 +303,9 @@ def attempt(problem: Problem, setting: Setting) -> Point:
     )
 
 
-def measure(problem: Problem, quick: bool, rounds: int, minimum_seconds: float) -> MeasuredPoints:
-    """All points of a problem. Those that are decisive have the seconds of ``rounds`` interleaved rounds, the others
-    those of one run.
+def measure(problem: Problem, quick: bool, round_count: int, minimum_seconds: float) -> MeasuredPoints:
+    """All points of a problem. Those that are decisive have the seconds of ``round_count`` interleaved rounds, the
+    others those of one run.
 
     Seconds are those of building the model and running it, input tables included, for every engine alike.
     """
@@ -307,32 +313,36 @@ def measure(problem: Problem, quick: bool, rounds: int, minimum_seconds: float) 
     for first in {setting.curve: setting for setting in reversed(settings)}.values():
         attempt(problem, first)  # imports and compiled code are loaded before anything is timed
     once = measured_points(problem, [attempt(problem, setting) for setting in settings])
-    rerun = _timed_points(problem, once.points_to_time(), rounds, minimum_seconds)
+    rerun = _timed_points(problem, once.points_to_time(), round_count, minimum_seconds)
     return replace(once, points=[rerun.get(p.setting, p) for p in once.points])
 
 
-def _timed_points(problem: Problem, points: list[Point], rounds: int, minimum_seconds: float) -> dict[Setting, Point]:
+def _timed_points(
+    problem: Problem, points: list[Point], round_count: int, minimum_seconds: float
+) -> dict[Setting, Point]:
     """The points with the seconds of their rounds, and whether counts or errors of the last run differ from the first
     one's.
     """
-    last: dict[Setting, Any] = {}
+    last_runs: dict[Setting, Any] = {}
 
     def run(setting: Setting) -> None:
-        last[setting] = problem.build(setting).run()
+        last_runs[setting] = problem.build(setting).run()
 
     lasted = [p.cost("seconds") for p in points]
-    apart = -(-rounds // FEWEST_ROUNDS) if rounds >= FEWEST_ROUNDS else rounds
-    every = [apart if seconds > SLOW_RUN_SECONDS else 1 for seconds in lasted]
+    interval_of_slow = -(-round_count // FEWEST_ROUNDS) if round_count >= FEWEST_ROUNDS else round_count
+    round_intervals = [interval_of_slow if seconds > SLOW_RUN_SECONDS else 1 for seconds in lasted]
     jobs = [partial(run, p.setting) for p in points]
-    timed = interleave(jobs, rounds, minimum_seconds, lasted=lasted, round_interval=every, clock=PROCESSOR_CLOCK)
+    timed = interleave(
+        jobs, round_count, minimum_seconds, lasted=lasted, round_interval=round_intervals, clock=PROCESSOR_CLOCK
+    )
     return {
         p.setting: replace(
             p,
             seconds=tuple(seconds[np.isfinite(seconds)].tolist()),
-            changed=dict(last[p.setting].counts) != p.counts or problem.errors(last[p.setting]) != p.errors,
+            changed=dict(last_runs[p.setting].counts) != p.counts or problem.errors(last_runs[p.setting]) != p.errors,
         )
         for p, seconds in zip(points, timed, strict=True)
-        if p.setting in last
+        if p.setting in last_runs
     }
 
 
@@ -340,9 +350,9 @@ def _nearly_cheapest(reaches: CostsAtTolerance, engine: str) -> CostsAtTolerance
     """The cheapest curve of one engine, or of all, and the curves that are little slower."""
     best = cheapest_curve(reaches, engine)
     return {
-        curve: least
-        for curve, least in reaches.items()
-        if best and curve.startswith(engine) and least.cost <= CLOSE_SECONDS_RATIO * best[1].cost
+        curve: cheapest
+        for curve, cheapest in reaches.items()
+        if best and curve.startswith(engine) and cheapest.cost <= CLOSE_SECONDS_RATIO * best[1].cost
     }
 
 

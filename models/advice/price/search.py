@@ -62,19 +62,19 @@ class Search:
 
     def search_all_ladders(self) -> "Search":
         """Search every ladder, methods of high order first. Their cost decides where other ladders are given up."""
-        for ladder in {each.engine: each for each in self.scene.ladders()}.values():
+        for ladder in {any_ladder.engine: any_ladder for any_ladder in self.scene.ladders()}.values():
             self._warm_up(ladder)
-        for ladder in sorted(self.scene.ladders(), key=lambda each: (each.adaptive, -each.order)):
+        for ladder in sorted(self.scene.ladders(), key=lambda any_ladder: (any_ladder.adaptive, -any_ladder.order)):
             self.search_ladder(ladder)
         return self
 
     def attempt(self, setting: Setting) -> TriedSetting:
         """Try a setting and record its outcome."""
-        begun = time.process_time()
+        start_time = time.process_time()
         try:
             with collected_breaches() as broken:
                 solution = self.scene.solve(setting, self.duration)
-                seconds, answer = time.process_time() - begun, self.scene.answer(solution)
+                seconds, answer = time.process_time() - start_time, self.scene.answer(solution)
         except InputError as error:
             attempt = TriedSetting(setting, "refused", getattr(error, "why", "") or error.allowed)
         except RunFailed as error:
@@ -85,9 +85,9 @@ class Search:
             if not error_of <= LARGEST_RELATIVE_ERROR * max(self.truth.size, self.tolerance):
                 why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result"
                 attempt = replace(attempt, status="SILENT", reason=why)
-            elif alone := self.truth.beside(broken):
+            elif broken_by_setting := self.truth.beside(broken):
                 attempt = replace(
-                    attempt, status="flagged", reason="; ".join(assumption.brief() for assumption in alone)
+                    attempt, status="flagged", reason="; ".join(assumption.brief() for assumption in broken_by_setting)
                 )
         self.tried.append(attempt)
         return attempt
@@ -103,19 +103,19 @@ class Search:
         """Find a ladder's coarsest setting that meets the tolerance, nearly by bisection. The declared order, or
         another engine with the same method, predicts which rung to try next.
         """
-        low, high, last, same = 0, len(ladder.values), None, self._value_in_another_engine(ladder)
+        low, high, last_tried, same_method_value = 0, len(ladder.values), None, self._value_in_another_engine(ladder)
         while low < high:
-            i = _next_rung(ladder, low, high, last, self.tolerance)
-            if same and (last is not None or not ladder.default):
-                i, same = _rung_for_target(ladder, same, low, high), 0.0
-            if ladder.default and last is not None and self.settings_that_meet(ladder.engine):
-                i = min(i, self._finest_affordable_rung(ladder, last))
-            if i < low or self._is_hopeless(ladder, i, last) or self._too_long(ladder, i, last):
+            i = _next_rung(ladder, low, high, last_tried, self.tolerance)
+            if same_method_value and (last_tried is not None or not ladder.default):
+                i, same_method_value = _rung_for_target(ladder, same_method_value, low, high), 0.0
+            if ladder.default and last_tried is not None and self.settings_that_meet(ladder.engine):
+                i = min(i, self._finest_affordable_rung(ladder, last_tried))
+            if i < low or self._is_hopeless(ladder, i, last_tried) or self._too_long(ladder, i, last_tried):
                 return
-            last = self.attempt(ladder.setting(i))
-            if self.meets(last):
+            last_tried = self.attempt(ladder.setting(i))
+            if self.meets(last_tried):
                 high = i
-            elif ladder.cells and last.status in ("refused", "raised"):
+            elif ladder.cells and last_tried.status in ("refused", "raised"):
                 return  # its step is too long, however many cells there are
             else:
                 low = i + 1
@@ -130,19 +130,19 @@ class Search:
 
     def _value_in_another_engine(self, ladder: SettingLadder) -> float:
         """The setting's value that the same method needs in another engine, 0 where none has it."""
-        alike = [
+        values_of_method = [
             attempt.setting.value for attempt in self.settings_that_meet() if attempt.setting.method == ladder.method
         ]
-        return max((value for value in alike if value in ladder.values), default=0.0)
+        return max((value for value in values_of_method if value in ladder.values), default=0.0)
 
     def _finest_affordable_rung(self, ladder: SettingLadder, last_tried: TriedSetting) -> int:
         """The finest rung whose run takes no longer than REFINED_SECONDS, or than the engine's fastest setting that
         meets the tolerance.
         """
         best = min(attempt.seconds for attempt in self.settings_that_meet(ladder.engine))
-        most = max(REFINED_SECONDS, best) / max(last_tried.seconds, 1e-9)
+        largest_work = max(REFINED_SECONDS, best) / max(last_tried.seconds, 1e-9)
         work = [ladder.work(last_tried.setting.value, value) for value in ladder.values]
-        return max(i for i, times in enumerate(work) if i == 0 or times <= most)
+        return max(i for i, work_ratio in enumerate(work) if i == 0 or work_ratio <= largest_work)
 
     def _is_hopeless(self, ladder: SettingLadder, i: int, last_tried: TriedSetting | None) -> bool:
         """Whether a rung would cost far more than another setting of its engine that meets the tolerance."""
@@ -191,7 +191,7 @@ def _next_rung(ladder: SettingLadder, low: int, high: int, last_tried: TriedSett
     return _rung_for_target(ladder, wanted, low, high)
 
 
-def _rung_for_target(ladder: SettingLadder, target: float, low: int, high: int) -> int:
-    """The coarsest of the remaining rungs that is no coarser than ``target``."""
-    i = bisect_left(ladder.values, -target * (1 + 1e-9), key=lambda value: -value)
+def _rung_for_target(ladder: SettingLadder, target_value: float, low: int, high: int) -> int:
+    """The coarsest of the remaining rungs that is no coarser than ``target_value``."""
+    i = bisect_left(ladder.values, -target_value * (1 + 1e-9), key=lambda value: -value)
     return min(max(i, low), high - 1)

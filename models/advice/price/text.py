@@ -47,20 +47,20 @@ def recommendation_lines(recommendation: Recommendation) -> list[str]:
 def _table(recommendation: Recommendation) -> list[str]:
     rows, unit = [TABLE_HEADING.format(counted=recommendation.scene.counted)], recommendation.scene.unit
     for (engine, kinds), choice in _merged_winners(recommendation.winners).items():
-        who = f"{LABELS[engine] if engine else 'all'}, by {kinds}"
+        winner_text = f"{LABELS[engine] if engine else 'all'}, by {kinds}"
         rows.append(
-            f"  {who:<24}{_setting_text(choice.tried.setting, not engine):<36}{choice.error:>9.2g} {unit}"
+            f"  {winner_text:<24}{_setting_text(choice.tried.setting, not engine):<36}{choice.error:>9.2g} {unit}"
             f"{choice.calls:>16,.0f}   {cost(choice.rounds or (choice.seconds,))}"
         )
-    over = (
+    duration_text = (
         " over the whole run"
         if recommendation.whole or all(choice.confirmed for choice in recommendation.winners.values())
         else ""
     )
     return [
         *rows,
-        f"  errors are measured{over}, against the truth; times are those of this machine's processor, model built "
-        "anew: median and range of interleaved runs, or of one run",
+        f"  errors are measured{duration_text}, against the truth; times are those of this machine's processor, "
+        "model built anew: median and range of interleaved runs, or of one run",
     ]
 
 
@@ -86,8 +86,8 @@ def _no_setting_lines(recommendation: Recommendation) -> list[str]:
     ]
 
 
-def _setting_text(setting: Setting, whole: bool) -> str:
-    engine = f"{LABELS[setting.engine]} " if whole else ""
+def _setting_text(setting: Setting, with_engine: bool) -> str:
+    engine = f"{LABELS[setting.engine]} " if with_engine else ""
     return f"{engine if setting.method != setting.engine else ''}{setting.method}, {setting.label()}"
 
 
@@ -97,8 +97,8 @@ def _default_lines(recommendation: Recommendation) -> list[str]:
         tried = default.as_it_is
         known = max(tried.error, recommendation.search_truth.uncertainty)
         error = f"{'' if known == tried.error else 'below '}{known:.2g} {recommendation.scene.unit}"
-        over = "" if recommendation.whole else f" over {recommendation.scene.first:g} s"
-        as_it_is = f"{error}{over}" if tried.status == "ok" else tried.status
+        duration_text = "" if recommendation.whole else f" over {recommendation.scene.first:g} s"
+        as_it_is = f"{error}{duration_text}" if tried.status == "ok" else tried.status
         lost = _cost_of_default_text(recommendation, engine, default.refined, default.extrapolated)
         rows.append(f"  {LABELS[engine]}'s default, {_setting_text(tried.setting, False)}: {as_it_is}{lost}")
     return rows if recommendation.defaults else []
@@ -162,20 +162,20 @@ def as_dict(recommendation: Recommendation) -> dict[str, Any]:
         "duration": scene.whole,
         "truth": recommendation.truth.origin,
         "uncertainty": recommendation.truth.uncertainty,
-        "broken assumptions": [asdict(each) for each in recommendation.truth.broken_assumptions],
+        "broken assumptions": [asdict(entry) for entry in recommendation.truth.broken_assumptions],
         "cheapest": [
-            {"engine": engine or "all", "by": kind, **_choice_as_json(each)}
-            for (engine, kind), each in recommendation.winners.items()
+            {"engine": engine or "all", "by": kind, **_choice_as_json(entry)}
+            for (engine, kind), entry in recommendation.winners.items()
         ],
         "defaults": {
             engine: {
-                "as it is": _tried_as_json(each.as_it_is),
-                "extrapolated": each.extrapolated,
-                "refined": None if each.refined is None else _choice_as_json(each.refined),
+                "as it is": _tried_as_json(entry.as_it_is),
+                "extrapolated": entry.extrapolated,
+                "refined": None if entry.refined is None else _choice_as_json(entry.refined),
             }
-            for engine, each in recommendation.defaults.items()
+            for engine, entry in recommendation.defaults.items()
         },
-        "tried": [_tried_as_json(each) for each in recommendation.tried],
+        "tried": [_tried_as_json(entry) for entry in recommendation.tried],
     }
 
 
@@ -185,5 +185,5 @@ def _choice_as_json(choice: SettingChoice) -> dict[str, Any]:
 
 def _tried_as_json(attempt: TriedSetting) -> dict[str, Any]:
     setting = {name: getattr(attempt.setting, name) for name in ("engine", "method", "value")}
-    told = {name: getattr(attempt, name) for name in ("status", "reason", "error", "seconds")}
-    return {**setting, **told, "error": attempt.error if attempt.status == "ok" else None}
+    outcome = {name: getattr(attempt, name) for name in ("status", "reason", "error", "seconds")}
+    return {**setting, **outcome, "error": attempt.error if attempt.status == "ok" else None}

@@ -59,34 +59,34 @@ class ReferenceTruth:
         return float(np.abs(self.answer.values).max())
 
 
-def values_at(answer: PricedRun, times: np.ndarray, kink_period: float = 0.0) -> np.ndarray:
+def values_at(priced_run: PricedRun, times: np.ndarray, kink_period: float = 0.0) -> np.ndarray:
     """Values (m, k) of an answer at ``times`` (m,) in s: its rows where they coincide, else cubic interpolation in four
     rows within one kink period.
     """
-    last = len(answer.times) - 1
-    step = float(answer.times[-1]) / last
-    place = times / step
-    index = np.rint(place).astype(int)
-    if np.abs(place - index).max() < ROW_TIME_ROUNDING:
-        return answer.values[np.minimum(index, last)]
-    rows = max(3, round(kink_period / step)) if kink_period else last
-    first = np.minimum((place + ROW_TIME_ROUNDING) // rows * rows, last - 3).astype(int)
-    left = np.clip(np.floor(place).astype(int) - 1, first, np.minimum(first + rows, last) - 3)
-    s = place - left
+    last_row = len(priced_run.times) - 1
+    step = float(priced_run.times[-1]) / last_row
+    row_position = times / step
+    index = np.rint(row_position).astype(int)
+    if np.abs(row_position - index).max() < ROW_TIME_ROUNDING:
+        return priced_run.values[np.minimum(index, last_row)]
+    rows = max(3, round(kink_period / step)) if kink_period else last_row
+    first_row = np.minimum((row_position + ROW_TIME_ROUNDING) // rows * rows, last_row - 3).astype(int)
+    left = np.clip(np.floor(row_position).astype(int) - 1, first_row, np.minimum(first_row + rows, last_row) - 3)
+    s = row_position - left
     weights = (
         -(s - 1) * (s - 2) * (s - 3) / 6,
         s * (s - 2) * (s - 3) / 2,
         -s * (s - 1) * (s - 3) / 2,
         s * (s - 1) * (s - 2) / 6,
     )
-    return sum((w[:, None] * answer.values[left + i] for i, w in enumerate(weights)), np.zeros((1, 1)))
+    return sum((w[:, None] * priced_run.values[left + i] for i, w in enumerate(weights)), np.zeros((1, 1)))
 
 
 def reference_truth(
     scene: PricedScene,
     tolerance: float,
     duration: float,
-    rung: int = 0,
+    first_rung: int = 0,
     second_method: bool = True,
     executor: Executor | None = None,
 ) -> ReferenceTruth:
@@ -99,29 +99,33 @@ def reference_truth(
     ends.
     """
     ladder = scene.reference()
-    settled, rung, change, seconds, broken = _settled_answer(scene, ladder, tolerance, duration, rung, executor)
-    said = _setting_text(ladder.setting(rung))
-    other = scene.second(ladder.setting(rung)) if second_method else None
+    settled, first_rung, change, seconds, broken = _settled_answer(
+        scene, ladder, tolerance, duration, first_rung, executor
+    )
+    change_text = _setting_text(ladder.setting(first_rung))
+    second_setting = scene.second(ladder.setting(first_rung)) if second_method else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
     finer = ladder.said or finer
-    alone = ReferenceTruth(
-        settled, change, f"{said}; {finer}", rung, scene.kink_period, seconds, tuple(broken.values())
+    truth_of_halving = ReferenceTruth(
+        settled, change, f"{change_text}; {finer}", first_rung, scene.kink_period, seconds, tuple(broken.values())
     )
-    if other is None:
-        return alone
-    differs = alone.error(scene.answer(scene.solve(other, duration)))
-    both = f"{said} and {_setting_text(other)}"
+    if second_setting is None:
+        return truth_of_halving
+    differs = truth_of_halving.error(scene.answer(scene.solve(second_setting, duration)))
+    both_settings = f"{change_text} and {_setting_text(second_setting)}"
     if differs > tolerance / AGREEMENT_FACTOR:
-        raise RunFailed("reference", f"{both} differ by {differs:.3g} {scene.unit}: the tolerance cannot be judged")
-    return replace(alone, uncertainty=max(change, differs), origin=f"{both}, which differ by")
+        raise RunFailed(
+            "reference", f"{both_settings} differ by {differs:.3g} {scene.unit}: the tolerance cannot be judged"
+        )
+    return replace(truth_of_halving, uncertainty=max(change, differs), origin=f"{both_settings}, which differ by")
 
 
-def _change_by_halving(scene: PricedScene, coarse: PricedRun, fine: PricedRun) -> float:
+def _change_by_halving(scene: PricedScene, coarse_run: PricedRun, fine_run: PricedRun) -> float:
     """Largest difference between an answer and that with half the step, at the rows of both; the coarser answer is
     interpolated between its rows.
     """
-    both = ((fine, coarse), (coarse, fine))
-    return max(ReferenceTruth(run, 0.0, "", 0, scene.kink_period).error(other) for run, other in both)
+    run_pairs = ((fine_run, coarse_run), (coarse_run, fine_run))
+    return max(ReferenceTruth(run, 0.0, "", 0, scene.kink_period).error(other_run) for run, other_run in run_pairs)
 
 
 def _setting_text(setting: Setting) -> str:
@@ -140,41 +144,46 @@ class _Rung(NamedTuple):
 
 
 def _reference_on_rung(scene: PricedScene, duration: float, setting: Setting) -> _Rung:
-    begun = time.process_time()
+    start_time = time.process_time()
     with collected_breaches() as broken:
         try:
             answer = scene.answer(scene.solve(setting, duration))
         except (InputError, RunFailed) as error:
             return _Rung(None, str(error), 0.0, broken)
-    return _Rung(answer, "", time.process_time() - begun, broken)
+    return _Rung(answer, "", time.process_time() - start_time, broken)
 
 
 def _settled_answer(
-    scene: PricedScene, ladder: SettingLadder, tolerance: float, duration: float, rung: int, executor: Executor | None
+    scene: PricedScene,
+    ladder: SettingLadder,
+    tolerance: float,
+    duration: float,
+    first_rung: int,
+    executor: Executor | None,
 ) -> tuple[PricedRun, int, float, float, dict[str, BrokenAssumption]]:
     """The first answer of the reference that the next finer rung changed by no more than a fraction of the tolerance;
     with its rung, the change, the processor seconds and the assumptions that it broke.
     """
-    before: PricedRun | None = None
+    coarser_run: PricedRun | None = None
     change, failure = float("inf"), ""
-    rungs = [i for i in range(rung, len(ladder.values)) if duration / ladder.values[i] <= MOST_ROWS]
+    rungs = [i for i in range(first_rung, len(ladder.values)) if duration / ladder.values[i] <= MOST_ROWS]
     job = partial(_reference_on_rung, scene, duration)
     together = [ladder.setting(i) for i in rungs[:2]] if executor is not None else []
     ready = dict(zip(rungs, block_results(job, together, executor), strict=False))
     for i in rungs:
-        now, failed, seconds, broken = ready.pop(i, None) or job(ladder.setting(i))
-        if now is None:
-            before, failure = None, failed
+        finer_run, failed, seconds, broken = ready.pop(i, None) or job(ladder.setting(i))
+        if finer_run is None:
+            coarser_run, failure = None, failed
             continue
-        if before is not None:
-            last, change = change, _change_by_halving(scene, before, now)
+        if coarser_run is not None:
+            last_change, change = change, _change_by_halving(scene, coarser_run, finer_run)
             if change <= tolerance / ladder.confirmation_divisor:
-                return now, i, change, seconds, broken
-            if change > 0.7 * last and change < 1e-6 * float(np.abs(now.values).max()):
+                return finer_run, i, change, seconds, broken
+            if change > 0.7 * last_change and change < 1e-6 * float(np.abs(finer_run.values).max()):
                 break  # rounding: finer steps no longer help
-        before = now
-    if before is None:
+        coarser_run = finer_run
+    if coarser_run is None:
         raise RunFailed("reference", failure or "no step is fine enough")
-    least = f"{ladder.confirmation_divisor * change:.2g} {scene.unit}"
-    allowed = f"is finer than the scene's own reference can be known here: at least {least}"
+    least_tolerance = f"{ladder.confirmation_divisor * change:.2g} {scene.unit}"
+    allowed = f"is finer than the scene's own reference can be known here: at least {least_tolerance}"
     raise InputError("--tolerance", "", tolerance, allowed)

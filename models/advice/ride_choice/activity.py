@@ -44,17 +44,17 @@ def activity_by_element(full_scene: FullScene) -> dict[str, float]:
             watts[f"damper {name}"] = c * s_v**2
 
     for spring in vehicle.springs:
-        apart = motion.shift(spring.second_body, spring.second_point) - motion.shift(
+        extension = motion.shift(spring.second_body, spring.second_point) - motion.shift(
             spring.first_body, spring.first_point
         )
-        elastic(spring.name, *slopes_at_rest(spring), np.array(spring.axis) @ apart)
+        elastic(spring.name, *slopes_at_rest(spring), np.array(spring.axis) @ extension)
     for bar in vehicle.bars:
         risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
         elastic(bar.name, bar.stiffness, bar.damping, motion.coordinate(bar.body, "rx") - risen / bar.track)
     for element in vehicle.joint_elements:
-        places = zip(element.coordinates, element.factors, strict=True)
-        along = sum(factor * motion.coordinate(*place) for place, factor in places)
-        elastic(element.name, element.stiffness, element.damping, np.asarray(along))
+        coordinate_factors = zip(element.coordinates, element.factors, strict=True)
+        displacement = sum(factor * motion.coordinate(*body_freedom) for body_freedom, factor in coordinate_factors)
+        elastic(element.name, element.stiffness, element.damping, np.asarray(displacement))
     heights = np.hstack([np.zeros((len(vehicle.tyres), 2 * n)), *full_scene.excitation.heights])
     for tyre, height in zip(vehicle.tyres, heights, strict=True):
         row = motion.shift(tyre.body, tyre.point)[2]

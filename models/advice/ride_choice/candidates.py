@@ -57,14 +57,14 @@ class Candidates:
         self.full_scenes = [FullScene(scene, float(speed), self.vehicles) for speed in speeds]
         names = self.full_scenes[0].full.system.names
         self.quantities, self.rows = tuple(quantities), [names.index(name) for name in quantities]
-        few = min(SCREENED_SPEEDS, len(speeds))
-        self.screened = [self.full_scenes[i] for i in np.linspace(0, len(speeds) - 1, few).round().astype(int)]
+        speed_count = min(SCREENED_SPEEDS, len(speeds))
+        self.screened = [self.full_scenes[i] for i in np.linspace(0, len(speeds) - 1, speed_count).round().astype(int)]
         self._suspects, self.full = list(self.screened), list[np.ndarray]()
         for full_scene in self.full_scenes:
             variances, silent = whole_variances(full_scene.full, self.rows)
             self.full.append(variances)
-            for name, variance, least in zip(quantities, variances, silent, strict=True):
-                if not least < variance < inf:
+            for name, variance, smallest_variance in zip(quantities, variances, silent, strict=True):
+                if not smallest_variance < variance < inf:
                     allowed = "has no finite standard deviation above zero in this scene, so nothing to hold it to"
                     raise InputError("", f"quantities.{name}", None, allowed)
         Screen(self.full_scenes[0].full, self.rows)  # refuses a vehicle that cannot be screened
@@ -79,9 +79,12 @@ class Candidates:
 
     def _row_and_weighting(self, quantity: str) -> tuple[int, str]:
         """For a quantity, the row of the vehicle's output and the name of its weighting, "" if it has none."""
-        weighted = {f"{name} {by}": (name, by) for name, by in self.scene.ride.weighting.items()}
-        name, by = weighted.get(quantity, (quantity, ""))
-        return [output.name for output in self.scene.vehicle.outputs].index(name), by
+        weighted = {
+            f"{name} {weighting_name}": (name, weighting_name)
+            for name, weighting_name in self.scene.ride.weighting.items()
+        }
+        name, weighting_name = weighted.get(quantity, (quantity, ""))
+        return [output.name for output in self.scene.vehicle.outputs].index(name), weighting_name
 
     @property
     def counts(self) -> dict[str, int]:
@@ -108,8 +111,8 @@ class Candidates:
         return self._screen(full_scene, base | {effect for effect in omitted_effects if effect.name in needs})
 
     @cached_in_object
-    def _screen(self, full_scene: FullScene, base: EffectSet) -> Screen | None:
-        reduced = self.system(full_scene, base)
+    def _screen(self, full_scene: FullScene, reduced_scene: EffectSet) -> Screen | None:
+        reduced = self.system(full_scene, reduced_scene)
         self.solved_equations += 1 + len(self.rows)
         try:
             return None if reduced is None else Screen(reduced, self.rows)
@@ -171,10 +174,12 @@ class Candidates:
         if screen is None or reduced is None:
             return False
         self.solved_equations += 1 + len(self.rows)
-        two, variance = screen.certificate_sides(reduced)
+        certificate_variances, variance = screen.certificate_sides(reduced)
         by_motions = solved_in_motions(reduced, self.rows)
-        same = by_motions is None or bool((abs(by_motions / variance - 1.0) <= VARIANCE_DIFFERENCE).all())
-        return same and bool((abs(two / variance - 1.0) <= IDENTITY_ERROR).all())
+        agrees_with_motions = by_motions is None or bool(
+            (abs(by_motions / variance - 1.0) <= VARIANCE_DIFFERENCE).all()
+        )
+        return agrees_with_motions and bool((abs(certificate_variances / variance - 1.0) <= IDENTITY_ERROR).all())
 
     def _predict(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         screen = self.screen(full_scene, omitted_effects)
@@ -217,8 +222,10 @@ class Candidates:
         """Changes (quantities,) over all speeds of the range if parameters are off, in the combination that is worst
         for each quantity.
         """
-        rest = self.rest(omitted_effects)
-        return largest_changes(np.concatenate([self.near.changes(rest, corner) for corner in self.near.corners(rest)]))
+        reduced_scene = self.rest(omitted_effects)
+        return largest_changes(
+            np.concatenate([self.near.changes(reduced_scene, corner) for corner in self.near.corners(reduced_scene)])
+        )
 
     def holds(self, changes: np.ndarray) -> bool:
         """Whether all changes are within the tolerance."""
@@ -234,9 +241,12 @@ class Candidates:
         """Cost without these effects in the largest stable step, at the screened speed where it is highest; infinite
         where no meaningful system remains.
         """
-        rest = self.rest(omitted_effects)
-        alike = of_speed(rest.vehicle, 0.0) is None
-        costs = [self._cost(full_scene, rest) for full_scene in (self.screened[:1] if alike else self.screened)]
+        reduced_scene = self.rest(omitted_effects)
+        independent_of_speed = of_speed(reduced_scene.vehicle, 0.0) is None
+        costs = [
+            self._cost(full_scene, reduced_scene)
+            for full_scene in (self.screened[:1] if independent_of_speed else self.screened)
+        ]
         return max(costs, key=lambda c: c.calls)
 
     def _cost(self, full_scene: FullScene, reduced_scene: ReducedScene) -> Cost:
@@ -260,10 +270,14 @@ class Candidates:
 
     def marches(self, omitted_effects: EffectSet) -> list[March]:
         """Marches of the scene without these effects, one for each of the screened speeds."""
-        weightings = tuple((row, by) for row, (_, by) in zip(self.rows, self.near.quantities, strict=True) if by)
-        rest = self.rest(omitted_effects)
+        weightings = tuple(
+            (row, weighting_name)
+            for row, (_, weighting_name) in zip(self.rows, self.near.quantities, strict=True)
+            if weighting_name
+        )
+        reduced_scene = self.rest(omitted_effects)
         return [
-            March(full_scene.reduced(rest), full_scene.speed, tuple(self.rows), weightings)
+            March(full_scene.reduced(reduced_scene), full_scene.speed, tuple(self.rows), weightings)
             for full_scene in self.screened
         ]
 

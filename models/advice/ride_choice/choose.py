@@ -99,9 +99,9 @@ class Chooser(Candidates):
         if not (self.holds(self.changes_by_modes(omitted_effects)) and self.holds(self.between(omitted_effects))):
             return False
         why = self._cancellation_text(omitted_effects)
-        off = np.zeros(len(self.rows)) if why else self.off(omitted_effects)
-        if not self.holds(off):
-            why = f"changes {self.told(off)} with parameters 5 % off"
+        perturbed_changes = np.zeros(len(self.rows)) if why else self.off(omitted_effects)
+        if not self.holds(perturbed_changes):
+            why = f"changes {self.told(perturbed_changes)} with parameters 5 % off"
         if why:
             self.refusal_reasons[omitted_effects] = why
         return not why and omitted_effects not in self.uncertified_sets
@@ -112,13 +112,15 @@ class Chooser(Candidates):
 
         Changes without end do not count: white noise that passes is nothing that another change could make up for.
         """
-        alone = zip(self.effects, self.single_effect_sets, strict=True)
-        parts = {f"{effect.name} alone changes": step for effect, step in alone if step < omitted_effects}
+        single_removals = zip(self.effects, self.single_effect_sets, strict=True)
+        parts = {f"{effect.name} alone changes": step for effect, step in single_removals if step < omitted_effects}
         parts |= {f"all but {effect.name} change": omitted_effects - {effect} for effect in omitted_effects}
-        for said, part in parts.items():
-            changes = np.zeros(len(self.rows)) if not part or refusal_reason(part) else self.between(part)
+        for step_text, effect_set in parts.items():
+            changes = (
+                np.zeros(len(self.rows)) if not effect_set or refusal_reason(effect_set) else self.between(effect_set)
+            )
             if np.isfinite(changes).all() and not self.holds(changes):
-                return f"holds by errors that cancel: {said} {self.told(changes)}"
+                return f"holds by errors that cancel: {step_text} {self.told(changes)}"
         return ""
 
     @cached_in_object
@@ -134,20 +136,20 @@ class Chooser(Candidates):
     def choose(self) -> RideChoice:
         """The greedy choice, confirmed, without effects whose removal saves nothing at equal accuracy."""
         chosen, rounds = self._certified_choice()
-        unchanged, none = np.zeros(len(self.rows)), frozenset[Effect]()
+        unchanged, no_effects = np.zeros(len(self.rows)), frozenset[Effect]()
         looks = (self.confirmed_changes, self.between, self.off)
-        changes, between, off = (look(chosen) if chosen else unchanged for look in looks)
+        changes, between, perturbed_changes = (look(chosen) if chosen else unchanged for look in looks)
         return RideChoice(
             self.effects,
             tuple(effect for effect in self.effects if effect in chosen),
             self.predicted_changes(chosen),
             changes,
             between,
-            off,
-            all(map(self.holds, (changes, between, off))),
-            self._cost_by_run(none),
+            perturbed_changes,
+            all(map(self.holds, (changes, between, perturbed_changes))),
+            self._cost_by_run(no_effects),
             self._cost_by_run(chosen),
-            (self.cost(none).step, self.cost(chosen).step),
+            (self.cost(no_effects).step, self.cost(chosen).step),
             rounds,
             self._refusal_texts(chosen),
         )
@@ -175,29 +177,29 @@ class Chooser(Candidates):
             refused - omitted_effects: why for refused, why in self.refusal_reasons.items() if refused - omitted_effects
         }
         return tuple(
-            f"{' and '.join(sorted(effect.name for effect in more))} stays: without it, the choice {why}"
-            for more, why in larger.items()
+            f"{' and '.join(sorted(effect.name for effect in larger_set))} stays: without it, the choice {why}"
+            for larger_set, why in larger.items()
         )
 
     def _greedy_set(self) -> tuple[EffectSet, int]:
         """The set of effects to leave out, and the number of sets that were tested for it, also unsuccessfully."""
-        kept, banned, rounds = [frozenset[Effect]()], set[EffectSet](), 0
+        steps_taken, banned, rounds = [frozenset[Effect]()], set[EffectSet](), 0
         while rounds < MOST_CONFIRMATIONS:
-            path = self.path(kept, banned)
-            if path == kept:
+            path = self.path(steps_taken, banned)
+            if path == steps_taken:
                 break
             rounds += 1
             if self.within_tolerance(path[-1]):
-                kept = path
+                steps_taken = path
                 continue
-            low, high = len(kept) - 1, len(path) - 1  # path[low] is kept, path[high] is not
+            low, high = len(steps_taken) - 1, len(path) - 1  # path[low] is kept, path[high] is not
             while high - low > 1:
                 middle = (low + high) // 2
                 rounds += 1
                 low, high = (middle, high) if self.within_tolerance(path[middle]) else (low, middle)
             banned.add(path[high] - path[low])
-            kept = path[: low + 1]
-        return kept[-1], rounds
+            steps_taken = path[: low + 1]
+        return steps_taken[-1], rounds
 
     def _without_worthless_effects(self, omitted_effects: EffectSet) -> EffectSet:
         """The choice without effects whose return costs hardly any more calls at equal accuracy, or no shorter stable
@@ -206,21 +208,21 @@ class Chooser(Candidates):
         fewer = [
             omitted_effects - {effect} for effect in omitted_effects if not refusal_reason(omitted_effects - {effect})
         ]
-        for less in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
-            if self._costs_the_same(less, omitted_effects) and self.within_tolerance(less):
-                return self._without_worthless_effects(less)
+        for smaller_set in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
+            if self._costs_the_same(smaller_set, omitted_effects) and self.within_tolerance(smaller_set):
+                return self._without_worthless_effects(smaller_set)
         return omitted_effects
 
-    def _costs_the_same(self, less: EffectSet, omitted_effects: EffectSet) -> bool:
-        """Whether the smaller set ``less`` has no shorter stable step than the larger one, or about as few calls at
-        equal accuracy.
+    def _costs_the_same(self, smaller_set: EffectSet, omitted_effects: EffectSet) -> bool:
+        """Whether the smaller set ``smaller_set`` has no shorter stable step than the larger one, or about as few calls
+        at equal accuracy.
         """
-        stable = self.cost(less).step
+        stable = self.cost(smaller_set).step
         if stable >= self.cost(omitted_effects).step * (1 - EQUAL_COST_LOG):
             return True
         if stable < self.cost_at_equal_accuracy(omitted_effects).step * (1 - EQUAL_COST_LOG):
             return False  # what is in the larger one alone bounds the step
-        return self.cost_at_equal_accuracy(less).calls <= self.cost_at_equal_accuracy(omitted_effects).calls * (
+        return self.cost_at_equal_accuracy(smaller_set).calls <= self.cost_at_equal_accuracy(omitted_effects).calls * (
             1 + EQUAL_COST_LOG
         )
 
@@ -235,29 +237,33 @@ class Chooser(Candidates):
         }
         return {effect: change for effect, change in changes.items() if change < inf}
 
-    def path(self, start: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
-        """Path of sets of effects that extends ``start``, one step at a time, as far as predictions allow.
+    def path(self, first_sets: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
+        """Path of sets of effects that extends ``first_sets``, one step at a time, as far as predictions allow.
 
         A step saves calls, or where none does, work; there is none where none is within the tolerance.
         """
-        path = list(start)
+        path = list(first_sets)
         while step := self._best_step(path[-1], banned, self._calls_saved) or self._best_step(
             path[-1], banned, self._work_saved
         ):
             path.append(path[-1] | step)
         return path
 
-    def _calls_saved(self, omitted_effects: EffectSet, further: EffectSet) -> float:
+    def _calls_saved(self, omitted_effects: EffectSet, added_effects: EffectSet) -> float:
         """Logarithm of the ratio by which leaving out more effects reduces the calls; 0 for ratios too small to spend
         tolerance on.
         """
-        then = self.cost(further).calls
-        saved = log(self.cost(omitted_effects).calls / then) if then < inf else 0.0
+        calls_after = self.cost(added_effects).calls
+        saved = log(self.cost(omitted_effects).calls / calls_after) if calls_after < inf else 0.0
         return saved if saved > EQUAL_COST_LOG else 0.0
 
-    def _work_saved(self, omitted_effects: EffectSet, further: EffectSet) -> float:
-        now, then = self.cost(omitted_effects), self.cost(further)
-        return log(now.work / then.work) if then.calls <= now.calls * (1 + LARGEST_CALL_RISE) else 0.0
+    def _work_saved(self, omitted_effects: EffectSet, added_effects: EffectSet) -> float:
+        cost_now, cost_after = self.cost(omitted_effects), self.cost(added_effects)
+        return (
+            log(cost_now.work / cost_after.work)
+            if cost_after.calls <= cost_now.calls * (1 + LARGEST_CALL_RISE)
+            else 0.0
+        )
 
     def _smallest_sets(self) -> list[EffectSet]:
         """The smallest sets that can be left out. A set that lets white noise pass is also tried together with the
@@ -269,11 +275,11 @@ class Chooser(Candidates):
         ]
         return self.single_effect_sets + [step | damping for step in white]
 
-    def _best_step(self, omitted_effects: EffectSet, banned: set[EffectSet], saved: SavingOfStep) -> EffectSet:
+    def _best_step(self, omitted_effects: EffectSet, banned: set[EffectSet], saving: SavingOfStep) -> EffectSet:
         """The step that saves the most for what it adds to the predicted error; empty if no step keeps the
         tolerance.
         """
-        best, most, now = frozenset[Effect](), 0.0, self.share(omitted_effects)
+        best, best_score, current_share = frozenset[Effect](), 0.0, self.share(omitted_effects)
         for step in self._smallest_sets():
             further = omitted_effects | step
             if (
@@ -283,11 +289,11 @@ class Chooser(Candidates):
                 or refusal_reason(further)
             ):
                 continue
-            saves = saved(omitted_effects, further)
-            if saves <= NEGLIGIBLE_SHARE * most:
+            saves = saving(omitted_effects, further)
+            if saves <= NEGLIGIBLE_SHARE * best_score:
                 continue  # whatever error it adds
             share = self.share(further)
-            score = saves / max(share - now, NEGLIGIBLE_SHARE) if share <= 1.0 else 0.0
-            if score > most:
-                best, most = step - omitted_effects, score
+            score = saves / max(share - current_share, NEGLIGIBLE_SHARE) if share <= 1.0 else 0.0
+            if score > best_score:
+                best, best_score = step - omitted_effects, score
         return best

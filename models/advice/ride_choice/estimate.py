@@ -57,7 +57,7 @@ def _eigenvalue_problem() -> float:
     """Processor time (s) of an eigenvalue problem of ``TIMED_PROBLEM_SIZE`` states on this machine, now."""
     A, seconds = np.random.default_rng(TIMED_PROBLEM_SIZE).standard_normal((TIMED_PROBLEM_SIZE, TIMED_PROBLEM_SIZE)), []
     for _ in range(TIMED_REPETITIONS):
-        begun = time.process_time()
+        start_time = time.process_time()
         np.linalg.eig(A)
-        seconds.append(time.process_time() - begun)
+        seconds.append(time.process_time() - start_time)
     return float(np.median(seconds))

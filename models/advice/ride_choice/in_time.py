@@ -115,9 +115,9 @@ class CopiesInTime:
         fresh = [effect for effect in chosen if effect.name not in self.left_out]
         return replace(self, scene=without_effects(self.scene, fresh), left_out=left_out)
 
-    def in_longer_steps(self, times: int) -> "CopiesInTime":
-        """The scene in steps ``times`` as long as now."""
-        return replace(self, times=self.times * times)
+    def in_longer_steps(self, step_factor: int) -> "CopiesInTime":
+        """The scene in steps ``step_factor`` as long as now."""
+        return replace(self, times=self.times * step_factor)
 
     def with_fewer_copies(self, steps: int) -> "CopiesInTime":
         """The scene with so few copies that these take about ``steps`` steps in all, but enough copies for a standard
@@ -130,24 +130,26 @@ class CopiesInTime:
     def _excitation(self) -> Excitation:
         return self.scene.excitation()
 
-    def vehicle(self, pace: CopySteps) -> SpatialVehicle:
+    def vehicle(self, copy_steps: CopySteps) -> SpatialVehicle:
         """The vehicle at a speed, without the effects that are left out; InputError where a run in time needs one of
         them.
         """
-        return reduced_vehicle(self.scene, pace.springs)
+        return reduced_vehicle(self.scene, copy_steps.springs)
 
-    def roads(self, pace: CopySteps) -> np.ndarray:
+    def roads(self, copy_steps: CopySteps) -> np.ndarray:
         """Heights and rates (2 steps + 1, 2 w, copies) of the road at half steps."""
-        roads = _road_heights(RoadPath(self._excitation, pace.speed, pace.half), pace.steps, self.samples)
+        roads = _road_heights(
+            RoadPath(self._excitation, copy_steps.speed, copy_steps.half), copy_steps.steps, self.samples
+        )
         return np.ascontiguousarray(roads[:: self.times])
 
-    def mean_squares(self, pace: CopySteps, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
+    def mean_squares(self, copy_steps: CopySteps, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
         """Outputs of the vehicle, and for each copy the mean squares (copies, p) about the mean of all copies."""
-        step = 2.0 * pace.half * self.times
-        march = CopiesMarch(self.vehicle(pace), pace.speed, step, self.samples.copies)
-        every = max(1, STEPS_PER_READING // self.times)
-        march.march_over(roads, pace.settling_steps // self.times, every)
-        count = len(range(0, pace.counted_steps // self.times, every))
+        step = 2.0 * copy_steps.half * self.times
+        march = CopiesMarch(self.vehicle(copy_steps), copy_steps.speed, step, self.samples.copies)
+        reading_interval = max(1, STEPS_PER_READING // self.times)
+        march.march_over(roads, copy_steps.settling_steps // self.times, reading_interval)
+        count = len(range(0, copy_steps.counted_steps // self.times, reading_interval))
         first, second = march.sums[0].T / count, march.sums[1].T / count
         if not (second < LARGEST_QUANTITY).all():
             raise RunFailed("reference", f"grows without end in steps of {step:.3g} s", step)
@@ -175,8 +177,8 @@ def _check(scene: ReducedScene) -> None:
         raise InputError(ride.file, "vehicle.file", ride.vehicle.file, "is linear, and has a closed form")
     if ride.speeds is None:
         raise InputError(ride.file, "drive", None, "has no effects priced or chosen by runs: give [speeds]")
-    for name, by in ride.weighting.items():
-        raise InputError(ride.file, f"weighting.{name}", by, "is not read by runs in time: leave it out")
+    for name, weighting_name in ride.weighting.items():
+        raise InputError(ride.file, f"weighting.{name}", weighting_name, "is not read by runs in time: leave it out")
     check_rates(scene.vehicle, scene.excitation(), ride.file)
 
 
@@ -191,16 +193,16 @@ def _copy_steps(scene: ReducedScene, speed: float, lasting: float) -> CopySteps:
 
 def _can_be_left_out(scene: ReducedScene, effect: Effect) -> bool:
     """Whether a run in time can do without an effect and the parts that leave with it."""
-    rest = effect.without(scene)
-    rigid = (spring for spring in scene.vehicle.springs if spring.name in rest.rigid)
-    return not rest.massless and not any(
+    reduced_scene = effect.without(scene)
+    rigid = (spring for spring in scene.vehicle.springs if spring.name in reduced_scene.rigid)
+    return not reduced_scene.massless and not any(
         {spring.first_body, spring.second_body} & wheels_of(scene.vehicle) for spring in rigid
     )
 
 
-def reduced_vehicle(scene: ReducedScene, moving: dict[str, BentSpring]) -> SpatialVehicle:
-    """The vehicle of a reduced scene; ``moving`` : motion of the nonlinear springs, for the gains that replace their
-    laws.
+def reduced_vehicle(scene: ReducedScene, motion_of_spring: dict[str, BentSpring]) -> SpatialVehicle:
+    """The vehicle of a reduced scene; ``motion_of_spring`` : motion of the nonlinear springs, for the gains that
+    replace their laws.
     """
     springs = scene.vehicle.springs
     seats = {s.first_body: s.second_body for s in springs if s.name in scene.rigid and s.second_body is not None}
@@ -214,14 +216,18 @@ def reduced_vehicle(scene: ReducedScene, moving: dict[str, BentSpring]) -> Spati
 
     return replace(
         scene.vehicle,
-        springs=tuple(_linearised_spring(s, scene.straight, moving) for s in springs if s.name not in scene.rigid),
-        bodies=tuple(sorted(map(body, scene.vehicle.bodies), key=lambda each: each.name in seats)),
+        springs=tuple(
+            _linearised_spring(s, scene.straight, motion_of_spring) for s in springs if s.name not in scene.rigid
+        ),
+        bodies=tuple(sorted(map(body, scene.vehicle.bodies), key=lambda any_body: any_body.name in seats)),
     )
 
 
-def _linearised_spring(spring: SpringDamper, laws: frozenset[str], moving: dict[str, BentSpring]) -> SpringDamper:
+def _linearised_spring(
+    spring: SpringDamper, laws: frozenset[str], motion_of_spring: dict[str, BentSpring]
+) -> SpringDamper:
     """The spring with gains of statistical linearisation in place of these laws."""
-    motion = moving.get(spring.name)
+    motion = motion_of_spring.get(spring.name)
     if motion is None:
         return spring
     if "travel_force" in laws and spring.travel_force:

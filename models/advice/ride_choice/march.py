@@ -78,15 +78,15 @@ class March:
 
     def deviations(self, step: float) -> np.ndarray:
         """Standard deviations (q,) of the quantities that a run in steps of ``step`` (s) samples."""
-        omega, weights, apart = self._frequencies(step)
-        last, half = self._count_of_aliases(step), np.exp(0.5j * step * omega)
-        alike = np.arange(-last, last + 1)[:, None]
-        count = np.where(abs(alike) < last - 1, 1.0, 1.0 + alike**2 / (2.0 * (abs(alike) + 1.0)))
+        omega, weights, is_independent = self._frequencies(step)
+        alias_limit, half = self._count_of_aliases(step), np.exp(0.5j * step * omega)
+        aliases = np.arange(-alias_limit, alias_limit + 1)[:, None]
+        count = np.where(abs(aliases) < alias_limit - 1, 1.0, 1.0 + aliases**2 / (2.0 * (abs(aliases) + 1.0)))
         total = np.zeros((len(omega), len(self.rows)))
         for odd, gains in enumerate(self._gains(half, step)):
-            these = alike[:, 0] % 2 == odd
-            waves = omega + 2 * np.pi * alike[these] / step
-            total += self._spectral_densities(gains, waves, count[these], apart)
+            same_parity = aliases[:, 0] % 2 == odd
+            waves = omega + 2 * np.pi * aliases[same_parity] / step
+            total += self._spectral_densities(gains, waves, count[same_parity], is_independent)
         return np.sqrt(weights @ (total * abs(self._weighting_factors(omega).T) ** 2) / np.pi)
 
     def _gains(self, half: np.ndarray, step: float) -> Iterator[list[np.ndarray]]:
@@ -96,49 +96,51 @@ class March:
         White noise enters as its mean over a step, computed from the filters' states at the step's begin, middle and
         end.
         """
-        rates, seen, forced = self.motions
+        rates, read_modes, forced = self.motions
         road, z, end = self.reduced.excitation, step * rates, half**2
         axles, (m, k) = len(road.heights), road.G.shape
         begin, middle = 1 + z + z**2 / 2 + z**3 / 4, 4 + 2 * z + z**2 / 2
         motions = step / 6 / (end[:, None] - (1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))))
         by_road, by_noise = (
-            (seen.T[:, :, None] * part[:, None, :]).reshape(len(rates), -1)
-            for part in np.split(forced, [axles * m], axis=1)
+            (read_modes.T[:, :, None] * forcing[:, None, :]).reshape(len(rates), -1)
+            for forcing in np.split(forced, [axles * m], axis=1)
         )
-        shape = len(half), len(seen), axles, m
+        shape = len(half), len(read_modes), axles, m
         outer = motions @ (begin[:, None] * by_road) + end[:, None] * (motions @ by_road)
         outer += self.read[:, self.vehicle :].reshape(-1)
         inner = motions @ (middle[:, None] * by_road)
         noisy = by_noise.any()
         noise = (motions @ ((begin + middle + 1)[:, None] * by_noise)).reshape(len(half), -1, k) if noisy else None
-        for at in (half, -half):
-            moved = (outer + at[:, None] * inner).reshape(shape)
+        for phase_factor in (half, -half):
+            gain = (outer + phase_factor[:, None] * inner).reshape(shape)
             if noise is not None:
-                moved += (noise @ self._mean_noise(at, step)).reshape(shape)
-            yield [moved[:, :, i] for i in range(axles)]
+                gain += (noise @ self._mean_noise(phase_factor, step)).reshape(shape)
+            yield [gain[:, :, i] for i in range(axles)]
 
     def _mean_noise(self, half: np.ndarray, step: float) -> np.ndarray:
         """Gains (w, k, m) from a filter's states at the begin of a step to the mean noise over this step."""
-        road, at = self.reduced.excitation, half[:, None, None]
-        slope = (at**2 - 1) / step * np.eye(len(road.F)) - self.speed * road.F * ((1 + 4 * at + at**2) / 6)
+        road, phase_factor = self.reduced.excitation, half[:, None, None]
+        slope = (phase_factor**2 - 1) / step * np.eye(len(road.F)) - self.speed * road.F * (
+            (1 + 4 * phase_factor + phase_factor**2) / 6
+        )
         return np.asarray(np.linalg.pinv(self.speed**0.5 * road.G) @ slope)
 
     def _spectral_densities(
-        self, gains: list[np.ndarray], waves: np.ndarray, count: np.ndarray, apart: np.ndarray
+        self, gains: list[np.ndarray], waves: np.ndarray, alias_weights: np.ndarray, is_independent: np.ndarray
     ) -> np.ndarray:
         """Spectral densities (w, q) of the quantities, summed over all ``waves`` (a, w) that look alike, each weighted
-        with its ``count`` (a, 1).
+        with its ``alias_weights`` (a, 1).
         """
         road, speeds, total = self.reduced.excitation, np.array([self.speed]), 0.0
         late, by_noises = {}, self.filters.by_noises(gains)
         for pair in self.filters.pairs:
-            density = count * pair.density(speeds, waves.ravel()).reshape(waves.shape)
+            density = alias_weights * pair.density(speeds, waves.ravel()).reshape(waves.shape)
             own, shared = pair_factors(by_noises, pair, road.independent)
             total = total + (density.sum(axis=0)[:, None] * own).real
             for (i, j), met in shared.items():
                 length = road.lengths[i] - road.lengths[j]
                 if length not in late:
-                    late[length] = np.exp(-1j * waves * (length / self.speed)) * ~apart
+                    late[length] = np.exp(-1j * waves * (length / self.speed)) * ~is_independent
                 total = total + ((density * late[length]).sum(axis=0)[:, None] * met).real
         return np.asarray(total)
 
@@ -217,13 +219,17 @@ def _longest_step_below(
 
     An error grows as a power of the step, so that linear interpolation of logarithms predicts where to look next.
     """
-    (low, high), (below, above) = (0, PARTS_BETWEEN_STEPS), shares
+    (low, high), (share_below, share_above) = (0, PARTS_BETWEEN_STEPS), shares
     while high - low > 1:
-        guess = low + (high - low) * -below / (above - below) if np.isfinite(above) else (low + high) / 2
+        guess = (
+            low + (high - low) * -share_below / (share_above - share_below)
+            if np.isfinite(share_above)
+            else (low + high) / 2
+        )
         middle = int(np.clip(np.round(guess), low + 1, high - 1))
         value = share(steps[0] * (steps[1] / steps[0]) ** (middle / PARTS_BETWEEN_STEPS))
-        (low, below), (high, above) = (
-            ((middle, value), (high, above)) if value <= 0.0 else ((low, below), (middle, value))
+        (low, share_below), (high, share_above) = (
+            ((middle, value), (high, share_above)) if value <= 0.0 else ((low, share_below), (middle, value))
         )
     return float(steps[0] * (steps[1] / steps[0]) ** (low / PARTS_BETWEEN_STEPS))
 

@@ -41,9 +41,9 @@ class Modes:
         """
         scale = dgebal(A, scale=1, permute=0)[3]
         V, W = self.V / scale[:, None], self.W * scale
-        off = abs(W @ V - np.eye(len(A))).max(initial=0.0)
+        deviation_of_inverse = abs(W @ V - np.eye(len(A))).max(initial=0.0)
         grows = (np.linalg.norm(V, axis=0) * np.linalg.norm(W, axis=1)).max(initial=0.0)
-        return self if off <= INVERSE_TOLERANCE and grows <= LARGEST_MODE_CONDITION else None
+        return self if deviation_of_inverse <= INVERSE_TOLERANCE and grows <= LARGEST_MODE_CONDITION else None
 
     def propagated(self, time: float, B: np.ndarray) -> np.ndarray:
         """The product e^(A t) B (n, k) after a time t (s)."""
@@ -81,10 +81,10 @@ def driven_motions(driver: Modes | None, coupling: np.ndarray, system: Modes | N
     """
     if driver is None or system is None:
         return None
-    apart = driver.rates - system.rates[:, None]
-    if not apart.all():
+    rate_differences = driver.rates - system.rates[:, None]
+    if not rate_differences.all():
         return None
-    met = (system.W @ coupling @ driver.V) / apart
+    met = (system.W @ coupling @ driver.V) / rate_differences
     rates = np.concatenate([driver.rates, system.rates])
     return Modes(
         rates,
@@ -96,9 +96,9 @@ def driven_motions(driver: Modes | None, coupling: np.ndarray, system: Modes | N
 def _block_triangular(upper: np.ndarray, corner: np.ndarray, lower: np.ndarray) -> np.ndarray:
     """Block matrix [[upper, 0], [corner, lower]]."""
     n = len(upper)
-    whole = np.zeros((n + len(lower),) * 2, complex)
-    whole[:n, :n], whole[n:, :n], whole[n:, n:] = upper, corner, lower
-    return whole
+    full = np.zeros((n + len(lower),) * 2, complex)
+    full[:n, :n], full[n:, :n], full[n:, n:] = upper, corner, lower
+    return full
 
 
 def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
@@ -106,11 +106,11 @@ def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int)
     n, road = len(A) - axles * len(F), _modes_of_filters(F.tobytes(), len(F), axles)
     if road is None or vehicle is None:
         return None
-    both = driven_motions(road, A[:n, n:], vehicle)
-    if both is None:
+    coupled_modes = driven_motions(road, A[:n, n:], vehicle)
+    if coupled_modes is None:
         return None
     order = np.concatenate([np.arange(len(A) - n, len(A)), np.arange(len(A) - n)])
-    return Modes(both.rates, both.V[order], both.W[:, order]).of(A)
+    return Modes(coupled_modes.rates, coupled_modes.V[order], coupled_modes.W[:, order]).of(A)
 
 
 def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
@@ -119,26 +119,30 @@ def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...
     if system is None or filters is None:
         return None
     n = len(system.rates)
-    both = driven_motions(system, A[n:, :n], filters)
-    return None if both is None else both.of(A)
+    coupled_modes = driven_motions(system, A[n:, :n], filters)
+    return None if coupled_modes is None else coupled_modes.of(A)
 
 
 @lru_cache(maxsize=256)
-def _modes_of_filters(F: bytes, size: int, axles: int) -> Modes | None:
-    each = modes_of(np.frombuffer(F).reshape(size, size))
-    if each is None:
+def _modes_of_filters(F: bytes, filter_size: int, axles: int) -> Modes | None:
+    modes_of_filter = modes_of(np.frombuffer(F).reshape(filter_size, filter_size))
+    if modes_of_filter is None:
         return None
-    return Modes(np.tile(each.rates, axles), block_diag(*[each.V] * axles), block_diag(*[each.W] * axles))
+    return Modes(
+        np.tile(modes_of_filter.rates, axles),
+        block_diag(*[modes_of_filter.V] * axles),
+        block_diag(*[modes_of_filter.W] * axles),
+    )
 
 
 @lru_cache(maxsize=64)
 def _modes_of_weightings(names: tuple[str, ...]) -> Modes | None:
     parts = [modes_of(WEIGHTINGS[name].matrices()[0]) for name in names]
-    filters = [part for part in parts if part]
+    filters = [filter_modes for filter_modes in parts if filter_modes]
     if len(filters) < len(parts):
         return None
-    V, W = (block_diag(*(getattr(part, key) for part in filters)) for key in ("V", "W"))
-    return Modes(np.concatenate([part.rates for part in filters]), V, W)
+    V, W = (block_diag(*(getattr(filter_modes, key) for filter_modes in filters)) for key in ("V", "W"))
+    return Modes(np.concatenate([filter_modes.rates for filter_modes in filters]), V, W)
 
 
 def stable_step(values: np.ndarray) -> float:

@@ -32,17 +32,17 @@ ROUNDING_SHARE = 1e-9
 """Share of the largest slope up to which one is nothing but rounding."""
 
 
-def speeds_between(scene: ReducedScene, listed: np.ndarray) -> np.ndarray:
+def speeds_between(scene: ReducedScene, listed_speeds: np.ndarray) -> np.ndarray:
     """The listed speeds (m/s), and enough speeds between the slowest and the fastest to resolve the effect of the delay
     between axles.
     """
-    low, high = float(listed.min()), float(listed.max())
+    low, high = float(listed_speeds.min()), float(listed_speeds.max())
     if low == high:
         return np.array([low])
     length = max(scene.excitation().lengths)
     turns = 8.0 * LOBE_FREQUENCY * length * (1.0 / low - 1.0 / high)
     slow = 1.0 / np.linspace(1.0 / high, 1.0 / low, int(np.ceil(turns)) + 1)
-    return np.unique(np.concatenate([listed, slow, np.geomspace(low, high, LEAST_SPEEDS)]).round(12))
+    return np.unique(np.concatenate([listed_speeds, slow, np.geomspace(low, high, LEAST_SPEEDS)]).round(12))
 
 
 @dataclass(frozen=True)
@@ -65,12 +65,12 @@ class Neighbourhood:
     def __init__(
         self,
         scene: ReducedScene,
-        listed: np.ndarray,
+        listed_speeds: np.ndarray,
         quantities: Sequence[tuple[int, str]],
         vehicles: Vehicles | None = None,
     ) -> None:
         self.scene, self.quantities = scene, quantities
-        self.speeds = speeds_between(scene, listed)
+        self.speeds = speeds_between(scene, listed_speeds)
         self.vehicles = Vehicles(scene.vehicle, float(self.speeds[0])) if vehicles is None else vehicles
         self.off = 0
         self.parameters = uncertain_parameters(scene.vehicle)
@@ -85,7 +85,8 @@ class Neighbourhood:
         if not factors:
             return np.asarray(np.sqrt(self._variances(reduced_scene, self.vehicles) / self.whole) - 1.0)
         scene, reduced_scene = (
-            replace(each, vehicle=scaled_vehicle(each.vehicle, factors)) for each in (self.scene, reduced_scene)
+            replace(any_scene, vehicle=scaled_vehicle(any_scene.vehicle, factors))
+            for any_scene in (self.scene, reduced_scene)
         )
         vehicles = Vehicles(scene.vehicle, float(self.speeds[0]), self.vehicles.roads)
         changes = np.sqrt(self._variances(reduced_scene, vehicles) / self._variances(scene, vehicles)) - 1.0
@@ -130,18 +131,25 @@ class Neighbourhood:
         """Changes of a vehicle's matrices with all parameters. Those of the full vehicle are used where only bars and
         the damping of tyres are removed and gravity is absent.
         """
-        whole = self.scene.vehicle
-        if not whole.gravity and replace(vehicle, bars=whole.bars, tyres=whole.tyres) == whole:
-            there = set(uncertain_parameters(vehicle))
-            return self._parameter_shifts(whole, speed).only(np.array([each in there for each in self.parameters]))
+        full_vehicle = self.scene.vehicle
+        if (
+            not full_vehicle.gravity
+            and replace(vehicle, bars=full_vehicle.bars, tyres=full_vehicle.tyres) == full_vehicle
+        ):
+            present_parameters = set(uncertain_parameters(vehicle))
+            return self._parameter_shifts(full_vehicle, speed).only(
+                np.array([parameter in present_parameters for parameter in self.parameters])
+            )
         return self._parameter_shifts(vehicle, speed)
 
     def _parameter_shifts(self, vehicle: SpatialVehicle, speed: float) -> Shifts:
         key = vehicle, of_speed(vehicle, speed)
         if key not in self._shifts:
             linear, factor = self.vehicles.linear, 1.0 + PARAMETER_ERROR
-            others = [linear(scaled_vehicle(vehicle, {each: factor}), speed) for each in self.parameters]
-            self._shifts[key] = Shifts.of(linear(vehicle, speed), others, [row for row, _ in self.quantities])
+            changed_vehicles = [
+                linear(scaled_vehicle(vehicle, {parameter: factor}), speed) for parameter in self.parameters
+            ]
+            self._shifts[key] = Shifts.of(linear(vehicle, speed), changed_vehicles, [row for row, _ in self.quantities])
         return self._shifts[key]
 
 
@@ -169,8 +177,8 @@ class FrequencySum:
 
     def heights(self) -> np.ndarray:
         """Transfer functions (v, w, wheels, k) from unit noises to heights under the wheels."""
-        each = filter_states(self.excitation, self.speeds, self.omega)
-        road = at_axles(each, self.excitation, self.speeds, self.omega, self.apart)
+        states_of_axle = filter_states(self.excitation, self.speeds, self.omega)
+        road = at_axles(states_of_axle, self.excitation, self.speeds, self.omega, self.apart)
         return np.asarray(np.hstack(self.excitation.heights) @ road)
 
 

@@ -25,29 +25,33 @@ Parameter = tuple[str, str, str]
 def uncertain_parameters(vehicle: SpatialVehicle) -> list[Parameter]:
     """All parameters of a vehicle that may be off: those with a value other than 0."""
     return [
-        (group, part.name, key)
+        (group, element.name, key)
         for group, keys in PARAMETERS_OF_PARTS.items()
-        for part in getattr(vehicle, group)
+        for element in getattr(vehicle, group)
         for key in keys
-        if np.any(getattr(part, key))
+        if np.any(getattr(element, key))
     ]
 
 
 def scaled_vehicle(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> SpatialVehicle:
     """The vehicle with its values multiplied by these factors; factors of values that it does not have are ignored."""
 
-    def part(group: str, original_part: Any) -> Any:
-        known = [key for key in PARAMETERS_OF_PARTS[group] if (group, original_part.name, key) in factors]
-        after = {
-            key: _multiplied(getattr(original_part, key), factors[group, original_part.name, key]) for key in known
+    def scaled_part(group_name: str, original_part: Any) -> Any:
+        known = [key for key in PARAMETERS_OF_PARTS[group_name] if (group_name, original_part.name, key) in factors]
+        changed_values = {
+            key: _multiplied(getattr(original_part, key), factors[group_name, original_part.name, key]) for key in known
         }
-        return replace(original_part, **after) if after else original_part
+        return replace(original_part, **changed_values) if changed_values else original_part
 
     groups: dict[str, Any] = {
-        group: tuple(part(group, each) for each in getattr(vehicle, group)) for group in PARAMETERS_OF_PARTS
+        group: tuple(scaled_part(group, each) for each in getattr(vehicle, group)) for group in PARAMETERS_OF_PARTS
     }
     return replace(vehicle, **groups)
 
 
-def _multiplied(value: Any, factor: float) -> Any:
-    return tuple(_multiplied(each, factor) for each in value) if isinstance(value, tuple) else value * factor
+def _multiplied(parameter_value: Any, factor: float) -> Any:
+    return (
+        tuple(_multiplied(component, factor) for component in parameter_value)
+        if isinstance(parameter_value, tuple)
+        else parameter_value * factor
+    )

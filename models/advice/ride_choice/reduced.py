@@ -91,21 +91,24 @@ class Numbers:
         self._of_object: dict[int, tuple[object, int]] = {}
         self._of_value: dict[Hashable, int] = {}
 
-    def of(self, thing: object, value: Callable[[], Hashable]) -> int:
+    def of(self, known_object: object, value_of: Callable[[], Hashable]) -> int:
         """Number of an object's value. The object is kept, so that its identity remains unique."""
-        known = self._of_object.get(id(thing))
+        known = self._of_object.get(id(known_object))
         if known is None:
-            known = self._of_object[id(thing)] = thing, self._of_value.setdefault(value(), len(self._of_value))
+            known = self._of_object[id(known_object)] = (
+                known_object,
+                self._of_value.setdefault(value_of(), len(self._of_value)),
+            )
         return known[1]
 
-    def of_parts(self, thing: Any, *names: str) -> tuple[int, ...]:
+    def of_parts(self, known_object: Any, *names: str) -> tuple[int, ...]:
         """Numbers of an object's attributes; copies of an object share most attributes."""
-        parts = [getattr(thing, name) for name in names]
-        return tuple(self.of(part, partial(_hashable_key, part)) for part in parts)
+        parts = [getattr(known_object, name) for name in names]
+        return tuple(self.of(attribute, partial(_hashable_key, attribute)) for attribute in parts)
 
 
-def _hashable_key(value: Hashable) -> Hashable:
-    return value
+def _hashable_key(any_value: Hashable) -> Hashable:
+    return any_value
 
 
 PARTS_OF_VEHICLE = tuple(field.name for field in fields(SpatialVehicle))
@@ -152,10 +155,10 @@ class Vehicles:
     def of(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
         """The reduced vehicle of a scene at a speed (m/s); InputError where no meaningful vehicle remains."""
         key = self.number(scene.vehicle), scene.limits, of_speed(scene.vehicle, speed)
-        made = self._made.get(key)
-        if made is None:
-            made = self._made[key] = self._make(scene, speed)
-        return made
+        reduced_vehicle = self._made.get(key)
+        if reduced_vehicle is None:
+            reduced_vehicle = self._made[key] = self._make(scene, speed)
+        return reduced_vehicle
 
     def number(self, vehicle: SpatialVehicle) -> int:
         """Number that is the same for vehicles with the same parts."""
@@ -213,18 +216,18 @@ class FullScene:
     def reduced(self, scene: ReducedScene) -> Reduced:
         """The system of the reduced scene; raises InputError where it is no system."""
         key = self.vehicles.number(scene.vehicle), self.vehicles.roads.number(scene), scene.limits
-        made = self._made.get(key)
-        if made is None:
-            made = self._made[key] = self._weighted(self._make(scene))
-        return made
+        reduced_system = self._made.get(key)
+        if reduced_system is None:
+            reduced_system = self._made[key] = self._weighted(self._make(scene))
+        return reduced_system
 
     def _weighted(self, reduced: Reduced) -> Reduced:
         weightings = self.scene.ride.weighting
         if not weightings:
             return reduced
         system = system_with_weightings(reduced.system, weightings)
-        more, names = np.eye(len(system.A) - reduced.states), tuple(weightings.values())
-        T, left = block_diag(reduced.T, more), block_diag(reduced.left, more)
+        unit_matrix, names = np.eye(len(system.A) - reduced.states), tuple(weightings.values())
+        T, left = block_diag(reduced.T, unit_matrix), block_diag(reduced.left, unit_matrix)
         return replace(reduced, system=system, T=T, left=left, weightings=names)
 
     def _make(self, scene: ReducedScene) -> Reduced:
@@ -254,7 +257,7 @@ class FullScene:
 
 
 def _filter_state_maps(
-    scene: ReducedScene, full_road: Excitation, less: ReducedScene, reduced_road: Excitation
+    scene: ReducedScene, full_road: Excitation, reduced_scene: ReducedScene, reduced_road: Excitation
 ) -> tuple[np.ndarray, np.ndarray]:
     """Matrices from the filter states of the reduced road to those of the full road, axle by axle, and back; states
     that effects add are last.
@@ -262,7 +265,7 @@ def _filter_state_maps(
     count, cutoff = full_road.G.shape[1], scene.ride.road.cutoff
     onto: np.ndarray = np.eye(count if cutoff is None else 2 * count)
     back: np.ndarray = onto
-    if cutoff is not None and less.ride.road.cutoff is None:
+    if cutoff is not None and reduced_scene.ride.road.cutoff is None:
         onto, back = np.kron(np.eye(count), [[1.0], [0.0]]), np.kron(np.eye(count), [[1.0, 1.0 / cutoff]])
     added = np.eye(len(full_road.F) - len(onto), len(reduced_road.F) - len(back))
     onto, back = block_diag(onto, added), block_diag(back, added.T)

@@ -18,9 +18,10 @@ QUESTION_KEYS = ("quantities", "tolerance", "options")
 def write(reduced_scene: ReducedScene, folder: Path) -> Path:
     """Write the reduced scene and its vehicle into a folder; returns the path of the scene."""
     scene = own_table(reduced_scene.ride)
-    whole = scene["vehicle"]["file"]
-    vehicle = reduced_tables(parse(vehicle_path(whole, reduced_scene.ride.folder)), reduced_scene)
-    notes = f"{vehicle.get('notes', '').strip()}\nReduced by a choice of effects; the whole vehicle is {whole}.".strip()
+    vehicle_file = scene["vehicle"]["file"]
+    vehicle = reduced_tables(parse(vehicle_path(vehicle_file, reduced_scene.ride.folder)), reduced_scene)
+    origin = f"Reduced by a choice of effects; the whole vehicle is {vehicle_file}."
+    notes = f"{vehicle.get('notes', '').strip()}\n{origin}".strip()
     with (folder / VEHICLE_FILE_NAME).open("x") as file:
         file.write(toml_text({**vehicle, "notes": notes}))
     table = {key: value for key, value in scene.items() if key not in QUESTION_KEYS and value != "auto"}
@@ -53,8 +54,8 @@ def reduced_tables(table: dict[str, Any], reduced_scene: ReducedScene) -> dict[s
         "rigid": sorted(reduced_scene.rigid),
         "locked": [list(pair) for pair in sorted(reduced_scene.locked)],
     }
-    given = {key: names for key, names in limits.items() if names}
-    return changed | ({"reduced": given} if given else {})
+    reduced_limits = {key: names for key, names in limits.items() if names}
+    return changed | ({"reduced": reduced_limits} if reduced_limits else {})
 
 
 def toml_text(table: dict[str, Any]) -> str:
@@ -81,11 +82,11 @@ def _key_text(key: str) -> str:
     return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else json.dumps(key)
 
 
-def _value_text(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(_table_lines(value)) + " }" if value else "{}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_value_text, value)) + "]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return json.dumps(value) if isinstance(value, str) else repr(value)
+def _value_text(any_value: Any) -> str:
+    if isinstance(any_value, dict):
+        return "{ " + ", ".join(_table_lines(any_value)) + " }" if any_value else "{}"
+    if isinstance(any_value, list | tuple):
+        return "[" + ", ".join(map(_value_text, any_value)) + "]"
+    if isinstance(any_value, bool):
+        return "true" if any_value else "false"
+    return json.dumps(any_value) if isinstance(any_value, str) else repr(any_value)

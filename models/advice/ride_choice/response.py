@@ -25,10 +25,10 @@ class OutputFactors(NamedTuple):
     @classmethod
     def of(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "OutputFactors":
         """Factors of the vehicle's outputs with these rows."""
-        read, at = vehicle.read, list(rows)
+        read, row_list = vehicle.read, list(rows)
         return cls(
-            (read.displacement_factors[at], read.rate_factors[at], read.acceleration_factors[at]),
-            (read.road_factors[at], read.road_rate_factors[at]),
+            (read.displacement_factors[row_list], read.rate_factors[row_list], read.acceleration_factors[row_list]),
+            (read.road_factors[row_list], read.road_rate_factors[row_list]),
         )
 
 
@@ -45,8 +45,8 @@ class Response:
         """Transfer functions (w, n, wheels) from heights to coordinates, and (w, q, n) from forces on coordinates to
         outputs.
         """
-        one = np.eye(len(self.vehicle.linear.mass))
-        return self._modal_product([one], self.by_heights), self._modal_product(self.read.by_motion, [one])
+        unit = np.eye(len(self.vehicle.linear.mass))
+        return self._modal_product([unit], self.by_heights), self._modal_product(self.read.by_motion, [unit])
 
     def _fractions(self) -> np.ndarray | None:
         """Partial fractions 1 / (s - rate) (w, modes). None where the equations must be solved: without modes, or where
@@ -56,54 +56,71 @@ class Response:
         if modes is None:
             return None
         fractions = 1.0 / (self.s[:, None] - modes.rates)
-        at = [int(abs(fractions).max(axis=1).argmax())]
-        one = [np.eye(len(self.vehicle.linear.mass))]
-        by_motions = self._sum_over_modes(fractions[at], one, self.by_heights, self.s[at])
-        by_solve = self._product_by_solving(one, self.by_heights, self.s[at])
-        same = abs(by_motions - by_solve).max() <= RESPONSE_DIFFERENCE * abs(by_solve).max()
-        return fractions if same else None
+        stiffest = [int(abs(fractions).max(axis=1).argmax())]
+        unit = [np.eye(len(self.vehicle.linear.mass))]
+        by_motions = self._sum_over_modes(fractions[stiffest], unit, self.by_heights, self.s[stiffest])
+        by_solve = self._product_by_solving(unit, self.by_heights, self.s[stiffest])
+        agree = abs(by_motions - by_solve).max() <= RESPONSE_DIFFERENCE * abs(by_solve).max()
+        return fractions if agree else None
 
-    def _modal_product(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray]) -> np.ndarray:
+    def _modal_product(
+        self, row_coefficients: Sequence[np.ndarray], column_coefficients: Sequence[np.ndarray]
+    ) -> np.ndarray:
         """Product (w, i, j) of a polynomial in s of rows, the compliance, and a polynomial of columns."""
         if self.motions is None:
-            return self._product_by_solving(left, right, self.s)
-        return self._sum_over_modes(self.motions, left, right, self.s)
+            return self._product_by_solving(row_coefficients, column_coefficients, self.s)
+        return self._sum_over_modes(self.motions, row_coefficients, column_coefficients, self.s)
 
     def _sum_over_modes(
-        self, fractions: np.ndarray, left: Sequence[np.ndarray], right: Sequence[np.ndarray], s: np.ndarray
+        self,
+        fractions: np.ndarray,
+        row_coefficients: Sequence[np.ndarray],
+        column_coefficients: Sequence[np.ndarray],
+        s: np.ndarray,
     ) -> np.ndarray:
         states, modes = self.vehicle.states, self.vehicle.modes
         assert modes is not None
         to_motions, of_motions = modes.W @ states.B, states.Q @ modes.V
-        rows = sum((part @ of_motions) * modes.rates**i for i, part in enumerate(left))
-        columns = sum((to_motions @ part) * modes.rates[:, None] ** i for i, part in enumerate(right))
-        each = rows.T[:, :, None] * columns[:, None, :]
-        whole = (fractions @ each.reshape(len(each), -1)).reshape(len(s), *each.shape[1:])
-        return np.asarray(whole + polynomial(self._remaining_polynomial(left, right), s))
+        rows = sum((coefficients @ of_motions) * modes.rates**i for i, coefficients in enumerate(row_coefficients))
+        columns = sum(
+            (to_motions @ coefficients) * modes.rates[:, None] ** i
+            for i, coefficients in enumerate(column_coefficients)
+        )
+        modal_products = rows.T[:, :, None] * columns[:, None, :]
+        sum_of_fractions = (fractions @ modal_products.reshape(len(modal_products), -1)).reshape(
+            len(s), *modal_products.shape[1:]
+        )
+        return np.asarray(
+            sum_of_fractions + polynomial(self._remaining_polynomial(row_coefficients, column_coefficients), s)
+        )
 
-    def _remaining_polynomial(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def _remaining_polynomial(
+        self, row_coefficients: Sequence[np.ndarray], column_coefficients: Sequence[np.ndarray]
+    ) -> list[np.ndarray]:
         """Coefficients, by power of s, of the polynomial that remains besides the partial fractions: s^k (s - A)^-1 =
         A^k (s - A)^-1 + sum s^(k-1-j) A^j.
 
         The motions have no part in it, so that what vanishes does so without rounding.
         """
-        states, powers = self.vehicle.states, len(left) + len(right) - 1
-        moved = [states.Q @ np.linalg.matrix_power(states.A, j) @ states.B for j in range(powers - 1)]
-        rest = [np.zeros((len(left[0]), right[0].shape[1])) for _ in range(powers)]
-        for i, row in enumerate(left):
-            for j, column in enumerate(right):
+        states, powers = self.vehicle.states, len(row_coefficients) + len(column_coefficients) - 1
+        impulse_terms = [states.Q @ np.linalg.matrix_power(states.A, j) @ states.B for j in range(powers - 1)]
+        coefficients = [np.zeros((len(row_coefficients[0]), column_coefficients[0].shape[1])) for _ in range(powers)]
+        for i, row in enumerate(row_coefficients):
+            for j, column in enumerate(column_coefficients):
                 if not row.any() or not column.any():
                     continue
-                rest[i + j] += row @ states.direct @ column
+                coefficients[i + j] += row @ states.direct @ column
                 for k in range(i + j):
-                    rest[k] += row @ moved[i + j - 1 - k] @ column
-        return rest
+                    coefficients[k] += row @ impulse_terms[i + j - 1 - k] @ column
+        return coefficients
 
-    def _product_by_solving(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray], s: np.ndarray) -> np.ndarray:
+    def _product_by_solving(
+        self, row_coefficients: Sequence[np.ndarray], column_coefficients: Sequence[np.ndarray], s: np.ndarray
+    ) -> np.ndarray:
         """The product of ``_modal_product``, by solving the equations at every frequency."""
         linear = self.vehicle.linear
         Z = polynomial((linear.stiffness, linear.damping, linear.mass), s)
-        return np.asarray(polynomial(left, s) @ np.linalg.solve(Z, polynomial(right, s)))
+        return np.asarray(polynomial(row_coefficients, s) @ np.linalg.solve(Z, polynomial(column_coefficients, s)))
 
 
 def polynomial(coefficients: Sequence[np.ndarray], s: np.ndarray) -> np.ndarray:

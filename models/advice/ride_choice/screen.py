@@ -67,9 +67,9 @@ class Screen:
     given by their rows of C.
     """
 
-    def __init__(self, base: Reduced, rows: list[int]) -> None:
-        self.base, self.rows = base, rows
-        A, C, modes = base.system.A, base.system.C[rows], base.modes
+    def __init__(self, reduced_scene: Reduced, rows: list[int]) -> None:
+        self.base, self.rows = reduced_scene, rows
+        A, C, modes = reduced_scene.system.A, reduced_scene.system.C[rows], reduced_scene.modes
         if has_undamped_motion(modes.rates if modes else np.linalg.eigvals(A)):
             raise InputError(
                 "",
@@ -79,9 +79,9 @@ class Screen:
                 "away: effects are chosen for vehicles of which every motion dies out",
             )
         if modes:
-            self.P, self.L = modes.covariance(base.noise), modes.adjoints(C)
+            self.P, self.L = modes.covariance(reduced_scene.noise), modes.adjoints(C)
         else:
-            self.P = solve_continuous_lyapunov(A, -base.noise)
+            self.P = solve_continuous_lyapunov(A, -reduced_scene.noise)
             self.L = np.array([solve_continuous_lyapunov(A.T, -np.outer(c, c)) for c in C])
 
     @cached_property
@@ -94,8 +94,8 @@ class Screen:
         system, left, T = reduced.system, reduced.left @ self.base.T, self.base.left @ reduced.T
         P, C = left @ self.P @ left.T, system.C[self.rows]
         half = system.A @ P
-        rest = half + half.T + reduced.noise
-        J = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", T.T @ self.L @ T, rest)
+        excess_noise = half + half.T + reduced.noise
+        J = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", T.T @ self.L @ T, excess_noise)
         white = sum((d[self.rows] ** 2).sum(axis=1) for d in system.D) > 0
         return np.where(white, np.inf, np.maximum(J, 0.0))
 
@@ -107,9 +107,9 @@ class Screen:
         covariance = solve(system, self.rows)
         P = left @ self.extended_solution.P @ left.T
         half = system.A.astype(np.longdouble) @ P
-        rest = half + half.T + noise_of(system)
+        excess_noise = half + half.T + noise_of(system)
         C = system.C[self.rows].astype(np.longdouble)
-        variance = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", covariance.L, rest)
+        variance = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", covariance.L, excess_noise)
         return variance.astype(float), covariance.variance.astype(float)
 
 
@@ -130,11 +130,14 @@ def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
         return None
     P, C = modes.covariance(reduced.noise), system.C
     half = system.A @ P
-    rest = modes.W @ (half + half.T + reduced.noise) @ modes.W.conj().T
+    modal_noise = modes.W @ (half + half.T + reduced.noise) @ modes.W.conj().T
     variance = ((C @ P) * C).sum(axis=1)
-    missing = (modes.adjoint_of_motions(C) * rest.T).sum(axis=(1, 2)).real
-    told = np.isfinite(system.D).all(axis=(0, 2)) & (variance > rounding_thresholds(C, P))
-    if not (abs(missing[told]) <= TRUSTED_VARIANCE_SHARE * variance[told]).all() or not told[rows].all():
+    missing = (modes.adjoint_of_motions(C) * modal_noise.T).sum(axis=(1, 2)).real
+    is_certain = np.isfinite(system.D).all(axis=(0, 2)) & (variance > rounding_thresholds(C, P))
+    if (
+        not (abs(missing[is_certain]) <= TRUSTED_VARIANCE_SHARE * variance[is_certain]).all()
+        or not is_certain[rows].all()
+    ):
         return None
     return np.asarray((variance + missing)[rows])
 

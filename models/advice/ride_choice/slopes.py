@@ -28,14 +28,21 @@ class Shifts:
     @classmethod
     def of(cls, vehicle: LinearVehicle, other_vehicles: Sequence[LinearVehicle], rows: Sequence[int]) -> "Shifts":
         """Matrices of the other vehicles less those of ``vehicle``, for the outputs with these rows."""
-        before, *after = ([*_matrices_and_readings(each, rows)] for each in (vehicle, *other_vehicles))
-        moved = [np.array([each[i] for each in after]) - matrix for i, matrix in enumerate(before)]
-        return cls(tuple(moved[:3]), tuple(moved[3:5]), tuple(moved[5:8]), tuple(moved[8:]))
+        matrices, *changed_matrices = (
+            [*_matrices_and_readings(linear_vehicle, rows)] for linear_vehicle in (vehicle, *other_vehicles)
+        )
+        changes = [
+            np.array([linear_vehicle[i] for linear_vehicle in changed_matrices]) - matrix
+            for i, matrix in enumerate(matrices)
+        ]
+        return cls(tuple(changes[:3]), tuple(changes[3:5]), tuple(changes[5:8]), tuple(changes[8:]))
 
-    def only(self, present: np.ndarray) -> "Shifts":
-        """The shifts, with zeros for parameters that are not ``present`` (p,)."""
+    def only(self, is_present: np.ndarray) -> "Shifts":
+        """The shifts, with zeros for parameters that are not ``is_present`` (p,)."""
         parts = (self.stiffness, self.by_heights, self.by_motion, self.by_road)
-        return Shifts(*(tuple(each * present[:, None, None] for each in part) for part in parts))
+        return Shifts(
+            *(tuple(matrix_changes * is_present[:, None, None] for matrix_changes in matrices) for matrices in parts)
+        )
 
 
 def _matrices_and_readings(vehicle: LinearVehicle, rows: Sequence[int]) -> Iterator[np.ndarray]:
@@ -51,14 +58,14 @@ class Sensitivity:
     """
 
     def __init__(self, response: Response, heights: np.ndarray, weights: np.ndarray, N: np.ndarray) -> None:
-        seen, powers = response.H @ heights, [response.s[:, None, None] ** k for k in range(3)]
-        met = 2.0 * weights[..., None] * (heights @ seen.conj().mT).mT  # (v, w, q, wheels)
+        outputs, powers = response.H @ heights, [response.s[:, None, None] ** k for k in range(3)]
+        met = 2.0 * weights[..., None] * (heights @ outputs.conj().mT).mT  # (v, w, q, wheels)
         q, back = response.coordinates()
-        moved = met @ (N @ q).mT  # (v, w, q, n)
+        spectra = met @ (N @ q).mT  # (v, w, q, n)
         back = back @ N.T
-        self.by_force = [_frequency_sums(back * s, moved) for s in powers]
+        self.by_force = [_frequency_sums(back * s, spectra) for s in powers]
         self.by_column = [_frequency_sums(back * s, met) for s in powers[:2]]
-        self.by_row = [(moved * s).sum(axis=1).real for s in powers]
+        self.by_row = [(spectra * s).sum(axis=1).real for s in powers]
         self.by_road = [(met * s).sum(axis=1).real for s in powers[:2]]
 
     def slopes(self, shifts: Shifts, inert: np.ndarray) -> np.ndarray:
@@ -69,21 +76,21 @@ class Sensitivity:
         forces = [(self.by_force, stiffness, -1.0), (self.by_column, shifts.by_heights, 1.0)]
         outputs = [(self.by_row, shifts.by_motion), (self.by_road, shifts.by_road)]
         total = np.zeros((*self.by_road[0].shape[:2], len(inert)))
-        for sums, moved, sign in forces:
-            for each, matrices in zip(sums, moved, strict=True):
+        for sums, matrix_changes, sign in forces:
+            for sensitivity, matrices in zip(sums, matrix_changes, strict=True):
                 if matrices.any():
-                    total += sign * np.tensordot(each, matrices, ((2, 3), (1, 2)))
-        for sums, moved in outputs:
-            for each, matrices in zip(sums, moved, strict=True):
+                    total += sign * np.tensordot(sensitivity, matrices, ((2, 3), (1, 2)))
+        for sums, matrix_changes in outputs:
+            for sensitivity, matrices in zip(sums, matrix_changes, strict=True):
                 if matrices.any():
-                    total += np.einsum("vqj,pqj->vqp", each, matrices)
+                    total += np.einsum("vqj,pqj->vqp", sensitivity, matrices)
         return total
 
 
-def _frequency_sums(back: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Real part (v, q, i, j) of the sums over frequencies w of products of ``back`` (w, q, i) and ``moved`` (v, w, q,
-    j).
+def _frequency_sums(adjoint_responses: np.ndarray, products: np.ndarray) -> np.ndarray:
+    """Real part (v, q, i, j) of the sums over frequencies w of products of ``adjoint_responses`` (w, q, i) and
+    ``products`` (v, w, q, j).
     """
-    left = np.concatenate([back.real, -back.imag]).transpose(1, 2, 0)  # (q, i, 2 w)
-    right = np.concatenate([moved.real, moved.imag], axis=1).transpose(0, 2, 1, 3)  # (v, q, 2 w, j)
+    left = np.concatenate([adjoint_responses.real, -adjoint_responses.imag]).transpose(1, 2, 0)  # (q, i, 2 w)
+    right = np.concatenate([products.real, products.imag], axis=1).transpose(0, 2, 1, 3)  # (v, q, 2 w, j)
     return np.asarray(left @ right)

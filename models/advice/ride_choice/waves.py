@@ -47,22 +47,31 @@ def filter_states(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray)
 
 
 def at_axles(
-    each: np.ndarray, excitation: Excitation, speeds: np.ndarray, omega: np.ndarray, apart: np.ndarray
+    states_of_axle: np.ndarray,
+    excitation: Excitation,
+    speeds: np.ndarray,
+    omega: np.ndarray,
+    is_independent: np.ndarray,
 ) -> np.ndarray:
     """Filter states (v, w, axles m, noises) of all axles: those of one axle (v, w, m, k), delayed for each axle.
 
-    Axles that are ``apart`` (w,), or independent, have noises of their own, axles k; all others share the first k.
+    Axles that are ``is_independent`` (w,), or independent, have noises of their own, axles k; all others share the
+    first k.
     """
-    (m, k), axles = each.shape[2:], len(excitation.lengths)
-    alone = apart | excitation.independent
-    out = np.zeros((*each.shape[:2], axles * m, (axles if alone.any() else 1) * k), complex)
+    (m, k), axles = states_of_axle.shape[2:], len(excitation.lengths)
+    has_separate_noise = is_independent | excitation.independent
+    states = np.zeros((*states_of_axle.shape[:2], axles * m, (axles if has_separate_noise.any() else 1) * k), complex)
     for i, length in enumerate(excitation.lengths):
-        late = each * np.exp(-1j * omega * length / speeds[:, None])[..., None, None] if length else each
-        rows = out[:, :, i * m : (i + 1) * m]
-        rows[:, ~alone, :, :k] = late[:, ~alone]
-        if alone.any():
-            rows[:, alone, :, i * k : (i + 1) * k] = late[:, alone]
-    return out
+        late = (
+            states_of_axle * np.exp(-1j * omega * length / speeds[:, None])[..., None, None]
+            if length
+            else states_of_axle
+        )
+        rows = states[:, :, i * m : (i + 1) * m]
+        rows[:, ~has_separate_noise, :, :k] = late[:, ~has_separate_noise]
+        if has_separate_noise.any():
+            rows[:, has_separate_noise, :, i * k : (i + 1) * k] = late[:, has_separate_noise]
+    return states
 
 
 @dataclass(frozen=True)
@@ -106,34 +115,38 @@ class Filters:
 
 
 def pair_factors(
-    gains: Mapping[complex, Sequence[np.ndarray]], axle_pair: CornerPair, alone: bool
+    gains: Mapping[complex, Sequence[np.ndarray]], axle_pair: CornerPair, all_independent: bool
 ) -> tuple[np.ndarray, dict[tuple[int, int], np.ndarray]]:
     """Factors of a pair's density in the density of the quantities: (w, q) summed over single axles and, unless all are
-    ``alone``, for every two axles, before the delay between them. ``gains`` : of ``Filters.by_noises``.
+    ``all_independent``, for every two axles, before the delay between them. ``gains`` : of ``Filters.by_noises``.
     """
     first, second = (gains[corner] for corner in axle_pair.corners)
     axles = range(len(first))
     own = sum(_noise_product(first[i], second[i]) for i in axles)
-    return np.asarray(own), {} if alone else {
+    return np.asarray(own), {} if all_independent else {
         (i, j): 2.0 * _noise_product(first[i], second[j]) for i, j in combinations(axles, 2)
     }
 
 
-def _noise_product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def _noise_product(first_factor: np.ndarray, second_factor: np.ndarray) -> np.ndarray:
     """Product of (w, q, k) with the conjugate of (w, q, k), summed over the noises k: (w, q)."""
-    return np.einsum("wqk,wqk->wq", first, second.conj())
+    return np.einsum("wqk,wqk->wq", first_factor, second_factor.conj())
 
 
 def variances(
-    gains: Sequence[np.ndarray], excitation: Excitation, speeds: np.ndarray, omega: np.ndarray, apart: np.ndarray
+    gains: Sequence[np.ndarray],
+    excitation: Excitation,
+    speeds: np.ndarray,
+    omega: np.ndarray,
+    is_independent: np.ndarray,
 ) -> np.ndarray:
     """Variances (v, q) at speeds (v,): sums over frequencies (w,) of the response to the road at all axles with their
     delays.
 
     gains : (w, q, m) of every axle, of its filter's states, with the root of the weights of the sum. Axles that are
-    ``apart`` (w,), or independent, know nothing of one another.
+    ``is_independent`` (w,), or independent, know nothing of one another.
     """
-    total, near = np.zeros((len(speeds), gains[0].shape[1])), ~apart
+    total, near = np.zeros((len(speeds), gains[0].shape[1])), ~is_independent
     late, filters = {}, Filters(excitation)
     by_noises = filters.by_noises(gains)
     for pair in filters.pairs:

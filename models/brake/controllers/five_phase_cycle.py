@@ -93,24 +93,24 @@ class WheelAtSpeed:
 
 
 @njit(cache=True, error_model="numpy")
-def rim_acceleration(state, driven):
+def rim_acceleration(state, wheel_at_speed):
     """Acceleration (m/s^2) of the wheel's rim."""
-    radius, inertia = driven.radius, driven.inertia
-    slip = min(max(1.0 - radius * state.turning / driven.vehicle_speed, 0.0), 1.0)
-    k, share = cell_and_share(driven.grip.slips, slip)
-    low, high = node_force(k, driven.grip), node_force(k + 1, driven.grip)
+    radius, inertia = wheel_at_speed.radius, wheel_at_speed.inertia
+    slip = min(max(1.0 - radius * state.turning / wheel_at_speed.vehicle_speed, 0.0), 1.0)
+    k, share = cell_and_share(wheel_at_speed.grip.slips, slip)
+    low, high = node_force(k, wheel_at_speed.grip), node_force(k + 1, wheel_at_speed.grip)
     return radius * (radius * (low + share * (high - low)) - state.torque) / inertia
 
 
 @njit(cache=True, error_model="numpy")
-def go_on(state, rate, time, driven):
+def go_on(state, rate, time, wheel_at_speed):
     """State after a time (s) in which pressure changes at a constant rate (bar/s) and reaches no corner of the
     hysteresis loop."""
     pressure = max(state.pressure + rate * time, 0.0)
-    after = torque(0, pressure, state.torque, driven.brakes)
-    drive = StepInput(driven.vehicle_speed, driven.vehicle_speed, state.torque, after, time)
-    rolled = wheel_step(drive, Wheel(driven.radius, driven.inertia, state.turning), driven.grip)
-    return WheelState(pressure, after, rolled.turning, state.time + time, state.impulse + time * rolled.force)
+    torque_after = torque(0, pressure, state.torque, wheel_at_speed.brakes)
+    drive = StepInput(wheel_at_speed.vehicle_speed, wheel_at_speed.vehicle_speed, state.torque, torque_after, time)
+    rolled = wheel_step(drive, Wheel(wheel_at_speed.radius, wheel_at_speed.inertia, state.turning), wheel_at_speed.grip)
+    return WheelState(pressure, torque_after, rolled.turning, state.time + time, state.impulse + time * rolled.force)
 
 
 @njit(cache=True, error_model="numpy")
@@ -130,35 +130,45 @@ def time_to_corner(state, rate, brakes):
 
 
 @njit(cache=True, error_model="numpy")
-def phase_end(state, sign, level, back, driven):
-    """MET if the rim's acceleration has passed ``level`` in the direction ``sign``, OTHER_LEVEL_MET if it is at most
-    ``back`` (m/s^2), else -1."""
-    now = rim_acceleration(state, driven)
-    return LEVEL_MET if sign * (now - level) >= 0.0 else OTHER_LEVEL_MET if now <= back else -1
+def phase_end(state, sign, end_level, other_level, wheel_at_speed):
+    """MET if the rim's acceleration has passed ``end_level`` in the direction ``sign``, OTHER_LEVEL_MET if it is at
+    most ``other_level`` (m/s^2), else -1.
+    """
+    acceleration = rim_acceleration(state, wheel_at_speed)
+    return (
+        LEVEL_MET
+        if sign * (acceleration - end_level) >= 0.0
+        else OTHER_LEVEL_MET
+        if acceleration <= other_level
+        else -1
+    )
 
 
 @njit(cache=True, error_model="numpy")
-def integrate_phase(state, rate, sign, level, back, step, driven):
+def integrate_phase(state, rate, sign, end_level, other_level, step, wheel_at_speed):
     """Integrate one phase from ``state`` at a constant rate of pressure (bar/s) in steps (s): the last state, and how
     the phase ended.
 
     A wheel that locks while pressure falls turns again later; another one does not.
     """
-    began, end = state.time, phase_end(state, sign, level, back, driven)
+    began, end = state.time, phase_end(state, sign, end_level, other_level, wheel_at_speed)
     while end < 0:
-        time = min(step, time_to_corner(state, rate, driven.brakes))
-        after = go_on(state, rate, time, driven)
-        end = phase_end(after, sign, level, back, driven)
+        time = min(step, time_to_corner(state, rate, wheel_at_speed.brakes))
+        next_state = go_on(state, rate, time, wheel_at_speed)
+        end = phase_end(next_state, sign, end_level, other_level, wheel_at_speed)
         if end >= 0:
             low, high = 0.0, time
             while high - low > 1e-15:
                 middle = 0.5 * (low + high)
-                if phase_end(go_on(state, rate, middle, driven), sign, level, back, driven) >= 0:
+                if (
+                    phase_end(go_on(state, rate, middle, wheel_at_speed), sign, end_level, other_level, wheel_at_speed)
+                    >= 0
+                ):
                     high = middle
                 else:
                     low = middle
-            after = go_on(state, rate, high, driven)
-        state = after
+            next_state = go_on(state, rate, high, wheel_at_speed)
+        state = next_state
         if end < 0 and not (state.turning > 0.0 or rate < 0.0):
             return state, WHEEL_LOCKS
         if end < 0 and state.time - began > LONGEST_PHASE:
@@ -177,62 +187,72 @@ class Cycle:
     slips: tuple[float, ...]
 
 
-def limit_cycle(frozen: WheelAtSpeed, controller: FivePhase, step: float = 2e-5, most: int = 60) -> Cycle:
+def limit_cycle(
+    wheel_at_speed: WheelAtSpeed, controller: FivePhase, step: float = 2e-5, most_cycles: int = 60
+) -> Cycle:
     """Limit cycle of the continuous controller, reached from a wheel that rolls freely, in steps of at most ``step``
     (s).
 
     The driver applies the brake fast, so the first release differs from later ones. If the wheel stops gaining speed in
     phase 2, phase 5 follows, as in the controller; a wheel that locks by this is released.
 
-    Raises RunFailed if a phase does not end, a wheel locks while it is not released, or no cycle closes among ``most``.
+    Raises RunFailed if a phase does not end, a wheel locks while it is not released, or no cycle closes among
+    ``most_cycles``.
     """
-    state, _ = _state_at_end(frozen.rolling(), 0, controller, step, frozen)
-    for _ in range(most):
+    state, _ = _state_at_end(wheel_at_speed.rolling(), 0, controller, step, wheel_at_speed)
+    for _ in range(most_cycles):
         state = state._replace(time=0.0, impulse=0.0)
         path, number = [state], RELEASE_PHASE
         while number <= SLOW_PHASE:
-            state, end = _state_at_end(state, number, controller, step, frozen)
+            state, end = _state_at_end(state, number, controller, step, wheel_at_speed)
             path.append(state)
             number = SLOW_PHASE if end == OTHER_LEVEL_MET else number + 1
         first = path[0]
         if abs(state.torque / first.torque - 1.0) + abs(state.turning / first.turning - 1.0) < CLOSED_CYCLE_TOLERANCE:
-            return _cycle_from_switches(path, frozen)
-    raise RunFailed("braking", f"{most} cycles of the five phases do not close")
+            return _cycle_from_switches(path, wheel_at_speed)
+    raise RunFailed("braking", f"{most_cycles} cycles of the five phases do not close")
 
 
-def _cycle_from_switches(switch_states: list[WheelState], frozen: WheelAtSpeed) -> Cycle:
+def _cycle_from_switches(switch_states: list[WheelState], wheel_at_speed: WheelAtSpeed) -> Cycle:
     """The ``Cycle`` computed from the wheel's states at the six switches between phases."""
-    last, slips = switch_states[-1], [1.0 - frozen.radius * state.turning / frozen.speed for state in switch_states]
+    last_state, slips = (
+        switch_states[-1],
+        [1.0 - wheel_at_speed.radius * state.turning / wheel_at_speed.speed for state in switch_states],
+    )
     durations = tuple(np.diff([state.time for state in switch_states]).tolist())
-    return Cycle(last.time, durations, last.impulse / last.time / frozen.peak, tuple(slips))
+    return Cycle(last_state.time, durations, last_state.impulse / last_state.time / wheel_at_speed.peak, tuple(slips))
 
 
 def _state_at_end(
-    state: WheelState, number: int, controller: FivePhase, step: float, frozen: WheelAtSpeed
+    state: WheelState, phase_number: int, controller: FivePhase, step: float, wheel_at_speed: WheelAtSpeed
 ) -> tuple[WheelState, int]:
     """State at the end of a phase, and whether it ended as LEVEL_MET or as OTHER_LEVEL_MET; raises RunFailed."""
-    sign, level = end_of_phase(number, controller)
-    back = controller.e4 if number == SPEED_UP_PHASE else -math.inf
-    state, end = integrate_phase(state, rate_of_phase(number, controller), sign, level, back, step, frozen.driven)
-    if end == NEVER_ENDS or (end == WHEEL_LOCKS and number != 0):
-        what = f"the wheel locks in phase {number}" if end == WHEEL_LOCKS else f"phase {number} does not end"
-        raise RunFailed("braking", what, state.time)
+    sign, level = end_of_phase(phase_number, controller)
+    back = controller.e4 if phase_number == SPEED_UP_PHASE else -math.inf
+    state, end = integrate_phase(
+        state, rate_of_phase(phase_number, controller), sign, level, back, step, wheel_at_speed.driven
+    )
+    if end == NEVER_ENDS or (end == WHEEL_LOCKS and phase_number != 0):
+        failure = (
+            f"the wheel locks in phase {phase_number}" if end == WHEEL_LOCKS else f"phase {phase_number} does not end"
+        )
+        raise RunFailed("braking", failure, state.time)
     return state, end
 
 
 def sampled_cycle(
-    frozen: WheelAtSpeed, controller: FivePhase, cycles: int = 30, substeps: int = 4, skip: int = 5
+    wheel_at_speed: WheelAtSpeed, controller: FivePhase, cycles: int = 30, substeps: int = 4, skip: int = 5
 ) -> Cycle:
     """Mean over ``cycles`` cycles of the sampled controller, after the first ``skip`` ones; no durations and slips are
     given.
 
     Raises RunFailed if it does not cycle.
     """
-    state, driven, number, falling = frozen.rolling(), frozen.driven, 0, False
+    state, driven, number, falling = wheel_at_speed.rolling(), wheel_at_speed.driven, 0, False
     starts: list[WheelState] = []
     while len(starts) <= cycles + skip:
-        wheels = np.array([frozen.radius * state.turning])
-        sample = Sample(number, round(number * SAMPLE * 1e9), wheels, True, 1e3, frozen.speed)
+        wheels = np.array([wheel_at_speed.radius * state.turning])
+        sample = Sample(number, round(number * SAMPLE * 1e9), wheels, True, 1e3, wheel_at_speed.speed)
         pressure = float(np.asarray(controller.sample(sample).pressures)[0])
         if pressure < state.pressure and not falling:
             starts.append(state)
@@ -242,6 +262,6 @@ def sampled_cycle(
             state = go_on(state, 0.0, SAMPLE / substeps, driven)
         if number * SAMPLE > (cycles + skip) * LONGEST_PHASE:
             raise RunFailed("braking", "the sampled controller does not cycle", state.time)
-    first, last = starts[skip], starts[-1]
-    time, impulse = last.time - first.time, last.impulse - first.impulse
-    return Cycle(time / cycles, (), impulse / time / frozen.peak, ())
+    first_start, last_start = starts[skip], starts[-1]
+    time, impulse = last_start.time - first_start.time, last_start.impulse - first_start.impulse
+    return Cycle(time / cycles, (), impulse / time / wheel_at_speed.peak, ())

@@ -60,14 +60,18 @@ class Common:
 
         Raises InputError. Axles that do not exist are refused by ``PerWheel``.
         """
-        for name, (above, most) in {"period": (0.0, 1.0), "cut_off": (-SMALLEST_FLOAT, 100.0), **bounds}.items():
-            value, place = getattr(self, name), f"controller.parameters.{name}"
+        for name, (bound_below, bound_above) in {
+            "period": (0.0, 1.0),
+            "cut_off": (-SMALLEST_FLOAT, 100.0),
+            **bounds,
+        }.items():
+            value, key_path = getattr(self, name), f"controller.parameters.{name}"
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
-                raise InputError("", place, value, "must be a number")
-            if not above < value <= most:
-                least = "0 or more" if above == -SMALLEST_FLOAT else f"above {above:g}"
-                largest = "below 0" if most == -SMALLEST_FLOAT else f"at most {most:g}"
-                raise InputError("", place, value, f"must be {least}, {largest}")
+                raise InputError("", key_path, value, "must be a number")
+            if not bound_below < value <= bound_above:
+                least_text = "0 or more" if bound_below == -SMALLEST_FLOAT else f"above {bound_below:g}"
+                largest = "below 0" if bound_above == -SMALLEST_FLOAT else f"at most {bound_above:g}"
+                raise InputError("", key_path, value, f"must be {least_text}, {largest}")
         self.select_low = tuple(self.select_low)
 
 
@@ -80,8 +84,8 @@ class PerWheel:
             if not (isinstance(axle, int) and 0 <= 2 * axle + 1 < wheels):
                 raise InputError("", "controller.parameters.select_low", axle, f"must be axles 0 to {wheels // 2 - 1}")
         shared = [(2 * axle, 2 * axle + 1) for axle in common.select_low]
-        alone = [(i, i) for i in range(wheels) if i // 2 not in common.select_low]
-        self._groups = sorted(shared + alone)
+        single_wheels = [(i, i) for i in range(wheels) if i // 2 not in common.select_low]
+        self._groups = sorted(shared + single_wheels)
         self._logics = [logic(common) for _ in self._groups]
         self._common, self._pressures, self._wheels = common, pressures, wheels
         self._estimate, self._before = SpeedEstimate(common.period), [np.nan] * len(self._groups)
@@ -94,18 +98,18 @@ class PerWheel:
         slowing = self._mean_slowing(speed)
         if not sample.brake:
             return self._command_all(0.0 if self._pressures else RELEASE)
-        out = [0.0] * self._wheels
-        for k, (first, last) in enumerate(self._groups):
-            wheel = min(wheels[first], wheels[last])
-            before = self._before[k]
-            gains = (wheel - before) / self._common.period - slowing if before == before else 0.0
+        commands = [0.0] * self._wheels
+        for k, (first_wheel, last_wheel) in enumerate(self._groups):
+            wheel = min(wheels[first_wheel], wheels[last_wheel])
+            speed_before = self._before[k]
+            gains = (wheel - speed_before) / self._common.period - slowing if speed_before == speed_before else 0.0
             self._before[k] = wheel
             if speed > 0.0:
                 answer = self._logics[k].decide(1.0 - wheel / speed, gains, speed, sample.supply)
-                out[first] = out[last] = answer
+                commands[first_wheel] = commands[last_wheel] = answer
         if speed < self._common.cut_off:
             return self._command_all(sample.supply if self._pressures else APPLY)
-        return self._commands_of_logics(out)
+        return self._commands_of_logics(commands)
 
     def _mean_slowing(self, speed: float) -> float:
         """Mean acceleration of the vehicle (m/s^2), smoothed over about ``SLOPE_MEMORY`` seconds."""
@@ -115,13 +119,13 @@ class PerWheel:
         self._speed = speed
         return self._slowing
 
-    def _command_all(self, answer: float) -> Command:
-        return self._commands_of_logics([answer] * self._wheels)
+    def _command_all(self, logic_output: float) -> Command:
+        return self._commands_of_logics([logic_output] * self._wheels)
 
-    def _commands_of_logics(self, answers: list[float]) -> Command:
+    def _commands_of_logics(self, logic_outputs: list[float]) -> Command:
         if self._pressures:
-            return Command(pressures=np.array(answers, dtype=float))
-        return Command(valves=np.array(answers, dtype=np.int64))
+            return Command(pressures=np.array(logic_outputs, dtype=float))
+        return Command(valves=np.array(logic_outputs, dtype=np.int64))
 
 
 @dataclass

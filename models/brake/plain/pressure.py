@@ -37,8 +37,10 @@ class Pressures:
             within = [
                 cut for cut in self._arrival_times(n * step) if STEP_END_SHARE < cut / step < 1.0 - STEP_END_SHARE
             ]
-            for now, then in pairwise([0.0, *within, step]):
-                self._advance_pressures(self._effective_command(n * step + 0.5 * (now + then)), then - now)
+            for start_time, end_time in pairwise([0.0, *within, step]):
+                self._advance_pressures(
+                    self._effective_command(n * step + 0.5 * (start_time + end_time)), end_time - start_time
+                )
             torques[n + 1] = self.air.torque
 
     def by_pressures(self, pressures: np.ndarray, torques: np.ndarray) -> None:
@@ -59,17 +61,17 @@ class Pressures:
 
     def _advance_pressures(self, valves: np.ndarray, time: float) -> None:
         """Update pressures and torques over a time (s) with constant valve states (W,)."""
-        chambers, supply, before = self.chambers, float(self.air.supply[0]), self.air.pressure.copy()
+        chambers, supply, pressures_before = self.chambers, float(self.air.supply[0]), self.air.pressure.copy()
         fills = valves >= APPLY
-        to = np.where(fills, supply, np.where(valves == RELEASE, 0.0, before))
+        to = np.where(fills, supply, np.where(valves == RELEASE, 0.0, pressures_before))
         slow = chambers.slow if chambers.slow.size else chambers.fill_time
         constants = np.where(valves == RELEASE, chambers.empty_time, np.where(valves == SLOW, slow, chambers.fill_time))
         left = np.exp(-time / np.where(constants > 0.0, constants, 1.0)) * (constants > 0.0)
-        self.air.pressure[:] = to + (before - to) * left
+        self.air.pressure[:] = to + (pressures_before - to) * left
         self._follow_hysteresis()
         if np.isfinite(chambers.reservoir):
-            taken = float(chambers.volumes @ ((self.air.pressure - before) * fills))
-            self.air.supply[0] -= max(taken, 0.0) / chambers.reservoir
+            air_used = float(chambers.volumes @ ((self.air.pressure - pressures_before) * fills))
+            self.air.supply[0] -= max(air_used, 0.0) / chambers.reservoir
 
     def _follow_hysteresis(self) -> None:
         """Update the torques: each stays between the lines of rising and of falling pressure in the hysteresis loop."""

@@ -22,15 +22,17 @@ def lag_on(
     (W,) : m; slope : largest cornering coefficient (1/rad).
     """
     (u, v), stiffness = speeds, np.sqrt(max(slope, SLOWEST_SPEED) * GRAVITY * length)
-    before = np.where(np.isnan(angle), v / np.maximum(np.abs(u), SLOWEST_SPEED), angle)
-    after = np.array([_lagging_slip(*wheel, time) for wheel in zip(before, np.abs(u), v, length, strict=True)])
+    slips_before = np.where(np.isnan(angle), v / np.maximum(np.abs(u), SLOWEST_SPEED), angle)
+    lagging_slips = np.array(
+        [_lagging_slip(*wheel, time) for wheel in zip(slips_before, np.abs(u), v, length, strict=True)]
+    )
     fade = np.clip(1.0 - np.abs(u) / FADING_SPEED, 0.0, 1.0)
-    return after, after + fade**2 * v * 2.0 * DAMPING / stiffness
+    return lagging_slips, lagging_slips + fade**2 * v * 2.0 * DAMPING / stiffness
 
 
-def _lagging_slip(angle: float, speed: float, across: float, length: float, time: float) -> float:
+def _lagging_slip(angle: float, speed: float, speed_across: float, length: float, time: float) -> float:
     """Solution of sigma a' = v - |u| a after a time (s), for the lagging slip a and the relaxation length sigma."""
-    rates = np.array([[-speed, across], [0.0, 0.0]]) * (time / length)
+    rates = np.array([[-speed, speed_across], [0.0, 0.0]]) * (time / length)
     return float((expm(rates) @ (angle, 1.0))[0])
 
 

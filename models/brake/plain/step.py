@@ -55,43 +55,51 @@ class Steps:
     def __init__(self, vehicle: Suspension, course: Course, step: float) -> None:
         self.vehicle, self.course, self.step = vehicle, course, step
 
-    def on(self, moving: Moving, torques: np.ndarray) -> tuple[int, float]:
+    def on(self, moving_vehicle: Moving, torques: np.ndarray) -> tuple[int, float]:
         """Advance the vehicle by a step between torques (2, W) in N m at its start and end; returns how the step ended
         and the time (s)."""
-        half, (q, v) = 0.5 * self.step, moving.state
-        under, middle = self._surfaces_under(moving.state, self.step), np.array([torques[0], torques.mean(axis=0)])
+        half, (q, v) = 0.5 * self.step, moving_vehicle.state
+        under, middle = (
+            self._surfaces_under(moving_vehicle.state, self.step),
+            np.array([torques[0], torques.mean(axis=0)]),
+        )
         contacts = self._contacts(q, v)
         starts = speeds(contacts)
-        if moving.lag is not None:
-            moving.lag.reach(np.array([starts, [contact.side_speed_of_contact for contact in contacts]]), half)
-        held = self._held_wheel_forces(moving, contacts, starts, under, middle, half)
-        rates = self.vehicle.acceleration(q, v, held)
-        moving.accelerations[:] = self._of_units(rates)
-        rest = self.time_of_rest(moving)
-        if rest is not None:
-            moving.state[0] += rest * v + 0.5 * rest**2 * rates
-            moving.state[1, [0, 1, 2, *self.vehicle.turns]], moving.turning[:] = 0.0, 0.0
-            return (AT_REST, rest) if rest < self.step else (self._end_status(moving), self.step)
+        if moving_vehicle.lag is not None:
+            moving_vehicle.lag.reach(np.array([starts, [contact.side_speed_of_contact for contact in contacts]]), half)
+        wheel_forces = self._held_wheel_forces(moving_vehicle, contacts, starts, under, middle, half)
+        rates = self.vehicle.acceleration(q, v, wheel_forces)
+        moving_vehicle.accelerations[:] = self._of_units(rates)
+        rest_time = self.time_of_rest(moving_vehicle)
+        if rest_time is not None:
+            moving_vehicle.state[0] += rest_time * v + 0.5 * rest_time**2 * rates
+            moving_vehicle.state[1, [0, 1, 2, *self.vehicle.turns]], moving_vehicle.turning[:] = 0.0, 0.0
+            return (AT_REST, rest_time) if rest_time < self.step else (self._end_status(moving_vehicle), self.step)
         contacts = self._contacts(q + half * v + 0.5 * half**2 * rates, v + half * rates)
-        moving.speed_changes[:] = (speeds(contacts) - starts) / half
-        held = self._held_wheel_forces(moving, contacts, starts, under, torques, self.step)
-        after = march(lambda _, x, u: self.vehicle.acceleration(x, u, held), q.copy(), v.copy(), 1, self.step)[-1]
-        moving.state[:], moving.turning[:] = after.reshape(2, -1), moving.report[:, SPINS]
-        return self._end_status(moving), self.step
+        moving_vehicle.speed_changes[:] = (speeds(contacts) - starts) / half
+        wheel_forces = self._held_wheel_forces(moving_vehicle, contacts, starts, under, torques, self.step)
+        states_after = march(
+            lambda _, x, u: self.vehicle.acceleration(x, u, wheel_forces), q.copy(), v.copy(), 1, self.step
+        )[-1]
+        moving_vehicle.state[:], moving_vehicle.turning[:] = (
+            states_after.reshape(2, -1),
+            moving_vehicle.report[:, SPINS],
+        )
+        return self._end_status(moving_vehicle), self.step
 
     def rolling(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) at a state (2, n) whose wheels roll freely, and the wheels' rotational speeds (W,)."""
         plane, contacts = self.course.on.plane, self._contacts(state[0], state[1])
         starts = speeds(contacts)
-        none, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
+        no_torques, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
         moving = Moving(state, starts / plane.radius, np.zeros(starts.size), report, np.zeros(2 + plane.masses.size))
         under = self._surfaces_under(state, 0.0)
-        held = self._held_wheel_forces(moving, contacts, starts, under, none, self.step)
-        return self.vehicle.acceleration(state[0], state[1], held), moving.turning
+        wheel_forces = self._held_wheel_forces(moving, contacts, starts, under, no_torques, self.step)
+        return self.vehicle.acceleration(state[0], state[1], wheel_forces), moving.turning
 
-    def _end_status(self, moving: Moving) -> int:
+    def _end_status(self, moving_vehicle: Moving) -> int:
         """How a step ends: the vehicle leans too far, a train folds, or neither."""
-        q, fold = moving.state[0], self.course.on.plane.jackknife_angle
+        q, fold = moving_vehicle.state[0], self.course.on.plane.jackknife_angle
         if not np.abs(q[self.vehicle.leans]).max() <= UPRIGHT:
             return OVER
         return FINE if (np.abs(q[self.vehicle.turns]) <= fold).all() else FOLDED
@@ -103,11 +111,11 @@ class Steps:
 
     def _surfaces_under(self, state: np.ndarray, time: float) -> list[Surface]:
         """Surfaces under the wheels over a time (s), in which the wheels move on straight lines."""
-        plane, (place, rates) = self.course.on.plane, map(self._of_units, state)
+        plane, (position, rates) = self.course.on.plane, map(self._of_units, state)
         paths = np.empty((plane.wheels, 2, 2))
         for k in range(plane.masses.size):
             mine = plane.unit == k
-            paths[mine] = ground_paths(*in_row(place, rates, plane.reach[k], k), plane.place[mine], time)
+            paths[mine] = ground_paths(*in_row(position, rates, plane.reach[k], k), plane.place[mine], time)
         return under_wheels(self.course.on.road, paths, self.course.on.kind)
 
     def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[TyreContact]:
@@ -115,7 +123,7 @@ class Steps:
 
     def _held_wheel_forces(
         self,
-        moving: Moving,
+        moving_vehicle: Moving,
         contacts: list[TyreContact],
         starts: np.ndarray,
         surfaces: list[Surface],
@@ -127,26 +135,28 @@ class Steps:
         for i, contact in enumerate(contacts):
             motion = WheelMotion(
                 starts[i],
-                moving.speed_changes[i],
+                moving_vehicle.speed_changes[i],
                 contact.side_speed,
                 contact.side_speed_of_contact,
                 course.least_speed,
             )
-            if moving.lag is not None:
-                motion = replace(motion, across=moving.lag.across(i, max(motion.forward_speed, course.least_speed)))
+            if moving_vehicle.lag is not None:
+                motion = replace(
+                    motion, across=moving_vehicle.lag.across(i, max(motion.forward_speed, course.least_speed))
+                )
             radius, inertia = float(course.on.plane.radius[i]), float(course.on.plane.spin[i])
-            braked = BrakedStep((torques[0, i], torques[1, i]), time, radius, inertia, moving.turning[i])
-            moving.report[i] = tyre(course.on.tables, surfaces[i], motion, contact.load, braked)
-        spun = course.on.plane.spin * (moving.report[:, SPINS] - moving.turning) / time
-        return WheelForces(course.steer, moving.report[:, :2].copy(), spun)
+            braked = BrakedStep((torques[0, i], torques[1, i]), time, radius, inertia, moving_vehicle.turning[i])
+            moving_vehicle.report[i] = tyre(course.on.tables, surfaces[i], motion, contact.load, braked)
+        spun = course.on.plane.spin * (moving_vehicle.report[:, SPINS] - moving_vehicle.turning) / time
+        return WheelForces(course.steer, moving_vehicle.report[:, :2].copy(), spun)
 
-    def time_of_rest(self, moving: Moving) -> float | None:
+    def time_of_rest(self, moving_vehicle: Moving) -> float | None:
         """Time (s) within the step at which the kinetic energy of the plane motion is least, if the vehicle is about to
         stop; else None."""
-        plane, v, a = self.course.on.plane, self._of_units(moving.state[1]), moving.accelerations
+        plane, v, a = self.course.on.plane, self._of_units(moving_vehicle.state[1]), moving_vehicle.accelerations
         weights = np.array([plane.masses.sum(), plane.masses.sum(), *plane.inertias])
         speed, falling, rate = (float(weights @ product) for product in (v * v, -v * a, a * a))
-        if speed == 0.0 and not moving.turning.any():
+        if speed == 0.0 and not moving_vehicle.turning.any():
             return 0.0
         if rate == 0.0 or falling <= 0.0:
             return None

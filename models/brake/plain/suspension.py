@@ -55,20 +55,20 @@ class Suspension:
         free = vehicle.handling.vehicle
         self.bodies, self.tyres = Bodies(free), free.tyres
         self.parts = PlainParts(self.bodies, free, CARRIER)
-        held, self.loads = held_at_rest(free, CARRIER)
-        self.held, self._joint_held = np.split(held, [len(self.parts.names)])
+        preloads, self.loads = held_at_rest(free, CARRIER)
+        self.held, self._joint_held = np.split(preloads, [len(self.parts.names)])
         self._joints = joint_rows(self.bodies, free)
         self._joint_stiffness, self._joint_damping, _, self._joint_inertia = joint_numbers(free)
         self.turns, self.leans = vehicle.turns, vehicle.leans
         self._gravity = -free.gravity * UPWARD
         self._hubs = self.bodies.points([(tyre.body, tyre.point) for tyre in free.tyres])
-        given = vehicle.handling.given
-        chassis = chassis_of(given)
+        spatial_handling = vehicle.handling.given
+        chassis = chassis_of(spatial_handling)
         towed = [free.towed_under(tyre.body) for tyre in free.tyres]
         self._carrier, self._towed = self.bodies.row[CARRIER], [self.bodies.row[name] if name else 0 for name in towed]
         self._carrying = [self.bodies.row[name or chassis.name] for name in towed]
         self._centre = self.bodies.points([(chassis.name, chassis.position)])
-        self._drag = 0.5 * given.drags[0].coefficient if given.drags else 0.0
+        self._drag = 0.5 * spatial_handling.drags[0].coefficient if spatial_handling.drags else 0.0
 
     @property
     def size(self) -> int:
@@ -85,21 +85,28 @@ class Suspension:
         if not self._towed[i]:
             carrier: np.ndarray = motion.axes(self._carrier)[PLACE]
             return carrier
-        ahead = motion.axes(self._towed[i])[PLACE][:2, 0]
-        cosine, sine = ahead / np.hypot(*ahead)
+        forward = motion.axes(self._towed[i])[PLACE][:2, 0]
+        cosine, sine = forward / np.hypot(*forward)
         return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
     def _contact(self, i: int, hub: np.ndarray, motion: PlainMotion, steer: float) -> TyreContact:
         heading = self._heading(i, motion)
         axle = heading @ (-np.sin(steer), np.cos(steer), 0.0)
-        along = heading @ (np.cos(steer), np.sin(steer), 0.0)
+        rolling_direction = heading @ (np.cos(steer), np.sin(steer), 0.0)
         height = max(float(hub[PLACE, 2]), 0.0)
         hub_turning, carrying = motion.turning(int(self._hubs.rows[i])), motion.turning(self._carrying[i])
         turning = hub_turning + axle * (
             axle @ (carrying - hub_turning)
         )  # the rim does not turn beside what carries the wheel about its axle
         sliding = hub[RATE] + height * round_the_vertical(turning)
-        return TyreContact(along, axle, height, self._load(i, hub), float(hub[RATE] @ along), float(sliding @ axle))
+        return TyreContact(
+            rolling_direction,
+            axle,
+            height,
+            self._load(i, hub),
+            float(hub[RATE] @ rolling_direction),
+            float(sliding @ axle),
+        )
 
     def _load(self, i: int, hub: np.ndarray) -> float:
         """Load (N) of a tyre whose spring and damper together never pull."""
@@ -113,18 +120,20 @@ class Suspension:
         mass, force = self.bodies.inertia(motion, self._gravity)
         travels = self.parts.travels(motion, q, v)
         force -= sum(self.parts.forces(travels, self.held)) @ travels.gradient
-        along = self._joint_held + self._joint_stiffness * (self._joints @ q) + self._joint_damping * (self._joints @ v)
+        joint_forces = (
+            self._joint_held + self._joint_stiffness * (self._joints @ q) + self._joint_damping * (self._joints @ v)
+        )
         mass += self._joints.T * self._joint_inertia @ self._joints
-        force += self._by_tyres(motion, constant) + self._drag_forces(motion) - along @ self._joints
+        force += self._by_tyres(motion, constant) + self._drag_forces(motion) - joint_forces @ self._joints
         accelerations: np.ndarray = np.linalg.solve(mass, force)
         return accelerations
 
     def _drag_forces(self, motion: PlainMotion) -> np.ndarray:
         """Generalised forces (n,) of aerodynamic drag at the chassis' centre, opposite to its speed along the vehicle's
         heading."""
-        centre, ahead = motion.at(self._centre)[0], motion.axes(self._carrier)[PLACE][:, 0]
-        speed = float(centre[RATE] @ ahead)
-        forces: np.ndarray = centre[FIRST:] @ (-self._drag * abs(speed) * speed * ahead)
+        centre, forward = motion.at(self._centre)[0], motion.axes(self._carrier)[PLACE][:, 0]
+        speed = float(centre[RATE] @ forward)
+        forces: np.ndarray = centre[FIRST:] @ (-self._drag * abs(speed) * speed * forward)
         return forces
 
     def _by_tyres(self, motion: PlainMotion, constant: WheelForces) -> np.ndarray:

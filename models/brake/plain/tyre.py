@@ -16,15 +16,15 @@ LOCKING_SLIP = 0.98
 """Slip from which on the force turns to that of a locked tyre, against the way in which it slides."""
 
 
-def interpolation_weights(nodes: np.ndarray, value: float) -> np.ndarray:
+def interpolation_weights(nodes: np.ndarray, interpolated_at: float) -> np.ndarray:
     """Interpolation weight (n,) of each node at a value; beyond the nodes, the end node alone counts."""
-    inside = float(np.clip(value, nodes[0], nodes[-1]))
-    high = min(max(int(np.searchsorted(nodes, inside)), 1), nodes.size - 1)
+    clipped = float(np.clip(interpolated_at, nodes[0], nodes[-1]))
+    high = min(max(int(np.searchsorted(nodes, clipped)), 1), nodes.size - 1)
     weights_at = np.zeros(nodes.size)
     if nodes.size == 1:
         weights_at[0] = 1.0
         return weights_at
-    weights_at[high] = (inside - nodes[high - 1]) / (nodes[high] - nodes[high - 1])
+    weights_at[high] = (clipped - nodes[high - 1]) / (nodes[high] - nodes[high - 1])
     weights_at[high - 1] = 1.0 - weights_at[high]
     return weights_at
 
@@ -118,8 +118,8 @@ def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, bra
     friction, sense = Friction(tables, surface, motion.angle, load), motion.direction
     speeds = sense * motion.start, sense * (motion.start + braked.step * motion.rate)
     wheel = WheelStep(speeds, braked.torques, braked.step, braked.radius, braked.inertia)
-    turning, ahead, slip, locked = wheel_step(wheel, sense * braked.turning, friction.ahead())
-    forces = _turned_to_sliding(np.array([ahead, friction.aside(slip)]), slip, motion)
+    turning, force_along, slip, locked = wheel_step(wheel, sense * braked.turning, friction.ahead())
+    forces = _turned_to_sliding(np.array([force_along, friction.aside(slip)]), slip, motion)
     side = -math.copysign(forces[1], motion.across) if motion.across else 0.0
     angle = math.copysign(motion.angle, motion.across)
     return np.array([-sense * forces[0], side, load, slip, angle, locked, sense * turning])
@@ -133,5 +133,5 @@ def _turned_to_sliding(forces: np.ndarray, slip: float, motion: WheelMotion) -> 
     if slip <= LOCKING_SLIP or speed == 0.0:
         return forces
     share = min((slip - LOCKING_SLIP) / (1.0 - LOCKING_SLIP), 1.0)
-    turned: np.ndarray = (1.0 - share) * forces + share * float(np.hypot(*forces)) * sliding / speed
-    return turned
+    turned_forces: np.ndarray = (1.0 - share) * forces + share * float(np.hypot(*forces)) * sliding / speed
+    return turned_forces

@@ -84,32 +84,37 @@ class WheelProgress:
     has_been_freed: bool = False
 
 
-def wheel_step(step_data: WheelStep, turning: float, force: Force) -> tuple[float, float, float, float]:
+def wheel_step(step_data: WheelStep, rim_turning: float, force: Force) -> tuple[float, float, float, float]:
     """Speed of turning (rad/s) at the end of a step, mean force (N), mean slip and time locked (s).
 
-    turning : at the start (rad/s), below 0 where it is against the direction of the speeds.
+    rim_turning : at the start (rad/s), below 0 where it is against the direction of the speeds.
     """
-    slip = 1.0 - step_data.radius * turning / step_data.speed(0.0)
-    at = WheelProgress(0.0, slip)
+    slip = 1.0 - step_data.radius * rim_turning / step_data.speed(0.0)
+    progress = WheelProgress(0.0, slip)
     if slip > LOCKED_SLIP:
         stopping = force.locked_force * step_data.radius + step_data.mean_torque(0.0)
-        if stopping * step_data.step <= -step_data.inertia * turning:
-            return turning + stopping * step_data.step / step_data.inertia, force.locked_force, slip, 0.0
-        _advance_at_slip(at, -step_data.inertia * turning / stopping, force.locked_force, LOCKED_SLIP)
-    while at.time < step_data.step:
-        if _stays_locked(step_data, at, force):
-            _advance_locked(step_data, at, force)
-        elif _is_spinning(step_data, at, force):
-            turned = _advance_spinning(step_data, at, force)
-            if at.time >= step_data.step:
-                return turned, at.impulse / step_data.step, at.slip_integral / step_data.step, at.locked
+        if stopping * step_data.step <= -step_data.inertia * rim_turning:
+            return rim_turning + stopping * step_data.step / step_data.inertia, force.locked_force, slip, 0.0
+        _advance_at_slip(progress, -step_data.inertia * rim_turning / stopping, force.locked_force, LOCKED_SLIP)
+    while progress.time < step_data.step:
+        if _stays_locked(step_data, progress, force):
+            _advance_locked(step_data, progress, force)
+        elif _is_spinning(step_data, progress, force):
+            turning_speed = _advance_spinning(step_data, progress, force)
+            if progress.time >= step_data.step:
+                return (
+                    turning_speed,
+                    progress.impulse / step_data.step,
+                    progress.slip_integral / step_data.step,
+                    progress.locked,
+                )
         else:
-            _roll(step_data, at, force)
+            _roll(step_data, progress, force)
     return (
-        step_data.speed(step_data.step) * (1.0 - at.slip) / step_data.radius,
-        at.impulse / step_data.step,
-        at.slip_integral / step_data.step,
-        at.locked,
+        step_data.speed(step_data.step) * (1.0 - progress.slip) / step_data.radius,
+        progress.impulse / step_data.step,
+        progress.slip_integral / step_data.step,
+        progress.locked,
     )
 
 
@@ -161,10 +166,10 @@ def _advance_spinning(step_data: WheelStep, progress: WheelProgress, force: Forc
         step_data.speed(progress.time) * (1.0 - progress.slip) / step_data.radius,
         _excess_rate(step_data, progress, force),
     )
-    ahead, time = step_data.radius * turning - 2.0 * step_data.speed(progress.time), step_data.step - progress.time
+    overspeed, time = step_data.radius * turning - 2.0 * step_data.speed(progress.time), step_data.step - progress.time
     slowing = (step_data.radius * force.locked_force + step_data.mean_torque(progress.time)) / step_data.inertia
     if excess < 0.0:
-        time = min(time, -ahead / excess)
+        time = min(time, -overspeed / excess)
     _advance_at_slip(progress, time, -force.locked_force, -1.0)
     progress.has_been_freed = False
     return turning - slowing * time
@@ -173,18 +178,19 @@ def _advance_spinning(step_data: WheelStep, progress: WheelProgress, force: Forc
 def _roll(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
     """Advance a wheel with a slip between -1 and 1 until the step ends or the slip reaches one of them. The mean force
     follows from the wheel's momentum."""
-    before, mean, slip = progress.time, step_data.mean_torque(progress.time), min(progress.slip, LOCKED_SLIP)
+    start_time, mean, slip = progress.time, step_data.mean_torque(progress.time), min(progress.slip, LOCKED_SLIP)
     nodes, forces = force.both_ways()
     kappa = step_data.radius**2 / (step_data.inertia * step_data.mean_speed)
     rates = kappa * (mean / step_data.radius - forces) + (1.0 - nodes) * step_data.gain / step_data.mean_speed
-    time, progress.slip, area = along_nodes(slip, nodes, rates, step_data.step - before)
+    time, progress.slip, area = along_nodes(slip, nodes, rates, step_data.step - start_time)
     if time == 0.0:  # by rounding it stands on the edge, where neither state takes it
-        time = step_data.step - before
-    progress.time, progress.has_been_freed = before + time, False
+        time = step_data.step - start_time
+    progress.time, progress.has_been_freed = start_time + time, False
     if math.isclose(progress.time, step_data.step, rel_tol=1e-15):
         progress.time = step_data.step
     turning = [
-        step_data.speed(t) * (1.0 - s) / step_data.radius for t, s in ((before, slip), (progress.time, progress.slip))
+        step_data.speed(t) * (1.0 - s) / step_data.radius
+        for t, s in ((start_time, slip), (progress.time, progress.slip))
     ]
     progress.impulse += (
         step_data.inertia * (turning[1] - turning[0]) / step_data.radius + mean / step_data.radius * time
@@ -201,16 +207,16 @@ def along_nodes(slip: float, nodes: np.ndarray, rates: np.ndarray, remaining: fl
     rate, time, area = float(np.interp(slip, nodes, rates)), 0.0, 0.0
     if rate == 0.0:
         return remaining, slip, slip * remaining
-    ahead = np.flatnonzero(nodes > slip) if rate > 0.0 else np.flatnonzero(nodes < slip)[::-1]
-    for k in ahead:
-        way, ratio = float(nodes[k]) - slip, float(rates[k]) / rate
-        grows = (ratio - 1.0) * rate / way
-        needed = way / rate * _log_over(ratio - 1.0) if ratio > 0.0 else math.inf
+    nodes_passed = np.flatnonzero(nodes > slip) if rate > 0.0 else np.flatnonzero(nodes < slip)[::-1]
+    for k in nodes_passed:
+        slip_to_node, ratio = float(nodes[k]) - slip, float(rates[k]) / rate
+        grows = (ratio - 1.0) * rate / slip_to_node
+        needed = slip_to_node / rate * _log_over(ratio - 1.0) if ratio > 0.0 else math.inf
         if time + needed >= remaining:
-            rest = remaining - time
-            z = grows * rest
-            moved = slip + rest * rate * _phi_function(1, z)
-            return remaining, moved, area + slip * rest + rate * rest**2 * _phi_function(2, z)
+            remaining_time = remaining - time
+            z = grows * remaining_time
+            end_slip = slip + remaining_time * rate * _phi_function(1, z)
+            return remaining, end_slip, area + slip * remaining_time + rate * remaining_time**2 * _phi_function(2, z)
         area += slip * needed + rate * needed**2 * _phi_function(2, grows * needed)
         time, slip, rate = time + needed, float(nodes[k]), float(rates[k])
     return time, slip, area

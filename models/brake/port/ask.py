@@ -74,8 +74,8 @@ def exception_text(error: BaseException) -> str:
         for frame in extract_tb(error.__traceback__)
         if "site-packages" not in frame.filename and Path(frame.filename).parent != PORT_FOLDER
     ]
-    where = f" ({Path(lines[-1].filename).name}, line {lines[-1].lineno})" if lines else ""
-    return f"{type(error).__name__}: {error}"[: LONGEST_ERROR_TEXT - len(where)] + where
+    source_line = f" ({Path(lines[-1].filename).name}, line {lines[-1].lineno})" if lines else ""
+    return f"{type(error).__name__}: {error}"[: LONGEST_ERROR_TEXT - len(source_line)] + source_line
 
 
 @dataclass
@@ -98,8 +98,12 @@ def checked_answer(
     if not isinstance(command, Command) or (command.valves is None) == (command.pressures is None):
         raise ControllerFailed(sample, "wrong frame", "needs either valves or pressures")
     valves = command.valves
-    whole = valves if isinstance(valves, np.ndarray) and valves.dtype == np.int64 else None
-    if whole is not None and whole.shape == sample.wheels.shape and states.issuperset(whole.tolist()):
+    valve_states = valves if isinstance(valves, np.ndarray) and valves.dtype == np.int64 else None
+    if (
+        valve_states is not None
+        and valve_states.shape == sample.wheels.shape
+        and states.issuperset(valve_states.tolist())
+    ):
         return command
     values = _answer_array(command.pressures if command.valves is None else command.valves, sample)
     for value in values.tolist():

@@ -19,25 +19,25 @@ def named_controller(name: str, folder: Path, wheels: int, parameters: dict[str,
     """
     make = _callable_of_path(name, folder, file)
     try:
-        made = make(wheels, **parameters)
+        controller = make(wheels, **parameters)
     except (Exception, SystemExit) as error:
         raise InputError(file, "port.callable", name, f"was not made: {type(error).__name__}: {error}") from error
-    if not callable(getattr(made, "sample", None)):
+    if not callable(getattr(controller, "sample", None)):
         raise InputError(file, "port.callable", name, "makes something that has no method sample(given)")
-    return made
+    return controller
 
 
 def _callable_of_path(name: str, folder: Path, file: str) -> Callable[..., Any]:
-    place, _, attribute = name.rpartition(":")
-    if not place or not attribute:
+    module_name, _, attribute = name.rpartition(":")
+    if not module_name or not attribute:
         raise InputError(file, "port.callable", name, 'must be "module:Name" or "file.py:Name"')
     try:
-        module = _module_of_file(folder / place) if place.endswith(".py") else import_module(place)
+        module = _module_of_file(folder / module_name) if module_name.endswith(".py") else import_module(module_name)
     except (Exception, SystemExit) as error:
         raise InputError(file, "port.callable", name, f"was not loaded: {type(error).__name__}: {error}") from error
     choices = tuple(key for key in vars(module) if not key.startswith("_"))
     if attribute not in choices:
-        raise InputError(file, "port.callable", attribute, f"{place} has no such name", choices)
+        raise InputError(file, "port.callable", attribute, f"{module_name} has no such name", choices)
     return getattr(module, attribute)
 
 

@@ -19,8 +19,8 @@ def serve(controller: Controller, port: int) -> int:
     with socket.create_connection((LOOPBACK_ADDRESS, port)) as link, link.makefile("rb") as reader:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         while len(frame := reader.read(QUESTION_LAYOUT.size)) == QUESTION_LAYOUT.size:
-            given = sample_of_question(frame)
-            link.sendall(answer_frame(given.number, controller.sample(given)))
+            sample = sample_of_question(frame)
+            link.sendall(answer_frame(sample.number, controller.sample(sample)))
             count += 1
     return count
 

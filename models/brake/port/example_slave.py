@@ -26,8 +26,8 @@ class ExampleSlave(Fmi2Slave):
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Answer to the inputs as they are."""
         wheels = np.array([getattr(self, f"wheel_{i}") for i in range(1, 5)])
-        given = Sample(self._number, round(1e9 * current_time), wheels, self.brake, self.supply, self.speed)
-        valves = self._controller.sample(given).valves
+        sample = Sample(self._number, round(1e9 * current_time), wheels, self.brake, self.supply, self.speed)
+        valves = self._controller.sample(sample).valves
         assert valves is not None
         for i, valve in enumerate(valves.tolist(), 1):
             setattr(self, f"valve_{i}", float(valve))

@@ -61,24 +61,28 @@ class FaultyController:
     def sample(self, sample: Sample) -> Command:
         """The controller's commands for faulty signals; the commands themselves also get their faults."""
         time = 1e-9 * sample.time
-        here = [fault for fault in self.faults if fault.holds(time)]
-        command = self.controller.sample(sample._replace(wheels=self._faulty_signals(sample.wheels, here)))
-        return command if command.valves is None else Command(valves=self._stuck_valves(np.array(command.valves), here))
+        active_faults = [fault for fault in self.faults if fault.holds(time)]
+        command = self.controller.sample(sample._replace(wheels=self._faulty_signals(sample.wheels, active_faults)))
+        return (
+            command
+            if command.valves is None
+            else Command(valves=self._stuck_valves(np.array(command.valves), active_faults))
+        )
 
-    def _faulty_signals(self, wheels: np.ndarray, here: list[Fault]) -> np.ndarray:
+    def _faulty_signals(self, wheels: np.ndarray, active_faults: list[Fault]) -> np.ndarray:
         self._past_signals.append(wheels)
-        seen = wheels.copy()
-        for fault in here:
+        faulty_wheels = wheels.copy()
+        for fault in active_faults:
             for i in fault.of(wheels.size):
                 if fault.kind == "delayed":
-                    seen[i] = self._past_signals[max(len(self._past_signals) - 1 - (fault.samples or 0), 0)][i]
+                    faulty_wheels[i] = self._past_signals[max(len(self._past_signals) - 1 - (fault.samples or 0), 0)][i]
                 elif fault.kind == "lost" and self._last_signals is not None:
-                    seen[i] = self._last_signals[i]
-        self._last_signals = seen
-        return seen
+                    faulty_wheels[i] = self._last_signals[i]
+        self._last_signals = faulty_wheels
+        return faulty_wheels
 
-    def _stuck_valves(self, valves: np.ndarray, here: list[Fault]) -> np.ndarray:
-        for fault in here:
+    def _stuck_valves(self, valves: np.ndarray, active_faults: list[Fault]) -> np.ndarray:
+        for fault in active_faults:
             for i in fault.of(valves.size) if fault.kind == "stuck" else ():
                 if fault.state is not None:
                     valves[i] = fault.state

@@ -93,8 +93,8 @@ class FmuPort:
         return Command(valves=values) if self._mode == "valve" else Command(pressures=values)
 
 
-def _references(names: dict[str, tuple[int, str]], kind: str, wheels: int) -> list[int]:
-    return [names[f"{kind}_{i + 1}"][0] for i in range(wheels)]
+def _references(names: dict[str, tuple[int, str]], variable_kind: str, wheels: int) -> list[int]:
+    return [names[f"{variable_kind}_{i + 1}"][0] for i in range(wheels)]
 
 
 def _variables_by_name(description: Any, wheels: int, file: str) -> dict[str, tuple[int, str]]:

@@ -72,19 +72,19 @@ def sample_of_question(frame: bytes) -> Sample:
     return Sample(number, time, np.array(signals[:wheels]), bool(flags & SWITCH), supply, speed)
 
 
-def answer_frame(number: int, command: Command) -> bytes:
+def answer_frame(sample_number: int, command: Command) -> bytes:
     """Frame that carries a controller's answer to a sample."""
     mode, values = (b"P", command.pressures) if command.valves is None else (b"V", command.valves)
     assert values is not None
-    return ANSWER_LAYOUT.pack(b"TRA1", number, mode[0], len(values), *_eight_values(values))
+    return ANSWER_LAYOUT.pack(b"TRA1", sample_number, mode[0], len(values), *_eight_values(values))
 
 
-def command_of_answer(frame: bytes, number: int) -> Command:
-    """The commands in the answer frame; raises WrongFrame if the frame does not answer the sample ``number``."""
+def command_of_answer(frame: bytes, sample_number: int) -> Command:
+    """The commands in the answer frame; raises WrongFrame if the frame does not answer the sample ``sample_number``."""
     magic, answered, mode, wheels, *values = ANSWER_LAYOUT.unpack(frame)
     if magic != b"TRA1" or mode not in b"VP":
         raise WrongFrame("wrong frame", f"begins with {magic!r}, mode {mode}, not with b'TRA1' and 'V' or 'P'")
-    if answered != number:
+    if answered != sample_number:
         raise WrongFrame("wrong number", f"the answer is one to sample {answered}")
     if wheels > MOST_WHEELS:
         raise WrongFrame("wrong length", f"values for {wheels} wheels, at most {MOST_WHEELS} fit")

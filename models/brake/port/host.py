@@ -54,9 +54,9 @@ def made_controller(guest: HostedController) -> Iterator[Controller]:
         yield named_controller(str(guest.callable), guest.folder, guest.wheels, guest.parameters, guest.file)
 
 
-def failure_frame(**what: Any) -> bytes:
+def failure_frame(**failure: Any) -> bytes:
     """Frame that reports the exception now being handled."""
-    text = json.dumps(what, default=str).encode()
+    text = json.dumps(failure, default=str).encode()
     return HEAD_LAYOUT.pack(TOLD_MARK, len(text)) + text
 
 
@@ -70,8 +70,8 @@ def serve(link: socket.socket) -> None:
         with made_controller(guest) as controller:
             link.sendall(HEAD_LAYOUT.pack(READY_MARK, 0))
             while len(frame := reader.read(QUESTION_LAYOUT.size)) == QUESTION_LAYOUT.size:
-                given = sample_of_question(frame)
-                link.sendall(answer_frame(given.number, ask(controller, given, STATES_WITH_SLOW_APPLY)))
+                sample = sample_of_question(frame)
+                link.sendall(answer_frame(sample.number, ask(controller, sample, STATES_WITH_SLOW_APPLY)))
 
 
 def main(port: int) -> None:
@@ -82,15 +82,15 @@ def main(port: int) -> None:
             serve(link)
             return
         except ControllerFailed as error:
-            what = failure_frame(name=error.name, reason=error.why)
+            failure = failure_frame(name=error.name, reason=error.why)
         except InputError as error:
-            what = failure_frame(
+            failure = failure_frame(
                 file=error.file, place=error.place, value=error.value, allowed=error.allowed, choices=error.choices
             )
         except BaseException as error:
-            what = failure_frame(name="crash", reason=exception_text(error))
+            failure = failure_frame(name="crash", reason=exception_text(error))
         with suppress(OSError):  # nobody is left to hear it
-            link.sendall(what)
+            link.sendall(failure)
 
 
 if __name__ == "__main__":

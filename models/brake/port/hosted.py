@@ -32,8 +32,8 @@ STARTUP_SECONDS = 30.0
 class Failed(Exception):
     """Failure reported by the controller's process; what : its details as a table."""
 
-    def __init__(self, what: dict[str, Any]) -> None:
-        self.what = what
+    def __init__(self, failure: dict[str, Any]) -> None:
+        self.what = failure
         super().__init__()
 
 
@@ -45,16 +45,18 @@ class ProcessController:
     process: subprocess.Popen[bytes] | None
     timeout: float
 
-    def begin(self, guest: HostedController, start: float) -> None:
-        """Have the process make the controller within ``start`` seconds; raises InputError, RunFailed."""
+    def begin(self, guest: HostedController, start_seconds: float) -> None:
+        """Have the process make the controller within ``start_seconds`` seconds; raises InputError, RunFailed."""
         text = pickle.dumps(guest)
         try:
             self._receive(LENGTH_LAYOUT.pack(len(text)) + text, HEAD_LAYOUT.size, READY_MARK, STARTUP_SECONDS)
-            self._receive(b"", HEAD_LAYOUT.size, READY_MARK, start)
+            self._receive(b"", HEAD_LAYOUT.size, READY_MARK, start_seconds)
         except Failed as error:
             raise _as_input(error.what) from None
         except TimeoutError:
-            raise RunFailed("controller", f"silence: it was not made within {start:g} s; {START_REMEDY}") from None
+            raise RunFailed(
+                "controller", f"silence: it was not made within {start_seconds:g} s; {START_REMEDY}"
+            ) from None
         except (OSError, EOFError):
             raise RunFailed(
                 "controller", f"crash: it ended as it was made{end_of_process(self.process, self.timeout)}"
@@ -79,12 +81,12 @@ class ProcessController:
             lost = f"the controller was lost{end_of_process(self.process, self.timeout)}"
             raise ControllerFailed(sample, "crash", lost) from None
 
-    def _receive(self, sent: bytes, size: int, begins: bytes, seconds: float) -> bytes:
+    def _receive(self, sent: bytes, byte_count: int, begins: bytes, seconds: float) -> bytes:
         """The bytes that the process sends back within ``seconds``; raises Failed, TimeoutError, OSError, EOFError."""
         end = time.perf_counter() + seconds
         self.link.settimeout(seconds)
         self.link.sendall(sent)
-        got = self._receive_more(b"", size, end)
+        got = self._receive_more(b"", byte_count, end)
         if got[:4] == TOLD_MARK:
             length = HEAD_LAYOUT.unpack_from(got)[1]
             raise Failed(
@@ -96,19 +98,19 @@ class ProcessController:
             raise EOFError
         return got
 
-    def _receive_more(self, received: bytes, size: int, end: float) -> bytes:
-        """Receive until ``size`` bytes are there, or until a complete, shorter frame reports a failure."""
-        while len(received) < size and not (
+    def _receive_more(self, received: bytes, byte_count: int, deadline: float) -> bytes:
+        """Receive until ``byte_count`` bytes are there, or until a complete, shorter frame reports a failure."""
+        while len(received) < byte_count and not (
             received[:4] == TOLD_MARK and HEAD_LAYOUT.size <= len(received) == _failure_length(received)
         ):
-            part = self.link.recv(size - len(received))
-            left = end - time.perf_counter()
+            received_part = self.link.recv(byte_count - len(received))
+            left = deadline - time.perf_counter()
             if left <= 0.0:
                 raise TimeoutError
-            if not part:
+            if not received_part:
                 raise EOFError
-            received += part
-            if len(received) < size:
+            received += received_part
+            if len(received) < byte_count:
                 self.link.settimeout(left)
         return received
 
@@ -118,20 +120,23 @@ def _failure_length(received: bytes) -> int:
     return HEAD_LAYOUT.size + int(HEAD_LAYOUT.unpack_from(received)[1])
 
 
-def _as_input(what: dict[str, Any]) -> InputError | RunFailed:
-    if "place" not in what:
-        return RunFailed("controller", f"{what.get('name')}: {what.get('reason')}")
-    return InputError(what["file"], what["place"], what["value"], what["allowed"], tuple(what["choices"]))
+def _as_input(failure: dict[str, Any]) -> InputError | RunFailed:
+    if "place" not in failure:
+        return RunFailed("controller", f"{failure.get('name')}: {failure.get('reason')}")
+    return InputError(
+        failure["file"], failure["place"], failure["value"], failure["allowed"], tuple(failure["choices"])
+    )
 
 
 @contextmanager
-def controller_in_process(guest: HostedController, timeout: float, start: float) -> Iterator[ProcessController]:
-    """The controller of a guest in a separate process, as a context manager; start : seconds allowed for making it.
+def controller_in_process(guest: HostedController, timeout: float, start_seconds: float) -> Iterator[ProcessController]:
+    """The controller of a guest in a separate process, as a context manager; start_seconds : seconds allowed for making
+    it.
 
     However the block ends, no process of it stays. Raises InputError, RunFailed.
     """
     code = f"import sys; sys.path[:] = {sys.path!r}; from models.brake.port.host import main; main(int(sys.argv[1]))"
     with controller_behind_socket([sys.executable, "-c", code, "{port}"], 0, timeout, STARTUP_SECONDS) as port:
         host = ProcessController(port.link, port.process, timeout)
-        host.begin(guest, start)
+        host.begin(guest, start_seconds)
         yield host

@@ -33,18 +33,18 @@ class LoggedController:
 
     def sample(self, sample: Sample) -> Command:
         """The controller's commands for a sample, which are also written to the log."""
-        asked = question_frame(sample)  # before a controller can write into what it is given
-        said = self.controller.sample(sample)
-        self.file.write(asked + answer_frame(sample.number, said))
-        return said
+        question = question_frame(sample)  # before a controller can write into what it is given
+        command = self.controller.sample(sample)
+        self.file.write(question + answer_frame(sample.number, command))
+        return command
 
 
 @contextmanager
-def logged_controller(inner: Controller, path: Path, scene: str) -> Iterator[LoggedController]:
+def logged_controller(controller: Controller, path: Path, scene: str) -> Iterator[LoggedController]:
     """The controller ``controller``, writing a log of its exchanges, as a context manager; scene: from ``name_of``."""
     with path.open("wb") as file:
         file.write(LOG_TITLE + scene.encode() + b"\n")
-        yield LoggedController(inner, file)
+        yield LoggedController(controller, file)
 
 
 def log_refusal(path: Path) -> str:
@@ -79,9 +79,12 @@ class Replay:
         """The logged answer to a sample; raises RunFailed if the log has ended, or if its question differs from this
         one."""
         start = sample.number * RECORD_LENGTH
-        record, place = self._records[start : start + RECORD_LENGTH], f"sample {sample.number}: {self._path.name}"
+        record, position_text = (
+            self._records[start : start + RECORD_LENGTH],
+            f"sample {sample.number}: {self._path.name}",
+        )
         if len(record) < RECORD_LENGTH:
-            raise RunFailed("replay", f"{place} has ended", 1e-9 * sample.time)
+            raise RunFailed("replay", f"{position_text} has ended", 1e-9 * sample.time)
         if record[: QUESTION_LAYOUT.size] != question_frame(sample):
-            raise RunFailed("replay", f"{place} was asked something else", 1e-9 * sample.time)
+            raise RunFailed("replay", f"{position_text} was asked something else", 1e-9 * sample.time)
         return command_of_answer(record[QUESTION_LAYOUT.size :], sample.number)

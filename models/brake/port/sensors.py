@@ -37,30 +37,32 @@ class Channels:
     """Conversion of several signals by sensors, sample by sample from 0 on. source: of the noise, see
     ``models.core.noise``."""
 
-    def __init__(self, conversion: Conversion, count: int, source: int) -> None:
-        self.conversion, self._count, self._source = conversion, count, source
-        self._block, self._noise = -1, np.zeros((0, count))
+    def __init__(self, conversion: Conversion, channel_count: int, source: int) -> None:
+        self.conversion, self._count, self._source = conversion, channel_count, source
+        self._block, self._noise = -1, np.zeros((0, channel_count))
 
-    def __call__(self, number: int, values: np.ndarray) -> np.ndarray:
+    def __call__(self, sample_number: int, values: np.ndarray) -> np.ndarray:
         """Values (count,) of one sample after gain, offset, noise and rounding of their sensors."""
         conversion = self.conversion
         if conversion.gain != 1.0 or conversion.offset != 0.0:
             values = conversion.gain * values + conversion.offset
         if conversion.noise > 0.0:
-            values = values + conversion.noise * self._drawn(number)
+            values = values + conversion.noise * self._drawn(sample_number)
         if conversion.bits is not None and conversion.range is not None:
-            last = 2.0**conversion.bits - 1.0
-            values = np.rint(np.clip(values / conversion.range, 0.0, 1.0) * last) * conversion.range / last
+            largest_code = 2.0**conversion.bits - 1.0
+            values = (
+                np.rint(np.clip(values / conversion.range, 0.0, 1.0) * largest_code) * conversion.range / largest_code
+            )
         return values
 
-    def _drawn(self, number: int) -> np.ndarray:
+    def _drawn(self, sample_number: int) -> np.ndarray:
         """Standard normal numbers (count,) for a sample's noise, taken from the block of numbers that contains them."""
-        block, place = divmod(number, SAMPLES_PER_BLOCK)
+        block, row_in_block = divmod(sample_number, SAMPLES_PER_BLOCK)
         if block != self._block:
             first = block * SAMPLES_PER_BLOCK
             self._block = block
             self._noise = normal_samples(self.conversion.seed, 0, SAMPLES_PER_BLOCK, self._count, first, self._source)
-        return self._noise[place]
+        return self._noise[row_in_block]
 
 
 @dataclass
@@ -79,17 +81,17 @@ class SensedController:
     def sample(self, sample: Sample) -> Command:
         """The controller's commands for measured signals, delayed on their way to the valves; negative pressures become
         zero."""
-        seen = sample.wheels if self.tooth_counter is None else self.tooth_counter(sample)
-        command = self.controller.sample(sample._replace(wheels=self.wheels(sample.number, seen)))
+        wheel_signals = sample.wheels if self.tooth_counter is None else self.tooth_counter(sample)
+        command = self.controller.sample(sample._replace(wheels=self.wheels(sample.number, wheel_signals)))
         if command.pressures is None:
             return command
         return Command(pressures=np.maximum(self.pressures(sample.number, np.asarray(command.pressures)), 0.0))
 
 
 def controller_behind_sensors(
-    inner: Controller, wheels: int, signals: Conversion, pressures: Conversion, **more: Any
+    controller: Controller, wheels: int, signals: Conversion, pressures: Conversion, **extras: Any
 ) -> SensedController:
     """A controller behind the sensors of W wheels."""
     return SensedController(
-        inner, Channels(signals, wheels, BRAKE_SIGNALS), Channels(pressures, wheels, BRAKE_PRESSURES), **more
+        controller, Channels(signals, wheels, BRAKE_SIGNALS), Channels(pressures, wheels, BRAKE_PRESSURES), **extras
     )

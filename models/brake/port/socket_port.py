@@ -54,26 +54,26 @@ class SocketPort:
                 f"the connection broke: {error.strerror or error}{end_of_process(self.process, self.timeout)}",
             ) from None
 
-    def _frame(self, sample: Sample, end: float) -> bytes:
+    def _frame(self, sample: Sample, deadline: float) -> bytes:
         """Receive exactly one answer; further bytes would answer a question that has not been asked yet."""
         got = b""
         while len(got) < ANSWER_LAYOUT.size:
             try:
-                part = self.link.recv(ANSWER_LAYOUT.size + 1 - len(got))
+                received_part = self.link.recv(ANSWER_LAYOUT.size + 1 - len(got))
             except TimeoutError:
-                part = None
-            if part is None or time.perf_counter() > end:
+                received_part = None
+            if received_part is None or time.perf_counter() > deadline:
                 raise ControllerFailed(sample, "silence", f"{_received_bytes(got)} within {self.timeout:g} s")
-            if not part:
+            if not received_part:
                 raise ControllerFailed(
                     sample,
                     "crash",
                     "the connection was closed after "
                     f"{_received_bytes(got)}{end_of_process(self.process, self.timeout)}",
                 )
-            got += part
+            got += received_part
             if len(got) < ANSWER_LAYOUT.size:
-                self.link.settimeout(max(end - time.perf_counter(), 1e-6))
+                self.link.settimeout(max(deadline - time.perf_counter(), 1e-6))
         if len(got) > ANSWER_LAYOUT.size:
             raise WrongFrame("wrong length", f"an answer of more than {ANSWER_LAYOUT.size} bytes")
         return got
@@ -91,10 +91,10 @@ def end_of_process(process: subprocess.Popen[bytes] | None, patience: float) -> 
     return ""
 
 
-def _signal_name(number: int) -> str:
+def _signal_name(signal_number: int) -> str:
     with suppress(ValueError):
-        return signal.Signals(number).name
-    return f"signal {number}"
+        return signal.Signals(signal_number).name
+    return f"signal {signal_number}"
 
 
 def _received_bytes(received: bytes) -> str:
@@ -116,33 +116,39 @@ def listening_socket(address: int = 0) -> Iterator[socket.socket]:
 
 @contextmanager
 def controller_behind_socket(
-    words: Sequence[str] | None, address: int, timeout: float, start: float, folder: Path = Path()
+    command_words: Sequence[str] | None, address: int, timeout: float, start_seconds: float, folder: Path = Path()
 ) -> Iterator[SocketPort]:
     """A controller behind a socket, as a context manager: started by a command, or connecting by itself.
 
-    words : the command, in which "{port}" stands for the number of the port; None waits for a controller that somebody
-    else starts; start : seconds until it must have connected; folder : in which the command runs. However the block
-    ends, no process of it stays. Raises InputError for a command that cannot be started, RunFailed where none connects.
+    command_words : the command, in which "{port}" stands for the number of the port; None waits for a controller that
+    somebody else starts; start_seconds : seconds until it must have connected; folder : in which the command runs.
+    However the block ends, no process of it stays. Raises InputError for a command that cannot be started, RunFailed
+    where none connects.
     """
-    with listening_socket(address) as server, _started_process(words, server.getsockname()[1], folder) as process:
-        link = _accepted_connection(server, process, start)
+    with (
+        listening_socket(address) as server,
+        _started_process(command_words, server.getsockname()[1], folder) as process,
+    ):
+        link = _accepted_connection(server, process, start_seconds)
         with link:
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             yield SocketPort(link, timeout, process)
 
 
-def _accepted_connection(server: socket.socket, process: subprocess.Popen[bytes] | None, start: float) -> socket.socket:
-    """The first connection to ``server`` within ``start`` seconds, while the process runs."""
-    end = time.perf_counter() + start
-    server.settimeout(min(0.05, start))
+def _accepted_connection(
+    server: socket.socket, process: subprocess.Popen[bytes] | None, start_seconds: float
+) -> socket.socket:
+    """The first connection to ``server`` within ``start_seconds`` seconds, while the process runs."""
+    end = time.perf_counter() + start_seconds
+    server.settimeout(min(0.05, start_seconds))
     while time.perf_counter() < end:
         with suppress(TimeoutError):
             return server.accept()[0]
         status = None if process is None else process.poll()
         if status is not None:
             raise RunFailed("controller", f"crash: its command ended with status {status} before it connected")
-    where = f"{LOOPBACK_ADDRESS}:{server.getsockname()[1]}"
-    raise RunFailed("controller", f"silence: nobody connected to {where} within {start:g} s; {START_REMEDY}")
+    address = f"{LOOPBACK_ADDRESS}:{server.getsockname()[1]}"
+    raise RunFailed("controller", f"silence: nobody connected to {address} within {start_seconds:g} s; {START_REMEDY}")
 
 
 @contextmanager
@@ -151,10 +157,10 @@ def _started_process(words: Sequence[str] | None, port: int, folder: Path) -> It
     if words is None:
         yield None
         return
-    said = [word.replace("{port}", str(port)) for word in words]
+    command_words = [word.replace("{port}", str(port)) for word in words]
     try:
         process = subprocess.Popen(
-            said, cwd=folder, stdin=subprocess.DEVNULL, stdout=STANDARD_ERROR, start_new_session=True
+            command_words, cwd=folder, stdin=subprocess.DEVNULL, stdout=STANDARD_ERROR, start_new_session=True
         )
     except OSError as error:
         raise InputError("", "command", list(words), f"cannot be started: {error.strerror}") from None

@@ -37,33 +37,35 @@ class Counted:
 
     def __call__(self, sample: Sample) -> np.ndarray:
         """Speed signals (W,) in m/s at a sample."""
-        speeds, now = np.abs(sample.wheels).tolist(), 1e-9 * sample.time
+        speeds, sample_time = np.abs(sample.wheels).tolist(), 1e-9 * sample.time
         if not self._wheels:
             self._wheels = [_Wheel(speed) for speed in speeds]
-        elif now > self._before:
+        elif sample_time > self._before:
             for i, (wheel, speed) in enumerate(zip(self._wheels, speeds, strict=True)):
-                self._go_on(i, wheel, speed, now)
-        self._before = now
+                self._go_on(i, wheel, speed, sample_time)
+        self._before = sample_time
         return np.array([wheel.shown for wheel in self._wheels])
 
     def _go_on(self, i: int, wheel: "_Wheel", speed: float, time: float) -> None:
         """Advance the tooth counter of wheel i from the last sample to ``time``."""
-        way, step = self._way[i], time - self._before
-        turned = wheel.turned + 0.5 * (wheel.speed + speed) * step / way
+        tooth_pitch, step = self._way[i], time - self._before
+        turned_teeth = wheel.turned + 0.5 * (wheel.speed + speed) * step / tooth_pitch
         edges = [
             k
-            for k in range(math.floor(wheel.turned) + 1, math.floor(turned) + 1)
+            for k in range(math.floor(wheel.turned) + 1, math.floor(turned_teeth) + 1)
             if self._missing is None or not self._missing(i, k % self._teeth.teeth, time)
         ]
         if edges:
-            at = self._before + _time_of_distance((edges[-1] - wheel.turned) * way, wheel.speed, speed, step)
-            at = math.floor(at / self._teeth.tick) * self._teeth.tick
-            if wheel.edge is not None and at > wheel.edge:
-                wheel.shown = len(edges) * way / (at - wheel.edge)
-            wheel.edge = at
+            edge_time = self._before + _time_of_distance(
+                (edges[-1] - wheel.turned) * tooth_pitch, wheel.speed, speed, step
+            )
+            edge_time = math.floor(edge_time / self._teeth.tick) * self._teeth.tick
+            if wheel.edge is not None and edge_time > wheel.edge:
+                wheel.shown = len(edges) * tooth_pitch / (edge_time - wheel.edge)
+            wheel.edge = edge_time
         elif wheel.edge is not None:
-            wheel.shown = min(wheel.shown, way / (time - wheel.edge))
-        wheel.turned, wheel.speed = turned, speed
+            wheel.shown = min(wheel.shown, tooth_pitch / (time - wheel.edge))
+        wheel.turned, wheel.speed = turned_teeth, speed
 
 
 class _Wheel:

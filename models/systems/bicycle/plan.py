@@ -35,13 +35,13 @@ def describe(scene: BicycleScene) -> str:
     bicycle, run, speeds, tyres = scene.whipple, scene.run, scene.speeds, scene.tyres
     rear, front = scene.rolling().loads()
     critical = {"weave": bicycle.weave_speed, "capsize": bicycle.capsize_speed}
-    told = ", ".join(f"{name} {'none' if v is None else f'{v:.6g} m/s'}" for name, v in critical.items())
+    speed_texts = ", ".join(f"{name} {'none' if v is None else f'{v:.6g} m/s'}" for name, v in critical.items())
     rows = {
         "scene": f"{scene.file}, study {scene.study}",
         "bicycle": f"{scene.bicycle.parameters}: wheelbase {bicycle.wheelbase:g} m, trail {bicycle.trail:g} m, "
         f"steering axis {bicycle.tilt:.4g} rad",
         "loads": f"{rear:.4g} N rear, {front:.4g} N front",
-        "stable": f"without control from the weave speed to the capsize speed: {told}",
+        "stable": f"without control from the weave speed to the capsize speed: {speed_texts}",
         "speeds": f"{speeds.count} from {speeds.start:g} to {speeds.stop:g} m/s, linear equations",
         "run": f"from {run.speed:g} m/s upright with a lean rate of {run.lean_rate:g} rad/s, {run.duration:g} s",
         "upright": _stability_text(scene),

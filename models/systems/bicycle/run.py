@@ -39,9 +39,9 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
 
     error : whether the error of the steps is estimated, by further runs in longer steps.
     """
-    begun = time.process_time()
+    start_time = time.process_time()
     ride = ride_with_ideal_rolling(scene) if engine == REFERENCE else ride_on_tyres(scene, engine, scene.run.step)
-    seconds = time.process_time() - begun
+    seconds = time.process_time() - start_time
     channels = dict[str, Channel]()
     for i, (name, unit) in enumerate(COORDINATES.items()):
         channels[name] = Channel("time", ride.positions[:, i], unit)
@@ -96,10 +96,12 @@ def ride_on_tyres(
     tyres, ledger = rolling.report(path.positions, path.rates)
     work = cumulative_simpson(ledger[:, DISSIPATED] + ledger[:, STEER_POWER], x=path.times, initial=0.0)
     steps = len(path.times) - 1
-    kept = slice(None, None, stride or _steps_between_rows(steps, step))
-    plain, q, v = IdealBicycle(rolling.bicycle), path.positions[kept], path.rates[kept]
+    kept_rows = slice(None, None, stride or _steps_between_rows(steps, step))
+    plain, q, v = IdealBicycle(rolling.bicycle), path.positions[kept_rows], path.rates[kept_rows]
     motion = [plain.energy(*row) for row in zip(q, v, strict=True)]
-    ride = Ride(path.times[kept], q, v, motion + ledger[kept, POTENTIAL], work[kept], steps, tyres[kept])
+    ride = Ride(
+        path.times[kept_rows], q, v, motion + ledger[kept_rows, POTENTIAL], work[kept_rows], steps, tyres[kept_rows]
+    )
     if not ride.unaccounted() < UNACCOUNTED_ENERGY_SHARE:
         why = f"{ride.unaccounted():.2g} of the energy is unaccounted for: shorten run.step, {step:g} s is too long"
         raise RunFailed(engine, why, float(path.times[-1]))
@@ -110,8 +112,8 @@ def _steps_between_rows(steps: int, step: float) -> int:
     """Largest number of steps (s) between rows that are at most ROWS_APART (s) and a twentieth of the run apart, and
     end with the run.
     """
-    most = max(1, min(int(ROWS_APART / step * (1.0 + 1e-9)), steps // 20))
-    return next(stride for stride in range(most, 0, -1) if steps % stride == 0)
+    most_steps = max(1, min(int(ROWS_APART / step * (1.0 + 1e-9)), steps // 20))
+    return next(stride for stride in range(most_steps, 0, -1) if steps % stride == 0)
 
 
 def ride_with_ideal_rolling(scene: BicycleScene) -> Ride:
@@ -141,8 +143,8 @@ def _with_step_error(run: Result, scene: BicycleScene) -> Result:
         steps = max(steps, 2 * stride)
         return series(ride_on_tyres(scene, engine, step, steps * step, stride))
 
-    told, how = by_steps(series(ride), rerun, 4.0, scene.run.step)
-    return with_stated_errors(run, told, how)
+    estimates, method_text = by_steps(series(ride), rerun, 4.0, scene.run.step)
+    return with_stated_errors(run, estimates, method_text)
 
 
 def lateral_matrix(model: FreeModel, rolling: RollingBicycle, speed: float) -> np.ndarray:
@@ -153,9 +155,9 @@ def lateral_matrix(model: FreeModel, rolling: RollingBicycle, speed: float) -> n
     matrix = np.eye(8, 8, 4)
     for j in range(8):
         ends = []
-        for moved in (LINEARISATION_STEP, -LINEARISATION_STEP):
+        for displacement in (LINEARISATION_STEP, -LINEARISATION_STEP):
             state = np.array([q, v])
-            state[j // 4, LATERAL_COORDINATES[j % 4]] += moved
+            state[j // 4, LATERAL_COORDINATES[j % 4]] += displacement
             ends.append(model.acceleration(0.0, *state)[LATERAL_COORDINATES])
         matrix[4:, j] = np.subtract(*ends) / (2.0 * LINEARISATION_STEP)
     return matrix
@@ -169,6 +171,6 @@ def engine_eigenvalues(engine: str, rolling: RollingBicycle, speed: float) -> np
     zero.
     """
     values = np.linalg.eigvals(lateral_matrix(free_model(engine, rolling.driven), rolling, speed))
-    kept = np.sort(np.argsort(np.abs(values))[2:])  # without the double zero
+    kept_rows = np.sort(np.argsort(np.abs(values))[2:])  # without the double zero
     wanted = rolling.bicycle.eigenvalues(speed, rolling.control)
-    return np.array([values[kept][np.argmin(np.abs(values[kept] - value))] for value in wanted])
+    return np.array([values[kept_rows][np.argmin(np.abs(values[kept_rows] - value))] for value in wanted])

@@ -68,14 +68,14 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Bi
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(BicycleScene, table, file, folder)
     run, speeds = scene.run, scene.speeds
-    for place, value, most, unit in (
+    for key_path, value, largest, unit in (
         ("run.speed", run.speed, HIGHEST_SPEED, "m/s"),
         ("run.lean_rate", run.lean_rate, FASTEST_LEAN, "rad/s"),
         ("speeds.start", speeds.start, HIGHEST_SPEED, "m/s"),
         ("speeds.stop", speeds.stop, HIGHEST_SPEED, "m/s"),
     ):
-        if abs(value) > most:
-            raise InputError(file, place, value, f"must be from -{most:g} to {most:g} {unit}")
+        if abs(value) > largest:
+            raise InputError(file, key_path, value, f"must be from -{largest:g} to {largest:g} {unit}")
     if speeds.start >= speeds.stop:
         raise InputError(file, "speeds.stop", speeds.stop, f"must be above speeds.start = {speeds.start:g} m/s")
     if run.duration / run.step > MOST_STEPS:

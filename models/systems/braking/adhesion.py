@@ -142,11 +142,11 @@ def _braking_rate(scene: BrakingScene, vehicle: BrakedVehicle, axle: int) -> flo
     for _ in range(PRESSURE_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if _wheel_locks(run(middle)) else (middle, high)
-    times = [_slowing_time(run(share * low), 40.0, 20.0) for share in BELOW_LOCK]
-    if not np.isfinite(times).any():
+    braking_times = [_slowing_time(run(share * low), 40.0, 20.0) for share in BELOW_LOCK]
+    if not np.isfinite(braking_times).any():
         raise NoAdhesion(f"the {AXLE_NAMES[axle]} alone does not slow the vehicle down to 20 km/h")
     return braking_rate(
-        40.0 * METRES_PER_SECOND_OF_KMH, 20.0 * METRES_PER_SECOND_OF_KMH, mean_of_fastest(np.array(times))
+        40.0 * METRES_PER_SECOND_OF_KMH, 20.0 * METRES_PER_SECOND_OF_KMH, mean_of_fastest(np.array(braking_times))
     )
 
 
@@ -174,8 +174,8 @@ def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None, na
     train = vehicle_on_one_surface(scene, surface)
     z = _by_system(scene, name, train, (55.0, 45.0, 15.0))
     loads = np.concatenate(([lengths.weight], trailer_loads(train, z)))
-    each = np.array([adhesion_of_vehicle(z, k.front, k.rear, lengths), *k.trailer])
-    return Utilised(z, k, float(each @ loads / loads.sum()))
+    axle_adhesions = np.array([adhesion_of_vehicle(z, k.front, k.rear, lengths), *k.trailer])
+    return Utilised(z, k, float(axle_adhesions @ loads / loads.sum()))
 
 
 @dataclass(frozen=True)
@@ -196,10 +196,13 @@ def split_adhesion(scene: BrakingScene, name: str) -> Split:
     """Braking rate z of a split procedure, braked from 50 km/h and measured between 40 and 20 km/h. The adhesion k_M of
     the vehicle is that on each of the two surfaces of the first stretch.
     """
-    procedure, alone = scene.procedures[name], scene.model_copy(update={"trailer": None})
-    both = [measured_adhesion(alone, surface) for surface in surfaces_of_stretch(procedure, scene.road.stretches[0])]
-    z = _by_system(alone, name, braked_vehicle(alone, procedure), (50.0, 40.0, 20.0))
-    return Split(z, *sorted(adhesion_of_vehicle(z, k.front, k.rear, axles(scene)) for k in both))
+    procedure, scene_without_trailer = scene.procedures[name], scene.model_copy(update={"trailer": None})
+    adhesions = [
+        measured_adhesion(scene_without_trailer, surface)
+        for surface in surfaces_of_stretch(procedure, scene.road.stretches[0])
+    ]
+    z = _by_system(scene_without_trailer, name, braked_vehicle(scene_without_trailer, procedure), (50.0, 40.0, 20.0))
+    return Split(z, *sorted(adhesion_of_vehicle(z, k.front, k.rear, axles(scene)) for k in adhesions))
 
 
 def figures_of_merit(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
@@ -225,12 +228,12 @@ def figures_of_merit(scene: BrakingScene, name: str, stop: Stop) -> dict[str, fl
     if controller_text(scene) == "none" or scene.measured is not None or once:
         return {}
     if procedure.kind == "split":
-        both = split_adhesion(scene, name)
+        split = split_adhesion(scene, name)
         return {
-            "z_MALS": both.z,
-            "z_MALS asked for": both.required_braking_rate,
-            "k low": both.k_low,
-            "k high": both.k_high,
+            "z_MALS": split.z,
+            "z_MALS asked for": split.required_braking_rate,
+            "k low": split.k_low,
+            "k high": split.k_high,
         }
     used = utilisation(scene, scene.road.stretches[0].left)
     return {

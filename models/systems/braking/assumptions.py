@@ -97,14 +97,14 @@ def _transferred_load(scene: BrakingScene, run: Result) -> Watched:
     """Shares of the load of the truck and of the trailer that the truck's accelerations would move, along and across
     the vehicle, because the centre of mass is above the road.
     """
-    states, times = run.detail.states, run.detail.times
-    rates = np.diff(states[:, 1, :2], axis=0) / np.maximum(np.diff(times), 1e-9)[:, None]
+    states, path_times = run.detail.states, run.detail.times
+    rates = np.diff(states[:, 1, :2], axis=0) / np.maximum(np.diff(path_times), 1e-9)[:, None]
     heading = states[1:, 0, 2]
-    ahead = np.abs(rates[:, 0] * np.cos(heading) + rates[:, 1] * np.sin(heading))
-    aside = np.abs(rates[:, 1] * np.cos(heading) - rates[:, 0] * np.sin(heading))
+    acceleration_along = np.abs(rates[:, 0] * np.cos(heading) + rates[:, 1] * np.sin(heading))
+    acceleration_across = np.abs(rates[:, 1] * np.cos(heading) - rates[:, 0] * np.sin(heading))
     bodies = {"truck": vehicle_of(scene), "trailer": scene.trailer}
     return {
-        name: _with_start_row(_load_transfer_of_body(body, ahead, aside))
+        name: _with_start_row(_load_transfer_of_body(body, acceleration_along, acceleration_across))
         for name, body in bodies.items()
         if body is not None
     }
@@ -172,8 +172,10 @@ def _has_spring_without_stops(vehicle: BrakedVehicle) -> bool:
     """Whether a vehicle on its suspension has any spring without stops: a joint element, or a spring without
     travel_force.
     """
-    whole = vehicle.sprung.handling.vehicle
-    return bool(whole.joint_elements) or any(spring.travel_force is None for spring in whole.springs)
+    spatial_vehicle = vehicle.sprung.handling.vehicle
+    return bool(spatial_vehicle.joint_elements) or any(
+        spring.travel_force is None for spring in spatial_vehicle.springs
+    )
 
 
 def _hinge_angles(run: Result) -> Watched:
@@ -193,8 +195,10 @@ def _share_lifted_by_hook(scene: BrakingScene, run: Result) -> Watched:
     trailer, path = scene.trailer, run.detail
     assert trailer is not None
     heading, slowed = path.states[1:, 0, 2], np.diff(path.states[:, 1, :2], axis=0)
-    along = slowed[:, 0] * np.cos(heading) + slowed[:, 1] * np.sin(heading)
-    pull = run["force_x"][1:, :4].sum(axis=1) - vehicle_of(scene).mass * along / np.maximum(np.diff(path.times), 1e-9)
+    deceleration = slowed[:, 0] * np.cos(heading) + slowed[:, 1] * np.sin(heading)
+    pull = run["force_x"][1:, :4].sum(axis=1) - vehicle_of(scene).mass * deceleration / np.maximum(
+        np.diff(path.times), 1e-9
+    )
     span = trailer.wheelbase
     lighter = trailer.mass * GRAVITY * min(trailer.front.x, -trailer.rear.x) / span
     share = np.abs(pull) * HOOK_HEIGHT / span / lighter
@@ -245,9 +249,13 @@ def _resolved_speed(vehicle: BrakedVehicle, run: Result) -> Watched:
     elsewhere.
     """
     lively = GRAVITY if vehicle.sprung is None else vehicle.engine.liveliness
-    least = vehicle.slope * lively * vehicle.sample / vehicle.substeps
+    least_resolved = vehicle.slope * lively * vehicle.sample / vehicle.substeps
     angles = np.nanmax(np.nan_to_num(np.abs(run["slip_angle"])), axis=1)
-    return {"vehicle": np.where((angles > LEAST_SLIP_ANGLE) & (Stop(run.detail).speed < least), least, np.nan)}
+    return {
+        "vehicle": np.where(
+            (angles > LEAST_SLIP_ANGLE) & (Stop(run.detail).speed < least_resolved), least_resolved, np.nan
+        )
+    }
 
 
 def _of_brakes(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> Iterator[Assumption]:

@@ -32,7 +32,7 @@ from models.systems.braking.stop_report import Stop
 LARGEST_ORDER, CAREFUL_ORDER = 1.5, 1.0
 """Largest that is taken for the order of the steps, two between the kinks of brakes and tables of friction, and what is
 taken where two runs cannot tell."""
-WINDOW, FINE_WINDOW = 0.4, 0.3
+COARSE_WINDOW, FINE_WINDOW = 0.4, 0.3
 """Shares of a stop that are run again with a quarter of the steps, and with twice as many where there is but one."""
 LONGEST_REPEAT = 1.1
 """Times of the stop, until which another run may take to stand."""
@@ -89,10 +89,10 @@ def with_error(run: Result, scene: BrakingScene, repeats: OtherRuns) -> Result:
         return not_estimated(run, LONGER_STEPS_NOTE)
     if loop and other_command_nearby(path, paths[0], repeats):
         return not_estimated(run, SHORTER_STEPS_NOTE)
-    told = _by_fewer(path, steps, paths, step)
+    estimates = _by_fewer(path, steps, paths, step)
     if rests_on_springs(scene):
-        told.pop(STOPPING_DISTANCE, None)
-    return with_stated_errors(run, told, "runs in longer steps")
+        estimates.pop(STOPPING_DISTANCE, None)
+    return with_stated_errors(run, estimates, "runs in longer steps")
 
 
 def rests_on_springs(scene: BrakingScene) -> bool:
@@ -114,8 +114,8 @@ def pressures_are_controlled(scene: BrakingScene, path: BrakingPath) -> bool:
     """Whether pressures fall in a run because a controller in the loop, or something unknown at the port, released
     brakes.
     """
-    none = scene.measured is not None or (scene.port is None and scene.controller.kind == "none")
-    return not none and bool((np.diff(path.pressures, axis=0) < 0.0).any())
+    without_controller = scene.measured is not None or (scene.port is None and scene.controller.kind == "none")
+    return not without_controller and bool((np.diff(path.pressures, axis=0) < 0.0).any())
 
 
 def same_commands(path: BrakingPath, other_path: BrakingPath) -> bool:
@@ -131,22 +131,29 @@ def other_command_nearby(path: BrakingPath, longer: BrakingPath, repeats: OtherR
     them, in the opposite direction. Valves change if any state differs, pressures if they differ by more than
     EQUAL_PRESSURE_SHARE.
     """
-    times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
+    path_times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
     turning, speed = path.turning[:-1], speeds[0][:-1]
-    shifted = 2.0 * turning - _columns_at(times, longer, longer.turning)
-    faster = np.maximum(2.0 * speed - np.interp(times, longer.times, speeds[1]), 0.0)
-    said, beside = (repeats.commands_for_speeds(path, *signals) for signals in ((turning, speed), (shifted, faster)))
-    if said.dtype.kind == "i":
-        return not np.array_equal(said, beside)
-    return _rms(said - beside) > EQUAL_PRESSURE_SHARE * size_of(said)
+    shifted = 2.0 * turning - _columns_at(path_times, longer, longer.turning)
+    faster = np.maximum(2.0 * speed - np.interp(path_times, longer.times, speeds[1]), 0.0)
+    plain_commands, shifted_commands = (
+        repeats.commands_for_speeds(path, *signals) for signals in ((turning, speed), (shifted, faster))
+    )
+    if plain_commands.dtype.kind == "i":
+        return not np.array_equal(plain_commands, shifted_commands)
+    return _rms(plain_commands - shifted_commands) > EQUAL_PRESSURE_SHARE * size_of(plain_commands)
 
 
 def motion_channels(path: BrakingPath, times: np.ndarray) -> Channels:
     """Channels of the motion at times (n,) in s; after the end of the run they keep their last values."""
-    places, rates = path.states[:, 0], path.states[:, 1]
-    motion = {"x": places[:, 0], "y": places[:, 1], "yaw": places[:, 2], "speed": np.hypot(rates[:, 0], rates[:, 1])}
+    positions, rates = path.states[:, 0], path.states[:, 1]
+    motion = {
+        "x": positions[:, 0],
+        "y": positions[:, 1],
+        "yaw": positions[:, 2],
+        "speed": np.hypot(rates[:, 0], rates[:, 1]),
+    }
     if "heading_1" in path.coordinates:
-        motion["hitch"] = places[:, 3] - places[:, 2]
+        motion["hitch"] = positions[:, 3] - positions[:, 2]
     return {name: np.interp(times, path.times, values) for name, values in motion.items()}
 
 
@@ -159,11 +166,13 @@ def _finer_runs(path: BrakingPath, steps: int, rerun: Callable[[int, float], Bra
     """The stop with half as many steps per sample and, over its first part, with a quarter, if commands stay alike. A
     stop with a single step per sample is repeated with two over its first part.
     """
-    last = float(path.times[-1])
+    end_time = float(path.times[-1])
     if steps == 1:
-        return [rerun(2, FINE_WINDOW * last)]
-    first = rerun(steps // 2, LONGEST_REPEAT * last if path.ended_at_rest else last)
-    return [first, rerun(steps // 4, WINDOW * last)] if steps >= 4 and same_commands(path, first) else [first]
+        return [rerun(2, FINE_WINDOW * end_time)]
+    first = rerun(steps // 2, LONGEST_REPEAT * end_time if path.ended_at_rest else end_time)
+    return (
+        [first, rerun(steps // 4, COARSE_WINDOW * end_time)] if steps >= 4 and same_commands(path, first) else [first]
+    )
 
 
 def _by_fewer(path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step: float) -> dict[str, Estimate]:
@@ -175,45 +184,47 @@ def _by_fewer(path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step
         motion_and_distance(finer_runs[0], path.times),
         [steps, steps // 2, steps // 4],
     )
-    part = path.times[path.times <= finer_runs[-1].times[-1]]
-    seen = [motion_channels(run, part) for run in (path, *finer_runs)]
-    told = dict[str, Estimate]()
+    compared_times = path.times[path.times <= finer_runs[-1].times[-1]]
+    channels_of_runs = [motion_channels(run, compared_times) for run in (path, *finer_runs)]
+    estimates = dict[str, Estimate]()
     for name in [name for name in fine if name in coarse]:
         order = CAREFUL_ORDER
         if len(finer_runs) > 1 and name != STOPPING_DISTANCE:
-            gaps = [_rms(first[name] - two[name]) for first, two in itertools.pairwise(seen)]
+            gaps = [_rms(first[name] - finer[name]) for first, finer in itertools.pairwise(channels_of_runs)]
             order = observed_order_of_stop(gaps[0], gaps[1], counts)
-        least = 0.0
+        least_error = 0.0
         if name == STOPPING_DISTANCE:
-            order, least = told["x"].order, told["x"].error
+            order, least_error = estimates["x"].order, estimates["x"].error
         error = _rms(fine[name] - coarse[name]) / ((counts[0] / counts[1]) ** order - 1.0)
-        told[name] = _estimate_of_channel(name, fine[name], max(error, least), order, step)
-    return told
+        estimates[name] = _estimate_of_channel(name, fine[name], max(error, least_error), order, step)
+    return estimates
 
 
-def observed_order_of_stop(fine: float, coarse: float, counts: list[int]) -> float:
+def observed_order_of_stop(fine_difference: float, coarse_difference: float, step_counts: list[int]) -> float:
     """Observed order of convergence, at most LARGEST_ORDER: from the differences of neighbouring runs, fine and coarse,
-    whose steps per sample are ``counts``.
+    whose steps per sample are ``step_counts``.
     """
-    if not (fine > 0.0 and coarse > 0.0):
+    if not (fine_difference > 0.0 and coarse_difference > 0.0):
         return CAREFUL_ORDER
     orders = np.linspace(LEAST_ORDER, LARGEST_ORDER, 61)
-    errors = [float(count) ** -orders for count in counts]
+    errors = [float(count) ** -orders for count in step_counts]
     ratios = np.log((errors[2] - errors[1]) / (errors[1] - errors[0]))
-    return float(orders[np.argmin(np.abs(ratios - math.log(coarse / fine)))])
+    return float(orders[np.argmin(np.abs(ratios - math.log(coarse_difference / fine_difference)))])
 
 
 def _by_twice(path: BrakingPath, other_path: BrakingPath, step: float) -> dict[str, Estimate]:
     """Error estimates by a run with twice as many steps over the first part of the stop. The relative error of this
     part is taken for the whole stop.
     """
-    part = path.times <= other_path.times[-1]
-    fine, finer, told = motion_channels(path, path.times), motion_channels(other_path, path.times[part]), {}
+    in_part = path.times <= other_path.times[-1]
+    fine, finer, estimates = motion_channels(path, path.times), motion_channels(other_path, path.times[in_part]), {}
     for name, values in fine.items():
-        size, seen = _size_of_channel(name, values), _size_of_channel(name, values[part], FINE_WINDOW)
-        error = _rms(values[part] - finer[name]) * 2.0**CAREFUL_ORDER / (2.0**CAREFUL_ORDER - 1.0)
-        told[name] = _estimate_of_channel(name, values, error * size / seen if seen > 0.0 else 0.0, CAREFUL_ORDER, step)
-    return told
+        size, size_in_part = _size_of_channel(name, values), _size_of_channel(name, values[in_part], FINE_WINDOW)
+        error = _rms(values[in_part] - finer[name]) * 2.0**CAREFUL_ORDER / (2.0**CAREFUL_ORDER - 1.0)
+        estimates[name] = _estimate_of_channel(
+            name, values, error * size / size_in_part if size_in_part > 0.0 else 0.0, CAREFUL_ORDER, step
+        )
+    return estimates
 
 
 def _columns_at(times: np.ndarray, path: BrakingPath, values: np.ndarray) -> np.ndarray:

@@ -12,5 +12,5 @@ def exported(scene: BrakingScene, engine: str) -> Exported:
     if scene.vehicle.file is None:
         allowed = "is in the plane, by equations of twinrig's: give vehicle.file, a vehicle on its suspension"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
-    more = ["spin of the wheels, brakes and controller"]
-    return of_handling(engine, sprung_of(scene).handling, ExportSubject(scene.title, scene.file, AXES), more)
+    omissions = ["spin of the wheels, brakes and controller"]
+    return of_handling(engine, sprung_of(scene).handling, ExportSubject(scene.title, scene.file, AXES), omissions)

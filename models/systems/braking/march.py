@@ -102,42 +102,47 @@ class BrakedVehicle:
 
         Raises RunFailed, which names the time and whose ``partial`` is the path until then.
         """
-        given, wheels = start if isinstance(start, StartState) else self.rolling(start), self.plane.wheels
-        check_way(self.road, self.sample / self.substeps * float(np.hypot(*given.state[1, :2])))
-        now = row(given.state.shape[1], wheels)
-        now.state[:], now.turning[:] = given.state, given.turning
+        start_state, wheels = start if isinstance(start, StartState) else self.rolling(start), self.plane.wheels
+        check_way(self.road, self.sample / self.substeps * float(np.hypot(*start_state.state[1, :2])))
+        current_row = row(start_state.state.shape[1], wheels)
+        current_row.state[:], current_row.turning[:] = start_state.state, start_state.turning
         commands = Commands(
             np.ones(1, dtype=np.int64), np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy()
         )
         steady = self.steering is None and is_steady(controller)
-        most = int(min(duration / self.sample + 2.0, MOST_SAMPLES_AT_ONCE)) if steady else 1
-        record = Record(now.whole, np.empty((most, now.whole.size)), np.zeros(1, dtype=np.int64), duration - 1e-9)
+        samples_at_once = int(min(duration / self.sample + 2.0, MOST_SAMPLES_AT_ONCE)) if steady else 1
+        record = Record(
+            current_row.whole,
+            np.empty((samples_at_once, current_row.whole.size)),
+            np.zeros(1, dtype=np.int64),
+            duration - 1e-9,
+        )
         states = STATES_WITH_SLOW_APPLY if self.chambers.slow.size else VALVE_STATES
         beyond = (
             LARGEST_PRESSURE if isinstance(controller, SensedController) else 0.0
         )  # noise of a sensor may exceed the supply
-        motion = now.motion(np.zeros(2 + self.plane.masses.size))
-        rows, status = [now.whole[None].copy()], FINE
+        motion = current_row.motion(np.zeros(2 + self.plane.masses.size))
+        rows, status = [current_row.whole[None].copy()], FINE
         try:
-            for number, (status, time, speed, supply) in enumerate(self._moving(commands, record, now, motion)):
+            for number, (status, time, speed, supply) in enumerate(self._moving(commands, record, current_row, motion)):
                 if status in FATAL_ENDS:
                     raise RunFailed("braking", ending_sentence(status, self.plane, motion), time)
                 _take_rows(rows, record)
                 if status == AT_REST or time >= record.until:
                     break
                 braked = time >= self.switch - 1e-9
-                commands.samples[0] = most if braked else 1
+                commands.samples[0] = samples_at_once if braked else 1
                 known = speed if self.speed_given else math.nan
-                rims = np.abs(now.turning) * self.plane.radius
-                asked = Sample(number, round(time * 1e9), rims, braked, supply, known)
-                _write_command(commands, ask(controller, asked, states, max(beyond, supply)), braked)
+                rims = np.abs(current_row.turning) * self.plane.radius
+                sample = Sample(number, round(time * 1e9), rims, braked, supply, known)
+                _write_command(commands, ask(controller, sample, states, max(beyond, supply)), braked)
                 if self.steering is not None:
                     commands.steer[:] = self.steering(time + 0.5 * self.sample)
         except RunFailed as error:
             _take_rows(rows, record)
-            error.partial = _path(rows, now, False, self.coordinates)
+            error.partial = _path(rows, current_row, False, self.coordinates)
             raise
-        return _path(rows, now, status == AT_REST, self.coordinates)
+        return _path(rows, current_row, status == AT_REST, self.coordinates)
 
     @property
     def on_road(self) -> OnRoad:
@@ -153,29 +158,42 @@ class BrakedVehicle:
         air = resting_chambers(self.chambers, self.sample)._replace(pressure=row.pressure, torque=row.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
         braking = Braking(air, self.chambers, self.brakes, torques)
-        go, given = by_steps, [commands, record, self.sample, braking, motion, self.on_road]
+        go, arguments = by_steps, [commands, record, self.sample, braking, motion, self.on_road]
         if self.relaxation is not None:
             from models.brake.relaxation import Lag, by_lagging_steps
 
             # straight ahead tyres begin without slip angles, whatever the wheels are steered, in a turn as in a steady
             # one
             angle = np.full(self.plane.wheels, np.nan if row.state[1, 1:].any() else 0.0)
-            go, given = by_lagging_steps, [*given, Lag(self.relaxation, angle)]
-        moving: Iterator[tuple[int, float, float, float]] = (go if self.engine is None else self.engine.moving)(*given)
+            go, arguments = by_lagging_steps, [*arguments, Lag(self.relaxation, angle)]
+        moving: Iterator[tuple[int, float, float, float]] = (go if self.engine is None else self.engine.moving)(
+            *arguments
+        )
         return moving
 
 
 def on_tyres(
-    plane: Plane, tyres: Sequence[TyreTable], brakes: Brakes, chambers: Chambers, road: Road = UNIFORM_ROAD, **more: Any
+    plane: Plane,
+    tyres: Sequence[TyreTable],
+    brakes: Brakes,
+    chambers: Chambers,
+    road: Road = UNIFORM_ROAD,
+    **other_fields: Any,
 ) -> BrakedVehicle:
     """A vehicle whose wheels point straight ahead, by default all with the same kind of tyre.
 
-    tyres : tables, surface by surface and kind by kind; more : as of ``BrakedVehicle``.
+    tyres : tables, surface by surface and kind by kind; other_fields : as of ``BrakedVehicle``.
     """
-    none = np.zeros(plane.wheels)
+    zeros = np.zeros(plane.wheels)
     slope = max(tyre.cornering for tyre in tyres)
-    given = {"kind": none.astype(int), "steer": none, "tables": stacked_tables(tyres), "slope": slope, **more}
-    return BrakedVehicle(plane=plane, road=road, brakes=brakes, chambers=chambers, **given)
+    vehicle_fields = {
+        "kind": zeros.astype(int),
+        "steer": zeros,
+        "tables": stacked_tables(tyres),
+        "slope": slope,
+        **other_fields,
+    }
+    return BrakedVehicle(plane=plane, road=road, brakes=brakes, chambers=chambers, **vehicle_fields)
 
 
 def _write_command(commands: Commands, command: Command, braked: bool) -> None:

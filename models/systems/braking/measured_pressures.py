@@ -41,10 +41,10 @@ class MeasuredPressures:
     def sample(self, sample: Sample) -> Command:
         """Command the pressures (W,) that are the means of the measured ones over the sample."""
         start, end = sample.time * 1e-9, sample.time * 1e-9 + self.period
-        inside = self.times[(self.times > start) & (self.times < end)]
-        at = np.concatenate(([start], inside, [end]))
-        rows = np.column_stack([np.interp(at, self.times, column) for column in self.pressures.T])
-        return Command(pressures=np.trapezoid(rows, at, axis=0) / self.period)
+        times_within = self.times[(self.times > start) & (self.times < end)]
+        interpolation_times = np.concatenate(([start], times_within, [end]))
+        rows = np.column_stack([np.interp(interpolation_times, self.times, column) for column in self.pressures.T])
+        return Command(pressures=np.trapezoid(rows, interpolation_times, axis=0) / self.period)
 
     def rms(self, times: np.ndarray, rims: np.ndarray) -> np.ndarray:
         """Root mean square difference (W,), m/s, between computed rim speeds ``rims`` (m, W) at times (m,) and measured
@@ -59,19 +59,19 @@ class MeasuredPressures:
         return np.sqrt(((rims[shared] - measured) ** 2).mean(axis=0))
 
 
-def read_pressures(path: str | Path, wheels: int, period: float = SAMPLE) -> MeasuredPressures:
+def read_pressures(path: str | Path, wheels: int, sample_period: float = SAMPLE) -> MeasuredPressures:
     """Measured pressures from a CSV with units; raises InputError for a file that cannot be used."""
     names, header = wheel_names(wheels), _header_line(path)
     columns = {"time": SECONDS, **{f"pressure_{name}": FACTOR_TO_BAR for name in names}}
     measured = "speed" in header
     if measured:
         columns |= {f"speed_{name}": FACTOR_TO_METRES_PER_SECOND for name in names}
-    table = read_table(path, columns, increasing="time", least=2)
+    table = read_table(path, columns, increasing="time", least_rows=2)
     if table["time"][0] != 0.0:
         raise InputError(path, "time", float(table["time"][0]), "must begin at 0, when the brake is applied")
     pressures = _columns_of_wheels(path, table, "pressure", names, LARGEST_PRESSURE, "bar above the air's")
     speeds = _columns_of_wheels(path, table, "speed", names, FASTEST_WHEEL_SPEED, "m/s") if measured else None
-    return MeasuredPressures(table["time"], pressures, speeds, period)
+    return MeasuredPressures(table["time"], pressures, speeds, sample_period)
 
 
 def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, rims: np.ndarray) -> None:
@@ -92,8 +92,8 @@ def _columns_of_wheels(
         column = table[f"{heading}_{name}"]
         wrong = np.flatnonzero((column < 0.0) | (column > largest))
         if wrong.size:
-            place = f"{heading}_{name} at {table['time'][wrong[0]]:g} s"
-            raise InputError(path, place, float(column[wrong[0]]), f"must be from 0 to {largest:g} {unit}")
+            location = f"{heading}_{name} at {table['time'][wrong[0]]:g} s"
+            raise InputError(path, location, float(column[wrong[0]]), f"must be from 0 to {largest:g} {unit}")
     return np.column_stack([table[f"{heading}_{name}"] for name in names])
 
 

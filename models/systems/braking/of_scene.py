@@ -41,18 +41,18 @@ def braked_vehicle(scene: BrakingScene, procedure: Procedure) -> BrakedVehicle:
     engine = None if sprung is None else on_springs(SPRUNG_ENGINE, sprung)
     if engine is not None:
         engine.check_step(scene.run.sample / scene.run.substeps)
-    ahead = np.arange(plane.wheels) < 2
+    on_front_unit = np.arange(plane.wheels) < 2
     vehicle = on_tyres(
         plane,
         [table_of(scene, name, kind) for name in names for kind in kinds],
         of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
         chambers_of(scene, plane.wheels),
         road_of(scene, procedure, names),
-        kind=np.where(ahead, 0, len(kinds) - 1),
+        kind=np.where(on_front_unit, 0, len(kinds) - 1),
         substeps=scene.run.substeps,
         sample=scene.run.sample,
         speed_given=scene.controller.true_speed,
-        relaxation=None if lags is None else np.where(ahead, lags.front, lags.rear),
+        relaxation=None if lags is None else np.where(on_front_unit, lags.front, lags.rear),
         sprung=sprung,
         engine=engine,
     )
@@ -70,12 +70,12 @@ def _check_lags(scene: BrakingScene, vehicle: BrakedVehicle, shortest: float) ->
     lively = GRAVITY if vehicle.engine is None else vehicle.engine.liveliness
     longest = longest_step(vehicle.slope, lively, shortest)
     if vehicle.sample / vehicle.substeps > longest:
-        least = math.ceil(vehicle.sample / longest)
-        if least > MOST_SUBSTEPS:
+        least_substeps = math.ceil(vehicle.sample / longest)
+        if least_substeps > MOST_SUBSTEPS:
             length = shortest * (vehicle.sample / (MOST_SUBSTEPS * longest)) ** 2  # longest goes with its root
             allowed = f"must be at least {1.01 * length:.2g} m: shorter ones need more than {MOST_SUBSTEPS} substeps"
             raise InputError(scene.file, "relaxation", shortest, allowed)
-        allowed = f"must be at least {least}: at rest the vehicle rocks up on tyres of so short a [relaxation]"
+        allowed = f"must be at least {least_substeps}: at rest the vehicle rocks up on tyres of so short a [relaxation]"
         raise InputError(scene.file, "run.substeps", vehicle.substeps, allowed)
 
 
@@ -155,8 +155,8 @@ def merged_tables(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[
     new = dict(table)
     for key, value in changes.items():
         old = table.get(key)
-        both = isinstance(old, Mapping) and isinstance(value, Mapping) and "kind" not in value
-        new[key] = merged_tables(old, value) if both else value  # type: ignore[arg-type]
+        are_tables = isinstance(old, Mapping) and isinstance(value, Mapping) and "kind" not in value
+        new[key] = merged_tables(old, value) if are_tables else value  # type: ignore[arg-type]
     return new
 
 
@@ -226,15 +226,15 @@ def brake_of(scene: BrakingScene, axle: str) -> Brake:
 
 def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
     """Brake chambers of all wheels; without the table [pressure] their time constants are zero."""
-    pressure, none = scene.pressure, np.zeros(wheels)
+    pressure, zeros = scene.pressure, np.zeros(wheels)
     if pressure is None:
-        return Chambers(none, none, scene.brakes.supply)
-    chambers = Chambers(none + pressure.fill, none + pressure.empty, scene.brakes.supply, delay=pressure.delay)
-    chambers = chambers if pressure.slow is None else chambers._replace(slow=none + pressure.slow)
+        return Chambers(zeros, zeros, scene.brakes.supply)
+    chambers = Chambers(zeros + pressure.fill, zeros + pressure.empty, scene.brakes.supply, delay=pressure.delay)
+    chambers = chambers if pressure.slow is None else chambers._replace(slow=zeros + pressure.slow)
     return (
         chambers
         if pressure.reservoir is None
-        else chambers._replace(volumes=none + pressure.volume, reservoir=pressure.reservoir)
+        else chambers._replace(volumes=zeros + pressure.volume, reservoir=pressure.reservoir)
     )
 
 
@@ -244,9 +244,9 @@ def measured_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPre
         return None
     name = scene.measured.file.replace("{procedure}", procedure)
     measured = read_pressures(scene.path(name, "measured.file"), wheels, scene.run.sample)
-    most, supply = float(measured.pressures.max()), scene.brakes.supply
-    if most > supply:
-        allowed = f"must be at least {most:g} bar, the largest pressure in {name}"
+    largest_pressure, supply = float(measured.pressures.max()), scene.brakes.supply
+    if largest_pressure > supply:
+        allowed = f"must be at least {largest_pressure:g} bar, the largest pressure in {name}"
         raise InputError(scene.file, "brakes.supply", supply, allowed)
     return measured
 

@@ -94,12 +94,12 @@ def _implausible_parameters(truck: Truck) -> Iterator[Finding]:
             ("size", f"{name}.track", axle.track, TRACK),
             ("size", f"{name}.radius", axle.radius, USUAL_RADIUS_RANGE),
         ]
-    for check, place, value, usual in looks:
+    for check, parameter_name, value, usual in looks:
         if not usual[0] <= value <= usual[1]:
             unit = "kg" if check == "mass" else "m"
             bounds = f"{usual[0]:.3g} to {usual[1]:.3g} {unit}"
-            text = f"{place}: {value:.4g} {unit}; usual are {bounds}. {REMEDY_OF_QUERY[check]}."
-            yield Finding(check, "doubt", place, text, value, unit)
+            text = f"{parameter_name}: {value:.4g} {unit}; usual are {bounds}. {REMEDY_OF_QUERY[check]}."
+            yield Finding(check, "doubt", parameter_name, text, value, unit)
 
 
 def describe(scene: BrakingScene) -> str:
@@ -110,7 +110,7 @@ def describe(scene: BrakingScene) -> str:
     _check_parts(scene, engines_of(scene, ())[:1])
     vehicle, run, file = vehicle_of(scene), scene.run, scene.vehicle.file
     motion = "plane motion" if file is None else "suspension, roll and pitch"
-    told = {
+    texts = {
         "scene": f"{scene.file}, study {scene.study}",
         "vehicle": f"{file or scene.vehicle.parameters}: {vehicle.mass:g} kg, {vehicle.yaw_inertia:g} kg m^2, "
         f"axles at {vehicle.front.x:g} and {vehicle.rear.x:g} m, wheels of {vehicle.front.radius:g} m; {motion}, "
@@ -118,7 +118,7 @@ def describe(scene: BrakingScene) -> str:
         "brakes": f"supply {scene.brakes.supply:g} bar",
         "controller": f"{controller_text(scene)}, every {1e3 * run.sample:g} ms",
     }
-    lines = [_line(*part) for part in told.items()]
+    lines = [_line(*head_and_text) for head_and_text in texts.items()]
     for name, procedure in scene.procedures.items():
         names = ", ".join(surfaces_of(scene, procedure))
         lines.append(_line(name, f"{PROCEDURE_TEXTS[procedure.kind]}, from {procedure.speed:g} m/s on {names}"))
@@ -141,11 +141,15 @@ def _native_and_other_forces(scene: BrakingScene) -> list[tuple[str, str]]:
 
     handling = sprung_of(scene).handling
     divisions = {engine: divided(handling, engine) for engine in ENGINES}
-    beside = [(engine, *each) for engine, division in divisions.items() for each in division.reasons.items()]
+    reasons_beside = [
+        (engine, *name_and_reason)
+        for engine, division in divisions.items()
+        for name_and_reason in division.reasons.items()
+    ]
     return [
         *(("read", note) for note in handling.vehicle.notes),
         *native_share(handling.vehicle, {engine: division.native for engine, division in divisions.items()}),
-        *(("shared", f"{engine}: {name}: {why}") for engine, name, why in beside),
+        *(("shared", f"{engine}: {name}: {why}") for engine, name, why in reasons_beside),
         ("shared", "tyres, wheels that turn, brakes and the road: no engine has them"),
         ("reference", "plain code that shares no force with them, where --engine reference asks for it"),
     ]

@@ -54,8 +54,8 @@ def vehicle_and_start(scene: BrakingScene, name: str) -> tuple[BrakedVehicle, St
 def steering_of(procedure: Procedure, vehicle: BrakedVehicle) -> Steering:
     """The driver's steering from time 0 on; a single angle is applied at once."""
     knots = procedure.steering or [[0.0, procedure.steer or 0.0]]
-    times, angles = np.array(knots, float).T
-    return Steering(times, angles, steer_angles(vehicle, 1.0))
+    knot_times, angles = np.array(knots, float).T
+    return Steering(knot_times, angles, steer_angles(vehicle, 1.0))
 
 
 def step_steer(scene: BrakingScene, name: str) -> YawResponse | None:
@@ -66,31 +66,31 @@ def step_steer(scene: BrakingScene, name: str) -> YawResponse | None:
     return yaw_response(path.times, path.states[:, 1, 2], steering.half)
 
 
-def engines_of(scene: BrakingScene, requested: tuple[str, ...]) -> tuple[str, ...]:
+def engines_of(scene: BrakingScene, requested_engines: tuple[str, ...]) -> tuple[str, ...]:
     """The requested engines, or the usual engine if none was requested.
 
     The reference takes minutes for a stop on a suspension: there it is used only if no other engine is requested.
     """
     if scene.vehicle.file is None:
-        return requested or ("reference",)
+        return requested_engines or ("reference",)
     return (
-        tuple(name for name in requested if name != "reference")
-        if len(requested) > 1
-        else requested or (SPRUNG_ENGINE,)
+        tuple(name for name in requested_engines if name != "reference")
+        if len(requested_engines) > 1
+        else requested_engines or (SPRUNG_ENGINE,)
     )
 
 
 def controlled_run(
-    scene: BrakingScene, name: str, vehicle: BrakedVehicle, start: StartState, engine: str = ""
+    scene: BrakingScene, name: str, vehicle: BrakedVehicle, start_state: StartState, engine: str = ""
 ) -> BrakingPath:
     """One run from a start, with the scene's controller in the loop or with what is connected to the port. ``engine``
     is only a name, for files.
     """
     usual = controller_of(scene, vehicle.plane.wheels, name)
     if scene.port is None:
-        return vehicle.run(usual, start, scene.run.duration)
+        return vehicle.run(usual, start_state, scene.run.duration)
     with controller_of_run(scene.port, port_of(scene, name, vehicle, engine), usual) as (controller, clock):
-        path = vehicle.run(controller, start, scene.run.duration)
+        path = vehicle.run(controller, start_state, scene.run.duration)
     return path if clock is None else replace(path, clock=clock.report())
 
 
@@ -158,40 +158,43 @@ class Circle:
     radius: float
     sprung: bool = False
 
-    def state(self, unknown: np.ndarray) -> np.ndarray:
+    def state(self, unknowns: np.ndarray) -> np.ndarray:
         """Positions and rates (2, n) for these unknowns."""
-        both = np.zeros((2, unknown.size + 1))
-        both[0, 3:], both[1, 2 : 3 if self.sprung else None] = unknown[2:], self.speed / self.radius
-        both[1, :2] = self.speed * np.cos(unknown[1]), self.speed * np.sin(unknown[1])
-        return both
+        positions_and_rates = np.zeros((2, unknowns.size + 1))
+        positions_and_rates[0, 3:], positions_and_rates[1, 2 : 3 if self.sprung else None] = (
+            unknowns[2:],
+            self.speed / self.radius,
+        )
+        positions_and_rates[1, :2] = self.speed * np.cos(unknowns[1]), self.speed * np.sin(unknowns[1])
+        return positions_and_rates
 
-    def motion(self, unknown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def motion(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) for these unknowns, and the wheels' speeds of turning (W,)."""
-        vehicle, state, steer = self.vehicle, self.state(unknown), steer_angles(self.vehicle, unknown[0])
+        vehicle, state, steer = self.vehicle, self.state(unknowns), steer_angles(self.vehicle, unknowns[0])
         if not self.sprung:
             return _accelerations(vehicle, state, steer)
         motion: tuple[np.ndarray, np.ndarray] = vehicle.engine.rolling(state, steer, vehicle.on_road)
         return motion
 
-    def left(self, unknown: np.ndarray) -> np.ndarray:
+    def left(self, unknowns: np.ndarray) -> np.ndarray:
         """Residual accelerations (n - 1,), zero on a steady circle: first that across the path, then those of the other
         coordinates.
         """
-        rates, _ = self.motion(unknown)
-        across = rates[1] * np.cos(unknown[1]) - rates[0] * np.sin(unknown[1])
+        rates, _ = self.motion(unknowns)
+        across = rates[1] * np.cos(unknowns[1]) - rates[0] * np.sin(unknowns[1])
         return np.concatenate(([across - self.speed**2 / self.radius], rates[2:]))
 
-    def solve_steady_circle(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
+    def solve_steady_circle(self, unknowns_guess: np.ndarray) -> tuple[np.ndarray, bool]:
         """Solution for the unknowns of a steady circle from a guess, and whether its residual accelerations vanish."""
         from scipy.optimize import root
 
-        unknown: np.ndarray = root(self.left, guess, tol=1e-12).x
+        unknown: np.ndarray = root(self.left, unknowns_guess, tol=1e-12).x
         return unknown, bool(np.abs(self.left(unknown)).max() <= STEADY_ACCELERATION)
 
-    def turn(self, unknown: np.ndarray) -> SteadyTurn:
+    def turn(self, unknowns: np.ndarray) -> SteadyTurn:
         """The steady turn, with which a procedure begins, for these unknowns."""
         return SteadyTurn(
-            steer_angles(self.vehicle, unknown[0]), StartState(self.state(unknown), self.motion(unknown)[1])
+            steer_angles(self.vehicle, unknowns[0]), StartState(self.state(unknowns), self.motion(unknowns)[1])
         )
 
 
@@ -201,10 +204,10 @@ def steady_turn(vehicle: BrakedVehicle, speed: float, radius: float) -> SteadyTu
     That of the plane vehicle is followed from a low speed on, and is the first guess of one on its suspension.
     """
     plane, units = vehicle.plane, vehicle.plane.masses.size
-    last = np.array([plane.reach[k].sum() + plane.place[plane.unit == k, 0].min() for k in range(units)])
+    rearmost_x = np.array([plane.reach[k].sum() + plane.place[plane.unit == k, 0].min() for k in range(units)])
     unknown = np.zeros(1 + units)  # of wheels that roll along the circle: the last ones of each unit on its tangent
-    unknown[0], unknown[1] = np.ptp(plane.place[plane.unit == 0, 0]) / radius, -last[0] / radius
-    unknown[2:] = (last[1:] - last[0]) / radius
+    unknown[0], unknown[1] = np.ptp(plane.place[plane.unit == 0, 0]) / radius, -rearmost_x[0] / radius
+    unknown[2:] = (rearmost_x[1:] - rearmost_x[0]) / radius
     for slower in speed * CONTINUATION_SHARES:
         unknown, steady = Circle(vehicle, slower, radius).solve_steady_circle(unknown)
         if not steady or np.abs(unknown).max() > LARGEST_TURN_ANGLE:
@@ -222,20 +225,20 @@ def steady_turn(vehicle: BrakedVehicle, speed: float, radius: float) -> SteadyTu
 def _rolling_speeds(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
     """Speeds of turning (W,) in rad/s of wheels that roll without slip."""
     headings, rates, unit = state[0, 2:], state[1, 2:], plane.unit
-    ahead = np.column_stack((np.cos(headings), np.sin(headings)))
-    aside = np.column_stack((-ahead[:, 1], ahead[:, 0]))
-    centres = state[1, :2] + plane.reach @ (rates[:, None] * aside)
-    spun = rates[unit, None] * (plane.place[:, :1] * aside[unit] - plane.place[:, 1:] * ahead[unit])
+    forward = np.column_stack((np.cos(headings), np.sin(headings)))
+    leftward = np.column_stack((-forward[:, 1], forward[:, 0]))
+    centres = state[1, :2] + plane.reach @ (rates[:, None] * leftward)
+    spun = rates[unit, None] * (plane.place[:, :1] * leftward[unit] - plane.place[:, 1:] * forward[unit])
     course = headings[unit] + steer
-    along = np.column_stack((np.cos(course), np.sin(course)))
-    return ((centres[unit] + spun) * along).sum(axis=1) / plane.radius
+    rolling_direction = np.column_stack((np.cos(course), np.sin(course)))
+    return ((centres[unit] + spun) * rolling_direction).sum(axis=1) / plane.radius
 
 
 def _accelerations(vehicle: BrakedVehicle, state: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations (2 + U,) of a plane vehicle whose unbraked wheels roll freely, and the wheels' speeds of turning
     (W,).
     """
-    plane, none, turning = (
+    plane, no_torques, turning = (
         vehicle.plane,
         np.zeros((2, vehicle.plane.wheels)),
         _rolling_speeds(vehicle.plane, state, steer),
@@ -245,7 +248,7 @@ def _accelerations(vehicle: BrakedVehicle, state: np.ndarray, steer: np.ndarray)
     under_wheels(state, 0.0, vehicle.on_road, ground)
     step_on(
         motion,
-        none,
+        no_torques,
         ACCELERATION_INTERVAL,
         steer,
         vehicle.slope * 9.81 * ACCELERATION_INTERVAL,

@@ -61,8 +61,8 @@ def _other_runs(scene: BrakingScene, name: str, vehicle: BrakedVehicle, start: S
     if scene.port is not None:
         scene = scene.model_copy(update={"port": scene.port.model_copy(update={"log": None})})
 
-    def rerun(steps: int, until: float) -> BrakingPath:
-        shorter = scene.model_copy(update={"run": scene.run.model_copy(update={"duration": until})})
+    def rerun(steps: int, end_time: float) -> BrakingPath:
+        shorter = scene.model_copy(update={"run": scene.run.model_copy(update={"duration": end_time})})
         return controlled_run(shorter, name, replace(vehicle, substeps=steps), start, engine)
 
     def answered(path: BrakingPath, turning: np.ndarray, speeds: np.ndarray) -> np.ndarray:
@@ -75,7 +75,7 @@ def _labelled_result(scene: BrakingScene, name: str, engine: str, path: BrakingP
     """Result with the motion of each coordinate and with the turning, pressure, torque, forces, load and slips of each
     wheel.
     """
-    units = ", ".join("rad" if place.split()[-1][0] in "hr" else "m" for place in path.coordinates)
+    units = ", ".join("rad" if coordinate.split()[-1][0] in "hr" else "m" for coordinate in path.coordinates)
     rates = ", ".join(f"{unit}/s" for unit in units.split(", "))
     moving, wheel = ("time", "coordinate"), ("time", "wheel")
     channels = {
@@ -85,9 +85,9 @@ def _labelled_result(scene: BrakingScene, name: str, engine: str, path: BrakingP
         "pressure": Channel(wheel, path.pressures, "bar"),
         "torque": Channel(wheel, path.torques, "N m"),
     }
-    begun = np.full((1, path.turning.shape[1]), np.nan)
+    start_row = np.full((1, path.turning.shape[1]), np.nan)
     channels |= {
-        name: Channel(wheel, np.concatenate((begun, getattr(path.reports, name))), unit)
+        name: Channel(wheel, np.concatenate((start_row, getattr(path.reports, name))), unit)
         for name, unit in REPORT_CHANNELS.items()
     }
     samples = len(path.times) - 1

@@ -187,8 +187,8 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Br
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(BrakingScene, table, file, folder)
     parts = (_of_procedures, _of_vehicle, _of_brakes, _refusals_of_run)
-    for place, value, allowed in chain.from_iterable(part(scene) for part in parts):
-        raise InputError(scene.file, place, value, allowed)
+    for key_path, value, allowed in chain.from_iterable(refusals_of(scene) for refusals_of in parts):
+        raise InputError(scene.file, key_path, value, allowed)
     check(scene)
     return scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, file)})
 
@@ -221,9 +221,9 @@ def _of_procedure(procedure: Procedure) -> RefusedPlaces:
     if procedure.steer is not None and abs(procedure.steer) > STEEPEST_STEER:
         yield "steer", procedure.steer, f"must be at most {STEEPEST_STEER:g} rad, of either sign"
     if procedure.steering is not None:
-        times, angles = np.array(procedure.steering, float).T
-        if (np.diff(times) <= 0.0).any() or times[0] < 0.0:
-            yield "steering", times.tolist(), "times must rise from knot to knot, from 0 on, in s"
+        knot_times, angles = np.array(procedure.steering, float).T
+        if (np.diff(knot_times) <= 0.0).any() or knot_times[0] < 0.0:
+            yield "steering", knot_times.tolist(), "times must rise from knot to knot, from 0 on, in s"
         if np.abs(angles).max() > STEEPEST_STEER:
             yield "steering", angles.tolist(), f"angles must be at most {STEEPEST_STEER:g} rad, of either sign"
     if procedure.radius is not None and abs(procedure.radius) < 10.0:
@@ -251,11 +251,13 @@ def _of_brakes(scene: BrakingScene) -> RefusedPlaces:
     supply = scene.brakes.supply
     if supply > LARGEST_PRESSURE:
         yield "brakes.supply", supply, f"must be at most {LARGEST_PRESSURE:g} bar"
-    most = f"must be at most {LARGEST_TORQUE / supply:g} N m/bar: no brake gives more than {LARGEST_TORQUE:g} N m"
+    torque_limit = (
+        f"must be at most {LARGEST_TORQUE / supply:g} N m/bar: no brake gives more than {LARGEST_TORQUE:g} N m"
+    )
     for axle, key in product(("front", "rear", "trailer"), ("gradient", "falling")):
         value = getattr(getattr(scene.brakes, axle), key) or 0.0
         if value * supply > LARGEST_TORQUE:
-            yield f"brakes.{axle}.{key}", value, most
+            yield f"brakes.{axle}.{key}", value, torque_limit
 
 
 def _refusals_of_run(scene: BrakingScene) -> RefusedPlaces:
@@ -263,9 +265,9 @@ def _refusals_of_run(scene: BrakingScene) -> RefusedPlaces:
     if not 1e-4 <= run.sample <= 0.1:
         yield "run.sample", run.sample, "must be from 0.0001 to 0.1 s"
     if run.sample / run.substeps > LONGEST_STEP * (1.0 + 1e-9):
-        least = math.ceil(run.sample / LONGEST_STEP - 1e-9)
+        least_substeps = math.ceil(run.sample / LONGEST_STEP - 1e-9)
         longer = f"steps of more than {LONGEST_STEP:g} s mistake stopping distances by percents"
-        yield "run.substeps", run.substeps, f"must be at least {least}: {longer}"
+        yield "run.substeps", run.substeps, f"must be at least {least_substeps}: {longer}"
     if pressure is not None and pressure.delay > 1.0:
         yield "pressure.delay", pressure.delay, "must be at most 1 s"
     if pressure is not None and pressure.slow is not None and pressure.slow < pressure.fill:

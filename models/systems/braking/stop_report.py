@@ -26,9 +26,9 @@ SLIP_LIMITS = (0.2, 0.5)
 """Slips of which it is told how much of the time they are exceeded: chosen, the paper's are not legible."""
 
 
-def wheel_names(count: int) -> tuple[str, ...]:
-    """Names of a vehicle's ``count`` wheels, those of towed vehicles included."""
-    return (*WHEEL_NAMES, *TOWED_WHEELS[count - len(WHEEL_NAMES)])
+def wheel_names(wheel_count: int) -> tuple[str, ...]:
+    """Names of a vehicle's ``wheel_count`` wheels, those of towed vehicles included."""
+    return (*WHEEL_NAMES, *TOWED_WHEELS[wheel_count - len(WHEEL_NAMES)])
 
 
 @dataclass(frozen=True)
@@ -73,16 +73,16 @@ class Stop:
     @property
     def across(self) -> np.ndarray:
         """Mean acceleration (n - 1,) across the path in every sample, in m/s^2, positive to the left."""
-        before, after = self.path.states[:-1, 1, :2], self.path.states[1:, 1, :2]
+        rates_before, rates_after = self.path.states[:-1, 1, :2], self.path.states[1:, 1, :2]
         size = np.maximum(self.speed[:-1], 1e-9)
-        change = (after - before) / np.maximum(self.lengths, 1e-12)[:, None]
-        return (before[:, 0] * change[:, 1] - before[:, 1] * change[:, 0]) / size
+        change = (rates_after - rates_before) / np.maximum(self.lengths, 1e-12)[:, None]
+        return (rates_before[:, 0] * change[:, 1] - rates_before[:, 1] * change[:, 0]) / size
 
     def of_vehicle(self) -> dict[str, float]:
         """Results of the whole vehicle over a stop, by name and unit."""
-        path, speed, way = self.path, self.speed, self.way
+        path, speed, distances = self.path, self.speed, self.way
         slip, lateral = _index_of_peak(self.side_slip), _index_of_peak(self.across)
-        time, distance = float(path.times[-1]), float(way[-1])
+        time, distance = float(path.times[-1]), float(distances[-1])
         return {
             "initial speed [m/s]": float(speed[0]),
             "stopping distance [m]": distance,
@@ -94,7 +94,7 @@ class Stop:
             if path.ended_at_rest
             else float("nan"),
             "v0/T [m/s^2]": float(speed[0] - speed[-1]) / time,
-            "MFDD [m/s^2]": mean_fully_developed(path.times, way, speed),
+            "MFDD [m/s^2]": mean_fully_developed(path.times, distances, speed),
             "largest side slip [deg]": float(np.degrees(self.side_slip[slip])),
             "largest side slip at [s]": float(path.times[slip]),
             "largest lateral acceleration [m/s^2]": float(self.across[lateral]),
@@ -106,8 +106,8 @@ class Stop:
         """Angles (n, 2) in rad of a vehicle on its suspension: roll to the right, and pitch nose down; None for a plane
         vehicle.
         """
-        places = [i for i, name in enumerate(self.path.coordinates) if name in ("sway rx", "sway ry")]
-        return self.path.states[:, 0, places] if places else None
+        columns = [i for i, name in enumerate(self.path.coordinates) if name in ("sway rx", "sway ry")]
+        return self.path.states[:, 0, columns] if columns else None
 
     def of_body(self) -> dict[str, float]:
         """Results for the sprung body over a stop, by name and unit; empty for a plane vehicle."""
@@ -125,11 +125,11 @@ class Stop:
         """Positions (n, 2 + U): of the first unit's centre (m), then the headings (rad) of all units; also for a
         vehicle on its suspension.
         """
-        places = self.path.states[:, 0]
+        coordinates = self.path.states[:, 0]
         if self.lean is None:
-            return places
+            return coordinates
         yaws = [2, *(i for i, name in enumerate(self.path.coordinates) if name.endswith(HITCH_SUFFIX))]
-        return np.column_stack((places[:, :2], np.cumsum(places[:, yaws], axis=1)))
+        return np.column_stack((coordinates[:, :2], np.cumsum(coordinates[:, yaws], axis=1)))
 
     @property
     def hitch(self) -> np.ndarray | None:
@@ -156,16 +156,17 @@ class Stop:
         name and unit."""
         path, fast = self.path, self.speed[:-1] > min(SLOWEST_SLIP_SPEED, 0.5 * self.speed[0])
         lengths, slips = self.lengths[fast], path.reports.slip[fast]
-        pressures, whole = path.pressures[1:][fast], float(self.lengths[fast].sum())
-        wheels = {"mean slip": lengths @ slips / whole, "largest slip": slips.max(axis=0)}
+        pressures, fast_duration = path.pressures[1:][fast], float(self.lengths[fast].sum())
+        wheels = {"mean slip": lengths @ slips / fast_duration, "largest slip": slips.max(axis=0)}
         wheels |= {
-            f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / whole for limit in SLIP_LIMITS
+            f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / fast_duration
+            for limit in SLIP_LIMITS
         }
         locks = self.locks()
         return wheels | {
             "locked above 15 km/h [s]": locks.time,
             "longest lock [s]": locks.longest_lock,
-            "mean pressure [bar]": lengths @ pressures / whole,
+            "mean pressure [bar]": lengths @ pressures / fast_duration,
             "final pressure [bar]": path.pressures[-1],
         }
 
@@ -179,13 +180,13 @@ class Stop:
             float(np.interp(time, self.times, values))
             for values in (self.speed, self.path.states[:, 1, 2], self.side_slip)
         )
-        place = [np.interp(time, self.times, self.path.states[:, 0, i]) for i in range(2)]
+        position = [np.interp(time, self.times, self.path.states[:, 0, i]) for i in range(2)]
         vx, vy = self.path.states[0, 1, :2] / self.speed[0]
         centre = self.path.states[0, 0, :2] + radius * np.array([-vy, vx])
         return {
             "yaw rate by that of the circle": yaw_ratio(yaw_rate, speed, radius),
             "mean deceleration [m/s^2]": float(self.speed[0] - speed) / time,
-            "outside of the circle [m]": float(np.hypot(*(place - centre)) - abs(radius)),
+            "outside of the circle [m]": float(np.hypot(*(position - centre)) - abs(radius)),
             "side slip [deg]": float(np.degrees(slip)),
         }
 

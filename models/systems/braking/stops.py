@@ -45,8 +45,8 @@ class Stops:
         """Named arrays (len(paths),) of ``KEPT_QUANTITIES`` and of the initial speed (m/s)."""
         scene = build(self.table, self.file, Path(self.folder))
         rows = [self._quantities_of_stop(scene, number) for number in paths]
-        kept = {**KEPT_QUANTITIES, "speed": "initial speed [m/s]"}
-        return {name: np.array([row[key] for row in rows]) for name, key in kept.items()}
+        kept_keys = {**KEPT_QUANTITIES, "speed": "initial speed [m/s]"}
+        return {name: np.array([row[key] for row in rows]) for name, key in kept_keys.items()}
 
     def facts(self) -> dict[str, Any]:
         """Everything that the result depends on."""
@@ -57,17 +57,17 @@ class Stops:
             "seed": self.seed,
         }
 
-    def _quantities_of_stop(self, scene: BrakingScene, number: int) -> dict[str, float]:
+    def _quantities_of_stop(self, scene: BrakingScene, path_number: int) -> dict[str, float]:
         procedure = scene.procedures[self.procedure]
-        drawn = float(normal_samples(self.seed, number, 1, 1, source=SPEED)[0, 0])
+        drawn = float(normal_samples(self.seed, path_number, 1, 1, source=SPEED)[0, 0])
         changed = procedure.model_copy(update={"speed": procedure.speed * (1.0 + self.spread * drawn)})
         scene = scene.model_copy(update={"procedures": {**scene.procedures, self.procedure: changed}})
         try:
             path = run(scene, procedure=self.procedure).detail
         except RunFailed as error:
-            raise PathFailed(number, str(error)) from None
+            raise PathFailed(path_number, str(error)) from None
         if not path.ended_at_rest:
-            raise PathFailed(number, f"does not stand after {scene.run.duration:g} s")
+            raise PathFailed(path_number, f"does not stand after {scene.run.duration:g} s")
         return Stop(path).of_vehicle()
 
 
@@ -113,15 +113,15 @@ class Welch:
     p_value: float
 
 
-def welch_test(first: Scatter, second: Scatter) -> Welch:
+def welch_test(first_scatter: Scatter, second_scatter: Scatter) -> Welch:
     """Welch's test of two means whose variances may differ; B. L. Welch, Biometrika 34 (1947)."""
     from scipy.stats import t as student
 
-    a, b = first.error**2, second.error**2
-    gap, error = second.mean - first.mean, sqrt(a + b)
+    a, b = first_scatter.error**2, second_scatter.error**2
+    gap, error = second_scatter.mean - first_scatter.mean, sqrt(a + b)
     if error == 0.0:
         return Welch(gap, 0.0, 0.0 if gap == 0.0 else np.copysign(np.inf, gap), np.inf, float(gap == 0.0))
-    freedoms = (a + b) ** 2 / (a**2 / (first.count - 1) + b**2 / (second.count - 1))
+    freedoms = (a + b) ** 2 / (a**2 / (first_scatter.count - 1) + b**2 / (second_scatter.count - 1))
     t = gap / error
     half, p = student.ppf(0.975, freedoms) * error, 2.0 * student.sf(abs(t), freedoms)
     return Welch(gap, float(half), t, freedoms, float(p))

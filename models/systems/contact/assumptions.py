@@ -52,12 +52,12 @@ def table_assumptions(file: Path) -> list[Assumption]:
     return [*listed, _small_creepage(lambda run: creepages), _constant_friction(lambda run: creepages)]
 
 
-def _half_space(watched: Callable[[Result], Watched]) -> Assumption:
+def _half_space(watch: Callable[[Result], Watched]) -> Assumption:
     return Assumption(
         "half-space",
         "the contact is small beside the bodies' radii",
         "lower the load, or compute with finite elements",
-        watched,
+        watch,
         "of the radius",
         upper_limit=HALF_SPACE,
     )
@@ -76,21 +76,21 @@ def _by_radii(scene: ContactScene, body: RollingContact) -> Callable[[Result], W
         else:
             shares = {"along": 2.0 * body.a * body.hertz.A, "across": 2.0 * body.b * body.hertz.B}
     elif isinstance(body, OnPatches):
-        for k, part in enumerate(body.pressed.patches, 1):
-            along, across = part.patch.distance.curvatures
-            x0, x1, y0, y1 = part.box
-            shares[f"patch {k} along"] = np.array([0.5 * (x1 - x0) * along])
+        for k, patch_pressure in enumerate(body.pressed.patches, 1):
+            curvature_along, across = patch_pressure.patch.distance.curvatures
+            x0, x1, y0, y1 = patch_pressure.box
+            shares[f"patch {k} along"] = np.array([0.5 * (x1 - x0) * curvature_along])
             shares[f"patch {k} across"] = np.array([0.5 * (y1 - y0) * across])
-    arrays = {where: np.atleast_1d(share) for where, share in shares.items()}
+    arrays = {axis_name: np.atleast_1d(share) for axis_name, share in shares.items()}
     return lambda run: arrays
 
 
-def _elastic_assumption(watched: Callable[[Result], Watched]) -> Assumption:
+def _elastic_assumption(watch: Callable[[Result], Watched]) -> Assumption:
     return Assumption(
         "elastic",
         "the steel does not flow",
         "lower the load or take larger radii: a real contact would be larger and its pressure lower",
-        watched,
+        watch,
         "MPa",
         upper_limit=1e-6 * YIELDS,
     )
@@ -111,34 +111,34 @@ def _creepages(body: RollingContact) -> list[Assumption]:
     ]
 
 
-def _small_creepage(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
+def _small_creepage(watch: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
     return Assumption(
         "small creepage",
         "creepages, and spin times the semi-axis, are so small that their squares do not count",
         "lower the creepage: a wheel that slides is no rolling contact",
-        lambda run: {name: np.abs(values) for name, values in watched(run).items()},
+        lambda run: {name: np.abs(values) for name, values in watch(run).items()},
         "",
         upper_limit=SMALL_CREEPAGE,
     )
 
 
-def _constant_friction(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
+def _constant_friction(watch: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
     return Assumption(
         "constant friction",
         "friction is the same however fast the contact slips",
         "name the effect falling_friction, which FASTSIM computes",
-        lambda run: {name: np.abs(values) for name, values in watched(run).items()},
+        lambda run: {name: np.abs(values) for name, values in watch(run).items()},
         "",
         upper_limit=CONSTANT_FRICTION,
     )
 
 
-def _no_slip_assumption(watched: Callable[[Result], Watched]) -> Assumption:
+def _no_slip_assumption(watch: Callable[[Result], Watched]) -> Assumption:
     return Assumption(
         "no slip",
         "the force of the linear theory is far below mu N",
         'name the effect saturation: method.name = "fastsim"',
-        watched,
+        watch,
         "mu N",
         upper_limit=NO_SLIP,
     )
@@ -150,12 +150,12 @@ def _utilised_friction(run: Result, body: RollingContact) -> np.ndarray:
     return force / limit if limit > 0.0 else np.where(force > 0.0, np.inf, 0.0)
 
 
-def _slender_assumption(watched: Callable[[Result], Watched]) -> Assumption:
+def _slender_assumption(watch: Callable[[Result], Watched]) -> Assumption:
     return Assumption(
         "axes alike",
         "the ellipse is no more slender than those of Kalker's table",
         'name the effect half_space: method.name = "exact"',
-        watched,
+        watch,
         "",
         *SLENDER,
     )
@@ -175,19 +175,21 @@ def _bodies_alike(body: RollingContact) -> Assumption:
 
 def _on_profiles(body: OnPatches) -> list[Assumption]:
     """Assumptions that contact patches lie within the given profiles and do not overlap."""
-    parts = sorted(body.pressed.patches, key=lambda part: part.patch.contour_position)
-    inside = {}
-    for k, part in enumerate(parts, 1):
-        known, (_, _, low, high) = part.patch.distance, part.box
-        free = [known.y[-1] - high] * (not part.patch.cut[3]) + [low - known.y[0]] * (not part.patch.cut[2])
-        inside[f"patch {k}"] = 1e3 * np.array(free)
+    parts = sorted(body.pressed.patches, key=lambda patch_pressure: patch_pressure.patch.contour_position)
+    free_distances = {}
+    for k, patch_pressure in enumerate(parts, 1):
+        known, (_, _, low, high) = patch_pressure.patch.distance, patch_pressure.box
+        free = [known.y[-1] - high] * (not patch_pressure.patch.cut[3]) + [low - known.y[0]] * (
+            not patch_pressure.patch.cut[2]
+        )
+        free_distances[f"patch {k}"] = 1e3 * np.array(free)
     gaps = [(b.patch.contour_position + b.box[2]) - (a.patch.contour_position + a.box[3]) for a, b in pairwise(parts)]
     return [
         Assumption(
             "within the profiles",
             "the contact lies within the profiles and their surroundings that are known",
             "use longer profiles, a smaller load or lateral_shift",
-            lambda run: inside,
+            lambda run: free_distances,
             "mm from the end",
             lower_limit=0.0,
         ),

@@ -88,7 +88,7 @@ def answer_table(
         partial(solved_rows, build=build, method=method, errors=errors),
     )
     first = list(islice(reading, 1))  # before the answer's file is made, so that a wrong header leaves none
-    with whole_file(output_path) as part, part.open("w") as file:
+    with whole_file(output_path) as partial_path, partial_path.open("w") as file:
         heads = (
             ANSWER_HEADINGS
             if errors
@@ -147,11 +147,11 @@ def _answers_of_rows(
         if count == 1:
             return np.full((1, columns), np.nan), {0: str(error).replace("[0]", "")}
     half = count // 2
-    (low, wrong), (high, others) = (
+    (low, wrong), (high, wrong_in_high) = (
         _answers_of_rows({name: column[rows] for name, column in values.items()}, solve, columns)
         for rows in (slice(half), slice(half, None))
     )
-    return np.concatenate([low, high]), wrong | {half + i: text for i, text in others.items()}
+    return np.concatenate([low, high]), wrong | {half + i: text for i, text in wrong_in_high.items()}
 
 
 def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool = True) -> Array:
@@ -180,21 +180,26 @@ def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool =
 
 
 def _force_errors(
-    fine: Any, coarse: Any, limit: Array, a: Array, b: Array, share: Array, method: Method
+    fine_forces: Any, coarse_forces: Any, friction_limit: Array, a: Array, b: Array, share: Array, method: Method
 ) -> list[Array]:
-    """Errors of forces (N) and moments (N m) from the finite cells and from the theory; limit : mu N; share : spin's
-    share of the creepage.
+    """Errors of forces (N) and moments (N m) from the finite cells and from the theory; friction_limit : mu N; share :
+    spin's share of the creepage.
     """
-    most = limit * np.maximum(a, b)
-    relative, other = (
-        np.divide([creep.fx, creep.fy, creep.mz], [limit, limit, most], out=np.zeros((3, limit.size)), where=limit > 0)
-        for creep in (fine, coarse)
+    moment_limit = friction_limit * np.maximum(a, b)
+    relative, relative_coarse = (
+        np.divide(
+            [creep.fx, creep.fy, creep.mz],
+            [friction_limit, friction_limit, moment_limit],
+            out=np.zeros((3, friction_limit.size)),
+            where=friction_limit > 0,
+        )
+        for creep in (fine_forces, coarse_forces)
     )
-    left = cells_error(relative, other, method.cells, method.order)
+    left = cells_error(relative, relative_coarse, method.cells, method.order)
     used, wider = np.hypot(relative[0], relative[1]), slenderness(a, b)
-    theory = wider * limit * band(method.band, used, share)
-    moment = wider * most * moment_band(method.band, used_with_moment(used, relative[2]), share)
-    return [limit * left, theory, most * left, moment]
+    theory = wider * friction_limit * band(method.band, used, share)
+    moment = wider * moment_limit * moment_band(method.band, used_with_moment(used, relative[2]), share)
+    return [friction_limit * left, theory, moment_limit * left, moment]
 
 
 def _line(line_number: int, row: list[float], wrong: str | None) -> str:
@@ -219,8 +224,8 @@ def column_sizes(path: Path) -> dict[str, dict[str, Any]]:
             largest = np.maximum(largest, np.abs(sound).max(axis=0, initial=0.0))
             squares, count = squares + (sound**2).sum(axis=0), count + len(sound)
     return {
-        name: {"unit": unit, "largest": float(most), "rms": float(np.sqrt(square / count))}
-        for (name, unit), most, square in zip(heads, largest, squares, strict=True)
+        name: {"unit": unit, "largest": float(largest_magnitude), "rms": float(np.sqrt(square / count))}
+        for (name, unit), largest_magnitude, square in zip(heads, largest, squares, strict=True)
         if count
     }
 

@@ -29,7 +29,7 @@ def findings(scene: ContactScene) -> tuple[Finding, ...]:
     from models.systems.contact.run import hertz_of
 
     area = hertz_of(scene)
-    out = list[Finding]()
+    doubts = list[Finding]()
     for name, radius in scene.radii:
         axis = float(area.a if name.endswith("x") else area.b)
         if radius is not None and axis > HALF_SPACE * abs(radius):
@@ -37,8 +37,8 @@ def findings(scene: ContactScene) -> tuple[Finding, ...]:
                 f"radii.{name}: {radius:.4g} m, where the contact is {axis:.4g} m long to either side; its theory "
                 f"needs radii of at least {axis / HALF_SPACE:.3g} m. Radii are in m, loads in N."
             )
-            out.append(Finding("size", "doubt", f"radii.{name}", text, radius, "m"))
-    return tuple(out)
+            doubts.append(Finding("size", "doubt", f"radii.{name}", text, radius, "m"))
+    return tuple(doubts)
 
 
 def describe(scene: ContactScene) -> str:

@@ -141,17 +141,17 @@ def run(
     seconds = time.process_time() - begun
     if shown is not None:
         steps[-1] = shown
-    forces, off = zip(*steps, strict=True)
-    rolls = ContactResults(body, motions, forces, off if error else (), marks[0] - start, np.diff(marks))
+    forces, errors_of_forces = zip(*steps, strict=True)
+    rolls = ContactResults(body, motions, forces, errors_of_forces if error else (), marks[0] - start, np.diff(marks))
     labelled = with_assumptions(_result(scene, rolls, seconds), assumptions(scene, body))
-    return with_error(labelled, scene, body, off) if error else labelled
+    return with_error(labelled, scene, body, errors_of_forces) if error else labelled
 
 
 def _result(scene: ContactScene, rolls: ContactResults, seconds: float) -> Result:
     body, count, power = rolls.contact, len(rolls.motions), CELL_POWER[scene.method.name]
     errors: list[tuple[float, ...]] = [ERRORS_OF_ROLLED(error) for error in rolls.errors] or [()] * count
     rows = zip(rolls.motions, map(FORCES_OF_ROLLED, rolls.rolled), errors, strict=True)
-    columns = np.array([[*motion, *forces, *off] for motion, forces, off in rows]).T
+    columns = np.array([[*motion, *forces, *errors_of_forces] for motion, forces, errors_of_forces in rows]).T
     doubt = ""
     if isinstance(body, LinearTheory):
         with np.errstate(divide="ignore", invalid="ignore"):  # no friction carries nothing
@@ -188,20 +188,20 @@ def cells_of(scene: ContactScene, rolls: ContactResults) -> Result | None:
     return result(scene, columns, {}, motion=list(rolls.motions[-1]))
 
 
-def _of_table(scene: ContactScene, answers: Path, progress: Progress, error: bool) -> Result:
+def _of_table(scene: ContactScene, answers_path: Path, progress: Progress, error: bool) -> Result:
     """Answer the scene's table of cases into its file; the result has the first rows."""
     built = partial(table_contacts, scene)
     compile_first(built, scene.method)  # no part of the time below
     start = time.perf_counter()
-    counts = _answered(scene, answers, built, progress, error)
+    counts = _answered(scene, answers_path, built, progress, error)
     seconds = time.perf_counter() - start
-    rows = {name: Channel("row", values, unit) for name, (unit, values) in kept_rows(answers).items()}
-    table = result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(column_sizes(answers)))
+    rows = {name: Channel("row", values, unit) for name, (unit, values) in kept_rows(answers_path).items()}
+    table = result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(column_sizes(answers_path)))
     with_assumptions(table, assumptions_of_rows(scene.cases_file()))
     return with_error_of_rows(table, scene) if error else table
 
 
-def _answered(scene: ContactScene, answers: Path, built: Any, progress: Progress, error: bool) -> dict[str, int]:
+def _answered(scene: ContactScene, answers_path: Path, built: Any, progress: Progress, error: bool) -> dict[str, int]:
     """Answer a table of cases and count its rows. A table of many blocks is solved by the scene's worker processes, and
     finished blocks are stored.
     """
@@ -209,21 +209,21 @@ def _answered(scene: ContactScene, answers: Path, built: Any, progress: Progress
     rows, several = _rows_of(file), file.stat().st_size > LARGE_TABLE_BYTES
     count = partial(_count_rows, progress, rows)
     if not several:
-        return answer_table(file, answers, built, scene.method, count, errors=error)
-    store = Store(answers.parent / BLOCKS_FOLDER)
+        return answer_table(file, answers_path, built, scene.method, count, errors=error)
+    store = Store(answers_path.parent / BLOCKS_FOLDER)
     facts = {"scene": scene.table(), "error": error, "files": named_files(scene.table(), Path(scene.folder))}
     with store.reserved_folder(facts), Crew.of(scene).at_work(rows // TABLE_BLOCK + 1, *places_of(scene)) as pool:
-        return answer_table(file, answers, built, scene.method, count, errors=error, executor=pool, store=store)
+        return answer_table(file, answers_path, built, scene.method, count, errors=error, executor=pool, store=store)
 
 
 def _rows_of(file: Path) -> int:
     """Number of line ends in a file, which is about its number of rows."""
     with file.open("rb") as lines:
-        return sum(part.count(b"\n") for part in iter(partial(lines.read, 1 << 20), b""))
+        return sum(block.count(b"\n") for block in iter(partial(lines.read, 1 << 20), b""))
 
 
-def _count_rows(progress: Progress, most: int, rows: int) -> None:
-    progress(f"{rows:,} of {most:,} rows", min(rows / max(most, 1), 1.0))
+def _count_rows(progress: Progress, total_rows: int, rows: int) -> None:
+    progress(f"{rows:,} of {total_rows:,} rows", min(rows / max(total_rows, 1), 1.0))
 
 
 def table_contacts(scene: ContactScene, friction: Any, load: Any) -> Built:

@@ -54,7 +54,7 @@ class Radii(Strict):
         for name, radius in self:
             if radius == 0:
                 raise InputError(file, f"radii.{name}", radius, "must not be 0 (radius in m, negative if concave)")
-        both = []
+        curvature_pair = []
         for axis in ("x", "y"):
             value = sum(1.0 / radius for name, radius in self if radius is not None and name.endswith(axis)) / 2
             if value <= 0:
@@ -65,8 +65,8 @@ class Radii(Strict):
                     f"are flat or conform along {axis}: "
                     f"half the sum of their curvatures is {value:.4g} 1/m and must be above 0",
                 )
-            both.append(value)
-        return both[0], both[1]
+            curvature_pair.append(value)
+        return curvature_pair[0], curvature_pair[1]
 
 
 class Profiles(Strict):
@@ -208,8 +208,8 @@ WrongPlaces = Iterator[tuple[str, Any, str]]
 
 
 def _refuse_places(scene: ContactScene, *checks: Callable[[ContactScene], WrongPlaces]) -> None:
-    for place, value, allowed in chain.from_iterable(wrong(scene) for wrong in checks):
-        raise InputError(scene.file, place, value, allowed)
+    for key_path, value, allowed in chain.from_iterable(wrong(scene) for wrong in checks):
+        raise InputError(scene.file, key_path, value, allowed)
 
 
 def _geometry_refusals(scene: ContactScene) -> WrongPlaces:
@@ -224,10 +224,10 @@ def _geometry_refusals(scene: ContactScene) -> WrongPlaces:
         scene.radii.curvatures(scene.file)
     if (profiles := scene.profiles) is None:
         return
-    for key, (least, most, unit) in PROFILE_RANGES.items():
+    for key, (least, largest, unit) in PROFILE_RANGES.items():
         value = getattr(profiles, key)
-        if not least <= value <= most:
-            yield f"profiles.{key}", value, f"must be from {least:g} to {most:g} {unit}"
+        if not least <= value <= largest:
+            yield f"profiles.{key}", value, f"must be from {least:g} to {largest:g} {unit}"
     if profiles.smoothing and "." not in profiles.wheel + profiles.rail:
         yield "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles"
 
@@ -268,15 +268,15 @@ def _size_refusals(scene: ContactScene) -> WrongPlaces:
     """Refusals of values beyond LARGEST_INPUTS: the theories refuse these, too, but do not know the file and the
     key.
     """
-    for place, most in LARGEST_INPUTS.items():
-        table, key = place.split(".")
-        values = {place: getattr(getattr(scene, table), key, None)}
+    for key_path, largest in LARGEST_INPUTS.items():
+        table, key = key_path.split(".")
+        values = {key_path: getattr(getattr(scene, table), key, None)}
         if scene.sweep is not None and scene.sweep.of == key:
             values = {f"sweep.{end}": getattr(scene.sweep, end) for end in ("start", "stop")}
         unit = {"load": " N", "approach": " m", "spin": " 1/m"}.get(key, "")
-        for where, value in values.items():
-            if value is not None and abs(value) > most:
-                yield where, value, f"must be at most {most:g}{unit}, of either sign"
+        for value_path, value in values.items():
+            if value is not None and abs(value) > largest:
+                yield value_path, value, f"must be at most {largest:g}{unit}, of either sign"
 
 
 def _sweep_refusals(scene: ContactScene) -> WrongPlaces:
@@ -287,8 +287,8 @@ def _sweep_refusals(scene: ContactScene) -> WrongPlaces:
     if sweep.spacing == "logarithmic" and sweep.start * sweep.stop <= 0:
         yield "sweep.spacing", sweep.spacing, "start and stop must then both be above 0, or both below"
     if sweep.of in scene.creepage.model_fields_set:
-        whole = "on the command line give the whole table, as in --set creepage={xi_x=1e-3}"
-        yield f"creepage.{sweep.of}", getattr(scene.creepage, sweep.of), f"is swept: drop this key; {whole}"
+        remedy = "on the command line give the whole table, as in --set creepage={xi_x=1e-3}"
+        yield f"creepage.{sweep.of}", getattr(scene.creepage, sweep.of), f"is swept: drop this key; {remedy}"
 
 
 ON_PROFILES = ("simplified", "exact")

@@ -25,13 +25,13 @@ def with_error(run: Result, scene: ContactScene, body: RollingContact, errors: S
     sizes = {"force": (force, "N"), "mz": (force * body.lever, "N m")}
     likely = {"force": [e.likely for e in errors], "mz": [e.moment_likely for e in errors]}
     cells, order = scene.method.cells, min(body.order, 1.5)
-    told = {
+    estimates = {
         name: by_cells(finite_rms(np.array(likely[name])), *sizes[name], cells, order, MOST_CELLS) for name in likely
     }
     if isinstance(body, LinearTheory):
         not_estimated(run, "the linear theory has no cells")
     else:
-        with_stated_errors(run, told, HALVED_CELLS)
+        with_stated_errors(run, estimates, HALVED_CELLS)
     theory = finite_rms(run["error_of_theory"])
     return of_theory(run, {"force": _of_theory(theory, force)}, BAND_TEXT) if theory > 0.0 else run
 

@@ -124,9 +124,13 @@ def without_grid(grids: list[Array]) -> tuple[Array, float]:
     which the extrapolations from the two coarser and the two finer grids agree best; their difference is the error.
     """
     coarse, middle, fine = grids
-    told = [(fine + (fine - middle) / part, middle + (middle - coarse) / part) for part in (1.0, 3.0)]
-    finest, before = min(told, key=lambda two: float(np.hypot(*(two[0] - two[1])[:2])))
-    return finest, float(np.hypot(*(finest - before)[:2]))
+    extrapolations = [
+        (fine + (fine - middle) / divisor, middle + (middle - coarse) / divisor) for divisor in (1.0, 3.0)
+    ]
+    finest, finest_before = min(
+        extrapolations, key=lambda finer_pair: float(np.hypot(*(finer_pair[0] - finer_pair[1])[:2]))
+    )
+    return finest, float(np.hypot(*(finest - finest_before)[:2]))
 
 
 @dataclass(frozen=True)
@@ -210,15 +214,15 @@ def measure(theory: TheorySettings, cells: int, cases: list[ContactCase], repeat
     """
     errors, seconds = [], []
     for case in cases:
-        answer, taken = _value_and_seconds(theory.rolled(case, cells), case.motion, repeats)
+        answer, seconds_taken = _value_and_seconds(theory.rolled(case, cells), case.motion, repeats)
         errors.append(float(np.linalg.norm(force_of(answer) / case.limit - case.force)))
-        seconds.append(taken)
+        seconds.append(seconds_taken)
     return TheoryPoint(theory.name, cells, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds)))
 
 
-def force_of(answer: Any) -> Array:
+def force_of(computed_answer: Any) -> Array:
     """Force (2,) in N of an answer, which is either a tuple of forces and moment or an object with ``force``."""
-    return np.array(answer[:2]) if isinstance(answer, tuple) else answer.force
+    return np.array(computed_answer[:2]) if isinstance(computed_answer, tuple) else computed_answer.force
 
 
 LEAST_TIMED_SECONDS = 2e-5
@@ -229,20 +233,20 @@ def _value_and_seconds(roll: ForcesOfMotion, motion: Motion, repeats: int) -> tu
     start = time.perf_counter()
     answer = roll(motion)
     count = max(1, int(LEAST_TIMED_SECONDS / max(time.perf_counter() - start, 1e-7)))
-    taken = []
+    seconds_taken = []
     for _ in range(repeats if count > 1 else 1):
         start = time.perf_counter()
         for _ in range(count):
             answer = roll(motion)
-        taken.append((time.perf_counter() - start) / count)
-    return answer, float(np.median(taken))
+        seconds_taken.append((time.perf_counter() - start) / count)
+    return answer, float(np.median(seconds_taken))
 
 
 def fastest_point(
-    points: list[TheoryPoint], target: float, error: Callable[[TheoryPoint], float]
+    points: list[TheoryPoint], target_error: float, error: Callable[[TheoryPoint], float]
 ) -> TheoryPoint | None:
-    """The fastest of the points whose error is at most ``target``; None if there is none."""
-    meets = [point for point in points if error(point) <= target]
+    """The fastest of the points whose error is at most ``target_error``; None if there is none."""
+    meets = [point for point in points if error(point) <= target_error]
     return min(meets, key=lambda point: point.seconds, default=None)
 
 
@@ -252,30 +256,32 @@ def ellipse_cases(
     load: float,
     friction: float,
     material_pair: MaterialPair,
-    levels: tuple[float, ...],
-    kinds: dict[str, Parts] = CREEPAGE_KINDS,
+    creepage_levels: tuple[float, ...],
+    creepage_kinds: dict[str, Parts] = CREEPAGE_KINDS,
 ) -> list[ContactCase]:
     """Cases of every kind and level on one ellipse, their exact forces not yet computed."""
     return [
         ContactCase(a, b, load, friction, material_pair, kind, parts, level)
-        for (kind, parts), level in product(kinds.items(), levels)
+        for (kind, parts), level in product(creepage_kinds.items(), creepage_levels)
     ]
 
 
-def priced_theories(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -> Result:
+def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], progress: Progress) -> Result:
     """Errors and seconds of every theory on every number of cells, on the scene's ellipse; the points are the detail.
 
-    levels : sizes of the creepage; at 1 the linear theory reaches mu N.
+    creepage_levels : sizes of the creepage; at 1 the linear theory reaches mu N.
     """
     hertz, built = hertz_of(scene), scene_contact(scene)
-    cases = ellipse_cases(float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, levels)
+    cases = ellipse_cases(
+        float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, creepage_levels
+    )
     known, points = list[ContactCase](), list[TheoryPoint]()
     for i, case in enumerate(cases):
         progress("exact theory", 0.5 * i / len(cases))
         known.append(with_exact_forces(case))
-    for i, way in enumerate(THEORIES_COMPARED):
-        progress(way.name, 0.5 + 0.5 * i / len(THEORIES_COMPARED))
-        points += [measure(way, cells, known) for cells in way.cells]
+    for i, theory in enumerate(THEORIES_COMPARED):
+        progress(theory.name, 0.5 + 0.5 * i / len(THEORIES_COMPARED))
+        points += [measure(theory, cells, known) for cells in theory.cells]
     channels = {
         "theory": Channel("point", [point.name for point in points], "", "theory, with its choices"),
         "cells": Channel("point", [point.cells for point in points], "", "cells along each axis"),

@@ -88,13 +88,13 @@ def assumptions(handling: Handling) -> list[Assumption]:
 
 def _unbuilt_stops(handling: Handling) -> list[Assumption]:
     """Assumptions that coordinates stay within their stops, for stops that the model does not have."""
-    places = handling.vehicle.coordinates()
+    coordinates = handling.vehicle.coordinates()
     return [
         Assumption(
             f"stops {body} {freedom}",
             f"{body!r} stays between the stops of its degree of freedom {freedom}, which are not built",
             "drive more slowly or steer less, or stiffen the spring",
-            partial(_watched_coordinate, places.index((body, freedom)), f"{body} {freedom}"),
+            partial(_watched_coordinate, coordinates.index((body, freedom)), f"{body} {freedom}"),
             "rad" if freedom.startswith("r") else "m",
             low,
             high,
@@ -146,11 +146,15 @@ def _static_loads(handling: Handling) -> np.ndarray:
 
 
 def _lean_angles(run: Result, handling: Handling) -> Watched:
-    places = handling.vehicle.coordinates()
+    coordinates = handling.vehicle.coordinates()
     names = {SWAY: "", **{hitch_of(name): f" of {name} beside what tows it" for name in handling.vehicle.towed}}
     turns = [("roll", "rx"), ("pitch", "ry")]
-    leans = {f"{angle}{of}": (body, turn) for body, of in names.items() for angle, turn in turns}
-    return {name: run["positions"][:, places.index(place)] for name, place in leans.items() if place in places}
+    leans = {f"{angle}{body_suffix}": (body, turn) for body, body_suffix in names.items() for angle, turn in turns}
+    return {
+        name: run["positions"][:, coordinates.index(coordinate)]
+        for name, coordinate in leans.items()
+        if coordinate in coordinates
+    }
 
 
 def _sliding_share(run: Result, handling: Handling) -> np.ndarray:

@@ -23,9 +23,9 @@ def unaccounted(drive: Drive) -> np.ndarray:
 
     Rows lie at every second step: the middle one of three belongs to the rule.
     """
-    power, times, whole = drive.power(), drive.run.times, drive_energy(drive)[::2]
-    work = np.cumsum((times[1] - times[0]) / 3.0 * (power[:-2:2] + 4.0 * power[1:-1:2] + power[2::2]))
-    return whole[1:] - whole[0] - work
+    power, run_times, total_energy = drive.power(), drive.run.times, drive_energy(drive)[::2]
+    work = np.cumsum((run_times[1] - run_times[0]) / 3.0 * (power[:-2:2] + 4.0 * power[1:-1:2] + power[2::2]))
+    return total_energy[1:] - total_energy[0] - work
 
 
 def bodies_energy(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:

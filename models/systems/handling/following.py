@@ -30,14 +30,14 @@ def controls_along(handling: Handling, drive: MeasuredDrive, step: float, file: 
     scene. Raises RunFailed where no torques of this kind give the measured speed, as on a road without friction.
     """
     period = float(drive.times[1] - drive.times[0])
-    every = round(period / step)
+    stride = round(period / step)
     speed = low_passed(drive.speed[:, None], period, LOW_PASS, file, "manoeuvres.NAME.measured")[:, 0]
     mass, radius = sum(body.mass for body in handling.vehicle.bodies), handling.vehicle.tyres[0].point[2]
     force, resistance = mass * np.gradient(speed, period), 0.0
     for march in range(MOST_MARCHES):
         controls = _with_torque(handling.controls, drive, radius * force)
         run = drive_run(ENGINE, handling.changed(controls=controls), float(speed[0]), period * (len(speed) - 1), step)
-        reached = run.velocity()[::every, 0]
+        reached = run.velocity()[::stride, 0]
         missing = speed - reached
         if np.sqrt(np.mean(missing**2)) <= SPEED_TOLERANCE * speed.mean():
             return controls
@@ -45,16 +45,18 @@ def controls_along(handling: Handling, drive: MeasuredDrive, step: float, file: 
             lost = force - mass * np.gradient(reached, period)
             resistance = float(lost @ reached / (reached @ reached))
         force = force + mass * np.gradient(missing, period) + resistance * missing
-    off = float(np.abs(missing).max())
-    raise RunFailed(ENGINE, f"no torque of the wheels gives the measured speed: it is off by up to {off:.3g} m/s")
+    largest_miss = float(np.abs(missing).max())
+    raise RunFailed(
+        ENGINE, f"no torque of the wheels gives the measured speed: it is off by up to {largest_miss:.3g} m/s"
+    )
 
 
 def _with_torque(controls: Controls, drive: MeasuredDrive, torque: np.ndarray) -> Controls:
     """Controls with the measured steer angle and a torque (n,) in N m of all wheels together."""
-    times = drive.times - drive.times[0]
+    knot_times = drive.times - drive.times[0]
 
     def knots(values: np.ndarray) -> Control:
-        return tuple(zip(times.tolist(), values.tolist(), strict=True))
+        return tuple(zip(knot_times.tolist(), values.tolist(), strict=True))
 
     return replace(
         controls, steer=knots(drive.steer), brake=knots(np.maximum(-torque, 0.0)), drive=knots(np.maximum(torque, 0.0))

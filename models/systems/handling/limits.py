@@ -22,35 +22,37 @@ TURNOVER_ANGLE, JACKKNIFE_ANGLE = 0.5, 1.57
 yaw (rad) of a towed body beside what tows it, beyond which a train jackknifes."""
 
 
-def check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
+def check_upright(handling: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
     """Refuse a run in which the car turns over or the train jackknifes, as the model is invalid from then on."""
-    for body, freedoms, most, what in _rotation_bounds(h):
+    for body, freedoms, largest_angle, failure in _rotation_bounds(handling):
         columns = [
-            i for i, (name, freedom) in enumerate(h.vehicle.coordinates()) if name == body and freedom in freedoms
+            i
+            for i, (name, freedom) in enumerate(handling.vehicle.coordinates())
+            if name == body and freedom in freedoms
         ]
-        over = (np.abs(positions[:, columns]) > most).any(axis=1)
-        if over.any():
-            raise RunFailed(engine, f"{what}; drive more slowly or steer less", float(times[np.argmax(over)]))
+        exceeds = (np.abs(positions[:, columns]) > largest_angle).any(axis=1)
+        if exceeds.any():
+            raise RunFailed(engine, f"{failure}; drive more slowly or steer less", float(times[np.argmax(exceeds)]))
 
 
-def _rotation_bounds(h: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]]:
+def _rotation_bounds(handling: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]]:
     """Limits of the bodies' rotations: the body, its rotational freedoms, the largest angle (rad), and what exceeding
     it means.
     """
     yield SWAY, ("rx", "ry"), TURNOVER_ANGLE, f"the car turns over: it leans by more than {TURNOVER_ANGLE} rad"
-    for name in h.vehicle.towed:
-        beside = f"by more than {{}} rad beside what tows it: {name!r}"
+    for name in handling.vehicle.towed:
+        lean_text = f"by more than {{}} rad beside what tows it: {name!r}"
         yield (
             hitch_of(name),
             ("rx", "ry"),
             TURNOVER_ANGLE,
-            f"a trailer turns over: it leans {beside.format(TURNOVER_ANGLE)}",
+            f"a trailer turns over: it leans {lean_text.format(TURNOVER_ANGLE)}",
         )
         yield (
             hitch_of(name),
             ("rz",),
             JACKKNIFE_ANGLE,
-            f"the train jackknifes: a trailer turns {beside.format(JACKKNIFE_ANGLE)}",
+            f"the train jackknifes: a trailer turns {lean_text.format(JACKKNIFE_ANGLE)}",
         )
 
 
@@ -58,8 +60,8 @@ def check_step(drive: "Drive", engine: str) -> None:
     """Refuse a step that is too long for the tyres: sticking bristles damp a wheel with C / u, u the speed of the
     tread, and a longer step lets it swing up.
     """
-    h, times = drive.handling, drive.run.times
-    step, force = float(times[1] - times[0]), np.hypot(drive["fx"], drive["fy"])
+    h, run_times = drive.handling, drive.run.times
+    step, force = float(run_times[1] - run_times[0]), np.hypot(drive["fx"], drive["fy"])
     for i, tyre in enumerate(h.vehicle.tyres):
         n, load, tread = h.tyre_numbers(i), drive["load"][:, i], drive["tread"][:, i]
         stiffness = 8.0 / 3.0 * n[at.RADIUS] * load / n[at.VERTICAL] * n[at.HALF_WIDTH] * n[at.BRISTLES]
@@ -75,5 +77,5 @@ def check_step(drive: "Drive", engine: str) -> None:
                 f"tyre {tyre.name!r}, at {tread[row]:.3g} m/s, damps its wheel faster than "
                 f"steps of {step:g} s can follow; use at most {0.9 * STABILITY_LIMIT / damped.max():.2g} s, "
                 "or end the run before",
-                float(times[row]),
+                float(run_times[row]),
             )

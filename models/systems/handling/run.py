@@ -104,21 +104,25 @@ class Drive:
         (rad/s).
         """
         yaw, rates = self.run.positions[:, 2], self.run.rates
-        place = chassis_of(self.handling.given).position
-        ahead = np.cos(yaw) * rates[:, 0] + np.sin(yaw) * rates[:, 1] - rates[:, 2] * place[1]
-        aside = np.cos(yaw) * rates[:, 1] - np.sin(yaw) * rates[:, 0] + rates[:, 2] * place[0]
-        return np.column_stack([ahead, aside, rates[:, 2]])
+        chassis_position = chassis_of(self.handling.given).position
+        speed_along = np.cos(yaw) * rates[:, 0] + np.sin(yaw) * rates[:, 1] - rates[:, 2] * chassis_position[1]
+        speed_across = np.cos(yaw) * rates[:, 1] - np.sin(yaw) * rates[:, 0] + rates[:, 2] * chassis_position[0]
+        return np.column_stack([speed_along, speed_across, rates[:, 2]])
 
     def lateral_acceleration(self) -> np.ndarray:
         """Acceleration (m,) in m/s^2 of the point below the chassis' centre, positive to the vehicle's left."""
-        ahead, aside, turning = self.velocity().T
-        return np.gradient(aside, self.run.times) + ahead * turning
+        speed_along, speed_across, turning = self.velocity().T
+        return np.gradient(speed_across, self.run.times) + speed_along * turning
 
     def motion(self) -> dict[str, np.ndarray]:
         """The channels (m,) of MOTION_CHANNELS by name."""
-        ahead, aside, turning = self.velocity().T
+        speed_along, speed_across, turning = self.velocity().T
         return dict(
-            zip(MOTION_CHANNELS, (ahead, turning, self.lateral_acceleration(), np.arctan2(aside, ahead)), strict=True)
+            zip(
+                MOTION_CHANNELS,
+                (speed_along, turning, self.lateral_acceleration(), np.arctan2(speed_across, speed_along)),
+                strict=True,
+            )
         )
 
     def slip_angles(self) -> np.ndarray:
@@ -148,13 +152,13 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
     error : whether the error of the steps is estimated, by further runs. Raises RunFailed where it does not end well.
     """
     name = manoeuvre or next(iter(scene.manoeuvres))
-    asked, handling, adaptive = scene.manoeuvres[name], scene.handling(name), scene.adaptive(engine, name)
+    driven_manoeuvre, handling, adaptive = scene.manoeuvres[name], scene.handling(name), scene.adaptive(engine, name)
     if adaptive is not None:
-        run = judged_drive(scene, engine, name, driven_adaptively(engine, handling, asked.speed, adaptive))
+        run = judged_drive(scene, engine, name, driven_adaptively(engine, handling, driven_manoeuvre.speed, adaptive))
         return not_estimated(run, NO_ESTIMATE) if error else run
-    drive = drive_run(engine, handling, asked.speed, asked.duration, scene.run.step)
+    drive = drive_run(engine, handling, driven_manoeuvre.speed, driven_manoeuvre.duration, scene.run.step)
     labelled = judged_drive(scene, engine, name, drive)
-    return _with_error(labelled, drive, asked.speed) if error else labelled
+    return _with_error(labelled, drive, driven_manoeuvre.speed) if error else labelled
 
 
 def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive) -> Result:
@@ -164,11 +168,14 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
         key: Channel(("time", "coordinate"), getattr(drive.run, key), "m, rad" + per)
         for key, per in (("positions", ""), ("rates", ", per s"))
     }
-    channels |= {key: Channel(("time", "tyre"), drive[key], *said) for key, (_, *said) in TYRE_CHANNELS.items()}
+    channels |= {
+        key: Channel(("time", "tyre"), drive[key], *unit_and_source)
+        for key, (_, *unit_and_source) in TYRE_CHANNELS.items()
+    }
     channels |= {name: Channel("time", values, *MOTION_CHANNELS[name]) for name, values in drive.motion().items()}
     axes = {
         "time": Channel("time", scene.begins(manoeuvre) + drive.run.times, "s"),
-        "coordinate": Channel("coordinate", [".".join(place) for place in vehicle.coordinates()]),
+        "coordinate": Channel("coordinate", [".".join(coordinate) for coordinate in vehicle.coordinates()]),
         "tyre": Channel("tyre", [tyre.name for tyre in vehicle.tyres]),
     }
     counts, seconds = drive.run.counts, drive.seconds
@@ -189,10 +196,12 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
         for name, values in fine.channels.items()
         if np.abs(values).max() > still.get(UNIT_OF_CHANNEL[name], STANDSTILL_SHARE * speed)
     }
-    by_step, how = by_steps(Series(fine.times, moving), rerun, TOLD_ORDERS, rerun.step)
+    by_step, method_text = by_steps(Series(fine.times, moving), rerun, TOLD_ORDERS, rerun.step)
     by_net = rerun.by_cells(list(moving))
-    told = {name: replace(summed_error(by_step[name], by_net[name]), unit=UNIT_OF_CHANNEL[name]) for name in moving}
-    return with_stated_errors(run, told, f"{how}, and other nets of the patch")
+    estimates = {
+        name: replace(summed_error(by_step[name], by_net[name]), unit=UNIT_OF_CHANNEL[name]) for name in moving
+    }
+    return with_stated_errors(run, estimates, f"{method_text}, and other nets of the patch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,30 +254,33 @@ class ManoeuvreRerun:
         is estimated from creep forces at the same states, compared with those of a grid with twice as many cells.
         """
         cells = self.drive.handling.tyres.cells
-        other, finer = max(3, cells // 3) if cells > 3 else 6, 2 * cells
+        other_cells, finer = max(3, cells // 3) if cells > 3 else 6, 2 * cells
         try:
-            base, coarse = self.in_double_step, self._with_net(other, 2.0)
+            base, coarse = self.in_double_step, self._with_net(other_cells, 2.0)
         except RunFailed:
-            base, coarse = principal_series(self.drive), self._with_net(other, 1.0)
-        creepages, fewer, more = (self._creep_forces(count) for count in (cells, other, finer))
-        apart, error = np.linalg.norm(creepages - fewer), np.linalg.norm(creepages - more) / (1.0 - 0.5**NET_ORDER)
-        share, told = error / apart if apart > 0.0 else 0.0, dict[str, Estimate]()
+            base, coarse = principal_series(self.drive), self._with_net(other_cells, 1.0)
+        creepages, fewer, forces_on_more = (self._creep_forces(count) for count in (cells, other_cells, finer))
+        force_difference, error = (
+            np.linalg.norm(creepages - fewer),
+            np.linalg.norm(creepages - forces_on_more) / (1.0 - 0.5**NET_ORDER),
+        )
+        share, estimates = error / force_difference if force_difference > 0.0 else 0.0, dict[str, Estimate]()
         for name in names:
             values = base.channels[name]
             gap = share * float(np.sqrt(np.mean((values - coarse.channels[name]) ** 2)))
             net = by_cells(gap, size_of(values), UNIT_OF_CHANNEL[name], cells, NET_ORDER, MOST_CELLS)
-            told[name] = replace(net, of=CELLS_KEY)
-        return told
+            estimates[name] = replace(net, of=CELLS_KEY)
+        return estimates
 
     def _creep_forces(self, cells: int) -> np.ndarray:
         """Creep forces (m, w, 2) in N at some states of the drive, computed on a grid of ``cells``."""
         run, handling = self.drive.run, self.drive.handling
         numbers = handling.changed(tyres=replace(handling.tyres, cells=cells)).numbers
-        times, positions, rates = (
-            np.ascontiguousarray(each[::ROWS_BETWEEN_NETS]) for each in (run.times, run.positions, run.rates)
+        sampled_times, positions, rates = (
+            np.ascontiguousarray(run_array[::ROWS_BETWEEN_NETS]) for run_array in (run.times, run.positions, run.rates)
         )
-        report = np.empty((len(times), len(handling.vehicle.tyres), at.REPORTED))
-        at.reports(numbers, times, positions, rates, report, np.empty((len(times), at.LEDGER)))
+        report = np.empty((len(sampled_times), len(handling.vehicle.tyres), at.REPORTED))
+        at.reports(numbers, sampled_times, positions, rates, report, np.empty((len(sampled_times), at.LEDGER)))
         return report[:, :, [at.FX, at.FY]]
 
 
@@ -283,18 +295,18 @@ def principal_series(drive: Drive, start_time: float = 0.0) -> Series:
 def _manoeuvre_from(handling: Handling, start_time: float) -> Handling:
     """The same manoeuvre with time counted from ``start_time`` (s)."""
 
-    def moved(control: Control) -> Control:
+    def shifted_control(control: Control) -> Control:
         return tuple((time - start_time, value) for time, value in control)
 
     controls_then = handling.controls
     controls = replace(
         controls_then,
-        steer=moved(controls_then.steer),
-        brake=moved(controls_then.brake),
-        drive=moved(controls_then.drive),
+        steer=shifted_control(controls_then.steer),
+        brake=shifted_control(controls_then.brake),
+        drive=shifted_control(controls_then.drive),
     )
     return handling.changed(
-        controls=controls, pushes=tuple(replace(push, size=moved(push.size)) for push in handling.pushes)
+        controls=controls, pushes=tuple(replace(push, size=shifted_control(push.size)) for push in handling.pushes)
     )
 
 
@@ -302,9 +314,9 @@ def build(engine: str, handling: Handling, settings: Settings | None = None) -> 
     """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : needed for runs."""
     if engine == REFERENCE:
         return Plain(engine, _plain_equations(handling).acceleration, len(handling.vehicle.coordinates()), settings)
-    division, whole = divided(handling, engine), driven_by(handling)
-    parts = (*whole.parts, *division.native)
-    return free_model(engine, replace(whole, numbers=numbers_beside(handling, division), parts=parts), settings)
+    division, full_forces = divided(handling, engine), driven_by(handling)
+    parts = (*full_forces.parts, *division.native)
+    return free_model(engine, replace(full_forces, numbers=numbers_beside(handling, division), parts=parts), settings)
 
 
 def _plain_equations(handling: Handling) -> "PlainRolling":
@@ -324,20 +336,20 @@ def driven_by(handling: Handling) -> Driven:
 def drive_run(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
     """Drive from straight rolling at a speed (m/s) for a duration (s); RunFailed where it does not end well."""
     model = build(engine, handling, Settings("RK4", step, duration))
-    begun = time.process_time()
+    start_time = time.process_time()
     with _turning_over(handling, engine):
         path = model.run(*handling.straight(speed))
-    return read_run(handling, path, engine, time.process_time() - begun)
+    return read_run(handling, path, engine, time.process_time() - start_time)
 
 
 def driven_adaptively(engine: str, handling: Handling, speed: float, settings: Settings) -> Drive:
     """``drive_run`` by an integrator of "exudyn" or "reference" that picks its own steps."""
     from models.engines.free_vehicle_adaptive import march_adaptively
 
-    model, begun = build(engine, handling), time.process_time()
+    model, start_time = build(engine, handling), time.process_time()
     with _turning_over(handling, engine):
         path = march_adaptively(model, *handling.straight(speed), settings)
-    return drive_with_reports(handling, path, engine, time.process_time() - begun)
+    return drive_with_reports(handling, path, engine, time.process_time() - start_time)
 
 
 @contextmanager
@@ -393,6 +405,6 @@ def _reports_of_run(handling: Handling, run: Trajectory, engine: str) -> tuple[n
 
 def joint_travel(handling: Handling, element: JointElement, values: np.ndarray) -> np.ndarray:
     """Displacement d (m,) of a joint element from positions (m, n), or its rate from rates."""
-    places = handling.vehicle.coordinates()
-    columns = [places.index(place) for place in element.coordinates]
+    coordinates = handling.vehicle.coordinates()
+    columns = [coordinates.index(coordinate) for coordinate in element.coordinates]
     return np.asarray(values[..., columns] @ np.array(element.factors))

@@ -174,7 +174,10 @@ class HandlingScene(SceneFile):
         if len(ratios) != axles:
             raise InputError(self.file, "tyres.cornering", ratios, f"needs a ratio for each of the {axles} axles")
         ratio = {tyre.name: ratios[tyre.axle] for tyre in vehicle.tyres}
-        forces = (replace(each, stiffness=ratio[each.name] * each.stiffness) for each in vehicle.side_forces)
+        forces = (
+            replace(side_force, stiffness=ratio[side_force.name] * side_force.stiffness)
+            for side_force in vehicle.side_forces
+        )
         return replace(vehicle, side_forces=tuple(forces))
 
 
@@ -183,10 +186,10 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
     scene = checked(HandlingScene, table, file, folder)
     scene = _with_measured(scene)
     for name, manoeuvre in scene.manoeuvres.items():
-        place = f"manoeuvres.{name}"
-        _check_times(scene, place, manoeuvre)
+        key_path = f"manoeuvres.{name}"
+        _check_times(scene, key_path, manoeuvre)
         for control, limits in CONTROL_LIMITS.items():
-            _check_knots(scene, f"{place}.{control}", getattr(manoeuvre, control), *limits)
+            _check_knots(scene, f"{key_path}.{control}", getattr(manoeuvre, control), *limits)
     check_engines(scene.file, scene.engines)
     return with_own(scene)
 
@@ -206,39 +209,41 @@ def _with_measured(scene: HandlingScene) -> HandlingScene:
 
 def _measured_manoeuvre(scene: HandlingScene, name: str, manoeuvre: Manoeuvre) -> Manoeuvre:
     """A manoeuvre with the speed and duration of its measured drive; refuses keys that contradict the measured file."""
-    file, place, drive = scene.file, f"manoeuvres.{name}", scene.drive(name)
+    file, key_path, drive = scene.file, f"manoeuvres.{name}", scene.drive(name)
     for control in CONTROL_LIMITS:
         if getattr(manoeuvre, control) != AT_REST:
-            raise InputError(file, f"{place}.{control}", None, "cannot go with a measured drive, which has its own")
+            raise InputError(file, f"{key_path}.{control}", None, "cannot go with a measured drive, which has its own")
     period = float(drive.times[1] - drive.times[0])
     if not divides(scene.run.step, period):
-        raise InputError(file, "run.step", scene.run.step, f"must divide {period:g} s, the clock of {place}.measured")
+        raise InputError(
+            file, "run.step", scene.run.step, f"must divide {period:g} s, the clock of {key_path}.measured"
+        )
     first, lasts = float(drive.speed[0]), round(period * (len(drive.times) - 1), 9)
     if manoeuvre.speed not in (0.0, first):
-        raise InputError(file, f"{place}.speed", manoeuvre.speed, f"the measured drive begins with {first:g} m/s")
+        raise InputError(file, f"{key_path}.speed", manoeuvre.speed, f"the measured drive begins with {first:g} m/s")
     if "duration" in manoeuvre.model_fields_set and manoeuvre.duration > lasts * (1.0 + 1e-9):
-        raise InputError(file, f"{place}.duration", manoeuvre.duration, f"the measured drive lasts {lasts:g} s")
+        raise InputError(file, f"{key_path}.duration", manoeuvre.duration, f"the measured drive lasts {lasts:g} s")
     return manoeuvre.model_copy(update={"speed": first, "duration": lasts})
 
 
-def _check_times(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None:
+def _check_times(scene: HandlingScene, key_path: str, manoeuvre: Manoeuvre) -> None:
     step, duration = scene.run.step, manoeuvre.duration
     if duration / step > MOST_STEPS:
         allowed = f"needs {duration / step:.3g} steps; at most {MOST_STEPS:,} are possible"
-        raise InputError(scene.file, f"{place}.duration", duration, allowed)
+        raise InputError(scene.file, f"{key_path}.duration", duration, allowed)
     if not divides(step, duration):
-        allowed = f"must divide {place}.duration = {duration:g} s; use for example {fitting(step, duration)}"
+        allowed = f"must divide {key_path}.duration = {duration:g} s; use for example {fitting(step, duration)}"
         raise InputError(scene.file, "run.step", step, allowed)
 
 
-def _check_knots(scene: HandlingScene, place: str, knots: list[Pair], low: float, high: float, unit: str) -> None:
+def _check_knots(scene: HandlingScene, key_path: str, knots: list[Pair], low: float, high: float, unit: str) -> None:
     """Refuse times that do not rise, values beyond the limits, and changes that are too fast for the run's step."""
-    (times, values), file, step = np.array(knots, float).T, scene.file, scene.run.step
-    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
-        raise InputError(file, place, times.tolist(), "times must be finite and rise from knot to knot, in s")
+    (knot_times, values), file, step = np.array(knots, float).T, scene.file, scene.run.step
+    if not np.isfinite(knot_times).all() or (np.diff(knot_times) <= 0.0).any():
+        raise InputError(file, key_path, knot_times.tolist(), "times must be finite and rise from knot to knot, in s")
     if not ((values >= low) & (values <= high)).all():
-        raise InputError(file, place, values.tolist(), f"values must be from {low:g} to {high:g} {unit}")
-    shortest = float(np.diff(times)[np.diff(values) != 0.0].min(initial=np.inf))
+        raise InputError(file, key_path, values.tolist(), f"values must be from {low:g} to {high:g} {unit}")
+    shortest = float(np.diff(knot_times)[np.diff(values) != 0.0].min(initial=np.inf))
     if shortest < step * (1.0 - 1e-9):
         allowed = f"changes within {shortest:.3g} s, which steps of {step:g} s do not see: run.step must not be longer"
-        raise InputError(file, place, None, allowed)
+        raise InputError(file, key_path, None, allowed)

@@ -56,8 +56,8 @@ def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
         matrix += c * np.outer(by_moment, trail * slip - turning * turn) - c * np.outer(by_force, slip + trail * turn)
         steered += n[STEERED] * c * (trail * by_moment - by_force)
     side, yaw, *headings = np.linalg.solve(matrix, steered).tolist()
-    places = [tyre.point[0] for tyre in free.tyres if free.towed_under(tyre.body) is None]
-    wheelbase = max(places) - min(places)
+    coordinates = [tyre.point[0] for tyre in free.tyres if free.towed_under(tyre.body) is None]
+    wheelbase = max(coordinates) - min(coordinates)
     return SteadyTurn(yaw, side, float((speed / yaw - wheelbase) / speed**2), tuple(headings))
 
 

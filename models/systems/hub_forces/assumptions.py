@@ -53,14 +53,20 @@ def usual_travel_assumptions(vehicle: CutVehicle, travel: Callable[[Result], Wat
     """
     kinds = (("springs", "N", "m", LARGEST_TRAVEL), ("bars", "N m", "rad", LARGEST_JOINT_TURN))
     listed = []
-    for kind, of, unit, most in kinds:
-        names = {each.name for each in vehicle.elements if each.unit == of and not each.travel_force}
+    for kind, unit_of_kind, unit, largest_travel in kinds:
+        names = {
+            element.name for element in vehicle.elements if element.unit == unit_of_kind and not element.travel_force
+        }
 
         def watched(run: Result, names: set[str] = names) -> Watched:
             return {name: values for name, values in travel(run).items() if name in names}
 
         says = f"linear {kind} do not meet their stops"
-        listed += [Assumption(f"{kind} between stops", says, remedy, watched, unit, -most, most)] if names else []
+        listed += (
+            [Assumption(f"{kind} between stops", says, remedy, watched, unit, -largest_travel, largest_travel)]
+            if names
+            else []
+        )
     return listed
 
 
@@ -178,11 +184,11 @@ def _sampling_assumption(scene: HubScene, road: Road) -> Assumption:
     """Assumption that a virtual measurement samples fast enough for the shortest wave of the road."""
     rate, rule = scene.forces.sampling_rate, scene.forces.interpolation
     wave = 4.0 * iso8608_road(road.iso8608, road.seed).finest
-    other = ' or use forces.interpolation = "smooth",' if rule != "smooth" else ""
+    other_remedy = ' or use forces.interpolation = "smooth",' if rule != "smooth" else ""
     return Assumption(
         "samples",
         "samples show every wave of the road",
-        f"raise forces.sampling_rate,{other} or lower road.speed",
+        f"raise forces.sampling_rate,{other_remedy} or lower road.speed",
         lambda run: {"shortest wave": np.array([road.speed / wave / rate])},
         "waves per sample",
         upper_limit=WAVE_SHARE_OF_RULE[rule],
@@ -192,9 +198,10 @@ def _sampling_assumption(scene: HubScene, road: Road) -> Assumption:
 def _angle_differences(run: Result, angles: Angles | None) -> Watched:
     """Roll and pitch of the run less the measured angles, rad."""
     assert angles is not None
-    times = angles.period * np.arange(len(angles.samples))
+    angle_times = angles.period * np.arange(len(angles.samples))
     return {
-        name: run[name] - np.interp(run.times, times, angles.samples[:, i]) for i, name in enumerate(("roll", "pitch"))
+        name: run[name] - np.interp(run.times, angle_times, angles.samples[:, i])
+        for i, name in enumerate(("roll", "pitch"))
     }
 
 

@@ -48,11 +48,11 @@ class Comparison:
         """
         if self.truth is not None:
             return np.column_stack([run[name] - self.truth[name] for name in MOTION_CHANNELS])
-        tilt, off = self.measurement.tilt, np.full((len(run.times), len(MOTION_CHANNELS)), np.nan)
-        times = self.measurement.angles.period * np.arange(len(tilt.states))
+        tilt, errors_of_motion = self.measurement.tilt, np.full((len(run.times), len(MOTION_CHANNELS)), np.nan)
+        angle_times = self.measurement.angles.period * np.arange(len(tilt.states))
         for i, name in enumerate(("roll", "pitch")):
-            off[:, i] = run[name] - np.interp(run.times, times, tilt.states[:, i])
-        return off
+            errors_of_motion[:, i] = run[name] - np.interp(run.times, angle_times, tilt.states[:, i])
+        return errors_of_motion
 
     def damages(self, forces: np.ndarray) -> dict[str, float]:
         """Damage of every element from section forces (m, e), divided by that in the true run or, without one, in the
@@ -64,32 +64,32 @@ class Comparison:
 
     def drift_off(self, run: Result) -> float:
         """First time (s) at which the error of roll or pitch exceeds DRIFT_OFF_ANGLE; infinite if it never does."""
-        off = np.abs(self.errors(run)[:, :2]).max(axis=1) > DRIFT_OFF_ANGLE
-        return float(run.times[np.argmax(off)]) if off.any() else float("inf")
+        has_drifted = np.abs(self.errors(run)[:, :2]).max(axis=1) > DRIFT_OFF_ANGLE
+        return float(run.times[np.argmax(has_drifted)]) if has_drifted.any() else float("inf")
 
     def answer(self) -> dict[str, Any]:
         """For each run: largest errors, rms of the stabiliser's moments, damage of every element, all relative to the
         run that ``beside`` names.
         """
-        out: dict[str, Any] = {"beside": self.beside}
-        out |= {name: {"failed": text} for name, text in self.failed.items()}
+        figures: dict[str, Any] = {"beside": self.beside}
+        figures |= {name: {"failed": text} for name, text in self.failed.items()}
         for name, run in self.runs.items():
-            out[name] = {
+            figures[name] = {
                 **dict(zip(MOTION_CHANNELS, map(float, np.abs(self.errors(run)).max(axis=0)), strict=True)),
                 "moments": np.sqrt(np.mean(run["holding_moment"] ** 2, axis=0)).tolist(),
                 "damage": self.damages(run["section_force"]),
             }
-        return out
+        return figures
 
     def engines_apart(self) -> float:
         """Largest difference between engines in any coordinate or rate before drift-off, for the method with the most
         runs.
         """
         kinds = [[run for name, run in self.runs.items() if name.startswith(kind)] for kind in METHOD_OF_RUN]
-        alike = max(kinds, key=len)
-        first, times = alike[0].detail.states, alike[0].times
-        rows = int(min(min(map(self.drift_off, alike)), times[-1]) / times[1]) + 1
-        return max(float(np.abs(run.detail.states[:rows] - first[:rows]).max()) for run in alike)
+        comparable = max(kinds, key=len)
+        first, common_times = comparable[0].detail.states, comparable[0].times
+        rows = int(min(min(map(self.drift_off, comparable)), common_times[-1]) / common_times[1]) + 1
+        return max(float(np.abs(run.detail.states[:rows] - first[:rows]).max()) for run in comparable)
 
 
 def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lambda text, part: None) -> Comparison:
@@ -97,9 +97,9 @@ def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lamb
 
     Raises RunFailed where even the filter cannot hold the vehicle, or where the step is too long for its springs.
     """
-    last, planned = engines[-1], planned_runs(scene, engines)
+    last_engine, planned = engines[-1], planned_runs(scene, engines)
     progress("virtual measurement", 0.05)
-    measurement = measure(scene, last, scene.error)
+    measurement = measure(scene, last_engine, scene.error)
     progress("Kalman filter", 0.2)
     measurement.tilt  # noqa: B018
     runs, failed = dict[str, Result](), dict[str, str]()
@@ -111,7 +111,7 @@ def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lamb
             if name == FILTERED_RUN:  # what the others are compared with
                 raise
             failed[name] = str(error)
-    return Comparison(measurement, runs, failed, _true_run(measurement, last))
+    return Comparison(measurement, runs, failed, _true_run(measurement, last_engine))
 
 
 def _true_run(measurement: Measurement, engine: str) -> Result | None:

@@ -14,8 +14,8 @@ AXES = "x forward, y left, z up; the chassis has position, heading, pitch (nose 
 def exported(scene: HubScene, engine: str) -> Exported:
     """Export the cut vehicle to "mujoco" or "exudyn", without hub forces and stabiliser."""
     vehicle = scene.cut_vehicle()
-    held = [] if scene.stabilise.method == "none" else [f"stabiliser of roll and pitch ({scene.stabilise.method})"]
-    return of_cut(engine, vehicle, ExportSubject(scene.title, scene.file, AXES), held)
+    omissions = [] if scene.stabilise.method == "none" else [f"stabiliser of roll and pitch ({scene.stabilise.method})"]
+    return of_cut(engine, vehicle, ExportSubject(scene.title, scene.file, AXES), omissions)
 
 
 def of_cut(engine: str, vehicle: CutVehicle, export_subject: ExportSubject, further_omissions: list[str]) -> Exported:

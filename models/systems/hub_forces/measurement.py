@@ -53,16 +53,16 @@ class Angles:
 
 
 def two_tracks(
-    vehicle: CutVehicle, left: RoadProfile, right: RoadProfile, speed: float, step: float, steps: int
+    vehicle: CutVehicle, left_profile: RoadProfile, right_profile: RoadProfile, speed: float, step: float, steps: int
 ) -> HubInputs:
     """Heights and rates of the road under the wheels at half steps. The front axle is at s = v t, and axles behind it
     reach the same place later.
     """
-    times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.uncut.axles)
+    half_step_times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.uncut.axles)
     heights, rates = [], []
     for tyre in vehicle.uncut.tyres:
-        road = left if tyre.point[1] > 0 else right
-        height, slope = road.height_and_slope(speed * times - (front - tyre.point[0]))
+        road = left_profile if tyre.point[1] > 0 else right_profile
+        height, slope = road.height_and_slope(speed * half_step_times - (front - tyre.point[0]))
         heights.append(-height)  # roads count downwards
         rates.append(-speed * slope)
     return HubInputs(np.column_stack([*heights, *rates]), speed=speed)

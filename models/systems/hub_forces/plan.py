@@ -90,7 +90,7 @@ def describe(scene: HubScene) -> str:
     lines += _whose_forces(scene, vehicle)
     never = "drag, tyres that roll"
     runs = [*([ON_TYRES] if scene.road is not None else []), scene.stabilise.method]
-    assumed = {each.says: each for run in runs for each in assumptions(scene, vehicle, run)}
+    assumed = {assumption.says: assumption for run in runs for assumption in assumptions(scene, vehicle, run)}
     return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumed.values()), _line("never", never)])
 
 
@@ -106,8 +106,12 @@ def filter_objections(scene: HubScene) -> tuple[str, ...]:
 
 def _frames_text(vehicle: CutVehicle) -> str:
     """Text that names the bodies to which the axes of the elements are fixed."""
-    others = [f"{each.name} in those of {each.frame}" for each in vehicle.elements if each.frame != vehicle.chassis]
-    return "; ".join(["in the chassis' axes", *others])
+    elements_in_other_axes = [
+        f"{element.name} in those of {element.frame}"
+        for element in vehicle.elements
+        if element.frame != vehicle.chassis
+    ]
+    return "; ".join(["in the chassis' axes", *elements_in_other_axes])
 
 
 def _whose_forces(scene: HubScene, vehicle: CutVehicle) -> list[str]:
@@ -130,8 +134,8 @@ def _noise(scene: HubScene) -> str:
     forces, angles = scene.forces, scene.angles
     of_forces = f"{forces.force_deviation:g} N and {forces.moment_deviation:g} N m on every sample of forces"
     of_angles = f"{angles.angle_deviation:g} rad and {angles.rate_deviation:g} rad/s on every one of angles"
-    said = [text for table, text in ((forces, of_forces), (angles, of_angles)) if table.noise == "white"]
-    return ", ".join(said) or "none"
+    noise_texts = [text for table, text in ((forces, of_forces), (angles, of_angles)) if table.noise == "white"]
+    return ", ".join(noise_texts) or "none"
 
 
 def _line(label: str, text: str) -> str:
@@ -143,27 +147,27 @@ def doubts_about_files(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, .
     from models.measured.checks import check
 
     findings = [
-        replace(each, text=_finding_text(each.text))
-        for each in check(_measured_recording(scene, vehicle), vehicle)
-        if each.check not in scene.forces.accept
+        replace(finding, text=_finding_text(finding.text))
+        for finding in check(_measured_recording(scene, vehicle), vehicle)
+        if finding.check not in scene.forces.accept
     ]
-    if errors := [each for each in findings if each.weight == "error"]:
-        names = json.dumps(list(dict.fromkeys(each.check for each in errors)))
+    if errors := [finding for finding in findings if finding.weight == "error"]:
+        names = json.dumps(list(dict.fromkeys(finding.check for finding in errors)))
         raise InputError(
             scene.file,
             "forces.file",
             scene.forces.file,
-            f"{' '.join(each.text for each in merged_findings(errors))} {COLUMN_REMEDY}; if it is "
+            f"{' '.join(finding.text for finding in merged_findings(errors))} {COLUMN_REMEDY}; if it is "
             f"meant so: accept = {names} under "
             "[forces].",
         )
-    return tuple(each for each in findings if each.weight == "doubt")
+    return tuple(finding for finding in findings if finding.weight == "doubt")
 
 
 def _finding_text(text: str) -> str:
     """Text of a finding without its advice on a channel map, which plain files do not have."""
-    before, colon, _ = text.partition("; give sign")
-    return before + "." if colon else text.replace(" in the channel map", "")
+    text_before, colon, _ = text.partition("; give sign")
+    return text_before + "." if colon else text.replace(" in the channel map", "")
 
 
 def _measured_recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
@@ -177,8 +181,12 @@ def _measured_recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
 
     (forces, angles), files = scene.measured(vehicle), (scene.forces.file, scene.angles.file)
     signals = (
-        *(signal(hub, *each, files[0], scene.forces.frame) for hub in vehicle.hubs for each in WRENCH_SIGNALS),
-        *(signal(vehicle.chassis, *each, files[1], "body") for each in ANGLE_SIGNALS),
+        *(
+            signal(hub, *signal_fields, files[0], scene.forces.frame)
+            for hub in vehicle.hubs
+            for signal_fields in WRENCH_SIGNALS
+        ),
+        *(signal(vehicle.chassis, *signal_fields, files[1], "body") for signal_fields in ANGLE_SIGNALS),
     )
     count = min(len(forces.samples), len(angles.samples))
     samples = np.hstack([forces.samples[:count], angles.samples[:count]])

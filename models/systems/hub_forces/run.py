@@ -104,9 +104,9 @@ def enforced_inputs(hub_inputs: HubInputs, angles: Angles, step: float, smoothin
     return with_angles(hub_inputs, quiet, angles.period, step)
 
 
-def with_angles(hub_inputs: HubInputs, angles: np.ndarray, period: float, step: float) -> HubInputs:
+def with_angles(hub_inputs: HubInputs, angles: np.ndarray, sample_period: float, step: float) -> HubInputs:
     """Hub inputs with enforced roll and pitch (m, 2), rad, interpolated by a quintic spline through the samples."""
-    motion = Smooth(angles, period, derivatives=2, degree=5)
+    motion = Smooth(angles, sample_period, derivatives=2, degree=5)
     return replace(hub_inputs, guide=motion.sample(0.0, step / 2, len(hub_inputs.hubs)))
 
 
@@ -129,14 +129,15 @@ def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
 
 
 def on_road(
-    vehicle: CutVehicle, road: Road, frame: Frame, march: tuple[str, Settings, Route], error: bool = False
+    vehicle: CutVehicle, road: Road, frame: Frame, march_choice: tuple[str, Settings, Route], error: bool = False
 ) -> tuple[HubRun, dict[str, Estimate]]:
     """Run the vehicle on its tyres over a road. Returns the run, with hub forces in a frame, and its errors if they are
     requested.
 
-    march : engine, its integrator with step and duration, and the route by which the springs' forces are computed.
+    march_choice : engine, its integrator with step and duration, and the route by which the springs' forces are
+    computed.
     """
-    engine, settings, kind = march
+    engine, settings, kind = march_choice
     left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
 
     def hub_inputs(step: float, steps: int) -> HubInputs:
@@ -151,20 +152,20 @@ def errors_of_steps(
     vehicle: CutVehicle,
     run: HubRun,
     hub_inputs: Callable[[float, int], HubInputs],
-    period: float = 0.0,
+    sample_period: float = 0.0,
     forces: Route = "compiled",
 ) -> tuple[dict[str, Estimate], str]:
     """Estimated errors of the channels that ``principal_series`` lists, by name, and the method of the estimate.
 
-    hub_inputs : function of a step (s) and a number of steps; period : of its samples (s), 0 for none: longer steps
-    must divide it, or they would take the samples' noise for motion; forces : route by which the springs' are
+    hub_inputs : function of a step (s) and a number of steps; sample_period : of its samples (s), 0 for none: longer
+    steps must divide it, or they would take the samples' noise for motion; forces : route by which the springs' are
     computed.
     """
     step, steps = float(run.times[1]), len(run.times) - 1
 
     def rerun(factor: float, share: float) -> Series:
         tried_step, count = factor * step, max(1, int(share * steps / factor + 1e-9))
-        if factor > 2.0 or (factor > 1.0 and period and not divides(tried_step, period)):
+        if factor > 2.0 or (factor > 1.0 and sample_period and not divides(tried_step, sample_period)):
             raise InputError(
                 "", "run.step", tried_step, "is not taken: longer steps must divide the period of the samples"
             )
@@ -172,8 +173,8 @@ def errors_of_steps(
         first = round(row / factor)
         inputs = hub_inputs(tried_step, first + count)
         guide = None if inputs.guide is None else inputs.guide[2 * first :]
-        part = replace(inputs, hubs=inputs.hubs[2 * first :], guide=guide)
-        path = build(engine, vehicle, part, tried_step, count * tried_step, forces).run(
+        inputs_of_part = replace(inputs, hubs=inputs.hubs[2 * first :], guide=guide)
+        path = build(engine, vehicle, inputs_of_part, tried_step, count * tried_step, forces).run(
             run.positions[row], run.rates[row]
         )
         return principal_series(vehicle, path, first * tried_step)
@@ -181,8 +182,12 @@ def errors_of_steps(
     fine, units = principal_series(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
     units |= {element.name: element.unit for element in vehicle.elements}
     order = LIFTING_ORDER if vehicle.uncut.lifts else TOLD_ORDERS
-    told, how = by_steps(fine._replace(channels=_moving_channels(fine.channels, units)), rerun, order, step)
-    return {name: replace(each, unit=units[name]) for name, each in told.items()}, how
+    estimates, method_text = by_steps(
+        fine._replace(channels=_moving_channels(fine.channels, units)), rerun, order, step
+    )
+    return {
+        name: replace(channel_estimate, unit=units[name]) for name, channel_estimate in estimates.items()
+    }, method_text
 
 
 def principal_series(vehicle: CutVehicle, run: HubRun, start_time: float = 0.0) -> Series:
@@ -196,13 +201,15 @@ def principal_series(vehicle: CutVehicle, run: HubRun, start_time: float = 0.0) 
 def _moving_channels(channels: Mapping[str, np.ndarray], units: Mapping[str, str]) -> dict[str, np.ndarray]:
     """Channels that vary by more than a small share of the variation of the largest channel with the same unit."""
     change = {name: float(np.std(values)) for name, values in channels.items()}
-    most = {unit: max(change[name] for name in change if units[name] == unit) for unit in set(units.values())}
+    largest_by_unit = {
+        unit: max(change[name] for name in change if units[name] == unit) for unit in set(units.values())
+    }
     largest = max((float(np.abs(channels[name]).max()) for name in channels if units[name] == "N"), default=0.0)
     still = {"rad": STANDSTILL_CHANGE, "N": STANDSTILL_CHANGE * largest, "N m": STANDSTILL_CHANGE * largest}
     return {
         name: values
         for name, values in channels.items()
-        if change[name] > max(LEAST_CHANGE_SHARE * most[units[name]], still[units[name]])
+        if change[name] > max(LEAST_CHANGE_SHARE * largest_by_unit[units[name]], still[units[name]])
     }
 
 
@@ -224,21 +231,27 @@ def run(
     hub_inputs = measurement.hub_inputs(method, scene.run.step, scene.steps)
     kind = scene.forces_with(method)
     model = HubModel(engine, measurement.vehicle, hub_inputs, scene.settings(engine), kind)
-    begun = time.process_time()
+    start_time = time.process_time()
     path = model.run(*np.split(measurement.start(hub_inputs), 2))
-    seconds = time.process_time() - begun
+    seconds = time.process_time() - start_time
     result = labelled_result(measurement, path, engine, method, seconds)
     if not error:
         return result
     if engine in scene.engines:
         return not_estimated(result, NO_ESTIMATE)
     vehicle, period = measurement.vehicle, measurement.forces.period
-    told, how = errors_of_steps(engine, vehicle, path, partial(measurement.hub_inputs, method), period, kind)
+    estimates, method_text = errors_of_steps(
+        engine, vehicle, path, partial(measurement.hub_inputs, method), period, kind
+    )
     if (
-        before := measurement.errors
+        measurement_errors := measurement.errors
     ):  # in roll and pitch moments that are measured wrong add up: nobody can tell by how much
-        told = {name: summed_error(told[name], before[name]) for name in told if name in before and name not in ANGLES}
-    return with_stated_errors(result, told, how)
+        estimates = {
+            name: summed_error(estimates[name], measurement_errors[name])
+            for name in estimates
+            if name in measurement_errors and name not in ANGLES
+        }
+    return with_stated_errors(result, estimates, method_text)
 
 
 def labelled_result(
@@ -257,7 +270,7 @@ def labelled_result(
         "element": Channel("element", [element.name for element in measurement.vehicle.elements]),
         "held": Channel("held", ["roll", "pitch"]),
     }
-    told = result(
+    labelled = result(
         measurement.scene,
         channels,
         axes,
@@ -268,4 +281,4 @@ def labelled_result(
         detail=path,
         method=method,
     )
-    return with_assumptions(told, assumptions(measurement.scene, measurement.vehicle, method, measurement.angles))
+    return with_assumptions(labelled, assumptions(measurement.scene, measurement.vehicle, method, measurement.angles))

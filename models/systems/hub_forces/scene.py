@@ -175,9 +175,9 @@ class HubScene(SceneFile):
                 self.angles.file,
                 f"is sampled every {spacing:g} s and the forces every {period:g} s: they must agree",
             )
-        last = period * (min(len(forces), len(angles)) - 1)
-        if last < self.run.duration * (1 - 1e-9):
-            allowed = f"the files end at {last:g} s{other_unit(last, self.run.duration)}"
+        last_time = period * (min(len(forces), len(angles)) - 1)
+        if last_time < self.run.duration * (1 - 1e-9):
+            allowed = f"the files end at {last_time:g} s{other_unit(last_time, self.run.duration)}"
             raise InputError(self.file, "run.duration", self.run.duration, allowed)
         if self.forces.interpolation == "held" and not divides(self.run.step, period):
             allowed = f"must divide the period of {period:g} s over which samples are held"

@@ -81,13 +81,15 @@ class TiltFilter:
     block.
     """
 
-    def __init__(self, vehicle: CutVehicle, frame: str, period: float, deviations: Deviations, file: str = "") -> None:
-        _check_measurement(frame, period, deviations)
-        self.rigid, self.frame, self.period, self.file = rigid(vehicle), frame, period, file
+    def __init__(
+        self, vehicle: CutVehicle, frame: str, sample_period: float, deviations: Deviations, file: str = ""
+    ) -> None:
+        _check_measurement(frame, sample_period, deviations)
+        self.rigid, self.frame, self.period, self.file = rigid(vehicle), frame, sample_period, file
         self.forces_noise = self.rigid.turning(deviations.forces)[:2, :2]
-        push = np.vstack([np.eye(2) * period**2 / 2, np.eye(2) * period])
+        push = np.vstack([np.eye(2) * sample_period**2 / 2, np.eye(2) * sample_period])
         process = push @ (self.forces_noise + deviations.model**2 * np.eye(2)) @ push.T
-        self.noise = Noise(period, process, np.repeat(deviations.angles, 2) ** 2)
+        self.noise = Noise(sample_period, process, np.repeat(deviations.angles, 2) ** 2)
         self.inverse = np.linalg.inv(self.rigid.inertia)[:2]
         self.state = FilterState()
 
@@ -106,9 +108,9 @@ class TiltFilter:
                 np.diag(np.where(np.isnan(angles[0]), UNKNOWN_VARIANCE, self.noise.variances)),
             )
         level = _wrenches_in_level_axes(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
-        turning, kept = self.rigid.moments(level) @ self.inverse.T, np.empty((2, count, 4))
+        turning, filtered = self.rigid.moments(level) @ self.inverse.T, np.empty((2, count, 4))
         self._check_balance(turning, angles[:, 2:])
-        state.surprise += march(state.x, state.p, turning, angles, self.noise, state.sums, kept)
+        state.surprise += march(state.x, state.p, turning, angles, self.noise, state.sums, filtered)
         if not self.normalised_innovation <= INNOVATION_LIMIT:
             raise InputError(
                 self.file,
@@ -118,7 +120,7 @@ class TiltFilter:
                 f"{self.normalised_innovation:.3g} times what the deviations allow (at most "
                 f"{INNOVATION_LIMIT:g}): {SIGNAL_REMEDY}",
             )
-        return kept[0], kept[1]
+        return filtered[0], filtered[1]
 
     @property
     def normalised_innovation(self) -> float:
@@ -134,8 +136,8 @@ class TiltFilter:
         count, total, squares, products, _ = self.state.sums
         number = np.maximum(count, 1.0)
         variance = np.maximum(squares / number - (total / number) ** 2, 0.0)
-        along = np.clip(products / np.maximum(squares, 1e-300), 0.0, 0.999)
-        return total / number, np.sqrt(variance * (1 + along) / (1 - along) / number)
+        autocorrelation = np.clip(products / np.maximum(squares, 1e-300), 0.0, 0.999)
+        return total / number, np.sqrt(variance * (1 + autocorrelation) / (1 - autocorrelation) / number)
 
     def objections(self) -> tuple[str, ...]:
         """Objections to the measurement because innovations are too large or have a mean. A constant error of an angle
@@ -156,42 +158,42 @@ class TiltFilter:
         ]
         return (*([large] if self.normalised_innovation > DOUBTFUL_INNOVATION_LIMIT else []), *biased)
 
-    def _check_balance(self, turning: np.ndarray, rates: np.ndarray) -> None:
+    def _check_balance(self, turning_acceleration: np.ndarray, rates: np.ndarray) -> None:
         """Refuse hub forces whose moments, integrated over time, do not give the measured rates of roll and pitch.
 
         A constant offset of a transducer, which the filter takes for noise, makes a straight line of what is left of a
         stretch: it is not counted, or 30 N at one wheel would be as much as a smooth road.
 
-        turning : (n, 2), rad/s^2; rates : (n, 2), rad/s.
+        turning_acceleration : (n, 2), rad/s^2; rates : (n, 2), rad/s.
         """
         dt, length = self.period, round(BALANCE_WINDOW / self.period)
         for first in range(0, len(rates) - 1, length):
-            part, measured = turning[first : first + length + 1], rates[first : first + length + 1]
+            turning_part, measured = turning_acceleration[first : first + length + 1], rates[first : first + length + 1]
             if not np.isfinite(measured).all():
                 continue
-            integral = np.vstack((np.zeros(2), np.cumsum(part[1:] + part[:-1], axis=0) * dt / 2))
+            integral = np.vstack((np.zeros(2), np.cumsum(turning_part[1:] + turning_part[:-1], axis=0) * dt / 2))
             allowed = self.noise.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(measured) / 6
             left = np.var(_without_slope(measured - integral), axis=0)
             self.state.rates += np.maximum(left - 9 * allowed, 0.0), np.var(measured, axis=0)
-        unexplained, whole = self.state.rates
-        share = np.sqrt(unexplained / np.where(whole > 0, whole, 1.0))
-        for name, part in zip(("roll", "pitch"), share, strict=True):
-            if not part <= LARGEST_UNEXPLAINED:
-                said = (
-                    f"{part:.0%} of it is not the integral of their moment (at most "
+        unexplained, measured_change = self.state.rates
+        share = np.sqrt(unexplained / np.where(measured_change > 0, measured_change, 1.0))
+        for name, turning_part in zip(("roll", "pitch"), share, strict=True):
+            if not turning_part <= LARGEST_UNEXPLAINED:
+                contradiction = (
+                    f"{turning_part:.0%} of it is not the integral of their moment (at most "
                     f"{LARGEST_UNEXPLAINED:.0%}): {SIGNAL_REMEDY}"
                 )
-                raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {said}")
+                raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {contradiction}")
 
 
-def _check_measurement(frame: str, period: float, deviations: Deviations) -> None:
+def _check_measurement(frame: str, sample_period: float, deviations: Deviations) -> None:
     """Refuse an unknown frame, and periods and deviations that are not above 0 and finite: no value is without
     error.
     """
     if frame not in get_args(Frame):
         raise InputError("", "frame", frame, "is none", get_args(Frame))
-    told = {"period": (period,), "angle_deviations": deviations.angles, "model": (deviations.model,)}
-    for name, value in ((name, value) for name, values in told.items() for value in sorted(values)):
+    named_values = {"period": (sample_period,), "angle_deviations": deviations.angles, "model": (deviations.model,)}
+    for name, value in ((name, value) for name, values in named_values.items() for value in sorted(values)):
         if not 0.0 < value < math.inf:
             raise InputError("", name, value, "must be above 0, and finite")
 
@@ -228,8 +230,8 @@ def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, deviations:
 def _wrenches_in_level_axes(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Wrenches (m, 6 h) turned from the axes of space into axes that roll and pitch by angles (m, 2 or more), rad."""
     (sr, sp), (cr, cp), zero = np.sin(angles[:, :2]).T, np.cos(angles[:, :2]).T, np.zeros(len(angles))
-    turned = np.array([[cp, sp * sr, sp * cr], [zero, cr, -sr], [-sp, cp * sr, cp * cr]])
-    return np.einsum("mhi,ijm->mhj", wrenches.reshape(len(wrenches), -1, 3), turned).reshape(wrenches.shape)
+    rotation = np.array([[cp, sp * sr, sp * cr], [zero, cr, -sr], [-sp, cp * sr, cp * cr]])
+    return np.einsum("mhi,ijm->mhj", wrenches.reshape(len(wrenches), -1, 3), rotation).reshape(wrenches.shape)
 
 
 def inputs_with_moments(

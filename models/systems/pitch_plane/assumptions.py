@@ -44,7 +44,7 @@ def assumptions(assembly: Assembly) -> list[Assumption]:
 
 def principal_channels(assembly: Assembly) -> tuple[str, ...]:
     """Channels whose error is estimated, without prescribed motions and forces, which have no error."""
-    free = tuple(name for name, place in (("z3", 2), ("pitch", 3)) if place not in assembly.guided)
+    free = tuple(name for name, index in (("z3", 2), ("pitch", 3)) if index not in assembly.guided)
     wheels = ("f1", "f2") if assembly.mode in ("free", "road") else ()
     enforced = {"pitch": ("enforced_moment",), "heave-pitch": ("enforced_force", "enforced_moment")}
     return (*free, *wheels, "f3", "f4", *enforced.get(assembly.mode, ()))
@@ -78,9 +78,9 @@ def _of_tyres(assembly: Assembly, lifts: bool) -> list[Assumption]:
     return [Assumption("tyres press", says, remedy, forces, "N", lower_limit=-PULL_LIMIT), pressed]
 
 
-def _deflections(p: Parameters, run: Result) -> Watched:
+def _deflections(parameters: Parameters, run: Result) -> Watched:
     """Deflection (n,) in m of each tyre if its spring alone carried the wheel's force."""
-    return {"front tyre": run["f1"] / p.k1, "rear tyre": run["f2"] / p.k2}
+    return {"front tyre": run["f1"] / parameters.k1, "rear tyre": run["f2"] / parameters.k2}
 
 
 def _spring_assumption(assembly: Assembly, lifts: bool) -> Assumption:
@@ -100,12 +100,12 @@ def _spring_assumption(assembly: Assembly, lifts: bool) -> Assumption:
     )
 
 
-def _compressions(p: Parameters, exact: bool, run: Result) -> Watched:
+def _compressions(parameters: Parameters, exact: bool, run: Result) -> Watched:
     """Compression (n,) in m of each suspension's spring, from the motion of chassis and wheels."""
-    turned = np.sin(run["pitch"]) if exact else run["pitch"]
+    sine_of_pitch = np.sin(run["pitch"]) if exact else run["pitch"]
     return {
-        "front suspension": run["z3"] - p.b * turned - run["z1"],
-        "rear suspension": run["z3"] + p.a * turned - run["z2"],
+        "front suspension": run["z3"] - parameters.b * sine_of_pitch - run["z1"],
+        "rear suspension": run["z3"] + parameters.a * sine_of_pitch - run["z2"],
     }
 
 
@@ -126,26 +126,26 @@ def _pitch_remedy(assembly: Assembly) -> str:
 
 def _artificial_assumption(assembly: Assembly) -> Assumption:
     """Assumption that the forces which hold pitch or heave are small compared with the vehicle's own forces."""
-    moved = "the measured motion, or the wheel forces, do not fit the vehicle: smooth it (bandwidth), correct its mass"
+    remedy = "the measured motion, or the wheel forces, do not fit the vehicle: smooth it (bandwidth), correct its mass"
     soft = "soften what holds the pitch, or name kalman_filter with a measured pitch in its place"
     return Assumption(
         "little artificial",
         "the forces that hold pitch or heave are small compared with the chassis' own inertia",
-        moved if assembly.guided else soft,
+        remedy if assembly.guided else soft,
         partial(_artificial_shares, assembly.parameters, assembly.mode == "heave-pitch"),
         "",
         upper_limit=ARTIFICIAL_SHARE_LIMIT,
     )
 
 
-def _artificial_shares(p: Parameters, heave: bool, run: Result) -> Watched:
+def _artificial_shares(parameters: Parameters, heave: bool, run: Result) -> Watched:
     """Ratio of the artificial moment, and of the force where the heave is held, to the chassis' inertia term, up to 15
     Hz. Empty where the rows are too few or too far apart.
     """
     from models.drift.score import figures_of_run
 
     with suppress(InputError):
-        figures = figures_of_run(run, p)
+        figures = figures_of_run(run, parameters)
         force = {"force": np.array([figures.force_share_band])} if heave else {}
         return {"moment": np.array([figures.moment_share_band]), **force}
     return {}

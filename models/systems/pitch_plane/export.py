@@ -37,7 +37,11 @@ def _left_out(assembly: Assembly) -> list[str]:
         *INPUTS[assembly.mode],
         *(["moment that holds the pitch"] if assembly.moment is not None else []),
         *(f"tyre {tyre.name!r}, which only pushes" for tyre in vehicle.tyres if tyre.pushes_only),
-        *(f"pitch spring of {each.body!r}, with its dead band" for each in vehicle.pitch_springs if each.dead_band),
+        *(
+            f"pitch spring of {pitch_spring.body!r}, with its dead band"
+            for pitch_spring in vehicle.pitch_springs
+            if pitch_spring.dead_band
+        ),
     ]
 
 
@@ -55,5 +59,5 @@ def _in_exudyn(assembly: Assembly, export_subject: ExportSubject, omissions: lis
 
     built, vehicle = native(assembly), assembly.vehicle
     built.mbs.Assemble()
-    names = [" ".join(place) for place in vehicle.coordinates()]
+    names = [" ".join(coordinate) for coordinate in vehicle.coordinates()]
     return of_exudyn(built.mbs, dict(zip(names, columns(built, vehicle), strict=True)), export_subject, omissions)

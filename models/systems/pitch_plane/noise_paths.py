@@ -92,8 +92,8 @@ class NoisePaths:
 
     def _saved_part(self, run: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
         if isinstance(run, RunFailed):
-            last = 0.0 if run.time is None else run.time
-            return np.full((len(self.rows), 8), np.nan), last, last
+            failure_time = 0.0 if run.time is None else run.time
+            return np.full((len(self.rows), 8), np.nan), failure_time, failure_time
         far = np.abs(run.states[:, 3] - self.truth) > self.threshold
         first = far.argmax()
         return run.states[self.rows], run.times[first] if far[first] else np.inf, np.nan
@@ -136,14 +136,14 @@ def noise_paths(
             settings.integrator,
             "picks its own steps: an ensemble keeps states at common times and needs fixed ones",
         )
-    base, rest = _shared_and_path_effects(scene)
+    base, path_effects = _shared_and_path_effects(scene)
     if truth is None:
         silent = scene.effects["force_noise"].model_copy(update={"deviation": 0.0})
         quiet = scene.model_copy(update={"effects": scene.effects | {"force_noise": silent}})
         truth = build("reference", assembly_of_scene(quiet), settings_of(quiet, "reference")).run().states[:, 3]
     if truth.shape != (settings.steps + 1,):
         raise InputError(scene.file, "truth", list(truth.shape), f"must have one pitch per step: {settings.steps + 1}")
-    return NoisePaths(base, rest, engine, settings, _step_rows(scene, settings, times), truth, threshold)
+    return NoisePaths(base, path_effects, engine, settings, _step_rows(scene, settings, times), truth, threshold)
 
 
 def _shared_and_path_effects(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
@@ -181,15 +181,15 @@ class MujocoThreads(NoisePaths):
         one.
         """
         models = [build("mujoco", self.assembly(path), self.settings) for path in paths]
-        times = self.settings.step * np.arange(self.settings.steps + 1)
+        step_times = self.settings.step * np.arange(self.settings.steps + 1)
         marched, warned = self._rollout(models)
         if warned:
             yield from super().trajectories(paths)
             return
         for states in marched:
             try:
-                guard("mujoco", times, states, self.settings.duration)
-                yield Trajectory(times, states)
+                guard("mujoco", step_times, states, self.settings.duration)
+                yield Trajectory(step_times, states)
             except RunFailed as error:
                 yield error
 
@@ -201,8 +201,8 @@ class MujocoThreads(NoisePaths):
         from models.engines.mujoco_quiet import installed, without_warnings
 
         start = np.concatenate(([0.0], self.base.initial))
-        held = models[0].drive.controls is not None
-        controls = np.stack([model.controls() for model in models]) if held else None
+        has_controls = models[0].drive.controls is not None
+        controls = np.stack([model.controls() for model in models]) if has_controls else None
         working = models[: self.threads]
         with installed(models[0].drive.law), without_warnings():
             sensed, _ = rollout.rollout(
@@ -244,5 +244,5 @@ def largest_difference(reference: Arrays, other_paths: Arrays, times: np.ndarray
     if not (times[times > 0.0] < until[:, None]).any():
         return math.nan
     first = np.where((times < until[:, None])[:, :, None], reference["states"][:count], 0.0)
-    two = np.where((times < until[:, None])[:, :, None], other_paths["states"], 0.0)
-    return float(np.abs(first - two).max() / np.abs(first).max())
+    other_states = np.where((times < until[:, None])[:, :, None], other_paths["states"], 0.0)
+    return float(np.abs(first - other_states).max() / np.abs(first).max())

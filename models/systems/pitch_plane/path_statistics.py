@@ -21,10 +21,10 @@ class PathStatistics:
     (rad) of the others; first : arrays of the first ``saved`` paths.
     """
 
-    def __init__(self, true: np.ndarray, saved_paths: int) -> None:
-        self._true, self._saved, self._blocks = true, saved_paths, list[Arrays]()
+    def __init__(self, true_states: np.ndarray, saved_paths: int) -> None:
+        self._true, self._saved, self._blocks = true_states, saved_paths, list[Arrays]()
         self.moments, self.covariance, self._spread, self.drift_off = Moments(), StreamedCovariance(), Spread(), Tally()
-        self.lost, self.steepest = 0, np.full(len(true), np.nan)
+        self.lost, self.steepest = 0, np.full(len(true_states), np.nan)
 
     def add(self, block: Arrays) -> None:
         """Add a block of paths."""
@@ -35,9 +35,9 @@ class PathStatistics:
         self.drift_off.add(block["drift_off"])
         self.lost += int(np.isfinite(block["failed"]).sum())
         self.steepest = np.fmax(self.steepest, np.fmax.reduce(np.abs(block["states"][:, :, PITCH_STATE]), axis=0))
-        kept = sum(len(each["drift_off"]) for each in self._blocks)
-        if kept < self._saved:
-            self._blocks.append({name: values[: self._saved - kept] for name, values in block.items()})
+        paths_kept = sum(len(saved_block["drift_off"]) for saved_block in self._blocks)
+        if paths_kept < self._saved:
+            self._blocks.append({name: values[: self._saved - paths_kept] for name, values in block.items()})
 
     @property
     def first(self) -> Arrays:

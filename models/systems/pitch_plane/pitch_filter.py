@@ -67,21 +67,21 @@ class PitchStep:
         self._p = assembly.parameters.array()
         self._respond = compiled_filter_step(assembly.mode, assembly.vehicle.geometry)
 
-    def advance(self, x: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def advance(self, x: np.ndarray, step_number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Advance the state x (7,) by a step; returns the new state and its derivatives.
 
         x : (z1 - z3, z2 - z3, pitch), their rates, and the share by which 1/I is above the assembly's
         They are those to x, (7, 7), and to the two force samples at the step's start and at its end, (7, 2) per N.
         A held sample acts on the step after it alone; a spline counts as the polyline through its samples.
         """
-        first = number * self._substeps * self._rows[2]
+        first = step_number * self._substeps * self._rows[2]
         inputs = self._inputs[first : first + len(self._hats)]
         answer = self._respond(x, self.period / self._substeps, self._substeps, inputs, self._rows, self._p, self._hats)
         return answer[:, 0].copy(), answer[:, 1:8], answer[:, 8:10], answer[:, 10:]
 
 
 @cache
-def compiled_filter_step(mode: str, geometry: str) -> Any:
+def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
     """The compiled filter step with its derivatives for one mode and geometry, compiled when it is first requested.
 
     (x, step, count, inputs, rows, p, hats) -> (7, 12): x after it, its columns d/dx (7), d/d(first force sample) (2)
@@ -89,10 +89,10 @@ def compiled_filter_step(mode: str, geometry: str) -> Any:
     last sample share in each row of the inputs.
     """
     # the march goes in as Python: numba cannot cache what encloses compiled code
-    march = register_jitable(march_of(mode, geometry).py_func)
+    march = register_jitable(march_of(drive_mode, geometry).py_func)
 
-    def respond(x, step, count, inputs, rows, p, hats):
-        states, transition, parameters = np.empty((count + 1, 8)), np.zeros((7, 12)), p.copy()
+    def respond(x, step, step_count, inputs, rows, p, hats):
+        states, transition, parameters = np.empty((step_count + 1, 8)), np.zeros((7, 12)), p.copy()
         for column in range(12):
             for sign in (1.0, -1.0):
                 y, pushed, nudge = np.zeros(8), inputs, sign * DIFFERENCE_WIDTHS[column]
@@ -103,15 +103,15 @@ def compiled_filter_step(mode: str, geometry: str) -> Any:
                 elif column > 7:
                     pushed = inputs.copy()
                     pushed[:, (column - 8) % 2] += nudge * hats[:, (column - 8) // 2]
-                march(y, step, count, pushed, rows, parameters, states)
-                end, share = states[count], 0.5 / (nudge if column > 0 else 1.0)
+                march(y, step, step_count, pushed, rows, parameters, states)
+                end, share = states[step_count], 0.5 / (nudge if column > 0 else 1.0)
                 for row in range(6):
                     heave = end[2] if row < 2 else end[6] if 2 < row < 5 else 0.0
                     transition[row, column] += share * (end[KEPT_STATES[row]] - heave)
         transition[6, 0], transition[6, 7] = x[6], 1.0
         return transition
 
-    return compiled(respond, ("pitch_step", mode, geometry))
+    return compiled(respond, ("pitch_step", drive_mode, geometry))
 
 
 PITCH, PITCH_RATE, INERTIA_SHARE, FILTER_STATES = 2, 5, 6, 7
@@ -179,17 +179,22 @@ class PitchFilter(ExtendedKalmanFilter):
     """
 
     def __init__(
-        self, step: PitchStep, start: np.ndarray, covariance: np.ndarray, intensity: float, measurement: Measurement
+        self,
+        step: PitchStep,
+        start_state: np.ndarray,
+        covariance: np.ndarray,
+        intensity: float,
+        measurement: Measurement,
     ) -> None:
-        """Initial state ``start`` (7,) and ``covariance`` (7, 7); intensity : variance (N^2) of a force sample, per
-        step of the filter.
+        """Initial state ``start_state`` (7,) and ``covariance`` (7, 7); intensity : variance (N^2) of a force sample,
+        per step of the filter.
         """
         super().__init__(dim_x=FILTER_STATES, dim_z=1)
         self.step, self.intensity, self.measured = step, intensity, measurement
-        self.x, self.P = start.copy(), covariance.copy()
+        self.x, self.P = start_state.copy(), covariance.copy()
         self.late = np.zeros((FILTER_STATES, 2))
         self._there = np.isfinite(measurement.values) @ (1 << np.arange(len(measurement.columns)))
-        self._seen = [self._model_of_columns(there) for there in range(1 << len(measurement.columns))]
+        self._seen = [self._model_of_columns(column_mask) for column_mask in range(1 << len(measurement.columns))]
 
     def predict_x(self, u: Any = 0) -> None:
         """Predict the state and its Jacobians over step number ``u``.
@@ -202,15 +207,15 @@ class PitchFilter(ExtendedKalmanFilter):
         push = early + self.F.dot(self.late)
         self.Q, self.late = self.intensity * push.dot(push.T), late
 
-    def measure(self, number: int) -> np.ndarray:
+    def measure(self, row_number: int) -> np.ndarray:
         """Update the filter with the finite values in a row of the measurement; returns whitened innovations
         (columns,), NaN for missing values."""
-        white, there = np.full(len(self.measured.columns), math.nan), self._there[number]
-        if not there:
+        white, columns_present = np.full(len(self.measured.columns), math.nan), self._there[row_number]
+        if not columns_present:
             return white
-        chosen, rows, variance = self._seen[there]
+        chosen, rows, variance = self._seen[columns_present]
         late = rows.dot(self.late)
-        values = self.measured.values[number, chosen]
+        values = self.measured.values[row_number, chosen]
         self.update(values, lambda x: rows, rows.dot, R=variance + self.intensity * late.dot(late.T))
         white[chosen] = np.linalg.cholesky(self.SI).T.dot(self.y)
         return white
@@ -260,7 +265,7 @@ def estimate(
 def _march_filter(filtered: PitchFilter) -> tuple[PitchEstimate, _Steps]:
     """Run the filter: predict each step, update with the measurement at its end, and record all of it."""
     n, period, measured = filtered.step.count + 1, filtered.step.period, filtered.measured
-    every, width = round(measured.period / period), len(measured.columns)
+    stride, width = round(measured.period / period), len(measured.columns)
     states, pending, predictions = np.empty((n, 7)), np.empty((n, 7, 2)), np.empty((n, 7))
     covariances, transitions, noises = (np.empty((n, 7, 7)) for _ in range(3))
     missed, innovations = np.zeros(n, dtype=int), np.full((n, width), np.nan)
@@ -270,8 +275,8 @@ def _march_filter(filtered: PitchFilter) -> tuple[PitchEstimate, _Steps]:
         if not math.isfinite(filtered.x.dot(filtered.P).dot(filtered.x)):
             raise RunFailed("kalman filter", "the estimate became infinite or not a number", i * period)
         predictions[i], transitions[i], noises[i] = filtered.x, filtered.F, filtered.Q
-        if i % every == 0 and i // every < len(measured.values):
-            innovations[i] = filtered.measure(i // every)
+        if i % stride == 0 and i // stride < len(measured.values):
+            innovations[i] = filtered.measure(i // stride)
             missed[i] = np.count_nonzero(np.isnan(innovations[i]))
         states[i], covariances[i], pending[i] = filtered.x, filtered.P, filtered.late
     pending *= math.sqrt(filtered.intensity)
@@ -309,12 +314,12 @@ def _covariance_inverse(matrix: np.ndarray) -> np.ndarray:
     return inverse
 
 
-def _start(assembly: Assembly, turn: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
-    """State and covariance at the start. The covariance comes from a rotation of the whole vehicle by ``turn`` (rad)
-    and from ``inertia``, the standard deviation of the share by which 1/I is off.
+def _start(assembly: Assembly, turn_deviation: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
+    """State and covariance at the start. The covariance comes from a rotation of the whole vehicle by
+    ``turn_deviation`` (rad) and from ``inertia``, the standard deviation of the share by which 1/I is off.
     """
     p = assembly.parameters
-    turned = turn * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])
-    covariance = np.outer(turned, turned) + KNOWN_DEVIATION**2 * np.eye(FILTER_STATES)
+    rotated_state = turn_deviation * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])
+    covariance = np.outer(rotated_state, rotated_state) + KNOWN_DEVIATION**2 * np.eye(FILTER_STATES)
     covariance[INERTIA_SHARE, INERTIA_SHARE] += inertia**2
     return np.append(RELATIVE_STATES @ assembly.initial, 0.0), covariance

@@ -45,11 +45,11 @@ def run(
     start = time.perf_counter()
     trajectory = model.run()
     seconds = time.perf_counter() - start
-    channels, beside = output_channels(assembly, trajectory, model), dict[str, str]()
+    channels, comparison_texts = output_channels(assembly, trajectory, model), dict[str, str]()
     if engine in OUTSIDE:
         from models.engines.outside import beside_reference
 
-        beside["beside reference"] = beside_reference(engine, assembly, settings, trajectory)
+        comparison_texts["beside reference"] = beside_reference(engine, assembly, settings, trajectory)
     labelled = result(
         scene,
         {name: Channel("time", values[rows], unit, meaning) for name, (unit, meaning, values) in channels.items()},
@@ -63,7 +63,7 @@ def run(
         integrator=settings.integrator,
         step=settings.step,
         integrated=json.dumps(STATES),
-        **beside,
+        **comparison_texts,
     )
     with_assumptions(labelled, assumptions(assembly))
     return _with_error(labelled, assembly, settings, channels) if error else labelled
@@ -97,10 +97,12 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
         looser = _with_longer_engine_step(rerun, replace(settings, tolerance=TOLERANCE_FACTOR * settings.tolerance))
         return of_tolerance(run, fine, looser, TOLERANCE_FACTOR, settings.tolerance, sizes)
 
-    def longer(times: float, share: float) -> Series:
-        return rerun(_settings_of_longer_step(settings, times, share))
+    def longer(step_factor: float, share: float) -> Series:
+        return rerun(_settings_of_longer_step(settings, step_factor, share))
 
-    return estimated(run, fine, longer, method.order, settings.step, growth=_pitch_error_growth(assembly), sizes=sizes)
+    return estimated(
+        run, fine, longer, method.order, settings.step, growth=_pitch_error_growth(assembly), channel_sizes=sizes
+    )
 
 
 def _with_longer_engine_step(rerun: Callable[[Settings], Series], settings: Settings) -> Series:
@@ -140,13 +142,13 @@ def _pitch_error_growth(assembly: Assembly) -> dict[str, float]:
 
     forces = pitch_error_growth(assembly)
     grown = np.asarray(pitch_variance(forces.times, forces.sinh_rate, 1.0))
-    part = max(2, round(FINE_WINDOW * len(grown)))
-    return {"pitch": float(np.sqrt(np.mean(grown) / np.mean(grown[:part])))}
+    rows_of_part = max(2, round(FINE_WINDOW * len(grown)))
+    return {"pitch": float(np.sqrt(np.mean(grown) / np.mean(grown[:rows_of_part])))}
 
 
-def _settings_of_longer_step(settings: Settings, times: float, share: float) -> Settings:
-    """Settings with a step ``times`` as long, over ``share`` of the run, rounded to whole steps."""
-    step = times * settings.step
+def _settings_of_longer_step(settings: Settings, step_factor: float, share: float) -> Settings:
+    """Settings with a step ``step_factor`` as long, over ``share`` of the run, rounded to whole steps."""
+    step = step_factor * settings.step
     return replace(settings, step=step, duration=step * max(1, math.floor(share * settings.duration / step + 1e-9)))
 
 

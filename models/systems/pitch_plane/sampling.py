@@ -25,10 +25,10 @@ INSTANT_TOLERANCE = 1e-6
 NO_ROW = "each sample needs a row of the run: use an integrator of fixed steps, which must divide the sampling period"
 
 
-def check_rate(scene: Scene, place: str, rate: float) -> None:
+def check_rate(scene: Scene, key_path: str, rate: float) -> None:
     """Refuse, before a run, a sampling rate whose sampling times are not at steps of an engine."""
     if CATALOGUE["exudyn"][str(scene.settings("exudyn").integrator)].adaptive:
-        raise InputError(scene.file, place, rate, NO_ROW)
+        raise InputError(scene.file, key_path, rate, NO_ROW)
     for engine in CATALOGUE:
         step = float(scene.settings(engine).step or 0)
         if not divides(step, 1 / rate):
@@ -36,17 +36,18 @@ def check_rate(scene: Scene, place: str, rate: float) -> None:
                 f"its period {1 / rate:g} s must be a multiple of {engine}'s step {step:g} s; use a step of "
                 f"{fitting(step, 1 / rate)} s or another rate"
             )
-            raise InputError(scene.file, place, rate, allowed)
+            raise InputError(scene.file, key_path, rate, allowed)
 
 
-def check_end(scene: Scene, place: str, file: str, end: float) -> None:
-    """Refuse a file whose data end at a time ``end`` (s) before the run does."""
+def check_end(scene: Scene, key_path: str, file: str, end_time: float) -> None:
+    """Refuse a file whose data end at a time ``end_time`` (s) before the run does."""
     length = scene.run.duration
-    if end < length * (1 - 1e-9):
+    if end_time < length * (1 - 1e-9):
         from models.core.time_series import other_unit
 
-        allowed = f"ends at {end:g} s, but the run lasts {length:g} s: shorten run.duration{other_unit(end, length)}"
-        raise InputError(scene.file, place, file, allowed)
+        remedy = f"shorten run.duration{other_unit(end_time, length)}"
+        allowed = f"ends at {end_time:g} s, but the run lasts {length:g} s: {remedy}"
+        raise InputError(scene.file, key_path, file, allowed)
 
 
 def instant_numbers(times: np.ndarray, rate: float) -> np.ndarray:
@@ -54,7 +55,7 @@ def instant_numbers(times: np.ndarray, rate: float) -> np.ndarray:
     return np.floor(times * rate + INSTANT_TOLERANCE).astype(np.int64)
 
 
-def read_samples(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place: str) -> np.ndarray:
+def read_samples(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, key_path: str) -> np.ndarray:
     """Values (n,) held by a sensor: for each row the value at the last sampling time at or before it.
 
     Raises InputError where a run has no row at an instant, as runs have whose engine picks its own rows.
@@ -62,23 +63,25 @@ def read_samples(times: np.ndarray, values: np.ndarray, rate: float, scene: Scen
     number = instant_numbers(times, rate)
     row = np.searchsorted(times, (number - INSTANT_TOLERANCE) / rate)
     if np.abs(times[row] * rate - number).max() > INSTANT_TOLERANCE:
-        raise InputError(scene.file, place, rate, NO_ROW)
+        raise InputError(scene.file, key_path, rate, NO_ROW)
     return values[row]
 
 
-def noisy_reading(p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Scene, place: str) -> np.ndarray:
+def noisy_reading(
+    p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Scene, key_path: str
+) -> np.ndarray:
     """The sampled reading with white noise on each sample; ``p`` has sampling_rate, deviation, seed and path."""
     number = instant_numbers(times, p.sampling_rate)
     noise = p.deviation * normal_samples(p.seed, p.path, int(number[-1]) + 1, 1, source=source)[:, 0]
-    return read_samples(times, values, p.sampling_rate, scene, place) + noise[number]
+    return read_samples(times, values, p.sampling_rate, scene, key_path) + noise[number]
 
 
-def within_range(effect: str, channels: Mapping[str, str], unit: str, limit: float) -> Assumption:
+def within_range(effect: str, channels: Mapping[str, str], unit: str, sensor_range: float) -> Assumption:
     """Assumption that a sensor stays within its range; ``channels`` gives the run's channel for each name of a
     sensor.
     """
     says, remedy = f"{effect}: readings are within the sensor's range", f"take one of a larger effects.{effect}.range"
-    return Assumption(f"{effect} in range", says, remedy, watch_function(**channels), unit, -limit, limit)
+    return Assumption(f"{effect} in range", says, remedy, watch_function(**channels), unit, -sensor_range, sensor_range)
 
 
 def write(result: Result, columns: Mapping[str, str], rate: float, path: Path) -> None:

@@ -104,17 +104,17 @@ SMALLEST_PARAMETER = 1e-9
 """No parameter of a vehicle is smaller in SI units, but for a gravity of 0."""
 
 
-def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
+def _check_rest(parameters: pitch_plane.Parameters, scene: Scene) -> None:
     """Refuse parameters without a static equilibrium, in which every run begins."""
-    for name, value in p:
+    for name, value in parameters:
         if 0 < value < SMALLEST_PARAMETER:
             allowed = f"too small for a vehicle: at least {SMALLEST_PARAMETER:g}"
             raise InputError(scene.file, f"vehicle.override.{name}", value, allowed)
     try:
-        rest = pitch_plane.equilibrium(p, scene.vehicle.geometry)
+        rest_state = pitch_plane.equilibrium(parameters, scene.vehicle.geometry)
     except (ValueError, ArithmeticError):  # the sine of the pitch beyond 1
-        rest = np.full(8, np.nan)
-    if not np.isfinite(rest).all():
+        rest_state = np.full(8, np.nan)
+    if not np.isfinite(rest_state).all():
         raise InputError(
             scene.file,
             "vehicle",
@@ -144,21 +144,21 @@ def _check_engine(name: str, scene: Scene) -> None:
     """Refuse unknown engines and integrators, and settings that the integrator does not read."""
     if name not in CATALOGUE:
         raise InputError(scene.file, f"engines.{name}", None, "no such engine", tuple(CATALOGUE))
-    given, place = scene.engines[name], f"engines.{name}"
+    engine_settings, key_path = scene.engines[name], f"engines.{name}"
     integrator = str(scene.settings(name).integrator)
     if integrator not in CATALOGUE[name]:
         names = tuple(key for key in CATALOGUE[name] if (name, key) not in MISSING)
-        raise InputError(scene.file, f"{place}.integrator", integrator, "no such integrator", names)
-    if "spectral_radius" in given.model_fields_set and integrator != "GeneralizedAlpha":
+        raise InputError(scene.file, f"{key_path}.integrator", integrator, "no such integrator", names)
+    if "spectral_radius" in engine_settings.model_fields_set and integrator != "GeneralizedAlpha":
         allowed = f"has no meaning for {integrator}: it belongs to exudyn's GeneralizedAlpha"
-        raise InputError(scene.file, f"{place}.spectral_radius", given.spectral_radius, allowed)
-    if "tolerance" in given.model_fields_set and not CATALOGUE[name][integrator].adaptive:
+        raise InputError(scene.file, f"{key_path}.spectral_radius", engine_settings.spectral_radius, allowed)
+    if "tolerance" in engine_settings.model_fields_set and not CATALOGUE[name][integrator].adaptive:
         adaptive = (
             " or ".join(key for key, value in CATALOGUE[name].items() if value.adaptive and (name, key) not in MISSING)
             or "other engines"
         )
         allowed = f"has no meaning for {integrator}, which takes steps of fixed length: it belongs to {adaptive}"
-        raise InputError(scene.file, f"{place}.tolerance", given.tolerance, allowed)
+        raise InputError(scene.file, f"{key_path}.tolerance", engine_settings.tolerance, allowed)
 
 
 def _check_times(scene: Scene) -> None:
@@ -178,16 +178,16 @@ def _check_times(scene: Scene) -> None:
         raise InputError(scene.file, "run.output_step", wanted, allowed)
 
 
-def _check_step(scene: Scene, place: str, step: float) -> None:
+def _check_step(scene: Scene, key_path: str, step: float) -> None:
     length, wanted = scene.run.duration, scene.run.output_step
     if length / step > MOST_STEPS:
-        allowed = f"needs {length / step:.3g} steps of {place} = {step:g} s; at most {MOST_STEPS:,} are possible"
+        allowed = f"needs {length / step:.3g} steps of {key_path} = {step:g} s; at most {MOST_STEPS:,} are possible"
         raise InputError(scene.file, "run.duration", length, allowed)
     if not divides(step, length):
         allowed = f"must divide run.duration = {length:g} s; use for example {fitting(step, length)}"
-        raise InputError(scene.file, place, step, allowed)
+        raise InputError(scene.file, key_path, step, allowed)
     if wanted is not None and not divides(step, wanted):
-        allowed = f"must be a multiple of {place} = {step:g} s"
+        allowed = f"must be a multiple of {key_path} = {step:g} s"
         raise InputError(scene.file, "run.output_step", wanted, allowed)
 
 
@@ -210,9 +210,9 @@ def assembly_of_scene(scene: Scene) -> Assembly:
     return assembly
 
 
-def _initial_state(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
+def _initial_state(scene: Scene, parameters: pitch_plane.Parameters) -> np.ndarray:
     """Initial state: the static equilibrium, except for the coordinates that the scene sets."""
-    state = pitch_plane.equilibrium(p, scene.vehicle.geometry)
+    state = pitch_plane.equilibrium(parameters, scene.vehicle.geometry)
     for name, value in scene.start.items():
         if name not in STATE_NAMES:
             raise InputError(scene.file, f"start.{name}", value, "not a state", STATE_NAMES)
@@ -224,10 +224,14 @@ def effects_in_order(scene: Scene) -> list[str]:
     """The scene's effects, each after those that it needs; refuses illegal combinations."""
     modules = {name: module_of(DEFAULT_SYSTEM, name) for name in scene.effects}
     check_combination(modules, scene)
-    done: list[str] = []
+    ordered_effects: list[str] = []
     waiting = list(modules)
     while waiting:
-        ready = [n for n in waiting if all(m in done for m in (*modules[n].NEEDS, *modules[n].AFTER) if m in modules)]
-        done += ready
+        ready = [
+            n
+            for n in waiting
+            if all(m in ordered_effects for m in (*modules[n].NEEDS, *modules[n].AFTER) if m in modules)
+        ]
+        ordered_effects += ready
         waiting = [n for n in waiting if n not in ready]
-    return done
+    return ordered_effects

@@ -124,10 +124,10 @@ def compare(
     benches = [Bench(on_road, road, options, folder, scene.error) for road, on_road in roads(scene, options).items()]
     for i, bench in enumerate(benches):
 
-        def told(text: str, share: float, completed: int = i) -> None:
+        def report_progress(text: str, share: float, completed: int = i) -> None:
             progress(text, (completed + share) / (len(benches) + 1))
 
-        rows += bench.score(engines[0], () if i else engines[1:], failed, told)
+        rows += bench.score(engines[0], () if i else engines[1:], failed, report_progress)
     return benches, rows, failed
 
 
@@ -155,14 +155,14 @@ class Bench:
         self.trusted = scene.run.duration if predicted.until is None else predicted.until[1]
         self.holding = holding_stiffness(self.parameters, predicted.rate)
 
-    def _write_sensors(self, stride: int, period: float) -> None:
+    def _write_sensors(self, stride: int, sample_period: float) -> None:
         """Write files of the noisy pitch, and of the exact heave and pitch."""
         heave, pitch = self.truth["z3"][::stride], self.truth["pitch"][::stride]
         noise = normal_samples(self.options.seed, 0, len(pitch), 1, source=PITCH_SENSOR)[:, 0]
         noisy = {"pitch": ("rad", pitch + self.options.angle_deviation * noise)}
-        write_time_series(self.folder / "measured_pitch.csv", noisy, period)
-        both = {"z3": ("m", heave), "pitch": ("rad", pitch)}
-        write_time_series(self.folder / "heave_and_pitch.csv", both, period)
+        write_time_series(self.folder / "measured_pitch.csv", noisy, sample_period)
+        exact_columns = {"z3": ("m", heave), "pitch": ("rad", pitch)}
+        write_time_series(self.folder / "heave_and_pitch.csv", exact_columns, sample_period)
 
     @property
     def pitch_inertia(self) -> float:
@@ -212,7 +212,11 @@ class Bench:
             of_method = self._rows_of_run(engine, name, effects, failed)
             rows += of_method
             if of_method and (name == "free" or of_method[0]["verdict"] == "accepted"):
-                rows += [row for other in other_engines for row in self._rows_of_run(other, name, effects, failed)]
+                rows += [
+                    row
+                    for other_engine in other_engines
+                    for row in self._rows_of_run(other_engine, name, effects, failed)
+                ]
         return rows
 
     def _rows_of_run(self, engine: str, name: str, effects: dict[str, Any], failed: dict[str, str]) -> list[Row]:
@@ -240,7 +244,7 @@ class Bench:
         limits = self.options.limits
         figures, wrong = figures_of_run(result, self.parameters), errors_of_run(result, self.truth, self.options.slope)
         with_truth = verdict_on_run(figures, wrong, effects, limits)
-        alone = blind_verdict(
+        verdict_without_truth = blind_verdict(
             figures,
             effects,
             float(result.times[-1]),
@@ -267,8 +271,8 @@ class Bench:
             "steps": figures.steps,
             "verdict": with_truth.word,
             "reason": with_truth.reason,
-            "without truth": alone.word,
-            "reason without truth": alone.reason,
+            "without truth": verdict_without_truth.word,
+            "reason without truth": verdict_without_truth.reason,
         }
 
     def sweep(self) -> np.ndarray:

@@ -82,34 +82,36 @@ def add_force_errors(y, p, body, du, dx):
 
 
 def _step_of(rhs, body, flat):
-    def step_of(y, x, given, count, row, p, other):
-        """Advance the path y (8,) and the error columns x (m, 8), in place, by the Runge-Kutta step number ``count``.
+    def step_of(y, x, step_inputs, step_number, row, p, wrong_parameters):
+        """Advance the path y (8,) and the error columns x (m, 8), in place, by the Runge-Kutta step number
+        ``step_number``.
 
-        given : ``StageForces``, whose errors are read from ``row`` on; p, other : parameters (15,), true and wrong.
+        step_inputs : ``StageForces``, whose errors are read from ``row`` on; p, wrong_parameters : parameters (15,),
+        true and wrong.
         """
-        step, first, columns = given.step, count * given.to_next, x.shape[0]
-        at = (first, first + given.to_middle, first + given.to_end)
-        wrong = (other != p).any()
+        step, first, columns = step_inputs.step, step_number * step_inputs.to_next, x.shape[0]
+        input_rows = (first, first + step_inputs.to_middle, first + step_inputs.to_end)
+        wrong = (wrong_parameters != p).any()
         k, kx = np.zeros((4, 8)), np.zeros((4, columns, 8))
-        stage, stage_x, off = np.empty(8), np.empty(8), np.zeros(8)
+        stage, stage_x, wrong_rate = np.empty(8), np.empty(8), np.zeros(8)
         for s in range(4):
-            now = (s + 1) // 2
-            part = 0.5 * step * now
-            u, e = given.forces[at[now]], given.errors[row + now]
+            half_steps = (s + 1) // 2
+            stage_step = 0.5 * step * half_steps
+            u, e = step_inputs.forces[input_rows[half_steps]], step_inputs.errors[row + half_steps]
             for q in range(8):
-                stage[q] = y[q] + part * k[s - 1, q]
+                stage[q] = y[q] + stage_step * k[s - 1, q]
             rhs(stage, u, p, k[s])
             if wrong:
-                rhs(stage, u, other, off)
+                rhs(stage, u, wrong_parameters, wrong_rate)
                 for q in range(8):
-                    off[q] = (off[q] - k[s, q]) / MODEL_DIFFERENCE_SHARE
+                    wrong_rate[q] = (wrong_rate[q] - k[s, q]) / MODEL_DIFFERENCE_SHARE
             for j in range(columns):
                 for q in range(8):
-                    stage_x[q] = x[j, q] + part * kx[s - 1, j, q]
+                    stage_x[q] = x[j, q] + stage_step * kx[s - 1, j, q]
                 jacobian_product(stage, u, p, body, flat, stage_x, kx[s, j])
                 add_force_errors(stage, p, body, e[j], kx[s, j])
                 for q in range(8):
-                    kx[s, j, q] += off[q]
+                    kx[s, j, q] += wrong_rate[q]
         for q in range(8):
             y[q] += step / 6 * (k[0, q] + 2 * k[1, q] + 2 * k[2, q] + k[3, q])
             for j in range(columns):
@@ -121,20 +123,20 @@ def _step_of(rhs, body, flat):
 def compile_carry(one_step, key):
     """Compile a march that records the path and its error columns at every step."""
 
-    def carry(y, x, given, p, other, states, kept):
-        states[0], kept[0] = y, x
+    def carry(y, x, step_inputs, p, wrong_parameters, states, error_columns):
+        states[0], error_columns[0] = y, x
         for i in range(len(states) - 1):
-            one_step(y, x, given, i, 3 * i, p, other)
-            states[i + 1], kept[i + 1] = y, x
+            one_step(y, x, step_inputs, i, 3 * i, p, wrong_parameters)
+            states[i + 1], error_columns[i + 1] = y, x
 
     return compiled(carry, key)
 
 
 @cache
-def march_along(compile_march: Any, mode: str, geometry: str) -> Any:
+def march_along(compile_march: Any, drive_mode: str, geometry: str) -> Any:
     """A march along the path for one mode and geometry, compiled when it is first requested."""
-    one_step = _step_of(RIGHT_HAND_SIDES[mode, geometry], mode == "force-body", geometry == "linear")
-    return compile_march(one_step, (mode, geometry))
+    one_step = _step_of(RIGHT_HAND_SIDES[drive_mode, geometry], drive_mode == "force-body", geometry == "linear")
+    return compile_march(one_step, (drive_mode, geometry))
 
 
 @dataclass(frozen=True)
@@ -185,11 +187,17 @@ class TangentPath:
         count, p = self.steps, self.assembly.parameters.array()
         wrong = p if wrong_parameters is None else p + MODEL_DIFFERENCE_SHARE * (wrong_parameters.array() - p)
         pushes = np.zeros((3 * count, len(columns), 2)) if errors is None else errors
-        states, kept = np.empty((count + 1, 8)), np.empty((count + 1, *columns.shape))
+        states, error_columns = np.empty((count + 1, 8)), np.empty((count + 1, *columns.shape))
         self.march(compile_carry)(
-            self.assembly.initial.copy(), np.array(columns, dtype=float), self.given(pushes), p, wrong, states, kept
+            self.assembly.initial.copy(),
+            np.array(columns, dtype=float),
+            self.given(pushes),
+            p,
+            wrong,
+            states,
+            error_columns,
         )
-        return states, kept
+        return states, error_columns
 
     @property
     def times(self) -> np.ndarray:
@@ -197,14 +205,14 @@ class TangentPath:
         return self.step * np.arange(self.steps + 1)
 
 
-def path_of(assembly: Assembly, longest: float = LONGEST_STEP) -> TangentPath:
+def path_of(assembly: Assembly, longest_duration: float = LONGEST_STEP) -> TangentPath:
     """The path of a free force-excited run; raises ValueError for a run of another kind."""
     forces = assembly.input
     held_up = assembly.vehicle.pitch_springs or assembly.moment is not None
     if assembly.mode not in ("force", "force-body") or held_up or not isinstance(forces, Sampled | Smooth):
         raise ValueError("errors grow along a free force-excited run; this one is guided or held, or has a road")
     samples = round(assembly.scene.run.duration / forces.period)
-    return TangentPath(assembly, forces, max(1, math.ceil(forces.period / longest - 1e-9)), samples)
+    return TangentPath(assembly, forces, max(1, math.ceil(forces.period / longest_duration - 1e-9)), samples)
 
 
 def tilt_error_columns(assembly: Assembly) -> np.ndarray:
@@ -237,8 +245,8 @@ def measured_growth(path: TangentPath) -> tuple[float, float]:
     they meet, at 1, an error of the map moves them by its square root.
     """
     tilting, duration = tilt_map(path), path.forces.period * path.samples
-    off = abs(float(np.linalg.det(tilting)) - 1.0)
-    return float(np.log(np.abs(np.linalg.eigvals(tilting)).max())) / duration, math.sqrt(off) / duration
+    departure = abs(float(np.linalg.det(tilting)) - 1.0)
+    return float(np.log(np.abs(np.linalg.eigvals(tilting)).max())) / duration, math.sqrt(departure) / duration
 
 
 def slow_swing_frequency(path: TangentPath) -> float:
@@ -262,14 +270,14 @@ class CovarianceOverTime:
         return np.sqrt(self.matrices[:, i, i])
 
 
-def covariance(assembly: Assembly, deviation: float, longest: float = LONGEST_STEP) -> CovarianceOverTime:
+def covariance(assembly: Assembly, deviation: float, longest_duration: float = LONGEST_STEP) -> CovarianceOverTime:
     """Covariance of the state along a free force-excited run under white noise, given the noise's standard deviation
     (N) per sample.
 
-    longest : of the steps (s). Raises ValueError for any other run and for samples that a spline goes through:
+    longest_duration : of the steps (s). Raises ValueError for any other run and for samples that a spline goes through:
     every sample of a spline reaches into all periods.
     """
-    path = path_of(assembly, longest)
+    path = path_of(assembly, longest_duration)
     if assembly.scene.effects["wheel_forces"].interpolation == "smooth":
         raise ValueError("the noise of samples that a spline goes through has no recursion: hold it, or take it linear")
     return CovarianceOverTime(path.forces.period * np.arange(path.samples + 1), noise_covariances(path, deviation))
@@ -295,19 +303,21 @@ def noise_covariances(path: TangentPath, deviation: float) -> np.ndarray:
 
 
 def _compile_covariance(one_step, key):
-    def covariance_march(y, per_sample, given, p, intensity, matrices):
+    def covariance_march(y, per_sample, step_inputs, p, intensity, matrices):
         """Run the covariance recursion of this file; x holds the columns of Phi, G0 and G1."""
-        x, before = np.empty((12, 8)), np.zeros((2, 8))
+        x, last_end_response = np.empty((12, 8)), np.zeros((2, 8))
         for i in range(len(matrices) - 1):
             x[:] = 0.0
             for j in range(8):
                 x[j, j] = 1.0
             for j in range(per_sample):
-                one_step(y, x, given, i * per_sample + j, 2 * j, p, p)
-            moved, begun, ended = x[:8], x[8:10], x[10:]
-            cross = intensity * moved.T @ before.T @ begun
-            matrices[i + 1] = moved.T @ matrices[i] @ moved + intensity * (begun.T @ begun + ended.T @ ended)
+                one_step(y, x, step_inputs, i * per_sample + j, 2 * j, p, p)
+            transition, start_response, ended = x[:8], x[8:10], x[10:]
+            cross = intensity * transition.T @ last_end_response.T @ start_response
+            matrices[i + 1] = transition.T @ matrices[i] @ transition + intensity * (
+                start_response.T @ start_response + ended.T @ ended
+            )
             matrices[i + 1] += cross + cross.T
-            before[:] = ended
+            last_end_response[:] = ended
 
     return compiled(covariance_march, key)

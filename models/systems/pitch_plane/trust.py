@@ -82,13 +82,13 @@ class GrowthCurve:
 def pitch_error_growth(assembly: Assembly) -> Growth:
     """Growth of a pitch error along a free force-excited run; raises ValueError for a run of another kind."""
     path = path_of(assembly)
-    times = path.forces.period * np.arange(path.samples + 1)
+    sample_times = path.forces.period * np.arange(path.samples + 1)
     if assembly.mode == "force-body" or assembly.vehicle.geometry == "linear":
-        return Growth(times, 0.0, np.zeros(len(times)))
+        return Growth(sample_times, 0.0, np.zeros(len(sample_times)))
     values, p = _covering_samples(path), assembly.parameters
     rate = pitch_rate_of_forces(values, path.forces.period, p)
     arguments = (rate, path.forces.period, p)
-    return Growth(times, growth_rate(*arguments), sinh_law_rate(*arguments))
+    return Growth(sample_times, growth_rate(*arguments), sinh_law_rate(*arguments))
 
 
 def _covering_samples(path: TangentPath) -> np.ndarray:
@@ -115,20 +115,22 @@ def interpolation_error(path: TangentPath) -> np.ndarray:
     spline as late as that, and err by -f'' T^2 / 24 on average.
     """
     spline = Smooth(_covering_samples(path), path.forces.period, degree=5)
-    count, given = path.steps, path.forces_at_stages
+    count, stage_forces = path.steps, path.forces_at_stages
     late = path.forces.period / 2 if path.forces.held else 0.0
     true = spline.sample(-late, path.step / 2, 2 * count + 1)
-    read = [given] * 3 if path.forces.held else [given[0:-1:2], given[1::2], given[2::2]]
+    read = [stage_forces] * 3 if path.forces.held else [stage_forces[0:-1:2], stage_forces[1::2], stage_forces[2::2]]
     return np.stack([read[0] - true[0:-1:2], read[1] - true[1::2], read[2] - true[2::2]], axis=1).reshape(3 * count, 2)
 
 
-def interpolation(assembly: Assembly, longest: float = LONGEST_STEP) -> GrowthCurve:
+def interpolation(assembly: Assembly, longest_duration: float = LONGEST_STEP) -> GrowthCurve:
     """Pitch error from the interpolation between samples alone; 0 for a run with too few samples to estimate it."""
-    path = path_of(assembly, longest)
+    path = path_of(assembly, longest_duration)
     return _growth_by_parameters(path, interpolation_error(path) if path.samples >= FEWEST_SAMPLES else None)
 
 
-def model_error_curve(assembly: Assembly, wrong_parameters: Parameters, longest: float = LONGEST_STEP) -> GrowthCurve:
+def model_error_curve(
+    assembly: Assembly, wrong_parameters: Parameters, longest_duration: float = LONGEST_STEP
+) -> GrowthCurve:
     """Pitch error of a run with the parameters ``wrong_parameters`` instead of the assembly's.
 
     The error that drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine
@@ -139,7 +141,9 @@ def model_error_curve(assembly: Assembly, wrong_parameters: Parameters, longest:
     change = {name: getattr(wrong_parameters, name) - value for name, value in parameters.items()}
     mean = Parameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
     shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
-    return _growth_by_parameters(path_of(replace(assembly, parameters=mean), longest), wrong_parameters=shifted)
+    return _growth_by_parameters(
+        path_of(replace(assembly, parameters=mean), longest_duration), wrong_parameters=shifted
+    )
 
 
 def _growth_by_parameters(
@@ -156,9 +160,10 @@ def rounding_error_curve(assembly: Assembly) -> GrowthCurve:
     """
     growing, path = pitch_error_growth(assembly), path_of(assembly)
     rate = pitch_rate_of_forces(_covering_samples(path), path.forces.period, assembly.parameters)
-    each = np.finfo(float).eps * float(np.sqrt(np.mean(rate**2))) / math.sqrt(12)
+    rounding_deviation = np.finfo(float).eps * float(np.sqrt(np.mean(rate**2))) / math.sqrt(12)
     return GrowthCurve(
-        growing.times, MEDIAN_OF_NORMAL * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, each**2 / path.step))
+        growing.times,
+        MEDIAN_OF_NORMAL * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, rounding_deviation**2 / path.step)),
     )
 
 
@@ -183,14 +188,14 @@ class Trust:
 
     def __str__(self) -> str:
         """The line that describes this trust in a plan."""
-        grown, rest = (
+        grown, remarks = (
             f"{self.angle:g} rad, growth rate {self.rate:.3g} 1/s",
             self.unchecked_text and f"; {self.unchecked_text}",
         )
         if self.until is None:
-            return f"nothing known limits this run ({grown}; looked at: {', '.join(self.times)}){rest}"
+            return f"nothing known limits this run ({grown}; looked at: {', '.join(self.times)}){remarks}"
         name, time = self.until
-        return f"trusted until about {time:.3g} s ({grown}, {name}){rest}"
+        return f"trusted until about {time:.3g} s ({grown}, {name}){remarks}"
 
 
 def predict_trust(assembly: Assembly, angle: float = UNTRUSTED_PITCH) -> Trust | None:
@@ -203,14 +208,14 @@ def predict_trust(assembly: Assembly, angle: float = UNTRUSTED_PITCH) -> Trust |
     except ValueError:
         return None
     assert isinstance(forces, Sampled | Smooth)
-    times = {"interpolation between the samples": interpolation(assembly).passing_time(angle)}
+    times_of_causes = {"interpolation between the samples": interpolation(assembly).passing_time(angle)}
     added = assembly.scene.effects.get("force_noise")
     if added is not None and added.deviation > 0:
         named = f"noise of {added.deviation:g} N at {1 / forces.period:g} Hz"
-        times[named] = noise(assembly, added.deviation).passing_time(angle)
-    times |= _steady_drift_time(assembly, angle)
-    times["rounding"] = rounding_error_curve(assembly).passing_time(angle)
-    return Trust(times, pitch_error_growth(assembly).rate, angle, _unchecked_sentence(assembly))
+        times_of_causes[named] = noise(assembly, added.deviation).passing_time(angle)
+    times_of_causes |= _steady_drift_time(assembly, angle)
+    times_of_causes["rounding"] = rounding_error_curve(assembly).passing_time(angle)
+    return Trust(times_of_causes, pitch_error_growth(assembly).rate, angle, _unchecked_sentence(assembly))
 
 
 def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
@@ -222,13 +227,13 @@ def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
     from models.measured.axle_forces import equilibrium_residual
 
     p, motion = assembly.parameters, equilibrium_residual(_axles(assembly))
-    ways = {"mean of the wheel forces": angle * (p.a + p.b), "balance of the axles": angle}
+    limits_of_motion = {"mean of the wheel forces": angle * (p.a + p.b), "balance of the axles": angle}
     return {
-        name: math.sqrt(2 * way / abs(acceleration))
-        for (name, way), acceleration, seen in zip(
-            ways.items(), motion.accelerations.tolist(), motion.is_beyond_uncertainty, strict=True
+        name: math.sqrt(2 * limit_of_motion / abs(acceleration))
+        for (name, limit_of_motion), acceleration, is_significant in zip(
+            limits_of_motion.items(), motion.accelerations.tolist(), motion.is_beyond_uncertainty, strict=True
         )
-        if seen
+        if is_significant
     }
 
 

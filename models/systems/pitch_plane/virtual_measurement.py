@@ -32,9 +32,9 @@ BuildFollower = Callable[[Mapping[str, float], Mapping[str, Any]], Scene]
 """Builder of a force-excited scene from overrides of parameters and further effects."""
 
 
-def perturbed_parameters(p: Parameters, factors: Mapping[str, float] = PAPER_FACTORS) -> dict[str, float]:
-    """Changed parameters by name: each is the value in ``p`` times its factor."""
-    return {name: getattr(p, name) * factor for name, factor in factors.items()}
+def perturbed_parameters(parameters: Parameters, factors: Mapping[str, float] = PAPER_FACTORS) -> dict[str, float]:
+    """Changed parameters by name: each is the value in ``parameters`` times its factor."""
+    return {name: getattr(parameters, name) * factor for name, factor in factors.items()}
 
 
 def measure(scene: Scene, error: bool = False) -> Result:
@@ -85,19 +85,19 @@ def steps_per_sample(scene: Scene, sampling_rate: float) -> int:
     return round(ratio)
 
 
-def write_wheel_forces(folder: Path, front: np.ndarray, rear: np.ndarray, period: float) -> None:
-    """Write ``wheel_forces.csv`` with forces (n,) in N, up on the wheels, every ``period`` (s)."""
-    write_time_series(folder / "wheel_forces.csv", {"front": ("N", front), "rear": ("N", rear)}, period)
+def write_wheel_forces(folder: Path, front: np.ndarray, rear: np.ndarray, sample_period: float) -> None:
+    """Write ``wheel_forces.csv`` with forces (n,) in N, up on the wheels, every ``sample_period`` (s)."""
+    write_time_series(folder / "wheel_forces.csv", {"front": ("N", front), "rear": ("N", rear)}, sample_period)
 
 
-def write_measurement(measured_run: Result, folder: Path, period: float) -> float:
-    """Write ``wheel_forces.csv`` and ``pitch.csv`` with a sample every ``period`` (s); returns the largest force
+def write_measurement(measured_run: Result, folder: Path, sample_period: float) -> float:
+    """Write ``wheel_forces.csv`` and ``pitch.csv`` with a sample every ``sample_period`` (s); returns the largest force
     (N).
     """
-    every = round(period / float(measured_run.times[1] - measured_run.times[0]))
-    front, rear, pitch = (measured_run[name][::every] for name in ("f1", "f2", "pitch"))
-    write_wheel_forces(folder, front, rear, period)
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, period)
+    stride = round(sample_period / float(measured_run.times[1] - measured_run.times[0]))
+    front, rear, pitch = (measured_run[name][::stride] for name in ("f1", "f2", "pitch"))
+    write_wheel_forces(folder, front, rear, sample_period)
+    write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, sample_period)
     return float(max(np.abs(front).max(), np.abs(rear).max()))
 
 

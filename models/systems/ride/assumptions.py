@@ -43,39 +43,45 @@ def assumptions(
     replaced : whether statistical linearisation replaces nonlinear springs by gains.
     """
 
-    def of(name: str) -> np.ndarray | Gaussian:
+    def values_of(name: str) -> np.ndarray | Gaussian:
         assert motion is not None
         return motion.of(name)
 
-    whole = [*_tyres(vehicle, of), *_angle_assumptions(vehicle, of), *_slip_assumptions(vehicle, of)]
+    assumptions_of_vehicle = [
+        *_tyres(vehicle, values_of),
+        *_angle_assumptions(vehicle, values_of),
+        *_slip_assumptions(vehicle, values_of),
+    ]
     for spring in vehicle.springs:
-        whole += (
-            _curve_assumptions(scene, spring, of) if spring.bent else _travel_assumptions(scene, vehicle, spring, of)
+        assumptions_of_vehicle += (
+            _curve_assumptions(scene, spring, values_of)
+            if spring.bent
+            else _travel_assumptions(scene, vehicle, spring, values_of)
         )
-    whole += [*_wave_assumptions(scene, vehicle), *_seat_assumptions(scene)]
-    return [*whole, *([NEARLY_GAUSSIAN] if replaced else [])]
+    assumptions_of_vehicle += [*_wave_assumptions(scene, vehicle), *_seat_assumptions(scene)]
+    return [*assumptions_of_vehicle, *([NEARLY_GAUSSIAN] if replaced else [])]
 
 
 ValuesByName = Callable[[str], np.ndarray | Gaussian]
 
 
-def _tyres(vehicle: SpatialVehicle, of: ValuesByName) -> Iterator[Assumption]:
+def _tyres(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumption]:
     loads = static_loads(vehicle)
     if not loads or vehicle.lifts:
         return
 
     def watched(run: Result) -> Watched:
-        return {f"tyre {name}": _raised_by(of(f"load {name}"), load) for name, load in loads.items()}
+        return {f"tyre {name}": _raised_by(values_of(f"load {name}"), load) for name, load in loads.items()}
 
     remedy = f'{IN_TIME} with [effects.lift_off] and vehicle.operating_point = "loaded", whose tyres only push'
     yield Assumption("tyres press", "linear tyres stay on the road", remedy, watched, "N", lower_limit=-PULL_LIMIT)
 
 
-def _raised_by(values: np.ndarray | Gaussian, by: float) -> np.ndarray | Gaussian:
-    return replace(values, mean=values.mean + by) if isinstance(values, Gaussian) else values + by
+def _raised_by(values: np.ndarray | Gaussian, static_load: float) -> np.ndarray | Gaussian:
+    return replace(values, mean=values.mean + static_load) if isinstance(values, Gaussian) else values + static_load
 
 
-def _angle_assumptions(vehicle: SpatialVehicle, of: ValuesByName) -> Iterator[Assumption]:
+def _angle_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumption]:
     turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in AXES]
     if turning:
         names = {"rx": "roll", "ry": "pitch", "rz": "yaw"}
@@ -83,20 +89,20 @@ def _angle_assumptions(vehicle: SpatialVehicle, of: ValuesByName) -> Iterator[As
             "small angles",
             "bodies turn so little that sines are angles",
             "take a smoother road or a slower speed: ride is small motion",
-            lambda run: {f"{names[f]} of {body}": of(f"{f} {body}") for body, f in turning},
+            lambda run: {f"{names[f]} of {body}": values_of(f"{f} {body}") for body, f in turning},
             "rad",
             -SMALL_ANGLE,
             SMALL_ANGLE,
         )
 
 
-def _slip_assumptions(vehicle: SpatialVehicle, of: ValuesByName) -> Iterator[Assumption]:
+def _slip_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumption]:
     if vehicle.side_forces:
         yield Assumption(
             "small slip",
             "side forces of tyres grow in proportion to slip angles",
             "use the system handling, whose tyres saturate",
-            lambda run: {f"side force {force.name}": of(f"slip {force.name}") for force in vehicle.side_forces},
+            lambda run: {f"side force {force.name}": values_of(f"slip {force.name}") for force in vehicle.side_forces},
             "rad",
             -LARGEST_SLIP_ANGLE,
             LARGEST_SLIP_ANGLE,
@@ -104,7 +110,7 @@ def _slip_assumptions(vehicle: SpatialVehicle, of: ValuesByName) -> Iterator[Ass
 
 
 def _travel_assumptions(
-    scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, of: ValuesByName
+    scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, values_of: ValuesByName
 ) -> Iterator[Assumption]:
     """Assumption that the linear spring between a wheel and the body that it carries stays within its free travel."""
     wheels = {tyre.body for tyre in vehicle.tyres}
@@ -116,14 +122,14 @@ def _travel_assumptions(
         f"free travel of {spring.name}",
         f"the suspension {spring.name} meets no stop",
         f"give its spring in the vehicle file a travel_force with stops, and {IN_TIME}",
-        lambda run: {spring.name: of(f"travel {spring.name}")},
+        lambda run: {spring.name: values_of(f"travel {spring.name}")},
         "m",
         -free,
         free,
     )
 
 
-def _curve_assumptions(scene: RideScene, spring: SpringDamper, of: ValuesByName) -> Iterator[Assumption]:
+def _curve_assumptions(scene: RideScene, spring: SpringDamper, values_of: ValuesByName) -> Iterator[Assumption]:
     """Assumption on a nonlinear spring: its motion stays within the straight piece about rest if slopes at rest are
     used, else within its tables.
     """
@@ -147,20 +153,20 @@ def _curve_assumptions(scene: RideScene, spring: SpringDamper, of: ValuesByName)
             f"{kind} of {spring.name}",
             says,
             remedy,
-            lambda run, name=f"{kind} {spring.name}": {spring.name: of(name)},  # type: ignore[misc]
+            lambda run, name=f"{kind} {spring.name}": {spring.name: values_of(name)},  # type: ignore[misc]
             unit,
             low,
             high,
         )
 
 
-def _curve_range(curve: Curve | None, small: bool) -> tuple[float, float]:
+def _curve_range(curve: Curve | None, small_motion: bool) -> tuple[float, float]:
     """Ends of a curve's table or, for small motion, of the straight piece about rest."""
     if curve is None:
         return -np.inf, np.inf
-    at = np.array(curve.arguments)
-    if not small:
-        return float(at[0]), float(at[-1])
+    curve_arguments = np.array(curve.arguments)
+    if not small_motion:
+        return float(curve_arguments[0]), float(curve_arguments[-1])
     _, _, corners, bends = curve.hinges()
     bent = np.array(corners)[np.array(bends) != 0.0] if corners else np.zeros(0)
     if (bent == 0.0).any():  # no slope at rest stands for a corner at rest, however small the motion is
@@ -184,11 +190,11 @@ def _wave_assumptions(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Ass
         return wheels | body
 
     if hop or bounce:
-        least = f"from {SHORTEST_WAVE * hop:.2g} " if hop else ""
+        least_text = f"from {SHORTEST_WAVE * hop:.2g} " if hop else ""
         yield Assumption(
             "waves of the road",
             "waves that swing wheels and body are as long as those of which spectra of roads are known",
-            f"take speeds {least}to {LONGEST_WAVE * bounce:.2g} m/s, or a measured road",
+            f"take speeds {least_text}to {LONGEST_WAVE * bounce:.2g} m/s, or a measured road",
             watched,
             "m",
             SHORTEST_WAVE,
@@ -213,7 +219,7 @@ def tyre_mode_frequencies(vehicle: SpatialVehicle) -> tuple[float, float]:
 
 def _seat_assumptions(scene: RideScene) -> Iterator[Assumption]:
     """Assumption that people stay on their seats, for outputs that are weighted for people along the vertical."""
-    people = [name for name, by in scene.weighting.items() if by == "Wk"]
+    people = [name for name, weighting_name in scene.weighting.items() if weighting_name == "Wk"]
     if not people:
         return
 
@@ -222,8 +228,8 @@ def _seat_assumptions(scene: RideScene) -> Iterator[Assumption]:
         if deviation.ndim == 3:
             deviation = deviation[0]
         rows = [f"at {speed:g} m/s" for speed in run["speed"]] if "speed" in run.data.coords else []
-        each = {name: deviation[:, outputs.index(name)] for name in people if name in outputs}
-        return {name: Gaussian(np.zeros(len(values)), values, rows) for name, values in each.items()}
+        deviations = {name: deviation[:, outputs.index(name)] for name in people if name in outputs}
+        return {name: Gaussian(np.zeros(len(values)), values, rows) for name, values in deviations.items()}
 
     yield Assumption(
         "people stay seated",

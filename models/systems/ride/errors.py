@@ -54,27 +54,28 @@ def with_error_of_sweep(
     run: Result, swept: Sweep, linear: Linear, roads: Mapping[str, Excitation], filters: Mapping[str, str], digit: float
 ) -> Result:
     """The result with the rounding errors of its standard deviations, estimated at some speeds on all roads."""
-    at = np.unique(np.linspace(0, len(swept.speeds) - 1, CHECKED_SPEEDS).round().astype(int))
+    checked_speeds = np.unique(np.linspace(0, len(swept.speeds) - 1, CHECKED_SPEEDS).round().astype(int))
     recomputed = np.array(
         [
-            [_deviations_of_changed(linear, road, filters, float(swept.speeds[i]), digit) for i in at]
+            [_deviations_of_changed(linear, road, filters, float(swept.speeds[i]), digit) for i in checked_speeds]
             for road in roads.values()
         ]
     )
-    deviation = swept.deviation[:, at]
+    deviation = swept.deviation[:, checked_speeds]
     known = np.isfinite(deviation) & np.isfinite(recomputed)
-    sizes, told = [root_mean_square(deviation[..., i][known[..., i]]) for i in range(len(swept.outputs))], {}
+    sizes, estimates = [root_mean_square(deviation[..., i][known[..., i]]) for i in range(len(swept.outputs))], {}
     largest = {
-        unit: max(size for size, of in zip(sizes, swept.units, strict=True) if of == unit) for unit in swept.units
+        unit: max(size for size, unit_of_output in zip(sizes, swept.units, strict=True) if unit_of_output == unit)
+        for unit in swept.units
     }
     for i, (name, unit, size) in enumerate(zip(swept.outputs, swept.units, sizes, strict=True)):
         if size > 0.0:
-            there = known[..., i]
-            changes = recomputed[..., i][there] - deviation[..., i][there]
+            is_known = known[..., i]
+            changes = recomputed[..., i][is_known] - deviation[..., i][is_known]
             error = max(SAFETY_FACTOR * root_mean_square(changes), MATRIX_ACCURACY / 4.0 * size)
-            told[name] = Estimate(error, unit, error / max(size, STILL * largest[unit]), 1.0, 0.0)
-    points = f"{len(at)} of {len(swept.speeds)} speeds"
-    return with_stated_errors(run, told, f"the Lyapunov equation of nudged matrices at {points}", "")
+            estimates[name] = Estimate(error, unit, error / max(size, STILL * largest[unit]), 1.0, 0.0)
+    points = f"{len(checked_speeds)} of {len(swept.speeds)} speeds"
+    return with_stated_errors(run, estimates, f"the Lyapunov equation of nudged matrices at {points}", "")
 
 
 def _deviations_of_changed(

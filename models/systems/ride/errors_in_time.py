@@ -38,7 +38,11 @@ DeviationsAtConstantSpeed = Callable[[int], np.ndarray]
 
 
 def with_error_of_drive(
-    run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: DeviationsAtConstantSpeed
+    run: Result,
+    scene: RideScene,
+    linear: LinearVehicle,
+    road: Excitation,
+    quasi_stationary_of: DeviationsAtConstantSpeed,
 ) -> Result:
     """The result with the errors of its deviations. They are estimated by the same drive in longer steps that end with
     its own, and by fewer speeds between which quasi-stationary deviations are interpolated linearly. Shares are of the
@@ -51,38 +55,53 @@ def with_error_of_drive(
     profile, step = scene.drive.profile(scene.file), float(np.diff(drive.time).max())
     shown = np.isfinite(drive.deviation).all(axis=0)
 
-    def series(time: np.ndarray, deviation: np.ndarray, each: np.ndarray) -> Series:
+    def series(time: np.ndarray, deviation: np.ndarray, quasi_stationary_rows: np.ndarray) -> Series:
         channels = {str(name): deviation[:, i] for i, name in enumerate(drive.names) if shown[i]}
-        apart = {
-            f"{name}{SPEED_BY_SPEED}": each[:, i] for i, name in enumerate(drive.names) if np.isfinite(each[:, i]).all()
+        speed_by_speed = {
+            f"{name}{SPEED_BY_SPEED}": quasi_stationary_rows[:, i]
+            for i, name in enumerate(drive.names)
+            if np.isfinite(quasi_stationary_rows[:, i]).all()
         }
-        return Series(time, channels | apart)
+        return Series(time, channels | speed_by_speed)
 
-    def rerun(times: float, share: float) -> Series:
-        every = max(1, round(times))
+    def rerun(step_factor: float, share: float) -> Series:
+        stride = max(1, round(step_factor))
         end = drive.time[0] + share * (drive.time[-1] - drive.time[0])
-        wanted = drive.time[::every][drive.time[::every] <= end + 1e-9]
-        if times < 1.0 or len(wanted) < 2:
+        wanted = drive.time[::stride][drive.time[::stride] <= end + 1e-9]
+        if step_factor < 1.0 or len(wanted) < 2:
             raise RunFailed(str(run.data.attrs["engine"]), "the drive cannot be repeated in other steps")
         cut = _drive_until(profile, float(wanted[-1]))
         coarse = varying_speed(
-            linear, road, cut, weightings=scene.weighting, instants=wanted, reach=1.01 * times * LARGEST_RATE_TIMES_STEP
+            linear,
+            road,
+            cut,
+            weightings=scene.weighting,
+            instants=wanted,
+            largest_rate_times_step=1.01 * step_factor * LARGEST_RATE_TIMES_STEP,
         )
         rows = np.abs(coarse.time[:, None] - wanted).argmin(axis=0)
-        return series(coarse.time[rows], coarse.deviation[rows], alone(every)[::every][: len(wanted)])
+        return series(coarse.time[rows], coarse.deviation[rows], quasi_stationary_of(stride)[::stride][: len(wanted)])
 
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
     units |= {f"{name}{SPEED_BY_SPEED}": unit for name, unit in units.items()}
     fine = series(drive.time, drive.deviation, run["quasi_stationary"])._replace(units=units)
-    sizes = {name: root_mean_square(deviations) for name, deviations in fine.channels.items()}
-    return estimated(run, fine, rerun, DRIVE_ORDER, step, sizes=sizes)
+    return estimated(
+        run,
+        fine,
+        rerun,
+        DRIVE_ORDER,
+        step,
+        channel_sizes={
+            name: root_mean_square(quasi_stationary_rows) for name, quasi_stationary_rows in fine.channels.items()
+        },
+    )
 
 
-def _drive_until(profile: SpeedProfile, end: float) -> SpeedProfile:
+def _drive_until(profile: SpeedProfile, end_time: float) -> SpeedProfile:
     """The drive cut off at a time (s)."""
-    before = profile.times < end - 1e-9
-    times = [*profile.times[before], end]
-    return SpeedProfile(times, [*profile.speeds[before], float(profile.speed(end))])
+    is_before = profile.times < end_time - 1e-9
+    kept_times = [*profile.times[is_before], end_time]
+    return SpeedProfile(kept_times, [*profile.speeds[is_before], float(profile.speed(end_time))])
 
 
 def with_error_of_copies(
@@ -101,17 +120,19 @@ def with_error_of_copies(
     """
     first = next(iter(copies.values()))
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
-    size = _over_speeds([each.deviation for each in copies.values()])
-    chance = _over_speeds([each.error / (2.0 * each.deviation) for each in copies.values()])
-    steps = [_of_steps(vehicle, road, speed, each, seed) for speed, each in copies.items()]
-    told = {}
+    size = _over_speeds([copies_at_speed.deviation for copies_at_speed in copies.values()])
+    chance = _over_speeds(
+        [copies_at_speed.error / (2.0 * copies_at_speed.deviation) for copies_at_speed in copies.values()]
+    )
+    steps = [_of_steps(vehicle, road, speed, copies_at_speed, seed) for speed, copies_at_speed in copies.items()]
+    estimates = {}
     for i, name in enumerate(first.names):
         if size[i] > 0.0:
             error, order = max(((row[i], orders[i]) for row, orders in steps), key=lambda pair: pair[0])
-            told[f"{name}, copies"] = Estimate(error, units[name], error / size[i], order, first.step)
+            estimates[f"{name}, copies"] = Estimate(error, units[name], error / size[i], order, first.step)
     if equivalents:
-        told |= _of_gains(equivalents, copies, units)
-    with_stated_errors(run, told, "the copies in longer steps, and gains beside copies")
+        estimates |= _of_gains(equivalents, copies, units)
+    with_stated_errors(run, estimates, "the copies in longer steps, and gains beside copies")
     scatter = {
         f"{name}, copies": by_chance(float(chance[i]), float(size[i]), units[name], len(first.moments[0]))
         for i, name in enumerate(first.names)
@@ -126,12 +147,14 @@ def _over_speeds(rows: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _of_steps(
-    vehicle: SpatialVehicle, road: Excitation, speed: float, fine: Copies, seed: int
+    vehicle: SpatialVehicle, road: Excitation, speed: float, fine_copies: Copies, seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Errors (p,) that the steps cause in the copies' standard deviations at a speed, and observed orders (p,)."""
-    twice, fourfold = (coarser_variances(vehicle, road, speed, fine, times, seed) for times in (2, 4))
+    twice, fourfold = (
+        coarser_variances(vehicle, road, speed, fine_copies, step_factor, seed) for step_factor in (2, 4)
+    )
     count = len(twice)
-    deviation = np.sqrt(fine.about_mean()[:count].mean(axis=0))
+    deviation = np.sqrt(fine_copies.about_mean()[:count].mean(axis=0))
     coarse, coarser = np.sqrt(twice.mean(axis=0)), np.sqrt(fourfold.mean(axis=0))
     pairs = zip(abs(deviation - coarse), abs(coarse - coarser), strict=True)
     order = np.array([observed_order(float(a), float(b), COPIES_ORDER) for a, b in pairs])
@@ -144,16 +167,16 @@ def _of_gains(
     """Errors of the standard deviations by statistical linearisation, from their difference to those of the copies at
     the copies' speeds.
     """
-    beside = [(equivalents[speed], each) for speed, each in copies.items()]
-    gains = np.array([each.covariance.deviation for each, _ in beside])
-    true = np.array([each.deviation for _, each in beside])
-    scatter = np.array([each.error / (2.0 * each.deviation) for _, each in beside])
-    left = np.array([each.left_out for each, _ in beside])
+    pairs = [(equivalents[speed], copies_at_speed) for speed, copies_at_speed in copies.items()]
+    gains = np.array([copies_at_speed.covariance.deviation for copies_at_speed, _ in pairs])
+    true = np.array([copies_at_speed.deviation for _, copies_at_speed in pairs])
+    scatter = np.array([copies_at_speed.error / (2.0 * copies_at_speed.deviation) for _, copies_at_speed in pairs])
+    left = np.array([copies_at_speed.left_out for copies_at_speed, _ in pairs])
     errors = np.sqrt(np.maximum((gains - true) ** 2 - scatter**2, (LEAST_LEFT * left * gains) ** 2))
-    told = {}
-    for i, name in enumerate(beside[0][1].names):
+    estimates = {}
+    for i, name in enumerate(pairs[0][1].names):
         known = np.isfinite(errors[:, i]) & (gains[:, i] > 0.0) & np.isfinite(gains[:, i])
         if known.any():
             error, size = root_mean_square(errors[known, i]), root_mean_square(gains[known, i])
-            told[f"{name}, gains"] = Estimate(error, units[name], error / size, 1.0, 0.0)
-    return told
+            estimates[f"{name}, gains"] = Estimate(error, units[name], error / size, 1.0, 0.0)
+    return estimates

@@ -44,8 +44,8 @@ def _in_exudyn(vehicle: SpatialVehicle, export_subject: ExportSubject, by_speed:
     built = assemble(vehicle, None, RoadRows(np.zeros((1, 2 * len(vehicle.tyres))), 0.0))
     mbs = built.mbs
     mbs.Assemble()
-    places = [built.places[place] for place in vehicle.coordinates()]
-    columns = [mbs.GetNodeODE2Index(node) + index for node, index in places]
+    node_indices = [built.places[coordinate] for coordinate in vehicle.coordinates()]
+    columns = [mbs.GetNodeODE2Index(node) + index for node, index in node_indices]
     names = dict(zip(coordinate_names(vehicle), columns, strict=True))
     return of_exudyn(mbs, names, export_subject, [*functions(mbs), *by_speed])
 

@@ -78,12 +78,12 @@ class Nonlinear:
 
     def of(self, name: str) -> np.ndarray:
         """One quantity (N, p) of the statistically linearised vehicles, by its name."""
-        return np.array([getattr(each, name) for each in self.linearised_vehicles])
+        return np.array([getattr(linearised, name) for linearised in self.linearised_vehicles])
 
     @property
     def deviation(self) -> np.ndarray:
         """Standard deviations (N, p) by statistical linearisation."""
-        return np.array([each.covariance.deviation for each in self.linearised_vehicles])
+        return np.array([linearised.covariance.deviation for linearised in self.linearised_vehicles])
 
 
 def linearised_result(
@@ -96,24 +96,26 @@ def linearised_result(
     """
     assert scene.speeds is not None
     speeds, road = scene.speeds.all(), excitation_of(scene, wheels(vehicle))
-    linear, on_road, begun = linear_vehicle(vehicle), vehicle.with_tyres(pushes_only=False), time.process_time()
+    linear, on_road, start_time = linear_vehicle(vehicle), vehicle.with_tyres(pushes_only=False), time.process_time()
     small, replaced = [], []
     for i, speed in enumerate(speeds):
         progress("statistical linearisation", 0.3 * i / len(speeds))
         small.append(stationary_covariance(vehicle_with_road(linear(speed), road, speed)).deviation)
         replaced.append(statistically_linear(on_road, road, speed))
     shown = sampling.shown(speeds)
-    beside = sampling.beside or [shown]
-    copies = _copies_by_speed(scene, CopiesBySpeed(vehicle, road, tuple(beside), sampling), progress)
+    compared_speeds = sampling.beside or [shown]
+    copies = _copies_by_speed(scene, CopiesBySpeed(vehicle, road, tuple(compared_speeds), sampling), progress)
     at_shown = statistically_linear(on_road, road, shown)
     linear_runs = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
     by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small_motion}
-    by_speed |= {part: linear_runs.of(part) for part in ("mean", "left_out")}
+    by_speed |= {field_name: linear_runs.of(field_name) for field_name in ("mean", "left_out")}
     of_copies = {"deviation": "deviation", "mean": "mean", "variance_error": "error", "kurtosis": "kurtosis"}
     channels = {name: Channel(("speed", "output"), values) for name, values in by_speed.items()}
     channels |= {
-        f"copies_{name}": Channel(("speed_of_copies", "output"), [getattr(each, part) for each in copies.values()])
-        for name, part in of_copies.items()
+        f"copies_{name}": Channel(
+            ("speed_of_copies", "output"), [getattr(copies_at_speed, field_name) for copies_at_speed in copies.values()]
+        )
+        for name, field_name in of_copies.items()
     }
     labelled = result(
         scene,
@@ -125,8 +127,8 @@ def linearised_result(
             "speed_of_copies": Channel("speed_of_copies", list(copies), "m/s"),
         },
         engine="reference",
-        counts={"iterations": sum(len(each.gain_changes) for each in replaced)},
-        seconds=time.process_time() - begun,
+        counts={"iterations": sum(len(copies_at_speed.gain_changes) for copies_at_speed in replaced)},
+        seconds=time.process_time() - start_time,
         detail=linear_runs,
         **({"tyres": "lift in copies alone"} if vehicle.lifts else {}),
     )
@@ -149,8 +151,11 @@ class CopiesBySpeed:
 
     def __call__(self, paths: range) -> Arrays:
         """Arrays of ``Copies``; the first axis of each is the speed."""
-        made = [self._copies_at_speed(self.speeds[i]) for i in paths]
-        return {name: np.array([getattr(each, name) for each in made]) for name in Copies.__dataclass_fields__}
+        copies_of_speeds = [self._copies_at_speed(self.speeds[i]) for i in paths]
+        return {
+            name: np.array([getattr(copies_at_speed, name) for copies_at_speed in copies_of_speeds])
+            for name in Copies.__dataclass_fields__
+        }
 
     def _copies_at_speed(self, speed: float) -> Copies:
         s = self.sampling
@@ -167,12 +172,12 @@ def _copies_by_speed(scene: RideScene, job: CopiesBySpeed, progress: Progress) -
     def tell(state: Done) -> None:
         progress(f"Monte Carlo at {state.done} of {state.paths} speeds", 0.3 + 0.4 * state.done / state.paths)
 
-    with Crew.of(scene, usual=1).at_work(len(job.speeds)) as pool:
-        made = run_paths(job, len(job.speeds), None, pool, Blocks(1), tell)
+    with Crew.of(scene, default_workers=1).at_work(len(job.speeds)) as pool:
+        arrays = run_paths(job, len(job.speeds), None, pool, Blocks(1), tell)
     return {
         speed: Copies(tuple(names.tolist()), moments, float(step), float(duration), int(settling))
         for speed, names, moments, step, duration, settling in zip(
-            job.speeds, *(made[name] for name in Copies.__dataclass_fields__), strict=True
+            job.speeds, *(arrays[name] for name in Copies.__dataclass_fields__), strict=True
         )
     }
 
@@ -181,8 +186,8 @@ def _replaced_at(
     vehicle: SpatialVehicle, road: Excitation, speed: float, speeds: np.ndarray, equivalents: list[StatisticallyLinear]
 ) -> StatisticallyLinear:
     """The statistically linearised vehicle at a speed (m/s), from ``equivalents`` if it is one of ``speeds``."""
-    at = np.flatnonzero(np.isclose(speeds, speed))
-    return equivalents[at[0]] if len(at) else statistically_linear(vehicle, road, speed)
+    matching = np.flatnonzero(np.isclose(speeds, speed))
+    return equivalents[matching[0]] if len(matching) else statistically_linear(vehicle, road, speed)
 
 
 def _motions_of_parts(
@@ -215,10 +220,14 @@ def in_engine(
     assert scene.speeds is not None
     speed, road = sampling.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
     path = road_path(road, speed, min(sampling.step or LONGEST_STEP, longest_resolving_step(vehicle, speed)))
-    begun, every, skipped = time.process_time(), max(1, round(2.0 * LONGEST_STEP / path.step)), sampling.skipped
+    start_time, row_interval, skipped = (
+        time.process_time(),
+        max(1, round(2.0 * LONGEST_STEP / path.step)),
+        sampling.skipped,
+    )
     if table is None:
         table = path.table(int(np.ceil(sampling.driven / path.step)), sampling.seed)
-    ride = ride_over(engine, vehicle, path, table, skipped=skipped, every=every)
+    ride = ride_over(engine, vehicle, path, table, skipped=skipped, every=row_interval)
     labelled = result(
         scene,
         {"output_value": Channel(("time", "output"), ride.outputs)},
@@ -229,13 +238,15 @@ def in_engine(
         },
         engine=engine,
         counts={"steps": len(ride.run.positions) - 1},
-        seconds=time.process_time() - begun,
+        seconds=time.process_time() - start_time,
         detail=ride,
         speed=speed,
         step=path.step,
     )
-    at, seen = ride.rows, watched_vehicle(linearise(vehicle, speed), vehicle, speed)
-    motion = MotionInRun(seen, ride.run.positions[at], ride.run.rates[at], table[2 * at])
+    recorded_rows, watched = ride.rows, watched_vehicle(linearise(vehicle, speed), vehicle, speed)
+    motion = MotionInRun(
+        watched, ride.run.positions[recorded_rows], ride.run.rates[recorded_rows], table[2 * recorded_rows]
+    )
     with_assumptions(labelled, assumptions(scene, vehicle, motion))
     return _with_error_of_steps(labelled, engine, vehicle, path, table, skipped) if error else labelled
 
@@ -254,16 +265,19 @@ def _with_error_of_steps(
     steps = len(table) // 2
     first = ROWS_APART * int(min(skipped / path.step, FIRST_ROW_SHARE * steps) / ROWS_APART)
 
-    def series(ride: Ride, begin: float) -> Series:
+    def series(ride: Ride, begin_time: float) -> Series:
         known = ~np.isnan(ride.outputs).any(axis=0)
-        return Series(begin + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
+        return Series(begin_time + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
 
-    def rerun(times: float, share: float) -> Series:
-        longer, every = replace(path, half=times * path.half), max(1, round(ROWS_APART / times) if times <= 2.0 else 8)
-        count = int(REPEATED_SHARE * share * steps / times)
-        read = table[:: round(times)] if times >= 1.0 else _road_at_half_spacing(table)
+    def rerun(step_factor: float, share: float) -> Series:
+        longer, stride = (
+            replace(path, half=step_factor * path.half),
+            max(1, round(ROWS_APART / step_factor) if step_factor <= 2.0 else 8),
+        )
+        count = int(REPEATED_SHARE * share * steps / step_factor)
+        read = table[:: round(step_factor)] if step_factor >= 1.0 else _road_at_half_spacing(table)
         begin = first * path.step
-        ride = ride_over(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, every=every)
+        ride = ride_over(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, every=stride)
         return series(ride, begin)
 
     outputs = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, ROWS_APART))
@@ -342,8 +356,8 @@ def ride_over(
     steps = len(table) // 2
     model = _engine_model(engine, vehicle, road, table)
     run = model.run()
-    at = np.arange(int(np.ceil(skipped / road.step - 1e-9)), steps + 1, every)
-    return _outputs_at_steps(model, vehicle, road, table, run, at)
+    recorded_steps = np.arange(int(np.ceil(skipped / road.step - 1e-9)), steps + 1, every)
+    return _outputs_at_steps(model, vehicle, road, table, run, recorded_steps)
 
 
 def _engine_model(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> SpatialModel:

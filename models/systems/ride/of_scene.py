@@ -138,7 +138,7 @@ def fitted_road(scene: RideScene) -> "FittedRoad":
     road = scene.road
     assert road.file is not None
     path = scene.path(road.file, "road.file")
-    return fit_road(read_tracks(path, road.track_width, first=road.first, last=road.last))
+    return fit_road(read_tracks(path, road.track_width, first_station=road.first, last_station=road.last))
 
 
 def half_track_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> float:
@@ -177,8 +177,8 @@ def scene_errors(scene: RideScene) -> Iterator[None]:
             raise
         if error.place.partition(" ")[0] not in ("vehicle", "output"):
             raise InputError(scene.file, error.place, error.value, error.allowed) from None
-        what = error.allowed if error.place == "vehicle" else f"{error.place}: {error.allowed}"
-        raise InputError(scene.file, "vehicle.file", scene.vehicle.file, what) from None
+        allowed = error.allowed if error.place == "vehicle" else f"{error.place}: {error.allowed}"
+        raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed) from None
 
 
 def placed_wheels(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:

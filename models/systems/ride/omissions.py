@@ -34,7 +34,7 @@ def effects_of(scene: ReducedScene) -> tuple[Effect, ...]:
         for name, table in tables.items()
     }
     return tuple(
-        _with_needy(effect, tuple(other for other, table in tables.items() if name in table.NEEDS))
+        _with_needy(effect, tuple(dependent for dependent, table in tables.items() if name in table.NEEDS))
         for name in sorted(effects)
         for effect in effects[name]
     )
@@ -62,7 +62,7 @@ def anti_roll_bars(scene: ReducedScene) -> list[Effect]:
 
 
 def _without_bar(scene: ReducedScene, bar: str) -> ReducedScene:
-    bars = tuple(each for each in scene.vehicle.bars if each.name != bar)
+    bars = tuple(kept_bar for kept_bar in scene.vehicle.bars if kept_bar.name != bar)
     return replace(scene, vehicle=replace(scene.vehicle, bars=bars))
 
 
@@ -89,9 +89,9 @@ def body_mass(scene: ReducedScene) -> list[Effect]:
 
     effects = [effect(ALL_WHEELS, sorted(wheels), tuple(groups))]
     effects += [effect(name, bodies, (ALL_WHEELS,)) for name, bodies in groups.items() if len(axles) > 1]
-    others = wheels | {body.parent for body in vehicle.bodies}
-    most = LIGHT_BODY_SHARE * sum(body.mass for body in vehicle.bodies)
-    light = [body.name for body in vehicle.bodies if body.name not in others and body.mass < most]
+    carriers = wheels | {body.parent for body in vehicle.bodies}
+    largest_light_mass = LIGHT_BODY_SHARE * sum(body.mass for body in vehicle.bodies)
+    light = [body.name for body in vehicle.bodies if body.name not in carriers and body.mass < largest_light_mass]
     return [*effects, *(effect(f"mass of {name}", [name], ()) for name in light)]
 
 
@@ -124,10 +124,10 @@ def _stiffness(spring: SpringDamper) -> float:
 
 def _rigid_bushings(springs: list[SpringDamper]) -> Effect:
     names = [spring.name for spring in springs]
-    told = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+    names_text = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
     bodies = {body for spring in springs for body in (spring.first_body, spring.second_body)}
     return Effect(
-        f"bushings: {told}",
+        f"bushings: {names_text}",
         partial(less, rigid=names),
         f"rigid: {', '.join(names)}",
         excludes=tuple(f"{body} {freedom}" for body in bodies for freedom in ("x", "y")),
@@ -178,13 +178,13 @@ def rigid_mount_effects(scene: ReducedScene) -> list[Effect]:
             pairs[spring.first_body, spring.second_body].append(spring.name)
     return [
         Effect(
-            f"springs of {body} on {two}",
+            f"springs of {body} on {other_body}",
             partial(less, rigid=springs),
-            f"{body} sits rigidly on {two}",
+            f"{body} sits rigidly on {other_body}",
             excludes=(*(f"{body} {freedom}" for freedom in scene.vehicle.body(body).freedoms), f"mass of {body}"),
             why="a body that sits rigidly on another has no motion of its own left",
         )
-        for (body, two), springs in pairs.items()
+        for (body, other_body), springs in pairs.items()
     ]
 
 

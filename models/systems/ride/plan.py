@@ -21,7 +21,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     vehicle = vehicle_of(scene)
     excitation_of(scene, wheels(vehicle))
     kinds = {output.name: output.kind for output in vehicle.outputs}
-    weighted = tuple(f"{name} {by}" for name, by in scene.weighting.items())
+    weighted = tuple(f"{name} {weighting_name}" for name, weighting_name in scene.weighting.items())
     for i, name in enumerate(scene.quantities):
         if name not in (*kinds, *weighted):
             raise InputError(scene.file, f"quantities.{i}", name, "is no output of the vehicle", (*kinds, *weighted))
@@ -41,17 +41,20 @@ def findings(scene: RideScene) -> tuple[Finding, ...]:
 def describe(scene: RideScene) -> str:
     """The scene's plan as text: vehicle, freedoms, road, cases, outputs and what is not computed."""
     vehicle = vehicle_of(scene)
-    there = wheels(vehicle)
+    wheel_positions = wheels(vehicle)
     lines = [
         ("scene", f"{scene.file}, study {scene.study}"),
         ("vehicle", f"{vehicle.name} ({scene.vehicle.file}), {scene.vehicle.operating_point}"),
         *(("read", note) for note in vehicle.notes),
         *_bodies(vehicle),
-        ("road", road_of(scene, there).label(half_track_of(scene, there))),
-        *(("", text) for text in noise_sharing_text(scene, there)),
+        ("road", road_of(scene, wheel_positions).label(half_track_of(scene, wheel_positions))),
+        *(("", text) for text in noise_sharing_text(scene, wheel_positions)),
         ("speed", _speed(scene)),
         ("outputs", ", ".join(output.name for output in vehicle.outputs)),
-        ("weighting", ", ".join(f"{name} by {by}" for name, by in scene.weighting.items()) or "none"),
+        (
+            "weighting",
+            ", ".join(f"{name} by {weighting_name}" for name, weighting_name in scene.weighting.items()) or "none",
+        ),
     ]
     replaced = any(spring.bent for spring in vehicle.springs) and not (vehicle.lifts or scene.vehicle.small_motion)
     assumed = assumption_lines(assumptions(scene, vehicle, replaced=replaced))
@@ -73,11 +76,11 @@ FRONT_REAR = {
 def noise_sharing_text(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[str, str]:
     """Text on how the wheels of an axle, and the axles, share the road's noise."""
     road, placed = scene.road, placed_wheels(scene, wheels)
-    place = "its own place" if road.wheels == "own" else "that of the front wheel on its side"
+    y_text = "its own place" if road.wheels == "own" else "that of the front wheel on its side"
     if len({wheel.y for wheel in placed}) == 1:
-        place = f"{placed[0].y:g} m for all: one track"
+        y_text = f"{placed[0].y:g} m for all: one track"
     return (
-        f"left and right {road.left_right}: {LEFT_RIGHT[road.left_right]}; y is {place}",
+        f"left and right {road.left_right}: {LEFT_RIGHT[road.left_right]}; y is {y_text}",
         f"axles {road.front_rear}: {FRONT_REAR[road.front_rear]}",
     )
 

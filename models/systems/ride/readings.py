@@ -19,7 +19,11 @@ LOWEST_WAVENUMBER_SHARE, HIGHEST_WAVENUMBER = 1e-2, 500.0
 def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
     """Static load (N) of the tyre that each output of the kind tyre force belongs to."""
     loads = preloads(replace(vehicle, gravity=GRAVITY)).tyres
-    forces = (out for out in vehicle.outputs if isinstance(out, TyreOutput) and out.kind == "tyre force")
+    forces = (
+        tyre_output
+        for tyre_output in vehicle.outputs
+        if isinstance(tyre_output, TyreOutput) and tyre_output.kind == "tyre force"
+    )
     return {output.name: loads[output.tyre] for output in forces}
 
 
@@ -44,8 +48,8 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
         else 0.01
     )
     of_road, of_isotropic = (
-        variances(linear, partial(spectral_matrix, each, placed), speed, low, HIGHEST_WAVENUMBER)
-        for each in (road, isotropic_like(road, y))
+        variances(linear, partial(spectral_matrix, road_model, placed), speed, low, HIGHEST_WAVENUMBER)
+        for road_model in (road, isotropic_like(road, y))
     )
     pairs = zip(linear.names, of_road, of_isotropic, strict=True)
     return {name: float(np.sqrt(isotropic / plain) - 1.0) for name, plain, isotropic in pairs if plain > 0}
@@ -56,9 +60,11 @@ def largest_gap(sweep: Sweep, reference: Sweep) -> float:
     the roads.
     """
     finite = np.isfinite(reference.deviation) & np.isfinite(sweep.deviation)
-    known, others = (np.where(finite, each.deviation, 0.0) for each in (reference, sweep))
+    known, compared_deviations = (
+        np.where(finite, compared_sweep.deviation, 0.0) for compared_sweep in (reference, sweep)
+    )
     largest = known.max(axis=(0, 1))  # an output may be zero on one of the roads
-    return float(np.max(np.abs(others - known) / np.where(largest > 0, largest, 1.0)))
+    return float(np.max(np.abs(compared_deviations - known) / np.where(largest > 0, largest, 1.0)))
 
 
 def largest_errors(sweep: Sweep, case: int, truth: np.ndarray, names: list[str]) -> np.ndarray:
@@ -71,8 +77,8 @@ def largest_errors(sweep: Sweep, case: int, truth: np.ndarray, names: list[str])
     for i, name in enumerate(names):
         if name in sweep.outputs:
             deviation = sweep.deviation[case, :, sweep.outputs.index(name)]
-            both = np.isfinite(deviation) & np.isfinite(truth[:, i]) & (truth[:, i] > 0)
-            gaps = deviation[both] / truth[both, i] - 1.0
+            are_known = np.isfinite(deviation) & np.isfinite(truth[:, i]) & (truth[:, i] > 0)
+            gaps = deviation[are_known] / truth[are_known, i] - 1.0
             errors[i] = gaps[np.argmax(np.abs(gaps))] if len(gaps) else np.nan
     return errors
 
@@ -81,7 +87,7 @@ def quasi_stationary_gaps(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> 
     """Error (N, p) of the quasi-stationary standard deviations, divided by each output's largest standard deviation in
     the drive; 0 where that is 0.
     """
-    both = np.isfinite(quasi_stationary) & np.isfinite(drive.deviation)
-    known = np.where(both, drive.deviation, 0.0)
+    are_known = np.isfinite(quasi_stationary) & np.isfinite(drive.deviation)
+    known = np.where(are_known, drive.deviation, 0.0)
     largest = known.max(axis=0)
-    return (np.where(both, quasi_stationary, 0.0) - known) / np.where(largest > 0, largest, 1.0)
+    return (np.where(are_known, quasi_stationary, 0.0) - known) / np.where(largest > 0, largest, 1.0)

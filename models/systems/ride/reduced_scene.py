@@ -36,7 +36,7 @@ class ReducedScene:
 
     def reduced_further(self, **names: Iterable[object]) -> "ReducedScene":
         """The scene reduced further: names are added to its sets, for example massless = ["wheel"]."""
-        return replace(self, **{key: getattr(self, key) | set(more) for key, more in names.items()})
+        return replace(self, **{key: getattr(self, key) | set(added_names) for key, added_names in names.items()})
 
     def on_road(self, **changes: object) -> "ReducedScene":
         """The reduced scene with other values in [road]."""

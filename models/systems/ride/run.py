@@ -86,7 +86,7 @@ def _deviations_by_speed(
 
     assert scene.speeds is not None
     roads = {name: excitation_of(scene, wheels(vehicle), case) for name, case in points.correlations.items()}
-    begun, linear = time.process_time(), linear_vehicle(vehicle, engine)
+    start_time, linear = time.process_time(), linear_vehicle(vehicle, engine)
     swept = variance_sweep(linear, roads, points.speeds or scene.speeds.all(), scene.weighting)
     labelled = result(
         scene,
@@ -99,7 +99,7 @@ def _deviations_by_speed(
         },
         engine=engine,
         counts={"points": swept.variance[..., 0].size, "direct": sum(swept.direct_counts.values())},
-        seconds=time.process_time() - begun,
+        seconds=time.process_time() - start_time,
         detail=swept,
     )
     road = roads.get(AS_WRITTEN, [*roads.values()][-1])
@@ -124,21 +124,26 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
     from models.systems.ride.errors_in_time import with_error_of_drive
 
     assert scene.drive is not None
-    begun, weightings = time.process_time(), scene.weighting
+    start_time, weightings = time.process_time(), scene.weighting
     linear, road = linear_vehicle(vehicle, engine)(ANY_SPEED), excitation_of(scene, wheels(vehicle))
     drive = varying_speed(linear, road, scene.drive.profile(scene.file), weightings=weightings)
     speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY)
-    each = quasi_stationary(linear, road, speeds, weightings=weightings)
+    quasi_stationary_deviations = quasi_stationary(linear, road, speeds, weightings=weightings)
 
-    def alone(stride: int) -> np.ndarray:
-        kept = np.unique([*range(0, len(speeds), stride), len(speeds) - 1])
-        return np.column_stack([np.interp(drive.speed, speeds[kept], column) for column in each[kept].T])
+    def deviations_along(stride: int) -> np.ndarray:
+        kept_speeds = np.unique([*range(0, len(speeds), stride), len(speeds) - 1])
+        return np.column_stack(
+            [
+                np.interp(drive.speed, speeds[kept_speeds], column)
+                for column in quasi_stationary_deviations[kept_speeds].T
+            ]
+        )
 
     labelled = result(
         scene,
         {
             "deviation": Channel(("time", "output"), drive.deviation),
-            "quasi_stationary": Channel(("time", "output"), alone(1)),
+            "quasi_stationary": Channel(("time", "output"), deviations_along(1)),
             "speed": Channel("time", drive.speed, "m/s"),
             "path": Channel("time", drive.path, "m"),
         },
@@ -149,13 +154,13 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
         },
         engine=engine,
         counts={"instants": len(drive.time)},
-        seconds=time.process_time() - begun,
+        seconds=time.process_time() - start_time,
         detail=drive,
     )
-    apart = Spectral(
+    spectral = Spectral(
         vehicle, lambda _: linear, road, few_speeds(np.linspace(0.0, drive.speed.max(), JUDGED_SPEEDS + 1)[1:]), {}
     )
     with_assumptions(
-        labelled, assumptions(scene, vehicle, MotionAlongDrive(own_deviations(vehicle, drive.deviation), apart))
+        labelled, assumptions(scene, vehicle, MotionAlongDrive(own_deviations(vehicle, drive.deviation), spectral))
     )
-    return with_error_of_drive(labelled, scene, linear, road, alone) if error else labelled
+    return with_error_of_drive(labelled, scene, linear, road, deviations_along) if error else labelled

@@ -117,13 +117,15 @@ def _check_road(file: str, road: Road) -> None:
 
 
 def _check_intensities(file: str, road: Road) -> None:
-    given = [name for name in ("q_mean", "q_roll") if getattr(road, name) is not None]
-    if len(given) == 1:
-        other = "q_roll" if given == ["q_mean"] else "q_mean"
-        raise InputError(file, f"road.{other}", None, f"is missing: it belongs to road.{given[0]}")
-    if given and not road.q_mean and not road.q_roll:
+    given_intensities = [name for name in ("q_mean", "q_roll") if getattr(road, name) is not None]
+    if len(given_intensities) == 1:
+        missing_intensity = "q_roll" if given_intensities == ["q_mean"] else "q_mean"
+        raise InputError(
+            file, f"road.{missing_intensity}", None, f"is missing: it belongs to road.{given_intensities[0]}"
+        )
+    if given_intensities and not road.q_mean and not road.q_roll:
         raise InputError(file, "road.q_mean", road.q_mean, "is 0, and road.q_roll, too: this is no road")
-    for name in ("level", "iso8608", "half_track") if given else ():
+    for name in ("level", "iso8608", "half_track") if given_intensities else ():
         if name in road.model_fields_set:
             raise InputError(file, f"road.{name}", getattr(road, name), "is not read beside q_mean and q_roll")
     if road.iso8608 is not None and "level" in road.model_fields_set:

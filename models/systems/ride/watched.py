@@ -37,28 +37,32 @@ def watched_outputs(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
     of bodies that may turn and, where tyres have side forces, the components of their slip.
     """
     turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in AXES]
-    whole: list[SpatialOutput] = [TyreOutput(f"load {tyre.name}", "tyre force", tyre.name) for tyre in vehicle.tyres]
-    whole += [PartOutput(f"travel {spring.name}", "travel", spring.name) for spring in vehicle.springs]
-    whole += [PartOutput(f"rate {spring.name}", "travel rate", spring.name) for spring in vehicle.springs]
-    whole += [TurnOutput(f"{freedom} {body}", "angle", body, AXES[freedom]) for body, freedom in turning]
+    watched_list: list[SpatialOutput] = [
+        TyreOutput(f"load {tyre.name}", "tyre force", tyre.name) for tyre in vehicle.tyres
+    ]
+    watched_list += [PartOutput(f"travel {spring.name}", "travel", spring.name) for spring in vehicle.springs]
+    watched_list += [PartOutput(f"rate {spring.name}", "travel rate", spring.name) for spring in vehicle.springs]
+    watched_list += [TurnOutput(f"{freedom} {body}", "angle", body, AXES[freedom]) for body, freedom in turning]
     for force in vehicle.side_forces:
-        whole.append(PointOutput(f"side velocity {force.name}", "velocity", force.body, force.point, (0.0, 1.0, 0.0)))
-        whole.append(TurnOutput(f"roll {force.name}", "angle", force.chassis, AXES["rx"]))
-        whole.append(TurnOutput(f"yaw {force.name}", "angle", force.chassis, AXES["rz"]))
-    return tuple(whole)
+        watched_list.append(
+            PointOutput(f"side velocity {force.name}", "velocity", force.body, force.point, (0.0, 1.0, 0.0))
+        )
+        watched_list.append(TurnOutput(f"roll {force.name}", "angle", force.chassis, AXES["rx"]))
+        watched_list.append(TurnOutput(f"yaw {force.name}", "angle", force.chassis, AXES["rz"]))
+    return tuple(watched_list)
 
 
 def watched_vehicle(linear: LinearVehicle, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
     """A linear vehicle, of any engine, with the outputs of ``watched`` and the slip angles (rad)."""
-    seen = replace(vehicle, outputs=watched_outputs(vehicle))
-    rows = linearise(seen, speed).outputs if vehicle.limits else outputs(seen, Kinematics(seen))
+    watched = replace(vehicle, outputs=watched_outputs(vehicle))
+    rows = linearise(watched, speed).outputs if vehicle.limits else outputs(watched, Kinematics(watched))
     return replace(linear, outputs=(*rows, *_slip_outputs(vehicle, rows, speed)))
 
 
 def _slip_outputs(vehicle: SpatialVehicle, rows: tuple[Output, ...], speed: float) -> Iterator[Output]:
     named = {row.name: row for row in rows}
     for force in vehicle.side_forces:
-        side, roll, yaw = (named[f"{part} {force.name}"] for part in ("side velocity", "roll", "yaw"))
+        side, roll, yaw = (named[f"{quantity_name} {force.name}"] for quantity_name in ("side velocity", "roll", "yaw"))
         displacement = force.roll_steer * roll.displacement_factors + yaw.displacement_factors
         yield replace(
             yaw, name=f"slip {force.name}", rate_factors=-side.rate_factors / speed, displacement_factors=displacement
@@ -129,9 +133,13 @@ class MotionAlongDrive:
 
 def own_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, np.ndarray]:
     """Standard deviations (rows, outputs) of a vehicle's own outputs, under the names of ``watched``."""
-    alike = {replace(output, name=""): output.name for output in watched_outputs(vehicle)}
+    names_of_outputs = {replace(output, name=""): output.name for output in watched_outputs(vehicle)}
     pairs = zip(vehicle.outputs, deviation.T, strict=False)  # weighted ones come last
-    return {alike[same]: values for output, values in pairs if (same := replace(output, name="")) in alike}
+    return {
+        names_of_outputs[unnamed]: values
+        for output, values in pairs
+        if (unnamed := replace(output, name="")) in names_of_outputs
+    }
 
 
 @dataclass(frozen=True)

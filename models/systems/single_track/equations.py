@@ -73,20 +73,20 @@ def forces(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive
     """
     steer, speed, rate = drive
     base = car.front_arm + car.rear_arm
-    weight, moved, pressure = car.mass * GRAVITY, car.mass * rate * car.height / base, speed * speed
+    weight, transferred_load, pressure = car.mass * GRAVITY, car.mass * rate * car.height / base, speed * speed
     load_f, load_r = weight * car.rear_arm / base, weight * car.front_arm / base
-    load_f = max(load_f - moved - front.downforce_coefficient * pressure, LEAST_LOAD * load_f)
-    load_r = max(load_r + moved - rear.downforce_coefficient * pressure, LEAST_LOAD * load_r)
+    load_f = max(load_f - transferred_load - front.downforce_coefficient * pressure, LEAST_LOAD * load_f)
+    load_r = max(load_r + transferred_load - rear.downforce_coefficient * pressure, LEAST_LOAD * load_r)
     forward = car.mass * rate + car.drag * pressure
-    ahead = (car.front_driving_share if forward > 0.0 else car.front_braking_share) * forward
+    forward_front = (car.front_driving_share if forward > 0.0 else car.front_braking_share) * forward
     angle_f = (motion[0] + car.front_arm * motion[1]) / speed - steer
     angle_r = (motion[0] - car.rear_arm * motion[1]) / speed
-    side_f = axle_force(front, load_f, ahead, angle_f)
-    side_r = axle_force(rear, load_r, forward - ahead, angle_r)
-    turned = side_f + ahead * steer
+    side_f = axle_force(front, load_f, forward_front, angle_f)
+    side_r = axle_force(rear, load_r, forward - forward_front, angle_r)
+    lateral_front = side_f + forward_front * steer
     return (
-        turned + side_r,
-        car.front_arm * turned - car.rear_arm * side_r,
+        lateral_front + side_r,
+        car.front_arm * lateral_front - car.rear_arm * side_r,
         load_f,
         load_r,
         side_f,
@@ -116,10 +116,10 @@ def march(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, fi
     w, r = first
     motion[0] = w, r
     for i in range(len(inputs) - 1):
-        here = inputs[i, 0], inputs[i, 1], inputs[i, 2]
-        there = inputs[i + 1, 0], inputs[i + 1, 1], inputs[i + 1, 2]
-        w1, r1 = motion_rates(car, front, rear, (w, r), here)
-        w2, r2 = motion_rates(car, front, rear, (w + step * w1, r + step * r1), there)
+        inputs_now = inputs[i, 0], inputs[i, 1], inputs[i, 2]
+        inputs_next = inputs[i + 1, 0], inputs[i + 1, 1], inputs[i + 1, 2]
+        w1, r1 = motion_rates(car, front, rear, (w, r), inputs_now)
+        w2, r2 = motion_rates(car, front, rear, (w + step * w1, r + step * r1), inputs_next)
         w += 0.5 * step * (w1 + w2)
         r += 0.5 * step * (r1 + r2)
         motion[i + 1] = w, r

@@ -25,8 +25,8 @@ def describe(scene: SingleTrackScene) -> str:
         "left out": f"{left_out} (spikes and samples that were not measured)",
         "never": "roll, tyres that build up their force slowly, bank and slope of the road, a driver",
     }
-    told = [f"  {head:<10} {text}" for head, text in lines.items()]
-    return "\n".join([scene.title, *told, *assumption_lines(assumptions(scene))])
+    lines_of_text = [f"  {head:<10} {text}" for head, text in lines.items()]
+    return "\n".join([scene.title, *lines_of_text, *assumption_lines(assumptions(scene))])
 
 
 def _axle(axle: object) -> str:

@@ -51,40 +51,40 @@ IDENTIFIED_PARAMETERS = (
 """What is identified of it."""
 
 
-def write_plain_table(source: Path, target: Path) -> Path:
+def write_plain_table(source_path: Path, target_path: Path) -> Path:
     """Write the race's file as a table that scenes can read: one of KEPT_SAMPLE_INTERVAL samples, low-passed so that
     frequencies which these cannot resolve are removed.
     """
-    raw = _raw_columns(source)
+    raw = _raw_columns(source_path)
     period = float(np.median(np.diff(raw["t"])))
     columns = {name: (unit, raw[column][::KEPT_SAMPLE_INTERVAL]) for name, (column, unit) in RACE_COLUMNS.items()}
     for name, (column, unit) in list(RACE_COLUMNS.items())[1:]:
-        kept = without_outliers(raw[column])
-        known = np.isfinite(kept)
-        whole = np.interp(raw["t"], raw["t"][known], kept[known])
+        cleaned = without_outliers(raw[column])
+        known = np.isfinite(cleaned)
+        filled = np.interp(raw["t"], raw["t"][known], cleaned[known])
         columns[name] = (
             unit,
-            low_passed(whole[:, None], period, 0.25 / period, str(source), column)[::KEPT_SAMPLE_INTERVAL, 0],
+            low_passed(filled[:, None], period, 0.25 / period, str(source_path), column)[::KEPT_SAMPLE_INTERVAL, 0],
         )
-    write_table(target, columns)
-    return target
+    write_table(target_path, columns)
+    return target_path
 
 
-def _raw_columns(source: Path) -> dict[str, np.ndarray]:
+def _raw_columns(source_path: Path) -> dict[str, np.ndarray]:
     """Columns of the race's file, gzipped or not; InputError where one is missing, or times do not rise."""
-    with gzip.open(source, "rt") if source.suffix == ".gz" else source.open() as file:
+    with gzip.open(source_path, "rt") if source_path.suffix == ".gz" else source_path.open() as file:
         head, *rows = list(csv.reader(file))
     for column, _ in RACE_COLUMNS.values():
         if column not in head:
-            raise InputError(source, column, None, "no such column in the race's file", tuple(head))
+            raise InputError(source_path, column, None, "no such column in the race's file", tuple(head))
     try:
         table = np.array(rows, float)
     except ValueError as error:
-        raise InputError(source, "rows", None, f"every row holds {len(head)} numbers: {error}") from None
+        raise InputError(source_path, "rows", None, f"every row holds {len(head)} numbers: {error}") from None
     raw = {column: table[:, head.index(column)] for column, _ in RACE_COLUMNS.values()}
     falls = np.flatnonzero(~(np.diff(raw["t"]) > 0.0))
     if len(falls):
         raise InputError(
-            source, f"t, row {falls[0] + 3}", float(raw["t"][falls[0] + 1]), "times must rise from row to row"
+            source_path, f"t, row {falls[0] + 3}", float(raw["t"][falls[0] + 1]), "times must rise from row to row"
         )
     return raw

@@ -28,7 +28,7 @@ LARGEST_YAW_RATE = 20.0
 REPORT_NAMES = ("load front", "side force front", "slip angle front", "load rear", "side force rear", "slip angle rear")
 REPORT_COLUMNS = (1, 3, 5, 2, 4, 6)
 REPORT_UNITS = ("N", "N", "rad") * 2
-TOLD, ORDER = ("yaw rate", "lateral acceleration", "side slip"), 2.0
+ESTIMATED_CHANNELS, HEUN_ORDER = ("yaw rate", "lateral acceleration", "side slip"), 2.0
 """Channels whose error is told, and the order of Heun's method."""
 
 
@@ -39,29 +39,33 @@ def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Re
     Raises InputError for a file that is no drive, RunFailed where the motion is not finite.
     """
     drive = read_drive(scene.path(scene.drive.file, "drive.file"), tuple(scene.drive.stretch))
-    begun = time.process_time()
-    given = equation_inputs(drive, scene)
-    motion, table = motion_of(scene, given, float(drive.times[1] - drive.times[0]))
-    channels = sensor_channels(scene.sensors, given, motion, table[:, 0])
+    start_time = time.process_time()
+    inputs_of_samples = equation_inputs(drive, scene)
+    motion, table = motion_of(scene, inputs_of_samples, float(drive.times[1] - drive.times[0]))
+    channels = sensor_channels(scene.sensors, inputs_of_samples, motion, table[:, 0])
     channels |= {
         name: Channel("time", table[:, column], unit)
         for name, column, unit in zip(REPORT_NAMES, REPORT_COLUMNS, REPORT_UNITS, strict=True)
     }
-    counts = {"steps": len(given) - 1} | {f"samples of {name} left out": n for name, n in drive.left_out.items()}
+    counts = {"steps": len(inputs_of_samples) - 1} | {
+        f"samples of {name} left out": n for name, n in drive.left_out.items()
+    }
     run = result(
         scene,
         channels,
         {"time": Channel("time", drive.times, "s")},
         engine="reference",
         counts=counts,
-        seconds=time.process_time() - begun,
+        seconds=time.process_time() - start_time,
         detail=drive,
     )
     run = with_assumptions(run, assumptions(scene))
-    return _with_step_error(run, scene, given, drive) if error else run
+    return _with_step_error(run, scene, inputs_of_samples, drive) if error else run
 
 
-def _with_step_error(run: Result, scene: SingleTrackScene, given: np.ndarray, drive: MeasuredDrive) -> Result:
+def _with_step_error(
+    run: Result, scene: SingleTrackScene, inputs_of_samples: np.ndarray, drive: MeasuredDrive
+) -> Result:
     """The result with the error of Heun's steps, which go from sample to sample, estimated by steps of a half and of a
     quarter of their length, with inputs (n, 3) straight between the samples.
 
@@ -69,27 +73,31 @@ def _with_step_error(run: Result, scene: SingleTrackScene, given: np.ndarray, dr
     drive make them.
     """
     period = float(drive.times[1] - drive.times[0])
-    half, quarter = (_sensed_in_parts(scene, given, period, parts) for parts in (2, 4))
-    told = {}
+    half, quarter = (_sensed_in_parts(scene, inputs_of_samples, period, parts) for parts in (2, 4))
+    estimates = {}
     for name, finer in quarter.items():
         fine, values = half[name], np.asarray(run[name])
-        order = observed_order(root_mean_square(finer - fine), root_mean_square(fine - values), ORDER)
+        order = observed_order(root_mean_square(finer - fine), root_mean_square(fine - values), HEUN_ORDER)
         error = root_mean_square(fine - values) / (1.0 - 0.5**order)
-        told[name] = estimate_rescaled(
+        estimates[name] = estimate_rescaled(
             Estimate(error, run.data[name].attrs["units"], 0.0, order, period), size_of(values), period
         )
     return with_stated_errors(
-        run, told, "steps of a half and a quarter of the drive's sampling period", "s between samples"
+        run, estimates, "steps of a half and a quarter of the drive's sampling period", "s between samples"
     )
 
 
-def _sensed_in_parts(scene: SingleTrackScene, given: np.ndarray, period: float, parts: int) -> dict[str, np.ndarray]:
+def _sensed_in_parts(
+    scene: SingleTrackScene, inputs_of_samples: np.ndarray, sample_period: float, parts_per_sample: int
+) -> dict[str, np.ndarray]:
     """The channels TOLD at the samples (n,), from a march of so many steps between two samples."""
-    at = np.linspace(0.0, len(given) - 1.0, parts * (len(given) - 1) + 1)
-    between = np.column_stack([np.interp(at, np.arange(len(given)), column) for column in given.T])
-    motion, table = motion_of(scene, np.ascontiguousarray(between), period / parts)
-    sensed = sensor_channels(scene.sensors, given, motion[::parts], table[::parts, 0])
-    return {name: np.asarray(sensed[name].values) for name in TOLD}
+    row_positions = np.linspace(0.0, len(inputs_of_samples) - 1.0, parts_per_sample * (len(inputs_of_samples) - 1) + 1)
+    between = np.column_stack(
+        [np.interp(row_positions, np.arange(len(inputs_of_samples)), column) for column in inputs_of_samples.T]
+    )
+    motion, table = motion_of(scene, np.ascontiguousarray(between), sample_period / parts_per_sample)
+    sensed = sensor_channels(scene.sensors, inputs_of_samples, motion[::parts_per_sample], table[::parts_per_sample, 0])
+    return {name: np.asarray(sensed[name].values) for name in ESTIMATED_CHANNELS}
 
 
 def equation_inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray:
@@ -99,27 +107,29 @@ def equation_inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray
     period, sensors = float(drive.times[1] - drive.times[0]), scene.sensors
     steer, speed = drive.steer, drive.speed
     if scene.drive.low_pass:
-        both = low_passed(np.column_stack([steer, speed]), period, scene.drive.low_pass, scene.file, "drive.low_pass")
-        steer, speed = both.T
+        filtered = low_passed(
+            np.column_stack([steer, speed]), period, scene.drive.low_pass, scene.file, "drive.low_pass"
+        )
+        steer, speed = filtered.T
     if sensors.steer_delay:
         steer = np.interp(drive.times - sensors.steer_delay, drive.times, steer)
     steer = sensors.steer_ratio * steer + sensors.steer_offset
     return np.ascontiguousarray(np.column_stack([steer, speed, np.gradient(speed, period)]))
 
 
-def motion_of(scene: SingleTrackScene, inputs: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+def motion_of(scene: SingleTrackScene, inputs: np.ndarray, sample_period: float) -> tuple[np.ndarray, np.ndarray]:
     """Lateral velocity and yaw rate (n, 2), and reports (n, 7). The motion begins with the steady turn of the first
     sample.
     """
     parts = scene.car(), scene.front.axle(), scene.rear.axle()
-    settling = np.repeat(inputs[:1], max(2, round(SETTLING_DURATION / period)), axis=0)
-    first = march(*parts, settling, period, (0.0, 0.0))[-1]
-    motion = march(*parts, inputs, period, (float(first[0]), float(first[1])))
+    settling = np.repeat(inputs[:1], max(2, round(SETTLING_DURATION / sample_period)), axis=0)
+    first = march(*parts, settling, sample_period, (0.0, 0.0))[-1]
+    motion = march(*parts, inputs, sample_period, (float(first[0]), float(first[1])))
     bad = ~(np.abs(motion[:, 1]) < LARGEST_YAW_RATE)
     if bad.any():
         row = int(bad.argmax())
         why = "the car turns faster than any car: check units and signs of the drive, and the tyres"
-        raise RunFailed("reference", why, period * row, motion[max(row - 1, 0)])
+        raise RunFailed("reference", why, sample_period * row, motion[max(row - 1, 0)])
     return motion, motion_reports(*parts, inputs, motion)
 
 

@@ -25,7 +25,9 @@ def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
     return listed
 
 
-def _extreme_of_patches(value: Callable[[PatchReport], float], largest: bool = True) -> Callable[[Result], Watched]:
+def _extreme_of_patches(
+    patch_value: Callable[[PatchReport], float], largest: bool = True
+) -> Callable[[Result], Watched]:
     """Return the watch function of a value: its largest or least among the patches of each wheel, over the
     positions.
     """
@@ -34,7 +36,7 @@ def _extreme_of_patches(value: Callable[[PatchReport], float], largest: bool = T
     def watched(run: Result) -> Watched:
         placed = run.detail.placed
         return {
-            f"{wheel} wheel": np.array([worst(map(value, getattr(position, wheel))) for position in placed])
+            f"{wheel} wheel": np.array([worst(map(patch_value, getattr(position, wheel))) for position in placed])
             for wheel in WHEEL_NAMES
         }
 
@@ -80,7 +82,7 @@ def _elastic_assumption() -> Assumption:
         "elastic",
         "the steel does not flow",
         "lower wheelset.load: a real contact would be larger and its pressure lower",
-        _extreme_of_patches(lambda place: 1e-6 * place.peak),
+        _extreme_of_patches(lambda patch: 1e-6 * patch.peak),
         "MPa",
         upper_limit=1e-6 * YIELDS,
     )
@@ -105,7 +107,7 @@ def _slow_slip(speed: float) -> Assumption:
         "constant friction",
         "friction is the same however fast the wheels slip",
         "give the case's friction as it is for such slip, or lower wheelset.speed",
-        _extreme_of_patches(lambda place: speed * float(np.hypot(place.xi_x, place.xi_y))),
+        _extreme_of_patches(lambda patch: speed * float(np.hypot(patch.xi_x, patch.xi_y))),
         "m/s",
         upper_limit=FAST_SLIP,
     )

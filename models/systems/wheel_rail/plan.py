@@ -13,7 +13,7 @@ def check(scene: WheelRailScene, engines: tuple[str, ...]) -> None:
 
 def describe(scene: WheelRailScene) -> str:
     """Text that describes the scene before a run: profiles, track, wheelset, positions, cases."""
-    p, w, at = scene.profiles, scene.wheelset, scene.positions
+    p, w, positions = scene.profiles, scene.wheelset, scene.positions
     lines = {
         "scene": f"{scene.file}, study {scene.study}",
         "wheel": f"{p.wheel}, radius {1e3 * w.radius:g} mm, backs {1e3 * p.back_to_back:g} mm apart, taping line "
@@ -21,15 +21,15 @@ def describe(scene: WheelRailScene) -> str:
         "rail": f"{p.rail}, turned by {p.inclination:g} rad, gauge {1e3 * p.gauge:g} mm at "
         f"{1e3 * p.gauge_depth:g} mm below the top",
         "wheelset": f"{w.load / 1e3:g} kN on each wheel, {w.speed:g} m/s",
-        "positions": f"{at.count} from {1e3 * at.start:g} to {1e3 * at.stop:g} mm to the right",
+        "positions": f"{positions.count} from {1e3 * positions.start:g} to {1e3 * positions.stop:g} mm to the right",
     }
     cases = ((name, case_text(case.yaw, case.friction)) for name, case in scene.cases.items())
-    told = [f"  {head:<10} {text}" for head, text in (*lines.items(), *cases)]
+    lines_of_text = [f"  {head:<10} {text}" for head, text in (*lines.items(), *cases)]
     rolling = max(case.friction for case in scene.cases.values())
-    return "\n".join([scene.title, *told, *assumption_lines(assumptions(scene, rolling))])
+    return "\n".join([scene.title, *lines_of_text, *assumption_lines(assumptions(scene, rolling))])
 
 
 def case_text(yaw: float, friction: float) -> str:
     """Text on a case: its yaw, and whether it rolls with friction or is only pressed."""
-    turned = f"yaw {yaw:g} mrad for each mm" if yaw else "no yaw"
-    return f"{turned}, " + (f"rolling with friction {friction:g}" if friction else "pressed without friction")
+    yaw_text = f"yaw {yaw:g} mrad for each mm" if yaw else "no yaw"
+    return f"{yaw_text}, " + (f"rolling with friction {friction:g}" if friction else "pressed without friction")

@@ -81,23 +81,24 @@ def run(
     cells, too, from which the error of the cells is estimated. Raises InputError for files that are no profiles.
     """
     name = case or next(iter(scene.cases))
-    held, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, ContactsOfCase()
+    contact, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, ContactsOfCase()
     for i, shift in enumerate(scene.positions.values().tolist()):
         progress(1e3 * shift, i / scene.positions.count)
-        begun = time.process_time()
+        start_time = time.process_time()
         try:
-            contacts.placed.append(held.at(shift, yaw * shift))
+            contacts.placed.append(contact.at(shift, yaw * shift))
         except (InputError, RunFailed) as failure:
             deep = isinstance(failure, InputError) and failure.place in TOO_DEEP
             contacts.failures[1e3 * shift] = (
-                f"a load of {held.load:g} N presses wheel and rail more than {1e3 * SURROUNDINGS_DISTANCE:g} mm into "
+                f"a load of {contact.load:g} N presses wheel and rail more than "
+                f"{1e3 * SURROUNDINGS_DISTANCE:g} mm into "
                 "each other"
                 if deep
                 else str(failure)
             )
-        contacts.seconds.append(time.process_time() - begun)
+        contacts.seconds.append(time.process_time() - start_time)
     labelled = with_assumptions(_labelled_result(scene, name, contacts), assumptions(scene, scene.cases[name].friction))
-    return _with_error(labelled, scene, held) if error and contacts.placed else labelled
+    return _with_error(labelled, scene, contact) if error and contacts.placed else labelled
 
 
 def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) -> Result:
@@ -114,33 +115,35 @@ def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) ->
             fine.append(placed)
     if not coarse:
         return not_estimated(run, "no position is found on half the cells")
-    of_fine, of_coarse = (np.array([wheel_sums(placed) for placed in each]) for each in (fine, coarse))
+    of_fine, of_coarse = (np.array([wheel_sums(placed) for placed in placements]) for placements in (fine, coarse))
     errors, sizes = (np.sqrt(np.mean(values**2, axis=(0, 1))) for values in (of_fine - of_coarse, of_fine))
-    told = {
+    estimates = {
         name: by_cells(float(error), float(size), unit, scene.method.cells, 1.0, MOST_CELLS)
         for (name, unit), error, size in zip(WHEEL_QUANTITIES.items(), errors, sizes, strict=True)
     }
-    return with_stated_errors(run, told, f"half the cells at {len(fine)} of {len(run.detail.placed)} positions")
+    return with_stated_errors(run, estimates, f"half the cells at {len(fine)} of {len(run.detail.placed)} positions")
 
 
-def wheel_sums(placed: WheelsetPlacement) -> np.ndarray:
+def wheel_sums(placement: WheelsetPlacement) -> np.ndarray:
     """Quantities ``WHEEL_QUANTITIES`` (2, 5) of the right and of the left wheel: sums over the wheel's patches, then
     the largest pressure.
     """
     return np.array(
         [
-            [*(sum(getattr(place, name) for place in wheel) for name in ("normal", "area", "fx", "fy")), peak]
-            for wheel in (placed.right, placed.left)
-            for peak in [max(place.peak for place in wheel)]
+            [*(sum(getattr(patch, name) for patch in wheel) for name in ("normal", "area", "fx", "fy")), peak]
+            for wheel in (placement.right, placement.left)
+            for peak in [max(patch.peak for patch in wheel)]
         ]
     )
 
 
 def _labelled_result(scene: WheelRailScene, case: str, contacts: ContactsOfCase) -> Result:
     positions = [position_quantities(placed) for placed in contacts.placed]
-    most = max((len(position[wheel]) for position in positions for wheel in WHEEL_NAMES), default=0)
+    most_patches = max((len(position[wheel]) for position in positions for wheel in WHEEL_NAMES), default=0)
     missing = dict.fromkeys(PATCH_QUANTITIES, np.nan)
-    rows = [(*position[wheel], *[missing] * most)[:most] for position in positions for wheel in WHEEL_NAMES]
+    rows = [
+        (*position[wheel], *[missing] * most_patches)[:most_patches] for position in positions for wheel in WHEEL_NAMES
+    ]
     channels = {
         key: Channel("shift", np.array([position[key] for position in positions], float), unit)
         for key, unit in POSITION_UNITS.items()
@@ -150,7 +153,7 @@ def _labelled_result(scene: WheelRailScene, case: str, contacts: ContactsOfCase)
         key: Channel(
             ("shift", "wheel", "patch"),
             np.array([[patch[key] for patch in row] for row in rows], float).reshape(
-                len(positions), len(WHEEL_NAMES), most
+                len(positions), len(WHEEL_NAMES), most_patches
             ),
             unit,
         )
@@ -160,23 +163,23 @@ def _labelled_result(scene: WheelRailScene, case: str, contacts: ContactsOfCase)
     return result(scene, channels, axes, seconds=sum(contacts.seconds), doubts=doubts, detail=contacts, case=case)
 
 
-def patches_by_force(placed: WheelsetPlacement, wheel: str) -> tuple[PatchReport, ...]:
+def patches_by_force(placement: WheelsetPlacement, wheel: str) -> tuple[PatchReport, ...]:
     """The patches of one wheel, in the order of their normal force, largest first."""
-    return tuple(sorted(getattr(placed, wheel), key=lambda place: -place.normal))
+    return tuple(sorted(getattr(placement, wheel), key=lambda patch: -patch.normal))
 
 
-def position_quantities(placed: WheelsetPlacement) -> dict[str, Any]:
+def position_quantities(placement: WheelsetPlacement) -> dict[str, Any]:
     """Quantities of the wheelset at a position and of every patch of both wheels, by name."""
     return {
-        "shift": 1e3 * placed.shift,
-        "yaw": 1e3 * placed.yaw,
-        "roll": 1e3 * placed.roll,
-        "spin_speed": placed.spin_speed,
-        "radius_difference": 1e3 * rolling_radius_difference(placed),
+        "shift": 1e3 * placement.shift,
+        "yaw": 1e3 * placement.yaw,
+        "roll": 1e3 * placement.roll,
+        "spin_speed": placement.spin_speed,
+        "radius_difference": 1e3 * rolling_radius_difference(placement),
         **{
             wheel: [
-                {key: factor * getattr(place, name) for key, (_, factor, name) in PATCH_QUANTITIES.items()}
-                for place in patches_by_force(placed, wheel)
+                {key: factor * getattr(patch, name) for key, (_, factor, name) in PATCH_QUANTITIES.items()}
+                for patch in patches_by_force(placement, wheel)
             ]
             for wheel in WHEEL_NAMES
         },

@@ -101,19 +101,19 @@ LARGEST_YAW, LARGEST_FRICTION = 0.1, 1.0
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> WheelRailScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(WheelRailScene, table, file, folder)
-    for place, (least, most, unit) in PLAUSIBLE_RANGES.items():
-        owner, key = place.split(".")
+    for key_path, (least, most_allowed, unit) in PLAUSIBLE_RANGES.items():
+        owner, key = key_path.split(".")
         value = getattr(getattr(scene, owner), key)
-        if not least <= value <= most:
-            raise InputError(file, place, value, f"must be from {least:g} to {most:g} {unit}")
+        if not least <= value <= most_allowed:
+            raise InputError(file, key_path, value, f"must be from {least:g} to {most_allowed:g} {unit}")
     for name, case in scene.cases.items():
         largest = float(np.abs(case.yaw * scene.positions.values()).max())
         if largest > LARGEST_YAW:
-            turned = (
+            refusal = (
                 f"turns the wheelset by {largest:.3g} rad, more than {LARGEST_YAW:g}: the yaw is in rad for each metre "
                 "of displacement"
             )
-            raise InputError(file, f"cases.{name}.yaw", case.yaw, turned)
+            raise InputError(file, f"cases.{name}.yaw", case.yaw, refusal)
         if case.friction > LARGEST_FRICTION:
             raise InputError(file, f"cases.{name}.friction", case.friction, f"must be at most {LARGEST_FRICTION:g}")
     profiles = scene.profiles

@@ -66,26 +66,32 @@ def of_branch(wheelset: Wheelset) -> list[Assumption]:
 
 def sums_by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
     """Values (n, patches) summed over the patches of each wheel."""
-    each = contacts.shape[1] // 2
-    return {"right wheel": values[:, :each].sum(axis=1), "left wheel": values[:, each:].sum(axis=1)}
+    patches_per_wheel = contacts.shape[1] // 2
+    return {
+        "right wheel": values[:, :patches_per_wheel].sum(axis=1),
+        "left wheel": values[:, patches_per_wheel:].sum(axis=1),
+    }
 
 
-def _watch_of_path(watched: Callable[[WheelsetPath], Watched]) -> Callable[[Result], Watched]:
+def _watch_of_path(watch: Callable[[WheelsetPath], Watched]) -> Callable[[Result], Watched]:
     """Return the watch function for a result whose detail is a path, or a periodic motion that has one."""
 
     def of_result(run: Result) -> Watched:
-        return watched(run.detail if isinstance(run.detail, WheelsetPath) else run.detail.path())
+        return watch(run.detail if isinstance(run.detail, WheelsetPath) else run.detail.path())
 
     return of_result
 
 
-def _watch_of_patches(watched: Callable[[Array], Array]) -> Callable[[Result], Watched]:
+def _watch_of_patches(watch: Callable[[Array], Array]) -> Callable[[Result], Watched]:
     """Return the watch function of a value's maximum among the loaded patches of each wheel, 0 where none is loaded."""
 
     def of_path(path: WheelsetPath) -> Watched:
-        each, load = path.contacts.shape[1] // 2, path.contacts["load"]
-        values = np.where(load > 0.0, np.abs(watched(path.contacts)), 0.0)
-        return {"right wheel": values[:, :each].max(axis=1), "left wheel": values[:, each:].max(axis=1)}
+        patches_per_wheel, load = path.contacts.shape[1] // 2, path.contacts["load"]
+        values = np.where(load > 0.0, np.abs(watch(path.contacts)), 0.0)
+        return {
+            "right wheel": values[:, :patches_per_wheel].max(axis=1),
+            "left wheel": values[:, patches_per_wheel:].max(axis=1),
+        }
 
     return _watch_of_path(of_path)
 
@@ -191,8 +197,8 @@ def _no_slip_assumption(wheelset: Wheelset) -> Assumption:
 
 def _travel_assumption(wheelset: Wheelset) -> Assumption:
     def watched(path: WheelsetPath) -> Watched:
-        along, up = (1e3 * wheelset.half_spacing * path.states[:, k] for k in (YAW, ROLL))
-        return {"along": np.abs(along), "across": 1e3 * np.abs(path.states[:, Y]), "vertical": np.abs(up)}
+        travel_along, travel_up = (1e3 * wheelset.half_spacing * path.states[:, k] for k in (YAW, ROLL))
+        return {"along": np.abs(travel_along), "across": 1e3 * np.abs(path.states[:, Y]), "vertical": np.abs(travel_up)}
 
     return Assumption(
         "suspension",
@@ -206,8 +212,8 @@ def _travel_assumption(wheelset: Wheelset) -> Assumption:
 
 def _climbing_assumption(wheelset: Wheelset) -> Assumption:
     def watched(path: WheelsetPath) -> Watched:
-        part = bound_shares(path.contacts["flange_force"], path.contacts["load"])
-        return {"right wheel": part[:, 0], "left wheel": part[:, 1]}
+        flange_share = bound_shares(path.contacts["flange_force"], path.contacts["load"])
+        return {"right wheel": flange_share[:, 0], "left wheel": flange_share[:, 1]}
 
     return Assumption(
         "no flange climbs",
@@ -219,12 +225,12 @@ def _climbing_assumption(wheelset: Wheelset) -> Assumption:
     )
 
 
-def _flange_way(wheelset: Wheelset, watched: Callable[[Result], Watched] | None = None) -> Assumption:
+def _flange_way(wheelset: Wheelset, watch: Callable[[Result], Watched] | None = None) -> Assumption:
     return Assumption(
         "on the tread",
         "the wheels roll on their cones, and a flange's rail gives way by a few mm at most",
         "name the effect profiles, which have flanges of their own",
-        watched or _watch_of_path(lambda path: {"wheelset": np.abs(path.states[:, Y])}),
+        watch or _watch_of_path(lambda path: {"wheelset": np.abs(path.states[:, Y])}),
         "m",
         upper_limit=wheelset.flange_clearance + FLANGE_WAY,
     )
@@ -247,7 +253,7 @@ def _within_profiles(wheelset: Wheelset) -> Assumption:
             "wheel's face": outer - wheel - half,
             "rail's ends": np.minimum(rail - side.rail.y[0], side.rail.y[-1] - rail) - half,
         }
-        return {where: 1e3 * np.where(load > 0.0, free, np.inf).min(axis=1) for where, free in ends.items()}
+        return {wheel_name: 1e3 * np.where(load > 0.0, free, np.inf).min(axis=1) for wheel_name, free in ends.items()}
 
     return Assumption(
         "within the profiles",

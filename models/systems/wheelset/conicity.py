@@ -57,12 +57,12 @@ def run(scene: WheelsetScene, report_progress: Callable[[float], Any] = lambda s
     report_progress : called with the share of the rolling radii that is done. InputError for a file that is no table
     and for wheels that do not stand on their rails; an amplitude without a wave is a doubt.
     """
-    asked, wheelset = scene.conicity or ConicityTable(), wheelset_of(scene)
-    table, source = _table(scene, asked, wheelset, report_progress)
+    conicity_table, wheelset = scene.conicity or ConicityTable(), wheelset_of(scene)
+    table, source = _table(scene, conicity_table, wheelset, report_progress)
     rows, why = list[ConicityRow](), dict[float, str]()
-    for amplitude in asked.amplitudes:
+    for amplitude in conicity_table.amplitudes:
         try:
-            rows.append(conicity_row(table, amplitude, guess=asked.near))
+            rows.append(conicity_row(table, amplitude, centre_guess=conicity_table.near))
         except InputError as error:
             rows.append(ConicityRow(amplitude, *[math.nan] * 5))
             why[amplitude] = error.allowed
@@ -73,7 +73,7 @@ def run(scene: WheelsetScene, report_progress: Callable[[float], Any] = lambda s
         name: Channel("amplitude", np.array([row[name] for row in values]), unit, meaning)
         for name, (unit, meaning) in CONICITY_CHANNELS.items()
     }
-    axis = Channel("amplitude", np.array(asked.amplitudes), "m")
+    axis = Channel("amplitude", np.array(conicity_table.amplitudes), "m")
     doubts = [f"at {amplitude:g} m: {reason}" for amplitude, reason in why.items()]
     return result(scene, channels, {"amplitude": axis}, engine="reference", doubts=doubts, detail=detail)
 
@@ -82,11 +82,11 @@ def check(scene: WheelsetScene) -> None:
     """Refuse, before anything is computed, a file that is no table of differences and a left side that is no
     profile.
     """
-    asked = scene.conicity or ConicityTable()
-    if asked.table is not None:
-        read_rolling_radii(scene.path(asked.table, "conicity.table"))
+    conicity_table = scene.conicity or ConicityTable()
+    if conicity_table.table is not None:
+        read_rolling_radii(scene.path(conicity_table.table, "conicity.table"))
     elif (profiles := wheelset_of(scene).profiles) is not None:
-        _left_profiles(scene, asked, profiles)
+        _left_profiles(scene, conicity_table, profiles)
 
 
 def _left_profiles(scene: WheelsetScene, conicity_table: ConicityTable, profiles: Profiles) -> Profiles:
@@ -145,15 +145,15 @@ def conicity_numbers(run_of_scene: Result) -> dict[str, Any]:
 def conicity_lines(conicities: Conicities) -> list[str]:
     """Text with both conicities at every amplitude."""
     head = f"    {'amplitude':>12}{'EN 15302':>12}{'+-':>10}{'1st harmonic':>14}{'centre':>13}{'wavelength':>14}"
-    told = [f"  equivalent conicity of {conicities.source}", head]
+    lines_of_text = [f"  equivalent conicity of {conicities.source}", head]
     for row, wavelength in zip(conicities.rows, conicities.wavelengths, strict=True):
         if row.amplitude in conicities.missing_reasons:
-            told.append(f"    {1e3 * row.amplitude:>9.4g} mm  {conicities.missing_reasons[row.amplitude]}")
+            lines_of_text.append(f"    {1e3 * row.amplitude:>9.4g} mm  {conicities.missing_reasons[row.amplitude]}")
             continue
         error = f"{row.spacing_error:>10.1g}" if math.isfinite(row.spacing_error) else f"{'-':>10}"
         wave = f"{wavelength:>12.5g} m" if math.isfinite(wavelength) else f"{'no wave':>14}"
-        told.append(
+        lines_of_text.append(
             f"    {1e3 * row.amplitude:>9.4g} mm{row.equivalent:>12.5f}{error}{row.harmonic:>14.5f}"
             f"{1e3 * row.centre + 0.0:>10.4f} mm{wave}"
         )
-    return told
+    return lines_of_text

@@ -54,8 +54,8 @@ def _checked_wheelset(values: dict[str, Any], file: str, table: str) -> Wheelset
     try:
         return Wheelset(**values)
     except InputError as error:
-        place = ".".join(part for part in (table, error.place.partition(".")[2]) if part)
-        raise InputError(file, place, error.value, error.allowed) from None
+        key_path = ".".join(key for key in (table, error.place.partition(".")[2]) if key)
+        raise InputError(file, key_path, error.value, error.allowed) from None
 
 
 def implementation(engine: str) -> type[Equations]:
@@ -73,10 +73,10 @@ def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
 
 @lru_cache(32)
 def _initial_state(
-    engine: str, wheelset: Wheelset, speed: float, law: Any, cells: int, shift: float, yaw: float
+    engine: str, wheelset: Wheelset, speed: float, law: Any, cells: int, lateral_shift: float, yaw: float
 ) -> tuple[Equations, np.ndarray]:
     equations = implementation(engine)(wheelset, speed, law, cells)
-    state = equations.displaced_state(shift)
+    state = equations.displaced_state(lateral_shift)
     state[YAW] = yaw
     return equations, state
 

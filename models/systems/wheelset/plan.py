@@ -53,8 +53,8 @@ def describe(scene: WheelsetScene) -> str:
     }
     if scene.conicity is not None:
         lines["conicity"] = _conicity(scene.conicity)
-    told = [f"  {head:<10} {text}" for head, text in lines.items()]
-    return "\n".join([scene.title, *told, *effect_lines(scene), *_assumption_lines(scene), "", *ENGINES])
+    lines_of_text = [f"  {head:<10} {text}" for head, text in lines.items()]
+    return "\n".join([scene.title, *lines_of_text, *effect_lines(scene), *_assumption_lines(scene), "", *ENGINES])
 
 
 def _assumption_lines(scene: WheelsetScene) -> list[str]:
@@ -74,8 +74,8 @@ def _wheels(wheelset: Wheelset) -> str:
 
 def _conicity(conicity_table: ConicityTable) -> str:
     amplitudes = ", ".join(f"{1e3 * amplitude:g}" for amplitude in conicity_table.amplitudes)
-    of = f"of {conicity_table.table}" if conicity_table.table else "of these wheels"
-    return f"{of}, at amplitudes of {amplitudes} mm, by EN 15302 and by the first harmonic"
+    source_text = f"of {conicity_table.table}" if conicity_table.table else "of these wheels"
+    return f"{source_text}, at amplitudes of {amplitudes} mm, by EN 15302 and by the first harmonic"
 
 
 def _suspension_text(wheelset: Wheelset) -> str:

@@ -68,16 +68,16 @@ def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error:
     """
     speed = path_speeds(scene)[0] if speed is None else speed
     equations_and_start(scene, engine, speed)  # kept: its seconds are none of the path
-    begun = time.process_time()
+    start_time = time.process_time()
     motion = path(scene, engine, speed)
-    labelled = judged_path(scene, engine, speed, motion, seconds=time.process_time() - begun)
-    return with_error(labelled, scene, lambda other: path(other, engine, speed)) if error else labelled
+    labelled = judged_path(scene, engine, speed, motion, seconds=time.process_time() - start_time)
+    return with_error(labelled, scene, lambda changed_scene: path(changed_scene, engine, speed)) if error else labelled
 
 
-def judged_path(scene: WheelsetScene, engine: str, speed: float, motion: WheelsetPath, **more: Any) -> Result:
+def judged_path(scene: WheelsetScene, engine: str, speed: float, motion: WheelsetPath, **result_fields: Any) -> Result:
     """A motion as the result of a scene at a speed (m/s), with the assumptions that it breaks."""
     equations, _ = equations_and_start(scene, engine, speed)
-    return with_assumptions(_labelled_result(scene, engine, motion, **more), assumptions(equations))
+    return with_assumptions(_labelled_result(scene, engine, motion, **result_fields), assumptions(equations))
 
 
 def path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
@@ -86,22 +86,22 @@ def path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
     return equations.run(start, scene.run.duration, scene.run.step)
 
 
-def _labelled_result(scene: WheelsetScene, engine: str, motion: WheelsetPath, **more: Any) -> Result:
-    steps, times = len(motion.times) - 1, Channel("time", motion.times, "s")
+def _labelled_result(scene: WheelsetScene, engine: str, motion: WheelsetPath, **result_fields: Any) -> Result:
+    steps, time_axis = len(motion.times) - 1, Channel("time", motion.times, "s")
     channels = {name: Channel("time", motion.states[:, k], unit) for name, (k, unit) in STATES.items()}
     channels |= {
         name: Channel(("time", "patch"), motion.contacts[field], unit) for name, (field, unit) in CONTACTS.items()
     }
     counts = {"steps": steps, "force calls": 4 * steps}
-    return result(scene, channels, {"time": times}, engine=engine, counts=counts, detail=motion, **more)
+    return result(scene, channels, {"time": time_axis}, engine=engine, counts=counts, detail=motion, **result_fields)
 
 
 def over_speeds(paths: Mapping[str, Mapping[Any, Result]]) -> Result:
     """Results by engine and speed (m/s), joined to one result over engine, speed and time."""
-    each = {engine: joined_result(join_results(path, "speed"), at_speeds(path)) for engine, path in paths.items()}
-    whole = joined_result(join_results(each, "engine"), each)
-    whole.data["speed"].attrs["units"] = "m/s"
-    return whole
+    by_engine = {engine: joined_result(join_results(path, "speed"), at_speeds(path)) for engine, path in paths.items()}
+    joined = joined_result(join_results(by_engine, "engine"), by_engine)
+    joined.data["speed"].attrs["units"] = "m/s"
+    return joined
 
 
 def at_speeds(results: Mapping[Any, Result]) -> dict[str, Result]:
@@ -140,16 +140,19 @@ def linearised_result(scene: WheelsetScene, engine: str, *, error: bool = False)
         *critical_or_why(wheelset, partial(largest_growth, kind)),
     )
     channels = {
-        name: Channel(("speed", "eigenvalue"), part, "1/s")
-        for name, part in (("real", linear.values.real), ("imag", linear.values.imag))
+        name: Channel(("speed", "eigenvalue"), part_of_values, "1/s")
+        for name, part_of_values in (("real", linear.values.real), ("imag", linear.values.imag))
     }
     labelled = result(scene, channels, {"speed": Channel("speed", speeds, "m/s")}, engine=engine, detail=linear)
     with_assumptions(labelled, of_linear(wheelset))
     left = uncertainty(kind, wheelset, float(speeds[-1])) if error else math.nan
     if math.isfinite(left):
-        told = Estimate(left, "1/s", left / abs(linear.hunting[-1]), 4.0, 1.0)
+        estimate_of_hunting = Estimate(left, "1/s", left / abs(linear.hunting[-1]), 4.0, 1.0)
         with_stated_errors(
-            labelled, {"hunting eigenvalue": told}, "differences over twice the way at the last speed", "times the way"
+            labelled,
+            {"hunting eigenvalue": estimate_of_hunting},
+            "differences over twice the way at the last speed",
+            "times the way",
         )
     return labelled
 
@@ -166,14 +169,14 @@ def branch_result(
     """
     speeds, orbits, why, unknown = scene.speeds.all(), list[Orbit](), list[str](), SPEED
     equations = equations_of(scene, "reference", float(speeds[-1]))
-    with Crew.of(scene, usual=1).at_work(PAIRS_OF_MARCHES, *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(PAIRS_OF_MARCHES, *places_of(scene)) as pool:
         try:
             for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step, pool):
                 orbits.append(orbit)
                 progress(len(orbits))
-        except NoCriticalSpeed as none:
-            why, unknown = [f"no branch begins: the wheelset {none.allowed}"], AMPLITUDE
-            reached = block_results(partial(_reached_cycle, scene), speeds.tolist() if none.unstable else [], pool)
+        except NoCriticalSpeed as no_speed:
+            why, unknown = [f"no branch begins: the wheelset {no_speed.allowed}"], AMPLITUDE
+            reached = block_results(partial(_reached_cycle, scene), speeds.tolist() if no_speed.unstable else [], pool)
             orbits = [orbit for orbit in reached if orbit is not None]
         except RunFailed as failure:
             why = [f"the branch is followed no further: {failure.reason}"]
@@ -190,14 +193,14 @@ def branch_result(
     return labelled
 
 
-def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: SoughtQuantity) -> Orbit | None:
+def _on_half_the_cells(scene: WheelsetScene, limit_cycle: Orbit, unknown: SoughtQuantity) -> Orbit | None:
     """The limit cycle solved on half the cells, in twice the step; None where there is none."""
     if scene.contact.cells < FEWEST_CELLS:
         return None
-    coarse = replace(orbit, steps=orbit.steps // 2)
+    coarse = replace(limit_cycle, steps=limit_cycle.steps // 2)
     try:
         return solved_orbit(
-            guess_from_orbit(coarse, replace(orbit.equations, cells=coarser_cells(scene.contact.cells))),
+            guess_from_orbit(coarse, replace(limit_cycle.equations, cells=coarser_cells(scene.contact.cells))),
             unknown,
             precise=False,
         )
@@ -212,13 +215,15 @@ def _reached_cycle(scene: WheelsetScene, speed: float) -> Orbit | None:
 
 
 def _attained_in_engine(scene: WheelsetScene, speed: float) -> Orbit | None:
-    return attained_cycle(equations_of(scene, "reference", speed), start=scene.run.displacement, step=scene.run.step)
+    return attained_cycle(
+        equations_of(scene, "reference", speed), start_displacement=scene.run.displacement, step=scene.run.step
+    )
 
 
 def cycle_speed(scene: WheelsetScene, orbits: Sequence[Orbit]) -> float:
     """A speed (m/s) above the one at which the branch begins; the scene's last speed where there is no branch."""
-    last = float(scene.speeds.all().max())
-    return min(last, round(SPEED_SHARES[1] * orbits[0].speed, 2)) if orbits else last
+    last_speed = float(scene.speeds.all().max())
+    return min(last_speed, round(SPEED_SHARES[1] * orbits[0].speed, 2)) if orbits else last_speed
 
 
 def cycles_of_engines(
@@ -244,11 +249,13 @@ def cycles_of_engines(
     return results, failed
 
 
-def _one_period(scene: WheelsetScene, engine: str, orbit: Orbit, error: bool) -> Result:
+def _one_period(scene: WheelsetScene, engine: str, limit_cycle: Orbit, error: bool) -> Result:
     """The result of a limit cycle over one period; its detail is the orbit."""
-    labelled = with_assumptions(_labelled_result(scene, engine, orbit.path()), assumptions(orbit.equations))
-    period = Result(over_speeds({engine: {orbit.speed: labelled}}).data, orbit)
+    labelled = with_assumptions(_labelled_result(scene, engine, limit_cycle.path()), assumptions(limit_cycle.equations))
+    period = Result(over_speeds({engine: {limit_cycle.speed: labelled}}).data, limit_cycle)
     if not error:
         return period
-    coarse = _on_half_the_cells(scene, orbit, AMPLITUDE)
-    return with_error_of_cycles(period, [orbit], {} if coarse is None else {0: coarse}, AMPLITUDE, scene.contact.cells)
+    coarse = _on_half_the_cells(scene, limit_cycle, AMPLITUDE)
+    return with_error_of_cycles(
+        period, [limit_cycle], {} if coarse is None else {0: coarse}, AMPLITUDE, scene.contact.cells
+    )

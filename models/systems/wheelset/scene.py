@@ -117,35 +117,38 @@ def _check_speeds(scene: WheelsetScene) -> None:
         )
     listed = {f"speeds.values.{i}": speed for i, speed in enumerate(scene.speeds.values)}
     listed |= {"speeds.stop": stop or 0.0} | {f"run.speeds.{i}": speed for i, speed in enumerate(scene.run.speeds)}
-    for place, speed in listed.items():
+    for key_path, speed in listed.items():
         if not speed <= HIGHEST_SPEED:
-            raise InputError(scene.file, place, speed, f"must be at most {HIGHEST_SPEED:g} m/s")
-        if place.startswith("run") and not speed > 0.0:
-            raise InputError(scene.file, place, speed, "must be above 0, in m/s")
+            raise InputError(scene.file, key_path, speed, f"must be at most {HIGHEST_SPEED:g} m/s")
+        if key_path.startswith("run") and not speed > 0.0:
+            raise InputError(scene.file, key_path, speed, "must be above 0, in m/s")
 
 
 def _check_conicity(scene: WheelsetScene) -> None:
-    asked = scene.conicity
-    if asked is None:
+    conicity_table = scene.conicity
+    if conicity_table is None:
         return
-    for i, amplitude in enumerate(asked.amplitudes):
+    for i, amplitude in enumerate(conicity_table.amplitudes):
         if not 0.0 < amplitude <= LARGEST_SHIFT:
             allowed = f"must be above 0 and at most {LARGEST_SHIFT:g} m: half of peak to peak"
             raise InputError(scene.file, f"conicity.amplitudes.{i}", amplitude, allowed)
-    if asked.table is not None:
-        for key in sorted(asked.model_fields_set & WHEELS_OF_SCENE):
+    if conicity_table.table is not None:
+        for key in sorted(conicity_table.model_fields_set & WHEELS_OF_SCENE):
             allowed = "is not read beside a table, which has both wheels in it: drop one of them"
-            raise InputError(scene.file, f"conicity.{key}", getattr(asked, key), allowed)
+            raise InputError(scene.file, f"conicity.{key}", getattr(conicity_table, key), allowed)
         return
     if scene.profiles is None:
-        for key in sorted(asked.model_fields_set & {"left_wheel", "left_rail", "spacing"}):
+        for key in sorted(conicity_table.model_fields_set & {"left_wheel", "left_rail", "spacing"}):
             allowed = "needs [profiles]: without them both wheels are cones"
-            raise InputError(scene.file, f"conicity.{key}", getattr(asked, key), allowed)
-    if not (asked.reach <= LARGEST_SHIFT and asked.reach / MOST_PLACES <= asked.spacing <= asked.reach / 4.0):
+            raise InputError(scene.file, f"conicity.{key}", getattr(conicity_table, key), allowed)
+    if not (
+        conicity_table.reach <= LARGEST_SHIFT
+        and conicity_table.reach / MOST_PLACES <= conicity_table.spacing <= conicity_table.reach / 4.0
+    ):
         allowed = f"must be from 1/{MOST_PLACES} to 1/4 of reach, and reach at most {LARGEST_SHIFT:g} m"
-        raise InputError(scene.file, "conicity.spacing", asked.spacing, allowed)
+        raise InputError(scene.file, "conicity.spacing", conicity_table.spacing, allowed)
     for key in ("right_radius", "left_radius"):
-        radius = getattr(asked, key)
+        radius = getattr(conicity_table, key)
         if radius is not None and not RADIUS_RANGE[0] <= radius <= RADIUS_RANGE[1]:
             raise InputError(
                 scene.file, f"conicity.{key}", radius, f"must be from {RADIUS_RANGE[0]:g} to {RADIUS_RANGE[1]:g} m"
@@ -154,9 +157,9 @@ def _check_conicity(scene: WheelsetScene) -> None:
 
 def _check_run(scene: WheelsetScene) -> None:
     run = scene.run
-    for key, most, unit in (("displacement", LARGEST_SHIFT, "m"), ("yaw", LARGEST_YAW, "rad")):
-        if abs(getattr(run, key)) > most:
-            allowed = f"must be at most {most:g} {unit}, of either sign: beyond, it does not stand on its rails"
+    for key, largest, unit in (("displacement", LARGEST_SHIFT, "m"), ("yaw", LARGEST_YAW, "rad")):
+        if abs(getattr(run, key)) > largest:
+            allowed = f"must be at most {largest:g} {unit}, of either sign: beyond, it does not stand on its rails"
             raise InputError(scene.file, f"run.{key}", getattr(run, key), allowed)
     if run.duration / run.step > MOST_STEPS:
         raise InputError(scene.file, "run.duration", run.duration, f"needs more than {MOST_STEPS:,} steps")

@@ -46,7 +46,7 @@ March = Callable[[WheelsetScene], WheelsetPath]
 """The path of a scene, by one engine at one speed."""
 
 
-def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
+def with_error(run: Result, scene: WheelsetScene, march_scene: March) -> Result:
     """The result of a path with the errors of its principal channels; RunFailed where these are so large that it is no
     answer.
     """
@@ -56,22 +56,22 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
         return estimated(
             run,
             fine,
-            lambda times, share: principal_series(march(with_step_factor(scene, times, share))),
+            lambda step_factor, share: principal_series(march_scene(with_step_factor(scene, step_factor, share))),
             RK4_ORDER,
             step,
-            sizes=sizes,
+            channel_sizes=sizes,
         )
     cells = scene.contact.cells
-    other = coarser_cells(cells) if cells >= FEWEST_CELLS else 2 * cells
+    other_cells = coarser_cells(cells) if cells >= FEWEST_CELLS else 2 * cells
     try:
-        coarse = _coarse_run(scene, march, other)
+        coarse = _coarse_run(scene, march_scene, other_cells)
     except (InputError, RunFailed) as failure:
-        return not_estimated(run, f"on {other} cells the path fails: {failure}")
-    told = _of_steps(scene, march, fine, coarse, sizes)
+        return not_estimated(run, f"on {other_cells} cells the path fails: {failure}")
+    estimates = _of_steps(scene, march_scene, fine, coarse, sizes)
     for name, unit in UNIT_OF_CHANNEL.items():
         gap = _rms_difference(fine, coarse, name)
-        told[f"{name} of cells"] = by_cells(gap, sizes[name], unit, cells, OF_CELLS, MOST_CELLS)
-    return with_stated_errors(run, told, f"a path on {other} cells and some steps of other length")
+        estimates[f"{name} of cells"] = by_cells(gap, sizes[name], unit, cells, OF_CELLS, MOST_CELLS)
+    return with_stated_errors(run, estimates, f"a path on {other_cells} cells and some steps of other length")
 
 
 def principal_series(path: WheelsetPath) -> Series:
@@ -82,19 +82,21 @@ def principal_series(path: WheelsetPath) -> Series:
     return Series(path.times, {"y": path.states[:, Y], "yaw": path.states[:, YAW], **forces})
 
 
-def _sizes(fine: Series, load: float) -> dict[str, float]:
+def _sizes(fine_series: Series, load: float) -> dict[str, float]:
     """Sizes of the channels by which errors are divided; ``load`` : the largest of a patch (N)."""
     return {
         name: max(size_of(values), STILL * (load if UNIT_OF_CHANNEL[name] == "N" else 1.0))
-        for name, values in fine.channels.items()
+        for name, values in fine_series.channels.items()
     }
 
 
-def with_step_factor(scene: WheelsetScene, times: float, share: float = 1.0, cells: int | None = None) -> WheelsetScene:
-    """The scene with a step that is ``times`` as long, over a share of its path (whole steps), and with another number
-    of cells. Raises RunFailed for a step that outlasts the path.
+def with_step_factor(
+    scene: WheelsetScene, step_factor: float, share: float = 1.0, cells: int | None = None
+) -> WheelsetScene:
+    """The scene with a step that is ``step_factor`` as long, over a share of its path (whole steps), and with another
+    number of cells. Raises RunFailed for a step that outlasts the path.
     """
-    step = times * scene.run.step
+    step = step_factor * scene.run.step
     if step > scene.run.duration * (1.0 + 1e-9):
         raise RunFailed("", f"a step of {step:g} s outlasts the path of {scene.run.duration:g} s")
     duration = step * max(1, math.floor(share * scene.run.duration / step + 1e-9))
@@ -103,64 +105,78 @@ def with_step_factor(scene: WheelsetScene, times: float, share: float = 1.0, cel
     return scene.model_copy(update={"contact": contact, "run": run})
 
 
-def _coarse_run(scene: WheelsetScene, march: March, cells: int) -> Series:
+def _coarse_run(scene: WheelsetScene, march_scene: March, cells: int) -> Series:
     """The path on another number of cells, in twice the step where this is possible."""
     with suppress(InputError, RunFailed):
-        return principal_series(march(with_step_factor(scene, 2.0, cells=cells)))
-    return principal_series(march(with_step_factor(scene, 1.0, cells=cells)))
+        return principal_series(march_scene(with_step_factor(scene, 2.0, cells=cells)))
+    return principal_series(march_scene(with_step_factor(scene, 1.0, cells=cells)))
 
 
 def _of_steps(
-    scene: WheelsetScene, march: March, fine: Series, coarse: Series, sizes: Mapping[str, float]
+    scene: WheelsetScene,
+    march_scene: March,
+    fine_series: Series,
+    coarse_series: Series,
+    channel_sizes: Mapping[str, float],
 ) -> dict[str, Estimate]:
     """Step errors over the whole path: those of its first part, enlarged as the errors of the cells grow."""
     power = 2.0**KINKED_ORDER
     try:
-        part, share, remains = (
-            principal_series(march(with_step_factor(scene, 2.0, FINE_WINDOW))),
+        first_part, share, remains = (
+            principal_series(march_scene(with_step_factor(scene, 2.0, FINE_WINDOW))),
             FINE_WINDOW,
             1.0 / (power - 1.0),
         )
     except (InputError, RunFailed):
         share = min(1.0, max(HALF_STEP_SHARE, LEAST_STEPS * scene.run.step / scene.run.duration))
-        part, remains = principal_series(march(with_step_factor(scene, 0.5, share))), power / (power - 1.0)
-    end, told = share * scene.run.duration, {}
+        first_part, remains = principal_series(march_scene(with_step_factor(scene, 0.5, share))), power / (power - 1.0)
+    end, estimates = share * scene.run.duration, {}
     for name, unit in UNIT_OF_CHANNEL.items():
-        before, whole = _rms_difference(fine, coarse, name, end), _rms_difference(fine, coarse, name)
-        grown = max(1.0, whole / before) if before > 0.0 else 1.0
-        error = remains * grown * _rms_difference(fine, part, name)
-        told[name] = Estimate(error, unit, error / sizes[name], KINKED_ORDER, scene.run.step)
-    return told
+        difference_at_start, difference_over_all = (
+            _rms_difference(fine_series, coarse_series, name, end),
+            _rms_difference(fine_series, coarse_series, name),
+        )
+        grown = max(1.0, difference_over_all / difference_at_start) if difference_at_start > 0.0 else 1.0
+        error = remains * grown * _rms_difference(fine_series, first_part, name)
+        estimates[name] = Estimate(error, unit, error / channel_sizes[name], KINKED_ORDER, scene.run.step)
+    return estimates
 
 
-def _rms_difference(fine: Series, other_series: Series, name: str, end: float = math.inf) -> float:
+def _rms_difference(fine_series: Series, other_series: Series, name: str, end_time: float = math.inf) -> float:
     """Root mean square of the difference between two series in one channel, up to a time (s), at the rows that both
     have.
     """
-    long, short = sorted((fine, other_series), key=lambda series: -series.times[min(1, len(series.times) - 1)])
-    times = long.times[long.times <= min(end, short.times[-1]) * (1.0 + 1e-9)]
-    gap = long.channels[name][: len(times)] - short.channels[name][rows_at(short.times, times)]
+    long, short = sorted((fine_series, other_series), key=lambda series: -series.times[min(1, len(series.times) - 1)])
+    shared_times = long.times[long.times <= min(end_time, short.times[-1]) * (1.0 + 1e-9)]
+    gap = long.channels[name][: len(shared_times)] - short.channels[name][rows_at(short.times, shared_times)]
     return float(np.sqrt(np.mean(gap**2)))
 
 
 def with_error_of_cycles(
-    run: Result, orbits: Sequence[Orbit], coarse: Mapping[int, Orbit], unknown: str, cells: int
+    run: Result, orbits: Sequence[Orbit], coarse_orbits: Mapping[int, Orbit], sought_quantity: str, cells: int
 ) -> Result:
     """The result of limit cycles with the errors of the frequency and of the unknown that was solved for.
 
-    Each cycle was also solved in half the step, which gives the error of the steps. ``coarse`` : some of them on half
-    the cells, by their index.
+    Each cycle was also solved in half the step, which gives the error of the steps. ``coarse_orbits`` : some of them on
+    half the cells, by their index.
     """
-    units, told = {unknown: "m" if unknown == "amplitude" else "m/s", "frequency": "Hz"}, dict[str, Estimate]()
+    units, estimates = (
+        {sought_quantity: "m" if sought_quantity == "amplitude" else "m/s", "frequency": "Hz"},
+        dict[str, Estimate](),
+    )
     for name, unit in units.items():
         size = size_of(np.array([getattr(orbit, name) for orbit in orbits]))
         changes = [orbit.frequency_error if name == "frequency" else orbit.error for orbit in orbits]
         error = float(np.sqrt(np.mean(np.square(changes)))) / (2.0**KINKED_ORDER - 1.0)
         steps = [orbit.period / orbit.steps for orbit in orbits]
-        told[name] = Estimate(error, unit, error / size, KINKED_ORDER, float(min(steps)))
-        if coarse:
-            gaps = [getattr(orbits[k], name) - getattr(other, name) for k, other in coarse.items()]
+        estimates[name] = Estimate(error, unit, error / size, KINKED_ORDER, float(min(steps)))
+        if coarse_orbits:
+            gaps = [getattr(orbits[k], name) - getattr(coarse_orbit, name) for k, coarse_orbit in coarse_orbits.items()]
             left = LIKELY * float(np.sqrt(np.mean(np.square(gaps))))
-            told[f"{name} of cells"] = by_cells(left, size, unit, cells, OF_CELLS, MOST_CELLS)
-    some = f", and half the cells at {len(coarse)} of {len(orbits)} cycles" if coarse else ", none on fewer cells"
-    return with_stated_errors(run, told, f"half the step at every cycle{some}")
+            estimates[f"{name} of cells"] = by_cells(left, size, unit, cells, OF_CELLS, MOST_CELLS)
+    cells_text = (
+        f", and half the cells at {len(coarse_orbits)} of {len(orbits)} cycles"
+        if coarse_orbits
+        else ", none on fewer cells"
+    )
+    return with_stated_errors(run, estimates, f"half the step at every cycle{cells_text}")

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 
 from validation.measured.measured_files.odd import (
-    COUNT,
     FX,
     FZ,
     MANY_CHANNELS,
     REPEATED_NAME,
-    TIMES,
+    SAMPLE_COUNT,
+    SAMPLE_TIMES,
     Files,
     Make,
     altered,
@@ -24,9 +24,12 @@ from validation.measured.measured_files.odd import (
 HEADER = "time [s],Fz [N],Fx [N]"
 
 
-def csv_rows(separator: str = ",", end: str = "\n") -> list[str]:
+def csv_rows(separator: str = ",", line_end: str = "\n") -> list[str]:
     """Rows of the usual file."""
-    return [separator.join(map(repr, row)) + end for row in zip(TIMES.tolist(), FZ.tolist(), FX.tolist(), strict=True)]
+    return [
+        separator.join(map(repr, row)) + line_end
+        for row in zip(SAMPLE_TIMES.tolist(), FZ.tolist(), FX.tolist(), strict=True)
+    ]
 
 
 def text(header: str = HEADER, body: list[str] | None = None, encoding: str = "utf-8") -> Make:
@@ -57,14 +60,14 @@ def whole() -> str:
     return HEADER + "\n" + "".join(csv_rows())
 
 
-BACK = np.where(np.arange(COUNT) < 20, TIMES, TIMES - 0.1)
+BACK = np.where(np.arange(SAMPLE_COUNT) < 20, SAMPLE_TIMES, SAMPLE_TIMES - 0.1)
 GAP = [
     row if not 10 <= i < 20 else ",".join((row.split(",")[0], ("", "nan")[i % 2], row.split(",")[2]))
     for i, row in enumerate(csv_rows())
 ]
 BACKWARDS = [f"{t!r},{z!r},{x!r}\n" for t, z, x in zip(BACK.tolist(), FZ.tolist(), FX.tolist(), strict=True)]
 GERMAN = [row.replace(".", ",") for row in csv_rows(";")]
-UMLAUTS = {"Kraft Räder": (TIMES, FZ), "Größe": (TIMES, FX)}
+UMLAUTS = {"Kraft Räder": (SAMPLE_TIMES, FZ), "Größe": (SAMPLE_TIMES, FX)}
 
 REFUSED: Files = {
     "CSV of no byte": ("there is nothing to read", raw(b""), "empty"),
@@ -179,9 +182,12 @@ RIGHT: Files = {
         "taken for seconds, every rate is 1000 times too slow",
         text(
             HEADER.replace("[s]", "[ms]"),
-            [f"{1e3 * t!r},{z!r},{x!r}\n" for t, z, x in zip(TIMES.tolist(), FZ.tolist(), FX.tolist(), strict=True)],
+            [
+                f"{1e3 * t!r},{z!r},{x!r}\n"
+                for t, z, x in zip(SAMPLE_TIMES.tolist(), FZ.tolist(), FX.tolist(), strict=True)
+            ],
         ),
     ),
 }
 GREEDY = ("CSV of one endless line",)
-FILES = every(refused=REFUSED, named=NAMED, right=RIGHT, greedy=GREEDY)
+FILES = every(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)

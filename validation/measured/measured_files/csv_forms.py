@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from validation.measured.measured_files.csv import holes
-from validation.measured.measured_files.odd import FX, FZ, REPEATED_NAME, TIMES, Files, Truth, every, raw, usual
+from validation.measured.measured_files.odd import FX, FZ, REPEATED_NAME, SAMPLE_TIMES, Files, Truth, every, raw, usual
 
 BEGAN = datetime(2026, 3, 2, 9, 30, 0)
 DAY_END = datetime(2026, 3, 2, 23, 59, 59, 900_000)
@@ -35,7 +35,7 @@ class Form:
     trailing: str = ""
     end: str = "\n"
     encoding: str = "utf-8"
-    times: Sequence[str] = tuple(map(repr, TIMES.tolist()))
+    times: Sequence[str] = tuple(map(repr, SAMPLE_TIMES.tolist()))
     gap: str | None = None
     below: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
@@ -65,29 +65,29 @@ class Form:
 
 def stamps(written: Callable[[datetime], str], began: datetime = BEGAN) -> tuple[str, ...]:
     """Function that writes the time of a sample as date and time of day in a given notation."""
-    return tuple(written(began + timedelta(milliseconds=10 * i)) for i in range(len(TIMES)))
+    return tuple(written(began + timedelta(milliseconds=10 * i)) for i in range(len(SAMPLE_TIMES)))
 
 
-def clock(stamp: datetime) -> str:
+def clock(time_stamp: datetime) -> str:
     """Hours, minutes, seconds and thousandths."""
-    return stamp.strftime("%H:%M:%S.%f")[:-3]
+    return time_stamp.strftime("%H:%M:%S.%f")[:-3]
 
 
-def iso(stamp: datetime) -> str:
+def iso(time_stamp: datetime) -> str:
     """ISO 8601 without a zone."""
-    return stamp.isoformat(timespec="milliseconds")
+    return time_stamp.isoformat(timespec="milliseconds")
 
 
-def german(stamp: datetime) -> str:
+def german(time_stamp: datetime) -> str:
     """Day, month and year, with a decimal comma."""
-    return stamp.strftime("%d.%m.%Y %H:%M:%S,%f")[:-3]
+    return time_stamp.strftime("%d.%m.%Y %H:%M:%S,%f")[:-3]
 
 
 GERMAN = Form(separator=";", decimal=",")
-MILLI = tuple(f"{10 * i}" for i in range(len(TIMES)))
+MILLI = tuple(f"{10 * i}" for i in range(len(SAMPLE_TIMES)))
 TITLES = ("Kistler RoaDyn export", "Operator: Meier", "Date: 02.03.2026", "")
 KEYS = ("Date;02.03.2026", "Time;09:30:00", "Channels;3", "")
-WHEELS = {"VL/Fz": (TIMES, FZ), "HR/Fz": (TIMES, FX)}
+WHEELS = {"VL/Fz": (SAMPLE_TIMES, FZ), "HR/Fz": (SAMPLE_TIMES, FX)}
 READ: tuple[tuple[str, str, Form, Truth], ...] = (
     ("a line sep=", "a spreadsheet writes it for itself", replace(GERMAN, above=("sep=;",)), usual()),
     ("sep= of tabs", "the line ends in what it names", Form(above=("sep=\t",), separator="\t"), usual()),
@@ -114,7 +114,7 @@ READ: tuple[tuple[str, str, Form, Truth], ...] = (
     (
         "an index without a name",
         "pandas counts the rows",
-        Form(("", *HEADINGS), times=tuple(f"{i},{t!r}" for i, t in enumerate(TIMES.tolist()))),
+        Form(("", *HEADINGS), times=tuple(f"{i},{t!r}" for i, t in enumerate(SAMPLE_TIMES.tolist()))),
         usual(),
     ),
     ("spaces around the numbers", "columns are padded", Form(separator=" , "), usual()),

@@ -10,12 +10,12 @@ import numpy as np
 from models.measured.formats.mdf4 import suppressed_output
 from validation.measured.measured_files.csv import BACK
 from validation.measured.measured_files.odd import (
-    COUNT,
     FX,
     FZ,
     MANY_CHANNELS,
     REPEATED_NAME,
-    TIMES,
+    SAMPLE_COUNT,
+    SAMPLE_TIMES,
     TWO_RATES,
     Files,
     Make,
@@ -40,8 +40,8 @@ def signals(
     *groups: dict[str, Any],
     version: str = "4.10",
     compression: Literal[0, 2] = 0,
-    start: datetime | None = None,
-    times: np.ndarray = TIMES,
+    start_date: datetime | None = None,
+    times: np.ndarray = SAMPLE_TIMES,
     families: tuple[str, ...] = (),
 ) -> Make:
     """Make a file of groups, name -> samples or keywords of asammdf's Signal; ``families`` are their names."""
@@ -51,8 +51,8 @@ def signals(
 
         path = folder / ("odd.mdf" if version < "4" else "odd.mf4")
         file = MDF(version=version)
-        if start is not None:
-            file.header.start_time = start
+        if start_date is not None:
+            file.header.start_time = start_date
         for group, family in zip(groups, families or [""] * len(groups), strict=True):
             plain = {name: data if isinstance(data, dict) else {"samples": data} for name, data in group.items()}
             file.append(
@@ -73,57 +73,67 @@ USUAL_CHANNELS = {"Fz": FZ, "Fx": FX}
 MDF4, MDF3 = plain(".mf4"), signals(USUAL_CHANNELS, version="3.30")
 
 
-def block(data: bytes, kind: bytes) -> int:
+def block(raw_bytes: bytes, block_kind: bytes) -> int:
     """Byte where the first block of a kind begins."""
-    return next(i for i in range(0, len(data), 8) if data[i : i + 4] == kind)
+    return next(i for i in range(0, len(raw_bytes), 8) if raw_bytes[i : i + 4] == block_kind)
 
 
-def inside(data: bytes, kind: bytes, offset: int, new: bytes) -> bytes:
+def inside(raw_bytes: bytes, block_kind: bytes, byte_offset: int, new_bytes: bytes) -> bytes:
     """Other bytes in a block's data, which stand after its links."""
-    place = block(data, kind)
-    return patched(data, place + DATA + 8 * struct.unpack_from("<Q", data, place + 16)[0] + offset, new)
+    block_start = block(raw_bytes, block_kind)
+    return patched(
+        raw_bytes,
+        block_start + DATA + 8 * struct.unpack_from("<Q", raw_bytes, block_start + 16)[0] + byte_offset,
+        new_bytes,
+    )
 
 
-def changed(kind: bytes, offset: int, new: bytes, make_file: Make = MDF4) -> Make:
+def changed(block_kind: bytes, byte_offset: int, new_bytes: bytes, make_file: Make = MDF4) -> Make:
     """Make a file with other bytes in a block's data."""
-    return altered(make_file, lambda data: inside(data, kind, offset, new))
+    return altered(make_file, lambda data: inside(data, block_kind, byte_offset, new_bytes))
 
 
-def linked(kind: bytes, offset: int, number: int) -> Make:
+def linked(block_kind: bytes, byte_offset: int, new_number: int) -> Make:
     """Make the usual file with another number in the head or a link of a block."""
-    return altered(MDF4, lambda data: patched(data, block(data, kind) + offset, struct.pack("<Q", number)))
+    return altered(
+        MDF4, lambda data: patched(data, block(data, block_kind) + byte_offset, struct.pack("<Q", new_number))
+    )
 
 
-def looped(kind: bytes) -> Make:
+def looped(block_kind: bytes) -> Make:
     """Make the usual file with a block that follows itself."""
-    return altered(MDF4, lambda data: patched(data, block(data, kind) + DATA, struct.pack("<Q", block(data, kind))))
+    return altered(
+        MDF4, lambda data: patched(data, block(data, block_kind) + DATA, struct.pack("<Q", block(data, block_kind)))
+    )
 
 
-def clocked(offset: int, new: bytes) -> Make:
+def clocked(byte_offset: int, new_bytes: bytes) -> Make:
     """Make the usual file whose master channel is another one; its block has its kind, 2, after eight links."""
 
-    def change(data: bytes) -> bytes:
-        master = next(i for i in range(0, len(data), 8) if data[i : i + 4] == b"##CN" and data[i + 88] == 2)
-        return patched(data, master + 88 + offset, new)
+    def change(raw_bytes: bytes) -> bytes:
+        master = next(
+            i for i in range(0, len(raw_bytes), 8) if raw_bytes[i : i + 4] == b"##CN" and raw_bytes[i + 88] == 2
+        )
+        return patched(raw_bytes, master + 88 + byte_offset, new_bytes)
 
     return altered(MDF4, change)
 
 
-def headed(byte_offset: int, new: bytes, length: int | None = None) -> Make:
+def headed(byte_offset: int, new_bytes: bytes, length: int | None = None) -> Make:
     """Make the usual file, or its first bytes, with others at its beginning."""
-    return altered(MDF4, lambda data: patched(data, byte_offset, new)[:length])
+    return altered(MDF4, lambda data: patched(data, byte_offset, new_bytes)[:length])
 
 
-def only(name: str, values: np.ndarray, times: np.ndarray = TIMES) -> Truth:
+def only(name: str, values: np.ndarray, times: np.ndarray = SAMPLE_TIMES) -> Truth:
     """Truth of one channel."""
     return {name: (times, values)}
 
 
-WHOLE_NUMBERS = np.arange(COUNT, dtype="i2")
-INVALID = np.arange(COUNT) % 11 == 3
+WHOLE_NUMBERS = np.arange(SAMPLE_COUNT, dtype="i2")
+INVALID = np.arange(SAMPLE_COUNT) % 11 == 3
 LOST_SAMPLES = np.where(FX < -50.0, np.nan, FZ)
 
-STOPPED = np.where(np.arange(COUNT) == 9, np.nan, TIMES)
+STOPPED = np.where(np.arange(SAMPLE_COUNT) == 9, np.nan, SAMPLE_TIMES)
 
 REFUSED: Files = {
     "MDF 4 cut in its header": ("the first block is incomplete", headed(0, b"MDF", 100), "cut off"),
@@ -165,7 +175,7 @@ REFUSED: Files = {
     ),
     "MDF 4 of one record more than there is": (
         "the last one is made up",
-        changed(b"##CG", 8, struct.pack("<Q", COUNT + 1)),
+        changed(b"##CG", 8, struct.pack("<Q", SAMPLE_COUNT + 1)),
         "records",
     ),
     "MDF 4 of no records": ("a recording that never began", changed(b"##CG", 8, struct.pack("<Q", 0)), "no samples"),
@@ -187,12 +197,12 @@ REFUSED: Files = {
 NAMED: Files = {
     "MDF 4 of fewer records than there are": (
         "counters of a recorder that stopped early",
-        changed(b"##CG", 8, struct.pack("<Q", COUNT - 5)),
+        changed(b"##CG", 8, struct.pack("<Q", SAMPLE_COUNT - 5)),
         "announced and read",
     ),
     "MDF 4 with texts": (
         "remarks of the driver in a channel",
-        signals({"Fz": FZ, "remark": {"samples": np.array([b"abc"] * COUNT), "encoding": "utf-8"}}),
+        signals({"Fz": FZ, "remark": {"samples": np.array([b"abc"] * SAMPLE_COUNT), "encoding": "utf-8"}}),
         "no numbers: 'remark'",
         only("Fz", FZ),
     ),
@@ -204,7 +214,7 @@ NAMED: Files = {
     ),
     "MDF 4 with a start without zone": (
         "eight o'clock where",
-        signals(USUAL_CHANNELS, start=datetime(2026, 11, 21, 8)),
+        signals(USUAL_CHANNELS, start_date=datetime(2026, 11, 21, 8)),
         "is not used",
     ),
     "MDF 4 called odd.tdms": ("the extension says otherwise", called(".mf4", "odd.tdms"), "extension"),
@@ -212,7 +222,7 @@ NAMED: Files = {
 RIGHT: Files = {
     "MDF 3": (
         "another layout, the same samples",
-        signals(USUAL_CHANNELS, version="3.30", start=datetime.fromisoformat("2026-11-21T08:00:00+00:00")),
+        signals(USUAL_CHANNELS, version="3.30", start_date=datetime.fromisoformat("2026-11-21T08:00:00+00:00")),
     ),
     "MDF 4 packed": ("samples are deflated", signals(USUAL_CHANNELS, compression=2)),
     "MDF 4 of two rates": ("a common clock does not exist", two_rates(".mf4"), TWO_RATES),
@@ -247,7 +257,7 @@ GREEDY = (
     "MDF 4 that claims to be a terabyte when unpacked",
 )
 FILES = (
-    *every(refused=REFUSED, named=NAMED, right=RIGHT, greedy=GREEDY),
+    *every(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY),
     *(
         OddFile(
             f"MDF {version[0]} whose groups are wheels",
@@ -255,7 +265,7 @@ FILES = (
             signals({"Fz": FZ}, {"Fz": FX}, version=version, families=("WFT VL", "WFT HR")),
             "named",
             "'WFT HR/Fz'",
-            {"WFT VL/Fz": (TIMES, FZ), "WFT HR/Fz": (TIMES, FX)},
+            {"WFT VL/Fz": (SAMPLE_TIMES, FZ), "WFT HR/Fz": (SAMPLE_TIMES, FX)},
         )
         for version in ("4.10", "3.30")
     ),

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 
 from validation.measured.measured_files.odd import (
-    COUNT,
     FX,
     FZ,
-    PERIOD,
     REPEATED_NAME,
-    TIMES,
+    SAMPLE_COUNT,
+    SAMPLE_PERIOD,
+    SAMPLE_TIMES,
     Files,
     Make,
     altered,
@@ -30,45 +30,51 @@ RPC = plain(".rsp")
 def with_parameters(make_file: Make = RPC, **changed: str | None) -> Make:
     """Function that makes a file with some header parameters changed (``_`` stands for ``.``) or, for None, removed."""
 
-    def change(data: bytes) -> bytes:
-        values = _values(data)
+    def change(raw_bytes: bytes) -> bytes:
+        values = _values(raw_bytes)
         size = BLOCK * int(values["NUM_HEADER_BLOCKS"])
         names = {name.replace(".", "_"): name for name in values}
         values |= {names.get(key, key): value for key, value in changed.items()}
-        kept = {name: value for name, value in values.items() if value is not None}
-        kept["NUM_PARAMS"] = changed.get("NUM_PARAMS") or str(len(kept))
-        latin = [(name.encode().ljust(KEY, b"\0"), value.encode("latin-1")) for name, value in kept.items()]
-        return b"".join(key + value.ljust(RECORD - KEY, b"\0") for key, value in latin).ljust(size, b"\0") + data[size:]
+        given_parameters = {name: value for name, value in values.items() if value is not None}
+        given_parameters["NUM_PARAMS"] = changed.get("NUM_PARAMS") or str(len(given_parameters))
+        latin = [(name.encode().ljust(KEY, b"\0"), value.encode("latin-1")) for name, value in given_parameters.items()]
+        return (
+            b"".join(key + value.ljust(RECORD - KEY, b"\0") for key, value in latin).ljust(size, b"\0")
+            + raw_bytes[size:]
+        )
 
     return altered(make_file, change)
 
 
-def _values(data: bytes) -> dict[str, Any]:
+def _values(raw_bytes: bytes) -> dict[str, Any]:
     """Header parameters of a file, by name."""
-    count = int(data[2 * RECORD + KEY : 3 * RECORD].rstrip(b"\0"))
-    records = [data[i * RECORD : (i + 1) * RECORD] for i in range(count)]
-    texts = [[part.rstrip(b"\0").decode("latin-1") for part in (record[:KEY], record[KEY:])] for record in records]
+    count = int(raw_bytes[2 * RECORD + KEY : 3 * RECORD].rstrip(b"\0"))
+    records = [raw_bytes[i * RECORD : (i + 1) * RECORD] for i in range(count)]
+    texts = [
+        [header_part.rstrip(b"\0").decode("latin-1") for header_part in (record[:KEY], record[KEY:])]
+        for record in records
+    ]
     return dict(texts)
 
 
-DIGITS = np.pad(np.tile(np.arange(COUNT, dtype="<i2"), (2, 1)), ((0, 0), (0, POINTS - COUNT)))
+DIGITS = np.pad(np.tile(np.arange(SAMPLE_COUNT, dtype="<i2"), (2, 1)), ((0, 0), (0, POINTS - SAMPLE_COUNT)))
 """Samples of 16 bits: 2^-6 per digit and an offset that fits, -2.5 per digit."""
 SCALED = with_parameters(DATA_TYPE="SHORT_INTEGER", SCALE_CHAN_1="0.015625", SCALE_CHAN_2="-2.5")
 
 
-def sample(value: float) -> Make:
+def sample(sample_value: float) -> Make:
     """Make the usual file with another value at sample 5 of the first channel."""
-    new = np.array([value], "<f4").tobytes()
+    new = np.array([sample_value], "<f4").tobytes()
     return altered(RPC, lambda data: patched(data, len(data) - 2 * POINTS * 4 + 5 * 4, new))
 
 
-def padded(count: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Expected values, with the last one repeated up to ``count`` samples."""
-    times, more = PERIOD * np.arange(count), (0, count - COUNT)
-    return {name: (times, np.pad(values, more, mode="edge")) for name, (_, values) in usual().items()}
+def padded(sample_count: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Expected values, with the last one repeated up to ``sample_count`` samples."""
+    sample_times, padding = SAMPLE_PERIOD * np.arange(sample_count), (0, sample_count - SAMPLE_COUNT)
+    return {name: (sample_times, np.pad(values, padding, mode="edge")) for name, (_, values) in usual().items()}
 
 
-WHOLE_NUMBERS = {"Fz": (TIMES, 2.0**-6 * np.arange(COUNT)), "Fx": (TIMES, FX)}
+WHOLE_NUMBERS = {"Fz": (SAMPLE_TIMES, 2.0**-6 * np.arange(SAMPLE_COUNT)), "Fx": (SAMPLE_TIMES, FX)}
 REFUSED: Files = {
     "RPC III cut in its header": (
         "the parameters are incomplete",
@@ -155,7 +161,7 @@ NAMED: Files = {
         "nothing to map",
         with_parameters(DESC_CHAN_2=None),
         "no channel 2",
-        {"Fz": (TIMES, FZ), "channel 2": (TIMES, FX)},
+        {"Fz": (SAMPLE_TIMES, FZ), "channel 2": (SAMPLE_TIMES, FX)},
     ),
     "RPC III with a date without zone": (
         "eight o'clock where",
@@ -177,14 +183,14 @@ RIGHT: Files = {
     "RPC III with umlauts": (
         "bytes beyond ASCII",
         with_parameters(DESC_CHAN_1="Kraft Räder", DESC_CHAN_2="Größe"),
-        {"Kraft Räder": (TIMES, FZ), "Größe": (TIMES, FX)},
+        {"Kraft Räder": (SAMPLE_TIMES, FZ), "Größe": (SAMPLE_TIMES, FX)},
     ),
     "RPC III without units": ("kN or N, nobody knows", with_parameters(UNITS_CHAN_1=None)),
     "RPC III with NaN": (
         "nothing was measured at one sample",
         sample(np.nan),
-        usual(Fz=np.where(np.arange(COUNT) == 5, np.nan, FZ)),
+        usual(Fz=np.where(np.arange(SAMPLE_COUNT) == 5, np.nan, FZ)),
     ),
 }
 GREEDY = ("RPC III of a huge number of frames", "RPC III of a huge number of channels", "RPC III of a huge header")
-FILES = every(refused=REFUSED, named=NAMED, right=RIGHT, greedy=GREEDY)
+FILES = every(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)

@@ -8,13 +8,13 @@ import numpy as np
 
 from validation.measured.measured_files.csv import BACK
 from validation.measured.measured_files.odd import (
-    COUNT,
     FX,
     FZ,
     MANY_CHANNELS,
-    PERIOD,
+    SAMPLE_COUNT,
+    SAMPLE_PERIOD,
+    SAMPLE_TIMES,
     SLOW_PERIOD,
-    TIMES,
     TWO_RATES,
     Files,
     Make,
@@ -33,7 +33,7 @@ from validation.measured.measured_files.odd import (
 
 LEAD = 28
 """Bytes that lead in a segment."""
-CLOCK = {"wf_increment": PERIOD, "wf_start_offset": 0.0}
+CLOCK = {"wf_increment": SAMPLE_PERIOD, "wf_start_offset": 0.0}
 
 
 TDMS = plain(".tdms")
@@ -52,32 +52,32 @@ def channels(*columns: tuple[str, str, Any, dict[str, Any]]) -> Make:
     return make
 
 
-def changed(offset: int, new: bytes, length: int | None = None) -> Make:
+def changed(byte_offset: int, new_bytes: bytes, length: int | None = None) -> Make:
     """Make the usual file with changed bytes, or cut off; the offset counts from the start of its last segment."""
 
-    def change(data: bytes) -> bytes:
-        begin = data.rindex(b"TDSm")
-        return patched(data, begin + offset, new)[: None if length is None else begin + length]
+    def change(raw_bytes: bytes) -> bytes:
+        begin = raw_bytes.rindex(b"TDSm")
+        return patched(raw_bytes, begin + byte_offset, new_bytes)[: None if length is None else begin + length]
 
     return altered(TDMS, change)
 
 
-def cut_by(count: int) -> Make:
+def cut_by(byte_count: int) -> Make:
     """Make the usual file without its last bytes."""
-    return altered(TDMS, lambda data: data[:-count])
+    return altered(TDMS, lambda data: data[:-byte_count])
 
 
-def claims(new: int) -> Make:
+def claims(stated_count: int) -> Make:
     """Make the usual file with a wrong number of samples stated for the first channel."""
-    index, number = struct.pack("<LLLQ", 20, 10, 1, COUNT), struct.pack("<Q", new)
+    index, number = struct.pack("<LLLQ", 20, 10, 1, SAMPLE_COUNT), struct.pack("<Q", stated_count)
     return altered(TDMS, lambda data: patched(data, data.rindex(index) + 12, number))
 
 
 def beside_old_index(folder: Path) -> Path:
     """Write the usual TDMS file beside an index file that belongs to another file."""
-    other = written(folder / "other.tdms", ("a", "b", "c"), np.ones((5, 3)))
-    data = other.read_bytes()
-    other.unlink()
+    other_path = written(folder / "other.tdms", ("a", "b", "c"), np.ones((5, 3)))
+    data = other_path.read_bytes()
+    other_path.unlink()
     (folder / "odd.tdms_index").write_bytes(data.replace(b"TDSm", b"TDSh"))
     return TDMS(folder)
 
@@ -94,7 +94,7 @@ def at(hour: int) -> np.datetime64:
 
 def prefix(**values: np.ndarray) -> Truth:
     """Expected values of some channels with the usual clock."""
-    return {name: (TIMES, samples) for name, samples in values.items()}
+    return {name: (SAMPLE_TIMES, samples) for name, samples in values.items()}
 
 
 REFUSED: Files = {
@@ -125,7 +125,7 @@ REFUSED: Files = {
     "TDMS without a clock": ("no increment and no channel of times", channels(("g", "Fz", FZ, {})), "no clock"),
     "TDMS with an increment below zero": (
         "time runs backwards",
-        channels(one("Fz", FZ, wf_increment=-PERIOD)),
+        channels(one("Fz", FZ, wf_increment=-SAMPLE_PERIOD)),
         "no clock",
     ),
     "TDMS with an increment of nan": (
@@ -156,7 +156,7 @@ NAMED: Files = {
     "TDMS of a huge segment": ("a reader makes room for it", changed(12, struct.pack("<Q", 2**50)), "cut off"),
     "TDMS with texts": (
         "remarks of the driver in a channel",
-        channels(one("Fz", FZ), one("remark", ["a"] * COUNT)),
+        channels(one("Fz", FZ), one("remark", ["a"] * SAMPLE_COUNT)),
         "no numbers: 'remark'",
         prefix(Fz=FZ),
     ),
@@ -185,7 +185,7 @@ NAMED: Files = {
 RIGHT: Files = {
     "TDMS with a channel of times": (
         "the clock is a channel like any other",
-        channels(("g", "time", TIMES, {"unit_string": "s"}), ("g", "Fz", FZ, {}), ("g", "Fx", FX, {})),
+        channels(("g", "time", SAMPLE_TIMES, {"unit_string": "s"}), ("g", "Fz", FZ, {}), ("g", "Fx", FX, {})),
     ),
     "TDMS whose clock goes back": (
         "sorting would hide it",
@@ -201,22 +201,22 @@ RIGHT: Files = {
     "TDMS of two starts": (
         "one amplifier was switched on an hour later",
         channels(one("Fz", FZ, wf_start_time=at(8)), one("Fx", FX, wf_start_time=at(9))),
-        {"Fz": (TIMES, FZ), "Fx": (3600.0 + TIMES, FX)},
+        {"Fz": (SAMPLE_TIMES, FZ), "Fx": (3600.0 + SAMPLE_TIMES, FX)},
     ),
     "TDMS with a start offset": (
         "the trigger came later",
         channels(one("Fz", FZ, wf_start_offset=-2.5)),
-        {"Fz": (TIMES - 2.5, FZ)},
+        {"Fz": (SAMPLE_TIMES - 2.5, FZ)},
     ),
     "TDMS of two lengths": (
         "one channel has half the samples",
         channels(one("Fz", FZ), one("Fx", FX[:20])),
-        {"Fz": (TIMES, FZ), "Fx": (TIMES[:20], FX[:20])},
+        {"Fz": (SAMPLE_TIMES, FZ), "Fx": (SAMPLE_TIMES[:20], FX[:20])},
     ),
     "TDMS of whole numbers": (
         "16 bits of a converter",
-        channels(one("Fz", (1000 + np.arange(COUNT)).astype("i2"))),
-        prefix(Fz=1000.0 + np.arange(COUNT)),
+        channels(one("Fz", (1000 + np.arange(SAMPLE_COUNT)).astype("i2"))),
+        prefix(Fz=1000.0 + np.arange(SAMPLE_COUNT)),
     ),
     "TDMS with umlauts and quotes": (
         "paths within the file are quoted",
@@ -238,4 +238,4 @@ GREEDY = (
     "TDMS of a huge number of channels",
     "TDMS of a huge name",
 )
-FILES = every(refused=REFUSED, named=NAMED, right=RIGHT, greedy=GREEDY)
+FILES = every(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)

@@ -29,6 +29,6 @@ def settings_of_curves(curves: Curves, setting: Callable[[str, str, float], Sett
     return tuple(setting(*curve, value) for curve, values in curves.items() for value in values)
 
 
-def largest_differences(channels: dict[str, np.ndarray], true: dict[str, np.ndarray]) -> dict[str, float]:
+def largest_differences(channels: dict[str, np.ndarray], true_values: dict[str, np.ndarray]) -> dict[str, float]:
     """Largest difference of each quantity from its reference."""
-    return {name: float(np.abs(values - true[name]).max()) for name, values in channels.items()}
+    return {name: float(np.abs(values - true_values[name]).max()) for name, values in channels.items()}

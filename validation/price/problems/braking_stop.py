@@ -42,7 +42,7 @@ DEFAULT_METHODS = {(OWN_METHOD, BrakedVehicle.substeps): "twinrig", (LITERAL, 1)
 SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 ORDERS = {EULER: 1, LITERAL: 1}
 FULL_STEPS = {OWN_METHOD: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
-QUICK = {OWN_METHOD: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
+QUICK_SUBSTEPS = {OWN_METHOD: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
 """The named share of FULL_STEPS that the quick report takes, from half the speed; the paper's own single step is far
 from where its order shows."""
 SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
@@ -116,17 +116,21 @@ class BrakingStop:
         self.duration = self.valves.size * SAMPLE
         solvers = SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
-        self.true, other = (self._distance_by_scipy(*each) for each in solvers)
-        self.uncertainty = {"stopping distance": abs(self.true - other)}
+        self.true, other_distance = (self._distance_by_scipy(*solver_arguments) for solver_arguments in solvers)
+        self.uncertainty = {"stopping distance": abs(self.true - other_distance)}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """FULL_STEPS, or its named share QUICK."""
-        chosen = QUICK if quick else FULL_STEPS
-        return tuple(self.setting("reference", method, SAMPLE / n) for method, some in chosen.items() for n in some)
+        chosen = QUICK_SUBSTEPS if quick else FULL_STEPS
+        return tuple(
+            self.setting("reference", method, SAMPLE / n)
+            for method, substep_counts in chosen.items()
+            for n in substep_counts
+        )
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting: curve, and the longest step (s) up to ``value`` that divides a sample."""
-        substeps = math.ceil(SAMPLE / value * (1 - 1e-9))
+    def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
+        """A setting: curve, and the longest step (s) up to ``step_or_tolerance`` that divides a sample."""
+        substeps = math.ceil(SAMPLE / step_or_tolerance * (1 - 1e-9))
         return Setting(
             engine,
             method,
@@ -167,11 +171,11 @@ class BrakingStop:
 
     def _torques(self, substeps: int) -> np.ndarray:
         """Brake torque (N m) at the ends of all steps."""
-        air, part = resting_chambers(self._chambers, SAMPLE), np.zeros((substeps + 1, 1))
+        air, substep_torques = resting_chambers(self._chambers, SAMPLE), np.zeros((substeps + 1, 1))
         torques = [np.zeros(1)]
         for valve in self.valves:
-            by_valves(np.array([valve]), SAMPLE, air, self._chambers, self._brakes, part)
-            torques.append(part[1:, 0].copy())
+            by_valves(np.array([valve]), SAMPLE, air, self._chambers, self._brakes, substep_torques)
+            torques.append(substep_torques[1:, 0].copy())
         return np.concatenate(torques)
 
     def _stop_by_twinrig(self, substeps: int) -> StopResult:
@@ -195,10 +199,10 @@ class BrakingStop:
         friction = FrictionChange(
             FrictionCurve(self.slips, self.mu[0]), FrictionCurve(self.slips, self.mu[1]), self.change
         )
-        way, steps, _ = marched_quarter(number, FRONT_WHEEL, torques, friction, self.speed, step)
+        distance, steps, _ = marched_quarter(number, FRONT_WHEEL, torques, friction, self.speed, step)
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
-        return StopResult(way, {"steps": steps, "force calls": CALLS_PER_STEP[method] * steps})
+        return StopResult(distance, {"steps": steps, "force calls": CALLS_PER_STEP[method] * steps})
 
 
 @cache

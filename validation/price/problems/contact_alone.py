@@ -66,7 +66,7 @@ class ContactAlone:
 
     def __init__(self) -> None:
         self._cases = read_contacts()[::CONTACT_SPACING]
-        self._ways = {CURVES[way.name]: way for way in THEORIES_COMPARED}
+        self._ways = {CURVES[theory.name]: theory for theory in THEORIES_COMPARED}
         self._forces = np.array([case.force for case in self._cases])
         self.title = f"Creep forces of {len(self._cases)} contacts by every theory of rolling contact"
         self.units = {"mean creep force": "% of mu N", "creep force in 95 of 100": "% of mu N"}
@@ -77,13 +77,13 @@ class ContactAlone:
         """Every theory with every number of cells."""
         return tuple(
             self.setting(*curve, 1.0 / cells)
-            for curve, way in self._ways.items()
-            for cells in CELLS.get(way.name, _STRIPS)
+            for curve, theory in self._ways.items()
+            for cells in CELLS.get(theory.name, _STRIPS)
         )
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
+    def setting(self, engine: str, method: str, inverse_cells: float) -> Setting:
         """A setting of this problem: curve, and 1 / number of cells as its value."""
-        cells = round(1.0 / value)
+        cells = round(1.0 / inverse_cells)
         usual = (self._ways[engine, method].name, cells) == DEFAULT_ANSWER
         return Setting(engine, method, 1.0 / cells, 0, default="twinrig" if usual else "", cells=True)
 
@@ -93,8 +93,10 @@ class ContactAlone:
 
     def errors(self, solution: ContactResult) -> dict[str, float]:
         """Error over the contacts in % of mu N: the mean, and the one that 95 of 100 contacts do not exceed."""
-        off = 100.0 * np.linalg.norm(solution.forces - self._forces, axis=1)
-        return dict(zip(self.units, (float(off.mean()), float(np.quantile(off, 0.95))), strict=True))
+        contact_errors = 100.0 * np.linalg.norm(solution.forces - self._forces, axis=1)
+        return dict(
+            zip(self.units, (float(contact_errors.mean()), float(np.quantile(contact_errors, 0.95))), strict=True)
+        )
 
     def _run(self, theory: TheorySettings, cells: int) -> ContactResult:
         forces = np.array([force_of(theory.rolled(case, cells)(case.motion)) / case.limit for case in self._cases])

@@ -25,10 +25,10 @@ from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.price.problems import Curves, curves_of_methods, largest_differences, milliseconds, settings_of_curves
 from validation.price.problems.road_excited import MUJOCO, SPEED, judge, scene, setting, settings_of
 
-DURATION, RATE = 2.0, 100.0
+DURATION, SAMPLING_RATE = 2.0, 100.0
 """Length of the run (s); rate of the samples (Hz), whose period every fixed step divides."""
-PERIOD = 1 / RATE
-FINE_STEP = PERIOD / 1280
+SAMPLE_PERIOD = 1 / SAMPLING_RATE
+FINE_STEP = SAMPLE_PERIOD / 1280
 """Step (s) of the reference's own Runge-Kutta march, which meets every sample: its error is that of rounding."""
 STEPS = milliseconds(2.5, 2, 1.25, 1, 0.5, 0.25, 0.125, 0.0625)
 FULL_STEPS: Curves = {
@@ -42,7 +42,7 @@ FULL_STEPS: Curves = {
     **curves_of_methods("mujoco", STEPS[:-1], "implicit", "implicitfast", "discrete"),
 }
 """Steps (s) of every method; the finest is for the engines' defaults and those whose order shows late."""
-QUICK: Curves = {
+QUICK_STEPS: Curves = {
     ("reference", "RK4"): milliseconds(0.5, 0.25, 0.125),
     ("exudyn", "ExplicitEuler"): milliseconds(1, 0.5, 0.25),
     ("mujoco", "Euler"): milliseconds(2, 1, 0.5),
@@ -63,8 +63,8 @@ SEED, DEVIATION = 77, 100.0
 def driven() -> Assembly:
     """The vehicle without a road, driven by the wheel forces of its run on the road."""
     on_road = assembly_of_scene(scene(DURATION))
-    true = simulate(on_road.scene, "reference", Settings("RK4", PERIOD / 80, DURATION))
-    forces = Sampled(np.column_stack([true["f1"], true["f2"]])[::80], PERIOD, held=False)
+    true = simulate(on_road.scene, "reference", Settings("RK4", SAMPLE_PERIOD / 80, DURATION))
+    forces = Sampled(np.column_stack([true["f1"], true["f2"]])[::80], SAMPLE_PERIOD, held=False)
     return replace(on_road.without_tyres().with_input("force", forces), assumptions=())  # those of the road are gone
 
 
@@ -73,7 +73,7 @@ class ForceExcited:
     ``validation.price.problems.Problem``. ``first`` : the quantity of a variant for which tolerances are set, listed
     before the states."""
 
-    key, duration, full, quick = "forces", DURATION, FULL_STEPS, QUICK
+    key, duration, full, quick = "forces", DURATION, FULL_STEPS, QUICK_STEPS
     note = "The forces are those of a virtual measurement at 100 Hz, linear between the samples, the same for all."
     tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
     what = "driven by its wheel forces"
@@ -87,11 +87,13 @@ class ForceExcited:
             f"drift-off, fixed steps of {min(steps):g} to {max(steps):g} ms"
         )
         self.assembly = self.driven()
-        other = Settings("RK4", 2 * FINE_STEP, DURATION) if quick else Settings("DOP853", PERIOD, DURATION, 1e-12)
+        other_settings = (
+            Settings("RK4", 2 * FINE_STEP, DURATION) if quick else Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-12)
+        )
         self.reference = f"RK4 at {1e6 * FINE_STEP:.2g} us and " + ("twice that" if quick else "DOP853 at 1e-12")
         self._true, check = (
             self._sampled(build("reference", self.assembly, settings).run())
-            for settings in (Settings("RK4", FINE_STEP, DURATION), other)
+            for settings in (Settings("RK4", FINE_STEP, DURATION), other_settings)
         )
         self.uncertainty = largest_differences(check, self._true)
         self.bound = 10 * float(np.abs(next(iter(self._true.values()))).max())
@@ -106,17 +108,18 @@ class ForceExcited:
 
     def _sampled(self, run: Trajectory) -> dict[str, np.ndarray]:
         """The compared quantities at the force samples."""
-        every = (len(run.states) - 1) // round(DURATION / PERIOD)
-        return {name: values[::every] for name, values in self.read(run).items()}
+        stride = (len(run.states) - 1) // round(DURATION / SAMPLE_PERIOD)
+        return {name: values[::stride] for name, values in self.read(run).items()}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """All settings, or their named share."""
         return settings_of_curves(self.quick if quick else self.full, self.setting)
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting of this problem: curve, and the longest step (s) up to ``value`` such that every force sample falls
-        on a step."""
-        return setting(engine, method, PERIOD / math.ceil(PERIOD / value * (1 - 1e-9)))
+    def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
+        """A setting of this problem: curve, and the longest step (s) up to ``step_or_tolerance`` such that every force
+        sample falls on a step.
+        """
+        return setting(engine, method, SAMPLE_PERIOD / math.ceil(SAMPLE_PERIOD / step_or_tolerance * (1 - 1e-9)))
 
     def build(self, setting: Setting) -> Model:
         """The vehicle in one engine."""
@@ -144,7 +147,7 @@ class NoisyForces(ForceExcited):
         clean = driven()
         assert isinstance(clean.input, Sampled)
         noise = DEVIATION * normal_samples(SEED, 0, *clean.input.values.shape)
-        return replace(clean, input=Sampled(clean.input.values + noise, PERIOD, held=False))
+        return replace(clean, input=Sampled(clean.input.values + noise, SAMPLE_PERIOD, held=False))
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
         """Both suspension forces and the states of a run."""
@@ -170,8 +173,10 @@ class PrescribedPitch(ForceExcited):
         """The vehicle with forces and pitch as inputs, on the pitch at the start."""
         forces = driven()
         assert isinstance(forces.input, Sampled)
-        run = build("reference", assembly_of_scene(scene(DURATION)), Settings("RK4", PERIOD / 80, DURATION)).run()
-        pitch = Smooth(run.states[::80, 3, None], PERIOD, derivatives=2, degree=5)
+        run = build(
+            "reference", assembly_of_scene(scene(DURATION)), Settings("RK4", SAMPLE_PERIOD / 80, DURATION)
+        ).run()
+        pitch = Smooth(run.states[::80, 3, None], SAMPLE_PERIOD, derivatives=2, degree=5)
         guided = replace(forces, initial=forces.initial.copy()).with_input("pitch", Stacked((forces.input, pitch)))
         guided.initial[[3, 7]] = pitch.at(0.0)[:2]
         return guided

@@ -33,7 +33,7 @@ GOLDEN = 0.6180339887498949
 """Phases of the sines are its multiples: a formula that nobody has to draw."""
 RISE_PLACE, RISE_LENGTH = 3.0, 0.5
 """Where the road has half its height (m from the origin), and over what length it rises."""
-GRID = 20e-3
+COMPARED_GRID = 20e-3
 """Spacing (s) of the instants that are compared, which every step meets."""
 GRAVITY = 9.81
 _LONG_STEPS = milliseconds(20, 10, 20 / 3, 5, 4, 2)
@@ -52,7 +52,7 @@ FULL_STEPS: Curves = {
 }
 """Steps (s) of every method; Exudyn's are few, because a call takes it half a millisecond. Adaptive methods are there
 to be refused: the road is read at half steps."""
-KINDS = {"wheel load": "tyre force", "acceleration": "acceleration"}
+OUTPUT_KINDS = {"wheel load": "tyre force", "acceleration": "acceleration"}
 """Kinds of the vehicle's outputs that are read."""
 REFERENCES = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "MuJoCo's accelerations"))
 """Solvers with their relative tolerances and what they solve: a Runge-Kutta method and a multistep one."""
@@ -94,8 +94,8 @@ class FreeVehicle:
         )
         self.units = {"wheel load": "N", "acceleration": "m/s^2"}
         self.vehicle = replace(load_vehicle("r19_free"), gravity=GRAVITY)
-        self.instants = GRID * np.arange(round(DURATION / GRID) + 1)
-        self.reference = " and ".join(f"{what} by {method} at {tol:g}" for method, tol, what in REFERENCES)
+        self.instants = COMPARED_GRID * np.arange(round(DURATION / COMPARED_GRID) + 1)
+        self.reference = " and ".join(f"{purpose} by {method} at {tol:g}" for method, tol, purpose in REFERENCES)
         self._outputs = linearise(self.vehicle, SPEED).outputs
         self._model = build("mujoco", self.vehicle, None, SPEED)
         laws = SpatialReference(self.vehicle, SPEED).acceleration, self._model.acceleration
@@ -136,36 +136,41 @@ class FreeVehicle:
         (m, 2 n)."""
         road = self.road(times)
         n = states.shape[1] // 2
-        given = [self._model.acceleration(0.0, y[:n], y[n:], z) for y, z in zip(states, road, strict=True)]
-        motion = np.column_stack([given, states[:, n:], states[:, :n], road])
+        accelerations = [self._model.acceleration(0.0, y[:n], y[n:], z) for y, z in zip(states, road, strict=True)]
+        motion = np.column_stack([accelerations, states[:, n:], states[:, :n], road])
         return {
             name: motion @ np.array([row_of(output) for output in self._outputs if output.kind == kind]).T
-            for name, kind in KINDS.items()
+            for name, kind in OUTPUT_KINDS.items()
         }
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """The settings FULL_STEPS, also in the quick share, since the reference alone takes seconds."""
         return settings_of_curves(FULL_STEPS, self.setting)
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting: curve, and the longest step (s) up to ``value`` for which all compared instants fall on steps; or
-        a tolerance."""
+    def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
+        """A setting: curve, and the longest step (s) up to ``step_or_tolerance`` for which all compared instants fall
+        on steps; or a tolerance.
+        """
         known = CATALOGUE[engine][method.split()[0]]
-        step = value if known.adaptive else GRID / np.ceil(GRID / value * (1 - 1e-9))
+        step = (
+            step_or_tolerance
+            if known.adaptive
+            else COMPARED_GRID / np.ceil(COMPARED_GRID / step_or_tolerance * (1 - 1e-9))
+        )
         return setting(engine, method, float(step))
 
     def build(self, setting: Setting) -> FreeVehicleSolver:
         """The vehicle in one engine."""
         settings = replace(settings_of(setting, DURATION), step=1e-3 if setting.adaptive else setting.value)
-        times = 0.5 * settings.step * np.arange(2 * settings.steps + 1)
-        model = build(setting.engine, self.vehicle, settings, SPEED, self.road(times))
-        rest = np.zeros(len(self.vehicle.coordinates()))
-        return FreeVehicleSolver(partial(model.run, rest, rest))
+        half_step_times = 0.5 * settings.step * np.arange(2 * settings.steps + 1)
+        model = build(setting.engine, self.vehicle, settings, SPEED, self.road(half_step_times))
+        rest_state = np.zeros(len(self.vehicle.coordinates()))
+        return FreeVehicleSolver(partial(model.run, rest_state, rest_state))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
         """Largest error of any wheel load and of any acceleration at the compared instants."""
-        every = round(GRID / (solution.times[1] - solution.times[0]))
-        states = np.hstack([solution.positions, solution.rates])[::every]
+        stride = round(COMPARED_GRID / (solution.times[1] - solution.times[0]))
+        states = np.hstack([solution.positions, solution.rates])[::stride]
         return largest_differences(self.read(states, self.instants), self._true)
 
 

@@ -23,7 +23,7 @@ from validation.price.problems import Curves, curves_of_methods, settings_of_cur
 from validation.price.problems.road_excited import DEFAULTS, STAGES
 from validation.price.problems.turning_sphere import Attitudes, in_exudyn, in_mujoco
 
-DURATION, GRID = 600.0, 1.0
+DURATION, COMPARED_GRID = 600.0, 1.0
 """s, of the run and between the instants that are compared, which every step meets."""
 SINES = {
     "roll": ((0.03, 1.1, 0.4), (0.015, 7.3, 1.9)),
@@ -59,12 +59,12 @@ FINE_STEP = 5e-3
 
 def angles(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Roll, pitch, yaw (n, 3) in rad at times (n,) in s, and their rates (n, 3) in rad/s."""
-    places, rates = [], []
+    angle_columns, rates = [], []
     for name, sines in SINES.items():
         steady = TURN if name == "yaw" else 0.0
-        places.append(steady * times + sum(size * np.sin(f * times + phase) for size, f, phase in sines))
+        angle_columns.append(steady * times + sum(size * np.sin(f * times + phase) for size, f, phase in sines))
         rates.append(steady + sum(size * f * np.cos(f * times + phase) for size, f, phase in sines))
-    return np.column_stack(places), np.column_stack(rates)
+    return np.column_stack(angle_columns), np.column_stack(rates)
 
 
 def attitude(times: np.ndarray) -> np.ndarray:
@@ -74,7 +74,7 @@ def attitude(times: np.ndarray) -> np.ndarray:
 
 def gyro(times: np.ndarray) -> np.ndarray:
     """Angular rates (n, 3) in rad/s in body axes at times (n,) in s, as an ideal gyro measures them."""
-    (roll, pitch, _), (by_roll, by_pitch, by_yaw) = (part.T for part in angles(times))
+    (roll, pitch, _), (by_roll, by_pitch, by_yaw) = (columns.T for columns in angles(times))
     return np.column_stack(
         [
             by_roll - by_yaw * np.sin(pitch),
@@ -91,19 +91,23 @@ def magnus(step: float) -> np.ndarray:
     Oteo and Ros, Physics Reports 470, 2009, eq. 257).
     """
     start = step * np.arange(round(DURATION / step))
-    first, middle, last = (step * gyro(start + step * (0.5 + off)) for off in np.array([-1, 0, 1]) * np.sqrt(0.15))
-    slope, bend = np.sqrt(15) / 3 * (last - first), 10 / 3 * (last - 2 * middle + first)
+    first_turn, middle, last_turn = (
+        step * gyro(start + step * (0.5 + point_offset)) for point_offset in np.array([-1, 0, 1]) * np.sqrt(0.15)
+    )
+    slope, bend = np.sqrt(15) / 3 * (last_turn - first_turn), 10 / 3 * (last_turn - 2 * middle + first_turn)
     odd = -np.cross(middle, slope)
-    two = np.cross(middle, 2 * bend + odd) / 60
-    turn = middle + bend / 12 - np.cross(-20 * middle - bend + odd, slope + two) / 240
+    second_commutator = np.cross(middle, 2 * bend + odd) / 60
+    turn = middle + bend / 12 - np.cross(-20 * middle - bend + odd, slope + second_commutator) / 240
     # a chain of rotations is what rates that are held for one second each make
     return integrate(np.concatenate([turn, turn[-1:]]), 1.0, attitude(np.zeros(1))[0], "held")
 
 
-def apart(computed: np.ndarray, true: np.ndarray) -> float:
+def apart(computed_attitudes: np.ndarray, true_values: np.ndarray) -> float:
     """Largest angle (rad) between computed and true attitudes (n, 4)."""
     return float(
-        np.linalg.norm(rotation_vector(quaternion_product(conjugate_quaternion(computed), true)), axis=-1).max()
+        np.linalg.norm(
+            rotation_vector(quaternion_product(conjugate_quaternion(computed_attitudes), true_values)), axis=-1
+        ).max()
     )
 
 
@@ -116,11 +120,11 @@ class AttitudeSolver:
     def run(self) -> Attitudes:
         """Attitudes at the compared instants; Refused or RunFailed from the engine pass through."""
         engine, method, period = self.setting.engine, self.setting.method, self.setting.value
-        count, every, start = round(DURATION / period), round(GRID / period), attitude(np.zeros(1))[0]
+        count, stride, start = round(DURATION / period), round(COMPARED_GRID / period), attitude(np.zeros(1))[0]
         if engine != "reference":
-            return (in_exudyn if engine == "exudyn" else in_mujoco)(method, period, count, every, start, gyro)
+            return (in_exudyn if engine == "exudyn" else in_mujoco)(method, period, count, stride, start, gyro)
         attitudes = integrate(gyro(period * np.arange(count + 1)), period, start, RULES[method][0])
-        return Attitudes(attitudes[::every], {"steps": count, "force calls": count})
+        return Attitudes(attitudes[::stride], {"steps": count, "force calls": count})
 
 
 class InertialUnit:
@@ -140,8 +144,8 @@ class InertialUnit:
         )
         self.units = {"attitude": "rad"}
         self.reference = f"closed form, and a Magnus method of order six at {1e3 * FINE_STEP:g} ms"
-        self.true = attitude(GRID * np.arange(round(DURATION / GRID) + 1))
-        self.uncertainty = {"attitude": apart(magnus(FINE_STEP)[:: round(GRID / FINE_STEP)], self.true)}
+        self.true = attitude(COMPARED_GRID * np.arange(round(DURATION / COMPARED_GRID) + 1))
+        self.uncertainty = {"attitude": apart(magnus(FINE_STEP)[:: round(COMPARED_GRID / FINE_STEP)], self.true)}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """FULL_RATES, or its named share QUICK."""
@@ -149,9 +153,11 @@ class InertialUnit:
             QUICK if quick else FULL_RATES, lambda engine, method, rate: self.setting(engine, method, 1 / rate)
         )
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting: curve, and the longest step (s) up to ``value`` for which all compared instants fall on steps."""
-        step = GRID / np.ceil(GRID / value * (1 - 1e-9))
+    def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
+        """A setting: curve, and the longest step (s) up to ``step_or_tolerance`` for which all compared instants fall
+        on steps.
+        """
+        step = COMPARED_GRID / np.ceil(COMPARED_GRID / step_or_tolerance * (1 - 1e-9))
         order = RULES[method][1] if engine == "reference" else 1 if method in FIRST_ORDER_METHODS else 2
         stages = 1 if engine == "reference" else STAGES.get(method, 0)
         return Setting(

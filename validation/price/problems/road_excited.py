@@ -105,8 +105,8 @@ def judge(assembly: Assembly, run: Trajectory) -> Result:
     """Result of a run with the assumptions that it broke."""
     channels = output_channels(replace(assembly, sensors=()), run)
     labelled = {name: Channel("time", values, unit, meaning) for name, (unit, meaning, values) in channels.items()}
-    times = {"time": Channel("time", run.times, "s")}
-    return with_assumptions(result(assembly.scene, labelled, times, mode=assembly.mode), assumptions(assembly))
+    time_axis = {"time": Channel("time", run.times, "s")}
+    return with_assumptions(result(assembly.scene, labelled, time_axis, mode=assembly.mode), assumptions(assembly))
 
 
 def settings_of(setting: Setting, duration: float = DURATION) -> Settings:
@@ -114,12 +114,12 @@ def settings_of(setting: Setting, duration: float = DURATION) -> Settings:
     return engine_settings(setting, duration)
 
 
-def setting(engine: str, method: str, value: float) -> Setting:
+def setting(engine: str, method: str, step_or_tolerance: float) -> Setting:
     """A setting of this problem, with what the catalogue declares about its method."""
     known = CATALOGUE[engine][method.split()[0]]
     order = 0 if method == "LSODA" else known.order
-    default = DEFAULTS.get((engine, method, value), "")
-    return Setting(engine, method, value, order, known.adaptive, STAGES.get(method, 0), default)
+    default = DEFAULTS.get((engine, method, step_or_tolerance), "")
+    return Setting(engine, method, step_or_tolerance, order, known.adaptive, STAGES.get(method, 0), default)
 
 
 def settings(quick: bool) -> tuple[Setting, ...]:
@@ -132,12 +132,12 @@ def dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
     is only C2."""
     derivative, p = derivative_of("road", assembly.vehicle.geometry), assembly.parameters.array()
     assert assembly.input is not None
-    at = assembly.input.at
+    road_at = assembly.input.at
     edges = [0.0, *assembly.input.knots(DURATION), DURATION]
-    times, pieces, y = [0.0], list[Any](), assembly.initial
+    piece_times, pieces, y = [0.0], list[Any](), assembly.initial
     for start, end in pairwise(edges):
-        part = solve_ivp(
-            lambda t, y: derivative(y, at(t), p),
+        piece_solution = solve_ivp(
+            lambda t, y: derivative(y, road_at(t), p),
             (start, end),
             y,
             method=method,
@@ -145,10 +145,10 @@ def dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
             rtol=tolerance,
             atol=1e-2 * tolerance,
         )
-        times += list(part.t[1:])
-        pieces += part.sol.interpolants
-        y = part.y[:, -1]
-    return OdeSolution(times, pieces)
+        piece_times += list(piece_solution.t[1:])
+        pieces += piece_solution.sol.interpolants
+        y = piece_solution.y[:, -1]
+    return OdeSolution(piece_times, pieces)
 
 
 class RoadExcited:
@@ -173,15 +173,15 @@ class RoadExcited:
         solvers = SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
         self._solution = dense(self.assembly, *solvers[0])
-        times = GRID * np.arange(round(DURATION / GRID) + 1)
-        self._states = self._solution(times).T
-        others = [dense(self.assembly, *solver)(times).T for solver in solvers[1:]]
-        differences = [self._largest_errors(other - self._states) for other in others]
+        grid_times = GRID * np.arange(round(DURATION / GRID) + 1)
+        self._states = self._solution(grid_times).T
+        other_solutions = [dense(self.assembly, *solver)(grid_times).T for solver in solvers[1:]]
+        differences = [self._largest_errors(other_solution - self._states) for other_solution in other_solutions]
         self.uncertainty = {name: max(gaps[name] for gaps in differences) for name in self.units}
         signal, p = self.assembly.input, self.assembly.parameters
         assert signal is not None
-        off = self._states[:, [0, 1, 4, 5]] - signal.sample(0.0, GRID, len(times))
-        self.bound = 10 * float(np.abs(off[:, :2] * [p.k1, p.k2] + off[:, 2:] * [p.d1, p.d2]).max())
+        deflections = self._states[:, [0, 1, 4, 5]] - signal.sample(0.0, GRID, len(grid_times))
+        self.bound = 10 * float(np.abs(deflections[:, :2] * [p.k1, p.k2] + deflections[:, 2:] * [p.d1, p.d2]).max())
 
     def build(self, setting: Setting) -> Model:
         """The vehicle in one engine."""

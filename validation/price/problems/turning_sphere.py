@@ -37,70 +37,84 @@ class Attitudes:
     counts: dict[str, int]
 
 
-def in_mujoco(method: str, period: float, count: int, stride: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
-    """Attitudes of the rotating sphere in MuJoCo: ``count`` steps of ``period`` (s) from an attitude (4,), of which
-    every ``stride``-th is kept."""
+def in_mujoco(
+    method: str, sample_period: float, step_count: int, stride: int, start_attitude: np.ndarray, gyro: Gyro
+) -> Attitudes:
+    """Attitudes of the rotating sphere in MuJoCo: ``step_count`` steps of ``sample_period`` (s) from an attitude (4,),
+    of which every ``stride``-th is kept.
+    """
     spec = mujoco.MjSpec()
-    spec.option.timestep, spec.option.gravity, spec.option.integrator = period, [0, 0, 0], INTEGRATORS[method]
+    spec.option.timestep, spec.option.gravity, spec.option.integrator = sample_period, [0, 0, 0], INTEGRATORS[method]
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_AUTORESET
     body = spec.worldbody.add_body(mass=1.0, inertia=[1.0, 1.0, 1.0], ipos=[0, 0, 0], explicitinertial=True)
     body.add_joint(type=mujoco.mjtJoint.mjJNT_BALL)
     model = spec.compile()
-    rates = gyro(period * np.arange(count + 1))
-    torques = np.diff(rates, axis=0)[None] / period
+    rates = gyro(sample_period * np.arange(step_count + 1))
+    torques = np.diff(rates, axis=0)[None] / sample_period
     with without_warnings():
         path, _ = rollout.rollout(
             model,
             mujoco.MjData(model),
-            np.concatenate([[0.0], start, rates[0]])[None],
+            np.concatenate([[0.0], start_attitude, rates[0]])[None],
             torques,
             control_spec=int(mujoco.mjtState.mjSTATE_QFRC_APPLIED),
         )
-    attitudes = np.vstack([start, path[0, stride - 1 :: stride, 1:5]])
-    return _sound("mujoco", attitudes, {"steps": count, "force calls": (4 if method == "RK4" else 1) * count})
+    attitudes = np.vstack([start_attitude, path[0, stride - 1 :: stride, 1:5]])
+    return _sound("mujoco", attitudes, {"steps": step_count, "force calls": (4 if method == "RK4" else 1) * step_count})
 
 
-def in_exudyn(method: str, period: float, count: int, stride: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
+def in_exudyn(
+    method: str, sample_period: float, step_count: int, stride: int, start_attitude: np.ndarray, gyro: Gyro
+) -> Attitudes:
     """Attitudes of the rotating sphere in Exudyn; raises Refused for methods whose steps cannot end on samples."""
     name = method.split()[0]
     known = CATALOGUE["exudyn"][name]
     if known.adaptive:
         raise Refused("exudyn", f"{name} picks its own steps, which do not end on the samples of the rates")
-    times = period * np.arange(count + 2)
-    rates = gyro(times)
-    pushed = np.diff(rates, axis=0) / period if known.holds else (gyro(times + NUDGE) - gyro(times - NUDGE)) / 2 / NUDGE
+    sample_times = sample_period * np.arange(step_count + 2)
+    rates = gyro(sample_times)
+    pushed = (
+        np.diff(rates, axis=0) / sample_period
+        if known.holds
+        else (gyro(sample_times + NUDGE) - gyro(sample_times - NUDGE)) / 2 / NUDGE
+    )
     implicit = name in ("GeneralizedAlpha", "TrapezoidalIndex2")
-    mbs, sensor = _sphere(start, rates[0], pushed.tolist(), period, implicit, known.holds)
+    mbs, sensor = _sphere(start_attitude, rates[0], pushed.tolist(), sample_period, implicit, known.holds)
     options = exu.SimulationSettings()
     options.solution.file.write, options.solution.sensors.active = False, True
-    options.solution.sensors.writePeriod = period * stride
+    options.solution.sensors.writePeriod = sample_period * stride
     options.timeIntegration.automaticStepSize = False
     options.timeIntegration.generalizedAlpha.spectralRadius = 0.9
-    note = solve(mbs, Settings(name, period, count * period), options)
-    kept = mbs.GetSensorStoredData(sensor)[:, 1:]
-    if note or len(kept) != count // stride + 1:
-        raise RunFailed("exudyn", "the solver reported failure", period * stride * len(kept))
-    attitudes = start + kept[:, 3:] if implicit else from_matrix(kept.reshape(-1, 3, 3))
+    note = solve(mbs, Settings(name, sample_period, step_count * sample_period), options)
+    stored = mbs.GetSensorStoredData(sensor)[:, 1:]
+    if note or len(stored) != step_count // stride + 1:
+        raise RunFailed("exudyn", "the solver reported failure", sample_period * stride * len(stored))
+    attitudes = start_attitude + stored[:, 3:] if implicit else from_matrix(stored.reshape(-1, 3, 3))
     return _sound("exudyn", attitudes, solver_counts(mbs))
 
 
 def _sphere(
-    start: np.ndarray, rate: np.ndarray, torques: list[list[float]], period: float, implicit: bool, held: bool
+    start_attitude: np.ndarray,
+    rate: np.ndarray,
+    torques: list[list[float]],
+    sample_period: float,
+    implicit: bool,
+    rate_is_held: bool,
 ) -> tuple[Any, Any]:
     """The sphere's system in Exudyn and its sensor: a rotation vector from the start for explicit methods, Euler
     parameters for implicit ones."""
     mbs = exu.SystemContainer().AddSystem()
     still, turning = [0.0] * 3, np.concatenate([[0.0], rate])
     if implicit:
-        kind, attitude, rates = items.NodeRigidBodyEP, start, 0.5 * quaternion_product(start, turning)
+        kind, attitude, rates = items.NodeRigidBodyEP, start_attitude, 0.5 * quaternion_product(start_attitude, turning)
     else:
-        kind, attitude, rates = items.NodeRigidBodyRotVecLG, rotation_vector(start), rate
+        kind, attitude, rates = items.NodeRigidBodyRotVecLG, rotation_vector(start_attitude), rate
     node = mbs.AddNode(kind(referenceCoordinates=still + attitude.tolist(), initialVelocities=still + rates.tolist()))
     body = mbs.AddObject(items.ObjectRigidBody(nodeNumber=node, mass=1.0, inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     row = [0]
 
     def begin(mbs: Any, t: float) -> bool:
-        row[0] = round(t / period) - held  # t is the end of the step
+        row[0] = round(t / sample_period) - rate_is_held  # t is the end of the step
         return True
 
     mbs.SetPreStepUserFunction(begin)
@@ -123,9 +137,9 @@ def _sphere(
     return mbs, sensor
 
 
-def _sound(engine: str, attitudes: np.ndarray, counts: dict[str, int]) -> Attitudes:
+def _sound(engine: str, attitudes: np.ndarray, work_counts: dict[str, int]) -> Attitudes:
     """Attitudes normalised to unit length; raises RunFailed if a length differs from 1 by 1 % or is not finite."""
     size = np.linalg.norm(attitudes, axis=1, keepdims=True)
     if not (np.abs(size - 1) < 0.01).all():
         raise RunFailed(engine, "a quaternion is no rotation", 0.0)
-    return Attitudes(attitudes / size, counts)
+    return Attitudes(attitudes / size, work_counts)

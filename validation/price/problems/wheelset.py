@@ -96,29 +96,29 @@ class WheelsetSolver:
 
 
 @njit(cache=True, error_model="numpy")
-def rates(state, numbers, table, out):
-    """Fill ``out`` (2 n,) with the time derivatives of coordinates and rates; table (3, n) : masses, springs and
+def rates(state, table_of_wheels, table, state_rate):
+    """Fill ``state_rate`` (2 n,) with the time derivatives of coordinates and rates; table (3, n) : masses, springs and
     dampers."""
     n = table.shape[1]
-    out[:n] = state[n:]
-    out[n:] = 0.0
+    state_rate[:n] = state[n:]
+    state_rate[n:] = 0.0
     position, rate, force = state[:n].copy(), state[n:].copy(), np.zeros(n)
-    forces(start(numbers), 0.0, start(position), start(rate), start(force))
+    forces(start(table_of_wheels), 0.0, start(position), start(rate), start(force))
     for i in range(n):
-        out[n + i] = (force[i] - table[1, i] * position[i] - table[2, i] * rate[i]) / table[0, i]
+        state_rate[n + i] = (force[i] - table[1, i] * position[i] - table[2, i] * rate[i]) / table[0, i]
 
 
 @njit(cache=True, error_model="numpy")
-def march(state, numbers, table, step, count):
-    """Advance ``state`` in place by ``count`` RK4 steps (s)."""
+def march(state, table_of_wheels, table, step, step_count):
+    """Advance ``state`` in place by ``step_count`` RK4 steps (s)."""
     total, rate = np.empty(state.size), np.empty(state.size)
-    for _ in range(count):
+    for _ in range(step_count):
         total[:] = 0.0
         for stage in range(4):
-            here = state.copy()
+            stage_state = state.copy()
             if stage > 0:
-                here += (step if stage == 3 else 0.5 * step) * rate
-            rates(here, numbers, table, rate)
+                stage_state += (step if stage == 3 else 0.5 * step) * rate
+            rates(stage_state, table_of_wheels, table, rate)
             total += (1.0 if stage % 3 == 0 else 2.0) * rate
         state += step / 6.0 * total
 
@@ -140,11 +140,11 @@ class RollingWheels:
         self.key = f"wheel-{speed:g}"
         self.title = f"A wheel with FASTSIM at {speed:g} m/s, released from sliding, {DURATION:g} s"
         self.wheels = Wheels(1, cells=CELLS, speed=speed)
-        self._start = np.concatenate([part * LEVEL for part in self.wheels.state()])
+        self._start = np.concatenate([state_part * LEVEL for state_part in self.wheels.state()])
         self._table = np.array([self.wheels.masses, self.wheels.stiffness, self.wheels.damping])
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in SOLVERS)
-        self._true, other = (self.read(self._run_by_method(*solver).state) for solver in SOLVERS)
-        self.uncertainty = self._channel_errors(other)
+        self._true, other_solution = (self.read(self._run_by_method(*solver).state) for solver in SOLVERS)
+        self.uncertainty = self._channel_errors(other_solution)
         self.bound = self.wheels.mu * self.wheels.load
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
@@ -158,14 +158,16 @@ class RollingWheels:
         for engine, method in ((engine, method) for engine, methods in EXPLICIT.items() for method in methods):
             like = "Euler" if method == "discrete" else method
             fewest = math.ceil(1.02 * DURATION / limit(like, 10 * MS, LONG_RUN * MS, linear(self.wheels)))
-            curves.append(((engine, method), tuple(DURATION / round(more * fewest) for more in STEP_RATIOS)))
+            curves.append(
+                ((engine, method), tuple(DURATION / round(step_ratio * fewest) for step_ratio in STEP_RATIOS))
+            )
         return curves
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
+    def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
         """A setting of this problem: curve, and step (s) or tolerance."""
-        made = setting(engine, method, value)
-        kept = made.order <= (2 if self.wheels.speed >= SMOOTH_SPEED else 1)
-        return made if kept else replace(made, order=0, nominal=made.order)
+        made_setting = setting(engine, method, step_or_tolerance)
+        keeps_order = made_setting.order <= (2 if self.wheels.speed >= SMOOTH_SPEED else 1)
+        return made_setting if keeps_order else replace(made_setting, order=0, nominal=made_setting.order)
 
     def build(self, setting: Setting) -> WheelsetSolver:
         """The wheel in one engine; raises Refused for an unstable step or a missing method."""
@@ -194,22 +196,24 @@ class RollingWheels:
     def _channel_errors(self, channels: dict[str, Array]) -> dict[str, float]:
         return {name: float(np.abs(values - self._true[name]).max()) for name, values in channels.items()}
 
-    def _run_by_method(self, method: str, value: float) -> WheelsetResult:
+    def _run_by_method(self, method: str, step_or_tolerance: float) -> WheelsetResult:
         """Final state by the written equations: RK4 with steps, or a scipy method at a relative tolerance."""
         state, numbers = self._start.copy(), self.wheels.numbers
         if method == "RK4":
-            steps = round(DURATION / value)
+            steps = round(DURATION / step_or_tolerance)
             march(state, numbers, self._table, DURATION / steps, steps)
             return WheelsetResult(state, {"steps": steps, "force calls": 4 * steps})
 
         def derivative(t: float, y: Array) -> Array:
-            rates(y, numbers, self._table, out := np.empty(y.size))
-            return out
+            rates(y, numbers, self._table, state_rate := np.empty(y.size))
+            return state_rate
 
-        done = solve_ivp(derivative, (0.0, DURATION), state, method, rtol=value, atol=1e-6 * value)
-        if not done.success:
-            raise RunFailed("reference", done.message)
-        return WheelsetResult(done.y[:, -1], {"steps": done.t.size - 1, "force calls": int(done.nfev)})
+        solution = solve_ivp(
+            derivative, (0.0, DURATION), state, method, rtol=step_or_tolerance, atol=1e-6 * step_or_tolerance
+        )
+        if not solution.success:
+            raise RunFailed("reference", solution.message)
+        return WheelsetResult(solution.y[:, -1], {"steps": solution.t.size - 1, "force calls": int(solution.nfev)})
 
     def _mujoco(self, method: str, steps: int) -> WheelsetSolver:
         marcher = Marcher(model(self.wheels, DURATION / steps, method))

@@ -15,7 +15,8 @@ def write(folder: Path) -> list[Value]:
     problem = inertial_unit.problem(False)
     sure = problem.uncertainty["attitude"]
     values = [
-        Value("unit", name, "", DURATION, float(part), sure) for name, part in zip(NAMES, problem.true[-1], strict=True)
+        Value("unit", name, "", DURATION, float(component), sure)
+        for name, component in zip(NAMES, problem.true[-1], strict=True)
     ]
     return write_page(
         folder,

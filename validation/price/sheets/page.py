@@ -22,9 +22,9 @@ class Value(NamedTuple):
         return (*self[:3], f"{self.time:.17g}", f"{self.value:.16e}", f"{self.uncertainty:.1e}")
 
 
-def columns(folder: Path, name: str, heads: Sequence[str], values: np.ndarray) -> None:
+def columns(folder: Path, name: str, headings: Sequence[str], values: np.ndarray) -> None:
     """Write columns (n, c) to ``name``.csv with all digits."""
-    np.savetxt(folder / f"{name}.csv", values, fmt="%.17g", delimiter=",", header=",".join(heads), comments="")
+    np.savetxt(folder / f"{name}.csv", values, fmt="%.17g", delimiter=",", header=",".join(headings), comments="")
 
 
 def matrices(folder: Path, name: str, arrays: dict[str, np.ndarray]) -> None:

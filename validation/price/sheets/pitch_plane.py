@@ -8,7 +8,7 @@ from models.engines.assembly import Settings
 from models.engines.protocol import build
 from models.road.study import FADE_IN_LENGTH, study_road
 from validation.price.problems import force_excited, road_excited
-from validation.price.problems.force_excited import DURATION, FINE_STEP, PERIOD, ForceExcited
+from validation.price.problems.force_excited import DURATION, FINE_STEP, SAMPLE_PERIOD, ForceExcited
 from validation.price.problems.road_excited import SOLVERS, SPEED
 from validation.price.sheets.page import Value, columns
 from validation.price.sheets.page import write as write_page
@@ -49,8 +49,8 @@ def on_road(folder: Path) -> list[Value]:
         np.column_stack([road.amplitude, road.wavenumber, road.phase]),
     )
     end = np.array([road_excited.DURATION])
-    true, *others = (road_excited.dense(problem.assembly, *solver)(end)[:, 0] for solver in SOLVERS[False])
-    sure = np.max([np.abs(other - true) for other in others], axis=0)
+    true, *other_solutions = (road_excited.dense(problem.assembly, *solver)(end)[:, 0] for solver in SOLVERS[False])
+    sure = np.max([np.abs(other_solution - true) for other_solution in other_solutions], axis=0)
     return write_page(
         folder,
         "road",
@@ -67,9 +67,9 @@ def by_forces(problem: ForceExcited, folder: Path) -> list[Value]:
     signal, guided = problem.assembly.input, bool(problem.assembly.guided)
     assert signal is not None
     heads = ["time [s]", "front [N]", "rear [N]", *(["pitch [rad]"] if guided else [])]
-    times = PERIOD * np.arange(round(DURATION / PERIOD) + 1)
-    inputs = signal.sample(0.0, PERIOD, len(times))[:, : len(heads) - 1]
-    columns(folder, problem.key, heads, np.column_stack([times, inputs]))
+    sample_times = SAMPLE_PERIOD * np.arange(round(DURATION / SAMPLE_PERIOD) + 1)
+    inputs = signal.sample(0.0, SAMPLE_PERIOD, len(sample_times))[:, : len(heads) - 1]
+    columns(folder, problem.key, heads, np.column_stack([sample_times, inputs]))
     return write_page(
         folder,
         problem.key,
@@ -86,15 +86,16 @@ def ends(problem: ForceExcited) -> list[Value]:
     over the run."""
     runs = [
         build("reference", problem.assembly, settings).run()
-        for settings in (Settings("RK4", FINE_STEP, DURATION), Settings("DOP853", PERIOD, DURATION, 1e-12))
+        for settings in (Settings("RK4", FINE_STEP, DURATION), Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-12))
     ]
-    true, other = (run.states[:: (len(run.states) - 1) // round(DURATION / PERIOD)] for run in runs)
-    return _values(problem.key, DURATION, true[-1], np.abs(true - other).max(axis=0))
+    true, other_states = (run.states[:: (len(run.states) - 1) // round(DURATION / SAMPLE_PERIOD)] for run in runs)
+    return _values(problem.key, DURATION, true[-1], np.abs(true - other_states).max(axis=0))
 
 
-def _values(key: str, time: float, states: np.ndarray, sure: np.ndarray) -> list[Value]:
+def _values(key: str, time: float, states: np.ndarray, uncertainties: np.ndarray) -> list[Value]:
     return [
-        Value(key, *entry[:2], time, *map(float, entry[2:])) for entry in zip(NAMES, UNITS, states, sure, strict=True)
+        Value(key, *entry[:2], time, *map(float, entry[2:]))
+        for entry in zip(NAMES, UNITS, states, uncertainties, strict=True)
     ]
 
 
@@ -112,12 +113,12 @@ def _body(problem: ForceExcited, guided: bool) -> str:
         if guided
         else " M is zero."
     )
-    asked = ", ".join(f"largest error of the {name} [{unit}]" for name, unit in problem.units.items())
+    question = ", ".join(f"largest error of the {name} [{unit}]" for name, unit in problem.units.items())
     return f"""{problem.note}
 {EQUATIONS}
 {_parameters_and_start(problem)}
 
 Input: `{problem.key}.csv`; between samples, forces are linear.{pitch}
 
-Asked for: {asked}, at the samples up to {DURATION:g} s. Steps should end on the samples, where the
+Asked for: {question}, at the samples up to {DURATION:g} s. Steps should end on the samples, where the
 input has kinks."""

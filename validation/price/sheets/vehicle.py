@@ -64,15 +64,15 @@ def write(folder: Path) -> list[Value]:
         Value("vehicle", name, unit, DURATION, *map(float, known))
         for (name, unit), *known in zip(_states(problem), problem.states[-1], sure, strict=True)
     ]
-    asked = (
+    question = (
         "Asked for: the largest error of a tyre force and of an acceleration along z of body, engine or seats at "
-        f"every {1e3 * free_vehicle.GRID:g} ms."
+        f"every {1e3 * free_vehicle.COMPARED_GRID:g} ms."
     )
     return write_page(
         folder,
         "vehicle",
         problem.title,
-        f"{LAWS}\n{_tables(problem.vehicle)}\n\n{asked}",
+        f"{LAWS}\n{_tables(problem.vehicle)}\n\n{question}",
         f"End values at {DURATION:g} s ({problem.reference}); the uncertainty is the largest difference of the "
         "two over the run.",
         values,
@@ -81,16 +81,16 @@ def write(folder: Path) -> list[Value]:
 
 def _states(problem: FreeVehicle) -> list[tuple[str, str]]:
     """Names and units of the coordinates, then of their rates."""
-    places = [
+    coordinates = [
         (f"{body} {freedom}", "rad" if freedom.startswith("r") else "m")
         for body, freedom in problem.vehicle.coordinates()
     ]
-    return places + [(f"{name} rate", f"{unit}/s") for name, unit in places]
+    return coordinates + [(f"{name} rate", f"{unit}/s") for name, unit in coordinates]
 
 
 def _tables(vehicle: SpatialVehicle) -> str:
     """Text with tables of all numbers of the vehicle."""
-    held = preloads(vehicle)
+    preload = preloads(vehicle)
     parts: dict[tuple[str, ...], Sequence[Sequence[Any]]] = {
         ("body", "mass [kg]", "place", "freedoms", "inertia, rows", "parent"): [
             (
@@ -111,7 +111,7 @@ def _tables(vehicle: SpatialVehicle) -> str:
                 *map(vector, (s.first_point, s.second_point, s.axis)),
                 s.stiffness,
                 s.damping,
-                held.parts[s.name],
+                preload.parts[s.name],
             )
             for s in vehicle.springs
         ],
@@ -124,12 +124,12 @@ def _tables(vehicle: SpatialVehicle) -> str:
                 *map(vector, (b.point_left, b.point_right)),
                 b.stiffness,
                 b.damping,
-                held.parts[b.name],
+                preload.parts[b.name],
             )
             for b in vehicle.bars
         ],
         ("tyre", "body", "place", "k [N/m]", "F0 [N]"): [
-            (t.name, t.body, vector(t.point), t.stiffness, held.tyres[t.name]) for t in vehicle.tyres
+            (t.name, t.body, vector(t.point), t.stiffness, preload.tyres[t.name]) for t in vehicle.tyres
         ],
         ("side force", "body", "point", "C [N/rad]"): [
             (f.name, f.body, vector(f.point), f.stiffness) for f in vehicle.side_forces
@@ -139,7 +139,7 @@ def _tables(vehicle: SpatialVehicle) -> str:
     return "\n\n".join(_table(heads, rows) for heads, rows in parts.items())
 
 
-def _table(heads: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
+def _table(headings: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
     """Text of a table; its numbers have all digits."""
-    told = [[cell if isinstance(cell, str) else f"{cell:.17g}" for cell in row] for row in rows]
-    return "\n".join(f"| {' | '.join(row)} |" for row in (heads, ("---",) * len(heads), *told))
+    text_rows = [[cell if isinstance(cell, str) else f"{cell:.17g}" for cell in row] for row in rows]
+    return "\n".join(f"| {' | '.join(row)} |" for row in (headings, ("---",) * len(headings), *text_rows))

@@ -35,9 +35,9 @@ TRAILER_DATA = {
 }
 
 
-def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` samples from stops that come to an end, also those whose result states no error."""
-    return drawn_samples(count, seed, _draw_stop)
+def samples(sample_count: int, seed: int) -> Iterator[Sample]:
+    """``sample_count`` samples from stops that come to an end, also those whose result states no error."""
+    return drawn_samples(sample_count, seed, _draw_stop)
 
 
 def _draw_stop(random: np.random.Generator) -> Sample:
@@ -79,7 +79,9 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
     }
     shares = (0.7, 0.8, 0.25, 0.2)
     return table | {
-        name: part for (name, part), share in zip(effects.items(), shares, strict=True) if random.random() < share
+        name: effect_table
+        for (name, effect_table), share in zip(effects.items(), shares, strict=True)
+        if random.random() < share
     }
 
 
@@ -92,8 +94,12 @@ def _random_brakes(random: np.random.Generator) -> dict[str, Any]:
 def _random_procedure(random: np.random.Generator, surface: str) -> dict[str, Any]:
     kind, speed = str(random.choice(["straight", "split", "turn", "j_turn"])), random.uniform(5.0, 20.0)
     radius = random.choice([-1.0, 1.0]) * max(speed**2 / (SURFACES[surface] * 9.81 * random.uniform(0.2, 0.6)), 25.0)
-    other = str(random.choice([name for name in SURFACES if name != surface]))
-    of_kind = {"split": {"right": other}, "turn": {"radius": radius}, "j_turn": {"steer": random.uniform(-0.06, 0.06)}}
+    other_surface = str(random.choice([name for name in SURFACES if name != surface]))
+    of_kind = {
+        "split": {"right": other_surface},
+        "turn": {"radius": radius},
+        "j_turn": {"steer": random.uniform(-0.06, 0.06)},
+    }
     return {"kind": kind, "speed": speed, **of_kind.get(kind, {})}
 
 
@@ -101,16 +107,21 @@ def _sample_of_stop(scene: BrakingScene, engine: str) -> Sample:
     """Run a scene with its stated error, and compute its true error by a finer run."""
     with counted_steps() as calls:
         try:
-            told = run(scene, engine, error=True)
+            stated_run = run(scene, engine, error=True)
         except RunFailed as error:
             if error.partial is None or not errors_of(error.partial):
                 raise
-            told = error.partial
-    errors, true = errors_of(told), dict[str, float]()
+            stated_run = error.partial
+    errors, true = errors_of(stated_run), dict[str, float]()
     if errors:
-        most = scene.run.model_copy(update={"substeps": FINER_STEPS * scene.run.substeps})
-        truth = run(scene.model_copy(update={"run": most}), "mujoco" if scene.vehicle.file else "reference").detail
-        fine, exact = motion_and_distance(told.detail, told.times), motion_and_distance(truth, told.times)
+        finer_settings = scene.run.model_copy(update={"substeps": FINER_STEPS * scene.run.substeps})
+        truth = run(
+            scene.model_copy(update={"run": finer_settings}), "mujoco" if scene.vehicle.file else "reference"
+        ).detail
+        fine, exact = (
+            motion_and_distance(stated_run.detail, stated_run.times),
+            motion_and_distance(truth, stated_run.times),
+        )
         true = {name: float(np.sqrt(np.mean((fine[name] - exact[name]) ** 2))) for name in errors}
     return Sample(scene.title, engine, errors, true, calls[0], sum(calls[1:]))
 
@@ -120,8 +131,8 @@ def counted_steps() -> Iterator[list[float]]:
     """Context that counts the steps of every run."""
     calls, march = list[float](), BrakedVehicle.run
 
-    def counting(vehicle: BrakedVehicle, *given: Any) -> BrakingPath:
-        path = march(vehicle, *given)
+    def counting(vehicle: BrakedVehicle, *arguments: Any) -> BrakingPath:
+        path = march(vehicle, *arguments)
         calls.append(float(vehicle.substeps * (len(path.times) - 1)))
         return path
 

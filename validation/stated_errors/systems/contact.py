@@ -22,30 +22,33 @@ LEAST_CELLS, LARGEST_CELLS = 5, {"fastsim": 50, "simplified": 40, "exact": 14}
 """Cells along each axis."""
 
 
-def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` samples from random scenes; scenes that are refused are replaced by others."""
-    return drawn_samples(count, seed, lambda random: _sample_of_contact(_draw_scene(random)))
+def samples(sample_count: int, seed: int) -> Iterator[Sample]:
+    """``sample_count`` samples from random scenes; scenes that are refused are replaced by others."""
+    return drawn_samples(sample_count, seed, lambda random: _sample_of_contact(_draw_scene(random)))
 
 
-def _draw_scene(rng: np.random.Generator) -> ContactScene:
-    theory = str(rng.choice(THEORIES))
-    method: dict[str, Any] = {"name": theory, "cells": int(rng.integers(LEAST_CELLS, LARGEST_CELLS[theory]))}
+def _draw_scene(generator: np.random.Generator) -> ContactScene:
+    theory = str(generator.choice(THEORIES))
+    method: dict[str, Any] = {"name": theory, "cells": int(generator.integers(LEAST_CELLS, LARGEST_CELLS[theory]))}
     if theory == "fastsim":
-        method["march"] = str(rng.choice(["second-order", "second-order", "plain"]))
-        method["bound"] = str(rng.choice(["intermediate", "parabolic", "elliptic"]))
-        method["flexibilities"] = str(rng.choice(["blended", "one", "three"]))
+        method["march"] = str(generator.choice(["second-order", "second-order", "plain"]))
+        method["bound"] = str(generator.choice(["intermediate", "parabolic", "elliptic"]))
+        method["flexibilities"] = str(generator.choice(["blended", "one", "three"]))
     spins = {"xi_x": 3e-3, "xi_y": 3e-3, "spin": 0.8}
-    creepage = {name: float(size * rng.normal()) for name, size in spins.items() if rng.random() < 0.7}
+    creepage = {name: float(size * generator.normal()) for name, size in spins.items() if generator.random() < 0.7}
     table: dict[str, Any] = {
         "title": "a random contact",
         "system": "contact",
-        "curvatures": {"A": float(10.0 ** rng.uniform(-0.4, 0.8)), "B": float(10.0 ** rng.uniform(-0.4, 1.0))},
-        "contact": {"load": float(10.0 ** rng.uniform(4.0, 5.2)), "friction": float(rng.uniform(0.1, 0.6))},
+        "curvatures": {
+            "A": float(10.0 ** generator.uniform(-0.4, 0.8)),
+            "B": float(10.0 ** generator.uniform(-0.4, 1.0)),
+        },
+        "contact": {"load": float(10.0 ** generator.uniform(4.0, 5.2)), "friction": float(generator.uniform(0.1, 0.6))},
         "creepage": creepage or {"xi_x": 1e-3},
         "method": method,
     }
-    if rng.random() < 0.4 and theory != "exact":
-        swept = str(rng.choice([*spins]))
+    if generator.random() < 0.4 and theory != "exact":
+        swept = str(generator.choice([*spins]))
         table["creepage"].pop(swept, None)
         table["sweep"] = {"of": swept, "start": 0.0, "stop": 2.0 * spins[swept], "count": 9}
     return build(table)
@@ -54,8 +57,8 @@ def _draw_scene(rng: np.random.Generator) -> ContactScene:
 def _sample_of_contact(scene: ContactScene) -> Sample:
     run_ = run(scene, error=True)
     body, motions, cells = run_.detail.contact, run_.detail.motions, scene.method.cells
-    most = OF_EXACT if scene.method.name == "exact" else MOST_CELLS
-    truth = np.array([_forces_of_motion(body, motion, min(FINER_CELLS * cells, most)) for motion in motions])
+    most_cells = OF_EXACT if scene.method.name == "exact" else MOST_CELLS
+    truth = np.array([_forces_of_motion(body, motion, min(FINER_CELLS * cells, most_cells)) for motion in motions])
     gap = np.column_stack([run_["fx"], run_["fy"], run_["mz"]]) - truth
     true = {"force": finite_rms(np.hypot(gap[:, 0], gap[:, 1])), "mz": finite_rms(gap[:, 2])}
     power = CELL_POWER[scene.method.name] or 0

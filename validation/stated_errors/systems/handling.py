@@ -22,9 +22,9 @@ FINER_CELLS, FINER_STEPS = 10, 8
 """Times that the truth is finer in cells along the patch, and in steps."""
 
 
-def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` samples from random manoeuvres whose runs come to an end."""
-    return drawn_samples(count, seed, _draw_manoeuvre)
+def samples(sample_count: int, seed: int) -> Iterator[Sample]:
+    """``sample_count`` samples from random manoeuvres whose runs come to an end."""
+    return drawn_samples(sample_count, seed, _draw_manoeuvre)
 
 
 def _draw_manoeuvre(random: np.random.Generator) -> Sample:
@@ -60,13 +60,13 @@ def _sample_of_drive(scene: HandlingScene, engine: str) -> Sample:
     """A run with its stated error, and the true error by a finer run."""
     with counted_forces() as calls:
         try:
-            told = run(scene, engine, error=True)
+            stated_run = run(scene, engine, error=True)
         except RunFailed as error:
             if error.partial is None:
                 raise
-            told = error.partial
-    errors, drive = errors_of(told), told.detail
-    return Sample(scene.title, engine, errors, _true_errors(scene, drive, engine, told), calls[0], sum(calls[1:]))
+            stated_run = error.partial
+    errors, drive = errors_of(stated_run), stated_run.detail
+    return Sample(scene.title, engine, errors, _true_errors(scene, drive, engine, stated_run), calls[0], sum(calls[1:]))
 
 
 def _true_errors(scene: HandlingScene, drive: Drive, engine: str, stated_result: Result) -> dict[str, float]:

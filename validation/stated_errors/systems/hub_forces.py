@@ -24,9 +24,9 @@ FINER_STEPS = 12
 """Times that the truth's steps are shorter."""
 
 
-def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` samples from random scenes whose runs come to an end."""
-    return drawn_samples(count, seed, _draw_scene)
+def samples(sample_count: int, seed: int) -> Iterator[Sample]:
+    """``sample_count`` samples from random scenes whose runs come to an end."""
+    return drawn_samples(sample_count, seed, _draw_scene)
 
 
 def _draw_scene(random: np.random.Generator) -> Sample:
@@ -37,20 +37,23 @@ def _draw_scene(random: np.random.Generator) -> Sample:
 
 def _table(random: np.random.Generator) -> dict[str, Any]:
     """Table of a random virtual measurement; its sampling period is a multiple of the step."""
-    step, part = float(f"{10.0 ** random.uniform(-3.0, -1.9):.3g}"), int(random.choice([1, 1, 2, 2, 3, 4]))
+    step, steps_per_sample = float(f"{10.0 ** random.uniform(-3.0, -1.9):.3g}"), int(random.choice([1, 1, 2, 2, 3, 4]))
     noise = str(random.choice(["white", "none"]))
     return {
-        "title": f"drawn, steps of {step:g} s, {part} a sample",
+        "title": f"drawn, steps of {step:g} s, {steps_per_sample} a sample",
         "system": "hub-forces",
         "vehicle": {"file": str(random.choice(["r19_free", "r19_ride"]))},
-        "run": {"step": step, "duration": step * part * int(random.uniform(0.8, 1.6) / (step * part))},
+        "run": {
+            "step": step,
+            "duration": step * steps_per_sample * int(random.uniform(0.8, 1.6) / (step * steps_per_sample)),
+        },
         "road": {
             "iso8608": str(random.choice(list("BCDE"))),
             "speed": random.uniform(15.0, 60.0),
             "seed": int(random.integers(1000)),
         },
         "forces": {
-            "sampling_rate": 1.0 / (step * part),
+            "sampling_rate": 1.0 / (step * steps_per_sample),
             "frame": str(random.choice(["hub", "body"])),
             "interpolation": str(random.choice(["linear", "smooth"])),
             "noise": noise,
@@ -64,12 +67,12 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
 def _sample_of_run(scene: HubScene, engine: str) -> Sample:
     """Run a scene with its stated error, and compute its true error by a finer run."""
     with counted_forces() as calls:
-        told = _run_with_error(scene, engine)
-    errors, plain = errors_of(told), 2 * scene.steps
+        stated_run = _run_with_error(scene, engine)
+    errors, plain = errors_of(stated_run), 2 * scene.steps
     names = list(errors)
     title = f"{scene.title}, {scene.stabilise.method}, {scene.vehicle.file}"
     return Sample(
-        title, engine, errors, _true_errors(scene, engine, told, names), 4.0 * plain, sum(calls) - 4.0 * plain
+        title, engine, errors, _true_errors(scene, engine, stated_run, names), 4.0 * plain, sum(calls) - 4.0 * plain
     )
 
 

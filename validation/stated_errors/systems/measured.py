@@ -21,9 +21,9 @@ FINER_STEPS = 12
 """Times that the truth's steps are shorter."""
 
 
-def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` samples from random recordings whose runs come to an end."""
-    return drawn_samples(count, seed, _draw_recording)
+def samples(sample_count: int, seed: int) -> Iterator[Sample]:
+    """``sample_count`` samples from random recordings whose runs come to an end."""
+    return drawn_samples(sample_count, seed, _draw_recording)
 
 
 def _draw_recording(random: np.random.Generator) -> Sample:
@@ -35,21 +35,21 @@ def _draw_recording(random: np.random.Generator) -> Sample:
 def _table(random: np.random.Generator) -> dict[str, Any]:
     """Table of a random virtual measurement. The steps of the road run divide its sampling period; the steps of the
     driven run are equal to it."""
-    period, part = float(f"{10.0 ** random.uniform(-2.9, -2.1):.3g}"), int(random.choice([1, 2]))
+    period, steps_per_sample = float(f"{10.0 ** random.uniform(-2.9, -2.1):.3g}"), int(random.choice([1, 2]))
     road = {
         "iso8608": str(random.choice(list("BCD"))),
         "speed": random.uniform(15.0, 45.0),
         "seed": int(random.integers(99)),
     }
     return {
-        "title": f"drawn, every {period:g} s, {part} steps of the road each",
+        "title": f"drawn, every {period:g} s, {steps_per_sample} steps of the road each",
         "system": "measured",
         "vehicle": {"file": "r19_free"},
         "virtual": {
             "road": road,
             "duration": period * int(random.uniform(2.0, 4.0) / period),
             "sampling_rate": 1.0 / period,
-            "step": period / part,
+            "step": period / steps_per_sample,
             "frame": str(random.choice(["hub", "body"])),
             "faults": {"noise": {"force": random.uniform(0.0, 10.0), "angle": 1e-3, "angular rate": 3e-3}},
             "format": "csv",
@@ -63,23 +63,23 @@ def _sample_of_recording(table: dict[str, Any], engine: str) -> Sample:
     scene = build(table, "drawn.toml")
     with counted_forces() as calls:
         try:
-            told = run(scene, engine, error=True)
+            stated_run = run(scene, engine, error=True)
         except RunFailed as error:
             if error.partial is None:
                 raise
-            told = error.partial
+            stated_run = error.partial
     virtual = table["virtual"] | {"step": table["virtual"]["step"] / FINER_STEPS}
     truth = run(
         build(table | {"virtual": virtual, "run": {"step": 1.0 / (FINER_STEPS * virtual["sampling_rate"])}}), engine
     )
-    steps = 4.0 * (round(virtual["duration"] / table["virtual"]["step"]) + told.counts()["steps"])
+    steps = 4.0 * (round(virtual["duration"] / table["virtual"]["step"]) + stated_run.counts()["steps"])
     title = f"{table['title']}, {table['stabilise']['method']}"
-    return Sample(title, engine, errors_of(told), _true_errors(told, truth), steps, sum(calls) - steps)
+    return Sample(title, engine, errors_of(stated_run), _true_errors(stated_run, truth), steps, sum(calls) - steps)
 
 
 def _true_errors(stated_result: Result, truth: Result) -> dict[str, float]:
     """True errors of every channel whose error is stated."""
-    mine, fine = (each.detail.outcome for each in (stated_result, truth))
+    mine, fine = (run_result.detail.outcome for run_result in (stated_result, truth))
     return {
         name: float(np.sqrt(np.mean((mine.samples(name) - fine.samples(name)[: mine.done]) ** 2)))
         for name in errors_of(stated_result)

@@ -30,10 +30,10 @@ SAMPLING_PERIODS = (1e-3, 2e-3, 5e-3)
 """Sampling periods (s) of wheel forces and pitch."""
 
 
-def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` samples from random runs; scenes that an engine refuses are replaced by others."""
+def samples(sample_count: int, seed: int) -> Iterator[Sample]:
+    """``sample_count`` samples from random runs; scenes that an engine refuses are replaced by others."""
     with TemporaryDirectory() as folder:
-        yield from drawn_samples(count, [seed, 1], lambda random: _sample_of_run(random, Path(folder)))
+        yield from drawn_samples(sample_count, [seed, 1], lambda random: _sample_of_run(random, Path(folder)))
 
 
 def _sample_of_run(random: np.random.Generator, folder: Path) -> Sample:
@@ -45,12 +45,12 @@ def _sample_of_run(random: np.random.Generator, folder: Path) -> Sample:
     with _count_force_calls() as calls:
         run = _run(scene, engine)
     truth = _reference_run(scene, engine)
-    told = errors_of(run)
-    true = {name: float(np.sqrt(np.mean((run[name] - _truth_at(truth, name, run.times)) ** 2))) for name in told}
+    estimates = errors_of(run)
+    true = {name: float(np.sqrt(np.mean((run[name] - _truth_at(truth, name, run.times)) ** 2))) for name in estimates}
     settings = settings_of(scene, engine)
     fine = f"tolerance {settings.tolerance:.1e}" if CATALOGUE[engine][integrator].adaptive else f"{settings.step:.3g} s"
-    what = " ".join((*scene.effects, scene.vehicle.geometry, integrator, fine))
-    return Sample(what, engine, told, true, calls[0], sum(calls[1:]))
+    sample_name = " ".join((*scene.effects, scene.vehicle.geometry, integrator, fine))
+    return Sample(sample_name, engine, estimates, true, calls[0], sum(calls[1:]))
 
 
 def _run(scene: Scene, engine: str) -> Result:
@@ -100,63 +100,65 @@ def _count_force_calls() -> Iterator[list[float]]:
         yield calls
 
 
-def _scene(rng: np.random.Generator, folder: Path, engine: str, integrator: str) -> Scene:
+def _scene(generator: np.random.Generator, folder: Path, engine: str, integrator: str) -> Scene:
     table: dict[str, Any] = {
         "title": "random",
-        "vehicle": {"geometry": str(rng.choice(["exact", "exact", "linear"])), "override": _vehicle(rng)},
+        "vehicle": {"geometry": str(generator.choice(["exact", "exact", "linear"])), "override": _vehicle(generator)},
         "effects": {},
-        "run": {"duration": float(rng.choice([1.0, 2.0, 3.0]))},
+        "run": {"duration": float(generator.choice([1.0, 2.0, 3.0]))},
     }
-    tolerance = {"tolerance": float(10.0 ** rng.uniform(-11, -4))} if CATALOGUE[engine][integrator].adaptive else {}
+    tolerance = (
+        {"tolerance": float(10.0 ** generator.uniform(-11, -4))} if CATALOGUE[engine][integrator].adaptive else {}
+    )
     table["engines"] = {engine: {"integrator": integrator, **tolerance}}
-    kind = str(rng.choice(["free", "road", "road", "road", "forces", "forces"]))
+    kind = str(generator.choice(["free", "road", "road", "road", "forces", "forces"]))
     if kind == "free":
-        table["start"] = {"pitch": float(rng.uniform(-0.1, 0.1)), "z3": float(rng.uniform(-0.1, 0.1))}
-        table["effects"] = _lift_off(rng)
+        table["start"] = {"pitch": float(generator.uniform(-0.1, 0.1)), "z3": float(generator.uniform(-0.1, 0.1))}
+        table["effects"] = _lift_off(generator)
     elif kind == "road":
-        table["effects"] = {"road": _road(rng, folder), **_lift_off(rng)}
+        table["effects"] = {"road": _road(generator, folder), **_lift_off(generator)}
     else:
-        table["effects"] = _forces(rng, folder, table)
+        table["effects"] = _forces(generator, folder, table)
     period = table.pop("period", None)
-    table["run"]["step"] = _step(rng, table["run"]["duration"], period)
+    table["run"]["step"] = _step(generator, table["run"]["duration"], period)
     return build(table, "random.toml", folder)
 
 
-def _vehicle(rng: np.random.Generator) -> dict[str, float]:
+def _vehicle(generator: np.random.Generator) -> dict[str, float]:
     """A published vehicle with random parameters: each half to twice the published one, dampers down to a tenth."""
-    p = parameter_set(str(rng.choice(["itwm_drift", "asymmetric_twin"])), "", Path())
-    softer = float(rng.choice([1.0, 0.3, 0.1]))
+    p = parameter_set(str(generator.choice(["itwm_drift", "asymmetric_twin"])), "", Path())
+    softer = float(generator.choice([1.0, 0.3, 0.1]))
     return {
-        name: value * float(2.0 ** rng.uniform(-0.7, 0.7)) * (softer if name in ("d3", "d4") else 1.0)
+        name: value * float(2.0 ** generator.uniform(-0.7, 0.7)) * (softer if name in ("d3", "d4") else 1.0)
         for name, value in p
         if name != "g"
     }
 
 
-def _lift_off(rng: np.random.Generator) -> dict[str, Any]:
-    return {"lift_off": {}} if rng.random() < 0.5 else {}
+def _lift_off(generator: np.random.Generator) -> dict[str, Any]:
+    return {"lift_off": {}} if generator.random() < 0.5 else {}
 
 
-def _road(rng: np.random.Generator, folder: Path) -> dict[str, Any]:
-    speed = float(rng.uniform(5.0, 35.0))
-    source = str(rng.choice(["study", "hills", "iso8608", "csv"]))
+def _road(generator: np.random.Generator, folder: Path) -> dict[str, Any]:
+    speed = float(generator.uniform(5.0, 35.0))
+    source = str(generator.choice(["study", "hills", "iso8608", "csv"]))
     options: dict[str, Any] = {}
     if source == "iso8608":
-        options = {"road_class": str(rng.choice(list("ABCDE"))), "seed": int(rng.integers(1000))}
+        options = {"road_class": str(generator.choice(list("ABCDE"))), "seed": int(generator.integers(1000))}
     if source == "csv":
-        spacing = float(rng.choice([0.01, 0.05, 0.2]))
+        spacing = float(generator.choice([0.01, 0.05, 0.2]))
         stations = spacing * np.arange(round(20.0 / spacing) + 1)
-        heights = np.cumsum(rng.normal(0.0, 0.01 * np.sqrt(spacing), len(stations)))
+        heights = np.cumsum(generator.normal(0.0, 0.01 * np.sqrt(spacing), len(stations)))
         lines = [f"{s:.3f}, {h:.6f}, {h:.6f}" for s, h in zip(stations, heights - heights[0], strict=True)]
         (folder / "road.csv").write_text("\n".join(["s [m], left [m], right [m]", *lines]) + "\n")
         options = {"file": "road.csv", "beyond_end": "mirrored"}
     return {"source": source, "speed": speed, **options}
 
 
-def _forces(rng: np.random.Generator, folder: Path, table: dict[str, Any]) -> dict[str, Any]:
+def _forces(generator: np.random.Generator, folder: Path, table: dict[str, Any]) -> dict[str, Any]:
     """Random wheel forces from a virtual measurement, sometimes with noise, sometimes with a prescribed pitch."""
-    period, duration = float(rng.choice(SAMPLING_PERIODS)), table["run"]["duration"]
-    road = {"source": "study", "speed": float(rng.uniform(8.0, 25.0))}
+    period, duration = float(generator.choice(SAMPLING_PERIODS)), table["run"]["duration"]
+    road = {"source": "study", "speed": float(generator.uniform(8.0, 25.0))}
     on_road = build(
         {
             **{key: table[key] for key in ("title", "vehicle")},
@@ -167,28 +169,30 @@ def _forces(rng: np.random.Generator, folder: Path, table: dict[str, Any]) -> di
     )
     measured = measure(on_road)
     write_measurement(measured, folder, period)
-    every = round(period / 2e-4)
-    both = {"z3": ("m", measured["z3"][::every]), "pitch": ("rad", measured["pitch"][::every])}
-    write_time_series(folder / "both.csv", both, period)
+    stride = round(period / 2e-4)
+    both_columns = {"z3": ("m", measured["z3"][::stride]), "pitch": ("rad", measured["pitch"][::stride])}
+    write_time_series(folder / "both.csv", both_columns, period)
     table["period"] = period
-    rule = str(rng.choice(["held", "linear", "smooth"]))
-    forces = {"file": "wheel_forces.csv", "interpolation": rule, "frame": str(rng.choice(["inertial", "body"]))}
-    noise = {"force_noise": {"deviation": 30.0, "seed": int(rng.integers(1000))}} if rng.random() < 0.5 else {}
+    rule = str(generator.choice(["held", "linear", "smooth"]))
+    forces = {"file": "wheel_forces.csv", "interpolation": rule, "frame": str(generator.choice(["inertial", "body"]))}
+    noise = (
+        {"force_noise": {"deviation": 30.0, "seed": int(generator.integers(1000))}} if generator.random() < 0.5 else {}
+    )
     holds: tuple[dict[str, Any], ...] = (
         {},
-        {"pitch_spring": {"stiffness": 3e3, "damping": 1e3, "dead_band": float(rng.choice([0.0, 0.01]))}},
+        {"pitch_spring": {"stiffness": 3e3, "damping": 1e3, "dead_band": float(generator.choice([0.0, 0.01]))}},
         {"high_pass": {"cut_off": 0.3}},
         {"prescribed_pitch": {"file": "pitch.csv", "bandwidth": 10.0}},
         {"prescribed_heave_and_pitch": {"file": "both.csv", "bandwidth": 10.0}},
         {"kalman_filter": {"file": "pitch.csv", "force_deviation": 50.0, "pitch_deviation": 2e-3}},
     )
-    return {"wheel_forces": forces, **noise, **holds[int(rng.integers(len(holds)))]}
+    return {"wheel_forces": forces, **noise, **holds[int(generator.integers(len(holds)))]}
 
 
-def _step(rng: np.random.Generator, duration: float, period: float | None) -> float:
+def _step(generator: np.random.Generator, duration: float, sample_period: float | None) -> float:
     """A random step from 20 microseconds to 8 ms that divides the duration and the period."""
-    wanted = float(np.exp(rng.uniform(np.log(2e-5), np.log(8e-3))))
-    whole = duration if period is None else period
-    step = whole / max(1, round(whole / wanted))
+    wanted = float(np.exp(generator.uniform(np.log(2e-5), np.log(8e-3))))
+    divided_time = duration if sample_period is None else sample_period
+    step = divided_time / max(1, round(divided_time / wanted))
     assert divides(step, duration)
     return step

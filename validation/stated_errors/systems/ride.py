@@ -34,54 +34,56 @@ TRUTH_COPIES = 2000
 ENGINES = ("exudyn", "mujoco")
 
 
-def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` samples from random rides of all kinds in turn."""
+def samples(sample_count: int, seed: int) -> Iterator[Sample]:
+    """``sample_count`` samples from random rides of all kinds in turn."""
     rng = np.random.default_rng(seed)
     kinds = (_sample_in_time, _sample_of_sweep, _sample_in_time, _sample_of_drive, _sample_in_time, _sample_of_copies)
-    for i in range(count):
+    for i in range(sample_count):
         yield kinds[i % len(kinds)](rng, i)
 
 
-def _scene(rng: np.random.Generator, file: str, point: str = "unloaded", **tables: Any) -> RideScene:
+def _scene(generator: np.random.Generator, file: str, point: str = "unloaded", **tables: Any) -> RideScene:
     """Random ride scene, with random level, corners and correlation of the road."""
     road = {
-        "level": float(10 ** rng.uniform(-6.0, -4.3)),
-        "corner_mean": float(rng.uniform(0.02, 0.5)),
-        "corner_roll": float(rng.uniform(0.6, 3.0)),
+        "level": float(10 ** generator.uniform(-6.0, -4.3)),
+        "corner_mean": float(generator.uniform(0.02, 0.5)),
+        "corner_roll": float(generator.uniform(0.6, 3.0)),
     }
-    road |= {"cutoff": float(rng.uniform(8.0, 40.0))} if rng.random() < 0.5 else {}
+    road |= {"cutoff": float(generator.uniform(8.0, 40.0))} if generator.random() < 0.5 else {}
     vehicle = {"file": file, "operating_point": point}
     return build({"title": "a sample", "system": "ride", "vehicle": vehicle, "road": road, **tables}, "sample.toml")
 
 
-def _varied_vehicle(rng: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle:
+def _varied_vehicle(generator: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle:
     """The vehicle with random changes of stiffnesses and dampings."""
     springs = tuple(
-        replace(s, stiffness=s.stiffness * rng.uniform(0.6, 1.6), damping=s.damping * rng.uniform(0.5, 1.8))
+        replace(s, stiffness=s.stiffness * generator.uniform(0.6, 1.6), damping=s.damping * generator.uniform(0.5, 1.8))
         for s in vehicle.springs
     )
-    tyres = tuple(replace(t, stiffness=t.stiffness * rng.uniform(0.7, 1.4)) for t in vehicle.tyres)
+    tyres = tuple(replace(t, stiffness=t.stiffness * generator.uniform(0.7, 1.4)) for t in vehicle.tyres)
     return replace(vehicle, springs=springs, tyres=tyres)
 
 
-def _sample_of(result: Result, name: str, engine: str, true: Mapping[str, float], calls: float, extra: float) -> Sample:
-    told = {channel: estimate for channel, estimate in errors_of(result).items() if channel in true}
-    return Sample(name, engine, told, true, calls, extra)
+def _sample_of(
+    result: Result, name: str, engine: str, true_errors: Mapping[str, float], calls: float, extra: float
+) -> Sample:
+    estimates = {channel: estimate for channel, estimate in errors_of(result).items() if channel in true_errors}
+    return Sample(name, engine, estimates, true_errors, calls, extra)
 
 
-def _sample_of_sweep(rng: np.random.Generator, number: int) -> Sample:
+def _sample_of_sweep(generator: np.random.Generator, sample_number: int) -> Sample:
     """Sample from the deviations of a linear vehicle at nine speeds, whose truth is computed in extended precision."""
-    file = str(rng.choice(["quarter_car", "half_car", "seven_freedoms"]))
-    engine = str(rng.choice(["reference", *ENGINES]))
-    scene = _scene(rng, file, speeds={"values": sorted(rng.uniform(2.0, 60.0, 9).tolist())})
-    vehicle = _varied_vehicle(rng, vehicle_of(scene))
+    file = str(generator.choice(["quarter_car", "half_car", "seven_freedoms"]))
+    engine = str(generator.choice(["reference", *ENGINES]))
+    scene = _scene(generator, file, speeds={"values": sorted(generator.uniform(2.0, 60.0, 9).tolist())})
+    vehicle = _varied_vehicle(generator, vehicle_of(scene))
     result = run(scene, engine, vehicle=vehicle, error=True)
     road, deviation = excitation_of(scene, wheels(vehicle)), result["deviation"][0]
     true = np.array([exact_deviations(linearise(vehicle), road, float(speed)) for speed in result["speed"]])
     gaps = np.sqrt(np.mean((deviation - true) ** 2, axis=0))
     names = result["output"].tolist()
     return _sample_of(
-        result, f"{number}: {file}, sweep", engine, dict(zip(names, gaps.tolist(), strict=True)), 9.0, 3.0
+        result, f"{sample_number}: {file}, sweep", engine, dict(zip(names, gaps.tolist(), strict=True)), 9.0, 3.0
     )
 
 
@@ -99,11 +101,11 @@ def exact_deviations(linear: LinearVehicle, road: Excitation, speed: float) -> n
     )
     C += linear.read.acceleration_factors @ (A - system.A)[n : 2 * n]
     met = noise_arrivals(system)
-    before, Q = np.zeros_like(met.B[0], np.longdouble), np.zeros_like(A)
+    earlier_response, Q = np.zeros_like(met.B[0], np.longdouble), np.zeros_like(A)
     for j, b in enumerate(met.B):
         if j and not met.independent:
-            before = _exponential(A * (met.delays[j] - met.delays[j - 1])) @ (before + met.B[j - 1])
-        Q += b @ b.T + before @ b.T + b @ before.T
+            earlier_response = _exponential(A * (met.delays[j] - met.delays[j - 1])) @ (earlier_response + met.B[j - 1])
+        Q += b @ b.T + earlier_response @ b.T + b @ earlier_response.T
     P: np.ndarray = np.zeros_like(A)
     for _ in range(8):
         half = A @ P
@@ -125,75 +127,91 @@ def _exponential(A: np.ndarray) -> np.ndarray:
     return total
 
 
-def _sample_of_drive(rng: np.random.Generator, number: int) -> Sample:
+def _sample_of_drive(generator: np.random.Generator, sample_number: int) -> Sample:
     """Sample from a drive with two sections, whose truth has steps eight times shorter (error about 1e-9 of the step's
     own)."""
-    first = float(rng.choice([0.0, rng.uniform(2.0, 15.0)]))
-    drive = {"time": [0.0, float(rng.uniform(1.0, 2.0)), 3.0], "speed": [first, *rng.uniform(3.0, 30.0, 2).tolist()]}
-    scene = _scene(rng, "quarter_car", drive=drive, study="ride_drive")
-    vehicle = _varied_vehicle(rng, vehicle_of(scene))
-    engine = str(rng.choice(["reference", *ENGINES]))
+    first = float(generator.choice([0.0, generator.uniform(2.0, 15.0)]))
+    drive = {
+        "time": [0.0, float(generator.uniform(1.0, 2.0)), 3.0],
+        "speed": [first, *generator.uniform(3.0, 30.0, 2).tolist()],
+    }
+    scene = _scene(generator, "quarter_car", drive=drive, study="ride_drive")
+    vehicle = _varied_vehicle(generator, vehicle_of(scene))
+    engine = str(generator.choice(["reference", *ENGINES]))
     result = run(scene, engine, vehicle=vehicle, error=True)
     road, profile = excitation_of(scene, wheels(vehicle)), scene.drive.profile()  # type: ignore[union-attr]
     fine = varying_speed(
-        linear_vehicle(vehicle)(ANY_SPEED), road, profile, instants=result.times, reach=LARGEST_RATE_TIMES_STEP / 8.0
+        linear_vehicle(vehicle)(ANY_SPEED),
+        road,
+        profile,
+        instants=result.times,
+        largest_rate_times_step=LARGEST_RATE_TIMES_STEP / 8.0,
     )
     rows = np.abs(fine.time[:, None] - result.times).argmin(axis=0)
     gaps = np.sqrt(np.mean((fine.deviation[rows] - result["deviation"]) ** 2, axis=0))
     true = dict(zip(result["output"].tolist(), gaps.tolist(), strict=True))
     steps = float(len(result.times))
-    return _sample_of(result, f"{number}: quarter car, drive from {first:.3g} m/s", engine, true, steps, 0.6 * steps)
+    return _sample_of(
+        result, f"{sample_number}: quarter car, drive from {first:.3g} m/s", engine, true, steps, 0.6 * steps
+    )
 
 
-def _sample_of_copies(rng: np.random.Generator, number: int) -> Sample:
+def _sample_of_copies(generator: np.random.Generator, sample_number: int) -> Sample:
     """Sample from Monte Carlo copies and statistical linearisation of a nonlinear quarter car; the truth has many more
     copies and shorter steps. Both contain random scatter."""
-    speed = float(rng.uniform(5.0, 35.0))
-    scene = _scene(rng, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
-    vehicle, sampling = vehicle_of(scene), Sampling(beside=[speed], copies=100, lasting=6.0, seed=number)
+    speed = float(generator.uniform(5.0, 35.0))
+    scene = _scene(generator, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
+    vehicle, sampling = vehicle_of(scene), Sampling(beside=[speed], copies=100, lasting=6.0, seed=sample_number)
     result = linearised_result(scene, vehicle, sampling, lambda text, share: None, error=True)
     run, road = result.detail.copies[speed], excitation_of(scene, wheels(vehicle))
-    fine = copies_in_time(vehicle, road, speed, 10.0, copies=TRUTH_COPIES, seed=1000 + number, longest=run.step / 4.0)
+    fine = copies_in_time(
+        vehicle, road, speed, 10.0, copies=TRUTH_COPIES, seed=1000 + sample_number, longest_step=run.step / 4.0
+    )
     chance = json.loads(result.data.attrs["error"])["chance"]["channels"]
-    told, true = dict[str, Estimate](), dict[str, float]()
+    estimates, true = dict[str, Estimate](), dict[str, float]()
     for i, (name, gains) in enumerate(zip(run.names, result["deviation"][0], strict=True)):
-        for part, value in (("copies", run.deviation[i]), ("gains", gains)):
-            channel = f"{name}, {part}"
+        for method_name, value in (("copies", run.deviation[i]), ("gains", gains)):
+            channel = f"{name}, {method_name}"
             estimate = errors_of(result)[channel]
-            more = chance.get(channel, {"error": 0.0, "share": 0.0})
-            error, share = np.hypot(estimate.error, more["error"]), np.hypot(estimate.share, more["share"])
-            told[channel] = replace(estimate, error=float(error), share=float(share))
+            chance_part = chance.get(channel, {"error": 0.0, "share": 0.0})
+            error, share = (
+                np.hypot(estimate.error, chance_part["error"]),
+                np.hypot(estimate.share, chance_part["share"]),
+            )
+            estimates[channel] = replace(estimate, error=float(error), share=float(share))
             true[channel] = abs(float(value - fine.deviation[i]))
     steps = sampling.copies * 6.0 / run.step
-    return Sample(f"{number}: bent quarter car at {speed:.3g} m/s", "reference", told, true, steps, 0.375 * steps)
+    return Sample(
+        f"{sample_number}: bent quarter car at {speed:.3g} m/s", "reference", estimates, true, steps, 0.375 * steps
+    )
 
 
-def _sample_in_time(rng: np.random.Generator, number: int) -> Sample:
+def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sample:
     """Sample from a run in time with nonlinear springs or tyres that lift, whose truth has much shorter steps on the
     same road."""
-    bent, speed = rng.random() < 0.5, float(rng.uniform(5.0, 40.0))
-    file = "quarter_car_nonlinear" if bent else str(rng.choice(["quarter_car", "half_car", "seven_freedoms"]))
+    bent, speed = generator.random() < 0.5, float(generator.uniform(5.0, 40.0))
+    file = "quarter_car_nonlinear" if bent else str(generator.choice(["quarter_car", "half_car", "seven_freedoms"]))
     tables: dict[str, Any] = {"speeds": {"values": [speed]}, "study": "ride_nonlinear"}
     tables |= {} if bent else {"effects": {"lift_off": {}}}
-    scene = _scene(rng, file, "loaded", **tables)
-    vehicle, engine = _varied_vehicle(rng, vehicle_of(scene)), str(rng.choice(ENGINES))
-    sampling = Sampling(step=float(10 ** rng.uniform(-3.7, -2.5)), driven=3.0, skipped=0.5, seed=number)
+    scene = _scene(generator, file, "loaded", **tables)
+    vehicle, engine = _varied_vehicle(generator, vehicle_of(scene)), str(generator.choice(ENGINES))
+    sampling = Sampling(step=float(10 ** generator.uniform(-3.7, -2.5)), driven=3.0, skipped=0.5, seed=sample_number)
     road = excitation_of(scene, wheels(vehicle))
     path = _path(scene, engine, vehicle, sampling, road, speed)
     steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half=path.half / FINER_STEPS)
-    table = finer.table(steps * FINER_STEPS, number)
+    table = finer.table(steps * FINER_STEPS, sample_number)
     try:
         result = in_engine(scene, engine, vehicle, sampling, True, table[::FINER_STEPS].copy())
     except RunFailed as failure:
         result = failure.partial
     rows = result.detail.rows * FINER_STEPS
-    every, begin = int(rows[1] - rows[0]), float(rows[0] * finer.step)
-    fine = ride_over("mujoco", vehicle, finer, table, skipped=begin, every=every)
+    stride, begin = int(rows[1] - rows[0]), float(rows[0] * finer.step)
+    fine = ride_over("mujoco", vehicle, finer, table, skipped=begin, every=stride)
     gaps = np.sqrt(np.mean((fine.outputs[: len(rows)] - result.detail.outputs) ** 2, axis=0))
     true = dict(zip(result["output"].tolist(), gaps.tolist(), strict=True))
     calls = RUNGE_KUTTA_ORDER * steps + len(rows)
     read = (1.0 + 0.9 + 0.18) * steps / 16
-    name = f"{number}: {file} at {speed:.3g} m/s in steps of {1e3 * path.step:.2g} ms"
+    name = f"{sample_number}: {file} at {speed:.3g} m/s in steps of {1e3 * path.step:.2g} ms"
     return _sample_of(result, name, engine, true, calls, 0.54 * RUNGE_KUTTA_ORDER * steps + read)
 
 

@@ -17,34 +17,37 @@ from validation.stated_errors.sample import Sample, drawn_samples
 FINER_CELLS, POSITION_COUNT = 4.0, 4
 
 
-def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` samples from random scenes; scenes that fail or are refused are replaced by others."""
-    return drawn_samples(count, seed, lambda random: _sample_of_position(_draw_scene(random)))
+def samples(sample_count: int, seed: int) -> Iterator[Sample]:
+    """``sample_count`` samples from random scenes; scenes that fail or are refused are replaced by others."""
+    return drawn_samples(sample_count, seed, lambda random: _sample_of_position(_draw_scene(random)))
 
 
-def _draw_scene(rng: np.random.Generator) -> WheelRailScene:
-    start = float(rng.uniform(-0.004, 0.004))
-    rolls = rng.random() < 0.6
-    case = {"yaw": float(rng.uniform(0.0, 3.0)), "friction": float(rng.uniform(0.1, 0.5))} if rolls else {}
+def _draw_scene(generator: np.random.Generator) -> WheelRailScene:
+    start = float(generator.uniform(-0.004, 0.004))
+    rolls = generator.random() < 0.6
+    case = {"yaw": float(generator.uniform(0.0, 3.0)), "friction": float(generator.uniform(0.1, 0.5))} if rolls else {}
     return build(
         {
             "title": "a random held wheelset",
             "system": "wheel-rail",
-            "wheelset": {"load": float(10.0 ** rng.uniform(3.7, 5.0)), "radius": float(rng.uniform(0.35, 0.6))},
-            "profiles": {"inclination": float(rng.choice([0.025, 0.05]))},
+            "wheelset": {
+                "load": float(10.0 ** generator.uniform(3.7, 5.0)),
+                "radius": float(generator.uniform(0.35, 0.6)),
+            },
+            "profiles": {"inclination": float(generator.choice([0.025, 0.05]))},
             "positions": {"start": start, "stop": start + 0.004, "count": POSITION_COUNT},
-            "method": {"cells": int(rng.integers(10, 24))},
+            "method": {"cells": int(generator.integers(10, 24))},
             "cases": {"one": case},
         }
     )
 
 
 def _sample_of_position(scene: WheelRailScene) -> Sample | None:
-    made = run(scene, error=True)
-    told, case = errors_of(made), next(iter(scene.cases.values()))
-    held = scene.contact(case)
-    fine = replace(held, cell_factor=held.cell_factor / FINER_CELLS)
-    placed = made.detail.placed
+    stated_run = run(scene, error=True)
+    estimates, case = errors_of(stated_run), next(iter(scene.cases.values()))
+    contact = scene.contact(case)
+    fine = replace(contact, cell_factor=contact.cell_factor / FINER_CELLS)
+    placed = stated_run.detail.placed
     gaps = np.array(
         [
             wheel_sums(wheelset_place) - wheel_sums(fine.at(wheelset_place.shift, wheelset_place.yaw))
@@ -52,9 +55,13 @@ def _sample_of_position(scene: WheelRailScene) -> Sample | None:
         ]
     )
     true = {name: finite_rms(gaps[:, :, k]) for k, name in enumerate(WHEEL_QUANTITIES)}
-    calls, again = (
+    calls, extra_seconds = (
         len(placed) * scene.method.cells**2,
         len(placed[::POSITIONS_PER_ERROR]) * (scene.method.cells / 2.0) ** 2,
     )
     name = f"{scene.wheelset.load:.3g} N, {scene.method.cells} cells, {'rolling' if case.friction else 'pressed'}"
-    return Sample(name, "", told, {channel: true[channel] for channel in told}, calls, again) if told else None
+    return (
+        Sample(name, "", estimates, {channel: true[channel] for channel in estimates}, calls, extra_seconds)
+        if estimates
+        else None
+    )

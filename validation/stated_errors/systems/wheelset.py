@@ -27,36 +27,41 @@ LONGEST_STEP_FACTOR = 2.4
 """Steps by the fastest motion's rate, at most."""
 
 
-def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` samples from random scenes; scenes that fail or are refused are replaced by others."""
-    return drawn_samples(count, seed, lambda random: _sample_of_path(*_draw_scene(random)))
+def samples(sample_count: int, seed: int) -> Iterator[Sample]:
+    """``sample_count`` samples from random scenes; scenes that fail or are refused are replaced by others."""
+    return drawn_samples(sample_count, seed, lambda random: _sample_of_path(*_draw_scene(random)))
 
 
-def _draw_scene(rng: np.random.Generator) -> tuple[WheelsetScene, str, float]:
-    speed, profiled = float(rng.uniform(8.0, 90.0)), rng.random() < 0.25
+def _draw_scene(generator: np.random.Generator) -> tuple[WheelsetScene, str, float]:
+    speed, profiled = float(generator.uniform(8.0, 90.0)), generator.random() < 0.25
     override = {
-        "stiffness_x": 10.0 ** rng.uniform(4.7, 6.3),
-        "damping_x": 10.0 ** rng.uniform(2.0, 4.0),
-        "friction": rng.uniform(0.15, 0.5),
-        "load": 10.0 ** rng.uniform(4.7, 5.2),
-        "conicity": rng.uniform(0.03, 0.2),
+        "stiffness_x": 10.0 ** generator.uniform(4.7, 6.3),
+        "damping_x": 10.0 ** generator.uniform(2.0, 4.0),
+        "friction": generator.uniform(0.15, 0.5),
+        "load": 10.0 ** generator.uniform(4.7, 5.2),
+        "conicity": generator.uniform(0.03, 0.2),
     }
-    law = "linear" if rng.random() < 0.2 else "fastsim"
+    law = "linear" if generator.random() < 0.2 else "fastsim"
     table: dict[str, Any] = {
         "title": "a random wheelset",
         "system": "wheelset",
         "wheelset": {"override": {name: float(value) for name, value in override.items()}},
-        "contact": {"law": law} | ({"cells": int(rng.integers(5, 25))} if law == "fastsim" else {}),
+        "contact": {"law": law} | ({"cells": int(generator.integers(5, 25))} if law == "fastsim" else {}),
         "speeds": {"values": [speed]},
-        "run": {"displacement": float(rng.uniform(5e-4, 7e-3)), "speeds": [speed], "step": 1e-4, "duration": 1e-4},
+        "run": {
+            "displacement": float(generator.uniform(5e-4, 7e-3)),
+            "speeds": [speed],
+            "step": 1e-4,
+            "duration": 1e-4,
+        },
     }
     table |= {"profiles": {}} if profiled else {}
     equations = equations_of(build(table), "reference", speed)
     fastest = float(np.abs(np.linalg.eigvals(equations.state_matrix)).max())
-    duration = float(rng.uniform(0.3, 2.0))
-    steps = math.ceil(duration * fastest / (LONGEST_STEP_FACTOR * rng.uniform(0.1, 1.0)))
+    duration = float(generator.uniform(0.3, 2.0))
+    steps = math.ceil(duration * fastest / (LONGEST_STEP_FACTOR * generator.uniform(0.1, 1.0)))
     table["run"] |= {"step": duration / steps, "duration": duration}
-    return build(table), str(rng.choice(ENGINES)), speed
+    return build(table), str(generator.choice(ENGINES)), speed
 
 
 def _sample_of_path(scene: WheelsetScene, engine: str, speed: float) -> Sample:
@@ -69,12 +74,12 @@ def _sample_of_path(scene: WheelsetScene, engine: str, speed: float) -> Sample:
 
     with mock.patch.object(system, "path", counted):
         run = system.run(scene, engine, speed, error=True)
-    true = _true_errors(scene, run, lambda other: march(other, "reference", speed))
-    told = errors_of(run)
+    true = _true_errors(scene, run, lambda changed_scene: march(changed_scene, "reference", speed))
+    estimates = errors_of(run)
     name = f"{speed:.3g} m/s, step {scene.run.step:.2g} s, {scene.contact.law}, {scene.contact.cells} cells"
     name += ", profiles" if scene.profiles else ""
-    true = {channel: true[channel] for channel in told}
-    return Sample(name, engine, told, true, 4.0 * marched[0], 4.0 * sum(marched[1:]))
+    true = {channel: true[channel] for channel in estimates}
+    return Sample(name, engine, estimates, true, 4.0 * marched[0], 4.0 * sum(marched[1:]))
 
 
 def _count_of_cells(scene: WheelsetScene) -> float:
@@ -82,21 +87,21 @@ def _count_of_cells(scene: WheelsetScene) -> float:
 
 
 def _true_errors(
-    scene: WheelsetScene, run: Result, march: Callable[[WheelsetScene], WheelsetPath]
+    scene: WheelsetScene, run: Result, march_scene: Callable[[WheelsetScene], WheelsetPath]
 ) -> Mapping[str, float]:
     """True errors by steps and by cells, for the channels of the estimates."""
     fine = principal_series(run.detail)
-    true = _rms_differences(fine, principal_series(march(with_step_factor(scene, 1.0 / FINER_STEPS))))
+    true = _rms_differences(fine, principal_series(march_scene(with_step_factor(scene, 1.0 / FINER_STEPS))))
     if scene.contact.law == "linear":
         return true
     cells = min(FINER_CELLS * scene.contact.cells, MOST_CELLS)
-    of_cells = _rms_differences(fine, principal_series(march(with_step_factor(scene, 1.0, cells=cells))))
+    of_cells = _rms_differences(fine, principal_series(march_scene(with_step_factor(scene, 1.0, cells=cells))))
     return true | {f"{name} of cells": error for name, error in of_cells.items()}
 
 
-def _rms_differences(fine: Series, truth: Series) -> dict[str, float]:
-    rows = rows_at(truth.times, fine.times)
+def _rms_differences(fine_series: Series, truth: Series) -> dict[str, float]:
+    rows = rows_at(truth.times, fine_series.times)
     return {
         name: float(np.sqrt(np.mean((values - truth.channels[name][rows]) ** 2)))
-        for name, values in fine.channels.items()
+        for name, values in fine_series.channels.items()
     }

@@ -23,9 +23,9 @@ def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -
     numbers, steps, states, seconds = defaultdict[str, list[np.ndarray]](list), 0, 0, 0.0
     (engine,) = engines_of(scene, (engine,)) or (engine,)
     for name in scene.procedures:
-        begun = time.process_time()
+        start_time = time.process_time()
         drive = run(scene, engine, procedure=name, error=error)
-        seconds += time.process_time() - begun
+        seconds += time.process_time() - start_time
         path, stop = drive.detail, Stop(drive.detail)
         if len(path.times) < 3:
             raise RunFailed("braking", f"{name} ends before it has begun", float(path.times[-1]))
@@ -59,6 +59,6 @@ def shorten(table: dict[str, Any], scene: BrakingScene, steps: int) -> None:
     table.setdefault("run", {})["duration"] = max(2, steps // scene.run.substeps) * scene.run.sample
 
 
-def coarsen(table: dict[str, Any], scene: BrakingScene, times: int) -> None:
+def coarsen(table: dict[str, Any], scene: BrakingScene, step_factor: int) -> None:
     """Edit the table to take fewer steps within a sample."""
-    table.setdefault("run", {})["substeps"] = scene.run.substeps // times
+    table.setdefault("run", {})["substeps"] = scene.run.substeps // step_factor

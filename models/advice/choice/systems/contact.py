@@ -34,5 +34,5 @@ def shorten(table: dict[str, Any], scene: ContactScene, steps: int) -> None:
     """Do nothing: a contact has no time steps to shorten."""
 
 
-def coarsen(table: dict[str, Any], scene: ContactScene, times: int) -> None:
+def coarsen(table: dict[str, Any], scene: ContactScene, step_factor: int) -> None:
     """Do nothing: a contact has no time steps to coarsen."""

@@ -17,7 +17,7 @@ TYRE_QUANTITIES = ("load", "fx", "fy", "mz")
 def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) -> RunQuantities:
     """Drive every manoeuvre and collect the quantities."""
     runs = [run(scene, engine, name, error) for name in scene.manoeuvres]
-    drives = [each.detail for each in runs]
+    drives = [handling_run.detail for handling_run in runs]
     speeds = [drive.velocity() for drive in drives]
     quantities = {
         name: Quantity(unit, tuple(speed[:, i] for speed in speeds)) for name, (i, unit) in MOTION_CHANNELS.items()
@@ -26,14 +26,14 @@ def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) 
     for name in TYRE_QUANTITIES:
         columns = tuple(np.ascontiguousarray(column) for drive in drives for column in drive[name].T)
         quantities[name] = Quantity(TYRE_CHANNELS[name][1], columns)
-    steps, handling = sum(each.counts()["steps"] for each in runs), drives[-1].handling
+    steps, handling = sum(handling_run.counts()["steps"] for handling_run in runs), drives[-1].handling
     counts = {
         "steps": steps,
         "calls": 4 * steps,
         "states": 2 * len(handling.vehicle.coordinates()),
         "terms": len(handling.waves) * len(handling.vehicle.tyres),
     }
-    return RunQuantities(quantities, counts, sum(each.seconds for each in runs))
+    return RunQuantities(quantities, counts, sum(handling_run.seconds for handling_run in runs))
 
 
 def steps(scene: HandlingScene) -> int:
@@ -50,6 +50,6 @@ def shorten(table: dict[str, Any], scene: HandlingScene, steps: int) -> None:
         manoeuvre["duration"] = min(scene.manoeuvres[name].duration, steps * scene.run.step)
 
 
-def coarsen(table: dict[str, Any], scene: HandlingScene, times: int) -> None:
-    """Edit the table to multiply the step by ``times``."""
-    table.setdefault("run", {})["step"] = times * scene.run.step
+def coarsen(table: dict[str, Any], scene: HandlingScene, step_factor: int) -> None:
+    """Edit the table to multiply the step by ``step_factor``."""
+    table.setdefault("run", {})["step"] = step_factor * scene.run.step

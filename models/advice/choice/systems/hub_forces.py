@@ -34,6 +34,6 @@ def shorten(table: dict[str, Any], scene: HubScene, steps: int) -> None:
     table.setdefault("run", {})["duration"] = steps * scene.run.step
 
 
-def coarsen(table: dict[str, Any], scene: HubScene, times: int) -> None:
-    """Edit the table to multiply the step by ``times``."""
-    table.setdefault("run", {})["step"] = times * scene.run.step
+def coarsen(table: dict[str, Any], scene: HubScene, step_factor: int) -> None:
+    """Edit the table to multiply the step by ``step_factor``."""
+    table.setdefault("run", {})["step"] = step_factor * scene.run.step

@@ -27,8 +27,8 @@ def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) 
     result = run(scene, engine, error=error)
     exam: Examination = result.detail
     assert exam.outcome is not None
-    forces = [each for each in exam.outcome.answers if each.quantity != "acceleration"]
-    quantities = {each.name: Quantity(each.unit, (exam.outcome.samples(each),)) for each in forces}
+    forces = [answer for answer in exam.outcome.answers if answer.quantity != "acceleration"]
+    quantities = {answer.name: Quantity(answer.unit, (exam.outcome.samples(answer),)) for answer in forces}
     counts = result.counts()
     called = {"steps": counts["steps"], "calls": counts["force calls"], "states": counts["states"]}
     return RunQuantities(quantities, called, result.seconds)
@@ -50,8 +50,10 @@ def _step(scene: MeasuredScene) -> float:
 def _period_and_duration(scene: MeasuredScene) -> tuple[float, float]:
     """Sampling period and duration (s) of the recording. For a virtual measurement they are known without a run."""
     if scene.virtual is not None:
-        whole = scene.virtual.duration - scene.clock.start
-        return 1.0 / (scene.clock.rate or scene.virtual.sampling_rate), min(whole, scene.clock.duration or whole)
+        full_duration = scene.virtual.duration - scene.clock.start
+        return 1.0 / (scene.clock.rate or scene.virtual.sampling_rate), min(
+            full_duration, scene.clock.duration or full_duration
+        )
     with tempfile.TemporaryDirectory() as name:
         recording = read_files(scene, Path(name))
         return recording.period, recording.duration
@@ -61,9 +63,9 @@ def shorten(table: dict[str, Any], scene: MeasuredScene, few: int) -> None:
     """Shorten the run to ``few`` steps, at least as many as a recording must have; a virtual measurement ends then,
     too.
     """
-    period, whole = _period_and_duration(scene)
-    least = SHORTEST_PART_STEPS * math.ceil(FEWEST_SAMPLES * period / (_step(scene) * SHORTEST_PART_STEPS))
-    duration = min(max(few, least) * _step(scene), whole)
+    period, full_duration = _period_and_duration(scene)
+    least_steps = SHORTEST_PART_STEPS * math.ceil(FEWEST_SAMPLES * period / (_step(scene) * SHORTEST_PART_STEPS))
+    duration = min(max(few, least_steps) * _step(scene), full_duration)
     if scene.virtual is None:
         table.setdefault("clock", {})["duration"] = duration
     else:
@@ -71,6 +73,6 @@ def shorten(table: dict[str, Any], scene: MeasuredScene, few: int) -> None:
         table.get("clock", {}).pop("duration", None)
 
 
-def coarsen(table: dict[str, Any], scene: MeasuredScene, times: int) -> None:
-    """Edit the table to multiply the step by ``times``."""
-    table.setdefault("run", {})["step"] = times * _step(scene)
+def coarsen(table: dict[str, Any], scene: MeasuredScene, step_factor: int) -> None:
+    """Edit the table to multiply the step by ``step_factor``."""
+    table.setdefault("run", {})["step"] = step_factor * _step(scene)

@@ -15,14 +15,17 @@ CALLS_PER_STEP = {"RK4": 4, "RK44": 4, "Euler": 1}
 def computed_quantities(scene: Scene, engine: str, error: bool = False) -> RunQuantities:
     """Run the scene and collect its quantities."""
     assembly = assembly_of_scene(scene)
-    begun = time.process_time()
+    start_time = time.process_time()
     result = run(scene, engine, assembly=assembly, error=error)
-    seconds = time.process_time() - begun
-    told, states = result.counts(), result.detail.states
-    counts = {"steps": told.get("steps", len(states) - 1), "states": states.shape[1]}
-    counts["calls"] = told.get("force calls", CALLS_PER_STEP.get(result.data.attrs["integrator"], 1) * counts["steps"])
+    seconds = time.process_time() - start_time
+    run_counts, states = result.counts(), result.detail.states
+    counts = {"steps": run_counts.get("steps", len(states) - 1), "states": states.shape[1]}
+    counts["calls"] = run_counts.get(
+        "force calls", CALLS_PER_STEP.get(result.data.attrs["integrator"], 1) * counts["steps"]
+    )
     quantities = {
-        str(name): Quantity(each.attrs["units"], (each.values,)) for name, each in result.data.data_vars.items()
+        str(name): Quantity(channel.attrs["units"], (channel.values,))
+        for name, channel in result.data.data_vars.items()
     }
     return RunQuantities(quantities, counts, seconds)
 
@@ -41,10 +44,10 @@ def shorten(table: dict[str, Any], scene: Scene, steps: int) -> None:
     table["run"].pop("output_step", None)
 
 
-def coarsen(table: dict[str, Any], scene: Scene, times: int) -> None:
-    """Edit the table to multiply the steps of all engines by ``times``; every step becomes a saved row."""
-    table["run"] |= {"step": times * scene.run.step}
+def coarsen(table: dict[str, Any], scene: Scene, step_factor: int) -> None:
+    """Edit the table to multiply the steps of all engines by ``step_factor``; every step becomes a saved row."""
+    table["run"] |= {"step": step_factor * scene.run.step}
     table["run"].pop("output_step", None)
     for engine_table in table.get("engines", {}).values():
         if "step" in engine_table:
-            engine_table["step"] *= times
+            engine_table["step"] *= step_factor

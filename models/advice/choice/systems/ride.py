@@ -34,9 +34,9 @@ def computed_quantities(scene: CopiesInTime, engine: str, error: bool = False) -
         raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")
     squares_of, seconds = dict[str, list[np.ndarray]](), 0.0
     for pace in scene.steps_at_speeds:
-        roads, begun = scene.roads(pace), time.process_time()
+        roads, start_time = scene.roads(pace), time.process_time()
         outputs, squares = scene.mean_squares(pace, roads)
-        seconds += time.process_time() - begun
+        seconds += time.process_time() - start_time
         for output, of_copies in zip(outputs, squares.T, strict=True):
             squares_of.setdefault(output.name, []).append(of_copies)
     units = {output.name: output.unit for output in outputs}

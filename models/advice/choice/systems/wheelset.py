@@ -46,6 +46,6 @@ def shorten(table: dict[str, Any], scene: WheelsetScene, steps: int) -> None:
     table.setdefault("run", {}).update(duration=steps * scene.run.step, speeds=path_speeds(scene))
 
 
-def coarsen(table: dict[str, Any], scene: WheelsetScene, times: int) -> None:
-    """Edit the table to multiply the step by ``times``."""
-    table.setdefault("run", {})["step"] = times * scene.run.step
+def coarsen(table: dict[str, Any], scene: WheelsetScene, step_factor: int) -> None:
+    """Edit the table to multiply the step by ``step_factor``."""
+    table.setdefault("run", {})["step"] = step_factor * scene.run.step

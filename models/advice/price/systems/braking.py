@@ -120,8 +120,10 @@ def priced_scene(scene: BrakingScene, quantity: str | None, engines: tuple[str, 
             None,
             "cannot be priced: what stands behind it answers one run; leave it out, with a controller in its place",
         )
-    name, asked = run_and_quantity(quantity, USUAL_QUANTITY, scene.procedures, "procedure")
-    checked_quantity(asked, QUANTITIES)
-    others = [procedure for procedure in scene.procedures if procedure != name]
-    note = f"procedure {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")
-    return PricedBraking(scene, name, asked, engines_of(scene, engines), note)
+    name, requested_quantity = run_and_quantity(quantity, USUAL_QUANTITY, scene.procedures, "procedure")
+    checked_quantity(requested_quantity, QUANTITIES)
+    other_procedures = [procedure for procedure in scene.procedures if procedure != name]
+    note = f"procedure {name}" + (
+        f"; of another one by --quantity {other_procedures[0]}.{requested_quantity}" if other_procedures else ""
+    )
+    return PricedBraking(scene, name, requested_quantity, engines_of(scene, engines), note)

@@ -76,26 +76,26 @@ class PricedContact:
             for march in MARCHES_OF_THEORY[name]
         ]
 
-    def _default(self, march: str) -> float:
-        return 1.0 / self.scene.method.cells if march in ("", self.scene.method.march) else 0.0
+    def _default(self, march_name: str) -> float:
+        return 1.0 / self.scene.method.cells if march_name in ("", self.scene.method.march) else 0.0
 
-    def _order(self, march: str) -> int:
-        return int(self._method(march, self.scene.method.cells).order)
+    def _order(self, march_name: str) -> int:
+        return int(self._method(march_name, self.scene.method.cells).order)
 
     def reference(self) -> SettingLadder:
         """Ladder of the reference: cells that halve, with the march of the highest order."""
         name = self.scene.method.name
         march = MARCHES_OF_THEORY[name][0]
         values = tuple(1.0 / n for n in REFERENCE_CELLS)
-        said = "half the cells change it by"
-        return SettingLadder(name, march or name, values, self._order(march), cells=True, said=said)
+        change_text = "half the cells change it by"
+        return SettingLadder(name, march or name, values, self._order(march), cells=True, said=change_text)
 
     def second(self, reference_setting: Setting) -> Setting | None:
         """None: no other family of methods has the same theory."""
         return None
 
-    def _method(self, march: str, cells: int) -> Method:
-        update = {"cells": cells, **({"march": march} if march in MARCHES_OF_THEORY["fastsim"] else {})}
+    def _method(self, march_name: str, cells: int) -> Method:
+        update = {"cells": cells, **({"march": march_name} if march_name in MARCHES_OF_THEORY["fastsim"] else {})}
         return self.scene.method.model_copy(update=update)
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, int]:

@@ -52,7 +52,7 @@ class PricedHandling(MeshedScene):
         handling = _with_cells(self.handling, cells)
         model, start = build(self.reference_engine, handling), np.concatenate(handling.straight(self.speed))
         n, times = start.size // 2, step * np.arange(round(duration / step) + 1)
-        done = solve_ivp(
+        solved = solve_ivp(
             lambda t, y: np.concatenate((y[n:], model.acceleration(t, y[:n], y[n:]))),
             (0.0, duration),
             start,
@@ -61,9 +61,9 @@ class PricedHandling(MeshedScene):
             rtol=OTHER_TOLERANCE,
             atol=OTHER_TOLERANCE,
         )
-        if not done.success:
-            raise RunFailed(self.reference_engine, done.message)
-        return read_run(handling, Trajectory(times, done.y.T), self.reference_engine)
+        if not solved.success:
+            raise RunFailed(self.reference_engine, solved.message)
+        return read_run(handling, Trajectory(times, solved.y.T), self.reference_engine)
 
     def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity over the time of a drive, and the number of force calls; the drive's assumptions are judged."""
@@ -84,18 +84,20 @@ class PricedHandling(MeshedScene):
 
 def priced_scene(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) -> PricedHandling:
     """The handling scene with the quantity MANOEUVRE.QUANTITY to price; the first manoeuvre where none is named."""
-    name, asked = run_and_quantity(quantity, USUAL_QUANTITY, scene.manoeuvres, "manoeuvre")
-    checked_quantity(asked, QUANTITIES)
-    manoeuvre, step, others = (
+    name, quantity_name = run_and_quantity(quantity, USUAL_QUANTITY, scene.manoeuvres, "manoeuvre")
+    checked_quantity(quantity_name, QUANTITIES)
+    manoeuvre, step, other_manoeuvres = (
         scene.manoeuvres[name],
         scene.run.step,
-        [each for each in scene.manoeuvres if each != name],
+        [name_of_other for name_of_other in scene.manoeuvres if name_of_other != name],
     )
-    note = f"manoeuvre {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")
+    note = f"manoeuvre {name}" + (
+        f"; of another one by --quantity {other_manoeuvres[0]}.{quantity_name}" if other_manoeuvres else ""
+    )
     return PricedHandling(
         scene.title,
-        asked,
-        QUANTITIES[asked][1],
+        quantity_name,
+        QUANTITIES[quantity_name][1],
         note,
         manoeuvre.duration,
         first_part(manoeuvre.duration, SEARCHED_DURATION),

@@ -119,9 +119,9 @@ class PricedPitchPlane:
 
     def reference(self) -> SettingLadder:
         """Ladder of the reference: RK4 on the written equations; each step is half the one before."""
-        fewest = math.ceil((FEWEST_ROWS - 1) * self.base / self.first * (1 - 1e-9))
-        most = max(fewest, math.ceil(self.base / 4e-3 * (1 - 1e-9)))
-        return SettingLadder("reference", "RK4", tuple(self.base / most / 2**k for k in range(16)), 4)
+        fewest_steps = math.ceil((FEWEST_ROWS - 1) * self.base / self.first * (1 - 1e-9))
+        coarsest_steps = max(fewest_steps, math.ceil(self.base / 4e-3 * (1 - 1e-9)))
+        return SettingLadder("reference", "RK4", tuple(self.base / coarsest_steps / 2**k for k in range(16)), 4)
 
     def second(self, reference_setting: Setting) -> Setting | None:
         """LSODA, to check the reference; None where it would restart at every sample."""
@@ -146,11 +146,11 @@ class PricedPitchPlane:
         if setting.engine in OUTSIDE:
             return _outside_engine_lines(setting)
         name, (_, _, radius) = setting.method.split()[0], setting.method.partition(" ")
-        last = f"tolerance = {setting.value:.4g}" if setting.adaptive else f"step = {setting.value!r}"
+        setting_line = f"tolerance = {setting.value:.4g}" if setting.adaptive else f"step = {setting.value!r}"
         return [
             f"[engines.{setting.engine}]",
             f'integrator = "{name}"',
-            last,
+            setting_line,
             *([f"spectral_radius = {radius}"] if radius else []),
         ]
 
@@ -169,11 +169,11 @@ class PricedPitchPlane:
 
 def _outside_engine_lines(setting: Setting) -> list[str]:
     """Lines for an engine from outside the tree, which a scene file cannot name."""
-    asked = f"# twinrig run SCENE --engine {setting.engine}"
+    command_line = f"# twinrig run SCENE --engine {setting.engine}"
     return (
-        [asked, f"# with the {setting.label()} in the class itself"]
+        [command_line, f"# with the {setting.label()} in the class itself"]
         if setting.adaptive
-        else ["[run]", f"step = {setting.value!r}", asked]
+        else ["[run]", f"step = {setting.value!r}", command_line]
     )
 
 
@@ -182,8 +182,8 @@ def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -
     assembly = assembly_of_scene(_without_sensors(scene))
     channels = tuple(name.strip() for name in (quantity or USUAL_QUANTITY[assembly.mode]).split(","))
     base, first = _base_step_and_duration(assembly)
-    asked = PricedPitchPlane(assembly, engines, channels, "", base, first)
-    return replace(asked, unit=_unit(asked))
+    priced = PricedPitchPlane(assembly, engines, channels, "", base, first)
+    return replace(priced, unit=_unit(priced))
 
 
 def _without_sensors(scene: Scene) -> Scene:
@@ -201,8 +201,8 @@ def _base_step_and_duration(assembly: Assembly) -> tuple[float, float]:
     if period is None:
         first = length / math.ceil(length / SEARCHED_DURATION * (1 - 1e-9))
         return first, first
-    whole = divides(period, length)
-    base = period if whole else step * math.gcd(round(length / step), round(period / step))
+    divides_evenly = divides(period, length)
+    base = period if divides_evenly else step * math.gcd(round(length / step), round(period / step))
     return base, min(length, base * math.ceil(SEARCHED_DURATION / base * (1 - 1e-9)))
 
 

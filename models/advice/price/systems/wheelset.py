@@ -62,28 +62,28 @@ class PricedWheelset(MeshedScene):
         return [*cells, "[run]", step, f"# twinrig run SCENE --engine {setting.engine}"]
 
 
-def _exact_path(equations: Equations, start: np.ndarray, step: float, duration: float) -> WheelsetPath:
+def _exact_path(equations: Equations, start_state: np.ndarray, step: float, duration: float) -> WheelsetPath:
     """A path by a Runge-Kutta method of order 8 that picks its own steps; RunFailed where it gives up."""
     times = step * np.arange(round(duration / step) + 1)
-    scale = np.maximum(np.abs(start), 1e-3)
-    done = solve_ivp(
+    scale = np.maximum(np.abs(start_state), 1e-3)
+    solved = solve_ivp(
         lambda t, y: equations.rates(y),
         (0.0, duration),
-        start,
+        start_state,
         "DOP853",
         np.minimum(times, duration),
         rtol=OTHER_TOLERANCE,
         atol=OTHER_TOLERANCE * 1e-1 * scale,
     )
-    if not done.success:
-        raise RunFailed("reference", done.message)
-    states = np.ascontiguousarray(done.y.T)
+    if not solved.success:
+        raise RunFailed("reference", solved.message)
+    states = np.ascontiguousarray(solved.y.T)
     return WheelsetPath(times, states, contacts=equations.at(states)[1])
 
 
 def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) -> PricedWheelset:
     """The wheelset scene with a quantity to price: a state or a contact force, along its paths at all speeds."""
-    asked, wheelset, contact = (
+    quantity_name, wheelset, contact = (
         checked_quantity(quantity or USUAL_QUANTITY, QUANTITIES),
         wheelset_of(scene),
         scene.contact,
@@ -96,8 +96,8 @@ def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str,
     note = f"all paths together, at {' and '.join(f'{speed:g}' for speed in speeds)} m/s"
     return PricedWheelset(
         scene.title,
-        asked,
-        QUANTITIES[asked][1],
+        quantity_name,
+        QUANTITIES[quantity_name][1],
         note,
         run.duration,
         first_part(run.duration, SEARCHED_DURATION),

@@ -5,20 +5,22 @@ from typing import Any
 from models.core.scene_effects import Entry, Table
 
 
-def _of_control(key: str, neutral: float, usual: float, says: str, **more: Any) -> Entry:
+def _of_control(key: str, neutral: float, usual_value: float, description: str, **entry_fields: Any) -> Entry:
     """An effect of the control: it is present where this key of [control] has a value other than ``neutral``."""
 
-    def there(scene: Any) -> bool:
+    def is_present(scene: Any) -> bool:
         return bool(getattr(scene.control, key) != neutral)
 
     def leave_out(table: Table, scene: Any) -> None:
         table["control"].pop(key, None)
 
     def put_in(table: Table, scene: Any) -> None:
-        table.setdefault("control", {})[key] = usual
+        table.setdefault("control", {})[key] = usual_value
 
     cost = "a product per call"
-    return Entry(says, f"control.{key}", cost, there=there, leave_out=leave_out, put_in=put_in, **more)
+    return Entry(
+        description, f"control.{key}", cost, there=is_present, leave_out=leave_out, put_in=put_in, **entry_fields
+    )
 
 
 NEEDS_OF_SENSING = {"needs": ("feedback",), "why": "whose command or sensor it changes"}

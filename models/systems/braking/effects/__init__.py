@@ -19,34 +19,42 @@ def _differs_from_default(table: Any, keys: tuple[str, ...]) -> bool:
     return any(getattr(table, key) != type(table).model_fields[key].default for key in keys)
 
 
-def _of_sensor(kind: str, keys: tuple[str, ...], says: str, cost: str, count: str, usual: dict[str, float]) -> Entry:
+def _of_sensor(
+    signal_kind: str, keys: tuple[str, ...], description: str, cost: str, count_name: str, usual_value: dict[str, float]
+) -> Entry:
     """An effect of the sensors at a port: present where keys of [port.signals] or [port.pressures] differ from those of
     a perfect sensor.
     """
 
-    def there(scene: Any) -> bool:
-        return scene.port is not None and _differs_from_default(getattr(scene.port, kind), keys)
+    def is_present(scene: Any) -> bool:
+        return scene.port is not None and _differs_from_default(getattr(scene.port, signal_kind), keys)
 
     def leave_out(table: Table, scene: Any) -> None:
         for key in (*keys, *(("seed",) if keys == NOISE_KEYS else ())):
-            table["port"][kind].pop(key, None)
+            table["port"][signal_kind].pop(key, None)
 
     def put_in(table: Table, scene: Any) -> None:
-        table.setdefault("port", {}).setdefault(kind, {}).update(usual)
+        table.setdefault("port", {}).setdefault(signal_kind, {}).update(usual_value)
 
-    counts = {"asked": 1, count: 4}
-    place = f"port.{kind}.{keys[0]}"
-    return Entry(says, place, cost, counts, ("port",), there=there, leave_out=leave_out, put_in=put_in)
+    counts = {"asked": 1, count_name: 4}
+    key_path = f"port.{signal_kind}.{keys[0]}"
+    return Entry(description, key_path, cost, counts, ("port",), there=is_present, leave_out=leave_out, put_in=put_in)
 
 
 def _of_brakes(
-    keys: tuple[str, ...], freed: tuple[str, ...], says: str, place: str, cost: str, count: str, usual: Any
+    keys: tuple[str, ...],
+    freed: tuple[str, ...],
+    description: str,
+    key_path: str,
+    cost: str,
+    count_name: str,
+    usual_value: Any,
 ) -> Entry:
     """An effect that the brakes' keys ``keys`` switch on. Leaving it out removes the keys ``freed``; putting it in
     updates the table of the front and of the rear brake by ``usual(axle, brake)``.
     """
 
-    def there(scene: Any) -> bool:
+    def is_present(scene: Any) -> bool:
         return any(_differs_from_default(getattr(scene.brakes, axle), keys) for axle in AXLE_KEYS)
 
     def leave_out(table: Table, scene: Any) -> None:
@@ -58,9 +66,9 @@ def _of_brakes(
         for axle in AXLE_KEYS[:2]:
             plain = getattr(scene.brakes, axle).model_dump(exclude_none=True)
             brake = table.setdefault("brakes", {}).setdefault(axle, plain)
-            brake.update(usual(axle, brake))
+            brake.update(usual_value(axle, brake))
 
-    return Entry(says, place, cost, {count: 4}, there=there, leave_out=leave_out, put_in=put_in)
+    return Entry(description, key_path, cost, {count_name: 4}, there=is_present, leave_out=leave_out, put_in=put_in)
 
 
 def _without_reservoir(table: Table, scene: Any) -> None:
@@ -107,9 +115,9 @@ def _on_one_surface(table: Table, scene: Any) -> None:
 
 def _on_another_surface(table: Table, scene: Any) -> None:
     """Append a stretch that begins 10 m after the last one does: ice if the last one is dry, else dry."""
-    last = scene.road.stretches[-1]
+    last_stretch = scene.road.stretches[-1]
     stretches = table.setdefault("road", {}).setdefault("stretches", [{"left": "ice"}])
-    stretches.append({"x": last.x + 10.0, "left": "ice" if last.left == "dry" else "dry"})
+    stretches.append({"x": last_stretch.x + 10.0, "left": "ice" if last_stretch.left == "dry" else "dry"})
 
 
 def _in_the_plane(table: Table, scene: Any) -> None:
@@ -130,8 +138,8 @@ def _tows_bodies(scene: Any) -> bool:
     """Whether the vehicle of the scene's file tows bodies."""
     from models.systems.braking.of_scene import spatial_vehicle_of
 
-    given = spatial_vehicle_of(scene)
-    return given is not None and bool(given.towed)
+    spatial_vehicle = spatial_vehicle_of(scene)
+    return spatial_vehicle is not None and bool(spatial_vehicle.towed)
 
 
 MEASURED_PRESSURES_KEY, SUSPENSION_KEY = ("measured_pressures",), ("suspension",)

@@ -11,7 +11,9 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _of_theory(says: str, theory: str, cost: str, count: str, instead: Callable[[Any], dict[str, str]]) -> Entry:
+def _of_theory(
+    description: str, theory: str, cost: str, count_name: str, instead: Callable[[Any], dict[str, str]]
+) -> Entry:
     """An effect that names a theory beyond FASTSIM. ``instead`` gives the [method] of the scene without this theory,
     cells excepted.
     """
@@ -21,10 +23,10 @@ def _of_theory(says: str, theory: str, cost: str, count: str, instead: Callable[
         table["method"] = cells | instead(scene)
 
     return Entry(
-        says,
+        description,
         "method.name",
         cost,
-        {count: 1},
+        {count_name: 1},
         **BOUND_BY_CONSTANT_FRICTION,
         there=lambda scene: scene.method.name == theory,
         leave_out=leave_out,

@@ -10,10 +10,10 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _of_manoeuvres(key: str, says: str, cost: str, counts: dict[str, int], usual: Any) -> Entry:
+def _of_manoeuvres(key: str, description: str, cost: str, work_counts: dict[str, int], usual_value: Any) -> Entry:
     """An effect that a key of the manoeuvres switches on; it is left out of all manoeuvres, or put into all."""
 
-    def there(scene: Any) -> bool:
+    def is_present(scene: Any) -> bool:
         values = [getattr(manoeuvre, key) for manoeuvre in scene.manoeuvres.values()]
         acts = any(value if isinstance(value, bool) else any(size for _, size in value) for value in values)
         return acts or (key in MEASURED_CONTROLS and _is_measured_drive(scene))
@@ -26,10 +26,10 @@ def _of_manoeuvres(key: str, says: str, cost: str, counts: dict[str, int], usual
 
     def put_in(table: dict[str, Any], scene: Any) -> None:
         for manoeuvre in table["manoeuvres"].values():
-            manoeuvre[key] = usual
+            manoeuvre[key] = usual_value
 
-    place = f"manoeuvres.NAME.{key}"
-    return Entry(says, place, cost, counts, there=there, leave_out=leave_out, put_in=put_in)
+    key_path = f"manoeuvres.NAME.{key}"
+    return Entry(description, key_path, cost, work_counts, there=is_present, leave_out=leave_out, put_in=put_in)
 
 
 CAR_ALONE, CAR_WITH_CARAVAN = "r19_free", "r19_caravan"

@@ -7,20 +7,26 @@ from models.core.scene_effects import Entry, Table
 
 
 def _selected_effect(
-    says: str, place: str, cost: str, counts: dict[str, int], usual: str, instead: str | None, **more: Any
+    description: str,
+    key_path: str,
+    cost: str,
+    work_counts: dict[str, int],
+    usual_value: str,
+    instead: str | None,
+    **entry_fields: Any,
 ) -> Entry:
-    """An effect that a word of the scene selects: ``usual`` with the effect, ``instead`` without it, None for the
+    """An effect that a word of the scene selects: ``usual_value`` with the effect, ``instead`` without it, None for the
     default.
 
     An effect that needs the virtual measurement is absent where the scene has files. Stated deviations of noise stay
     without the effect: the filter gets the same ones as before.
     """
-    name, key = place.split(".")
+    name, key = key_path.split(".")
 
-    def there(scene: Any) -> bool:
+    def is_present(scene: Any) -> bool:
         word = getattr(getattr(scene, name), key)
-        named = word == usual if key != "frame" else word != instead
-        return named and not (more.get("needs") and scene.road is None)
+        named = word == usual_value if key != "frame" else word != instead
+        return named and not (entry_fields.get("needs") and scene.road is None)
 
     def leave_out(table: Table, scene: Any) -> None:
         if instead is None:
@@ -29,9 +35,11 @@ def _selected_effect(
             table.setdefault(name, {})[key] = instead
 
     def put_in(table: Table, scene: Any) -> None:
-        table.setdefault(name, {})[key] = usual
+        table.setdefault(name, {})[key] = usual_value
 
-    return Entry(says, place, cost, counts, there=there, leave_out=leave_out, put_in=put_in, **more)
+    return Entry(
+        description, key_path, cost, work_counts, there=is_present, leave_out=leave_out, put_in=put_in, **entry_fields
+    )
 
 
 def _keep_road(table: Table, scene: Any) -> None:

@@ -61,15 +61,16 @@ class Parameters(Strict):
         return {name: (sensor.x, sensor.y, sensor.z) for name, sensor in self.sensors.items()}
 
 
-def channels_of_sensors(p: Parameters) -> list[tuple[str, ...]]:
+def channels_of_sensors(parameters: Parameters) -> list[tuple[str, ...]]:
     """Channels of each sensor in the scene's order: ax1, ay1, az1, then those of the next one."""
-    return [tuple(f"a{axis}{i + 1}" for axis in "xyz") for i in range(len(p.sensors))]
+    return [tuple(f"a{axis}{i + 1}" for axis in "xyz") for i in range(len(parameters.sensors))]
 
 
-def readings_of(result: Result, p: Parameters) -> np.ndarray:
+def readings_of(result: Result, parameters: Parameters) -> np.ndarray:
     """Readings (n, sensors, 3) in m/s^2 of the accelerometers, from a run's result."""
     return np.stack(
-        [np.column_stack([result[channel] for channel in channels]) for channels in channels_of_sensors(p)], axis=1
+        [np.column_stack([result[channel] for channel in channels]) for channels in channels_of_sensors(parameters)],
+        axis=1,
     )
 
 
@@ -95,15 +96,19 @@ class Accelerometers:
         from models.sensors.sensor_array import on_bracket, sensor_readings
 
         p, y = self.parameters, run.states[rows]
-        moved = np.array([model.acceleration(run.times[row], run.positions[row], run.rates[row]) for row in rows])
-        places = np.array(list(p.positions().values()))
-        values = sensor_readings(places, y[:, 3], y[:, 7], moved[:, 2], moved[:, 3], assembly.parameters.g)
+        accelerations = np.array(
+            [model.acceleration(run.times[row], run.positions[row], run.rates[row]) for row in rows]
+        )
+        sensor_positions = np.array(list(p.positions().values()))
+        values = sensor_readings(
+            sensor_positions, y[:, 3], y[:, 7], accelerations[:, 2], accelerations[:, 3], assembly.parameters.g
+        )
         for i, sensor in enumerate(p.sensors.values()):
             if sensor.bracket is not None:
                 values[:, i] = on_bracket(
                     values[:, i], 1 / p.sampling_rate, sensor.bracket.frequency, sensor.bracket.damping
                 )
-        noise = normal_samples(p.seed, p.path, len(values), 3 * len(places), source=ACCELEROMETERS)
+        noise = normal_samples(p.seed, p.path, len(values), 3 * len(sensor_positions), source=ACCELEROMETERS)
         return values + p.deviation * noise.reshape(values.shape)
 
 
@@ -115,5 +120,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
         for sensor, channels in zip(p.sensors, channels_of_sensors(p), strict=True)
         for axis, channel in zip("xyz", channels, strict=True)
     }
-    kept = within_range("accelerometers", axes, "m/s^2", p.range or USUAL_RANGE)
-    return replace(assembly, sensors=(*assembly.sensors, Accelerometers(p)), assumptions=(*assembly.assumptions, kept))
+    range_assumption = within_range("accelerometers", axes, "m/s^2", p.range or USUAL_RANGE)
+    return replace(
+        assembly, sensors=(*assembly.sensors, Accelerometers(p)), assumptions=(*assembly.assumptions, range_assumption)
+    )

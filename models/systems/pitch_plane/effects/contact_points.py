@@ -60,40 +60,44 @@ def contact_points(assembly: Assembly, times: np.ndarray, states: np.ndarray) ->
     }
 
 
-def compression(pieces: np.ndarray, period: float, stiffness: float, damping: float, times: np.ndarray) -> np.ndarray:
+def compression(
+    force_pieces: np.ndarray, force_period: float, stiffness: float, damping: float, times: np.ndarray
+) -> np.ndarray:
     """Tyre compression e (n,) in m that solves d e' + k e = f at times (n,) in s, exact where the force f is a
     polynomial between samples.
 
-    pieces : (powers, periods), the force (N) in the time since each sample, lowest power first.
+    force_pieces : (powers, periods), the force (N) in the time since each sample, lowest power first.
     On each piece e = P(t) + (e_0 - P(0)) exp(-t / tau) with tau = d / k and the particular solution
     P = (f - tau f' + tau^2 f'' - ...) / k, which ends because f is a polynomial.
     """
     tau = damping / stiffness
-    particular = _particular_solution(pieces, tau) / stiffness
-    piece = np.clip(np.floor(times / period + 1e-9).astype(int), 0, pieces.shape[1] - 1)
-    since = np.maximum(times - piece * period, 0.0)
+    particular = _particular_solution(force_pieces, tau) / stiffness
+    piece = np.clip(np.floor(times / force_period + 1e-9).astype(int), 0, force_pieces.shape[1] - 1)
+    since = np.maximum(times - piece * force_period, 0.0)
     steady_part = sum(particular[power, piece] * since**power for power in range(len(particular)))
     if tau == 0.0:
         return np.asarray(steady_part)
-    starts = _start_compressions(particular, pieces[0, 0] / stiffness, period, tau)
+    starts = _start_compressions(particular, force_pieces[0, 0] / stiffness, force_period, tau)
     return steady_part + (starts - particular[0])[piece] * np.exp(-since / tau)
 
 
-def _particular_solution(pieces: np.ndarray, tau: float) -> np.ndarray:
-    """Coefficients of f - tau f' + tau^2 f'' - ..., shape as ``pieces``."""
-    total, derivative = np.zeros_like(pieces), pieces.copy()
-    for order in range(len(pieces)):
+def _particular_solution(force_pieces: np.ndarray, tau: float) -> np.ndarray:
+    """Coefficients of f - tau f' + tau^2 f'' - ..., shape as ``force_pieces``."""
+    total, derivative = np.zeros_like(force_pieces), force_pieces.copy()
+    for order in range(len(force_pieces)):
         total += (-tau) ** order * derivative
-        derivative = np.vstack([derivative[1:] * np.arange(1, len(pieces))[:, None], np.zeros_like(pieces[:1])])
+        derivative = np.vstack(
+            [derivative[1:] * np.arange(1, len(force_pieces))[:, None], np.zeros_like(force_pieces[:1])]
+        )
     return total
 
 
-def _start_compressions(particular: np.ndarray, first: float, period: float, tau: float) -> np.ndarray:
+def _start_compressions(particular: np.ndarray, first: float, sample_period: float, tau: float) -> np.ndarray:
     """Compression (m) at the start of each piece, equal to that at the end of the piece before."""
-    powers = period ** np.arange(len(particular))
-    gained = powers @ particular - particular[0] * math.exp(-period / tau)
+    powers = sample_period ** np.arange(len(particular))
+    gained = powers @ particular - particular[0] * math.exp(-sample_period / tau)
     starts = np.empty(particular.shape[1])
     starts[0] = first
     for i in range(len(starts) - 1):
-        starts[i + 1] = gained[i] + starts[i] * math.exp(-period / tau)
+        starts[i + 1] = gained[i] + starts[i] * math.exp(-sample_period / tau)
     return starts

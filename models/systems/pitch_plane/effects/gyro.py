@@ -51,5 +51,7 @@ class Gyro:
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with a gyro's reading among its results."""
     check_rate(assembly.scene, PLACE, p.sampling_rate)
-    kept = within_range("gyro", {"gyro": "gyro"}, "rad/s", p.range or USUAL_RANGE)
-    return replace(assembly, outputs=(*assembly.outputs, Gyro(p)), assumptions=(*assembly.assumptions, kept))
+    range_assumption = within_range("gyro", {"gyro": "gyro"}, "rad/s", p.range or USUAL_RANGE)
+    return replace(
+        assembly, outputs=(*assembly.outputs, Gyro(p)), assumptions=(*assembly.assumptions, range_assumption)
+    )

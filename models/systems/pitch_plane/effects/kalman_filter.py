@@ -136,25 +136,25 @@ _LATEST_GUIDE: dict[bytes, GuidingEstimate] = {}
 """The last guide, by all that it depends on: a check and a run per engine need it once."""
 
 
-def guide_of(assembly: Assembly, p: Parameters) -> GuidingEstimate:
+def guide_of(assembly: Assembly, parameters: Parameters) -> GuidingEstimate:
     """The estimated pitch that a force-excited assembly follows; InputError for an unusable file, RunFailed from the
     filter.
     """
     from models.systems.pitch_plane.pitch_filter import estimate
 
-    measured, forces, p_vehicle = _measurement(assembly, p), assembly.input, assembly.parameters
+    measured, forces, p_vehicle = _measurement(assembly, parameters), assembly.input, assembly.parameters
     assert isinstance(forces, Sampled | Smooth)
     signal = type(forces).__name__, forces.values, forces.period, forces.held
     kind = assembly.mode, assembly.vehicle.geometry, assembly.scene.run.duration
-    key = pickle.dumps((kind, p_vehicle.array(), assembly.initial, signal, measured, p))
+    key = pickle.dumps((kind, p_vehicle.array(), assembly.initial, signal, measured, parameters))
     if key not in _LATEST_GUIDE:
         estimated = estimate(
             assembly,
             measured,
-            p.force_deviation,
-            start_deviation=p.start_deviation,
-            inertia_deviation=p.inertia_deviation,
-            smoother=p.smoother,
+            parameters.force_deviation,
+            start_deviation=parameters.start_deviation,
+            inertia_deviation=parameters.inertia_deviation,
+            smoother=parameters.smoother,
         )
         _LATEST_GUIDE.clear()
         _LATEST_GUIDE[key] = _guiding_estimate(assembly, estimated, measured)
@@ -185,73 +185,79 @@ def _guiding_estimate(assembly: Assembly, estimated: "PitchEstimate", measuremen
     )
 
 
-def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
+def _measurement(assembly: Assembly, parameters: Parameters) -> "Measurement":
     """The measured columns of the file with their standard deviations; InputError for what the filter cannot use."""
     from models.core.time_series import read_time_series
     from models.systems.pitch_plane.pitch_filter import PITCH, PITCH_RATE, Measurement
 
-    scene, place = assembly.scene, "effects.kalman_filter"
+    scene, key_path = assembly.scene, "effects.kalman_filter"
     known = (
-        ("pitch", RADIANS, PITCH, p.pitch_deviation),
-        ("pitch_rate", RADIANS_PER_SECOND, PITCH_RATE, p.rate_deviation),
+        ("pitch", RADIANS, PITCH, parameters.pitch_deviation),
+        ("pitch_rate", RADIANS_PER_SECOND, PITCH_RATE, parameters.rate_deviation),
     )
-    given = {name: (units, state, deviation) for name, units, state, deviation in known if deviation is not None}
-    if not given:
-        raise InputError(scene.file, place, None, "needs pitch_deviation, rate_deviation or both: the columns to read")
-    path = scene.path(p.file, f"{place}.file")
-    values, period = read_time_series(path, {name: fields[0] for name, fields in given.items()}, gaps=True)
-    for name, column in zip(given, values.T, strict=True):
+    read_columns = {name: (units, state, deviation) for name, units, state, deviation in known if deviation is not None}
+    if not read_columns:
+        raise InputError(
+            scene.file, key_path, None, "needs pitch_deviation, rate_deviation or both: the columns to read"
+        )
+    path = scene.path(parameters.file, f"{key_path}.file")
+    values, period = read_time_series(path, {name: fields[0] for name, fields in read_columns.items()}, gaps=True)
+    for name, column in zip(read_columns, values.T, strict=True):
         if not np.isfinite(column).any():
             raise InputError(path, f"column {name!r}", None, "holds no number at all: leave its deviation out")
-    check_end(scene, f"{place}.file", p.file, len(values) * period)
+    check_end(scene, f"{key_path}.file", parameters.file, len(values) * period)
     assert assembly.input is not None and assembly.input.period is not None
     if not divides(*sorted((period, assembly.input.period))):
         raise InputError(
             scene.file,
-            f"{place}.file",
-            p.file,
+            f"{key_path}.file",
+            parameters.file,
             f"is sampled every {period:g} s and the forces every {assembly.input.period:g} s: one must be "
             "a multiple of the other",
         )
     return Measurement(
-        values, period, tuple(fields[1] for fields in given.values()), tuple(fields[2] for fields in given.values())
+        values,
+        period,
+        tuple(fields[1] for fields in read_columns.values()),
+        tuple(fields[2] for fields in read_columns.values()),
     )
 
 
-def _check_surprise(assembly: Assembly, p: Parameters, guide: GuidingEstimate) -> None:
+def _check_surprise(assembly: Assembly, parameters: Parameters, guiding_estimate: GuidingEstimate) -> None:
     """Refuse a filter whose measurement contradicts its forces or its model: it would draw the vehicle anywhere."""
-    mean = float(guide.innovation_sum[-1] / max(guide.used_values[-1], 1))
+    mean = float(guiding_estimate.innovation_sum[-1] / max(guiding_estimate.used_values[-1], 1))
     if mean > INNOVATION_LIMIT:
         raise InputError(
             assembly.scene.file,
             "effects.kalman_filter",
             None,
-            f"{p.file} contradicts forces and model: the squares of the innovations are {mean:.3g} times "
+            f"{parameters.file} contradicts forces and model: the squares of the innovations are {mean:.3g} times "
             f"what the deviations allow (at most {INNOVATION_LIMIT:g}): check sign and unit, or state larger ones",
         )
 
 
-def _filter_objections(p: Parameters, guide: GuidingEstimate) -> tuple[str, ...]:
+def _filter_objections(parameters: Parameters, guiding_estimate: GuidingEstimate) -> tuple[str, ...]:
     """Objections to the filter that follow from its own innovations."""
-    if guide.consistency.consistent:
+    if guiding_estimate.consistency.consistent:
         return ()
-    square = guide.consistency.statistics[0]
-    known = f"the stated deviation of the pitch, up to {guide.deviations[:, 0].max():.2g} rad, is not to be relied upon"
+    square = guiding_estimate.consistency.statistics[0]
+    largest = guiding_estimate.deviations[:, 0].max()
+    known = f"the stated deviation of the pitch, up to {largest:.2g} rad, is not to be relied upon"
     remedy = (
         "the stated deviations are too large: state smaller ones"
         if square.value < square.low
-        else f"check {p.file} for a bias, a delay and its unit, the inertia, and the stated deviations"
+        else f"check {parameters.file} for a bias, a delay and its unit, the inertia, and the stated deviations"
     )
-    return (f"the filter contradicts {p.file}: {guide.consistency}; {known}; {remedy}",)
+    return (f"the filter contradicts {parameters.file}: {guiding_estimate.consistency}; {known}; {remedy}",)
 
 
-def _innovation_assumption(guide: GuidingEstimate) -> Assumption:
+def _innovation_assumption(guiding_estimate: GuidingEstimate) -> Assumption:
     """Assumption that the innovations' statistics are those of a correctly tuned filter."""
     return Assumption(
         "innovations",
         "the filter's innovations are as its model and deviations make them",
         "correct the measured pitch (bias, delay, unit) or the inertia, or state deviations that are true",
-        partial(_places_in_intervals, guide.consistency),
+        partial(_places_in_intervals, guiding_estimate.consistency),
         "half widths of a right filter's band",
         -1.0,
         1.0,
@@ -263,33 +269,43 @@ def _places_in_intervals(consistency: Consistency, run: Result) -> Watched:
     return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.statistics}
 
 
-def _check_bandwidth(assembly: Assembly, p: Parameters, guide: GuidingEstimate) -> None:
+def _check_bandwidth(assembly: Assembly, parameters: Parameters, guiding_estimate: GuidingEstimate) -> None:
     """Refuse a bandwidth at which the moment reacts more slowly than the pitch diverges. Only vertical forces make it
     diverge.
     """
     if assembly.mode != "force" or assembly.vehicle.geometry != "exact":
         return
     share = math.sqrt(assembly.parameters.I / rigid_pitch(assembly.parameters).total_inertia)
-    growth = share * float(np.sqrt(np.mean(guide.values[:, 1] ** 2)))
-    if 2 * math.pi * p.bandwidth <= growth:
+    growth = share * float(np.sqrt(np.mean(guiding_estimate.values[:, 1] ** 2)))
+    if 2 * math.pi * parameters.bandwidth <= growth:
         raise InputError(
             assembly.scene.file,
             "effects.kalman_filter.bandwidth",
-            p.bandwidth,
+            parameters.bandwidth,
             f"must be above {growth / (2 * math.pi):.3g} Hz: a pitch error grows at {growth:.3g} 1/s here",
         )
 
 
 def _guiding_channels(
-    guide: GuidingEstimate, stiffness: float, damping: float, assembly: Assembly, times: np.ndarray, states: np.ndarray
+    guiding_estimate: GuidingEstimate,
+    stiffness: float,
+    damping: float,
+    assembly: Assembly,
+    times: np.ndarray,
+    states: np.ndarray,
 ) -> Channels:
     """Channels of the guiding moment and of the estimate that it follows, at the saved times."""
-    grid = guide.period * np.arange(len(guide.values))
+    grid = guiding_estimate.period * np.arange(len(guiding_estimate.values))
     pitch, rate, pitch_deviation, rate_deviation, inertia, lacking = (
         np.interp(times, grid, column)
-        for column in (*guide.values.T, *guide.deviations.T, guide.inertia, guide.inertia_moment)
+        for column in (
+            *guiding_estimate.values.T,
+            *guiding_estimate.deviations.T,
+            guiding_estimate.inertia,
+            guiding_estimate.inertia_moment,
+        )
     )
-    latest = np.clip(np.floor(times / guide.period + 1e-6).astype(int), 0, len(grid) - 1)
+    latest = np.clip(np.floor(times / guiding_estimate.period + 1e-6).astype(int), 0, len(grid) - 1)
     moment = stiffness * (pitch - states[:, 3]) + damping * (rate - states[:, 7])
     return {
         "kalman_moment": ("N m", "artificial moment towards the estimated pitch, nose up", moment),
@@ -299,7 +315,15 @@ def _guiding_channels(
         "pitch_deviation": ("rad", "standard deviation of the estimated pitch", pitch_deviation),
         "pitch_rate_deviation": ("rad/s", "standard deviation of its estimated rate", rate_deviation),
         "inertia_share": ("", "share by which 1/I of the chassis is estimated to exceed the scene's", inertia),
-        "kalman_used": ("", "measured values that the filter has taken in so far", guide.used_values[latest]),
-        "kalman_missed": ("", "measured values so far that were no numbers", guide.missed_values[latest]),
-        "kalman_surprise": ("", "sum of the normalised innovations squared so far", guide.innovation_sum[latest]),
+        "kalman_used": (
+            "",
+            "measured values that the filter has taken in so far",
+            guiding_estimate.used_values[latest],
+        ),
+        "kalman_missed": ("", "measured values so far that were no numbers", guiding_estimate.missed_values[latest]),
+        "kalman_surprise": (
+            "",
+            "sum of the normalised innovations squared so far",
+            guiding_estimate.innovation_sum[latest],
+        ),
     }

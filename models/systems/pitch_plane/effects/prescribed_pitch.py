@@ -45,10 +45,10 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 
 def prescribe(
-    assembly: Assembly, effect: str, p: Any, mode: Mode, columns: Mapping[str, Mapping[str, float]]
+    assembly: Assembly, effect: str, p: Any, drive_mode: Mode, columns: Mapping[str, Mapping[str, float]]
 ) -> Assembly:
-    """The force-excited vehicle with the coordinates of ``mode`` prescribed by a quintic spline through the samples of
-    a file.
+    """The force-excited vehicle with the coordinates of ``drive_mode`` prescribed by a quintic spline through the
+    samples of a file.
 
     ``p`` holds the effect's ``file`` and ``bandwidth`` (Hz or None); ``columns`` names the file's columns, with the
     factors of their units, in the order of the mode's coordinates. Raises InputError.
@@ -63,8 +63,8 @@ def prescribe(
     motion = Smooth(values, period, derivatives=2, degree=5)
     check_end(scene, f"effects.{effect}.file", p.file, motion.end)
     assert assembly.input is not None
-    guided = assembly.with_input(mode, Stacked((assembly.input, motion)))
-    guided.initial[[*GUIDED[mode], *(4 + i for i in GUIDED[mode])]] = motion.at(0.0)[: 2 * len(columns)]
+    guided = assembly.with_input(drive_mode, Stacked((assembly.input, motion)))
+    guided.initial[[*GUIDED[drive_mode], *(4 + i for i in GUIDED[drive_mode])]] = motion.at(0.0)[: 2 * len(columns)]
     doubt = sparse_record_warning(len(values), period, scene.run.duration, CHASSIS_SAMPLE_TIME)
     return replace(guided, doubts=(*guided.doubts, doubt)) if doubt else guided
 

@@ -77,69 +77,79 @@ def _slopes_under_wheels(speed: float, run: Result) -> Watched:
     return {name: np.arctan(slope) for name, slope in slopes.items()}
 
 
-def _check_keys(file: str, p: Parameters) -> None:
-    keys = {name: value for name, value in p if name not in ("source", "speed") and value is not None}
+def _check_keys(file: str, parameters: Parameters) -> None:
+    keys = {name: value for name, value in parameters if name not in ("source", "speed") and value is not None}
     for name, value in keys.items():
-        if name not in KEYS_OF_SOURCE[p.source]:
-            taken = ", ".join(("speed", *KEYS_OF_SOURCE[p.source]))
-            allowed = f"has no meaning for source = {p.source!r}, which takes {taken}"
+        if name not in KEYS_OF_SOURCE[parameters.source]:
+            accepted_keys = ", ".join(("speed", *KEYS_OF_SOURCE[parameters.source]))
+            allowed = f"has no meaning for source = {parameters.source!r}, which takes {accepted_keys}"
             raise InputError(file, f"effects.road.{name}", value, allowed)
-    for name in NEEDED.get(p.source, ()):
+    for name in NEEDED.get(parameters.source, ()):
         if name not in keys:
-            meaning = str(type(p).model_fields[name].description).partition(": ")[2]
-            allowed = f"is missing: source = {p.source!r} needs it ({meaning})"
+            meaning = str(type(parameters).model_fields[name].description).partition(": ")[2]
+            allowed = f"is missing: source = {parameters.source!r} needs it ({meaning})"
             raise InputError(file, f"effects.road.{name}", None, allowed)
 
 
-def _road_profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
+def _road_profile(scene: Any, parameters: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
     """The road profile, and the stations (m) at which it is only twice continuously differentiable."""
-    if p.source in ("opencrg", "csv"):
-        profile = _measured_road(scene, p, distance)
+    if parameters.source in ("opencrg", "csv"):
+        profile = _measured_road(scene, parameters, distance)
         return profile, (profile.start, profile.start + profile.window_length)
-    if p.source == "iso8608":
+    if parameters.source == "iso8608":
         from models.road.iso8608 import iso8608_road
 
-        assert p.road_class is not None
-        profile = iso8608_road(p.road_class, 0 if p.seed is None else p.seed, level=p.level or "one-sided")
+        assert parameters.road_class is not None
+        profile = iso8608_road(
+            parameters.road_class,
+            0 if parameters.seed is None else parameters.seed,
+            level_convention=parameters.level or "one-sided",
+        )
     else:
         from models.road.study import STUDY_GD, hills_road, study_road
 
-        profile = hills_road() if p.source == "hills" else study_road(STUDY_GD if p.gd is None else p.gd)
+        profile = (
+            hills_road()
+            if parameters.source == "hills"
+            else study_road(STUDY_GD if parameters.gd is None else parameters.gd)
+        )
     faded_in = profile.window_length
-    if p.grade is None:
+    if parameters.grade is None:
         return profile, (0.0, faded_in)
     from models.road.grade import TRANSITION_LENGTH, Graded
 
-    return Graded(profile, p.grade, faded_in), (0.0, faded_in, faded_in + TRANSITION_LENGTH)
+    return Graded(profile, parameters.grade, faded_in), (0.0, faded_in, faded_in + TRANSITION_LENGTH)
 
 
-def _measured_road(scene: Any, p: Parameters, distance: float) -> Any:
+def _measured_road(scene: Any, parameters: Parameters, distance: float) -> Any:
     from models.road.continuation import RUN_IN, continued_road, run_in
 
-    path, track = scene.path(p.file, "effects.road.file"), p.track or "mean"
-    length = RUN_IN if p.run_in is None else p.run_in
-    if p.source == "opencrg":
+    path, track = scene.path(parameters.file, "effects.road.file"), parameters.track or "mean"
+    length = RUN_IN if parameters.run_in is None else parameters.run_in
+    if parameters.source == "opencrg":
         from models.road.opencrg import read_opencrg
 
-        raw = read_opencrg(path, track, offset=0.0 if p.offset is None else p.offset)
+        raw = read_opencrg(path, track, lateral_offset=0.0 if parameters.offset is None else parameters.offset)
     else:
         from models.road.csv_road import read_csv_road
 
         raw = read_csv_road(path, track)
-    _check_length(scene, p, raw, distance, length)
-    longer = continued_road(raw, str(p.beyond_end), distance, path)
+    _check_length(scene, parameters, raw, distance, length)
+    longer = continued_road(raw, str(parameters.beyond_end), distance, path)
     assert isinstance(longer, type(raw))
     return run_in(longer, length)
 
 
-def _check_length(scene: Any, p: Parameters, raw: Any, distance: float, run_in: float) -> None:
+def _check_length(scene: Any, parameters: Parameters, raw: Any, distance: float, run_in: float) -> None:
     """Refuse a road file that is too short for the run-in or the run; the message names the scene's keys."""
     total = raw.end - raw.start
     if run_in > total:
-        raise InputError(scene.file, "effects.road.run_in", run_in, f"the road {p.file} is only {total:g} m long")
-    if p.beyond_end == "refused" and distance > total * (1 + 1e-9):
+        raise InputError(
+            scene.file, "effects.road.run_in", run_in, f"the road {parameters.file} is only {total:g} m long"
+        )
+    if parameters.beyond_end == "refused" and distance > total * (1 + 1e-9):
         allowed = (
-            f"the road {p.file} ends at {total:g} m and the run needs {distance:g} m: shorten "
+            f"the road {parameters.file} ends at {total:g} m and the run needs {distance:g} m: shorten "
             "run.duration, lower effects.road.speed or set this to 'mirrored'"
         )
         raise InputError(scene.file, "effects.road.beyond_end", "refused", allowed)

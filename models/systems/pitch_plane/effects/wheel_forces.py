@@ -56,7 +56,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 
 def _doubts_about_forces(
-    assembly: Assembly, p: Parameters, values: np.ndarray, period: float
+    assembly: Assembly, parameters: Parameters, values: np.ndarray, sample_period: float
 ) -> tuple[tuple[str, ...], tuple[Assumption, ...]]:
     """Doubts about wheel forces (n, 2) in N that do not suit this vehicle, and assumptions that they carry its weight;
     InputError for impossible forces.
@@ -65,12 +65,13 @@ def _doubts_about_forces(
     from models.measured.signal import Signal
 
     front, rear = (
-        Signal(axle, p.file, f"{axle} [N]", "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
+        Signal(axle, parameters.file, f"{axle} [N]", "force", axle, "z", "inertial", 1, "N", 1.0)
+        for axle in ("front", "rear")
     )
     scene = assembly.scene
     axles = AxleForces(
         values,
-        period,
+        sample_period,
         assembly.parameters,
         ((front,), (rear,)),
         scene.run.duration,
@@ -78,26 +79,28 @@ def _doubts_about_forces(
         starts_at_rest=not scene.start,
         turn=assembly.mode == "force-body",
     )
-    looked = (*check(axles), *_samples((front, rear), values, period))
-    findings = tuple(each for each in looked if each.weight != "note" and each.check not in p.accept)
-    errors = [each for each in findings if each.weight == "error"]
+    looked = (*check(axles), *_samples((front, rear), values, sample_period))
+    findings = tuple(
+        finding for finding in looked if finding.weight != "note" and finding.check not in parameters.accept
+    )
+    errors = [finding for finding in findings if finding.weight == "error"]
     if errors:
-        names = ", ".join(f'"{name}"' for name in dict.fromkeys(each.check for each in errors))
+        names = ", ".join(f'"{name}"' for name in dict.fromkeys(finding.check for finding in errors))
         raise InputError(
             scene.file,
             "effects.wheel_forces.file",
-            p.file,
-            f"{' '.join(each.text for each in errors)} If it is meant so: accept = [{names}].",
+            parameters.file,
+            f"{' '.join(finding.text for finding in errors)} If it is meant so: accept = [{names}].",
         )
-    return tuple(each.text for each in findings), _balance_assumptions(axles, p)
+    return tuple(finding.text for finding in findings), _balance_assumptions(axles, parameters)
 
 
-def _balance_assumptions(axles: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
+def _balance_assumptions(axles: "AxleForces", parameters: Parameters) -> tuple[Assumption, ...]:
     """Assumptions that the mean forces carry the vehicle's weight and each axle's, as far as the record can tell."""
     from models.measured.axle_balance import equilibrium_residual
 
     means = equilibrium_residual(axles)
-    each = (
+    balance_rows = (
         ("weight", "the wheel forces carry the vehicle's weight on average", "m/s^2", "m1, m2, m3"),
         ("balance", "front and rear wheel forces balance each other on average", "rad/s^2", "a, b"),
     )
@@ -112,8 +115,8 @@ def _balance_assumptions(axles: "AxleForces", p: Parameters) -> tuple[Assumption
             -float(means.known[i]),
             float(means.known[i]),
         )
-        for i, (name, says, unit, symbols) in enumerate(each)
-        if name not in p.accept and axles.parameters.g > 0
+        for i, (name, says, unit, symbols) in enumerate(balance_rows)
+        if name not in parameters.accept and axles.parameters.g > 0
     )
 
 
@@ -121,7 +124,7 @@ def _steady_accelerations(acceleration: float, run: Result) -> Watched:
     return {"chassis": np.array([acceleration])}
 
 
-def _samples(signals: "tuple[Signal, ...]", values: np.ndarray, period: float) -> "list[Finding]":
+def _samples(signals: "tuple[Signal, ...]", values: np.ndarray, sample_period: float) -> "list[Finding]":
     """Findings on samples that no wheel can have felt: spikes, and values that the sensor's range cut off. The zeros of
     a lifted wheel are neither.
     """
@@ -131,5 +134,5 @@ def _samples(signals: "tuple[Signal, ...]", values: np.ndarray, period: float) -
     from models.measured.recording import Recording
 
     felt = MemoryColumns(tuple(s.name for s in signals), np.where(values == 0.0, np.nan, values))
-    evidence = Evidence(Recording(signals, felt, period), None)
+    evidence = Evidence(Recording(signals, felt, sample_period), None)
     return [*spikes.check(evidence), *(finding for finding in clipped.check(evidence) if finding.unit == "%")]

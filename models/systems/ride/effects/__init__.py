@@ -7,9 +7,9 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _of_vehicle(says: str, cost: str, there: Callable[[Any], bool]) -> Entry:
+def _of_vehicle(description: str, cost: str, is_present: Callable[[Any], bool]) -> Entry:
     """An effect that belongs to the vehicle file and not to a table of the scene."""
-    return Entry(says, "vehicle.file", cost, there=there, leave_out=_keep_vehicle)
+    return Entry(description, "vehicle.file", cost, there=is_present, leave_out=_keep_vehicle)
 
 
 def _keep_vehicle(table: Table, scene: Any) -> None:
@@ -21,12 +21,12 @@ def _keep_vehicle(table: Table, scene: Any) -> None:
 def _omissions_of_sort(sort: str) -> Callable[[Any], bool]:
     """Return the test whether a scene's vehicle and road have effects of this sort, which can be left out."""
 
-    def there(scene: Any) -> bool:
+    def is_present(scene: Any) -> bool:
         from models.systems.ride.omissions import has_omissions
 
         return has_omissions(scene, sort)
 
-    return there
+    return is_present
 
 
 def _vehicle(scene: Any) -> Any:
@@ -56,9 +56,11 @@ def _take_papers_road(table: Table, scene: Any) -> None:
 
 def _hold_mean_speed(table: Table, scene: Any) -> None:
     drive = table.pop("drive")
-    times, speeds = drive["time"], drive["speed"]
-    way = sum((b - a) * (v + w) / 2.0 for a, b, v, w in zip(times, times[1:], speeds, speeds[1:], strict=False))
-    table["speeds"] = {"values": [way / (times[-1] - times[0])]}
+    drive_times, speeds = drive["time"], drive["speed"]
+    driven_distance = sum(
+        (b - a) * (v + w) / 2.0 for a, b, v, w in zip(drive_times, drive_times[1:], speeds, speeds[1:], strict=False)
+    )
+    table["speeds"] = {"values": [driven_distance / (drive_times[-1] - drive_times[0])]}
 
 
 def _weight_first_output(table: Table, scene: Any) -> None:

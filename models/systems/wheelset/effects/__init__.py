@@ -10,22 +10,24 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _of_parameters(says: str, keys: tuple[str, ...], cost: str, counts: dict[str, int], **more: Any) -> Entry:
+def _of_parameters(
+    description: str, keys: tuple[str, ...], cost: str, work_counts: dict[str, int], **entry_fields: Any
+) -> Entry:
     """An effect that is present where any of these parameters of the wheelset is above zero; its usual values are those
     of the chosen wheelset.
     """
 
-    def there(scene: Any) -> bool:
+    def is_present(scene: Any) -> bool:
         from models.systems.wheelset.of_scene import wheelset_of
 
         wheelset = wheelset_of(scene)
-        excluded = "profiles" in more.get("excludes", ()) and wheelset.profiles is not None
+        excluded = "profiles" in entry_fields.get("excludes", ()) and wheelset.profiles is not None
         return not excluded and any(getattr(wheelset, key) > 0.0 for key in keys)
 
-    def overriding(value: Callable[[str], float]) -> Callable[[Table, Any], None]:
+    def overriding(value_of: Callable[[str], float]) -> Callable[[Table, Any], None]:
         def change(table: Table, scene: Any) -> None:
             override = table.setdefault("wheelset", {}).setdefault("override", {})
-            override.update({key: value(key) for key in keys})
+            override.update({key: value_of(key) for key in keys})
 
         return change
 
@@ -35,14 +37,14 @@ def _of_parameters(says: str, keys: tuple[str, ...], cost: str, counts: dict[str
         return float(getattr(CHOSEN_WHEELSET, key))
 
     return Entry(
-        says,
+        description,
         f"wheelset.override.{keys[0]}",
         cost,
-        counts,
-        there=there,
+        work_counts,
+        there=is_present,
         leave_out=overriding(lambda key: 0.0),
         put_in=overriding(usual),
-        **more,
+        **entry_fields,
     )
 
 
