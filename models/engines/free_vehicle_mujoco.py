@@ -93,7 +93,7 @@ def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
     with without_warnings():  # a hinge with a ball joint of one body has no inertia but its rotor, which comes next
         set_masses(model, places, driven.vehicle.bodies)
     set_rotors(model, rotors(driven.vehicle))
-    if driven.tied:  # how soft constraints are depends on all inertias
+    if driven.tied or driven.frictions:  # how soft constraints are depends on all inertias
         mujoco.mj_setConst(model, mujoco.MjData(model))
     set_laws(model, driven.parts)
     set_line_springs(model, driven.line_springs)

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from models.core.errors import InputError
+from models.engines.native_mujoco import SOLVER_TOLERANCE
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
 from models.own_model.equalities import is_tie, joins_bodies
 from models.own_model.names import feature_is_disabled, label
@@ -107,10 +108,10 @@ def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Coll
     model.opt.disableflags |= int(DSBL.mjDSBL_LIMIT) | int(DSBL.mjDSBL_AUTORESET) | int(DSBL.mjDSBL_SENSOR)
     model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # constraints are compared, not their solvers
     model.opt.iterations, model.opt.noslip_iterations = max(100, model.opt.iterations), 0
-    model.opt.tolerance = min(1e-8, model.opt.tolerance)
+    model.opt.tolerance = min(SOLVER_TOLERANCE, model.opt.tolerance)
     if not feature_is_disabled(model, "REFSAFE"):  # at shorter steps of a path constraints stay as soft
-        times = model.eq_solref[:, 0]
-        times[:] = np.where(times > 0.0, np.maximum(times, 2.0 * model.opt.timestep), times)
+        for times in (model.eq_solref[:, 0], model.dof_solref[:, 0]):
+            times[:] = np.where(times > 0.0, np.maximum(times, 2.0 * model.opt.timestep), times)
     return left_out
 
 

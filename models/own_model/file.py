@@ -19,6 +19,7 @@ NUMBERS_OF_MOTION = (
     *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_gravcomp"),
     *("site_pos", "site_quat", "jnt_axis", "jnt_pos"),
     *("qpos0", "qpos_spring", "jnt_stiffness", "jnt_range", "dof_damping", "dof_armature", "dof_frictionloss"),
+    *("dof_solref", "dof_solimp"),
     *("tendon_stiffness", "tendon_damping", "tendon_lengthspring", "wrap_prm", "eq_data", "eq_solref", "eq_solimp"),
     *("actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_ctrlrange"),
 )
