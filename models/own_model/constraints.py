@@ -54,15 +54,31 @@ def by_differences(rows_at: Rows, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
 
 
 def satisfying_state(
-    constraints: PlainConstraints, q: np.ndarray, v: np.ndarray
+    constraints: PlainConstraints,
+    q: np.ndarray,
+    v: np.ndarray,
+    ranges: tuple[np.ndarray, np.ndarray] = (-np.inf * np.ones(1), np.inf * np.ones(1)),
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Nearest coordinates (n,) and rates (n,) that satisfy the constraints, by Newton's method; None if it does not
-    converge."""
+    converge. ranges : lowest and highest coordinates, which no correction leaves."""
     for _ in range(MOST_CORRECTIONS):
         gap = constraints.gap(q)
-        inverse = np.linalg.pinv(gap.rows, REDUNDANT_SHARE)
         if np.abs(gap.size).max() <= SATISFIED_GAP:
-            return q, v - inverse @ (gap.rows @ v)
-        step = inverse @ gap.size
-        q = q - step * min(1.0, LONGEST_CORRECTION / float(np.abs(step).max()))
+            return q, v - np.linalg.pinv(gap.rows, REDUNDANT_SHARE) @ (gap.rows @ v)
+        step = _correction(gap.rows, gap.size, q, ranges)
+        q = np.clip(q - step * min(1.0, LONGEST_CORRECTION / max(float(np.abs(step).max()), SATISFIED_GAP)), *ranges)
     return None
+
+
+def _correction(
+    rows: np.ndarray, size: np.ndarray, q: np.ndarray, ranges: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Smallest correction (n,) that closes gaps (c,) to first order, of those coordinates that it does not press
+    against an end of their ranges."""
+    (low, high), held = ranges, np.zeros(len(q), bool)
+    while True:
+        step: np.ndarray = np.linalg.pinv(np.where(held, 0.0, rows), REDUNDANT_SHARE) @ size
+        pressed = ~held & (((q <= low) & (step > 0.0)) | ((q >= high) & (step < 0.0)))
+        if not pressed.any():
+            return step
+        held |= pressed
