@@ -126,7 +126,7 @@ def states_of(twin: TwinModel, count: int) -> list[State]:
         states += next((each for each in tried if each), [])
     states = states or rubbing_states(twin, drawn)
     if not states:
-        said = "a joint with dry friction cannot move, so that its friction has no direction: try `--without friction_loss`"
+        said = "a joint with dry friction cannot move, so its friction has no direction: try `--without friction_loss`"
         raise RunFailed("twin", said)
     return states
 

@@ -21,9 +21,7 @@ WAY_SHARES = (1.0, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01)
 """Shares of a random way from the design position, of which the first is taken at which constraints can be met."""
 UNMET_GAP = 1e-9
 """rad, m: gap of couplings that no coordinates satisfy all at once."""
-UNMET_REASON = (
-    "constraints cannot be satisfied all at once by coordinates in their ranges: try `--without equality`"
-)
+UNMET_REASON = "constraints cannot be satisfied all at once by coordinates in their ranges: try `--without equality`"
 
 
 def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:

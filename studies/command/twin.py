@@ -36,13 +36,15 @@ def _tell_nobody(what: str, share: float) -> None:
 class TwinOptions:
     """Options of the command. states: number of random states at which accelerations are compared; compare_paths:
     whether paths are compared, too; tolerance (rad, m) and quantity of the price, None for no price and for all joints;
-    controls: file of the controls on the paths."""
+    controls: file of the controls on the paths; folder: in which all files must lie that a model names, its own if
+    None."""
 
     states: int = STATE_COUNT
     compare_paths: bool = True
     tolerance: float | None = None
     quantity: str | None = None
     controls: Path | None = None
+    folder: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +124,7 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: TwinOptions, 
     if wanted.controls and (not wanted.compare_paths or wanted.tolerance is not None or len(files) > 1):
         allowed = "acts on paths of one file alone: leave out --no-paths, --tolerance and other files"
         raise InputError("--controls", "", str(wanted.controls), allowed)
-    read_files = [read(path, without) for path in files]
+    read_files = [read(path, without, wanted.folder) for path in files]
     for file in read_files if wanted.compare_paths else ():
         steps_of_path(file.twin)
     tables = [read_controls(wanted.controls, file.twin.model) if wanted.controls else None for file in read_files]
