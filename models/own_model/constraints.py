@@ -20,6 +20,8 @@ SATISFIED_GAP, MOST_CORRECTIONS, LONGEST_CORRECTION = 1e-12, 60, 0.5
 
 Rows = Callable[[Sequence[np.ndarray]], Sequence[np.ndarray]]
 """J (c, n) of constraints at each of some coordinates (n,)."""
+Ranges = tuple[np.ndarray | float, np.ndarray | float]
+"""Lowest and highest coordinates (n,), or of all."""
 
 
 def plain_constraints(twin: TwinModel) -> PlainConstraints:
@@ -54,10 +56,7 @@ def by_differences(rows_at: Rows, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
 
 
 def satisfying_state(
-    constraints: PlainConstraints,
-    q: np.ndarray,
-    v: np.ndarray,
-    ranges: tuple[np.ndarray, np.ndarray] = (-np.inf * np.ones(1), np.inf * np.ones(1)),
+    constraints: PlainConstraints, q: np.ndarray, v: np.ndarray, ranges: Ranges = (-np.inf, np.inf)
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Nearest coordinates (n,) and rates (n,) that satisfy the constraints, by Newton's method; None if it does not
     converge. ranges : lowest and highest coordinates, which no correction leaves."""

@@ -25,10 +25,10 @@ NUMBERS_OF_MOTION = (
 )
 """Numbers of a compiled model that move something."""
 REMEDIES = {
-    "use 'balanceinertia'": 'No mass has this inertia: correct it, or let MuJoCo, by <compiler balanceinertia="true"/>',
+    "use 'balanceinertia'": 'No mass has this inertia: correct it, or let MuJoCo, by <compiler balanceinertia="true"/> {place}',
     "positive eigenvalues": "No mass has this inertia: correct it",
     "larger than mjMINVAL": "Give it mass and inertia, or fix it to a part that has them; or let MuJoCo, by "
-    '<compiler boundmass="1e-6" boundinertia="1e-9"/> with numbers of yours',
+    '<compiler boundmass="1e-6" boundinertia="1e-9"/> {place}, with numbers of yours',
     "Error opening file": "What shapes need must lie beside the model or where its <compiler> says; a body with an "
     "<inertial> of its own can do without",
     "Schema violation": "Is it a part that another model includes? Then give that; or of another version of MuJoCo",
@@ -37,7 +37,7 @@ REMEDIES = {
 """What helps against mistakes, by a part of what MuJoCo's parser says."""
 FUSED_REMARK = "The static bodies of the spec were fused before this error, and remain so."
 """What the parser adds for those who go on with the same specification."""
-COMPILER_PLACES = {"MJCF": " below <mujoco>", "URDF": " within a <mujoco> below <robot>"}
+COMPILER_PLACES = {"MJCF": "below <mujoco>", "URDF": "within a <mujoco> below <robot>"}
 """Where the element <compiler> belongs."""
 LARGEST_NUMBER = 1e30
 """Above, no mechanism has a number, and sums of them are not finite."""
@@ -90,16 +90,19 @@ def compiled_model(document: Document) -> tuple[mujoco.MjModel, list[str]]:
 
 
 def _place(document: Document, reason: str) -> str:
-    """Where the element is that a message of MuJoCo's parser names without its line."""
-    named = re.search(r"Element name '([^']+)', id \d+(?!.*line)", reason)
-    place = document.line(("link", "joint", "body", "geom", "mesh"), named[1]) if named else ""
+    """Where the element is that a message of MuJoCo's parser names without its line, or with line 0 for an include."""
+    if named := re.search(r"Element name '([^']+)', id \d+(?!.*line)", reason):
+        place = document.line(("link", "joint", "body", "geom", "mesh"), named[1])
+    else:
+        attribute, tag = re.search(r"attribute: '([^']+)'", reason), re.search(r"Element '([^']+)', line 0", reason)
+        place = document.line_of_attribute(tag[1], attribute[1]) if tag and attribute else ""
     return f" ({place})" if place else ""
 
 
 def _remedy(document: Document, reason: str) -> str:
     """What helps against a mistake that a message of MuJoCo's parser tells; "" where that is plain."""
     said = next((remedy for part, remedy in REMEDIES.items() if part in reason), "")
-    return f". {said}{COMPILER_PLACES[document.kind] if '<compiler' in said else ''}" if said else ""
+    return f". {said.format(place=COMPILER_PLACES[document.kind])}" if said else ""
 
 
 def check_sane(model: mujoco.MjModel, name: str, kind: str = "MJCF") -> None:

@@ -52,7 +52,7 @@ class _Writer:
         if self.around == ["robot"]:
             self.link = attributes.get("name", "") if tag == "link" else ""
         if self.inside or self._is_unwanted(tag):
-            self.left[tag] += not self.inside
+            self.left.update([] if self.inside else [tag])
             self.inside += 1
             return
         line = self._parser.CurrentLineNumber

@@ -56,6 +56,11 @@ class Document:
                 return f"{element.file}:{element.line}"
         return ""
 
+    def line_of_attribute(self, tag: str, attribute: str) -> str:
+        """Position "FILE:LINE" of the first element of a tag that has an attribute; "" if there is none."""
+        there = (each for each in self.elements if each.tag == tag and attribute in each.attributes)
+        return next((f"{each.file}:{each.line}" for each in there), "")
+
 
 @dataclass
 class _Reader:

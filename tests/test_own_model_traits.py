@@ -1,0 +1,76 @@
+"""Traits of models that others wrote, each of which a build or the certificate once got wrong."""
+
+from dataclasses import replace
+
+import pytest
+
+from models.own_model.builds import sliding_states
+from models.own_model.certificate import certificate, states_of
+from models.own_model.constraints import plain_constraints
+from models.own_model.file import read
+from models.own_model.states import file_limits
+
+ALMOST_X = """
+<mujoco><worldbody>
+  <body><joint name="j" axis="1 5e-9 0"/><inertial pos="3 .1 .2" mass="2" diaginertia=".1 .2 .3"/>
+    <body pos="4 0 0"><joint name="k" axis="0 1 0"/><inertial pos="2 .3 0" mass="1" diaginertia=".01 .02 .03"/></body>
+  </body>
+</worldbody></mujoco>"""
+"""An axis whose first component rounds to 1, as angles written with ten digits give: 5e-9 of it are seen in masses."""
+GEARED_DOWN = """
+<mujoco><default><joint axis="0 1 0" armature="2" frictionloss="1" damping=".01"/></default><worldbody>
+  <body><joint name="a"/><inertial pos=".1 0 0" mass=".2" diaginertia="1e-4 1e-4 1e-4"/>
+    <body pos=".3 0 0"><joint name="b"/><inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/></body>
+  </body>
+</worldbody></mujoco>"""
+"""Joints whose inertia is that of their rotors alone, which makes MuJoCo's dry friction stiff."""
+STUCK = GEARED_DOWN.replace('armature="2" frictionloss="1"', 'frictionloss="8"').replace("1e-9", "1e-5")
+"""The same without rotors, and with more friction: in MuJoCo it sticks at any rate."""
+ROTORS = "<mujoco><worldbody>{}</worldbody></mujoco>".format(
+    "".join(
+        f'<body pos=".2 {y} .1" euler="0 0 {turn}"><joint axis="0 0 1"/>'
+        '<inertial pos="0 0 .023" mass=".005" diaginertia="1.4e-4 1.4e-4 2.74e-4"/></body>'
+        for y, turn in ((-0.1, 13), (0.2, 47), (0.3, 110))
+    )
+)
+"""Rotors about their own axes: nothing accelerates them, to the last digit in one build and to rounding in another."""
+GRIPPER = """
+<mujoco><compiler angle="radian" autolimits="true"/><worldbody>
+  <body><joint name="driver" axis="0 1 0" range="0 .8"/><inertial pos=".1 0 .05" mass=".2" diaginertia=".01 .01 .01"/>
+    <body pos=".2 0 0"><joint name="coupler" axis="0 1 0" range="-2 2"/>
+      <inertial pos=".1 0 0" mass=".1" diaginertia=".01 .01 .01"/><site name="tip" pos=".2 0 .1"/></body></body>
+  <body pos="0 0 .2"><joint name="link" axis="0 1 0" range="-.8 .8"/>
+    <inertial pos=".1 0 0" mass=".1" diaginertia=".01 .01 .01"/><site name="end" pos=".4 0 -.1"/></body>
+</worldbody><equality><connect site1="tip" site2="end"/></equality></mujoco>"""
+"""A finger that begins at the ends of its ranges: the nearest places where it closes often lie beyond."""
+
+
+IDS = ("axis", "geared down", "stuck", "rotors", "gripper")
+
+
+def _twin(folder, text):
+    path = folder / "a.xml"
+    path.write_text(text)
+    return read(path).twin
+
+
+@pytest.mark.parametrize("text", [ALMOST_X, GEARED_DOWN, STUCK, ROTORS, GRIPPER], ids=IDS)
+def test_every_build_moves_as_the_file_does(tmp_path, text):
+    for row in certificate(_twin(tmp_path, text), 20):
+        assert row.alike, row
+
+
+def test_friction_that_sticks_in_mujoco_has_its_whole_force_elsewhere(tmp_path):
+    """1 % more of it is seen in both builds with Coulomb's law; MuJoCo's holds still whatever it is."""
+    twin = _twin(tmp_path, STUCK)
+    assert sliding_states(twin, states_of(twin, 20)) == [] and len(states_of(twin, 20)) >= 18
+    more = tuple(replace(friction, force=1.01 * friction.force) for friction in twin.driven.frictions)
+    wrong = certificate(replace(twin, driven=replace(twin.driven, frictions=more)), 20)
+    assert [row.acceleration > 1e-5 for row in wrong] == [True, False, True]
+
+
+def test_states_that_close_a_finger_stay_in_its_ranges(tmp_path):
+    twin = _twin(tmp_path, GRIPPER)
+    low, high = file_limits(twin.model)
+    for q, _ in states_of(twin, 20):
+        assert ((low <= q) & (q <= high)).all() and abs(plain_constraints(twin).gap(q).size).max() < 1e-11
