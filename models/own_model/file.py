@@ -25,7 +25,8 @@ NUMBERS_OF_MOTION = (
 )
 """Numbers of a compiled model that move something."""
 REMEDIES = {
-    "use 'balanceinertia'": 'No mass has this inertia: correct it, or let MuJoCo, by <compiler balanceinertia="true"/> {place}',
+    "use 'balanceinertia'": "No mass has this inertia: correct it, or let MuJoCo, by "
+    '<compiler balanceinertia="true"/> {place}',
     "positive eigenvalues": "No mass has this inertia: correct it",
     "larger than mjMINVAL": "Give it mass and inertia, or fix it to a part that has them; or let MuJoCo, by "
     '<compiler boundmass="1e-6" boundinertia="1e-9"/> {place}, with numbers of yours',
