@@ -14,7 +14,7 @@ from models.core.errors import InputError
 from models.engines.native_mujoco import SOLVER_TOLERANCE
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
 from models.own_model.equalities import is_tie, joins_bodies
-from models.own_model.names import feature_is_disabled, label
+from models.own_model.names import feature_is_disabled, label, some_names
 from models.own_model.reading import (
     JOINT_TARGETS,
     affine_law,
@@ -40,8 +40,6 @@ TAGS_OF_ELEMENT = {
 """Elements of MJCF and URDF that have a name, by what MuJoCo calls the thing."""
 AFFINE_GAINS = (int(GAIN.mjGAIN_FIXED), int(GAIN.mjGAIN_AFFINE))
 AFFINE_BIASES = (int(BIAS.mjBIAS_NONE), int(BIAS.mjBIAS_AFFINE))
-NAMES_SHOWN = 3
-"""Names in a message."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +53,7 @@ class Content:
 
     def line(self) -> str:
         """One line of text with kind, names and reason."""
-        more = f" and {len(self.names) - NAMES_SHOWN} more" if len(self.names) > NAMES_SHOWN else ""
-        return f"{self.kind}: {', '.join(self.names[:NAMES_SHOWN])}{more}: {self.why}"
+        return f"{self.kind}: {some_names(self.names)}: {self.why}"
 
 
 def contents_of_model(model: mujoco.MjModel, document: Document) -> list[Content]:

@@ -81,8 +81,10 @@ def compiled_model(document: Document) -> tuple[mujoco.MjModel, list[str]]:
         with without_warnings():
             if urdf is None:
                 return mujoco.MjModel.from_xml_path(str(path)), []
+            if not any(element.tag == "mesh" for element in document.elements):
+                return mujoco.MjModel.from_xml_string(urdf.text), list(urdf.notes)
             spec = mujoco.MjSpec.from_string(urdf.text)
-            spec.modelfiledir = str(path.resolve().parent)
+            spec.modelfiledir = str(path.resolve().parent)  # a string alone has its meshes in the current folder
             return spec.compile(), list(urdf.notes)
     except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         reason = " ".join(str(error).split()).removesuffix(FUSED_REMARK).rstrip()

@@ -35,6 +35,8 @@ MOST_STEPS = 100_000
 LARGEST_STATE = 1e6
 """m, rad, m/s, rad/s: what lies beyond has blown up."""
 FILE_BUILD_NAME = "the file's own model"
+STARTS = 20
+"""Random states from which the start of a path is chosen."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,8 @@ class PathReport:
     build from the first one up to there, relative; failed : what stopped a build; has_quaternions : whether the file's
     has them;
     energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy;
-    has_soft_constraints : whether MuJoCo has soft constraints, so that its path is another one: from it the file's is
-    counted then;
+    has_soft_constraints : whether MuJoCo has soft constraints, or dry friction that sticks at the start, so that its
+    path is another one: from it the file's is counted then;
     has_dry_friction : whether there is dry friction: paths are compared as long as it slides; struck_limit : whose
     limit, which is not built, ends the comparison, empty if none's; controls : name of their file, empty where they are
     constant.
@@ -94,7 +96,11 @@ class PathReport:
                 if name == FILE_BUILD_NAME and self.has_quaternions
                 else ""
             )
-            given = " (soft constraints give way)" if name == SOFT_BUILD and self.has_soft_constraints else ""
+            given = (
+                " (soft constraints and dry friction that sticks give way)"
+                if name == SOFT_BUILD and self.has_soft_constraints
+                else ""
+            )
             first = SOFT_BUILD if name == FILE_BUILD_NAME and self.has_soft_constraints else ENGINES[0]
             rows.append(f"  {name} from {first}: {two_digit_text(size)}{turned}{given}")
         if self.energy is not None:
@@ -126,7 +132,7 @@ def compare_paths(
     """Paths over 1 s; step (s): the file's unless given; table : of controls, which are constant without; told : the
     share that is done. InputError for too many steps."""
     steps = int(np.ceil(PATH_DURATION / step - 1e-9)) if step else steps_of_path(twin)
-    step, (q,), (v,) = PATH_DURATION / steps, *random_states(twin, 1)
+    step, (q, v) = PATH_DURATION / steps, start_of_path(twin)
     legs = table.path_sections(twin, steps, step) if table else constant_leg(twin, steps)
     built, failed = dict[str, np.ndarray](), dict[str, str]()
     for i, build in enumerate((*ENGINES, PLAIN_BUILD)):
@@ -138,7 +144,7 @@ def compare_paths(
     under = table.path.name if table else ""
     if first is None:
         return PathReport(step, 0.0, {}, failed, bool(twin.coordinates.turnings), None, controls=under)
-    soft = twin.driven.tied
+    soft = twin.driven.tied or not sliding_states(twin, [(q, v)])
     calm = PLAIN_BUILD if soft and PLAIN_BUILD in built else ENGINES[0]
     disturbed = path_by(legs, calm, (q + DISTURBANCE, v), step)
     rows = _sliding_rows(legs, first[: rows_alike(built.get(calm, first), disturbed, steps)])
@@ -150,6 +156,14 @@ def compare_paths(
     energy = _energy_imbalance(legs, first[:rows], step)
     kinds = bool(twin.coordinates.turnings), energy, soft, bool(twin.driven.frictions), struck, under
     return PathReport(step, (rows - 1) * step, distances, failed, *kinds)
+
+
+def start_of_path(twin: TwinModel) -> tuple[np.ndarray, np.ndarray]:
+    """The first random state at which no limit acts and all dry friction slides; if there is none, the first of all."""
+    struck = limits_struck(twin) if limits_switched_off(twin.model) else lambda q: ()
+    first, *more = [*zip(*random_states(twin, 1), strict=True), *zip(*random_states(twin, STARTS), strict=True)]
+    good = (state for state in (first, *more) if not struck(state[0]) and sliding_states(twin, [state]))
+    return next(good, first)
 
 
 def _march_build(

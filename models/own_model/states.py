@@ -7,6 +7,7 @@ from models.core.errors import RunFailed
 from models.own_model.constraints import plain_constraints, satisfying_state
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
 from models.own_model.equalities import tie_rows
+from models.own_model.names import some_names
 from models.own_model.reading import TwinModel
 
 STATE_COUNT = 100
@@ -61,8 +62,7 @@ def _constrained_states(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[
                 if state is not None and ((low <= state[0]) & (state[0] <= high)).all():
                     return state
         names = [each.name for each in (*twin.driven.couplings, *twin.driven.connections)]
-        more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-        raise RunFailed("twin", UNMET_REASON.format(", ".join(names[:3]) + more))
+        raise RunFailed("twin", UNMET_REASON.format(some_names(names)))
 
     states = [nearest(*each) for each in zip(q, v, strict=True)]
     return np.array([place for place, _ in states]), np.array([rate for _, rate in states])

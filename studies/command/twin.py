@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from models.core.errors import InputError
+from models.own_model.builds import sliding_states
 from models.own_model.certificate import (
     CONSTRAINT_GAP,
     EQUAL_ACCELERATION_SHARE,
@@ -19,7 +20,9 @@ from models.own_model.elements import Element, two_digit_text
 from models.own_model.explain import Comparison, compare, removals_that_agree
 from models.own_model.file import ModelFile, read
 from models.own_model.limits import limits_struck
+from models.own_model.names import some_names
 from models.own_model.path import PathReport, compare_paths, steps_of_path
+from models.own_model.reading import TwinModel
 from models.own_model.states import STATE_COUNT
 from models.own_model.two_paths import PathGap, paths_apart
 from models.own_model.urdf import Misread, misread_numbers
@@ -180,12 +183,9 @@ def _constraints(file: ModelFile, count: int) -> Iterator[str]:
     beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, count)] if file.ignored_limits else []
     if any(beyond):
         names = dict.fromkeys(name for struck in beyond for name in struck)
-        yield f"limits of {', '.join(names)} are not built: some would act at {sum(map(bool, beyond))} of the states"
-    if frictions := twin.driven.frictions:
-        yield (
-            f"dry friction of {len(frictions)} joints: compared at {len(states_of(twin, count))} of {count} states, at "
-            "which all of them slide, with faster rates where they would not; where they stick, MuJoCo's gives way"
-        )
+        yield f"limits of {some_names(tuple(names))} would act at {sum(map(bool, beyond))} of the states"
+    if twin.driven.frictions:
+        yield _friction_line(twin, count)
     if twin.driven.tied:
         kinds = {"couplings of joints": twin.driven.couplings, "joints between bodies": twin.driven.connections}
         told = " and ".join(f"{len(rows)} {kind}" for kind, rows in kinds.items() if rows)
@@ -193,6 +193,35 @@ def _constraints(file: ModelFile, count: int) -> Iterator[str]:
             f"{told}: rigid in Exudyn and the plain equations, which are held to the file with rigid ones; soft in "
             f"MuJoCo, where accelerations are {two_digit_text(softness_difference(twin, count))} away from that"
         )
+
+
+def _friction_line(twin: TwinModel, count: int) -> str:
+    """Line on dry friction: at how many states builds are compared, and to what each is held."""
+    states = states_of(twin, count)
+    head = (
+        f"dry friction of {counted(len(twin.driven.frictions), 'joint')}: compared at {len(states)} of {count} states"
+    )
+    if sliding_states(twin, states):
+        return (
+            f"{head}, at which all of it slides, with faster rates where it would not; where it sticks, MuJoCo's gives "
+            "way"
+        )
+    return (
+        f"{head}; in MuJoCo it sticks at all of them, however fast, and gives way: MuJoCo's build is held to that, "
+        "Exudyn and the plain equations to the file with Coulomb's law"
+    )
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun, in the plural unless it is 1."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def limited_text(names: Sequence[str]) -> str:
+    """How many joints and tendons have limits that are not built; names : theirs, each with what it is."""
+    sorts = {sort: sum(name.startswith(sort) for name in names) for sort in ("joint", "tendon")}
+    told = " and ".join(counted(number, sort) for sort, number in sorts.items() if number)
+    return f"limits of {told} are not built; states are drawn inside the ranges of joints"
 
 
 def twin_lines(twins: Twins) -> list[str]:
@@ -220,8 +249,8 @@ def verdict_sentence(each: ExaminedFile) -> str:
 def _file_lines(each: ExaminedFile) -> list[str]:
     model, twin = each.file.twin.model, each.file.twin
     rows = [
-        f"{each.name}: {each.file.document.kind}, {model.nbody - 1} bodies, {twin.size} coordinates, "
-        f"{model.ntendon} tendons, {model.nu} actuators",
+        f"{each.name}: {each.file.document.kind}, {model.nbody - 1} bodies, {counted(twin.size, 'coordinate')}, "
+        f"{counted(model.ntendon, 'tendon')}, {counted(model.nu, 'actuator')}",
         f"  {verdict_sentence(each)}",
     ]
     for row in each.agreements:
@@ -238,9 +267,7 @@ def _file_lines(each: ExaminedFile) -> list[str]:
     rows += [f"  {lost.sentence()}" for lost in each.misread]
     rows += [f"  left out: {content.line()}" for content in each.file.left_out]
     if each.file.ignored_limits:
-        rows.append(
-            f"  limits not built, states drawn inside the ranges: {len(each.file.ignored_limits)} joints and tendons"
-        )
+        rows.append(f"  {limited_text(each.file.ignored_limits)}")
     rows += [f"  {note}" for note in (*each.constraint_lines, *each.file.notes)]
     rows += [f"  {line}" for line in each.path.lines()] if each.path is not None else []
     return rows + [f"  {line}".rstrip() for line in each.price_lines]
