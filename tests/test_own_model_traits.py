@@ -1,13 +1,17 @@
 """Traits of models that others wrote, each of which a build or the certificate once got wrong."""
 
+import re
 from dataclasses import replace
 
 import pytest
 
+from models.core.errors import InputError
 from models.own_model.builds import sliding_states
 from models.own_model.certificate import certificate, states_of
 from models.own_model.constraints import plain_constraints
 from models.own_model.file import read
+from models.own_model.limits import limits_struck
+from models.own_model.path import FILE_BUILD_NAME, compare_paths, start_of_path
 from models.own_model.states import file_limits
 
 ALMOST_X = """
@@ -80,6 +84,52 @@ def test_friction_that_sticks_in_mujoco_has_its_whole_force_elsewhere(tmp_path):
     more = tuple(replace(friction, force=1.01 * friction.force) for friction in twin.driven.frictions)
     wrong = certificate(replace(twin, driven=replace(twin.driven, frictions=more)), 20)
     assert [row.acceleration > 1e-5 for row in wrong] == [True, False, True]
+
+
+MUSCLED = """
+<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/>
+  <body pos="0 0 1"><joint name="j" axis="0 1 0" damping=".1"/><geom name="ball" size=".1" pos=".3 0 0"/></body>
+</worldbody><actuator><general name="m" joint="j" dyntype="filter" dynprm=".1" gainprm="2"/><motor name="t" joint="j" delay=".01" nsample="5"/></actuator>
+</mujoco>"""
+"""Actuators with states: activation, and a history of controls."""
+SHEET = """
+<mujoco><worldbody><body><joint/><geom size=".1"/></body>
+  <flexcomp name="sheet" type="grid" count="3 3 1" spacing=".1 .1 .1" radius=".01" dim="2"/></worldbody></mujoco>"""
+
+
+def test_one_refusal_names_all_that_has_no_equal_and_its_option_helps(tmp_path):
+    path = tmp_path / "a.xml"
+    path.write_text(MUSCLED)
+    with pytest.raises(InputError) as error:
+        read(path)
+    said = str(error.value)
+    assert "geom 'floor' (a.xml:2)" in said and "actuator 'm' (a.xml:4)" in said
+    kinds = re.search(r"They have no equal .* with `--without ([\w,]+)`", said)
+    assert kinds and kinds[1] == "contact,actuator"
+    twin = read(path, kinds[1].split(",")).twin
+    assert compare_paths(twin).alike and set(compare_paths(twin).distances) == {"mujoco", "plain", FILE_BUILD_NAME}
+
+
+@pytest.mark.parametrize("without", [(), ("flex",), ("contact", "flex")])
+def test_a_refusal_of_deformable_bodies_offers_no_option(tmp_path, without):
+    path = tmp_path / "a.xml"
+    path.write_text(SHEET)
+    with pytest.raises(InputError, match=r"sheet.*cannot be left out") as error:
+        read(path, without)
+    assert "--without" not in str(error.value)
+
+
+def test_a_path_begins_where_dry_friction_slides_and_no_limit_acts(tmp_path):
+    """The first random state has the joint at rest beyond the range of a tendon; where no state slides, it is told."""
+    limited = GEARED_DOWN.replace(
+        "</worldbody>",
+        '</worldbody><tendon><fixed limited="true" range="-1 1"><joint joint="a" coef="1"/></fixed></tendon>',
+    )
+    twin = _twin(tmp_path, limited)
+    q, v = start_of_path(twin)
+    assert limits_struck(twin)(q) == () and sliding_states(twin, [(q, v)])
+    report = compare_paths(_twin(tmp_path, STUCK))
+    assert report.alike and any("dry friction that sticks give way" in line for line in report.lines())
 
 
 def test_states_that_close_a_finger_stay_in_its_ranges(tmp_path):

@@ -23,9 +23,14 @@ def some_names(names: Sequence[str]) -> str:
 
 
 def label(model: mujoco.MjModel, kind: str, number: int) -> str:
-    """Name of a joint, body, tendon or actuator of a file; its number if it has no name."""
-    name: str = getattr(model, kind)(number).name
+    """Name of a joint, body, tendon, actuator or the like of a file; its number if it has no name."""
+    name = name_of(model, kind, number)
     return f"{kind} {name!r}" if name else f"{kind} {number}"
+
+
+def name_of(model: mujoco.MjModel, kind: str, number: int) -> str:
+    """Name alone; "" if there is none."""
+    return mujoco.mj_id2name(model, int(getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")), number) or ""
 
 
 def coordinate_names(model: mujoco.MjModel) -> tuple[str, ...]:

@@ -214,14 +214,16 @@ def file_path(
     held: np.ndarray | None = None,
 ) -> np.ndarray:
     """MuJoCo's own states (steps + 1, nq + n) of the file's model from coordinates and rates (n,), over the number and
-    size of steps in ``grid``; held : controls (steps, nu), constant if not given."""
+    size of steps in ``grid``; held : controls (steps, nu), constant if not given. Actuators that were left out keep
+    their states, which move nothing."""
     (steps, step), model, data = grid, twin.model, mujoco.MjData(twin.model)
     before = model.opt.timestep, model.opt.integrator
     model.opt.timestep, model.opt.integrator = step, INTEGRATORS[integrator]
-    state = twin.coordinates.to_mujoco(*start)
+    state, size = twin.coordinates.to_mujoco(*start), model.nq + model.nv
+    idle = np.zeros(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS) - 1 - size)
     held = np.tile(constant_controls(model), (steps, 1)) if held is None else held
     try:
-        return march(model, data, np.concatenate((state.qpos, state.qvel)), held)
+        return march(model, data, np.concatenate((state.qpos, state.qvel, idle)), held)[:, :size]
     finally:
         model.opt.timestep, model.opt.integrator = before
 
