@@ -89,7 +89,8 @@ def test_friction_that_sticks_in_mujoco_has_its_whole_force_elsewhere(tmp_path):
 MUSCLED = """
 <mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/>
   <body pos="0 0 1"><joint name="j" axis="0 1 0" damping=".1"/><geom name="ball" size=".1" pos=".3 0 0"/></body>
-</worldbody><actuator><general name="m" joint="j" dyntype="filter" dynprm=".1" gainprm="2"/><motor name="t" joint="j" delay=".01" nsample="5"/></actuator>
+</worldbody><actuator><general name="m" joint="j" dyntype="filter" dynprm=".1" gainprm="2"/>
+  <motor name="t" joint="j" delay=".01" nsample="5"/></actuator>
 </mujoco>"""
 """Actuators with states: activation, and a history of controls."""
 SHEET = """
