@@ -237,7 +237,7 @@ def verdict_sentence(each: ExaminedFile) -> str:
     """Sentence with the verdict on a file."""
     worst = max(row.acceleration for row in each.agreements)
     if each.misread:
-        return f"MuJoCo's parser made something else of {len(each.misread)} numbers of the file"
+        return f"MuJoCo's parser made something else of {counted(len(each.misread), 'number')} of the file"
     if each.is_certified:
         bound = max(row.bound for row in each.agreements)
         said = f"; up to {bound:.0e} may be rounding" if bound > EQUAL_ACCELERATION_SHARE else ""
