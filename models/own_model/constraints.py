@@ -69,7 +69,7 @@ def satisfying_state(
     return None
 
 
-def _correction(rows: np.ndarray, size: np.ndarray, q: np.ndarray, ranges: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+def _correction(rows: np.ndarray, size: np.ndarray, q: np.ndarray, ranges: Ranges) -> np.ndarray:
     """Smallest correction (n,) that closes gaps (c,) to first order, of those coordinates that it does not press
     against an end of their ranges."""
     (low, high), held = ranges, np.zeros(len(q), bool)

@@ -201,10 +201,10 @@ def _rows_undisturbed(legs: Sequence[PathSection], build: str, start: State, ste
     steps, (q, v) = sum(leg.steps for leg in legs), start
     try:
         with np.errstate(all="ignore"):  # what blows up differs
-            paths = [path_by(legs, build, (q + change, v), step) for change in (0.0, DISTURBANCE)]
+            path, disturbed = (path_by(legs, build, (q + change, v), step) for change in (0.0, DISTURBANCE))
     except RunFailed:
         return 2
-    return rows_alike(*paths, steps)
+    return rows_alike(path, disturbed, steps)
 
 
 def start_of_path(twin: TwinModel) -> tuple[np.ndarray, np.ndarray]:

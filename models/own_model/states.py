@@ -61,7 +61,7 @@ def _constrained_states(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[
                 state = satisfying_state(constraints, middle + share * (place - middle), rate, ranges)
                 if state is not None and ((low <= state[0]) & (state[0] <= high)).all():
                     return state
-        names = [each.name for each in (*twin.driven.couplings, *twin.driven.connections)]
+        names = [each.name for each in twin.driven.couplings] + [each.name for each in twin.driven.connections]
         raise RunFailed("twin", UNMET_REASON.format(some_names(names)))
 
     states = [nearest(*each) for each in zip(q, v, strict=True)]
