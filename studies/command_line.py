@@ -333,6 +333,9 @@ def twin(
     controls: Annotated[
         Path | None, typer.Option(help="CSV of the actuators' controls over time, for the paths; constant if none.")
     ] = None,
+    folder: Annotated[
+        Path | None, typer.Option(help="Folder from which includes, meshes and pictures may come; the model's if none.")
+    ] = None,
 ) -> None:
     """Build a model of your own in every engine, and prove it equal or tell where it differs.
 
@@ -343,7 +346,8 @@ def twin(
 
     check_asked(files, page)
     with progress_bar("building the model") as tell:
-        twins = examine(files, content_kinds(without), TwinOptions(states, march, tolerance, quantity, controls), tell)
+        wanted = TwinOptions(states, march, tolerance, quantity, controls, folder)
+        twins = examine(files, content_kinds(without), wanted, tell)
     print("\n".join(twin_lines(twins)))
     if page is not None:
         from studies.twin_page import write

@@ -1,4 +1,5 @@
-"""Models that others wrote, from packages of the extra ``robots``: legs, arms, carts, swimmers, a humanoid robot.
+"""Models that others wrote, from packages of the extra ``robots``: legs, arms, carts, swimmers, a humanoid robot, cars,
+hands.
 
 Each is certified, with what has no equal left out by name, or refused with the element that makes it impossible.
 """
@@ -23,9 +24,17 @@ URDF = (
     "hex_util_urdf/urdf/firefly_y6/gp80.urdf",
     "jvrc_description/urdf/jvrc1.urdf",
 )
+CARS = tuple(f"pybullet_data/racecar/{name}.urdf" for name in ("racecar", "racecar_differential"))
+"""With plugins of a simulator, and one with a differential that meshes by contact alone."""
+ASSETS = "gymnasium_robotics/envs/assets"
+HANDS = (f"{ASSETS}/hand/reach.xml", f"{ASSETS}/adroit_hand/adroit_door.xml")
+"""Tendons that tie joints of a finger; dry friction that holds light fingers at any rate. Their shapes lie in folders
+beside that of the file."""
 IMPOSSIBLE = "hex_util_urdf/urdf/archer_y6/gp100_p050_handle.urdf"
 OUTSIDE = ("contact", "equality", "fluid", "force_range")
 STATES = 5
+FEW_STATES = 3
+"""Of models of 30 joints."""
 
 
 def _path(name: str) -> Path:
@@ -51,6 +60,26 @@ def test_urdf_of_others_is_certified_and_nothing_of_it_lost(name):
         assert row.acceleration < 1e-10, row
 
 
+@pytest.mark.parametrize("name", CARS)
+def test_cars_of_others_are_certified(name):
+    file = read(_path(name))
+    assert misread_numbers(file) == [] and "stands on the world" in file.notes[-1]
+    for row in certificate(file.twin, FEW_STATES):
+        assert row.alike, row
+
+
+@pytest.mark.parametrize("name", HANDS)
+def test_hands_of_others_are_certified(name):
+    for row in certificate(read(_path(name), OUTSIDE, _path(ASSETS)).twin, FEW_STATES):
+        assert row.alike, row
+
+
 def test_an_inertia_that_no_mass_has_is_refused_by_name():
     with pytest.raises(InputError, match="'link_6'"):
         read(_path(IMPOSSIBLE))
+
+
+def test_a_refusal_of_what_xacro_left_names_its_line():
+    """It stands in <origin xyz="$(optenv HUSKY_IMU_XYZ ...)">."""
+    with pytest.raises(InputError, match=r"husky\.urdf: .*bad format in attribute 'xyz'.*line 97"):
+        read(_path("pybullet_data/husky/husky.urdf"))

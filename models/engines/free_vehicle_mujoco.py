@@ -14,7 +14,7 @@ from models.engines.mujoco_layout import check
 from models.engines.mujoco_march import GAVE_UP, Marcher
 from models.engines.mujoco_native import Native, native
 from models.engines.mujoco_quiet import installed, without_warnings
-from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
+from models.engines.mujoco_tree import MujocoIndices, keep_small_turns, set_masses, spec_of
 from models.engines.native_mujoco import (
     add_body_load,
     add_connection,
@@ -93,8 +93,10 @@ def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
     with without_warnings():  # a hinge with a ball joint of one body has no inertia but its rotor, which comes next
         set_masses(model, places, driven.vehicle.bodies)
     set_rotors(model, rotors(driven.vehicle))
-    if driven.tied:  # how soft constraints are depends on all inertias
+    if driven.tied or driven.frictions:  # how soft constraints are depends on all inertias
+        model.dof_simplenum[:] = model.body_simple[:] = 0  # else rotors of slides would not count
         mujoco.mj_setConst(model, mujoco.MjData(model))
+    keep_small_turns(model)  # last, since mj_setConst looks for them, too
     set_laws(model, driven.parts)
     set_line_springs(model, driven.line_springs)
     return model

@@ -105,12 +105,14 @@ class LineSpring:
 @dataclass(frozen=True)
 class DryFriction:
     """Coulomb friction against the motion of a coordinate, which is given by its number in the tree's order; force in N
-    or N m.
+    or N m; solref, solimp : how soft MuJoCo makes it, where it sticks.
     """
 
     name: str
     coordinate: int
     force: float
+    solref: tuple[float, ...]
+    solimp: tuple[float, ...]
 
 
 @dataclass(frozen=True)

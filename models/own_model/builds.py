@@ -92,9 +92,16 @@ def plain_tree(twin: TwinModel) -> PlainTree:
 
 
 def expected_equations(twin: TwinModel, build: str) -> Equations:
-    """The motion with which a build must agree: the file's own model, with rigid constraints unless the build is
-    MuJoCo's."""
-    return as_parsed(twin) if build == SOFT_BUILD or not twin.driven.tied else rigid_equations(twin)
+    """The motion with which a build must agree: the file's own model, with rigid constraints and Coulomb's dry friction
+    unless the build is MuJoCo's."""
+    if build == SOFT_BUILD or not is_soft_in_mujoco(twin):
+        return as_parsed(twin)
+    return rigid_equations(twin) if twin.driven.tied else sliding_equations(twin)
+
+
+def is_soft_in_mujoco(twin: TwinModel) -> bool:
+    """Whether a model has constraints or dry friction, which give way in MuJoCo and nowhere else."""
+    return twin.driven.tied or bool(twin.driven.frictions)
 
 
 def as_parsed(twin: TwinModel) -> Equations:
@@ -116,14 +123,34 @@ def rigid_equations(twin: TwinModel) -> Equations:
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
         rows, rest = asked(q, v)
-        state = forward_state(twin, data, q, v)
-        ties, others = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY, np.empty(twin.size)
-        mujoco.mj_mulJacTVec(twin.model, data, others, np.where(ties, 0.0, data.efc_force))
-        mass, force = _mass_and_forces_of_file(twin, data, state, others)
+        mass, force = _sliding_forces_of_file(twin, data, q, v)
         force = constrained_forces(mass, force, rows, rest)
         return Moved(mass, force, np.linalg.solve(mass, force))
 
     return move
+
+
+def sliding_equations(twin: TwinModel) -> Equations:
+    """The file's own model as MuJoCo parsed it, its dry friction that of Coulomb's law."""
+    data = mujoco.MjData(twin.model)
+
+    def move(q: np.ndarray, v: np.ndarray) -> Moved:
+        mass, force = _sliding_forces_of_file(twin, data, q, v)
+        return Moved(mass, force, np.linalg.solve(mass, force))
+
+    return move
+
+
+def _sliding_forces_of_file(
+    twin: TwinModel, data: mujoco.MjData, q: np.ndarray, v: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mass matrix (n, n) and forces (n,) of the file's own model without its equality constraints, its dry friction
+    whole against the rates."""
+    state, sliding = forward_state(twin, data, q, v), np.empty(twin.size)
+    rubs, rows = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF, np.zeros(data.nefc)
+    rows[rubs] = -np.sign(v[data.efc_id[rubs]]) * data.efc_frictionloss[rubs]
+    mujoco.mj_mulJacTVec(twin.model, data, sliding, rows)
+    return _mass_and_forces_of_file(twin, data, state, sliding)
 
 
 def _rows_of_file(twin: TwinModel, data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
@@ -159,8 +186,7 @@ def sliding_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
 
     MuJoCo's is a soft constraint, whose force is less where a joint sticks.
     """
-    rubbing = [friction.coordinate for friction in twin.driven.frictions]
-    if not rubbing:
+    if not twin.driven.frictions:
         return list(states)
     data = mujoco.MjData(twin.model)
 
@@ -169,6 +195,12 @@ def sliding_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
         of = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
         whole = np.abs(data.efc_force[of]) >= WHOLE_FRICTION_SHARE * data.efc_frictionloss[of]
         against = data.efc_force[of] * v[data.efc_id[of]] < 0.0
-        return bool((whole & against).all() and (np.abs(v[rubbing]) >= SLIDES).all())
+        return bool((whole & against).all())
 
-    return [(q, v) for q, v in states if slides(q, v)]
+    return [(q, v) for q, v in rubbing_states(twin, states) if slides(q, v)]
+
+
+def rubbing_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
+    """Those of the states at which every joint with dry friction moves fast enough for Coulomb's law."""
+    rubbing = [friction.coordinate for friction in twin.driven.frictions]
+    return [(q, v) for q, v in states if (np.abs(v[rubbing]) >= SLIDES).all()]

@@ -23,7 +23,9 @@ from models.own_model.builds import (
     State,
     equations_of_build,
     expected_equations,
+    is_soft_in_mujoco,
     largest_gap,
+    rubbing_states,
     sliding_states,
 )
 from models.own_model.coordinates import several_at_once
@@ -96,11 +98,13 @@ class Agreement:
 
 
 def certificate(twin: TwinModel, count: int = STATE_COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:
-    """Agreement of every build of the description with the file's own model; RunFailed where dry friction sticks at all
-    states."""
+    """Agreement of every build of the description with the file's own model.
+
+    RunFailed where a joint with dry friction cannot move.
+    """
     states, rows = states_of(twin, count), list[Agreement]()
     soft = reference_of_file(twin, states, SOFT_BUILD)
-    rigid = reference_of_file(twin, states, PLAIN_BUILD) if twin.driven.tied else soft
+    rigid = reference_of_file(twin, states, PLAIN_BUILD) if is_soft_in_mujoco(twin) else soft
     for i, build in enumerate(ALL_BUILDS):
         row = agreement_of_build(
             build, soft if build == SOFT_BUILD else rigid, moved_at(equations_of_build(twin, build), states)
@@ -111,16 +115,18 @@ def certificate(twin: TwinModel, count: int = STATE_COUNT, told: Told = lambda s
 
 
 def states_of(twin: TwinModel, count: int) -> list[State]:
-    """Random states. Where dry friction sticks, the rates are increased; a state is left out if it sticks all the same.
+    """Random states. Where dry friction sticks in MuJoCo, the rates are increased; a state is left out if it sticks all
+    the same, unless all do: then those are taken at which every joint with dry friction moves.
 
-    RunFailed where none is left.
+    RunFailed where none does.
     """
-    states = list[State]()
-    for q, v in zip(*random_states(twin, count), strict=True):
+    states, drawn = list[State](), list(zip(*random_states(twin, count), strict=True))
+    for q, v in drawn:
         tried = (sliding_states(twin, [(q, factor * v)]) for factor in RATE_FACTORS)
         states += next((each for each in tried if each), [])
+    states = states or rubbing_states(twin, drawn)
     if not states:
-        said = "dry friction sticks at all states, and MuJoCo's gives way: try `--without friction_loss`"
+        said = "a joint with dry friction cannot move, so its friction has no direction: try `--without friction_loss`"
         raise RunFailed("twin", said)
     return states
 

@@ -20,6 +20,8 @@ SATISFIED_GAP, MOST_CORRECTIONS, LONGEST_CORRECTION = 1e-12, 60, 0.5
 
 Rows = Callable[[Sequence[np.ndarray]], Sequence[np.ndarray]]
 """J (c, n) of constraints at each of some coordinates (n,)."""
+Ranges = tuple[np.ndarray | float, np.ndarray | float]
+"""Lowest and highest coordinates (n,), or of all."""
 
 
 def plain_constraints(twin: TwinModel) -> PlainConstraints:
@@ -54,15 +56,26 @@ def by_differences(rows_at: Rows, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
 
 
 def satisfying_state(
-    constraints: PlainConstraints, q: np.ndarray, v: np.ndarray
+    constraints: PlainConstraints, q: np.ndarray, v: np.ndarray, ranges: Ranges = (-np.inf, np.inf)
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Nearest coordinates (n,) and rates (n,) that satisfy the constraints, by Newton's method; None if it does not
-    converge."""
+    converge. ranges : lowest and highest coordinates, which no correction leaves."""
     for _ in range(MOST_CORRECTIONS):
         gap = constraints.gap(q)
-        inverse = np.linalg.pinv(gap.rows, REDUNDANT_SHARE)
         if np.abs(gap.size).max() <= SATISFIED_GAP:
-            return q, v - inverse @ (gap.rows @ v)
-        step = inverse @ gap.size
-        q = q - step * min(1.0, LONGEST_CORRECTION / float(np.abs(step).max()))
+            return q, v - np.linalg.pinv(gap.rows, REDUNDANT_SHARE) @ (gap.rows @ v)
+        step = _correction(gap.rows, gap.size, q, ranges)
+        q = np.clip(q - step * min(1.0, LONGEST_CORRECTION / max(float(np.abs(step).max()), SATISFIED_GAP)), *ranges)
     return None
+
+
+def _correction(rows: np.ndarray, size: np.ndarray, q: np.ndarray, ranges: Ranges) -> np.ndarray:
+    """Smallest correction (n,) that closes gaps (c,) to first order, of those coordinates that it does not press
+    against an end of their ranges."""
+    (low, high), held = ranges, np.zeros(len(q), bool)
+    while True:
+        step: np.ndarray = np.linalg.pinv(np.where(held, 0.0, rows), REDUNDANT_SHARE) @ size
+        pressed = ~held & (((q <= low) & (step > 0.0)) | ((q >= high) & (step < 0.0)))
+        if not pressed.any():
+            return step
+        held |= pressed

@@ -4,16 +4,17 @@ Limits of joints are the exception: as long as no coordinate leaves its range th
 inside the ranges, limits are switched off in the file's own model, and that is said.
 """
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from models.core.errors import InputError
+from models.engines.native_mujoco import SOLVER_TOLERANCE
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
 from models.own_model.equalities import is_tie, joins_bodies
-from models.own_model.names import feature_is_disabled, label
+from models.own_model.names import feature_is_disabled, label, name_of, some_names
 from models.own_model.reading import (
     JOINT_TARGETS,
     affine_law,
@@ -35,12 +36,11 @@ TAGS_OF_ELEMENT = {
     "geom": ("geom",),
     "actuator": (*PLAIN_ACTUATORS, *STATEFUL_ACTUATORS),
     "equality": ("connect", "weld", "joint", "tendon", "flex"),
+    "flex": ("flex", "flexcomp"),
 }
 """Elements of MJCF and URDF that have a name, by what MuJoCo calls the thing."""
 AFFINE_GAINS = (int(GAIN.mjGAIN_FIXED), int(GAIN.mjGAIN_AFFINE))
 AFFINE_BIASES = (int(BIAS.mjBIAS_NONE), int(BIAS.mjBIAS_AFFINE))
-NAMES_SHOWN = 3
-"""Names in a message."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,7 @@ class Content:
 
     def line(self) -> str:
         """One line of text with kind, names and reason."""
-        more = f" and {len(self.names) - NAMES_SHOWN} more" if len(self.names) > NAMES_SHOWN else ""
-        return f"{self.kind}: {', '.join(self.names[:NAMES_SHOWN])}{more}: {self.why}"
+        return f"{self.kind}: {some_names(self.names)}: {self.why}"
 
 
 def contents_of_model(model: mujoco.MjModel, document: Document) -> list[Content]:
@@ -94,30 +93,37 @@ def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Coll
     for kind in without:
         if kind not in CONTENT_KINDS:
             raise InputError("--without", "", kind, "no such content", tuple(CONTENT_KINDS))
-    there = without_equal(model, document)
-    for row in there:
-        if row.kind not in without:
-            allowed = f"has no equal in the other builds; leave it out with `--without {row.kind}`"
-            all_kinds = ",".join(dict.fromkeys((*without, *(each.kind for each in there))))
-            more = f"; all that this file needs: `--without {all_kinds}`" if len(there) > 1 else ""
-            raise InputError(document.path.name, "", None, f"{row.line()}. It {allowed}{more}")
+    if there := [row for row in without_equal(model, document) if row.kind not in without or row.kind == "flex"]:
+        raise InputError(document.path.name, "", None, _refusal(there, without))
     left_out = [row for row in contents_of_model(model, document) if row.kind in without]
     for row in left_out:
         CONTENT_KINDS[row.kind][2](model)
     model.opt.disableflags |= int(DSBL.mjDSBL_LIMIT) | int(DSBL.mjDSBL_AUTORESET) | int(DSBL.mjDSBL_SENSOR)
     model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # constraints are compared, not their solvers
     model.opt.iterations, model.opt.noslip_iterations = max(100, model.opt.iterations), 0
-    model.opt.tolerance = min(1e-8, model.opt.tolerance)
+    model.opt.tolerance = min(SOLVER_TOLERANCE, model.opt.tolerance)
     if not feature_is_disabled(model, "REFSAFE"):  # at shorter steps of a path constraints stay as soft
-        times = model.eq_solref[:, 0]
-        times[:] = np.where(times > 0.0, np.maximum(times, 2.0 * model.opt.timestep), times)
+        for times in (model.eq_solref[:, 0], model.dof_solref[:, 0]):
+            times[:] = np.where(times > 0.0, np.maximum(times, 2.0 * model.opt.timestep), times)
     return left_out
+
+
+def _refusal(rows: Sequence[Content], without: Collection[str]) -> str:
+    """What has no equal, and the option that leaves all of it out; without : what is left out already."""
+    told = ". ".join(row.line() for row in rows)
+    if any(row.kind == "flex" for row in rows):
+        return (
+            f"{told}. Deformable bodies have no equal, and cannot be left out: their vertices are bodies of the model"
+        )
+    it_has, it = ("It has", "it") if len(rows) == 1 else ("They have", "them")
+    kinds = ",".join(dict.fromkeys((*without, *(row.kind for row in rows))))
+    return f"{told}. {it_has} no equal in the other builds; leave {it} out with `--without {kinds}`"
 
 
 def _with_line(model: mujoco.MjModel, document: Document, what: str, number: int) -> str:
     if number == NAMELESS_INDEX:
         return what
-    name = getattr(model, what)(number).name
+    name = name_of(model, what, number)
     line = document.line(TAGS_OF_ELEMENT.get(what, ()), name) if name else ""
     return f"{label(model, what, number)} ({line})" if line else label(model, what, number)
 
@@ -287,7 +293,7 @@ def _forget_medium(model: mujoco.MjModel) -> None:
 
 
 def _keep_flexes(model: mujoco.MjModel) -> None:
-    raise InputError("", "flex", None, "deformable bodies cannot be left out: their vertices are bodies of the model")
+    """Nothing: a model with flexes has been refused."""
 
 
 CONTENT_KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco.MjModel], None]]] = {

@@ -28,17 +28,20 @@ def joint_couplings(model: mujoco.MjModel) -> Iterator[Coupling]:
         first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
         driver = int(model.jnt_dofadr[second]) if second >= 0 else None
         offset, ratio = model.eq_data[e, :2].tolist()
-        softness = _stiffness_and_damping(model, e)
+        softness = stiffness_and_damping(model, model.eq_solref[e], model.eq_solimp[e])
         yield Coupling(label(model, "equality", e), int(model.jnt_dofadr[first]), driver, ratio, offset, *softness)
 
 
-def _stiffness_and_damping(model: mujoco.MjModel, equality: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """MuJoCo's solref, converted to stiffness and damping so that it does not depend on the step, and solimp."""
-    time, ratio = model.eq_solref[equality].tolist()
+def stiffness_and_damping(
+    model: mujoco.MjModel, solref: np.ndarray, solimp: np.ndarray
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """MuJoCo's solref (2,) of a constraint, converted to stiffness and damping so that it does not depend on the step,
+    and its solimp (5,)."""
+    time, ratio = solref.tolist()
     if time > 0.0 and ratio > 0.0:
         time = time if feature_is_disabled(model, "REFSAFE") else max(time, 2.0 * float(model.opt.timestep))
         time, ratio = -1.0 / (time * ratio) ** 2, -2.0 / time
-    return (time, ratio), tuple(model.eq_solimp[equality].tolist())
+    return (time, ratio), tuple(solimp.tolist())
 
 
 def joins_bodies(model: mujoco.MjModel, equality: int) -> bool:
@@ -65,7 +68,7 @@ def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connec
         (start, turned), (end, other) = _frames_of_ends(model, design, e)
         turns = model.eq_type[e] == WELD_EQUALITY and model.eq_data[e, 10]
         axes = (turned, other) if turns else None
-        softness = _stiffness_and_damping(model, e)
+        softness = stiffness_and_damping(model, model.eq_solref[e], model.eq_solimp[e])
         ends = (first, three_numbers(start)), (second, three_numbers(end))
         yield Connection(label(model, "equality", e), ends, axes, *softness, float(model.eq_data[e, 10]))
 

@@ -1,9 +1,9 @@
 """A file of a user as a compiled model of MuJoCo's own parser, and as the description of it."""
 
+import re
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -19,10 +19,27 @@ NUMBERS_OF_MOTION = (
     *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_gravcomp"),
     *("site_pos", "site_quat", "jnt_axis", "jnt_pos"),
     *("qpos0", "qpos_spring", "jnt_stiffness", "jnt_range", "dof_damping", "dof_armature", "dof_frictionloss"),
+    *("dof_solref", "dof_solimp"),
     *("tendon_stiffness", "tendon_damping", "tendon_lengthspring", "wrap_prm", "eq_data", "eq_solref", "eq_solimp"),
     *("actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_ctrlrange"),
 )
 """Numbers of a compiled model that move something."""
+REMEDIES = {
+    "use 'balanceinertia'": "No mass has this inertia: correct it, or let MuJoCo, by "
+    '<compiler balanceinertia="true"/> {place}',
+    "positive eigenvalues": "No mass has this inertia: correct it",
+    "larger than mjMINVAL": "Give it mass and inertia, or fix it to a part that has them; or let MuJoCo, by "
+    '<compiler boundmass="1e-6" boundinertia="1e-9"/> {place}, with numbers of yours',
+    "Error opening file": "What shapes need must lie beside the model or where its <compiler> says; a body with an "
+    "<inertial> of its own can do without",
+    "Schema violation": "Is it a part that another model includes? Then give that; or of another version of MuJoCo",
+    "not found in": "Is it a part that another model includes, where this name is? Then give that",
+}
+"""What helps against mistakes, by a part of what MuJoCo's parser says."""
+FUSED_REMARK = "The static bodies of the spec were fused before this error, and remain so."
+"""What the parser adds for those who go on with the same specification."""
+COMPILER_PLACES = {"MJCF": "below <mujoco>", "URDF": "within a <mujoco> below <robot>"}
+"""Where the element <compiler> belongs."""
 LARGEST_NUMBER = 1e30
 """Above, no mechanism has a number, and sums of them are not finite."""
 
@@ -43,47 +60,60 @@ class ModelFile:
     notes: tuple[str, ...]
 
 
-def read(path: Path, without: Collection[str] = ()) -> ModelFile:
-    """The file at a path; InputError for what cannot be read, or has no equal and is not named in ``without``."""
-    document = checked_document(path)
+def read(path: Path, without: Collection[str] = (), folder: Path | None = None) -> ModelFile:
+    """The file at a path; InputError for what cannot be read, or has no equal and is not named in ``without``.
+
+    folder : in which all files must lie that the model names; the file's own if None.
+    """
+    document = checked_document(path, folder)
     model, notes = compiled_model(document)
-    check_sane(model, path.name)
+    check_sane(model, path.name, document.kind)
     left_out = check_and_leave_out(model, document, without)
     twin = described_model(model, path.stem)
     return ModelFile(document, twin, tuple(left_out), tuple(limits_switched_off(model)), tuple(notes))
 
 
 def compiled_model(document: Document) -> tuple[mujoco.MjModel, list[str]]:
-    """The document compiled by MuJoCo's own parser, and notes; InputError with the parser's message."""
-    path, notes = document.path, list[str]()
+    """The document compiled by MuJoCo's own parser, and notes; InputError with the parser's message, the place of what
+    it names, and what may help."""
+    path, urdf = document.path, document.urdf
     try:
         with without_warnings():
-            if document.kind == "URDF":
-                text, dropped = _without_shapes(path)
-                if dropped:
-                    notes.append(f"{dropped} shapes of links with masses of their own were not read")
-                return mujoco.MjModel.from_xml_string(text), notes
-            return mujoco.MjModel.from_xml_path(str(path)), notes
+            if urdf is None:
+                return mujoco.MjModel.from_xml_path(str(path)), []
+            if not any(element.tag == "mesh" for element in document.elements):
+                return mujoco.MjModel.from_xml_string(urdf.text), list(urdf.notes)
+            spec = mujoco.MjSpec.from_string(urdf.text)
+            spec.modelfiledir = str(path.resolve().parent)  # a string alone has its meshes in the current folder
+            return spec.compile(), list(urdf.notes)
     except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(path.name, "", None, f"MuJoCo's parser refuses it: {reason}") from None
+        reason = " ".join(str(error).split()).removesuffix(FUSED_REMARK).rstrip()
+        told = f"MuJoCo's parser refuses it: {reason}{_place(document, reason)}{_remedy(document, reason)}"
+        raise InputError(path.name, "", None, told) from None
 
 
-def _without_shapes(path: Path) -> tuple[str, int]:
-    """Text of a URDF without its shapes, which only contact would need and whose files are often missing."""
-    root, dropped = ElementTree.fromstring(path.read_bytes()), 0
-    for link in root.iter("link"):
-        massive = link.find("inertial") is not None
-        for shape in [each for each in link if each.tag == "visual" or (massive and each.tag == "collision")]:
-            link.remove(shape)
-            dropped += shape.tag == "collision"
-    return ElementTree.tostring(root, encoding="unicode"), dropped
+def _place(document: Document, reason: str) -> str:
+    """Where the element is that a message of MuJoCo's parser names without its line, or with line 0 for an include."""
+    if named := re.search(r"Element name '([^']+)', id \d+(?!.*line)", reason):
+        place = document.line(("link", "joint", "body", "geom", "mesh"), named[1])
+    else:
+        attribute, tag = re.search(r"attribute: '([^']+)'", reason), re.search(r"Element '([^']+)', line 0", reason)
+        place = document.line_of_attribute(tag[1], attribute[1]) if tag and attribute else ""
+    return f" ({place})" if place else ""
 
 
-def check_sane(model: mujoco.MjModel, name: str) -> None:
+def _remedy(document: Document, reason: str) -> str:
+    """What helps against a mistake that a message of MuJoCo's parser tells; "" where that is plain."""
+    said = next((remedy for part, remedy in REMEDIES.items() if part in reason), "")
+    return f". {said.format(place=COMPILER_PLACES[document.kind])}" if said else ""
+
+
+def check_sane(model: mujoco.MjModel, name: str, kind: str = "MJCF") -> None:
     """InputError if nothing can move, or if a number that affects motion is not finite."""
     if not model.nv:
-        raise InputError(name, "", None, "nothing in it can move: it has no joint")
+        stands = "; its first link stands on the world: a joint of type floating, from a link before it, sets it free"
+        allowed = f"nothing in it can move: it has no joint{stands if kind == 'URDF' else ''}"
+        raise InputError(name, "", None, allowed)
     for numbers in NUMBERS_OF_MOTION:
         _check_numbers(model, name, numbers)
     if not np.isfinite(model.opt.gravity).all():

@@ -1,5 +1,7 @@
 """Names of what a compiled model has, of the bodies that stand for its joints, and small readers of its numbers."""
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -9,13 +11,26 @@ from models.vehicles.spatial import FREEDOMS, Freedom, Vector
 ROTATION_NAMES: tuple[Freedom, ...] = ("rx", "ry", "rz")
 OF_KIND: dict[int, tuple[Freedom, ...]] = {BALL_JOINT: ROTATION_NAMES, FREE_JOINT: FREEDOMS}
 """Freedoms of joints that have several."""
+NAMES_SHOWN = 3
+"""Names in a message."""
 CONSTRAINT_FEATURES = ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT")
 
 
+def some_names(names: Sequence[str]) -> str:
+    """The first names, and how many more there are."""
+    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
+    return ", ".join(names[:NAMES_SHOWN]) + more
+
+
 def label(model: mujoco.MjModel, kind: str, number: int) -> str:
-    """Name of a joint, body, tendon or actuator of a file; its number if it has no name."""
-    name: str = getattr(model, kind)(number).name
+    """Name of a joint, body, tendon, actuator or the like of a file; its number if it has no name."""
+    name = name_of(model, kind, number)
     return f"{kind} {name!r}" if name else f"{kind} {number}"
+
+
+def name_of(model: mujoco.MjModel, kind: str, number: int) -> str:
+    """Name alone; "" if there is none."""
+    return mujoco.mj_id2name(model, int(getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")), number) or ""
 
 
 def coordinate_names(model: mujoco.MjModel) -> tuple[str, ...]:

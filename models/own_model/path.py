@@ -18,7 +18,7 @@ from models.engines.free_vehicle import ENGINES, FreeModel, Plain, free_model
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_march import march
 from models.multibody.plain.joint_elements import PlainTree
-from models.own_model.builds import PLAIN_BUILD, SOFT_BUILD, equations_of_build, plain_tree, sliding_states
+from models.own_model.builds import PLAIN_BUILD, SOFT_BUILD, State, equations_of_build, plain_tree, sliding_states
 from models.own_model.content import limits_switched_off
 from models.own_model.control_table import ControlTable, PathSection, constant_leg
 from models.own_model.elements import two_digit_text
@@ -35,6 +35,10 @@ MOST_STEPS = 100_000
 LARGEST_STATE = 1e6
 """m, rad, m/s, rad/s: what lies beyond has blown up."""
 FILE_BUILD_NAME = "the file's own model"
+PIECES = (1.0 / 16.0, 1.0 / 4.0, 1.0)
+"""Shares of a path up to which it is marched at once."""
+STARTS = 20
+"""Random states from which the start of a path is chosen."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,8 @@ class PathReport:
     build from the first one up to there, relative; failed : what stopped a build; has_quaternions : whether the file's
     has them;
     energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy;
-    has_soft_constraints : whether MuJoCo has soft constraints, so that its path is another one: from it the file's is
-    counted then;
+    has_soft_constraints : whether MuJoCo has soft constraints, or dry friction that sticks at the start, so that its
+    path is another one: from it the file's is counted then;
     has_dry_friction : whether there is dry friction: paths are compared as long as it slides; struck_limit : whose
     limit, which is not built, ends the comparison, empty if none's; controls : name of their file, empty where they are
     constant.
@@ -94,7 +98,8 @@ class PathReport:
                 if name == FILE_BUILD_NAME and self.has_quaternions
                 else ""
             )
-            given = " (soft constraints give way)" if name == SOFT_BUILD and self.has_soft_constraints else ""
+            soft = f"soft constraints{' and dry friction that sticks' if self.has_dry_friction else ''} give way"
+            given = f" ({soft})" if name == SOFT_BUILD and self.has_soft_constraints else ""
             first = SOFT_BUILD if name == FILE_BUILD_NAME and self.has_soft_constraints else ENGINES[0]
             rows.append(f"  {name} from {first}: {two_digit_text(size)}{turned}{given}")
         if self.energy is not None:
@@ -126,30 +131,88 @@ def compare_paths(
     """Paths over 1 s; step (s): the file's unless given; table : of controls, which are constant without; told : the
     share that is done. InputError for too many steps."""
     steps = int(np.ceil(PATH_DURATION / step - 1e-9)) if step else steps_of_path(twin)
-    step, (q,), (v,) = PATH_DURATION / steps, *random_states(twin, 1)
+    step, start = PATH_DURATION / steps, start_of_path(twin)
     legs = table.path_sections(twin, steps, step) if table else constant_leg(twin, steps)
-    built, failed = dict[str, np.ndarray](), dict[str, str]()
-    for i, build in enumerate((*ENGINES, PLAIN_BUILD)):
-        _march_build(build, partial(path_by, legs, build, (q, v), step), built, failed)
-        told((i + 1) / (len(ENGINES) + 3))
-    held = np.concatenate([np.tile(leg.controls, (leg.steps, 1)) for leg in legs])
-    _march_build(FILE_BUILD_NAME, lambda: file_path(twin, (q, v), (steps, step), held=held), built, failed)
+    built, failed, under = dict[str, np.ndarray](), dict[str, str](), table.path.name if table else ""
+    _march_build(ENGINES[0], lambda: _path_until_stopped(twin, legs, start, step), built, failed)
+    told(1 / 4)
     first = built.pop(ENGINES[0], None)
-    under = table.path.name if table else ""
     if first is None:
+        _march_others(twin, legs, start, step, built, failed)
         return PathReport(step, 0.0, {}, failed, bool(twin.coordinates.turnings), None, controls=under)
-    soft = twin.driven.tied
-    calm = PLAIN_BUILD if soft and PLAIN_BUILD in built else ENGINES[0]
-    disturbed = path_by(legs, calm, (q + DISTURBANCE, v), step)
-    rows = _sliding_rows(legs, first[: rows_alike(built.get(calm, first), disturbed, steps)])
-    rows, struck = _unlimited_rows(twin, first[:rows])
+    rows, struck = _rows_before_stop(twin, legs, first)
+    soft, legs = twin.driven.tied or not sliding_states(twin, [start]), _sections_between(legs, 0, rows - 1)
+    calm_rows = _rows_undisturbed(legs, PLAIN_BUILD if soft else ENGINES[0], start, step)
+    told(1 / 2)
+    rows, struck = min(rows, calm_rows), struck if rows <= calm_rows else ""
+    first, legs = first[:rows], _sections_between(legs, 0, rows - 1)
+    _march_others(twin, legs, start, step, built, failed)
     base = {FILE_BUILD_NAME: built.get(SOFT_BUILD, first)} if soft else {}
-    distances = {
-        name: _relative_distance(twin, name, base.get(name, first)[:rows], path[:rows]) for name, path in built.items()
-    }
-    energy = _energy_imbalance(legs, first[:rows], step)
+    distances = {name: _relative_distance(twin, name, base.get(name, first), path) for name, path in built.items()}
+    energy = _energy_imbalance(legs, first, step)
     kinds = bool(twin.coordinates.turnings), energy, soft, bool(twin.driven.frictions), struck, under
     return PathReport(step, (rows - 1) * step, distances, failed, *kinds)
+
+
+def _march_others(
+    twin: TwinModel,
+    legs: Sequence[PathSection],
+    start: State,
+    step: float,
+    built: dict[str, np.ndarray],
+    failed: dict[str, str],
+) -> None:
+    """Store the paths of all builds but the first, and of the file's own model."""
+    for build in (*ENGINES[1:], PLAIN_BUILD):
+        _march_build(build, partial(path_by, legs, build, start, step), built, failed)
+    held = np.concatenate([np.tile(leg.controls, (leg.steps, 1)) for leg in legs])
+    _march_build(FILE_BUILD_NAME, lambda: file_path(twin, start, (len(held), step), held=held), built, failed)
+
+
+def _path_until_stopped(twin: TwinModel, legs: Sequence[PathSection], start: State, step: float) -> np.ndarray:
+    """The path of the first build; at constant controls in a few pieces, up to that in which comparison must stop."""
+    steps, path = sum(leg.steps for leg in legs), np.concatenate(start)[None]
+    for share in PIECES if len(legs) == 1 else (1.0,):
+        q, v = np.split(path[-1], 2)
+        piece = _sections_between(legs, len(path) - 1, int(np.ceil(share * steps)))
+        path = np.concatenate((path, path_by(piece, ENGINES[0], (q, v), step)[1:]))
+        if blown_up(path) or _rows_before_stop(twin, legs, path)[0] < len(path):
+            break
+    return path
+
+
+def _rows_before_stop(twin: TwinModel, legs: Sequence[PathSection], path: np.ndarray) -> tuple[int, str]:
+    """Number of states of a path before dry friction sticks or a limit is reached, and whose limit that is."""
+    return _unlimited_rows(twin, path[: _sliding_rows(legs, path)])
+
+
+def _sections_between(legs: Sequence[PathSection], first: int, last: int) -> list[PathSection]:
+    """The sections of a path from one step to another."""
+    sections, done = list[PathSection](), 0
+    for leg in legs:
+        steps = min(last, done + leg.steps) - max(first, done)
+        sections += [leg._replace(steps=steps)] if steps > 0 else []
+        done += leg.steps
+    return sections
+
+
+def _rows_undisturbed(legs: Sequence[PathSection], build: str, start: State, step: float) -> int:
+    """Number of states of a build's path that a small disturbance of its start leaves alike."""
+    steps, (q, v) = sum(leg.steps for leg in legs), start
+    try:
+        with np.errstate(all="ignore"):  # what blows up differs
+            path, disturbed = (path_by(legs, build, (q + change, v), step) for change in (0.0, DISTURBANCE))
+    except RunFailed:
+        return 2
+    return rows_alike(path, disturbed, steps)
+
+
+def start_of_path(twin: TwinModel) -> tuple[np.ndarray, np.ndarray]:
+    """The first random state at which no limit acts and all dry friction slides; if there is none, the first of all."""
+    struck = limits_struck(twin) if limits_switched_off(twin.model) else lambda q: ()
+    first, *more = [*zip(*random_states(twin, 1), strict=True), *zip(*random_states(twin, STARTS), strict=True)]
+    good = (state for state in (first, *more) if not struck(state[0]) and sliding_states(twin, [state]))
+    return next(good, first)
 
 
 def _march_build(
@@ -200,14 +263,16 @@ def file_path(
     held: np.ndarray | None = None,
 ) -> np.ndarray:
     """MuJoCo's own states (steps + 1, nq + n) of the file's model from coordinates and rates (n,), over the number and
-    size of steps in ``grid``; held : controls (steps, nu), constant if not given."""
+    size of steps in ``grid``; held : controls (steps, nu), constant if not given. Actuators that were left out keep
+    their states, which move nothing."""
     (steps, step), model, data = grid, twin.model, mujoco.MjData(twin.model)
     before = model.opt.timestep, model.opt.integrator
     model.opt.timestep, model.opt.integrator = step, INTEGRATORS[integrator]
-    state = twin.coordinates.to_mujoco(*start)
+    state, size = twin.coordinates.to_mujoco(*start), model.nq + model.nv
+    idle = np.zeros(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS) - 1 - size)
     held = np.tile(constant_controls(model), (steps, 1)) if held is None else held
     try:
-        return march(model, data, np.concatenate((state.qpos, state.qvel)), held)
+        return march(model, data, np.concatenate((state.qpos, state.qvel, idle)), held)[:, :size]
     finally:
         model.opt.timestep, model.opt.integrator = before
 

@@ -13,7 +13,7 @@ import numpy as np
 from models.engines.free_vehicle import Driven
 from models.engines.native_parts import BodyLoad, DryFriction, GroundSpring, LineSpring, TurningSpring, joint_parts
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, Coordinates
-from models.own_model.equalities import connections, joint_couplings
+from models.own_model.equalities import connections, joint_couplings, stiffness_and_damping
 from models.own_model.names import (
     OF_KIND,
     body_with_mass,
@@ -107,7 +107,7 @@ def _joint_body(model: mujoco.MjModel, design: mujoco.MjData, j: int, behind: st
 
 def _axes_along(axis: np.ndarray) -> tuple[Vector, Vector, Vector]:
     """Right-handed axes, as rows, of which the first is the given unit vector."""
-    if axis[0] == 1.0:
+    if tuple(axis) == PARALLEL[0]:  # a component of 1 is no proof: others below 1e-8 leave it so
         return PARALLEL
     second = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
     second /= np.linalg.norm(second)
@@ -218,7 +218,8 @@ def dry_frictions(model: mujoco.MjModel) -> Iterator[DryFriction]:
         return
     for j in (j for j in range(model.njnt) if has_dry_friction(model, j)):
         first = int(model.jnt_dofadr[j])
-        yield DryFriction(label(model, "joint", j), first, float(model.dof_frictionloss[first]))
+        softness = stiffness_and_damping(model, model.dof_solref[first], model.dof_solimp[first])
+        yield DryFriction(label(model, "joint", j), first, float(model.dof_frictionloss[first]), *softness)
 
 
 def _along_tendon(model: mujoco.MjModel, tendon: int) -> tuple[tuple, tuple[float, ...], float]:

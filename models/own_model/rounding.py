@@ -86,8 +86,8 @@ def _sums_of_rates(twin: TwinModel, states: Sequence[State]) -> Iterator[np.ndar
             mujoco.mj_jacDot(model, data, shifting, turning, data.xipos[b], b)
             axes = data.ximat[b].reshape(3, 3)
             inertia, rate = axes * model.body_inertia[b] @ axes.T, turns @ data.qvel
-            gyroscopic = np.cross(rate, inertia @ rate)
-            moment = np.linalg.norm(inertia @ (turning @ data.qvel)) + np.linalg.norm(gyroscopic)
+            gyroscopic = np.linalg.norm(rate) * np.linalg.norm(inertia @ rate)  # before an axis cancels it
+            moment = np.linalg.norm(inertia @ (turning @ data.qvel)) + gyroscopic
             force = model.body_mass[b] * np.linalg.norm(shifting @ data.qvel)
             sums += force * np.linalg.norm(shifts, axis=0) + moment * np.linalg.norm(turns, axis=0)
         yield np.abs(state.jacobian).T @ sums

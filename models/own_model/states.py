@@ -7,6 +7,7 @@ from models.core.errors import RunFailed
 from models.own_model.constraints import plain_constraints, satisfying_state
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
 from models.own_model.equalities import tie_rows
+from models.own_model.names import some_names
 from models.own_model.reading import TwinModel
 
 STATE_COUNT = 100
@@ -21,7 +22,9 @@ WAY_SHARES = (1.0, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01)
 """Shares of a random way from the design position, of which the first is taken at which constraints can be met."""
 UNMET_GAP = 1e-9
 """rad, m: gap of couplings that no coordinates satisfy all at once."""
-UNMET_REASON = "constraints cannot be satisfied all at once by coordinates in their ranges"
+UNMET_REASON = (
+    "constraints cannot be satisfied all at once by coordinates in their ranges: {}; try `--without equality`"
+)
 
 
 def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
@@ -53,11 +56,13 @@ def _constrained_states(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[
     middle = np.clip(0.0, low, high)
 
     def nearest(place: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        for share in WAY_SHARES:
-            state = satisfying_state(constraints, middle + share * (place - middle), rate)
-            if state is not None and ((low <= state[0]) & (state[0] <= high)).all():
-                return state
-        raise RunFailed("twin", UNMET_REASON)
+        for ranges in ((-np.inf, np.inf), (low, high)):  # within them alone where the nearest ones lie beyond
+            for share in WAY_SHARES:
+                state = satisfying_state(constraints, middle + share * (place - middle), rate, ranges)
+                if state is not None and ((low <= state[0]) & (state[0] <= high)).all():
+                    return state
+        names = [each.name for each in twin.driven.couplings] + [each.name for each in twin.driven.connections]
+        raise RunFailed("twin", UNMET_REASON.format(some_names(names)))
 
     states = [nearest(*each) for each in zip(q, v, strict=True)]
     return np.array([place for place, _ in states]), np.array([rate for _, rate in states])

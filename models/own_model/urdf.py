@@ -14,6 +14,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.own_model.file import ModelFile
 from models.own_model.names import label
+from models.own_model.urdf_text import parsed_root
 from models.vehicles.spatial import steiner
 
 PARSER_TOLERANCE = 1e-6
@@ -67,7 +68,7 @@ class _Mass:
 
 def misread_numbers(file: ModelFile) -> list[Misread]:
     """Numbers of a URDF that differ in MuJoCo's compiled model, each with both values."""
-    root = ElementTree.fromstring(file.document.path.read_bytes())
+    root = parsed_root(file.document.path.read_bytes())
     model, design = file.twin.model, mujoco.MjData(file.twin.model)
     design.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, design)
@@ -82,7 +83,8 @@ def misread_numbers(file: ModelFile) -> list[Misread]:
 
 def _compared_mass(model: mujoco.MjModel, design: mujoco.MjData, name: str, expected: _Mass) -> list[Misread]:
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-    if body <= 0 or expected.centre is None or expected.inertia is None:
+    stands = body <= 0 or model.body_weldid[body] == 0
+    if stands or expected.centre is None or expected.inertia is None:
         return []
     axes, owner = design.ximat[body].reshape(3, 3), label(model, "body", body)
     tensor = axes * model.body_inertia[body] @ axes.T

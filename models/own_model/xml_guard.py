@@ -1,15 +1,18 @@
 """What a file of a model may ask of the parser, looked at before MuJoCo sees it; nothing in a file is executed.
 
 Refused, with the line: what is no XML, document types and entities, plugins, includes, attached models, meshes and
-pictures outside the file's folder, and counts that no machine could hold.
+pictures outside the file's folder, or that which the user names, and counts that no machine could hold. Of a URDF all
+this is asked of the text that MuJoCo gets (``urdf_text``).
 """
 
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.parsers import expat
 
 from models.core.errors import InputError
+from models.own_model.urdf_text import UrdfText, text_for_mujoco
 
 LARGEST_FILE = 20_000_000
 """Bytes of a file."""
@@ -17,7 +20,9 @@ DEEPEST_INCLUDE = 8
 """Includes within includes."""
 MOST_COPIES = 2000
 """Copies that one element may ask for (replicate, composite, flexcomp): more is a mistake, or an attack."""
-FORMAT_OF_ROOT = {"mujoco": "MJCF", "mujocoinclude": "MJCF", "robot": "URDF"}
+FORMAT_OF_ROOT = {"mujoco": "MJCF", "robot": "URDF"}
+PART_ROOT = "mujocoinclude"
+"""Root of a file that is a part of models, and none itself."""
 PLUGIN_TAGS = ("plugin", "extension")
 ASSETS = {"mesh": "meshdir", "hfield": "meshdir", "texture": "texturedir", "skin": "meshdir"}
 """Elements that name files, by the attribute of <compiler> with the folder of these files."""
@@ -36,11 +41,13 @@ class XmlElement:
 
 @dataclass(frozen=True)
 class Document:
-    """path; kind : "MJCF" or "URDF"; elements : of the file and all that it includes, in their order."""
+    """path; kind : "MJCF" or "URDF"; elements : of the file and all that it includes, in their order; urdf : of a URDF,
+    the text that MuJoCo gets."""
 
     path: Path
     kind: str
     elements: tuple[XmlElement, ...]
+    urdf: UrdfText | None = None
 
     def line(self, tags: tuple[str, ...], name: str) -> str:
         """Position "FILE:LINE" of the first element with one of the tags and the name; "" if there is none."""
@@ -48,6 +55,11 @@ class Document:
             if element.tag in tags and element.attributes.get("name") == name:
                 return f"{element.file}:{element.line}"
         return ""
+
+    def line_of_attribute(self, tag: str, attribute: str) -> str:
+        """Position "FILE:LINE" of the first element of a tag that has an attribute; "" if there is none."""
+        there = (each for each in self.elements if each.tag == tag and attribute in each.attributes)
+        return next((f"{each.file}:{each.line}" for each in there), "")
 
 
 @dataclass
@@ -92,15 +104,26 @@ class _Folders(NamedTuple):
     elements: list[XmlElement]
 
 
-def checked_document(path: Path) -> Document:
-    """The file's elements, after checks; InputError for content that must not reach the parser."""
-    folder, elements = path.resolve().parent, list[XmlElement]()
-    _read_model(path, _Folders(folder, folder, []), elements, 0)
-    root = elements[0].tag
-    if root not in FORMAT_OF_ROOT:
-        allowed = "must be <mujoco> (MJCF) or <robot> (URDF)"
-        raise InputError(path.name, f"line {elements[0].line}", f"<{root}>", allowed)
-    return Document(path, FORMAT_OF_ROOT[root], tuple(elements))
+def checked_document(path: Path, folder: Path | None = None) -> Document:
+    """The file's elements, after checks; InputError for content that must not reach the parser.
+
+    folder : in which all files must lie that the model names; its own if None.
+    """
+    base = path.resolve().parent
+    allowed, elements = base if folder is None else folder.resolve(), list[XmlElement]()
+    if not base.is_relative_to(allowed):
+        raise InputError("--folder", "", str(folder), f"must be a folder that holds {path}")
+    content = _file_content(path)
+    root = _Reader(path).read(content)[0]
+    if root.tag not in FORMAT_OF_ROOT:
+        part = f": <{PART_ROOT}> is a part of other models: give the model that includes it"
+        told = f"must be <mujoco> (MJCF) or <robot> (URDF){part if root.tag == PART_ROOT else ''}"
+        raise InputError(path.name, f"line {root.line}", f"<{root.tag}>", told)
+    urdf = text_for_mujoco(content) if FORMAT_OF_ROOT[root.tag] == "URDF" else None
+    folders = _Folders(allowed, base, [])
+    _read_elements(path, urdf.text.encode() if urdf else content, folders, elements, 0)
+    _check_assets(folders)
+    return Document(path, FORMAT_OF_ROOT[root.tag], tuple(elements), urdf)
 
 
 def _file_content(path: Path) -> bytes:
@@ -114,12 +137,12 @@ def _file_content(path: Path) -> bytes:
 
 def _read_model(path: Path, folders: _Folders, elements: list[XmlElement], depth: int) -> None:
     """Read a model with all that it includes, and look where the files of its meshes and pictures lie."""
-    _read_elements(path, folders, elements, depth)
+    _read_elements(path, _file_content(path), folders, elements, depth)
     _check_assets(folders)
 
 
-def _read_elements(path: Path, folders: _Folders, elements: list[XmlElement], depth: int) -> None:
-    for element in _Reader(path).read(_file_content(path)):
+def _read_elements(path: Path, content: bytes, folders: _Folders, elements: list[XmlElement], depth: int) -> None:
+    for element in _Reader(path).read(content):
         elements.append(element)
         folders.elements.append(element)
         place = f"line {element.line}"
@@ -135,26 +158,44 @@ def _read_included(path: Path, folders: _Folders, element: XmlElement, elements:
     name, place = element.attributes["file"], f"line {element.line}"
     target = (folders.base / name).resolve()
     if not target.is_relative_to(folders.allowed):
-        raise InputError(path.name, place, name, f"<{element.tag}> must name a file in the folder of the model")
+        raise InputError(path.name, place, name, _outside_text(element, folders, target))
+    if not target.is_file():
+        raise InputError(path.name, place, name, f"<{element.tag}> names a file that is not there: {target}")
     if depth >= DEEPEST_INCLUDE:
         raise InputError(path.name, place, name, f"includes go {DEEPEST_INCLUDE} deep at the most")
     if element.tag == "model":
         _read_model(target, _Folders(folders.allowed, target.parent, []), elements, depth + 1)
     else:
-        _read_elements(target, folders, elements, depth + 1)
+        _read_elements(target, _file_content(target), folders, elements, depth + 1)
+
+
+def _outside_text(element: XmlElement, folders: _Folders, target: Path) -> str:
+    """What is allowed in place of a file outside the allowed folder, and the option that allows this file."""
+    both = Path(os.path.commonpath((folders.allowed, target.parent)))
+    option = f"; if all below {both} may be read: `--folder {both}`" if both != Path(both.anchor) else ""
+    return f"<{element.tag}> must name a file in the folder of the model{option}"
 
 
 def _check_assets(folders: _Folders) -> None:
     """InputError for a file of a mesh or a picture outside the allowed folder, in any folder that a <compiler> says."""
     compilers = [element.attributes for element in folders.elements if element.tag == "compiler"]
+    urdf = folders.elements[0].tag == "robot"
+    strips = any(_strips_paths(compiler, urdf) for compiler in compilers or [{}])
     for element in (element for element in folders.elements if element.tag in ASSETS):
         keys = (ASSETS[element.tag], "assetdir")
         within = {compiler[key] for compiler in compilers for key in keys if key in compiler} or {""}
         names = [name for key, name in element.attributes.items() if key.startswith("file")]
+        names = [Path(name).name for name in names] if strips else names
         for path in (Path(folder) / name for name in names for folder in within):
-            if not (folders.base / path).resolve().is_relative_to(folders.allowed):
-                told = f"<{element.tag}> must name a file in the folder of the model"
+            target = (folders.base / path).resolve()
+            if not target.is_relative_to(folders.allowed):
+                told = _outside_text(element, folders, target)
                 raise InputError(element.file, f"line {element.line}", str(path), told)
+
+
+def _strips_paths(compiler: dict[str, str], urdf: bool) -> bool:
+    """Whether MuJoCo takes the last part alone of the names of files, as it does in a URDF unless told otherwise."""
+    return compiler.get("strippath", str(urdf).lower()) == "true"
 
 
 def _check_counts(path: Path, element: XmlElement, place: str) -> None:

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from models.core.errors import InputError
+from models.own_model.builds import sliding_states
 from models.own_model.certificate import (
     CONSTRAINT_GAP,
     EQUAL_ACCELERATION_SHARE,
@@ -19,7 +20,9 @@ from models.own_model.elements import Element, two_digit_text
 from models.own_model.explain import Comparison, compare, removals_that_agree
 from models.own_model.file import ModelFile, read
 from models.own_model.limits import limits_struck
+from models.own_model.names import some_names
 from models.own_model.path import PathReport, compare_paths, steps_of_path
+from models.own_model.reading import TwinModel
 from models.own_model.states import STATE_COUNT
 from models.own_model.two_paths import PathGap, paths_apart
 from models.own_model.urdf import Misread, misread_numbers
@@ -36,13 +39,15 @@ def _tell_nobody(activity: str, share: float) -> None:
 class TwinOptions:
     """Options of the command. states: number of random states at which accelerations are compared; compare_paths:
     whether paths are compared, too; tolerance (rad, m) and quantity of the price, None for no price and for all joints;
-    controls: file of the controls on the paths."""
+    controls: file of the controls on the paths; folder: in which all files must lie that a model names, its own if
+    None."""
 
     states: int = STATE_COUNT
     compare_paths: bool = True
     tolerance: float | None = None
     quantity: str | None = None
     controls: Path | None = None
+    folder: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +131,7 @@ def examine(
     ):
         allowed = "acts on paths of one file alone: leave out --no-paths, --tolerance and other files"
         raise InputError("--controls", "", str(twin_options.controls), allowed)
-    read_files = [read(path, without) for path in files]
+    read_files = [read(path, without, twin_options.folder) for path in files]
     for file in read_files if twin_options.compare_paths else ():
         steps_of_path(file.twin)
     tables = [
@@ -196,13 +201,9 @@ def _constraints(file: ModelFile, state_count: int) -> Iterator[str]:
     beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, state_count)] if file.ignored_limits else []
     if any(beyond):
         names = dict.fromkeys(name for struck in beyond for name in struck)
-        yield f"limits of {', '.join(names)} are not built: some would act at {sum(map(bool, beyond))} of the states"
-    if frictions := twin.driven.frictions:
-        yield (
-            f"dry friction of {len(frictions)} joints: compared at {len(states_of(twin, state_count))} of "
-            f"{state_count} states, at "
-            "which all of them slide, with faster rates where they would not; where they stick, MuJoCo's gives way"
-        )
+        yield f"limits of {some_names(tuple(names))} would act at {sum(map(bool, beyond))} of the states"
+    if twin.driven.frictions:
+        yield _friction_line(twin, state_count)
     if twin.driven.tied:
         kinds = {"couplings of joints": twin.driven.couplings, "joints between bodies": twin.driven.connections}
         constraints_text = " and ".join(f"{len(rows)} {kind}" for kind, rows in kinds.items() if rows)
@@ -211,6 +212,35 @@ def _constraints(file: ModelFile, state_count: int) -> Iterator[str]:
             "ones; soft in "
             f"MuJoCo, where accelerations are {two_digit_text(softness_difference(twin, state_count))} away from that"
         )
+
+
+def _friction_line(twin: TwinModel, count: int) -> str:
+    """Line on dry friction: at how many states builds are compared, and to what each is held."""
+    states = states_of(twin, count)
+    head = (
+        f"dry friction of {counted(len(twin.driven.frictions), 'joint')}: compared at {len(states)} of {count} states"
+    )
+    if sliding_states(twin, states):
+        return (
+            f"{head}, at which all of it slides, with faster rates where it would not; where it sticks, MuJoCo's gives "
+            "way"
+        )
+    return (
+        f"{head}; in MuJoCo it sticks at all of them, however fast, and gives way: MuJoCo's build is held to that, "
+        "Exudyn and the plain equations to the file with Coulomb's law"
+    )
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun, in the plural unless it is 1."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def limited_text(names: Sequence[str]) -> str:
+    """How many joints and tendons have limits that are not built; names : theirs, each with what it is."""
+    sorts = {sort: sum(name.startswith(sort) for name in names) for sort in ("joint", "tendon")}
+    told = " and ".join(counted(number, sort) for sort, number in sorts.items() if number)
+    return f"limits of {told} are not built; states are drawn inside the ranges of joints"
 
 
 def twin_lines(twins: Twins) -> list[str]:
@@ -226,14 +256,11 @@ def verdict_sentence(examined_file: ExaminedFile) -> str:
     """Sentence with the verdict on a file."""
     worst = max(row.acceleration for row in examined_file.agreements)
     if examined_file.misread:
-        return f"MuJoCo's parser made something else of {len(examined_file.misread)} numbers of the file"
+        return f"MuJoCo's parser made something else of {counted(len(examined_file.misread), 'number')} of the file"
     if examined_file.is_certified:
         bound = max(row.bound for row in examined_file.agreements)
-        rounding_text = f"; up to {bound:.0e} may be rounding" if bound > EQUAL_ACCELERATION_SHARE else ""
-        return (
-            f"every build moves as the file does: accelerations differ by {two_digit_text(worst)} at the "
-            f"most{rounding_text}"
-        )
+        said = f"; up to {bound:.0e} may be rounding" if bound > EQUAL_ACCELERATION_SHARE else ""
+        return f"every build moves as the file does: accelerations differ by {two_digit_text(worst)} at the most{said}"
     builds = ", ".join(row.build for row in examined_file.agreements if not row.alike)
     return f"differs in {builds}: accelerations by {two_digit_text(worst)}"
 
@@ -241,8 +268,8 @@ def verdict_sentence(examined_file: ExaminedFile) -> str:
 def _file_lines(examined_file: ExaminedFile) -> list[str]:
     model, twin = examined_file.file.twin.model, examined_file.file.twin
     rows = [
-        f"{examined_file.name}: {examined_file.file.document.kind}, {model.nbody - 1} bodies, {twin.size} coordinates, "
-        f"{model.ntendon} tendons, {model.nu} actuators",
+        f"{examined_file.name}: {examined_file.file.document.kind}, {model.nbody - 1} bodies, "
+        f"{counted(twin.size, 'coordinate')}, {counted(model.ntendon, 'tendon')}, {counted(model.nu, 'actuator')}",
         f"  {verdict_sentence(examined_file)}",
     ]
     for row in examined_file.agreements:
@@ -259,10 +286,7 @@ def _file_lines(examined_file: ExaminedFile) -> list[str]:
     rows += [f"  {lost.sentence()}" for lost in examined_file.misread]
     rows += [f"  left out: {content.line()}" for content in examined_file.file.left_out]
     if examined_file.file.ignored_limits:
-        rows.append(
-            f"  limits not built, states drawn inside the ranges: {len(examined_file.file.ignored_limits)} joints "
-            "and tendons"
-        )
+        rows.append(f"  {limited_text(examined_file.file.ignored_limits)}")
     rows += [f"  {note}" for note in (*examined_file.constraint_lines, *examined_file.file.notes)]
     rows += [f"  {line}" for line in examined_file.path.lines()] if examined_file.path is not None else []
     return rows + [f"  {line}".rstrip() for line in examined_file.price_lines]
