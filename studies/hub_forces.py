@@ -25,7 +25,8 @@ def check(scene: HubScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Measure, run free and with both stabilisers; saves the measurement, all runs and two figures."""
+    """Measure hub forces; run the vehicle free, with the Kalman filter and with prescribed roll and pitch. Saves the
+    measurement, all runs and two figures."""
     from studies.hub_forces_figures import damage_figure, drift_figure
 
     comparison = compare(scene, engines, progress)

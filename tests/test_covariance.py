@@ -44,10 +44,10 @@ def test_quarter_car_has_its_closed_forms_down_to_a_walking_road(corner):
     found = stationary_covariance(vehicle_with_road(quarter_car_vehicle([(0.0, CORNER)]), walk(corner), 20.0))
     q, w = 20.0 * Q, 20.0 * corner
     # the matrices themselves are rounded to 1e-16, which the ratio of height to travel multiplies
-    assert found.variance[0] == pytest.approx(CORNER.body_acceleration(q, w), rel=1e-10)
-    assert found.variance[1] == pytest.approx(CORNER.suspension_travel(q, w), rel=1e-10)
+    assert found.variance[0] == pytest.approx(CORNER.body_acceleration_variance(q, w), rel=1e-10)
+    assert found.variance[1] == pytest.approx(CORNER.suspension_travel_variance(q, w), rel=1e-10)
     if corner == 0.0:
-        assert found.variance[2] == pytest.approx(CORNER.tyre_deflection(q), rel=1e-10)
+        assert found.variance[2] == pytest.approx(CORNER.tyre_deflection_variance(q), rel=1e-10)
         assert found.status[3] == DIFFUSING
         assert (found.rate[3], found.power[3]) == (pytest.approx(q, rel=1e-9), 1)  # the body walks with the road
 

@@ -216,7 +216,7 @@ def test_absent_files_tracks_and_positions_are_named(tmp_path, good_bytes):
     path = tmp_path / "road.crg"
     path.write_bytes(good_bytes["KDBI"])
     assert "did you mean 'left'" in refusal(path, track="lefft")
-    assert "= 1.75: the file covers v = -1 to 1 m" in refusal(path, track="left", offset=1.0)
+    assert "= 1.75: the file covers v = -1 to 1 m" in refusal(path, track="left", lateral_offset=1.0)
 
 
 @pytest.mark.parametrize(("length", "increment"), [(1.0, 0.0), (1.0, 5e-4), (1.05, 0.1), (0.2, 0.1), (np.nan, 0.1)])

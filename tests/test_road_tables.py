@@ -66,7 +66,7 @@ def test_files_without_a_table_are_refused(tmp_path, text):
 
 def test_too_few_rows_and_missing_files_are_refused(tmp_path):
     with pytest.raises(InputError, match="rows = 2: at least 4"):
-        read(tmp_path, GOOD, least=4)
+        read(tmp_path, GOOD, least_rows=4)
     with pytest.raises(InputError, match="No such file"):
         tables.read_table(tmp_path / "absent.csv", FORCES)
     with pytest.raises(InputError, match="cannot be read"):

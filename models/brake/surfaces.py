@@ -42,8 +42,8 @@ class OnRoad(NamedTuple):
 
 
 class Surfaces(NamedTuple):
-    """Surfaces under the wheels, each (W,): two tyre tables and the share of the second; lag: tan of a slip angle that
-    lags behind the motion of the wheel, not a number where none does."""
+    """Surface under each wheel, arrays (W,): numbers of two tyre tables, and the share of the second; lag: tan of the
+    slip angle that lags behind the motion of the wheel, NaN for a tyre without lag."""
 
     first: np.ndarray
     second: np.ndarray

@@ -91,7 +91,7 @@ def distance_integral(distance, rate, decay, time):
 
 
 @lean
-def slip_at_node(k, slips):
+def slip_at_table_node(k, slips):
     """Slip at node k; for a negative k, minus the slip at node -k."""
     return slips[k] if k >= 0 else -slips[-k]
 
@@ -119,7 +119,7 @@ def roll(slip, remaining, kappa, fade, brake_force, grip):
         cell = -cell - 1
     low, high = node_force(cell, grip), node_force(cell + 1, grip)
     for _ in range(MOST_PIECES):
-        bottom, top = slip_at_node(cell, slips), slip_at_node(cell + 1, slips)
+        bottom, top = slip_at_table_node(cell, slips), slip_at_table_node(cell + 1, slips)
         slope = (high - low) / (top - bottom)
         rate = kappa * (brake_force - high - slope * (slip - top)) + (1.0 - slip) * fade
         target, turn = (top, 1) if rate > 0.0 else (bottom, -1)

@@ -56,9 +56,9 @@ MISSING = {("exudyn", "DVERK6"): "DVERK6 is named but not implemented in Exudyn;
 """Integrators that an engine names and does not have, with what to say to who asks for one."""
 
 ADAPTIVE = {
-    engine: tuple(name for name, own in methods.items() if own.adaptive and (engine, name) not in MISSING)
+    engine: tuple(name for name, known in methods.items() if known.adaptive and (engine, name) not in MISSING)
     for engine, methods in CATALOGUE.items()
-    if any(own.adaptive for own in methods.values())
+    if any(known.adaptive for known in methods.values())
 }
 """Integrators that pick their own steps, of the engines that have some."""
 

@@ -79,5 +79,5 @@ def error_bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorMo
     predicted = problem.predicted(values)
     slopes = problem.jacobian(values, problem.predicted)
     variance = np.einsum("cnp,pq,cnq->cn", slopes, uncertainty.covariance, slopes)
-    own = np.array([model.half_width(row) for model, row in zip(errors, predicted, strict=True)])
-    return Bands(problem, predicted, np.sqrt(own**2 + NORMAL_QUANTILE**2 * np.clip(variance, 0.0, None)))
+    model_half_widths = np.array([model.half_width(row) for model, row in zip(errors, predicted, strict=True)])
+    return Bands(problem, predicted, np.sqrt(model_half_widths**2 + NORMAL_QUANTILE**2 * np.clip(variance, 0.0, None)))

@@ -58,8 +58,8 @@ class Timing:
 
 
 def sample_timing(times: np.ndarray, place: str, signal_names: tuple[str, ...] = ()) -> Timing:
-    """Times of samples (n,) given in the order of the file at ``place``; InputError where fewer than two times
-    differ."""
+    """``Timing`` of sample times (n,) as the file at ``place`` gives them: rising times, their order in the file, the
+    period, findings. InputError where fewer than two times differ."""
     has_no_time = _no_times(times)
     if has_no_time.any():
         timing, first = sample_timing(times[~has_no_time], place, signal_names), int(np.argmax(has_no_time))

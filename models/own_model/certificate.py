@@ -174,14 +174,14 @@ def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -
 def agreement_of_build(build: str, expected: Reference, seen: Sequence[Moved]) -> Agreement:
     """Largest differences between a build and the reference over all states."""
     rows = [_scales_at_state(expected, i) for i in range(len(seen))]
-    own, rounding = (Moved(*map(np.array, zip(*each, strict=True))) for each in zip(*rows, strict=True))
+    magnitudes, rounding = (Moved(*map(np.array, zip(*each, strict=True))) for each in zip(*rows, strict=True))
     apart = Moved(*(np.abs(np.array(there) - np.array(here)) for there, here in _paired_values(seen, expected.moved)))
     mass, force, shares = (
         np.where(d > 0.0, d / np.maximum(np.maximum(a, r / EQUAL_ACCELERATION_SHARE), SMALLEST_FLOAT), 0.0)
-        for d, a, r in zip(apart, own, rounding, strict=True)
+        for d, a, r in zip(apart, magnitudes, rounding, strict=True)
     )
     at, i = np.unravel_index(np.argmax(np.nan_to_num(shares, nan=np.inf)), shares.shape)
-    bound = _may_be_rounding(own, rounding.acceleration)
+    bound = _may_be_rounding(magnitudes, rounding.acceleration)
     sizes = (float(apart.acceleration[at, i]), float(np.abs(expected.moved[at].acceleration[i])))
     return Agreement(
         build,
@@ -194,11 +194,11 @@ def agreement_of_build(build: str, expected: Reference, seen: Sequence[Moved]) -
     )
 
 
-def _may_be_rounding(own: Moved, rounding: np.ndarray) -> float:
+def _may_be_rounding(magnitudes: Moved, rounding: np.ndarray) -> float:
     """Largest ratio of the rounding (s, n) to the largest acceleration of a coordinate, from 1e-10 to 1, which is all
     of it; coordinates that hardly move are left out."""
-    largest, allowed = own.acceleration.max(axis=0), rounding.max(axis=0)
-    weighted = largest * np.sqrt(np.diagonal(own.mass, axis1=1, axis2=2).max(axis=0))
+    largest, allowed = magnitudes.acceleration.max(axis=0), rounding.max(axis=0)
+    weighted = largest * np.sqrt(np.diagonal(magnitudes.mass, axis1=1, axis2=2).max(axis=0))
     moves = weighted > HARDLY_MOVING_SHARE * weighted.max()
     return min(1.0, max(EQUAL_ACCELERATION_SHARE, float((allowed[moves] / largest[moves]).max(initial=0.0))))
 
@@ -221,9 +221,9 @@ def _scales_at_state(expected: Reference, state: int) -> tuple[Moved, Moved]:
     inertia = np.sqrt(np.maximum(moved.mass.diagonal(), 0.0))
     force, acceleration = (np.abs(each) for each in (moved.force, moved.acceleration))
     acceleration = np.array([acceleration[together].max() for together in expected.judged_together])
-    own = Moved(np.outer(inertia, inertia), force, acceleration)
+    magnitudes = Moved(np.outer(inertia, inertia), force, acceleration)
     allowed = ROUNDING_SHARE * min(1.0, WORST_CONDITION / _scaled_condition(moved.mass))
-    return own, Moved(*(allowed * each for each in sensitive))
+    return magnitudes, Moved(*(allowed * each for each in sensitive))
 
 
 def _scaled_condition(mass: np.ndarray) -> float:

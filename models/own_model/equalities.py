@@ -87,7 +87,7 @@ def _frames_of_ends(model: mujoco.MjModel, design: mujoco.MjData, equality: int)
         points, axes = points[::-1], [rotation_of(data[6:10]), np.eye(3)]
     turns = [design.xmat[b].reshape(3, 3) for b in things]
     places = [design.xpos[b] + turn @ point for b, turn, point in zip(things, turns, points, strict=True)]
-    return [(place, turn @ own) for place, turn, own in zip(places, turns, axes, strict=True)]
+    return [(place, turn @ axis) for place, turn, axis in zip(places, turns, axes, strict=True)]
 
 
 def tie_rows(ties: Sequence[Coupling], size: int) -> tuple[np.ndarray, np.ndarray]:

@@ -26,18 +26,18 @@ class QuarterCar:
         """Mass of body and wheel together, kg."""
         return self.m_s + self.m_u
 
-    def body_acceleration(self, q: float, corner: float = 0.0) -> float:
+    def body_acceleration_variance(self, q: float, corner: float = 0.0) -> float:
         """Variance of the body's acceleration, m^2/s^4; q : intensity of the road, m^2/s."""
         s, u, k, c, t, w = self.m_s, self.m_u, self.k, self.c, self.k_t, corner
         top = c**3 * t * w + c**2 * k * t + c**2 * t * s * w**2 + c * k**2 * self.mass * w + k**3 * self.mass
         return q * t / (2 * c * s**2) * (top + k**2 * s * u * w**2) / self._common(w)
 
-    def suspension_travel(self, q: float, corner: float = 0.0) -> float:
+    def suspension_travel_variance(self, q: float, corner: float = 0.0) -> float:
         """Variance of the suspension travel, body height less wheel height, m^2."""
         slow = self.mass * (self.c * corner + self.k) + self.m_s * self.m_u * corner**2
         return q * self.k_t / (2 * self.c) * slow / self._common(corner)
 
-    def tyre_deflection(self, q: float) -> float:
+    def tyre_deflection_variance(self, q: float) -> float:
         """Variance of the tyre deflection, wheel height less road height, m^2, on a random-walk road; times k_t^2, that
         of the wheel load."""
         s, u, k, c, t, m = self.m_s, self.m_u, self.k, self.c, self.k_t, self.mass
@@ -71,7 +71,7 @@ def half_car_acceleration(corner: QuarterCar, q: float, a: float, b: float, spee
     factor.
     """
     base = a + b
-    at_axle = corner.body_acceleration(q)
+    at_axle = corner.body_acceleration_variance(q)
     delayed_correlation = corner.correlation_of_acceleration(q, base / speed)
     return ((a**2 + b**2) * at_axle + 2 * a * b * delayed_correlation) / base**2
 

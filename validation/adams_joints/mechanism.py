@@ -148,16 +148,16 @@ class _Reading:
         body_part = self.part
         centre = self.marker(body_part, body_part.whole("CM"))
         ixx, iyy, izz, ixy, ixz, iyz = body_part.numbers("IP", (0.0,) * 6)
-        own = np.array([[ixx, -ixy, -ixz], [-ixy, iyy, -iyz], [-ixz, -iyz, izz]])
+        inertia_at_marker = np.array([[ixx, -ixy, -ixz], [-ixy, iyy, -iyz], [-ixz, -iyz, izz]])
         mass = float(body_part.numbers("MASS", (0.0,))[0])
-        if mass <= 0.0 or np.linalg.eigvalsh(own)[0] <= 0.0:
+        if mass <= 0.0 or np.linalg.eigvalsh(inertia_at_marker)[0] <= 0.0:
             raise body_part.refuse("", None, "must have a mass and a positive inertia")
         kind, (ground, body), length = self._joint(centre)
         gravity = [sum(float(g.numbers(f"{axis}GRAV", (0.0,))[0]) for g in self.named("ACCGRAV")) for axis in "IJK"]
         return Mechanism(
             mass=mass,
             centre=centre.place,
-            inertia=centre.axes @ own @ centre.axes.T,
+            inertia=centre.axes @ inertia_at_marker @ centre.axes.T,
             axes=centre.axes,
             gravity=np.array(gravity),
             kind=kind,

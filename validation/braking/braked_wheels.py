@@ -62,7 +62,7 @@ class MovedVehicle(RollingTruck):
         return status == AT_REST and bool(np.isfinite(self.state).all() and np.isfinite(self.turning).all())
 
     @property
-    def rims(self) -> float:
+    def first_wheel_slip(self) -> float:
         """Slip magnitude of the first wheel: |ratio of rim speed to vehicle speed - 1|."""
         return float(abs(self.plane.radius[0] * self.turning[0] / self.state[1, 0] - 1.0))
 
@@ -172,7 +172,7 @@ def backwards_spin_error(implementation: str, folder: Path) -> float:
     after 0.5 s."""
     wheel = MovedVehicle(implementation, QUARTER.plane, DRY, rim_turning=-10.0)
     wheel.under(np.zeros((101, 1)), 5e-3)
-    return wheel.rims
+    return wheel.first_wheel_slip
 
 
 def released_brake_error(implementation: str, folder: Path) -> float:
@@ -180,7 +180,7 @@ def released_brake_error(implementation: str, folder: Path) -> float:
     vehicle speed 0.6 s later."""
     wheel = MovedVehicle(implementation, QUARTER.plane, ICE, rim_turning=0.0)
     wheel.under(np.where(np.arange(161) < 40, 2e4, 0.0)[:, None], 5e-3)
-    return wheel.rims
+    return wheel.first_wheel_slip
 
 
 def on_the_line(implementation: str, folder: Path) -> float:

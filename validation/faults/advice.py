@@ -245,13 +245,13 @@ FAULTS = (
         "recommendation",
         _in_module(
             "_timed_settings",
-            lambda real: lambda search: [one for one in real(search) if not one.tried.setting.default],
+            lambda real: lambda search: [timed for timed in real(search) if not timed.tried.setting.default],
         ),
     ),
     CampaignFault(
         "the default kept whatever it costs",
         "recommendation",
-        _in_module("_is_slower", lambda _: lambda one, best: False),
+        _in_module("_is_slower", lambda _: lambda rival, best: False),
     ),
     CampaignFault(
         "judged over the part that is searched alone",

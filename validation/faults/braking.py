@@ -171,13 +171,13 @@ def _force_of_step_start(original: Any) -> Any:
     return stop
 
 
-def _tables_patch(stacked_tables: Callable[[np.ndarray], np.ndarray]) -> Patch:
+def _tables_patch(changed_friction: Callable[[np.ndarray], np.ndarray]) -> Patch:
     def stacked(original: Any) -> Any:
-        return lambda tables: (
-            lambda stacked_tables: stacked_tables._replace(
-                mu_x=np.ascontiguousarray(stacked_tables(stacked_tables.mu_x))
-            )
-        )(original(tables))
+        def with_changed_friction(tables: Any) -> Any:
+            made = original(tables)
+            return made._replace(mu_x=np.ascontiguousarray(changed_friction(made.mu_x)))
+
+        return with_changed_friction
 
     return attribute_patch("models.tyre.tyre_table:stacked_tables", stacked)
 
@@ -212,11 +212,11 @@ FAULTS = (
     CampaignFault("roll transfer with the other sign", "vehicle", _truck_patch(by_y=np.negative)),
     CampaignFault("left and right swapped", "vehicle", _truck_patch(place=lambda p: p * np.array([1.0, -1.0]))),
     CampaignFault("track halved", "vehicle", _truck_patch(place=lambda p: p * np.array([1.0, 0.5]))),
-    CampaignFault("yaw inertia 1 % too large", "vehicle", _truck_patch(inertias=lambda own: 1.01 * own)),
+    CampaignFault("yaw inertia 1 % too large", "vehicle", _truck_patch(inertias=lambda inertia: 1.01 * inertia)),
     CampaignFault(
         "height of the centre of mass 1 % too large",
         "vehicle",
-        _truck_patch(by_x=lambda own: 1.01 * own, by_y=lambda own: 1.01 * own),
+        _truck_patch(by_x=lambda transfer: 1.01 * transfer, by_y=lambda transfer: 1.01 * transfer),
     ),
     CampaignFault("spin inertia 1 % too large", "wheel", _spin_inertia_patch(1.01)),
     CampaignFault(
@@ -228,17 +228,21 @@ FAULTS = (
         "conversion with a bit less", "port", attribute_patch("models.brake.port.sensors:Channels", _one_bit_less)
     ),
     CampaignFault("front and rear swapped", "vehicle", _truck_patch(place=lambda p: p * np.array([-1.0, 1.0]))),
-    CampaignFault("hysteresis without a width", "brake", _brakes_patch(lambda own: own._replace(release=own.push_out))),
+    CampaignFault(
+        "hysteresis without a width", "brake", _brakes_patch(lambda brake: brake._replace(release=brake.push_out))
+    ),
     CampaignFault(
         "hysteresis reversed",
         "brake",
-        _brakes_patch(lambda own: own._replace(release=own.push_out, push_out=own.release)),
+        _brakes_patch(lambda brake: brake._replace(release=brake.push_out, push_out=brake.release)),
     ),
     CampaignFault(
-        "push-out pressure ignored", "brake", _brakes_patch(lambda own: own._replace(push_out=0.0 * own.push_out))
+        "push-out pressure ignored", "brake", _brakes_patch(lambda brake: brake._replace(push_out=0.0 * brake.push_out))
     ),
     CampaignFault(
-        "falling pressure by the rising gradient", "brake", _brakes_patch(lambda own: own._replace(falling=own.rising))
+        "falling pressure by the rising gradient",
+        "brake",
+        _brakes_patch(lambda brake: brake._replace(falling=brake.rising)),
     ),
     CampaignFault("friction read one node late", "tyre", _tables_patch(lambda mu: np.roll(mu, 1, axis=3) * (mu > 0.0))),
     CampaignFault("friction 1 % too large", "tyre", _tables_patch(lambda mu: 1.01 * mu)),

@@ -158,14 +158,15 @@ FAULTS = (
         "choice of linear scenes",
         attribute_patch(
             f"{LINEAR_MODULES}.choose:Chooser.confirmed_changes",
-            lambda real: lambda own, chosen: own.predicted_changes(chosen),
+            lambda real: lambda chooser, chosen: chooser.predicted_changes(chosen),
         ),
     ),
     CampaignFault(
         "confirmed against itself",
         "choice of linear scenes",
         attribute_patch(
-            f"{LINEAR_MODULES}.choose:Chooser.confirmed_changes", lambda real: lambda own, chosen: 0.0 * own.full[0]
+            f"{LINEAR_MODULES}.choose:Chooser.confirmed_changes",
+            lambda real: lambda chooser, chosen: 0.0 * chooser.full[0],
         ),
     ),
     CampaignFault(
@@ -176,14 +177,16 @@ FAULTS = (
     CampaignFault(
         "parameters that are off taken as they stand",
         "choice of linear scenes",
-        attribute_patch(f"{LINEAR_MODULES}.choose:Chooser.off", lambda real: lambda own, chosen: own.between(chosen)),
+        attribute_patch(
+            f"{LINEAR_MODULES}.choose:Chooser.off", lambda real: lambda chooser, chosen: chooser.between(chosen)
+        ),
     ),
     CampaignFault(
         "predictions reported as confirmed",
         "choice by runs",
         attribute_patch(
             f"{RUN_MODULES}.choose:Chooser.confirm",
-            _unconfirmed_report(lambda own, chosen, times: own.told(chosen, times)),
+            _unconfirmed_report(lambda chooser, chosen, times: chooser.told(chosen, times)),
         ),
     ),
     CampaignFault(
@@ -191,7 +194,7 @@ FAULTS = (
         "choice by runs",
         attribute_patch(
             f"{RUN_MODULES}.choose:Chooser.confirm",
-            _unconfirmed_report(lambda own, *_: np.zeros(len(own.whole.quantities))),
+            _unconfirmed_report(lambda chooser, *_: np.zeros(len(chooser.whole.quantities))),
         ),
     ),
     CampaignFault(
@@ -202,7 +205,7 @@ FAULTS = (
         "screen by runs",
         attribute_patch(
             f"{RUN_MODULES}.screen:Screen.relative_changes",
-            lambda real: lambda own, change: np.full(len(own.quantities), real(own, change).min()),
+            lambda real: lambda screen, change: np.full(len(screen.quantities), real(screen, change).min()),
         ),
     ),
 )

@@ -131,8 +131,8 @@ def _turning_body() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
     return sensor_array(SENSOR_PLACES), in_space(np.array(list(SENSOR_PLACES.values())), felt, w, alpha), pitch, heave
 
 
-def _motion_errors() -> float:
-    """Errors of the rates and the vertical acceleration of this body that are computed from the readings."""
+def _recovered_motion_error() -> float:
+    """Larger relative error of the rates and the vertical acceleration of this body, recovered from the readings."""
     array, read, _, heave = _turning_body()
     moved_body = body.recovered_motion(array, read, SAMPLE_PERIOD, body.StartState(rates=(0.0, 0.6, 0.0)))
     rate = 0.6 * np.cos(2 * SAMPLE_PERIOD * np.arange(SAMPLE_COUNT))
@@ -171,7 +171,7 @@ CHECKS = {
     "clock": Check("sines of two rates onto one clock", "of the amplitude", 1e-3, _resampling_error),
     "gap": Check("numbers within a gap", "samples", 0.5, _points_in_gap),
     "sections": Check("forces along a turned body", "of the largest", 1e-12, _section_force_error),
-    "motion": Check("rate and acceleration from accelerometers", "of the largest", 1e-4, _motion_errors),
+    "motion": Check("rate and acceleration from accelerometers", "of the largest", 1e-4, _recovered_motion_error),
     "rigid": Check("a rigid body is found rigid", "share", 1e-9, _unexplained_share),
     "road": Check("variance of a road of class C", "relative", 1e-9, _road),
     "levels": Check("two-sided level of class C", "relative", 1e-9, _road_level_error),
@@ -240,7 +240,7 @@ FAULTS = (
         "deviation for variance",
         "noise",
         attribute_patch(
-            "models.core.noise:normal_block", lambda real: lambda *own, **rows: real(*own, **rows) * 2.0**0.5
+            "models.core.noise:normal_block", lambda real: lambda *path, **rows: real(*path, **rows) * 2.0**0.5
         ),
     ),
     CampaignFault(
@@ -252,10 +252,16 @@ FAULTS = (
         ),
     ),
     CampaignFault(
-        "residue counted as whole cycles", "counting", _change_rainflow(lambda own: (own[0], own[1], np.ceil(own[2])))
+        "residue counted as whole cycles",
+        "counting",
+        _change_rainflow(lambda cycles: (cycles[0], cycles[1], np.ceil(cycles[2]))),
     ),
-    CampaignFault("residue lost", "counting", _change_rainflow(lambda own: (own[0], own[1], np.floor(own[2])))),
-    CampaignFault("amplitude for range", "counting", _change_rainflow(lambda own: (own[0] / 2.0, own[1], own[2]))),
+    CampaignFault(
+        "residue lost", "counting", _change_rainflow(lambda cycles: (cycles[0], cycles[1], np.floor(cycles[2])))
+    ),
+    CampaignFault(
+        "amplitude for range", "counting", _change_rainflow(lambda cycles: (cycles[0] / 2.0, cycles[1], cycles[2]))
+    ),
     CampaignFault(
         "pairs beyond a range, not from it on",
         "counting",
@@ -278,7 +284,7 @@ FAULTS = (
         "clock",
         attribute_patch(
             "models.measured.resampling:_unknown_points",
-            lambda real: lambda times, *own: np.zeros(7, dtype=bool) if len(times) < 100 else real(times, *own),
+            lambda real: lambda times, *others: np.zeros(7, dtype=bool) if len(times) < 100 else real(times, *others),
         ),
     ),
     CampaignFault(

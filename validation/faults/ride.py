@@ -57,7 +57,7 @@ def _closed_form() -> float:
     road = Excitation(np.array([[-corner]]), np.array([[q**0.5]]), (np.ones((1, 1)),), (0.0,))
     variance = stationary_covariance(_system("quarter_car", lambda vehicle: road)[2]).variance[0]
     car = QuarterCar(297.15222009894956, 31.8960913028392, 24453.137879749014, 1786.2441002440723, 158294.1398119115)
-    return largest_relative_error(variance, car.body_acceleration(q * SPEED, corner * SPEED))
+    return largest_relative_error(variance, car.body_acceleration_variance(q * SPEED, corner * SPEED))
 
 
 @cache
@@ -246,17 +246,17 @@ FAULTS = (
     CampaignFault(
         "noise without the root of the speed",
         "road",
-        _excited_patch(lambda own, v: replace(own, B=tuple(b / v**0.5 for b in own.B))),
+        _excited_patch(lambda road, v: replace(road, B=tuple(b / v**0.5 for b in road.B))),
     ),
     CampaignFault(
         "noise with the speed, not its root",
         "road",
-        _excited_patch(lambda own, v: replace(own, B=tuple(b * v**0.5 for b in own.B))),
+        _excited_patch(lambda road, v: replace(road, B=tuple(b * v**0.5 for b in road.B))),
     ),
     CampaignFault(
         "delay by the speed in km/h",
         "road",
-        _excited_patch(lambda own, v: replace(own, delays=tuple(tau / 3.6 for tau in own.delays))),
+        _excited_patch(lambda road, v: replace(road, delays=tuple(tau / 3.6 for tau in road.delays))),
     ),
     CampaignFault(
         "rear wheels on the front track", "road", attribute_patch("models.road.two_track:_height_row", _on_front_track)
@@ -266,7 +266,7 @@ FAULTS = (
         "road",
         attribute_patch(
             "models.road.two_track:road_of_level",
-            lambda real: lambda y, level=two_track.TRACK_DENSITY_LEVEL, **own: real(y, 2.0 * level, **own),
+            lambda real: lambda y, level=two_track.TRACK_DENSITY_LEVEL, **others: real(y, 2.0 * level, **others),
         ),
     ),
     CampaignFault("a and b swapped", "vehicle", _vehicle(_mirrored_body)),
@@ -277,7 +277,7 @@ FAULTS = (
     CampaignFault(
         "tyre stiffness per axle for per wheel",
         "vehicle",
-        _vehicle(lambda own: replace(own, tyres=tuple(replace(t, stiffness=2 * t.stiffness) for t in own.tyres))),
+        _vehicle(lambda car: replace(car, tyres=tuple(replace(t, stiffness=2 * t.stiffness) for t in car.tyres))),
     ),
     CampaignFault(
         "Wk: upward step turned round", "weighting", attribute_patch("validation.faults.ride:WEIGHTINGS", _wrong_wk)

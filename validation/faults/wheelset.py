@@ -98,7 +98,8 @@ def _friction() -> float:
 
 
 def _spin_and_load_at_rest() -> float:
-    """Errors of the spin and the carried load at rest."""
+    """Larger relative error of the speed of turning, -V / r, and of the carried load, of a wheelset that rolls in the
+    middle of the track."""
     rest_state = equations().rest
     report = _contact_report(rest_state)
     vertical_force = report["load"] * np.cos(report["angle"]) - report["fy"] * np.sin(report["angle"])

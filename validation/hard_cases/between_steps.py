@@ -137,8 +137,8 @@ REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 CASES = (
     *(
-        Case(name, hard, "fails, and says when", "", 0.0, "exact", wheelset(**own), RAISED)
-        for name, hard, own in (
+        Case(name, hard, "fails, and says when", "", 0.0, "exact", wheelset(**changes), RAISED)
+        for name, hard, changes in (
             ("suspension of 1e9 N/m on rails", "ten steps for a swing, which dies of them", {"stiffness_y": 1e9}),
             (
                 "suspension of 1e9 N/m, yawed",

@@ -37,7 +37,8 @@ def built_wheelset(
 
 
 def displaced_state(equations: Equations, **values: float) -> np.ndarray:
-    """State at rest, displaced by values for the states named in ``equations``."""
+    """State of equilibrium, to which each value is added at the index that has its name in ``models.rail.equations``,
+    as Y."""
     state = equations.rest.copy()
     for name, value in values.items():
         state[getattr(eq, name)] += value

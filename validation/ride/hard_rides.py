@@ -45,7 +45,8 @@ def closed_form(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car
             worst = max(
                 worst,
                 largest_relative_error(
-                    covariance.variance[:2], [exact.body_acceleration(q, w), exact.suspension_travel(q, w)]
+                    covariance.variance[:2],
+                    [exact.body_acceleration_variance(q, w), exact.suspension_travel_variance(q, w)],
                 ),
             )
         return worst

@@ -135,8 +135,8 @@ class March:
         late, by_noises = {}, self.filters.by_noises(gains)
         for pair in self.filters.pairs:
             density = alias_weights * pair.density(speeds, waves.ravel()).reshape(waves.shape)
-            own, shared = pair_factors(by_noises, pair, road.independent)
-            total = total + (density.sum(axis=0)[:, None] * own).real
+            axle_factor, shared = pair_factors(by_noises, pair, road.independent)
+            total = total + (density.sum(axis=0)[:, None] * axle_factor).real
             for (i, j), met in shared.items():
                 length = road.lengths[i] - road.lengths[j]
                 if length not in late:

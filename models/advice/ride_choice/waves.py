@@ -122,8 +122,8 @@ def pair_factors(
     """
     first, second = (gains[corner] for corner in axle_pair.corners)
     axles = range(len(first))
-    own = sum(_noise_product(first[i], second[i]) for i in axles)
-    return np.asarray(own), {} if all_independent else {
+    axle_factor = sum(_noise_product(first[i], second[i]) for i in axles)
+    return np.asarray(axle_factor), {} if all_independent else {
         (i, j): 2.0 * _noise_product(first[i], second[j]) for i, j in combinations(axles, 2)
     }
 
@@ -151,8 +151,8 @@ def variances(
     by_noises = filters.by_noises(gains)
     for pair in filters.pairs:
         density = pair.density(speeds, omega)
-        own, shared = pair_factors(by_noises, pair, excitation.independent)
-        total += (density @ own).real if np.iscomplexobj(density) else density @ own.real
+        axle_factor, shared = pair_factors(by_noises, pair, excitation.independent)
+        total += (density @ axle_factor).real if np.iscomplexobj(density) else density @ axle_factor.real
         for (i, j), met in shared.items():
             length = excitation.lengths[i] - excitation.lengths[j]
             if length not in late:

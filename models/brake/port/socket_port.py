@@ -102,14 +102,14 @@ def _received_bytes(received: bytes) -> str:
 
 
 @contextmanager
-def listening_socket(address: int = 0) -> Iterator[socket.socket]:
+def listening_socket(port_number: int = 0) -> Iterator[socket.socket]:
     """A socket that waits for a controller at a port of this machine (0 for any free port); raises InputError."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as server:
         server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            server.bind((LOOPBACK_ADDRESS, address))
+            server.bind((LOOPBACK_ADDRESS, port_number))
         except OSError as error:
-            raise InputError("", "port", address, f"cannot be listened on: {error.strerror}") from None
+            raise InputError("", "port", port_number, f"cannot be listened on: {error.strerror}") from None
         server.listen(1)
         yield server
 

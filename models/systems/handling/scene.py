@@ -68,7 +68,7 @@ class RoadTable(Strict):
 
 
 class RunTable(Strict):
-    """[run]."""
+    """[run]: the step, and which forces are compiled."""
 
     step: float = quantity(
         "s", "of Runge-Kutta 4 in every engine, or from row to row and the longest of [engines.NAME]", default=1e-3

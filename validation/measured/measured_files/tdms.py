@@ -82,7 +82,7 @@ def beside_old_index(folder: Path) -> Path:
     return TDMS(folder)
 
 
-def one(name: str, values: Any, **properties: Any) -> tuple[str, str, Any, dict[str, Any]]:
+def channel_named(name: str, values: Any, **properties: Any) -> tuple[str, str, Any, dict[str, Any]]:
     """A channel with the usual clock: group, name, values, properties."""
     return "g", name, values, CLOCK | properties
 
@@ -101,7 +101,7 @@ REFUSED: Files = {
     "TDMS cut in its first lead-in": ("not a segment is whole", altered(TDMS, lambda data: data[:20]), "cut off"),
     "TDMS cut in a description": ("channels without samples", changed(0, b"", 60), "cut off"),
     "TDMS with another beginning": (
-        "one letter is wrong",
+        "channel_named letter is wrong",
         altered(TDMS, lambda data: patched(data, 0, b"tDSm")),
         "no known format",
     ),
@@ -125,23 +125,23 @@ REFUSED: Files = {
     "TDMS without a clock": ("no increment and no channel of times", channels(("g", "Fz", FZ, {})), "no clock"),
     "TDMS with an increment below zero": (
         "time runs backwards",
-        channels(one("Fz", FZ, wf_increment=-SAMPLE_PERIOD)),
+        channels(channel_named("Fz", FZ, wf_increment=-SAMPLE_PERIOD)),
         "no clock",
     ),
     "TDMS with an increment of nan": (
         "it passes every comparison",
-        channels(one("Fz", FZ, wf_increment=np.nan)),
+        channels(channel_named("Fz", FZ, wf_increment=np.nan)),
         "no clock",
     ),
     "TDMS over a path": (
         "the increment is in m",
-        channels(one("Fz", FZ, wf_xunit_string="m")),
+        channels(channel_named("Fz", FZ, wf_xunit_string="m")),
         "does not count seconds",
     ),
-    "TDMS of no samples": ("channels that were never written to", channels(one("Fz", FZ[:0])), "no samples"),
+    "TDMS of no samples": ("channels that were never written to", channels(channel_named("Fz", FZ[:0])), "no samples"),
     "TDMS with inf": (
         "an overflow of the amplifier",
-        channels(one("Fz", np.where(FX < -50, np.inf, FZ))),
+        channels(channel_named("Fz", np.where(FX < -50, np.inf, FZ))),
         "channel 'Fz', sample 21",
     ),
     "index of a TDMS file": ("it has no samples", raw(b"TDSh" + bytes(200), "odd.tdms_index"), "beside it"),
@@ -156,12 +156,12 @@ NAMED: Files = {
     "TDMS of a huge segment": ("a reader makes room for it", changed(12, struct.pack("<Q", 2**50)), "cut off"),
     "TDMS with texts": (
         "remarks of the driver in a channel",
-        channels(one("Fz", FZ), one("remark", ["a"] * SAMPLE_COUNT)),
+        channels(channel_named("Fz", FZ), channel_named("remark", ["a"] * SAMPLE_COUNT)),
         "no numbers: 'remark'",
         prefix(Fz=FZ),
     ),
     "TDMS with the same name twice": (
-        "one in each group",
+        "channel_named in each group",
         channels(("a", "Fz", FZ, CLOCK), ("b", "Fz", FX, CLOCK)),
         "2 channels are called 'Fz'",
         prefix(**{"a/Fz": FZ, "b/Fz": FX}),
@@ -193,29 +193,29 @@ RIGHT: Files = {
         {"Fz": (BACK, FZ)},
     ),
     "TDMS of two rates": ("a common clock does not exist", two_rates(".tdms"), TWO_RATES),
-    "TDMS of two rates in one group": (
+    "TDMS of two rates in channel_named group": (
         "the clock belongs to the channel",
-        channels(one("Fz", FZ), one("Fx", FX, wf_increment=SLOW_PERIOD)),
+        channels(channel_named("Fz", FZ), channel_named("Fx", FX, wf_increment=SLOW_PERIOD)),
         TWO_RATES,
     ),
     "TDMS of two starts": (
-        "one amplifier was switched on an hour later",
-        channels(one("Fz", FZ, wf_start_time=at(8)), one("Fx", FX, wf_start_time=at(9))),
+        "channel_named amplifier was switched on an hour later",
+        channels(channel_named("Fz", FZ, wf_start_time=at(8)), channel_named("Fx", FX, wf_start_time=at(9))),
         {"Fz": (SAMPLE_TIMES, FZ), "Fx": (3600.0 + SAMPLE_TIMES, FX)},
     ),
     "TDMS with a start offset": (
         "the trigger came later",
-        channels(one("Fz", FZ, wf_start_offset=-2.5)),
+        channels(channel_named("Fz", FZ, wf_start_offset=-2.5)),
         {"Fz": (SAMPLE_TIMES - 2.5, FZ)},
     ),
     "TDMS of two lengths": (
-        "one channel has half the samples",
-        channels(one("Fz", FZ), one("Fx", FX[:20])),
+        "channel_named channel has half the samples",
+        channels(channel_named("Fz", FZ), channel_named("Fx", FX[:20])),
         {"Fz": (SAMPLE_TIMES, FZ), "Fx": (SAMPLE_TIMES[:20], FX[:20])},
     ),
     "TDMS of whole numbers": (
         "16 bits of a converter",
-        channels(one("Fz", (1000 + np.arange(SAMPLE_COUNT)).astype("i2"))),
+        channels(channel_named("Fz", (1000 + np.arange(SAMPLE_COUNT)).astype("i2"))),
         prefix(Fz=1000.0 + np.arange(SAMPLE_COUNT)),
     ),
     "TDMS with umlauts and quotes": (
@@ -226,7 +226,7 @@ RIGHT: Files = {
     "TDMS of 300 channels": ("a long description", wide(".tdms"), MANY_CHANNELS),
     "TDMS with NaN": (
         "nothing was measured for a while",
-        channels(one("Fz", np.where(FX < -50, np.nan, FZ)), one("Fx", FX)),
+        channels(channel_named("Fz", np.where(FX < -50, np.nan, FZ)), channel_named("Fx", FX)),
         usual(Fz=np.where(FX < -50, np.nan, FZ)),
     ),
     "TDMS beside an old index": ("the index describes another file", beside_old_index),

@@ -116,8 +116,8 @@ class ForceExcited:
         return settings_of_curves(self.quick if quick else self.full, self.setting)
 
     def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
-        """A setting of this problem: curve, and the longest step (s) up to ``step_or_tolerance`` such that every force
-        sample falls on a step.
+        """Setting of an engine and a method, with the longest step (s) that is not above ``step_or_tolerance`` and
+        divides the sampling period of the forces.
         """
         return setting(engine, method, SAMPLE_PERIOD / math.ceil(SAMPLE_PERIOD / step_or_tolerance * (1 - 1e-9)))
 

@@ -45,7 +45,7 @@ parts = steps
 
 
 def shorten(table: dict[str, Any], scene: HandlingScene, steps: int) -> None:
-    """Shorten every manoeuvre to at most ``steps`` steps of the scene's own length."""
+    """Shorten every manoeuvre of the table to at most ``steps`` of the scene's time steps."""
     for name, manoeuvre in table["manoeuvres"].items():
         manoeuvre["duration"] = min(scene.manoeuvres[name].duration, steps * scene.run.step)
 
