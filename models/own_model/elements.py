@@ -156,7 +156,7 @@ def _owner_name(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
 
 
 def _unit(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
-    """The unit for this part, where one exists for rotation and one for translation."""
+    """Unit of this element; of two, that of translation for slides and free joints, else that of rotation."""
     turning, _, shifting = kind.unit.partition(" | ")
     slides = kind.sort == "joint" and model.jnt_type[number] in (SLIDE_JOINT, FREE_JOINT)
     return shifting if shifting and slides else turning

@@ -94,7 +94,8 @@ def _sums_of_rates(twin: TwinModel, states: Sequence[State]) -> Iterator[np.ndar
 
 
 def _with_solver_rounding(sensitive: Moved, moved: Moved) -> Moved:
-    """Sensitivities with that of solving M a = f, whose rounding is a relative change of every entry of M.
+    """Sensitivities to rounding, those of accelerations increased by that of solving M a = f, in which every entry of M
+    is rounded.
 
     This is Skeel's componentwise condition, |M^-1| |M| |a| (Higham 2002, Accuracy and Stability of Numerical
     Algorithms, section 7.2; recalled). A light seat on a car takes its share of the rounding of wheels that spin up a

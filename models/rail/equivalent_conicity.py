@@ -226,8 +226,8 @@ def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
 
 
 def _idle_centre(table: RollingRadiusTable, amplitude: float) -> float | None:
-    """Centre of an interval with zero difference that is as wide as the swing, the one nearest to y = 0; None if there
-    is none."""
+    """Centre of an interval, the nearest to y = 0, in which the difference of rolling radii is zero and which is at
+    least as wide as the swing; None if there is none."""
     y, zero = table.displacements, table.differences == 0.0
     edges = np.flatnonzero(np.diff(np.concatenate([[0], zero.astype(int), [0]])))
     stretches = [(float(y[a]), float(y[b - 1])) for a, b in edges.reshape(-1, 2)]

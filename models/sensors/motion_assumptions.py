@@ -88,5 +88,5 @@ def _tilt_from_gravity(first: np.ndarray) -> np.ndarray:
     return np.array([np.arctan2(np.hypot(first[0], first[1]), -first[2])])
 
 
-def _as_known(values: dict[str, np.ndarray], run: Result) -> Watched:
+def _as_known(values: dict[str, np.ndarray], _unused_run: Result) -> Watched:
     return values

@@ -39,11 +39,11 @@ def tables() -> Tables:
     return stacked_tables([by_load(name) for name in ("dry", "wet", "ice")])
 
 
-def largest_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
+def largest_difference(compiled_values: np.ndarray, plain_values: np.ndarray) -> float:
     """Largest difference between two arrays; in each column it is divided by the column's largest magnitude. Infinite
     where only one of them is not a number."""
-    scale = np.maximum(np.abs(plain).max(axis=0), 1e-300)
-    difference = float(np.max(np.abs(compiled - plain) / scale))
+    scale = np.maximum(np.abs(plain_values).max(axis=0), 1e-300)
+    difference = float(np.max(np.abs(compiled_values - plain_values) / scale))
     return difference if np.isfinite(difference) else np.inf
 
 

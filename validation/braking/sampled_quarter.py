@@ -70,14 +70,14 @@ def tight_distance(
     return float(y[0] + max(y[1], 0.0) ** 2 / (2.0 * slowing))
 
 
-def _law(pressure: float, torque: float, valve: int, brake: Brake) -> Callable[[float], tuple[float, float]]:
+def _law(pressure: float, torque: float, valve_command: int, brake: Brake) -> Callable[[float], tuple[float, float]]:
     """Function of the time (s) since the sample's start that gives brake pressure (bar) and torque (N m)."""
 
     def law_at(time: float) -> tuple[float, float]:
         p = pressure
-        if valve == APPLY:
+        if valve_command == APPLY:
             p = SUPPLY + (pressure - SUPPLY) * np.exp(-time / FILL)
-        elif valve == RELEASE:
+        elif valve_command == RELEASE:
             p = pressure * np.exp(-time / EMPTY)
         rising_torque, falling_torque = (
             brake.rising * max(p - brake.push_out, 0.0),

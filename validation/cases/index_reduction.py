@@ -234,13 +234,13 @@ def _index_two_refused() -> Row:
     )
 
 
-def _noise_rows(walked: dict[str, np.ndarray], loose: dict[str, np.ndarray]) -> list[Row]:
+def _noise_rows(guided_errors: dict[str, np.ndarray], unguided_errors: dict[str, np.ndarray]) -> list[Row]:
     """Rows: the drift caused by noise, with and without prescribed pitch, is the same in all formulations."""
     rows = []
     guided = "guided by the integrated rate of a noisy gyro"
     free = f"without guidance, {FORCE_NOISE:g} N of noise on each sample of the forces"
     why = "stabilisation puts the vehicle where the data is, and the data is what drifts"
-    for id, words, errors in (("walk", guided, walked), ("force", free, loose)):
+    for id, words, errors in (("walk", guided, guided_errors), ("force", free, unguided_errors)):
         paths = np.array(list(errors.values()))
         size = float(np.sqrt(np.mean(paths[-1] ** 2)))
         rows.append(

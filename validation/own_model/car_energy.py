@@ -58,7 +58,7 @@ def _of_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
 
 
 def _energy_by_description(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
-    """Energies (J) by the description, with springs that lack the preloads, as in the file."""
+    """Energy (J) of bodies and springs by the description; springs have no preload, as in MuJoCo's file."""
     places, springs = handling.vehicle.coordinates(), 0.0
     for e in handling.vehicle.joint_elements:
         travel = sum(k * q[places.index(at)] for at, k in zip(e.coordinates, e.factors, strict=True))

@@ -120,8 +120,8 @@ def _series_of_run(times: np.ndarray, channels: Channels, names: tuple[str, ...]
 
 
 def _enforced_sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
-    """Sizes by which errors of the enforced moment and force are divided, as these may be zero: those of the chassis'
-    inertia term and of the suspension forces together.
+    """Sizes by which errors of the enforced moment and force are divided, since these may themselves be zero: those of
+    the chassis' inertia term, and of the sum of the suspension forces.
     """
     sizes = {}
     if "enforced_moment" in channels:
@@ -147,7 +147,8 @@ def _pitch_error_growth(assembly: Assembly) -> dict[str, float]:
 
 
 def _settings_of_longer_step(settings: Settings, step_factor: float, share: float) -> Settings:
-    """Settings with a step ``step_factor`` as long, over ``share`` of the run, rounded to whole steps."""
+    """Settings with a step ``step_factor`` times as long, over ``share`` of the run, rounded down to whole steps, at
+    least one."""
     step = step_factor * settings.step
     return replace(settings, step=step, duration=step * max(1, math.floor(share * settings.duration / step + 1e-9)))
 
