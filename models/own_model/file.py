@@ -109,8 +109,8 @@ def _remedy(document: Document, reason: str) -> str:
 
 
 def check_sane(model: mujoco.MjModel, name: str, kind: str = "MJCF") -> None:
-    """InputError if nothing can move, if a number that affects motion is not finite, if the time step is not above 0, or
-    if dry friction is negative."""
+    """InputError if nothing can move, if a number that affects motion is not finite, if the time step is not above 0,
+    or if dry friction is negative."""
     if not model.nv:
         stands = "; its first link stands on the world: a joint of type floating, from a link before it, sets it free"
         allowed = f"nothing in it can move: it has no joint{stands if kind == 'URDF' else ''}"
