@@ -48,6 +48,14 @@ def test_two_files_that_differ_end_with_code_1_and_name_why(asked, tmp_path):
     assert "damping of joint &#39;x&#39;: 0.1 N s/m in cart.xml" in (tmp_path / "two.html").read_text()
 
 
+def test_a_gear_without_influence_names_the_controls_at_which_it_has_none(asked, tmp_path):
+    for name, gear in (("a.xml", 2), ("b.xml", 3)):
+        motor = f'<actuator><motor name="push" joint="x" gear="{gear}"/></actuator></mujoco>'
+        (tmp_path / name).write_text(CART.replace("</mujoco>", motor))
+    code, said, _ = asked("a.xml", "b.xml", "--states", "2", "--no-paths")
+    assert code == 0 and "without influence at controls of 0, or the nearest in range: gear of actuator 'push'" in said
+
+
 def test_files_of_other_joints_are_told_apart(asked):
     code, said, _ = asked("cart.xml", "arm.urdf", "--states", "2", "--no-paths")
     assert code == 1 and "joint 'x' of cart.xml has no partner" in said

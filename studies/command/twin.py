@@ -17,7 +17,7 @@ from models.own_model.certificate import (
 )
 from models.own_model.control_table import ControlTable, read_controls
 from models.own_model.elements import Element, two_digit_text
-from models.own_model.explain import Comparison, compare, removals_that_agree
+from models.own_model.explain import Comparison, Difference, compare, removals_that_agree
 from models.own_model.file import ModelFile, read
 from models.own_model.limits import limits_struck
 from models.own_model.names import some_names
@@ -292,6 +292,11 @@ def _file_lines(examined_file: ExaminedFile) -> list[str]:
     return rows + [f"  {line}".rstrip() for line in examined_file.price_lines]
 
 
+def _at_which_controls(difference: Difference) -> str:
+    """Phrase on the controls at which an actuator's element has no influence; empty for all other elements."""
+    return " at controls of 0, or the nearest in range" if difference.owner.startswith("actuator ") else ""
+
+
 def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]:
     if comparison.acceleration_agreement is None:
         rows = ["the files have not the same coordinates:", *(f"  {text}" for text in comparison.unmatched)]
@@ -311,7 +316,10 @@ def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]
         rows.append(f"  {difference.sentence(names)} ({size})")
     if not comparison.alike:
         rows.append(f"  {comparison.rest()}")
-    rows += [f"  without influence: {difference.sentence(names)}" for difference in comparison.silent_differences]
+    rows += [
+        f"  without influence{_at_which_controls(difference)}: {difference.sentence(names)}"
+        for difference in comparison.silent_differences
+    ]
     return rows + [
         f"  not compared, since it is off or MuJoCo's alone: {difference.sentence(names)}"
         for difference in comparison.not_compared
