@@ -59,6 +59,22 @@ def pytest_collection_modifyitems(config, items):
 
 
 @pytest.fixture(autouse=True, scope="session")
+def tolerance_rules():
+    """Refuse an expected figure so small that ``pytest.approx`` would take anything near 0 for it: without ``abs`` it
+    allows 1e-12."""
+    plain = pytest.approx
+
+    def checked(expected, rel=None, abs=None, nan_ok=False):
+        numbers = expected if isinstance(expected, int | float) and not isinstance(expected, bool) else None
+        assert abs is not None or numbers is None or not 0.0 < numbers**2 < 1e-20, f"{expected}: give abs, too"
+        return plain(expected, rel=rel, abs=abs, nan_ok=nan_ok)
+
+    pytest.approx = checked
+    yield
+    pytest.approx = plain
+
+
+@pytest.fixture(autouse=True, scope="session")
 def figure_rules():
     """Hold every figure that a test saves, or puts into a page, to the rules of figures."""
     from figure_rules import faults
