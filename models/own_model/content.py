@@ -115,9 +115,9 @@ def _refusal(rows: Sequence[Content], without: Collection[str]) -> str:
         return (
             f"{told}. Deformable bodies have no equal, and cannot be left out: their vertices are bodies of the model"
         )
-    it_has, it = ("It has", "it") if len(rows) == 1 else ("They have", "them")
+    subject_and_verb, pronoun = ("It has", "it") if len(rows) == 1 else ("They have", "them")
     kinds = ",".join(dict.fromkeys((*without, *(row.kind for row in rows))))
-    return f"{told}. {it_has} no equal in the other builds; leave {it} out with `--without {kinds}`"
+    return f"{told}. {subject_and_verb} no equal in the other builds; leave {pronoun} out with `--without {kinds}`"
 
 
 def _with_line(model: mujoco.MjModel, document: Document, what: str, number: int) -> str:
