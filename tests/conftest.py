@@ -65,8 +65,8 @@ def tolerance_rules():
     plain = pytest.approx
 
     def checked(expected, rel=None, abs=None, nan_ok=False):
-        numbers = expected if isinstance(expected, int | float) and not isinstance(expected, bool) else None
-        assert abs is not None or numbers is None or not 0.0 < numbers**2 < 1e-20, f"{expected}: give abs, too"
+        if abs is None and isinstance(expected, float) and expected != 0.0:
+            assert not -1e-10 < expected < 1e-10, f"{expected}: give abs, too"
         return plain(expected, rel=rel, abs=abs, nan_ok=nan_ok)
 
     pytest.approx = checked

@@ -14,6 +14,8 @@ from xml.sax.saxutils import quoteattr
 
 READ_TAGS = ("link", "joint", "material", "mujoco")
 """Elements below <robot> that MuJoCo reads."""
+PARTS_OF_LINKS = ("visual", "collision", "inertial")
+"""Elements of links, of which those that move nothing are left away."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ def _notes(
     notes = list[str]()
     if left["collision"]:
         notes.append(f"{left['collision']} shapes of links with masses of their own were not read")
-    others = ", ".join(f"{count} <{tag}>" for tag, count in left.items() if tag not in SHAPES)
+    others = ", ".join(f"{count} <{tag}>" for tag, count in left.items() if tag not in PARTS_OF_LINKS)
     if others:
         notes.append(f"not read, since it is for other programs and moves nothing here: {others}")
     if heavy := [name for name in standing if name in massive]:
@@ -135,7 +137,3 @@ def _notes(
         more = f" and {len(light) - 1} more links" if len(light) > 1 else ""
         notes.append(f"link {light[0]!r}{more} without <inertial>: MuJoCo takes 1000 kg/m^3 for the collision shapes")
     return notes
-
-
-SHAPES = ("visual", "collision", "inertial")
-"""Elements of links."""

@@ -105,8 +105,8 @@ def rates(state, speed, body, rails, state_rate, report):
 
 @lean
 def set_rates(state, speed, body, rails, state_rate, report, workspace):
-    """Fill ``state_rate`` with the time derivative of a state, using the workspace ``workspace``; ``report`` may have
-    no rows if no one needs it.
+    """Fill ``state_rate`` with the time derivative of a state. workspace : ``Workspace``, written over; report : has no
+    rows where nobody asks for contacts.
     """
     y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
     roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]

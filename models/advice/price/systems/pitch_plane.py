@@ -188,7 +188,8 @@ def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -
 
 def _without_sensors(scene: Scene) -> Scene:
     """The scene without sensors."""
-    return scene.model_copy(update={"effects": {name: of for name, of in scene.effects.items() if name not in SENSORS}})
+    moving = {name: parameters for name, parameters in scene.effects.items() if name not in SENSORS}
+    return scene.model_copy(update={"effects": moving})
 
 
 def _base_step_and_duration(assembly: Assembly) -> tuple[float, float]:
