@@ -15,6 +15,7 @@ import typer
 from typer.exceptions import TyperException
 
 from models.core.errors import InputError, RunFailed
+from models.core.result_folders import check_unused
 from models.core.whole_files import reason_of
 from models.machine.left_out import OF_LABELS, leave_out
 from models.measured.file_kinds import is_measurement
@@ -163,6 +164,8 @@ def run_scene(
 ) -> None:
     """Run a scene and save its results and figures."""
     telling = profile_lines(profile)
+    if out is not None:
+        check_unused(out)  # before kernels are compiled
     if sweep is not None:
         from studies.command.crew import crew_of
         from studies.command.sweep import RECORDS_FOLDER, sweep_points

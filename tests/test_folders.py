@@ -6,12 +6,14 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from models.core.errors import InputError
 from models.core.result_folders import COMMAND_FILE, drop_if_empty, new_folder, resumed_folder
 from models.core.whole_files import PARTIAL_NAME
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
+from studies import command_line
 from studies.single_run import largest_state_difference
 
 
@@ -51,6 +53,14 @@ def test_a_resumed_folder_keeps_no_part_of_a_killed_process_and_those_of_living_
         child.communicate(b"\n")
     resumed_folder(tmp_path, "points")
     assert [file.exists() for file in files] == [False, False, True, False]
+
+
+def test_a_used_folder_is_refused_before_the_scene_is_checked(tmp_path, monkeypatch):
+    """Checks compile kernels, and nobody should wait for them to be told that a folder is in use."""
+    monkeypatch.setattr(command_line, "checked_study", lambda *_: pytest.fail("the scene was checked first"))
+    (tmp_path / "notes.txt").touch()
+    with pytest.raises(InputError, match="holds files already"):
+        command_line.run_scene("wheelset", out=tmp_path)
 
 
 def test_a_run_that_saved_nothing_leaves_nothing(tmp_path):

@@ -23,16 +23,28 @@ def new_folder(requested_folder: Path | None, name: str) -> Path:
     """
     if requested_folder is None:
         return next(path for path in _candidate_folders(name) if _make_folder(path))
+    check_unused(requested_folder)
+    _make_folder(requested_folder)
+    if not _take_folder(requested_folder):
+        raise _used_folder(requested_folder)
+    return requested_folder
+
+
+def check_unused(requested_folder: Path) -> None:
+    """InputError if the path is a file, or a folder that holds anything or cannot be read; nothing is made."""
     try:
         if requested_folder.exists() and not requested_folder.is_dir():
             raise InputError("--out", "", str(requested_folder), "is a file: name a folder")
-        free = _make_folder(requested_folder) or not any(requested_folder.iterdir())
+        is_used = requested_folder.is_dir() and any(requested_folder.iterdir())
     except OSError as error:
         raise _unwritable_folder(requested_folder, "cannot be used", error) from None
-    if not free or not _take_folder(requested_folder):
-        allowed = "holds files already and is left as it is: name a new or empty folder"
-        raise InputError("--out", "", str(requested_folder), allowed)
-    return requested_folder
+    if is_used:
+        raise _used_folder(requested_folder)
+
+
+def _used_folder(folder: Path) -> InputError:
+    """The error for a folder with files of an earlier run."""
+    return InputError("--out", "", str(folder), "holds files already and is left as it is: name a new or empty folder")
 
 
 def resumed_folder(requested_folder: Path, blocks: str) -> Path:
