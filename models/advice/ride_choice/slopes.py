@@ -58,15 +58,17 @@ class Sensitivity:
     """
 
     def __init__(self, response: Response, heights: np.ndarray, weights: np.ndarray, N: np.ndarray) -> None:
-        outputs, powers = response.H @ heights, [response.s[:, None, None] ** k for k in range(3)]
+        outputs = response.H @ heights
         met = 2.0 * weights[..., None] * (heights @ outputs.conj().mT).mT  # (v, w, q, wheels)
         q, back = response.coordinates()
-        spectra = met @ (N @ q).mT  # (v, w, q, n)
-        back = back @ N.T
-        self.by_force = [_frequency_sums(back * s, spectra) for s in powers]
-        self.by_column = [_frequency_sums(back * s, met) for s in powers[:2]]
-        self.by_row = [(spectra * s).sum(axis=1).real for s in powers]
-        self.by_road = [(met * s).sum(axis=1).real for s in powers[:2]]
+        r = N.shape[1]
+        adjoint = np.concatenate([back, np.ones((*back.shape[:2], 1))], axis=2)  # (w, q, r + 1)
+        products = _by_outputs(np.concatenate([met @ q.mT, met], axis=3))  # with coordinates, then with heights
+        sums = [_frequency_sums(adjoint * response.s[:, None, None] ** k, products) for k in range(3)]
+        self.by_force = [N @ each[:, :, :r, :r] @ N.T for each in sums]
+        self.by_column = [N @ each[:, :, :r, r:] for each in sums[:2]]
+        self.by_row = [each[:, :, r, :r] @ N.T for each in sums]
+        self.by_road = [each[:, :, r, r:] for each in sums[:2]]
 
     def slopes(self, shifts: Shifts, inert: np.ndarray) -> np.ndarray:
         """Changes of variances (v, q, p) by each shift, to first order. A change of mass counts only for parameters
@@ -87,10 +89,14 @@ class Sensitivity:
         return total
 
 
+def _by_outputs(products: np.ndarray) -> np.ndarray:
+    """Real, then imaginary parts (v, q, 2 w, j) of complex products (v, w, q, j)."""
+    return np.concatenate([products.real, products.imag], axis=1).transpose(0, 2, 1, 3).copy()
+
+
 def _frequency_sums(adjoint_responses: np.ndarray, products: np.ndarray) -> np.ndarray:
-    """Real part (v, q, i, j) of the sums over frequencies w of products of ``adjoint_responses`` (w, q, i) and
-    ``products`` (v, w, q, j).
+    """Real part (v, q, i, j) of the sums over frequencies w of products of complex ``adjoint_responses`` (w, q, i) and
+    of ``products`` from ``_by_outputs``.
     """
     left = np.concatenate([adjoint_responses.real, -adjoint_responses.imag]).transpose(1, 2, 0)  # (q, i, 2 w)
-    right = np.concatenate([products.real, products.imag], axis=1).transpose(0, 2, 1, 3)  # (v, q, 2 w, j)
-    return np.asarray(left @ right)
+    return np.asarray(left @ products)
