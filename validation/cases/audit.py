@@ -1,4 +1,4 @@
-"""Build audit: accelerations at random states, before any trajectory."""
+"""Accelerations of both engines at random states compared with the paper's equations, before any time simulation."""
 
 from pathlib import Path
 
@@ -10,11 +10,11 @@ from validation.common.rows import CaseAnswer, Observed, System
 
 TITLE = "Accelerations at 100 random states"
 SYSTEM: System = "pitch-plane"
-STATES = 100
+STATE_COUNT = 100
 
 
 def scene(parameters: str, geometry: str = "exact"):
-    """The scene of a vehicle on the study road, whose heights enter the comparison."""
+    """Scene of a vehicle on the study road; the road makes its heights enter the comparison."""
     return build_scene(
         {
             "title": TITLE,
@@ -25,22 +25,24 @@ def scene(parameters: str, geometry: str = "exact"):
     )
 
 
-def difference(engine: str, parameters: str, geometry: str = "exact") -> float:
-    """Largest difference of an engine's accelerations from the reference over all states, divided by the largest
-    acceleration."""
+def acceleration_difference(engine: str, parameters: str, geometry: str = "exact") -> float:
+    """Largest difference of an engine's accelerations from the reference's over all random states, divided by the
+    largest acceleration."""
     audited = scene(parameters, geometry)
-    return acceleration_gap(checks.engine(engine), assembly_of_scene(audited), settings_of(audited, engine), STATES)
+    return acceleration_gap(
+        checks.engine(engine), assembly_of_scene(audited), settings_of(audited, engine), STATE_COUNT
+    )
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """A row per engine, vehicle and geometry, the same in quick."""
+    """Rows for each engine, vehicle and geometry; a quick run is the same."""
     rows = [
         Observed(
             f"audit.{engine}.{parameters}.{geometry}",
             SYSTEM,
             f"largest difference of the acceleration in {engine} from the paper's equations, "
             f"{parameters}, {geometry} geometry",
-            difference(engine, parameters, geometry),
+            acceleration_difference(engine, parameters, geometry),
             "of the largest",
         ).at_most(
             1e-12,
