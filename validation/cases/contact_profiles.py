@@ -229,8 +229,8 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
         "exact peak [MPa]",
     )
     note = (
-        f"{BENCHMARK}; {WHEEL_LOAD / 1e3:g} kN on the right wheel, vertical. A row for every place closer than 0.2 mm; y "
-        "on the rail from its highest point, on the wheel from the taping line; pressures of the theory of 1983."
+        f"{BENCHMARK}; {WHEEL_LOAD / 1e3:g} kN on the right wheel, vertical. A row for every place closer than 0.2 mm; "
+        "y on the rail from its highest point, on the wheel from the taping line; pressures of the theory of 1983."
     )
     return [
         Table(f"Places of contact, {name}", note, heads, tuple(_table_rows(cases))) for name, cases in case_data.items()

@@ -316,8 +316,8 @@ def tables(case_data: Saved) -> list[Table]:
             "damage f3x / true damage",
         )
         about = (
-            f"{PATH_COUNT} noise files of {FORCE_NOISE} N at {NOISE_SAMPLING_RATE:g} Hz; damage without noise, first {DAMAGE_SECONDS:g} s, "
-            "front section force in the chassis' frame."
+            f"{PATH_COUNT} noise files of {FORCE_NOISE} N at {NOISE_SAMPLING_RATE:g} Hz; damage without noise, "
+            f"first {DAMAGE_SECONDS:g} s, front section force in the chassis' frame."
         )
         tables.append(Table("Smoothing before the run, and schemes", about, columns, lines))
     return tables

@@ -264,7 +264,7 @@ def tables(case_data: Saved) -> list[Table]:
         for how, counts in both.items()
     )
     note = (
-        f"Every fixed-step integrator at steps of {', '.join(f'{1e3 * step:g}' for step in STEPS)} ms over "
+        f"Every fixed-step integrator at steps of {', '.join(f'{1e3 * step:g}' for step in UNSTABLE_STEPS)} ms over "
         f"{', '.join(f'{duration:g}' for duration in DURATIONS)} s on the study road. Silent: a complete run that is "
         "wrong by more than the motion itself. Past the check, short unstable runs are finite, small and wrong."
     )
