@@ -244,7 +244,8 @@ def _growth_rows(vehicle: CutVehicle) -> list[Row]:
         Observed(
             f"hub_forces.growth_{name}",
             SYSTEM,
-            f"ratio of the mean square of {name} after {NOISE_SECONDS:g} s of white noise to its law, {PATH_COUNT} paths",
+            f"ratio of the mean square of {name} after {NOISE_SECONDS:g} s of white noise to its law, "
+            f"{PATH_COUNT} paths",
             float(np.mean(ends[:, i] ** 2) / variance),
             "1",
         ).within(
