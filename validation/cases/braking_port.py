@@ -81,7 +81,7 @@ QUICK_FAULTS = ("NaN", "too few wheels", "silence", "died")
 @allowing_breaches("both sides are cut off after the same few samples", "stop")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of equal bits, costs and faults; a quick run brakes for half a second and plants few faults."""
-    tables_by_connection = _port_tables(folder, with_second=not quick)
+    tables_by_connection = _port_tables(folder, with_python_process=not quick)
     rows = _bit_rows(tables_by_connection, folder, 0.5 if quick else 4.0)
     costs = _exchange_times(tables_by_connection, folder, 5 if quick else 40)
     rows += [

@@ -66,7 +66,8 @@ def _turn_rows(name: str) -> list[Row]:
         Observed(
             f"trailer.turn.{name}",
             SYSTEM,
-            f"yaw gain of a steady turn of small slip of the {name} at {TURN_SPEED:g} m/s, over the closed form's, less 1",
+            f"yaw gain of a steady turn of small slip of the {name} at {TURN_SPEED:g} m/s, "
+            "over the closed form's, less 1",
             errors.yaw,
             "",
         ).at_most(TURN_TOLERANCE, why, "closed form"),

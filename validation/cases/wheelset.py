@@ -243,7 +243,7 @@ def _limit_cycles(
     """Limit cycles by wheelset and implementation: of the chosen wheelset, and of those whose critical speed is low
     enough for a simulation above this speed.
 
-    Each implementation starts from a guess that is 1 % off.
+    Each implementation starts from a guess that is 1 % off, and closes the orbit again at half the step.
     """
     cycles = {}
     for name, wheelset in wheelsets.items():
