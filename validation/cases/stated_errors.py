@@ -208,7 +208,7 @@ def tables(case_data: Saved) -> list[Table]:
             f"{sample['stated']:.2g} {sample['unit']}".rstrip(),
             f"{100.0 * sample['share']:.2g}{' (warned)' if sample['warned'] else ''}",
             f"{sample['true']:.2g}",
-            f"{sample['error_ratio']:.2g}",
+            f"{sample['ratio']:.2g}",
             f"{sample['cost']:.2f}",
         )
         for sample in known
