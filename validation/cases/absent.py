@@ -1,5 +1,5 @@
-"""Effects that a scene does not name cost no computation; effects that it names change the counts of an engine model as
-they declare."""
+"""Effects that a scene does not name cost no computation; effects that it names change the model's numbers of
+components exactly as they declare."""
 
 import tempfile
 from collections.abc import Sequence
@@ -87,7 +87,7 @@ def model(simulated_scene: Scene, engine: str) -> Model:
 
 
 def scenes_without_and_with(effect: str, step_count: int, folder: Path) -> tuple[Scene, Scene]:
-    """Two scenes that differ by one effect: without the effect, and with it."""
+    """Two scenes that differ by one effect: the first without the effect, the second with the effect."""
     needed, prescribed, module = (
         required_effects(effect),
         effect.startswith("prescribed"),
@@ -105,13 +105,15 @@ def counts_of_scene(simulated_scene: Scene, engine: str) -> dict[str, int]:
 
 
 def count_changes(effect: str, engine: str, folder: Path) -> dict[str, int]:
-    """Changes of an engine model's counts when an effect is added, for each count that changes."""
+    """Changes of the numbers of components in an engine's model when an effect is added; unchanged numbers are left
+    out."""
     before, after = (counts_of_scene(bare, engine) for bare in scenes_without_and_with(effect, 20, folder))
     return {key: after[key] - before[key] for key in after if after[key] != before[key]}
 
 
 def declared_changes(effect: str, engine: str) -> dict[str, int]:
-    """Changes of an engine model's counts that an effect declares in its COUNTS, zero changes left out."""
+    """Changes of the numbers of components in an engine's model that an effect declares in its COUNTS; zero changes are
+    left out."""
     table = module_of(DEFAULT_SYSTEM, effect).COUNTS
     return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
 
@@ -125,7 +127,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         write_files(files_folder)
         rows = [*_import_rows(), *(row for engine in ENGINES for row in _absence_rows(engine, files_folder))]
         rows += [
-            _positive_control(effect, files_folder, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
+            _positive_control_row(effect, files_folder, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
             for i, effect in enumerate(EFFECTS)
         ]
     return rows + ride.rows(quick) + wheelset.rows() + machinery.rows() + of_systems.rows(quick), {}
@@ -183,8 +185,9 @@ def _absence_rows(engine: str, folder: Path) -> list[Row]:
     ]
 
 
-def _positive_control(effect: str, folder: Path, engines: Sequence[str] = ENGINES) -> Row:
-    """Row of a positive control: the effect changes the counts of each engine by exactly what it declares."""
+def _positive_control_row(effect: str, folder: Path, engines: Sequence[str] = ENGINES) -> Row:
+    """Row of a positive control: the effect changes the numbers of components in each engine's model exactly as it
+    declares."""
     changed = {engine: count_changes(effect, engine, folder) for engine in engines}
     wanted = {engine: declared_changes(effect, engine) for engine in engines}
     return behaviour_row(
@@ -197,12 +200,13 @@ def _positive_control(effect: str, folder: Path, engines: Sequence[str] = ENGINE
     )
 
 
-def counts_text(counts_by_engine: dict[str, dict[str, int]]) -> str:
-    """Text that lists the counts that an effect changes in each engine; "nothing" where it changes none."""
-    parts = [f"{engine} {changes_text(more)}" for engine, more in counts_by_engine.items() if more]
+def counts_text(changes_by_engine: dict[str, dict[str, int]]) -> str:
+    """Text that lists the numbers of components that an effect changes in each engine; "nothing" where it changes
+    none."""
+    parts = [f"{engine} {changes_text(more)}" for engine, more in changes_by_engine.items() if more]
     return "; ".join(parts) or "nothing"
 
 
-def changes_text(added_counts: dict[str, int]) -> str:
-    """Text that lists the counts that an effect changes, each with its signed change."""
-    return ", ".join(f"{value:+d} {key}" for key, value in sorted(added_counts.items()))
+def changes_text(changes: dict[str, int]) -> str:
+    """Text that lists the signed change of each number of components that an effect changes."""
+    return ", ".join(f"{value:+d} {key}" for key, value in sorted(changes.items()))

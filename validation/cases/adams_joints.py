@@ -24,14 +24,23 @@ from validation.common.scenes import data_folder
 
 TITLE = "Joints and springs of another multibody code"
 SYSTEM: System = "rolling-vehicle"
-FOLDER = "adams_joints"
-FAMILIES = ("Revolute", "Prismatic", "Cylindrical", "Spherical", "Universal", "Distance", "RotSpring", "TranSpring")
-QUICK_FAMILIES = ("Revolute", "Distance")
+MODEL_FOLDER = "adams_joints"
+JOINT_FAMILIES = (
+    "Revolute",
+    "Prismatic",
+    "Cylindrical",
+    "Spherical",
+    "Universal",
+    "Distance",
+    "RotSpring",
+    "TranSpring",
+)
+QUICK_JOINT_FAMILIES = ("Revolute", "Distance")
 MODEL_FILE_NAMES = {"TranSpring": "TransSpring"}
 """Model file names of the joint families whose file has another name."""
 ENGINES = ("exudyn", "mujoco")
 STEP, STEPS_PER_ROW, DURATION, QUICK_DURATION = 5e-3, 2, 5.0, 1.0
-"""Step (s); steps for each row of the output files; full and quick duration (s)."""
+"""Step (s); number of steps for each row of the output files; lengths (s) of a full and of a quick run."""
 MJCF_STEP_RATIO = 5
 """Number of steps of the joints in MJCF for each step of the other runs. The spring of the free body has no length at
 the start, where MuJoCo's tendon has no direction and so no damping. MuJoCo's first step errs by order 2 (5.7e-6 m by 5
@@ -60,11 +69,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     data = data_folder()
     rows: list[Row] = []
     saved: dict[str, Any] = {}
-    for family in QUICK_FAMILIES if quick else FAMILIES:
-        model = None if data is None else data / FOLDER / f"{MODEL_FILE_NAMES.get(family, family)}_Case01.adm"
+    for family in QUICK_JOINT_FAMILIES if quick else JOINT_FAMILIES:
+        model = None if data is None else data / MODEL_FOLDER / f"{MODEL_FILE_NAMES.get(family, family)}_Case01.adm"
         if model is None or not model.is_file():
             reason = "TWINRIG_DATA names no folder with the other code's models"
-            rows.append(not_run(_id(family, "position"), SYSTEM, f"{family}: position and reaction", reason))
+            rows.append(not_run(_row_id(family, "position"), SYSTEM, f"{family}: position and reaction", reason))
             continue
         output = read_output(model.with_name(f"{family}_Case01.csv.gz"))
         mechanism, notes = _mechanism_of_output(read_mechanism(model), output)
@@ -80,7 +89,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, saved
 
 
-def _id(family: str, row_name: str) -> str:
+def _row_id(family: str, row_name: str) -> str:
     return f"adams_joints.{family.lower()}.{row_name}"
 
 
@@ -135,7 +144,7 @@ def fitted_constant_rows(family: str, constants: dict[str, float]) -> list[Row]:
     why = f"read off the first {FIT_SECONDS:g} s of the output: the model file describes another case; calibrated"
     units = {"stiffness": "N/m or N m/rad", "damping": "N s/m or N m s/rad", "rest": "m or rad"}
     return [
-        Observed(_id(family, name), SYSTEM, f"{family}: {name} of the spring", value, units[name]).beside("-", why)
+        Observed(_row_id(family, name), SYSTEM, f"{family}: {name} of the spring", value, units[name]).beside("-", why)
         for name, value in constants.items()
     ]
 
@@ -166,12 +175,12 @@ def mjcf_rows(family: str, mechanism: Mechanism, folder: Path, duration: float) 
     motion, _ = ConstrainedBody(mechanism).run(duration, step, every)
     quantity = f"{family} in MJCF: accelerations of all builds from the file as MuJoCo parsed it"
     tolerance_reason = "rounding; the bound asked for"
-    alike = Observed(_id(family, "mjcf.accelerations"), SYSTEM, quantity, accelerations, "of the largest")
+    alike = Observed(_row_id(family, "mjcf.accelerations"), SYSTEM, quantity, accelerations, "of the largest")
     rows: list[Row] = [alike.at_most(EQUAL_ACCELERATION_SHARE, tolerance_reason, "native")]
     for name, positions in paths.items():
         off = float(np.abs(positions[::every] - motion.place).max())
         quantity = f"{family} in MJCF: position of the centre from the reference with constraints, {name}"
-        observed = Observed(_id(family, f"mjcf.position.{name}"), SYSTEM, quantity, off, "m")
+        observed = Observed(_row_id(family, f"mjcf.position.{name}"), SYSTEM, quantity, off, "m")
         rows.append(observed.at_most(ENGINE_TOLERANCE, "no code in common but Runge-Kutta's steps of 1 ms", "native"))
     return rows
 
@@ -203,14 +212,14 @@ def _file_motion_row(family: str, mechanism: Mechanism, output: OutputFile) -> R
     off = _reaction_difference(mechanism, output.reaction_of_motion(mechanism), output.reaction())
     why = "Newton's and Euler's equations on the motion that the file tells; the bound asked for"
     quantity = f"{family}: reaction on the file's own motion, by the largest"
-    return Observed(_id(family, "own_motion"), SYSTEM, quantity, off, "").at_most(FORCE_BOUND, why, "published")
+    return Observed(_row_id(family, "own_motion"), SYSTEM, quantity, off, "").at_most(FORCE_BOUND, why, "published")
 
 
 def _file_rows(
     family: str, solver: str, mechanism: Mechanism, output: OutputFile, motion: BodyMotion, reaction: Reaction
 ) -> list[Row]:
     """Rows: positions and reactions of one simulation compared with the output file. Where the motion in the file loses
-    energy although nothing damps, the bound is an aim."""
+    energy although nothing damps, the bound is only an aim."""
     m = len(motion.times)
     position_error = np.abs(motion.place - output.columns["Pos"][:m]) - output.rounding("Pos")[:m]
     digits = output.rounding("Rforce")[:m], output.rounding("Rtorque")[:m]
@@ -229,7 +238,7 @@ def _file_rows(
     rows = []
     for what, words, off, unit, bound in seen:
         quantity = f"{family}: {words}, beside the other code's digits, {solver}"
-        observed = Observed(_id(family, f"{what}.{solver}"), SYSTEM, quantity, off, unit)
+        observed = Observed(_row_id(family, f"{what}.{solver}"), SYSTEM, quantity, off, unit)
         if lost <= ENERGY_LOSS_LIMIT:
             rows.append(observed.at_most(bound, "the bound asked for", "published"))
         else:
@@ -261,7 +270,7 @@ def _window_row(family: str, mechanism: Mechanism, output: OutputFile, duration:
     why = "from state to state of the file, less its digits and what its loss of energy explains; the bound asked for"
     quantity = f"{family}: position 0.1 s after each of the file's own states, reference"
     left = max(0.0, float((off - lost).max()))
-    return Observed(_id(family, "window"), SYSTEM, quantity, left, "m").at_most(POSITION_BOUND, why, "published")
+    return Observed(_row_id(family, "window"), SYSTEM, quantity, left, "m").at_most(POSITION_BOUND, why, "published")
 
 
 def _same_pendulum_rows(family: str, mechanism: Mechanism, output: OutputFile, revolute_file: Path) -> list[Row]:
@@ -285,17 +294,17 @@ def _same_pendulum_rows(family: str, mechanism: Mechanism, output: OutputFile, r
         f"above {POSITION_BOUND:g} m from {since:.2f} s on"
     )
     return [
-        Observed(_id(family, "hinge"), SYSTEM, hinged % "position", max(0.0, off), "m").at_most(
+        Observed(_row_id(family, "hinge"), SYSTEM, hinged % "position", max(0.0, off), "m").at_most(
             POSITION_BOUND, why, "published"
         ),
         Observed(
-            _id(family, "hinge_force"),
+            _row_id(family, "hinge_force"),
             SYSTEM,
             hinged % "force by the largest",
             max(0.0, pushed) / float(np.abs(force).max()),
             "",
         ).at_most(FORCE_BOUND, why, "published"),
-        Observed(_id(family, "files"), SYSTEM, both, float(files.max()), "m").beside(
+        Observed(_row_id(family, "files"), SYSTEM, both, float(files.max()), "m").beside(
             POSITION_BOUND, "one motion: what is left is the error of the file that loses energy", "published"
         ),
     ]
@@ -315,7 +324,7 @@ def _engine_row(
     off = max(position_error, turned, _reaction_difference(mechanism, engine_run[1], reference_run[1]))
     why = "joint coordinates against constraints with multipliers, no code in common but Runge-Kutta's steps of 5 ms"
     quantity = f"{family}: {engine} from the reference: position, rotation, reaction by the largest"
-    return Observed(_id(family, f"twin.{engine}"), SYSTEM, quantity, off, "m, -").at_most(
+    return Observed(_row_id(family, f"twin.{engine}"), SYSTEM, quantity, off, "m, -").at_most(
         ENGINE_TOLERANCE, why, "native"
     )
 

@@ -21,7 +21,7 @@ from validation.common.rows import Observed, Row, System, Table, not_run
 TITLE = "A bicycle: benchmark and measured"
 SYSTEM: System = "rolling-vehicle"
 ENGINES = ("exudyn", "mujoco")
-TYRE_STIFFNESSES = (4.0, 16.0, 64.0, 256.0)
+TYRE_STIFFNESS_FACTORS = (4.0, 16.0, 64.0, 256.0)
 """Factors by which the tyres are stiffer than usual."""
 SPEED = 5.0
 """Speed (m/s) at which eigenvalues of the bicycle on tyres are compared."""
@@ -34,7 +34,8 @@ TRAIL_FACTOR = 1.001
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """All rows. A quick run simulates half a second, and does not choose suspects with one speed left out."""
+    """Rows of all comparisons. A quick run simulates half a second, and omits the predictions with one speed left
+    out."""
     benchmark = load_bicycle("benchmark")
     rows = [*_published_rows(benchmark), *_fault_rows(benchmark)]
     gaps = {engine: _eigenvalue_differences(benchmark, engine) for engine in ENGINES}
@@ -57,7 +58,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
                     *(f"{case_data['gaps'][e][i]:.3e}" for e in ENGINES),
                     "" if i == 0 else _observed_order(gaps, i),
                 )
-                for i, s in enumerate(TYRE_STIFFNESSES)
+                for i, s in enumerate(TYRE_STIFFNESS_FACTORS)
             ),
         )
     ]
@@ -74,9 +75,10 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     return rows_of_tables
 
 
-def _observed_order(gaps: list[float], i: int) -> str:
+def _observed_order(eigenvalue_gaps: list[float], i: int) -> str:
     """Text of the order at which the eigenvalue differences fall from stiffness i - 1 to stiffness i."""
-    return f"{np.log(gaps[i - 1] / gaps[i]) / np.log(TYRE_STIFFNESSES[i] / TYRE_STIFFNESSES[i - 1]):.3f}"
+    stiffer = TYRE_STIFFNESS_FACTORS[i] / TYRE_STIFFNESS_FACTORS[i - 1]
+    return f"{np.log(eigenvalue_gaps[i - 1] / eigenvalue_gaps[i]) / np.log(stiffer):.3f}"
 
 
 def _published_rows(bicycle: Whipple) -> list[Row]:
@@ -112,15 +114,15 @@ def _fault_rows(bicycle: Whipple) -> list[Row]:
 def _eigenvalue_differences(bicycle: Whipple, engine: str) -> np.ndarray:
     """Largest difference (1/s) between the eigenvalues on tyres and those of ideal rolling, for each tyre stiffness."""
     wanted = bicycle.eigenvalues(SPEED)
-    stiff = [RollingBicycle(bicycle, BicycleTyre(stiffness=s)) for s in TYRE_STIFFNESSES]
+    stiff = [RollingBicycle(bicycle, BicycleTyre(stiffness=s)) for s in TYRE_STIFFNESS_FACTORS]
     return np.array([np.abs(engine_eigenvalues(engine, rolling, SPEED) - wanted).max() for rolling in stiff])
 
 
-def _limit_rows(gaps: dict[str, np.ndarray]) -> list[Row]:
+def _limit_rows(eigenvalue_gaps: dict[str, np.ndarray]) -> list[Row]:
     """Rows on the limit of stiff tyres: order of convergence in each engine, and difference between the engines."""
     rows = []
-    for engine, gap in gaps.items():
-        order = np.log(gap[-2] / gap[-1]) / np.log(TYRE_STIFFNESSES[-1] / TYRE_STIFFNESSES[-2])
+    for engine, gap in eigenvalue_gaps.items():
+        order = np.log(gap[-2] / gap[-1]) / np.log(TYRE_STIFFNESS_FACTORS[-1] / TYRE_STIFFNESS_FACTORS[-2])
         rows.append(
             Observed(
                 f"bicycle.tyres.order.{engine}",
@@ -130,7 +132,7 @@ def _limit_rows(gaps: dict[str, np.ndarray]) -> list[Row]:
                 "",
             ).within(1.0, 0.02, "side slip, trail and patch fall as 1 / s; what is left is of order 2", "closed form")
         )
-    between = float(np.abs(gaps["exudyn"] / gaps["mujoco"] - 1.0).max())
+    between = float(np.abs(eigenvalue_gaps["exudyn"] / eigenvalue_gaps["mujoco"] - 1.0).max())
     rows.append(
         Observed(
             "bicycle.tyres.engines",
@@ -174,8 +176,8 @@ def _energy_rows(duration: float) -> list[Row]:
 
 
 def _measured_rows(quick: bool) -> tuple[list[Row], list[list[str]]]:
-    """Rows on the measured bicycle: predictions with nothing fitted, and predictions for each speed with suspects
-    chosen and fitted on the other speeds."""
+    """Rows on the measured bicycle: predictions with nothing fitted, and predictions for each speed with parameters
+    that were chosen and fitted on the other speeds."""
     root = os.environ.get("TWINRIG_DATA")
     folder = Path(root) / "bicycle" if root else None
     if folder is None or not (folder / "windows.csv").is_file():

@@ -37,7 +37,7 @@ LOCK_FREE_SPEED = 15.0 / 3.6
 """Speed (m/s) above which no wheel may lock but briefly: UN Regulation 13, annex 13; not checked against its text."""
 LONGEST_LOCK = 0.1
 """Longest time (s) for which a wheel may lock above ``LOCK_FREE_SPEED``."""
-SUBSTEPS = (1, 2, 4, 8)
+SUBSTEP_COUNTS = (1, 2, 4, 8)
 CONTROLLER_NAMES = tuple(CONTROLLERS)[1:]
 """Names of the anti-lock controllers, without the first entry of CONTROLLERS, which applies the brakes fully."""
 
@@ -45,10 +45,10 @@ CONTROLLER_NAMES = tuple(CONTROLLERS)[1:]
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of hysteresis, supply and limit cycle; a full run also has stops of the truck, substeps, and an ensemble of
     stops."""
-    rows = [*_loop_rows(), _supply_row(), *_cycle_rows("shallow")]
+    rows = [*_hysteresis_rows(), _air_supply_row(), *_limit_cycle_rows("shallow")]
     if quick:
         return rows, {}
-    rows += _cycle_rows("deep")
+    rows += _limit_cycle_rows("deep")
     stops = {
         f"{on}, {speed:g} m/s, {name}": stop_results(on, name, speed)
         for on in ("ice", "snow", "dry")
@@ -79,25 +79,29 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     ]
 
 
-def hysteresis_loop(brake: Brake, low: float, high: float, point_count: int = 2000) -> tuple[np.ndarray, np.ndarray]:
+def hysteresis_loop(
+    brake: Brake, low_pressure: float, high_pressure: float, point_count: int = 2000
+) -> tuple[np.ndarray, np.ndarray]:
     """Pressures (bar) and torques (N m) of one hysteresis loop, from high to low pressure and back, after a first rise
     from zero."""
-    path = np.concatenate((np.linspace(high, low, point_count), np.linspace(low, high, point_count)))
+    path = np.concatenate(
+        (np.linspace(high_pressure, low_pressure, point_count), np.linspace(low_pressure, high_pressure, point_count))
+    )
     return path, torques_of_pressures(path, of_wheels(brake))
 
 
-def loop_area(brake: Brake, low: float, high: float) -> float:
+def loop_area(brake: Brake, low_pressure: float, high_pressure: float) -> float:
     """Area (N m bar) of the hysteresis loop by the closed form of its polygon, whose four corners lie on the lines of
     rising and falling pressure."""
-    most = brake.rising * (high - brake.push_out)
-    least = brake.falling * max(low - brake.release, 0.0)
+    most = brake.rising * (high_pressure - brake.push_out)
+    least = brake.falling * max(low_pressure - brake.release, 0.0)
     a, b = brake.release + most / brake.falling, brake.push_out + least / brake.rising
-    end = max(low, brake.release)
-    down = most * (high - a) + 0.5 * (most + least) * (a - end)
-    return down - least * (b - end) - 0.5 * (least + most) * (high - b)
+    end = max(low_pressure, brake.release)
+    down = most * (high_pressure - a) + 0.5 * (most + least) * (a - end)
+    return down - least * (b - end) - 0.5 * (least + most) * (high_pressure - b)
 
 
-def _loop_rows() -> list[Row]:
+def _hysteresis_rows() -> list[Row]:
     worst, sense = 0.0, True
     for brake in (HYSTERETIC_BRAKE, PAPER_FRONT):
         for low in (0.0, 2.5):
@@ -132,7 +136,7 @@ def _loop_rows() -> list[Row]:
     ]
 
 
-def _supply_row() -> Row:
+def _air_supply_row() -> Row:
     """Row: pressure that remains at the fifth brake stroke when the supply is cut off, compared with a closed form."""
     volumes, reservoir = np.array([1.2, 1.2, 1.6, 1.6]), 40.0
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0, volumes, reservoir)
@@ -157,41 +161,46 @@ def _wheel_at_constant_speed(inertia: float = FRONT_WHEEL.spin_inertia) -> Wheel
     )
 
 
-def _cycle_rows(name: str) -> list[Row]:
+def _limit_cycle_rows(controller_name: str) -> list[Row]:
     cycle, (period, used) = (
-        limit_cycle(_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[name]),
-        exact_cycle(_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[name]),
+        limit_cycle(_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
+        exact_cycle(_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
     )
-    wrong = exact_cycle(_wheel_at_constant_speed(FRONT_WHEEL.spin_inertia * 1.001), FIVE_PHASE_CONTROLLERS[name])[0]
+    wrong = exact_cycle(
+        _wheel_at_constant_speed(FRONT_WHEEL.spin_inertia * 1.001), FIVE_PHASE_CONTROLLERS[controller_name]
+    )[0]
     return [
         Observed(
-            f"braking_controllers.period_{name}",
+            f"braking_controllers.period_{controller_name}",
             SYSTEM,
-            f"relative difference of the period of the five-phase limit cycle from the exact period, {name}",
+            f"relative difference of the period of the five-phase limit cycle from the exact period, {controller_name}",
             cycle.period / period - 1.0,
             "",
         ).at_most(1e-4, "frozen speed; every switch is located", "closed form"),
         Observed(
-            f"braking_controllers.utilisation_{name}",
+            f"braking_controllers.utilisation_{controller_name}",
             SYSTEM,
-            f"difference of the limit cycle's mean friction, as a share of the peak, from the exact mean, {name}",
+            f"difference of the limit cycle's mean friction, as a share of the peak, from the exact mean, "
+            f"{controller_name}",
             cycle.utilisation - used,
             "",
         ).at_most(1e-3, "as above", "closed form"),
         behaviour_row(
-            f"braking_controllers.planted_{name}",
+            f"braking_controllers.planted_{controller_name}",
             SYSTEM,
-            f"a planted error of 0.1 % in the spin inertia is noticed in the period, {name}",
+            f"a planted error of 0.1 % in the spin inertia is noticed in the period, {controller_name}",
             "told" if abs(cycle.period / wrong - 1.0) > 1e-4 else "missed",
             "told",
             "a planted fault",
         ),
         Observed(
-            f"braking_controllers.sampled_{name}",
+            f"braking_controllers.sampled_{controller_name}",
             SYSTEM,
             "relative difference of the period with samples of 5.5 ms from the period of the "
-            f"continuous controller, {name}",
-            sampled_cycle(_wheel_at_constant_speed(), replace(FIVE_PHASE_CONTROLLERS[name]), cycles=5, skip=3).period
+            f"continuous controller, {controller_name}",
+            sampled_cycle(
+                _wheel_at_constant_speed(), replace(FIVE_PHASE_CONTROLLERS[controller_name]), cycles=5, skip=3
+            ).period
             / cycle.period
             - 1.0,
             "",
@@ -258,7 +267,7 @@ def _substep_rows() -> list[Row]:
     rows = []
     for on, speed in (("snow", 13.9), ("dry", 22.22)):
         tight = reference_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed)
-        for n in SUBSTEPS:
+        for n in SUBSTEP_COUNTS:
             distance = own_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
             rows.append(
                 Observed(

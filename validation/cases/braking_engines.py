@@ -62,7 +62,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         )
         for name, end in beside.items()
     ]
-    rows += [*_symmetry_rows(until, compiled), *_load_rows(), *_trailer_rows(quick)]
+    rows += [*_symmetry_rows(until, compiled), *_axle_load_rows(), *_trailer_rows(quick)]
     rows += [
         Observed(
             f"braking_engines.speed.{steps}",
@@ -105,7 +105,7 @@ def simulation_speed(substep_count: int) -> float:
     return float(path.times[-1]) / (time.process_time() - start)
 
 
-def _load_rows() -> list[Row]:
+def _axle_load_rows() -> list[Row]:
     rows = [
         Observed(
             f"braking_engines.transfer.{name.replace(' ', '-')}",
@@ -128,9 +128,11 @@ def _load_rows() -> list[Row]:
     ]
 
 
-def _symmetry_rows(end_speed: float, steered: TurnEnd) -> list[Row]:
+def _symmetry_rows(end_speed: float, steered_turn: TurnEnd) -> list[Row]:
     mirrored, straight = braked_truck_turn(end_speed, -STEER), braked_truck_turn(end_speed, 0.0)
-    apart = max(abs(mirrored.x - steered.x), abs(mirrored.y + steered.y), abs(mirrored.heading + steered.heading))
+    apart = max(
+        abs(mirrored.x - steered_turn.x), abs(mirrored.y + steered_turn.y), abs(mirrored.heading + steered_turn.heading)
+    )
     return [
         Observed(
             "braking_engines.mirror", SYSTEM, "difference between a turn and its mirror image", apart, "m, rad"

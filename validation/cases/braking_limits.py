@@ -29,12 +29,14 @@ TITLE = "Limits of braking: stops that finish, vehicles that fall or fold, slow 
 SYSTEM: System = "anti-lock"
 SEED = 19
 STOP_COUNTS = {True: 3, False: 200}
-"""Number of random stops, keyed by ``quick``."""
+"""Number of random stops, for a quick run (True) and a full run (False)."""
 VEHICLE_LIMITS = ("rolls over", "pitches over", "jackknifes", "turns over")
 """Words in the error of a run that ends at a physical limit of the vehicle, which a legal scene may reach."""
 LINEAR_BRAKE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
-FAST_RELEASE_PHASES = FivePhase(1, e1=21.21, e2=26.62, e3=20.73, e4=2.07, e5=50.4, falling=74.51, fast=42.29, slow=6.42)
-"""Five-phase controller whose first application is fast and whose release does not end by the wheel's acceleration."""
+LONG_RELEASE_CONTROLLER = FivePhase(
+    1, e1=21.21, e2=26.62, e3=20.73, e4=2.07, e5=50.4, falling=74.51, fast=42.29, slow=6.42
+)
+"""Five-phase controller whose release does not end by the wheel's acceleration after a fast first application."""
 
 
 @allowing_breaches("stops at the limits, and random ones: that they end, or say why not, is judged")
@@ -42,7 +44,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of all limits. A quick run takes three of the random stops, and one speed of the slow stops on split
     friction."""
     ends = [ending_text(number) for number in range(STOP_COUNTS[quick])]
-    rows = [_stops_row(ends), _jackknife_row(), *_roll_rows(), _slow_apply_row(), _cycle_row()]
+    rows = [_random_stops_row(ends), _jackknife_row(), *_roll_rows(), _slow_apply_row(), _cycle_row()]
     rows += [_yaw_row(speed) for speed in ((1.0,) if quick else (0.5, 1.0, 3.0))]
     return rows + [_refused_row(*refusal_arguments) for refusal_arguments in REFUSED_INPUTS.items()], {"ends": ends}
 
@@ -56,7 +58,7 @@ def ending_text(scene_number: int) -> str:
     return "" if path.ended_at_rest else "does not stand"
 
 
-def _stops_row(endings: list[str]) -> Row:
+def _random_stops_row(endings: list[str]) -> Row:
     limits = [end for end in endings if any(limit in end for limit in VEHICLE_LIMITS)]
     wrong = [f"{i}: {end}" for i, end in enumerate(endings) if end and end not in limits]
     what = (
@@ -73,7 +75,7 @@ def _braking_scene(**tables: Any) -> Any:
 
 
 def _error_of_procedure(scene: Any) -> RunFailed | None:
-    """Error with which the only procedure of a scene fails; None if the procedure runs to its end."""
+    """Error with which the only braking procedure of a scene fails; None if the procedure runs to its end."""
     try:
         run(scene)
     except RunFailed as error:
@@ -166,8 +168,8 @@ def _cycle_row() -> Row:
     """Row: period of the controller's limit cycle after a fast first application to a rolling wheel, compared with the
     exact period after a slow first application."""
     frozen = WheelAtSpeed(20.0, 16900.0, 0.5, 13.35, LINEAR_BRAKE, table_of_surface("snow"))
-    period, _ = exact_cycle(frozen, FAST_RELEASE_PHASES, FAST_RELEASE_PHASES.slow)
-    reached = limit_cycle(frozen, replace(FAST_RELEASE_PHASES), 1e-4).period
+    period, _ = exact_cycle(frozen, LONG_RELEASE_CONTROLLER, LONG_RELEASE_CONTROLLER.slow)
+    reached = limit_cycle(frozen, replace(LONG_RELEASE_CONTROLLER), 1e-4).period
     return Observed(
         "braking_limits.cycle_from_rolling",
         SYSTEM,

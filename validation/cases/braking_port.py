@@ -82,11 +82,11 @@ QUICK_FAULTS = ("NaN", "too few wheels", "silence", "died")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of equal bits, costs and faults; a quick run brakes for half a second and plants few faults."""
     tables_by_connection = _port_tables(folder, with_python_process=not quick)
-    rows = _bit_rows(tables_by_connection, folder, 0.5 if quick else 4.0)
+    rows = _equal_bits_rows(tables_by_connection, folder, 0.5 if quick else 4.0)
     costs = _exchange_times(tables_by_connection, folder, 5 if quick else 40)
     rows += [
         Observed(
-            f"braking_port.cost.{_id(name)}",
+            f"braking_port.cost.{_row_id(name)}",
             SYSTEM,
             f"time of an exchange with a controller, {name}, 95 % interval {low:.1f} to {high:.1f}",
             cost,
@@ -144,14 +144,14 @@ def _table_of_fmu(folder: Path) -> dict[str, Any] | str:
     return {"fmu": FmuBuilder.build_FMU(Path(port.__path__[0]) / "example_slave.py", dest=folder).name}
 
 
-def _bit_rows(tables_by_connection: dict[str, dict[str, Any] | str], folder: Path, duration: float) -> list[Row]:
+def _equal_bits_rows(tables_by_connection: dict[str, dict[str, Any] | str], folder: Path, duration: float) -> list[Row]:
     """Rows: runs with every kind of connection, and a replay of the log, compared bit by bit with a run that calls the
     controller directly."""
     first = run(_scene(folder, duration, {"callable": EXAMPLE, "log": "port.log"})).detail
     rows = []
     for name, table in {**tables_by_connection, "replay": {"replay": "port.log"}}.items():
         key, what = (
-            f"braking_port.bits.{_id(name)}",
+            f"braking_port.bits.{_row_id(name)}",
             f"a run through the {name} has the bits of the callable, {len(first.times) - 1} samples",
         )
         if isinstance(table, str):
@@ -301,7 +301,7 @@ def _fault_rows(fault: dict[str, Any]) -> list[Row]:
     slow = fault["name"] == fault["expected"] == "silence" and fault["number"] <= well  # a busy machine is silent, too
     is_complete = fault["kept"] == fault["number"] and (fault["number"] == well or slow)
     ended = fault["name"] if is_complete else f"{fault['name']} at {fault['number']}, {fault['kept']} samples kept"
-    key = f"braking_port.fault.{_id(fault['kind'])}"
+    key = f"braking_port.fault.{_row_id(fault['kind'])}"
     return [
         behaviour_row(
             key,
@@ -321,7 +321,7 @@ def _fault_rows(fault: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _id(name: str) -> str:
+def _row_id(name: str) -> str:
     return name.replace(": ", ".").replace(" ", "-")
 
 

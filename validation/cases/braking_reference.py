@@ -39,8 +39,8 @@ LAW_COMPARISONS = {
     ),
     "relaxation": (laws.slip_lags, 1e-12, "difference of slip angles that lag by a relaxation length from plain code"),
 }
-"""For each force law: the function that evaluates both implementations at random states, the tolerance, and what is
-compared."""
+"""For each force law: the function that evaluates both implementations at random states, the tolerance, and the
+compared quantity."""
 ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 
 

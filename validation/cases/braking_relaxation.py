@@ -1,5 +1,5 @@
-"""Tyres with a relaxation length on a braked vehicle on its suspension, compared with a closed form, limits, and plain
-code."""
+"""Tyres with a relaxation length on a braked vehicle on its suspension, compared with a closed form, limits, and
+independently written code."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -29,14 +29,14 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     has MuJoCo and the limit of a stiff suspension."""
     engines = ENGINES[1:] if quick else ENGINES
     vehicles = ("car",) if quick else tuple(whole.VEHICLES)
-    rows = [_rise_row(engine) for engine in engines] + [_short_relaxation_row("exudyn")]
+    rows = [_slip_rise_row(engine) for engine in engines] + [_short_relaxation_row("exudyn")]
     rows += [_reference_row(vehicle, engine, 0.05 if quick else 0.2) for vehicle in vehicles for engine in engines]
     if not quick:
-        rows.append(_stiff_row())
+        rows.append(_stiff_suspension_row())
     return rows, {}
 
 
-def _rise_row(engine: str) -> Row:
+def _slip_rise_row(engine: str) -> Row:
     return Observed(
         f"braking_relaxation.rise.{engine}",
         SYSTEM,
@@ -98,7 +98,7 @@ def _reference_row(vehicle: str, engine: str, duration: float) -> Row:
     ).at_most(1e-10, "the same steps in plain code, whose lag is an exponential of a matrix", "native")
 
 
-def _stiff_row() -> Row:
+def _stiff_suspension_row() -> Row:
     apart = []
     for stiffer in (1.0, 100.0):
         ends = [braked_turn(engine, 0.3, stiffer, 2.0).states[-1, 0, :2] for engine in ("mujoco", None)]

@@ -50,12 +50,12 @@ FURTHER_CASES = {
 DISTANCE_BOUND = 5e-4
 """Largest relative error of a stopping distance that is asked for."""
 SWEEP_STEPS = {True: (PAPER_STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, PAPER_STEP, 1e-2, 2e-2)}
-"""Steps (s) of the sweep over brake torques, keyed by ``quick``."""
+"""Steps (s) of the sweep over brake torques, for a quick run (True) and a full run (False)."""
 SMALLEST_FIGURE_STEP = 5e-4
 """Smallest of the sweep's steps (s) that the figure shows."""
 FULL_SWEEP_SURFACES = ("dry", "wet", "snow", "ice")
 """Surfaces on which the sweep takes every brake torque at every step."""
-TORQUE_LEVELS, SOME_LEVELS = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
+TORQUE_LEVELS, LEVEL_SELECTION = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
 """Brake torques of the sweep divided by the locking torque; and the selection of them that other surfaces take in steps
 below the paper's, as does the quick run."""
 SLOW_SPEED = 0.5
@@ -72,16 +72,16 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     }
     rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
     if not quick:
-        rows += [_further_row(name, *headline_arguments) for name, headline_arguments in FURTHER_CASES.items()]
+        rows += [_further_case_row(name, *headline_arguments) for name, headline_arguments in FURTHER_CASES.items()]
     rows += [
         _sweep_row(
             ("ice", "dry") if quick else tuple(NAMED_SURFACES),
-            TORQUE_LEVELS[SOME_LEVELS] if quick else TORQUE_LEVELS,
+            TORQUE_LEVELS[LEVEL_SELECTION] if quick else TORQUE_LEVELS,
             SWEEP_STEPS[quick],
         ),
-        _locked_row(),
-        _release_row(),
-        _friction_row(9 if quick else 25),
+        _locked_wheel_row(),
+        _wheel_release_row(),
+        _friction_level_row(9 if quick else 25),
     ]
     return rows, {"curves": curves, "steps": steps}
 
@@ -148,9 +148,13 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
     return rows
 
 
-def _further_row(name: str, surface: str, slip: float, speed: float, mass: float, spin: float) -> Row:
+def _further_case_row(
+    name: str, surface: str, slip: float, speed: float, mass_factor: float, spin_inertia_factor: float
+) -> Row:
     quarter = Quarter(
-        mass=mass * FRONT_WHEEL.mass, radius=FRONT_WHEEL.radius, spin_inertia=spin * FRONT_WHEEL.spin_inertia
+        mass=mass_factor * FRONT_WHEEL.mass,
+        radius=FRONT_WHEEL.radius,
+        spin_inertia=spin_inertia_factor * FRONT_WHEEL.spin_inertia,
     )
     tyre, _ = both = friction_table(surface)
     torque = steady_torque(quarter, tyre, slip)[1]
@@ -191,7 +195,7 @@ def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tu
         lock = float(tyre[0].mu_x.max()) * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
         speed = 11.11 if step >= 1e-3 else SLOW_SPEED
         for level in (
-            friction_levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else friction_levels[SOME_LEVELS]
+            friction_levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else friction_levels[LEVEL_SELECTION]
         ):
             faults = broken_rules(
                 constant_torque_stop(FRONT_WHEEL, tyre, level * lock, speed, step, STANDSTILL_SECONDS),
@@ -214,7 +218,7 @@ def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tu
     )
 
 
-def _locked_row() -> Row:
+def _locked_wheel_row() -> Row:
     errors = []
     for on in NAMED_SURFACES:
         tyre = friction_table(on)
@@ -231,7 +235,7 @@ def _locked_row() -> Row:
     ).at_most(1e-9, "asked for", "closed form")
 
 
-def _release_row() -> Row:
+def _wheel_release_row() -> Row:
     errors = []
     for on, step in product(NAMED_SURFACES, (1e-3, PAPER_STEP, 2e-2)):
         tyre, tables = friction_table(on)
@@ -251,7 +255,7 @@ def _release_row() -> Row:
     ).at_most(1e-3, "asked for: the time at which torque falls to that of sliding", "closed form")
 
 
-def _friction_row(level_count: int) -> Row:
+def _friction_level_row(level_count: int) -> Row:
     torque = 3.0 * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
     distances = [
         constant_torque_stop(FRONT_WHEEL, friction_table("ice", float(scale)), torque, 11.11).distance

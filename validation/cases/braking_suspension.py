@@ -43,16 +43,22 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     turns = [
         braked_vehicle(car(), wet, steer=steer).run(steady_torques(*HARD_TURN_TORQUES), 6.0) for steer in (0.1, -0.1)
     ]
-    rows = [*_locked_rows(GENTLE_FRICTION), *_mirror_rows(*turns)]
+    rows = [*_locked_wheel_rows(GENTLE_FRICTION), *_mirror_rows(*turns)]
     data: dict[str, Any] = {"limit": []}
     if not quick:
-        rows += [*_locked_rows(HARD_FRICTION), *_engine_rows(wet), *_ice_rows(), *_order_rows(wet), _speed_row(wet)]
+        rows += [
+            *_locked_wheel_rows(HARD_FRICTION),
+            *_engine_rows(wet),
+            *_ice_rows(),
+            *_step_rows(wet),
+            _simulation_speed_row(wet),
+        ]
         data["limit"] = stiff_limit(wet)
-        rows += _limit_rows(data["limit"])
+        rows += _stiff_limit_rows(data["limit"])
     return rows, data
 
 
-def _locked_rows(mu: float) -> list[Row]:
+def _locked_wheel_rows(mu: float) -> list[Row]:
     """Rows of stops of the box and the car with locked wheels, from a speed at which the stop takes 4 s."""
     speed, rows = 4.0 * mu * GRAVITY, []
     for name, vehicle_kind in (("box", box()), ("car", car())):
@@ -104,7 +110,7 @@ def _locked_rows(mu: float) -> list[Row]:
     return rows
 
 
-def _pitch_rows(mu: float, pitch: float, gained: float) -> list[Row]:
+def _pitch_rows(mu: float, pitch: float, axle_load_gain: float) -> list[Row]:
     exact, bound = pitch_and_transfer(mu * GRAVITY), 2e-2 if mu == HARD_FRICTION else 2e-3
     return [
         Observed(
@@ -114,7 +120,7 @@ def _pitch_rows(mu: float, pitch: float, gained: float) -> list[Row]:
             abs(value / theory - 1.0),
             "relative",
         ).at_most(bound, "closed form to first order in the pitch angle", "closed form")
-        for what, value, theory in zip(("pitch", "axle-loads"), (pitch, gained), exact, strict=True)
+        for what, value, theory in zip(("pitch", "axle-loads"), (pitch, axle_load_gain), exact, strict=True)
     ]
 
 
@@ -150,7 +156,7 @@ def _engine_rows(wet_table: TyreTable) -> list[Row]:
     ]
 
 
-def _order_rows(wet_table: TyreTable) -> list[Row]:
+def _step_rows(wet_table: TyreTable) -> list[Row]:
     distances = [
         braked_vehicle(car(), wet_table, steer=0.05, substeps=n)
         .run(steady_torques(*HARD_TURN_TORQUES), 10.0)
@@ -216,7 +222,7 @@ class _TimedController:
         return command
 
 
-def _speed_row(wet_table: TyreTable) -> Row:
+def _simulation_speed_row(wet_table: TyreTable) -> Row:
     """Row of the simulation speed, from the fastest tenth of the samples, which other processes disturb least."""
     vehicle, controller = (
         braked_vehicle(car(), wet_table, substeps=4, gradient=150.0),
@@ -254,7 +260,7 @@ def stiff_limit(tyre: TyreTable) -> list[list[float]]:
     return distances
 
 
-def _limit_rows(ends: list[list[float]]) -> list[Row]:
+def _stiff_limit_rows(ends: list[list[float]]) -> list[Row]:
     return [
         Observed(
             "braking_suspension.limit",

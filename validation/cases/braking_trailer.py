@@ -1,5 +1,5 @@
-"""A car that brakes with a caravan, both on suspensions: statics, locked wheels, plain equations, slip control, and
-planted faults."""
+"""A car that brakes with a caravan, both on suspensions: statics, locked wheels, independently written equations, slip
+control, and planted faults."""
 
 from pathlib import Path
 from typing import Any
@@ -38,7 +38,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         for engine in engines
     ]
     if not quick:
-        rows += [_locked_row(), *_caravan_brakes_rows(), *_control_rows(), *_fault_rows()]
+        rows += [_locked_wheels_row(), *_caravan_brakes_rows(), *_slip_control_rows(), *_fault_rows()]
     return rows, {}
 
 
@@ -81,7 +81,7 @@ def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
     ).at_most(1e-10, "the same steps, in another code from the valves to the bodies", "native")
 
 
-def _locked_row() -> Row:
+def _locked_wheels_row() -> Row:
     stopping_way, wanted = train.locked_stop()
     return Observed(
         "braking_trailer.locked",
@@ -109,7 +109,7 @@ def _caravan_brakes_rows() -> list[Row]:
     ]
 
 
-def _control_rows() -> list[Row]:
+def _slip_control_rows() -> list[Row]:
     """Rows: stop on ice with slip control of all six wheels, compared with locked wheels."""
     ice, speed = table_of_surface("ice"), 11.11
     vehicle = braked_vehicle(whole.towing_car(), ice, substeps=4, gradient=150.0)

@@ -1,4 +1,4 @@
-"""Effects chosen for linear stationary ride scenes within a tolerance: is each choice right, and how many evaluations
+"""Effects chosen for linear stationary ride scenes within a tolerance: is each choice right, and how many force calls
 does it save?"""
 
 from dataclasses import dataclass
@@ -54,7 +54,8 @@ class JudgedChoice:
 
     @property
     def saving(self) -> float:
-        """Evaluations at equal accuracy of the complete scene, divided by those of the reduced scene."""
+        """Number of force calls that the complete scene needs, divided by that of the reduced scene, at equal
+        accuracy."""
         return self.choice.cost_before.calls / self.choice.cost_after.calls
 
     @property
@@ -93,9 +94,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         )
         for seed in seeds
     ]
-    rows = [*_kept_rows(choices), _identity_row(choices), *_nearby_and_saving_rows(choices)]
+    rows = [*_tolerance_rows(choices), _adjoint_identity_row(choices), *_nearby_and_saving_rows(choices)]
     if not quick:
-        rows += [_prediction_row(choices), _saving_row(choices), *_count_rows()]
+        rows += [_prediction_row(choices), _saving_row(choices), *_solver_count_rows()]
     pair_rows, pair = _half_car_rows()
     return [*rows, *pair_rows, *_activity_rows()], {
         "scenes": [_summary_of_choice(choice) for choice in choices],
@@ -103,7 +104,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     }
 
 
-def _kept_rows(choices: list[JudgedChoice]) -> list[Row]:
+def _tolerance_rows(choices: list[JudgedChoice]) -> list[Row]:
     share = float(np.mean([judged_choice.choice.within_tolerance for judged_choice in choices]))
     lies = sum(not judged_choice.is_honest for judged_choice in choices)
     second = [judged_choice for judged_choice in choices if judged_choice.frequency_changes is not None]
@@ -163,7 +164,7 @@ def _prediction_row(choices: list[JudgedChoice]) -> Row:
     )
 
 
-def _identity_row(choices: list[JudgedChoice]) -> Row:
+def _adjoint_identity_row(choices: list[JudgedChoice]) -> Row:
     return Observed(
         "choice_linear.identity",
         SYSTEM,
@@ -175,8 +176,8 @@ def _identity_row(choices: list[JudgedChoice]) -> Row:
 
 
 def _nearby_and_saving_rows(choices: list[JudgedChoice]) -> list[Row]:
-    """Rows over all scenes: whether the tolerance holds near each scene as well, and the saving. Both are computed by
-    methods that the choice does not use."""
+    """Rows over all scenes: whether the tolerance also holds at other speeds and with changed parameters, and the
+    saving. Both are computed by methods that the choice does not use."""
     told_in_advance = sum(
         bool(judged_choice.choice.said) and not judged_choice.choice.left_out for judged_choice in choices
     )
@@ -237,7 +238,7 @@ def _saving_row(choices: list[JudgedChoice]) -> Row:
     ).beside("", "it depends on what is asked of which vehicle: a wheel's force needs the wheel", "none")
 
 
-def _count_rows() -> list[Row]:
+def _solver_count_rows() -> list[Row]:
     """Rows: numbers of eigenvalue problems and of Lyapunov equations that a choice solves for a car of 19 degrees of
     freedom, divided by the square of its number of effects."""
     chooser = Chooser.of(whole_car())
@@ -359,7 +360,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Plot predicted over confirmed changes, and the saving in evaluations over the tolerance."""
+    """Plot predicted over confirmed changes, and the saving in force calls over the tolerance."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

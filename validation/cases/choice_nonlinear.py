@@ -1,5 +1,5 @@
-"""Effects chosen within a tolerance for scenes that are simulated in time: is each choice right, and how many
-evaluations does it save?"""
+"""Effects chosen within a tolerance for scenes that are simulated in time: is each choice right, and how many force
+calls does it save?"""
 
 from pathlib import Path
 
@@ -46,17 +46,17 @@ def judge_choice(system: str, seed: int) -> JudgedByRuns:
     return judged_of(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
-def judge_ride(asked: BentRide) -> JudgedByRuns:
-    """Choose effects for a ride, then compare the complete and the reduced vehicle on new roads that the choice did not
-    use."""
+def judge_ride(bent_ride: BentRide) -> JudgedByRuns:
+    """Choose effects for a ride with nonlinear springs, then compare the complete and the reduced vehicle on new roads
+    that the choice did not use."""
     engine = ENGINES["ride"][0]
-    choice = Chooser(asked.opened(), engine, list(asked.quantities), asked.tolerance).choose()
-    fresh = Variants(asked.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
+    choice = Chooser(bent_ride.opened(), engine, list(bent_ride.quantities), bent_ride.tolerance).choose()
+    fresh = Variants(bent_ride.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
     full_scene, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
     if full_scene is None or rest is None:
-        return JudgedByRuns("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
-    again = [_significant_change(full_scene.of(name).cases[0], rest.of(name).cases[0]) for name in asked.quantities]
-    return JudgedByRuns("ride", engine, asked, choice, np.array(again))
+        return JudgedByRuns("ride", engine, bent_ride, choice, np.full(len(bent_ride.quantities), np.inf))
+    again = [_significant_change(full_scene.of(name).cases[0], rest.of(name).cases[0]) for name in bent_ride.quantities]
+    return JudgedByRuns("ride", engine, bent_ride, choice, np.array(again))
 
 
 def _significant_change(full_mean_squares: np.ndarray, reduced_mean_squares: np.ndarray) -> float:
@@ -224,7 +224,7 @@ def tables(case_data: Saved) -> list[Table]:
 
 
 def draw(case_data: Saved) -> Drawn:
-    """Plot predicted over confirmed changes, and savings in evaluations over the tolerance."""
+    """Plot predicted over confirmed changes, and savings in force calls over the tolerance."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

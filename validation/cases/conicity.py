@@ -17,7 +17,7 @@ from validation.common.scenes import data_folder
 
 TITLE = "Equivalent conicity by EN 15302"
 SYSTEM: System = "contact"
-FOLDER, PROFILES = "en15302", ("E1", "E2", "E3", "E4")
+TABLE_FOLDER, PROFILE_NAMES = "en15302", ("E1", "E2", "E3", "E4")
 TABLE_SPACING = 0.1
 """Lateral distance (mm) between the rows of the standard's tables, which are symmetric about zero."""
 CONICITY_TOLERANCE = 0.003
@@ -30,9 +30,9 @@ LATERAL_SHIFTS = np.linspace(-8.0, 8.0, 161)
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the closed forms and of the standard's profiles; a full run also has a wheelset with wheels of unequal
     radii."""
-    rows = [*_closed_form_rows(), _cubic_row(), _refusal_row()]
+    rows = [*_closed_form_rows(), _cubic_difference_row(), _refusal_row()]
     saved_data: dict[str, Any] = {}
-    for name in PROFILES:
+    for name in PROFILE_NAMES:
         of_standard, saved = _reference_profile_rows(name)
         rows += of_standard
         saved_data |= saved
@@ -125,7 +125,7 @@ def two_slope_period(inner_slope: float, outer_slope: float, bend: float, amplit
     return 4.0 * (within + math.acos(rest / deep) / root)
 
 
-def _cubic_row() -> Row:
+def _cubic_difference_row() -> Row:
     """Row: observed order of the period's error in the table spacing, for a difference of rolling radii that is cubic
     in the displacement. The exact period is an elliptic integral."""
     a, b, amplitude = 0.1, 0.02, 4.0
@@ -164,7 +164,7 @@ def _reference_profile_rows(name: str) -> tuple[list[Row], dict[str, Any]]:
     """Rows on one of the standard's reference profiles, and data for the figure."""
     quantities = (f"{name}: amplitudes outside of the standard's limits", f"{name}: largest error")
     data = data_folder()
-    table_file = None if data is None else data / FOLDER / f"dr_ce_{name}.dat"
+    table_file = None if data is None else data / TABLE_FOLDER / f"dr_ce_{name}.dat"
     if table_file is None or not table_file.is_file():
         reason = "TWINRIG_DATA names no folder with the standard's tables"
         ids = (f"conicity.{name}.outside", f"conicity.{name}.error")

@@ -43,7 +43,7 @@ STEP_COUNTS = {
 """Number of steps of a timed run, by bridge, for an integrator with one force call per step. The runs take a few
 milliseconds, so that some of them are not disturbed by other processes."""
 CONTACT_LAWS = (("linear", 0), ("fastsim", 7), ("fastsim", 11), ("fastsim", 21), ("fastsim", 41), ("simplified", 21))
-"""Contact theories and numbers of cells per strip."""
+"""Contact theories, each with a number of cells per strip."""
 MAIN_LAW = CONTACT_LAWS[3]
 WHEEL_COUNTS = (1, 4, 8)
 CALLS_PER_STEP = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
@@ -186,11 +186,11 @@ def _timed_kernel(law: tuple[str, int], wheel_count: int) -> tuple[Callable[[], 
     wheels = Setup("", "", "native", law, wheel_count).wheels()
     q, v = wheels.state()
     f, numbers, calls = np.zeros(wheels.size), wheels.numbers, 4 if law[0] == "simplified" else 200
-    return lambda: _repeat(numbers, q, v, f, calls), calls
+    return lambda: _repeat_kernel(numbers, q, v, f, calls), calls
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat(table_of_wheels, q, v, force_sum, repeats):
+def _repeat_kernel(table_of_wheels, q, v, force_sum, repeats):
     for _ in range(repeats):
         forces(start(table_of_wheels), 0.0, start(q), start(v), start(force_sum))
 
@@ -258,12 +258,12 @@ def library_law(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
     return add
 
 
-def _cost_rows(prices: MeasuredTimes) -> list[Row]:
+def _cost_rows(measured_times: MeasuredTimes) -> list[Row]:
     rows = []
-    for setup in prices.setups:
+    for setup in measured_times.setups:
         if not setup.is_reported:
             continue
-        step, bare, kernel = prices.times_by_round(setup)
+        step, bare, kernel = measured_times.times_by_round(setup)
         name, calls = f"contact_bridges.{setup.engine}.{setup.method}", CALLS_PER_STEP[setup.method]
         if setup.engine == "mujoco":
             value, low, high = median(step / (bare + kernel))

@@ -61,7 +61,7 @@ def exact_coefficients(axis_ratio: float, poisson_ratio: float, cells: int = COA
     return limit
 
 
-def _coefficients_on_grid(axis_ratio: float, nu: float, cells: int) -> Array:
+def _coefficients_on_grid(axis_ratio: float, poisson_ratio: float, cells: int) -> Array:
     """Creepage coefficients (4,) by the exact linear theory on one grid, from unit creepages. C23 is the mean of two
     values: lateral force due to spin, and moment due to lateral creepage."""
     a, b = axis_ratio**0.5, axis_ratio**-0.5
@@ -70,7 +70,7 @@ def _coefficients_on_grid(axis_ratio: float, nu: float, cells: int) -> Array:
     dx, dy = 2.0 * a / columns, 2.0 * b / rows
     x, y = centres(columns, dx), centres(rows, dy)
     inside = (x / a) ** 2 + (y[:, None] / b) ** 2 < 1.0
-    body = Material(E=2e11, nu=nu)
+    body = Material(E=2e11, nu=poisson_ratio)
     operator = SlipOperator(columns, rows, dx, dy, MaterialPair(body, body))
     system = FreeSystem(operator, inside[..., None, None] * np.eye(2), np.zeros(inside.shape))
     sums = []
@@ -103,7 +103,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, data
 
 
-def deviation(exact_rows: Array) -> Array:
+def relative_deviations(exact_rows: Array) -> Array:
     """Relative deviations (n, 4) of the library's coefficients from the exact ones. exact_rows (n, 6): axis ratio,
     Poisson's ratio, and the four exact coefficients."""
     c = coefficients(exact_rows[:, 0], exact_rows[:, 1])
@@ -111,7 +111,7 @@ def deviation(exact_rows: Array) -> Array:
 
 
 def _node_rows(nodes: Array) -> list[Row]:
-    off = np.abs(deviation(nodes))
+    off = np.abs(relative_deviations(nodes))
     middle = (nodes[:, 0] > 0.19) & (nodes[:, 0] < 5.1)
     rows = [
         _worst_difference_row(name, off[middle, i], nodes[middle], "a/b 0.2 to 5", COEFFICIENT_TOLERANCES[name])
@@ -131,14 +131,14 @@ def _node_rows(nodes: Array) -> list[Row]:
     return rows
 
 
-def _worst_difference_row(name: str, off: Array, nodes: Array, where: str, bound: float) -> Row:
-    ratio, nu = nodes[int(off.argmax()), :2]
+def _worst_difference_row(name: str, deviations: Array, nodes: Array, range_text: str, bound: float) -> Row:
+    ratio, nu = nodes[int(deviations.argmax()), :2]
     return Observed(
-        f"contact_coefficients.{name}.{where.split()[1]}.{where.split()[-1]}",
+        f"contact_coefficients.{name}.{range_text.split()[1]}.{range_text.split()[-1]}",
         SYSTEM,
-        f"relative difference of {name} of the published table from the exact theory, {where}: worst "
-        f"of {len(off)}, at a/b {ratio:.4g}, nu {nu:g}",
-        float(off.max()),
+        f"relative difference of {name} of the published table from the exact theory, {range_text}: worst "
+        f"of {len(deviations)}, at a/b {ratio:.4g}, nu {nu:g}",
+        float(deviations.max()),
         "",
     ).at_most(bound, REFERENCE_NOTE, "published")
 
@@ -158,14 +158,14 @@ def _misprint_row(nodes: Array) -> Row:
     )
 
 
-def _between_rows(interpolated: Array, nodes: Array) -> list[Row]:
+def _between_rows(exact_rows: Array, nodes: Array) -> list[Row]:
     """Rows: interpolation error of the coefficients. This is the deviation between two nodes of the table minus the
     mean deviation at these nodes."""
-    at_nodes = deviation(nodes).reshape(len(RATIOS), len(POISSON_RATIOS), 4)
+    at_nodes = relative_deviations(nodes).reshape(len(RATIOS), len(POISSON_RATIOS), 4)
     count = len(RATIOS) - 1
     along_ratio = (at_nodes[1:, 1] + at_nodes[:-1, 1]) / 2.0
     along_nu = [(at_nodes[i, k] + at_nodes[i, k + 1]) / 2.0 for i in (0, 9, 18) for k in (0, 1)]
-    off = np.abs(deviation(interpolated) - np.concatenate((along_ratio, along_nu)))
+    off = np.abs(relative_deviations(exact_rows) - np.concatenate((along_ratio, along_nu)))
     spans = {"ratios": slice(0, count), "nu": slice(count, None)}
     why = "1 % is asked; the deviation of the nodes on both sides is taken off"
     return [
@@ -181,19 +181,19 @@ def _between_rows(interpolated: Array, nodes: Array) -> list[Row]:
     ]
 
 
-def _beyond_rows(beyond: Array) -> list[Row]:
+def _beyond_rows(exact_rows: Array) -> list[Row]:
     """Rows on slender contact ellipses beyond the table. C33 of ellipses that are long in the rolling direction has
     separate nodes at axis ratios 20 and 50, because it is a small difference of large terms."""
-    off = np.abs(deviation(beyond))
-    long = beyond[:, 0] > 1.0
+    off = np.abs(relative_deviations(exact_rows))
+    long = exact_rows[:, 0] > 1.0
     asymptotes, nodes = "Kalker's asymptotes, led on from the table", "nodes by the same theory; 30 lies between them"
     parts = [
-        (f"beyond.{name}", f"{name} at a/b {_ratios_text(beyond)}", off[:, i], 0.03, asymptotes)
+        (f"beyond.{name}", f"{name} at a/b {_ratios_text(exact_rows)}", off[:, i], 0.03, asymptotes)
         for i, name in enumerate(COEFFICIENT_NAMES[:3])
     ]
     parts += [
-        ("beyond.C33", f"C33 at a/b {_ratios_text(beyond[~long])}", off[~long, 3], 0.03, asymptotes),
-        ("beyond.C33.long", f"C33 at a/b {_ratios_text(beyond[long])}", off[long, 3], 0.1, nodes),
+        ("beyond.C33", f"C33 at a/b {_ratios_text(exact_rows[~long])}", off[~long, 3], 0.03, asymptotes),
+        ("beyond.C33.long", f"C33 at a/b {_ratios_text(exact_rows[long])}", off[long, 3], 0.1, nodes),
     ]
     return [
         Observed(
@@ -221,7 +221,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
             f"{node[0]:.4g}",
             *(f"{value:.4g} ({100 * part_name:+.2f} %)" for value, part_name in zip(node[2:], parts, strict=True)),
         )
-        for node, parts in zip(some, deviation(some), strict=True)
+        for node, parts in zip(some, relative_deviations(some), strict=True)
     )
     note = (
         "Coefficients of the exact theory, nu = 1/4, and how far the published table is above them. C33 of the "
@@ -242,7 +242,9 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     for i, (name, curve) in enumerate(zip(COEFFICIENT_NAMES, (c.c11, c.c22, c.c23, c.c33), strict=True)):
         left.loglog(ratio, curve, color=f"C{i}", label=name)
         left.loglog(quarter[:, 0], quarter[:, 2 + i], "o", color=f"C{i}", markersize=3.5)
-        right.semilogx(solved[:, 0], 100 * deviation(solved)[:, i], "o", color=f"C{i}", markersize=3.5, label=name)
+        right.semilogx(
+            solved[:, 0], 100 * relative_deviations(solved)[:, i], "o", color=f"C{i}", markersize=3.5, label=name
+        )
     left.set(title="Coefficients [-], ν = 1/4 (dots: exact theory)", xlabel="a/b [-]")
     right.set(title="Library above exact theory [%], ν = 0 to 1/2", xlabel="a/b [-]", ylim=(-5, 20))
     for axes in (left, right):

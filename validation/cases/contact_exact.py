@@ -20,7 +20,8 @@ from validation.common.scenes import data_folder
 TITLE = "The exact theory of contact on cells"
 SYSTEM: System = "contact"
 MATERIAL_PAIR, MU, LOAD, CONTACT_SIZE = MaterialPair(), 0.3, 8e4, 5e-3
-"""Materials, coefficient of friction, normal load (N), and sqrt(a b) (m) of the contact ellipse."""
+"""Materials, coefficient of friction mu, normal load N (N), and sqrt(a b) (m) of the contact ellipse with the semi-axes
+a and b."""
 FRICTION_LIMIT = MU * LOAD
 SAMPLE_FILE = "contact_sample.csv"
 STRIP_AXIS_RATIO = 0.02
@@ -36,7 +37,7 @@ CASES: dict[str, tuple[float, float, float, float]] = {
     "spin, long": (5.0, 0.0, 0.0, 0.15),
 }
 """Axis ratio a/b, longitudinal and lateral creepage divided by mu N / (G ab), and spin divided by mu N / (G
-(ab)^(3/2))."""
+(ab)^(3/2)); N is the normal load, G the shear modulus."""
 RANDOM_CONTACT_COUNT, SEED = 12, 47
 """Number of random contacts that test the solver's convergence, and their seed. Ellipses, creepages with spin, and
 numbers of cells are random."""

@@ -49,7 +49,7 @@ JUDGED_CHOICES: tuple[dict[str, str], ...] = ({}, {"bound": "elliptic"}, {"march
 """Options of FASTSIM, changed from the best ones, whose stated discretisation errors are judged; a quick run takes the
 first alone."""
 REFERENCE_TOLERANCES = {True: 0.01, False: 0.005}
-"""Error of the exact theory divided by mu N on the grids of a quick and of a full run, keyed by ``quick``."""
+"""Error of the exact theory, divided by mu N, on the grids of a quick run (True) and of a full run (False)."""
 MISSED_SHARE = 0.06
 """Largest share of contacts whose error may exceed the stated one: the 5 % for which the band is made, and a contact or
 two."""
@@ -76,7 +76,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, {}
     programs = compare(cases[::2])
-    return [*rows, *_program_rows(programs), _table_row(folder)], {"programs": programs}
+    return [*rows, *_program_rows(programs), _long_table_row(folder)], {"programs": programs}
 
 
 def _reference_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
@@ -229,7 +229,7 @@ def _program_rows(program_times: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _table_row(folder: Path) -> Row:
+def _long_table_row(folder: Path) -> Row:
     """Row: computing time of a long table of contacts."""
     rng = np.random.default_rng(SEED)
     low, high = np.array([2.0, 2.0, 1.0, 0.1, -0.5, -0.5, -1.0]), np.array([9.0, 9.0, 150.0, 0.5, 0.5, 0.5, 1.0])

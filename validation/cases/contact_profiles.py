@@ -28,7 +28,7 @@ LATERAL_SHIFTS = np.arange(0.0, 10.1, 0.5)
 QUICK_SHIFTS = np.array([0.0, 4.5, 5.0, 6.0, 6.5])
 WHEEL_LOAD = 1e4
 """Vertical load (N) of a wheel; the benchmark has 20 kN on a wheelset."""
-CELLS = 40
+EXACT_CELLS = 40
 MATERIAL_PAIR = MaterialPair()
 BENCHMARK = (
     "Manchester contact benchmark, case A (Shackleton and Iwnicki, Vehicle Syst. Dyn. 46, 2008, 129-149), "
@@ -37,7 +37,7 @@ BENCHMARK = (
 CONTACT_JUMP = {"from": -22.6, "to": -33.4, "peak": 1556.0}
 """Lateral positions (mm) on the right rail between which the benchmark's contact jumps at a displacement of 5 mm, and
 its peak pressure there (MPa)."""
-LABELS = {"no yaw": "no yaw", "yaw": "yaw of 2.4 mrad per mm of shift"}
+FIGURE_LABELS = {"no yaw": "no yaw", "yaw": "yaw of 2.4 mrad per mm of shift"}
 FLANGE_SHIFT = 6.5
 """Lateral displacement (mm) from which the benchmark's flange touches the rail."""
 
@@ -49,11 +49,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     data: dict[str, Any] = {"no yaw": [_right_wheel_contact(float(shift), 0.0, not quick) for shift in shifts]}
     if not quick:
         data["yaw"] = [_right_wheel_contact(float(shift), 2.4e-3 * float(shift), False) for shift in shifts]
-    rows = _file_rows() + _contact_point_rows(data["no yaw"])
+    rows = _profile_file_rows() + _contact_point_rows(data["no yaw"])
     return rows + ([] if quick else _benchmark_rows(data["no yaw"])), data
 
 
-def _right_wheel_contact(lateral_shift: float, yaw: float, exact: bool) -> dict[str, Any]:
+def _right_wheel_contact(lateral_shift: float, yaw: float, with_exact_peak: bool) -> dict[str, Any]:
     """Contact of the right wheel at a lateral displacement (mm) and yaw angle (rad): contact points, their loads, area
     and peak pressure."""
     touches = wheel_on_rail(s1002(), uic60(), lateral_shift=lateral_shift * 1e-3, yaw=yaw)
@@ -78,7 +78,9 @@ def _right_wheel_contact(lateral_shift: float, yaw: float, exact: bool) -> dict[
         "peak": pressed.peak / 1e6,
     }
     heaviest = max(pressed.patches, key=lambda patch_pressure: patch_pressure.load)
-    return contact_facts | {"exact": _exact_peak(heaviest.patch, heaviest.load, heaviest.box) if exact else None}
+    return contact_facts | {
+        "exact": _exact_peak(heaviest.patch, heaviest.load, heaviest.box) if with_exact_peak else None
+    }
 
 
 def _exact_peak(patch: Any, load: float, box_ends: tuple[float, float, float, float]) -> float | None:
@@ -89,12 +91,12 @@ def _exact_peak(patch: Any, load: float, box_ends: tuple[float, float, float, fl
     wide, high = 0.15 * (x1 - x0), 0.3 * (y1 - y0)
     grid = (x0 - wide, x1 + wide, max(y0 - high, distance.y[0]), min(y1 + high, distance.y[-1]))
     try:
-        return float(exact_normal(Shape("", distance, load), CELLS, grid).pressure.max() / 1e6)
+        return float(exact_normal(Shape("", distance, load), EXACT_CELLS, grid).pressure.max() / 1e6)
     except InputError:
         return None
 
 
-def _file_rows() -> list[Row]:
+def _profile_file_rows() -> list[Row]:
     folder = data_folder()
     if folder is None or not (folder / WHEEL_FILE).is_file():
         reason = "TWINRIG_DATA names no folder with the benchmark's profiles"
@@ -270,7 +272,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
         hollow: dict[str, Any] = {} if name == "no yaw" else {"markerfacecolor": "none", "markersize": 10}
         style: dict[str, Any] = {"marker": "o", "linestyle": "none", **hollow}
         axis.plot(shift[load == 0], rail[load == 0], color="0.75", **style)
-        axis.plot(shift[load > 0], rail[load > 0], label=f"in contact, {LABELS[name]}", **style)
+        axis.plot(shift[load > 0], rail[load > 0], label=f"in contact, {FIGURE_LABELS[name]}", **style)
     axis.set(xlabel="lateral shift of the wheelset [mm]", ylabel="place of contact on the rail [mm]")
     axis.legend()
     add_heading(figure, "S1002 on UIC 60: where the right wheel touches its rail")

@@ -103,7 +103,7 @@ def largest_jump(patch: Patch, step_count: int) -> float:
 
 
 def _jump(load: Callable[[float], float], low_depth: float, high_depth: float) -> float:
-    """Jump (N) of the load, located by bisection, between two depths that are a relative distance of 1e-15 apart."""
+    """Jump (N) of the load between two depths, located by bisection down to a relative distance of 1e-15."""
     at_low, at_high = load(low_depth), load(high_depth)
     while high_depth - low_depth > 1e-15 * high_depth:
         middle = 0.5 * (low_depth + high_depth)
@@ -187,8 +187,8 @@ def _computing_times() -> dict[str, list[float]]:
     return dict(zip(jobs, interleave(list(jobs.values()), TIMING_ROUNDS).tolist(), strict=True))
 
 
-def _hertz_rows(hertz: dict[str, dict[str, float]]) -> list[Row]:
-    worst = {key: max(abs(case[key]) for case in hertz.values()) for key in ("approach", "paper")}
+def _hertz_rows(errors_by_ratio: dict[str, dict[str, float]]) -> list[Row]:
+    worst = {key: max(abs(case[key]) for case in errors_by_ratio.values()) for key in ("approach", "paper")}
     why = "the figure set for the theory; the closed form is Hertz's"
     rows = [
         Observed(
@@ -201,7 +201,7 @@ def _hertz_rows(hertz: dict[str, dict[str, float]]) -> list[Row]:
         ).at_most(100.0 * APPROACH_TOLERANCE, why, "closed form")
         for key, value in worst.items()
     ]
-    circle = hertz["1"]
+    circle = errors_by_ratio["1"]
     rows += [
         Observed(
             f"contact_simplified.hertz_circle.{key}",
@@ -250,12 +250,14 @@ def _shape_rows(errors_by_shape: dict[str, dict[str, Any]]) -> list[Row]:
     return rows
 
 
-def _merged_rows(grown: dict[str, dict[str, float]]) -> list[Row]:
+def _merged_rows(errors_by_contact: dict[str, dict[str, float]]) -> list[Row]:
     """Rows: largest error of the approach among contacts whose patches have merged, and among wheels on rails."""
     rows = []
     kinds = (("grown", "distances with several valleys", False), ("wheels", "wheels on rails", True))
     for row_name, what, chosen in kinds:
-        errors = {name: abs(case["each"]) for name, case in grown.items() if name.startswith("S1002") == chosen}
+        errors = {
+            name: abs(case["each"]) for name, case in errors_by_contact.items() if name.startswith("S1002") == chosen
+        }
         worst = max(errors, key=errors.__getitem__)
         rows.append(
             Observed(

@@ -81,7 +81,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     combinations = [
         _drift_off_figures(combination, folder, quick) for combination in (COMBINATIONS[:1] if quick else COMBINATIONS)
     ]
-    return [_row(figures) for figures in combinations], {"combinations": combinations}
+    return [_drift_off_row(figures) for figures in combinations], {"combinations": combinations}
 
 
 def _drift_off_figures(combination: Combination, folder: Path, quick: bool) -> Saved:
@@ -112,17 +112,19 @@ def _drift_off_figures(combination: Combination, folder: Path, quick: bool) -> S
     }
 
 
-def _drift_by_noise(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
+def _drift_by_noise(combination: Combination, folder: Path, path_count: int) -> tuple[list[float | None], list[float]]:
     """Predicted drift-off time (s), and the drift-off time of every noise path."""
     true = virtual_drive(folder, combination.duration, 1 / combination.rate, road=combination.road)
     effects = {"force_noise": {"deviation": combination.noise_deviation, "seed": SEED}}
     scene = force_scene(folder, duration=combination.duration, effects=effects)
-    times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), paths)["drift_off"]
+    times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), path_count)["drift_off"]
     quiet = assembly_of_scene(force_scene(folder, duration=combination.duration))
     return [noise(quiet, combination.noise_deviation).passing_time()], times.tolist()
 
 
-def _drift_by_sampling(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
+def _drift_by_sampling(
+    combination: Combination, folder: Path, path_count: int
+) -> tuple[list[float | None], list[float]]:
     """Predicted and measured drift-off times (s) on similar roads, which have other speeds or other seeds."""
     speed = combination.road["speed"]
     roads = [
@@ -140,7 +142,9 @@ def _drift_by_sampling(combination: Combination, folder: Path, paths: int) -> tu
     return predicted, measured
 
 
-def _drift_by_model_error(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
+def _drift_by_model_error(
+    combination: Combination, folder: Path, path_count: int
+) -> tuple[list[float | None], list[float]]:
     """Predicted and measured drift-off times (s) of vehicles with random parameters, all started from the true
     state."""
     true = virtual_drive(folder, combination.duration, 1 / combination.rate, STEP, road=combination.road)
@@ -165,7 +169,7 @@ def _drift_off_time(assembly: Assembly, true_run: Result) -> float:
     return np.inf if time is None else time
 
 
-def _row(combination: Saved) -> Row:
+def _drift_off_row(combination: Saved) -> Row:
     key = f"drift_off.{combination['source']}.{combination['name']}.{combination['rate']:g}Hz".replace(
         " ", "-"
     ).replace(",", "")

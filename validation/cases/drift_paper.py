@@ -15,7 +15,7 @@ from validation.common.scenes import on_paper_road
 
 TITLE = "The paper's six runs"
 SYSTEM: System = "drift"
-SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "six_runs.toml"
+STUDY_SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "six_runs.toml"
 SINGLE_NOISE_SAMPLE = ("options.noise_samples=1", "options.perturbed_models=0")
 """Changes of the scene that leave out the random models and all noise samples but one."""
 SAMPLING_RATES = (200.0, 400.0, 1000.0, 2000.0)
@@ -96,7 +96,7 @@ COMPARED_FIGURES = (
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for drift-off times, enforced moments and inertia term of the reference; a quick run has 15 s and one
     sampling rate."""
-    scene = load(SCENE, QUICK_CHANGES if quick else ())
+    scene = load(STUDY_SCENE, QUICK_CHANGES if quick else ())
     runs, rate = _figures_by_run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
     rows = [
         Observed(f"drift.{name}", SYSTEM, f"{words}, {rate}", runs[which][what], unit).beside(paper, why)
@@ -146,10 +146,10 @@ def _figures_by_run(scene: Scene, run_names: Collection[str] = ()) -> dict[str, 
         }
 
 
-def _undisturbed_figures(rate: float) -> dict[str, float]:
+def _undisturbed_figures(sampling_rate: float) -> dict[str, float]:
     """Drift-off time (s) and largest enforced moment (N m) of undisturbed runs at one sampling rate (Hz), with steps of
     0.5 ms."""
-    scene = load(SCENE, (*SINGLE_NOISE_SAMPLE, "run.step=5e-4", f"options.sampling_rate={rate}"))
+    scene = load(STUDY_SCENE, (*SINGLE_NOISE_SAMPLE, "run.step=5e-4", f"options.sampling_rate={sampling_rate}"))
     rows = _figures_by_run(scene, ("undisturbed", "guided, undisturbed"))
     return {"drift-off": rows["undisturbed"]["drift-off"], "moment max": rows["guided, undisturbed"]["moment max"]}
 
@@ -159,11 +159,11 @@ def tables(case_data: Saved) -> list[Table]:
     rows = tuple(
         (
             row["run"],
-            _cell(row["drift-off"], ".1f") or "never",
+            _cell_text(row["drift-off"], ".1f") or "never",
             f"{row['heave error']:.1e}",
-            _cell(row.get("moment rms"), ".1f"),
-            _cell(row.get("moment max"), ".0f"),
-            _cell(row.get("inertia max"), ".0f"),
+            _cell_text(row.get("moment rms"), ".1f"),
+            _cell_text(row.get("moment max"), ".0f"),
+            _cell_text(row.get("inertia max"), ".0f"),
         )
         for row in case_data["rows"]
     )
@@ -172,7 +172,7 @@ def tables(case_data: Saved) -> list[Table]:
     tables = [Table(f"The six runs, {case_data['duration']:g} s on the study road", note, heads, rows)]
     if case_data["rates"]:
         rates = tuple(
-            (f"{rate:g}", _cell(when, ".1f") or "never", f"{most:.1f}") for rate, when, most in case_data["rates"]
+            (f"{rate:g}", _cell_text(when, ".1f") or "never", f"{most:.1f}") for rate, when, most in case_data["rates"]
         )
         note = "Undisturbed forces, linear between the samples. The paper's 70 N m fits a rate of about 400 Hz."
         columns = ("sampling rate [Hz]", "drift-off [s]", "moment max [N m]")
@@ -180,5 +180,5 @@ def tables(case_data: Saved) -> list[Table]:
     return tables
 
 
-def _cell(cell_value: float | None, format_name: str) -> str:
+def _cell_text(cell_value: float | None, format_name: str) -> str:
     return "" if cell_value is None else format(cell_value, format_name)

@@ -36,10 +36,12 @@ from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Tab
 TITLE = "What the machinery costs, and each effect"
 SYSTEM: System = "effects"
 TIMED_STEP_COUNTS = {True: 2000, False: 4000}
-"""Number of steps of the runs that are timed against hand-built models, keyed by ``quick``. 4 s are a fifth of a study
-scene, and short enough that the load of the machine hardly changes between the two runs of a comparison."""
+"""Number of steps of the runs that are timed against hand-built models, for a quick run (True) and a full run (False).
+4 s are a fifth of a study scene, and short enough that the load of the machine hardly changes between the two runs of a
+comparison."""
 RATIO_ROUNDS, PRICE_ROUNDS = {True: 7, False: 80}, {True: 5, False: 15}
-"""Numbers of timing rounds, keyed by ``quick``: of the ratios to hand-built models, and of the price of each effect."""
+"""Numbers of timing rounds, for a quick run (True) and a full run (False): of the ratios to hand-built models, and of
+the price of each effect."""
 UNCHECKED_INTERVAL = 4
 """The hand-built run without a result check is timed in the first of every so many rounds."""
 RIDE_STEP_COUNTS = {
@@ -319,7 +321,7 @@ def _timed_run(simulated_scene: Scene, engine: str) -> Any:
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """The price list of effects."""
+    """Table of the computing time that each effect adds."""
     note = (
         "Each effect is added to the scene without it: wheel_forces, road, pitch_spring and the sensors to the "
         "bare vehicle, geometry to one of small angles, gyro_bias to one with a gyro, the others to one under "

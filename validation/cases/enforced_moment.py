@@ -27,7 +27,7 @@ DURATION, QUICK_DURATION, ABRUPT_SECONDS, ROUGH_ROAD_SECONDS = 4.0, 1.5, 1.0, 2.
 is not most of the run), and on the study road."""
 SAMPLE_PERIOD = 1e-3
 STEP = 1e-3
-MOMENT_BOUND = 1e-4
+MOMENT_TOLERANCE = 1e-4
 PRESCRIBED_PITCH = {"prescribed_pitch": {"file": "pitch.csv"}}
 BEST_SETTINGS = {
     "exudyn": Settings("GeneralizedAlpha", STEP, DURATION, spectral_radius=0.6),
@@ -107,7 +107,7 @@ def _manoeuvre_rows(folder: Path, vehicles: tuple[str, ...], duration: float) ->
                     relative_rms_error(enforced_moment(scene, engine, settings), true),
                     "of its rms",
                 ).at_most(
-                    MOMENT_BOUND,
+                    MOMENT_TOLERANCE,
                     f"the rms is {np.sqrt(np.mean(true**2)):.0f} N m; a second-order scheme leaves (2 pi f h)^2 / 12, "
                     "which is 2e-5 at 2.7 Hz and 1 ms",
                     "native",
@@ -126,7 +126,7 @@ def _uncertainty_row(scene: Scene, true_moment: np.ndarray) -> Row:
         "uncertainty of the moment of the eliminated form: Runge-Kutta at 1/16 ms against Dormand-Prince 8 at 1e-11",
         relative_rms_error(by_other_solver, true_moment),
         "of its rms",
-    ).at_most(MOMENT_BOUND / 100, "a hundredth of the bound that it has to judge", "shared kernel")
+    ).at_most(MOMENT_TOLERANCE / 100, "a hundredth of the bound that it has to judge", "shared kernel")
 
 
 def _ringing_rows(folder: Path) -> CaseAnswer:
@@ -214,7 +214,7 @@ def _study_road_rows(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row],
             next(row[3] for row in table if row[0] == engine and row[2] == STEP),
             "of its rms",
         ).beside(
-            MOMENT_BOUND,
+            MOMENT_TOLERANCE,
             "40 Hz of roughness at 1 ms: (2 pi f h)^2 / 12 is 5e-3 of I beta'', twenty times the moment; the "
             "table shows the step that it takes",
             "native",

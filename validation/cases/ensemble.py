@@ -54,7 +54,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             return _quick_rows(forces, scene, job, times), {}
         large = _in_separate_process(_large_ensemble, job, LARGE_ENSEMBLE_PATHS, forces / "large")
         paths = large.pop("found")
-        rows = [_path_row(forces, duration, paths), *_scale_rows(large)]
+        rows = [_single_run_row(forces, duration, paths), *_scale_rows(large)]
         with process_pool(2) as pool:
             again, half = pool.submit(run_paths, job, RECOMPUTED_PATHS), pool.submit(_half_step_row, forces)
             killed = _killed_row(job, paths, forces / "killed")
@@ -86,14 +86,14 @@ def _quick_rows(force_folder: Path, scene: Scene, job: NoisePaths, times: np.nda
         two = run_paths(job, 12, executor=pool, blocks=Blocks(3))
     engines, _ = _engine_rows_and_times(scene, job.truth, times, paths, 2, None)
     return [
-        _path_row(force_folder, 1.0, paths),
+        _single_run_row(force_folder, 1.0, paths),
         _equal_bits_row("workers", "12 paths have the same bits with 1 worker and with 2", paths, two),
         _interrupted_row(job, paths, force_folder / "stopped"),
         *engines,
     ]
 
 
-def _path_row(force_folder: Path, duration: float, paths: Arrays) -> Row:
+def _single_run_row(force_folder: Path, duration: float, paths: Arrays) -> Row:
     """Row: path 7 of the ensemble equals a single run of the scene with ``path = 7``."""
     alone = simulate(_noisy_scene(force_folder, duration, path=7), "reference")
     worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - paths["states"][7]).max())

@@ -40,9 +40,10 @@ CREEPAGE_KINDS = {
 CREEPAGE_LEVELS = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
 SLIDING_LEVELS = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
 """Creepage levels around the one from which the whole contact area slides."""
-LOAD, FRICTION, MEAN_AXIS = 80e3, 0.3, 5e-3
+LOAD, FRICTION, MEAN_SEMI_AXIS = 80e3, 0.3, 5e-3
+"""Normal load (N), coefficient of friction, and sqrt(a b) (m) of the ellipses with the semi-axes a and b."""
 MATERIAL_PAIR = MaterialPair()
-FORCE_SCALES = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
+FORCE_SCALES = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_SEMI_AXIS])
 """Scales of fx and fy (N) and of mz (N m)."""
 Contacts = dict[str, Any]
 """Type of a set of contacts: arrays by the names of the parameters of ``fastsim``."""
@@ -73,7 +74,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, data
     answers, data["model"] = _model_error_rows()
-    timed, data["speed"] = speed(MATERIAL_PAIR, LOAD, FRICTION, MEAN_AXIS)
+    timed, data["speed"] = speed(MATERIAL_PAIR, LOAD, FRICTION, MEAN_SEMI_AXIS)
     return rows + answers + timed, data
 
 
@@ -84,10 +85,10 @@ def creepage_contacts(kind_names: tuple[str, ...], creepage_levels: tuple[float,
         grid.ravel() for grid in np.meshgrid(AXIS_RATIOS, np.arange(len(kind_names)), creepage_levels, indexing="ij")
     )
     creepage_parts = np.array([CREEPAGE_KINDS[name] for name in kind_names])[kind] * level[:, None]
-    known, unit = coefficients(ratio, MATERIAL_PAIR.nu), FRICTION * LOAD / (MATERIAL_PAIR.G * MEAN_AXIS**2)
-    scale = unit / np.stack([known.c11, known.c22, known.c23 * MEAN_AXIS], axis=1)
+    known, unit = coefficients(ratio, MATERIAL_PAIR.nu), FRICTION * LOAD / (MATERIAL_PAIR.G * MEAN_SEMI_AXIS**2)
+    scale = unit / np.stack([known.c11, known.c22, known.c23 * MEAN_SEMI_AXIS], axis=1)
     xi_x, xi_y, spin = (creepage_parts * scale).T
-    a, b = MEAN_AXIS * np.sqrt(ratio), MEAN_AXIS / np.sqrt(ratio)
+    a, b = MEAN_SEMI_AXIS * np.sqrt(ratio), MEAN_SEMI_AXIS / np.sqrt(ratio)
     return {
         "a": a,
         "b": b,
@@ -229,7 +230,7 @@ def _spin_rows() -> list[Row]:
     """Rows: moment in full sliding under spin alone, on 21 cells, compared with the integral of mu times Hertz's
     pressure."""
     ratio = np.array(SPIN_AXIS_RATIOS)
-    a, b = MEAN_AXIS * np.sqrt(ratio), MEAN_AXIS / np.sqrt(ratio)
+    a, b = MEAN_SEMI_AXIS * np.sqrt(ratio), MEAN_SEMI_AXIS / np.sqrt(ratio)
     longer, shorter = np.maximum(a, b), np.minimum(a, b)
     most = FRICTION * LOAD * 0.375 * longer * ellipe(1.0 - (shorter / longer) ** 2)
     rows = []
@@ -256,7 +257,7 @@ def _spin_rows() -> list[Row]:
 def _derivative_rows() -> list[Row]:
     """Row: difference of the forces' analytic derivatives from central differences."""
     columns = creepage_contacts(tuple(CREEPAGE_KINDS), CREEPAGE_LEVELS)
-    scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_AXIS, "load": LOAD}
+    scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_SEMI_AXIS, "load": LOAD}
     known, off = derivatives(RollingEllipse(**columns), MATERIAL_PAIR), []
     for k, (name, unit) in enumerate(scale.items()):
         ends = [_forces_with_changed_input(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]

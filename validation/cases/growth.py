@@ -109,7 +109,8 @@ def _force_samples(assembly: Assembly) -> Sampled:
 
 
 def _error_path(assembly: Assembly, start_state: np.ndarray, first_sample: int, sample_count: int) -> TangentPath:
-    """Error path over a section of a run that starts at sample number ``first`` in the state ``start_state`` (8,)."""
+    """Error path over a section of a run that starts at sample number ``first_sample`` in the state ``start_state``
+    (8,)."""
     forces = replace(
         _force_samples(assembly), values=_force_samples(assembly).values[first_sample : first_sample + sample_count + 1]
     )

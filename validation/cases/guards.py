@@ -82,7 +82,7 @@ def _ending_of_unstable_run(engine: str, name: str, step: float, duration: float
 
 
 def nan_force_endings(engine: str) -> dict[str, str]:
-    """How runs end if a force sample is NaN, passed around the file reader, for every integrator and both
+    """How runs end if a force sample is NaN and has not passed the file reader, for every integrator and both
     interpolations."""
     base, endings = setups.vehicle(), {}
     for name in integrators(engine):

@@ -31,7 +31,7 @@ from validation.spatial.cars import cornering_error, mirrored_coordinates
 TITLE = "A car on four rolling tyres"
 SYSTEM: System = "rolling-vehicle"
 R19 = load_vehicle("r19_free")
-NO_DRAG = replace(R19, drags=())
+R19_WITHOUT_DRAG = replace(R19, drags=())
 WHEELS = ("fl", "fr", "rl", "rr")
 LANE_CHANGE = Controls(steer=((0.0, 0.0), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)))
 SMALL_LANE_CHANGE = Controls(steer=tuple((time, 0.5 * angle) for time, angle in LANE_CHANGE.steer))
@@ -50,16 +50,22 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     and computing time."""
     duration = 0.3 if quick else 1.0
     drives = {engine: drive_run(engine, lane_change(), SPEED, duration) for engine in ("mujoco", "exudyn")}
-    rows = [_engines_row(drives), *_tyre_rows(), _power_row(drives["mujoco"]), _mirror_row(duration), _threads_row()]
+    rows = [
+        _engines_row(drives),
+        *_tyre_rows(),
+        _friction_power_row(drives["mujoco"]),
+        _mirror_row(duration),
+        _threads_row(),
+    ]
     if not quick:
         rows += [
-            *_turn_rows(),
-            *_stop_rows(),
-            *_transfer_rows(),
-            _slope_row(),
+            *_steady_turn_rows(),
+            *_locked_stop_rows(),
+            *_load_transfer_rows(),
+            _slope_standstill_row(),
             *_energy_rows(),
             *_fault_rows(),
-            _price_row(),
+            _tyre_cost_row(),
         ]
     return rows, {}
 
@@ -113,7 +119,7 @@ def _tyre_rows() -> list[Row]:
     ]
 
 
-def _power_row(drive: Drive) -> Row:
+def _friction_power_row(drive: Drive) -> Row:
     return behaviour_row(
         "handling.power",
         SYSTEM,
@@ -150,15 +156,15 @@ def yaw_gain_error(plant_fault: Callable[[Handling], None] | None = None, speed:
     """Relative error of the yaw gain in a steady turn with small slip, compared with the closed form. ``plant_fault``
     may change the table of the vehicle first."""
     steer = 2e-5
-    handling = Handling(NO_DRAG, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
+    handling = Handling(R19_WITHOUT_DRAG, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
     gain = steady_turn(handling, speed).yaw_gain
     if plant_fault is not None:
         plant_fault(handling)
     return float(drive_run("mujoco", handling, speed, 5.0).velocity()[-1, 2] / steer / gain - 1.0)
 
 
-def _turn_rows() -> list[Row]:
-    turn = steady_turn(Handling(NO_DRAG), 20.0)
+def _steady_turn_rows() -> list[Row]:
+    turn = steady_turn(Handling(R19_WITHOUT_DRAG), 20.0)
     return [
         Observed(
             "handling.turn",
@@ -173,9 +179,9 @@ def _turn_rows() -> list[Row]:
     ]
 
 
-def _stop_rows() -> list[Row]:
+def _locked_stop_rows() -> list[Row]:
     mu, speed = 0.7, 15.0
-    handling = Handling(NO_DRAG, Tyres(friction=mu, fixed=WHEELS))
+    handling = Handling(R19_WITHOUT_DRAG, Tyres(friction=mu, fixed=WHEELS))
     drive = drive_run("mujoco", handling, speed, 2.0)
     ahead = drive.velocity()[:, 0]
     left = drive["fx"] + drive.grip()
@@ -198,11 +204,11 @@ def _stop_rows() -> list[Row]:
     ]
 
 
-def _transfer_rows() -> list[Row]:
+def _load_transfer_rows() -> list[Row]:
     """Rows: load transfer of the car, and of a box on four springs, compared with the balance of moments of all
     bodies."""
     rows = []
-    for name, vehicle in (("car", NO_DRAG), ("box", box().handling.given)):
+    for name, vehicle in (("car", R19_WITHOUT_DRAG), ("box", box().handling.given)):
         braking = braked_error(drive_run("mujoco", sliding_car(vehicle, GENTLE_FRICTION), 10.0, 2.0), GENTLE_FRICTION)
         turn = turning_error(drive_run("mujoco", turning_car(vehicle, 2e-3), SPEED, 3.0))
         rows += [
@@ -225,7 +231,7 @@ def _transfer_rows() -> list[Row]:
     return rows
 
 
-def _slope_row() -> Row:
+def _slope_standstill_row() -> Row:
     handling = Handling(R19, Tyres(fixed=WHEELS), slope=SLOPE)
     drive = drive_run("mujoco", handling, 0.0, 2.0, 1e-4)
     last = slice(-2000, None)
@@ -308,7 +314,7 @@ def _fault_rows() -> list[Row]:
     ]
 
 
-def _price_row() -> Row:
+def _tyre_cost_row() -> Row:
     steps, (car, bare) = 50, (lane_change(waves=np.empty((0, 4))) for _ in range(2))
     bare.numbers[at.TYRES] = 0.0
     jobs = _timed_march(car, steps), _timed_march(bare, steps), lambda: _repeat_four_tyres(4 * steps)
@@ -363,10 +369,12 @@ def _repeat_four_tyres(repeats: int) -> None:
     contacts, forces = np.zeros((4, 10)), np.empty((4, 4))
     contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9
     contacts[:, FIRST_FLEXIBILITY:] = 2e-8
-    _repeat_forces(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, repeats)
+    _repeat_tyre_forces(
+        contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, repeats
+    )
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces, repeats):
+def _repeat_tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces, repeats):
     for _ in range(repeats):
         tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces)

@@ -25,8 +25,8 @@ TITLE = "Drift by index reduction, and drift by noise"
 SYSTEM: System = "drift"
 STEP = 1e-3
 START_ERROR, START_RATE_ERROR = 1e-4, 1e-4
-"""Error of the initial angle (rad) and rate (rad/s): such as a measured start has, and as rounding adds up to in a long
-run."""
+"""Error of the initial angle (rad) and rate (rad/s), of the size that a measured start has or that rounding accumulates
+in a long run."""
 BAUMGARTE_RATE = 10.0
 """Rate (1/s) of Baumgarte's stabilisation: slow compared with a step of 1 ms, fast compared with a run."""
 SEED, FORCE_NOISE, RATE_WALK = 31, 31.0, np.deg2rad(0.2)
@@ -81,14 +81,14 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of pitch gaps after a start off the constraint, by formulation, and of drift by noise with and without
     prescribed pitch. A quick run has short runs."""
     with TemporaryDirectory() as name:
-        files = _measured_drive(Path(name), 0.2 if quick else 4.0)
-        gaps, laws = _pitch_gaps(files), _gap_laws(files)
+        drive = _measured_drive(Path(name), 0.2 if quick else 4.0)
+        gaps, laws = _pitch_gaps(drive), _gap_laws(drive)
         walked = _pitch_errors(
-            files.prescribed_assembly("gyro.csv", bandwidth=PITCH_BANDWIDTH), files
+            drive.prescribed_assembly("gyro.csv", bandwidth=PITCH_BANDWIDTH), drive
         )  # from a start on the constraint
         loose = _unguided_pitch_errors(_measured_drive(Path(name), 1.0 if quick else 12.0))
     rows = [
-        *_gap_rows(gaps, laws, files.duration),
+        *_gap_rows(gaps, laws, drive.duration),
         *_noise_rows(walked, loose),
         *(not_run(f"index_reduction.{id}", SYSTEM, words, why) for id, words, why in MISSING_FORMULATIONS),
     ]
@@ -110,10 +110,10 @@ def _measured_drive(folder: Path, duration: float) -> MeasuredDrive:
     return MeasuredDrive(folder, duration, measured["pitch"])
 
 
-def _pitch_errors(assembly: Assembly, files: MeasuredDrive) -> dict[str, np.ndarray]:
+def _pitch_errors(assembly: Assembly, drive: MeasuredDrive) -> dict[str, np.ndarray]:
     """Difference (n,) in rad between the run's pitch and the true pitch for every constraint formulation, from the
     assembly's initial state."""
-    duration = files.duration
+    duration = drive.duration
     paths = {
         name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND_WRITTEN_FORMULATIONS.items()
     }
@@ -123,38 +123,38 @@ def _pitch_errors(assembly: Assembly, files: MeasuredDrive) -> dict[str, np.ndar
         f"eliminated, {engine}": build(engine, assembly, Settings("RK4", STEP, duration)).run().states
         for engine in ("reference", "mujoco")
     }
-    return {name: states[:, 3] - files.pitch for name, states in paths.items()}
+    return {name: states[:, 3] - drive.pitch for name, states in paths.items()}
 
 
-def _pitch_gaps(files: MeasuredDrive) -> dict[str, np.ndarray]:
+def _pitch_gaps(drive: MeasuredDrive) -> dict[str, np.ndarray]:
     """Difference (n,) in rad between the run's pitch and the prescribed pitch for every constraint formulation, if the
     start is wrong by START_ERROR and START_RATE_ERROR."""
-    prescribed_assembly = files.prescribed_assembly()
+    prescribed_assembly = drive.prescribed_assembly()
     start = prescribed_assembly.initial.copy()
     start[[3, 7]] += START_ERROR, START_RATE_ERROR
-    return _pitch_errors(replace(prescribed_assembly, initial=start), files)
+    return _pitch_errors(replace(prescribed_assembly, initial=start), drive)
 
 
-def _unguided_pitch_errors(files: MeasuredDrive) -> dict[str, np.ndarray]:
+def _unguided_pitch_errors(drive: MeasuredDrive) -> dict[str, np.ndarray]:
     """Difference (n,) in rad between the run's pitch and the true pitch under noisy forces and without a prescribed
     pitch, for several solvers."""
-    noisy = assembly_of_scene(files.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
+    noisy = assembly_of_scene(drive.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
     solvers = {
         "Exudyn's solver of index 2": ("exudyn", "TrapezoidalIndex2"),
         "Exudyn's solver of index 3": ("exudyn", "GeneralizedAlpha"),
         "Runge-Kutta": ("reference", "RK4"),
     }
     return {
-        name: build(engine, noisy, Settings(integrator, STEP, files.duration, spectral_radius=0.6)).run().states[:, 3]
-        - files.pitch
+        name: build(engine, noisy, Settings(integrator, STEP, drive.duration, spectral_radius=0.6)).run().states[:, 3]
+        - drive.pitch
         for name, (engine, integrator) in solvers.items()
     }
 
 
-def _gap_laws(files: MeasuredDrive) -> dict[str, tuple[np.ndarray, str]]:
+def _gap_laws(drive: MeasuredDrive) -> dict[str, tuple[np.ndarray, str]]:
     """For each formulation, the closed form of the pitch error (n,) in rad after the wrong start, and the reason for
     this form."""
-    times = STEP * np.arange(len(files.pitch))
+    times = STEP * np.arange(len(drive.pitch))
     return {
         "index 1": (gap_law(times, START_ERROR, START_RATE_ERROR), "g'' = 0 keeps both errors: g = g(0) + g'(0) t"),
         "index 1, Baumgarte": (
@@ -162,7 +162,7 @@ def _gap_laws(files: MeasuredDrive) -> dict[str, tuple[np.ndarray, str]]:
             "g'' + 2 alpha g' + alpha^2 g = 0",
         ),
         "index 2": (
-            np.append(START_ERROR, START_ERROR + STEP / 2 * START_RATE_ERROR + _quadrature_error(files)[1:]),
+            np.append(START_ERROR, START_ERROR + STEP / 2 * START_RATE_ERROR + _quadrature_error(drive)[1:]),
             "g' = 0 keeps the error of the angle, and adds that of the trapezoidal rule over the rate",
         ),
     }
@@ -172,7 +172,7 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
     start = f"from a start off by {START_ERROR:g} rad and {START_RATE_ERROR:g} rad/s"
     rows = [
         Observed(
-            f"index_reduction.law.{_id(name)}",
+            f"index_reduction.law.{_row_id(name)}",
             SYSTEM,
             f"{name}: difference of the gap {start} from its law",
             float(np.abs(gaps[name] - law).max() / START_ERROR),
@@ -188,7 +188,7 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
     }
     rows += [
         Observed(
-            f"index_reduction.none.{_id(name)}",
+            f"index_reduction.none.{_row_id(name)}",
             SYSTEM,
             f"{name}: gap after the first step {start}",
             float(np.abs(gaps[name][1:]).max()),
@@ -208,11 +208,11 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
     return [*rows, _index_two_row()]
 
 
-def _quadrature_error(files: MeasuredDrive) -> np.ndarray:
+def _quadrature_error(drive: MeasuredDrive) -> np.ndarray:
     """Error (n,) in rad of the prescribed pitch if its rate is integrated by the trapezoidal rule."""
-    signal = files.prescribed_assembly().input
+    signal = drive.prescribed_assembly().input
     assert signal is not None
-    angle, rate = signal.sample(0.0, STEP, len(files.pitch))[:, 2:4].T
+    angle, rate = signal.sample(0.0, STEP, len(drive.pitch))[:, 2:4].T
     summed = np.concatenate(([0.0], np.cumsum(0.5 * STEP * (rate[1:] + rate[:-1]))))
     return summed - (angle - angle[0])
 
@@ -269,7 +269,7 @@ def _noise_rows(guided_errors: dict[str, np.ndarray], unguided_errors: dict[str,
     return rows
 
 
-def _id(name: str) -> str:
+def _row_id(name: str) -> str:
     return name.replace(", ", ".").replace(" ", "_")
 
 

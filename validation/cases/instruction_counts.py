@@ -40,13 +40,13 @@ METHODS = {
     ),
     "mujoco": ("Euler", "implicit", "implicitfast", "discrete", "RK4"),
 }
-CURVES = tuple(f"{engine} {method}" for engine, methods in METHODS.items() for method in methods)
+ENGINE_METHODS = tuple(f"{engine} {method}" for engine, methods in METHODS.items() for method in methods)
 STEP_COUNTS = (40, 120)
 """Numbers of steps of the two runs that are differenced."""
 COUNT_TOLERANCE = 1e-6
 PROCESS_TIMEOUT = 900
 """Time (s) after which a counting process is given up."""
-CASE_ID, CASE_QUANTITY = "instruction_counts", f"instructions of {len(CURVES)} methods counted in two processes"
+CASE_ID, CASE_QUANTITY = "instruction_counts", f"instructions of {len(ENGINE_METHODS)} methods counted in two processes"
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
@@ -77,7 +77,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         for engine, largest in zip(METHODS, np.split(off, [len(METHODS["exudyn"])]), strict=True)
     ]
     per_step = np.diff(first, axis=1)[:, 0] / (STEP_COUNTS[1] - STEP_COUNTS[0])
-    return rows, {"instructions": dict(zip(CURVES, per_step.tolist(), strict=True))}
+    return rows, {"instructions": dict(zip(ENGINE_METHODS, per_step.tolist(), strict=True))}
 
 
 def _instruction_counts(folder: Path) -> np.ndarray:
@@ -103,7 +103,7 @@ def _instruction_counts(folder: Path) -> np.ndarray:
         json.dumps(march),
     ]
     subprocess.run(command, env=settled, check=True, capture_output=True, timeout=PROCESS_TIMEOUT)
-    marches = len(CURVES) * len(STEP_COUNTS)
+    marches = len(ENGINE_METHODS) * len(STEP_COUNTS)
     counts = [
         [_count_of_dump(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
         for path in folder.glob("count.*")

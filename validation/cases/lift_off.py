@@ -163,17 +163,17 @@ def _bounce_rows(duration: float) -> list[Row]:
     "springs compressed",
     "tyres not flat",
 )
-def _order_row(halvings: int) -> Row:
+def _order_row(halving_count: int) -> Row:
     """Row: observed order of the error in the step, for a run with landings."""
     lifting = scene(geometry="linear")
-    steps, coarse = 1e-3 / 2.0 ** np.arange(halvings), 1e-3
+    steps, coarse = 1e-3 / 2.0 ** np.arange(halving_count), 1e-3
     exact = Bounces(assembly_of_scene(lifting), coarse).path(assembly_of_scene(lifting).initial, round(1.0 / coarse))
     errors = []
     for step in steps:
         states = simulate(lifting, "reference", Settings("RK4", step, 1.0)).states[:: round(coarse / step)]
         errors.append(float(np.abs(states - exact).max()))
     slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-    what = f"observed order of RK4 through landings, {halvings - 1} halvings of 1 ms"
+    what = f"observed order of RK4 through landings, {halving_count - 1} halvings of 1 ms"
     why = "the force has corners: 2 on the average, 4 between them"
     return Observed("lift_off.order", SYSTEM, what, slope, "").beside(2.0, why, "closed form")
 

@@ -66,8 +66,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         static, each_still = _timed_positions("A-1", CONTACT[::2, 0])
         data["A-1"] = [_table_of_patches(position_seconds) for position_seconds in static]
         rows += [
-            *_static_rows(static),
-            *_split_rows(placed[10]),
+            *_first_contact_rows(static),
+            *_load_share_rows(placed[10]),
             *_file_rows(placed),
             _load_row(static),
             _axle_row(placed[0]),
@@ -119,7 +119,7 @@ def _published_rows(wheel: str, placements: list[WheelsetPlacement], published: 
     return rows
 
 
-def _static_rows(placements: list[WheelsetPlacement]) -> list[Row]:
+def _first_contact_rows(placements: list[WheelsetPlacement]) -> list[Row]:
     """Rows: first contact points compared with a search over surface points, and contact compared with its mirror
     image."""
     contact, gaps = contact_of("A-1"), []
@@ -180,7 +180,7 @@ def _axle_row(placement: WheelsetPlacement) -> Row:
     )
 
 
-def _split_rows(placement: WheelsetPlacement) -> list[Row]:
+def _load_share_rows(placement: WheelsetPlacement) -> list[Row]:
     """Rows: shares of the wheel load on two patches at a displacement of 5 mm, in case A-2."""
     forces = [patch.normal for patch in placement.right]
     total = sum(forces)
@@ -211,10 +211,10 @@ def _split_rows(placement: WheelsetPlacement) -> list[Row]:
     ]
 
 
-def _load_row(static: list[WheelsetPlacement]) -> Row:
+def _load_row(static_placements: list[WheelsetPlacement]) -> Row:
     off = max(
         abs(sum(patch.vertical for patch in wheel) / SCENE.wheelset.load - 1.0)
-        for placement in static
+        for placement in static_placements
         for wheel in (placement.right, placement.left)
     )
     return Observed(

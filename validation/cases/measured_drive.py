@@ -28,7 +28,7 @@ CHI_SQUARE_LIMIT = 18.4
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of both engines and of the repeated drive over 2 s; a full run takes 8 s and also identifies the tyres."""
-    scene = _scene([0.0, 2.0] if quick else [0.0, 8.0])
+    scene = _drive_scene([0.0, 2.0] if quick else [0.0, 8.0])
     first, second = (run(scene, engine) for engine in ("mujoco", "exudyn"))
     gap = max(float(np.abs(first[name] - second[name]).max()) for name in ("positions", "rates"))
     rows = [
@@ -44,9 +44,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return (rows, {}) if quick else ([*rows, *_tyre_rows()], {})
 
 
-def _scene(stretch: list[float], cornering: tuple[float, float] = (1.0, 1.0)) -> HandlingScene:
+def _drive_scene(stretch: list[float], stiffness_ratios: tuple[float, float] = (1.0, 1.0)) -> HandlingScene:
     table = parse(SCENES / "measured_drive.toml")
-    table["tyres"]["cornering"] = list(cornering)
+    table["tyres"]["cornering"] = list(stiffness_ratios)
     table["manoeuvres"]["measured"]["stretch"] = stretch
     return build(table, "measured drive", SCENES)
 
@@ -69,7 +69,7 @@ def _motion_rows(drive: Any) -> list[Row]:
 def _tyre_rows() -> list[Row]:
     keys = ["tyres.cornering.0=0.3:3", "tyres.cornering.1=0.3:3"]
     known = uncertainty(
-        fit(problem_of(_scene([0.0, 6.0], START_RATIOS), SIMULATED_DRIVE_FILE, keys, "mujoco", low_pass=5.0))
+        fit(problem_of(_drive_scene([0.0, 6.0], START_RATIOS), SIMULATED_DRIVE_FILE, keys, "mujoco", low_pass=5.0))
     )
     off = known.fit.values - 1.0
     scaled = off / known.fit.problem.scale

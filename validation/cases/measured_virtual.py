@@ -197,7 +197,7 @@ def _largest_channel_change(recording: Recording, true_measurement: VirtualMeasu
 
 
 def _damage_rows(
-    chain_test: ChainTest, format_name: str, off: float, mean_damage_ratios: dict[str, float]
+    chain_test: ChainTest, format_name: str, channel_change: float, mean_damage_ratios: dict[str, float]
 ) -> list[Row]:
     worst = max(mean_damage_ratios, key=lambda name: abs(mean_damage_ratios[name] - 1))
     what = f"{chain_test.name}, frame {chain_test.frame!r}, {chain_test.bits} bit, through {format_name}"
@@ -206,7 +206,7 @@ def _damage_rows(
             f"measured_virtual.values_{chain_test.name}_{format_name}",
             SYSTEM,
             f"change of hub channels by writing, reading and mapping, relative to their largest value; {what}",
-            off,
+            channel_change,
             "1",
         ).at_most(
             2**-23 if format_name == "rsp" else 1e-12,

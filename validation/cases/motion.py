@@ -59,7 +59,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of clean motions in space, noise, each engine's simulated readings, and drift; a quick run has few paths and
     runs of 1 s."""
     rows = [row for name in SENSOR_ARRANGEMENTS for row in _exact_rows(name)]
-    rows += [_printed_formula_row(), _order_row(), _tilt_row()]
+    rows += [_printed_formula_row(), _order_row(), _tilt_error_row()]
     gains, gain_rows = _gain_rows(4000 if quick else 40_000)
     rows += gain_rows
     for engine in IMPLEMENTATIONS:
@@ -132,7 +132,7 @@ def _order_row() -> Row:
     ).within(4.0, 0.4, "cubics through four neighbours and a fourth-order step of the quaternion", "closed form")
 
 
-def _tilt_row() -> Row:
+def _tilt_error_row() -> Row:
     array, tilt, count = sensor_array(SENSOR_ARRANGEMENTS["4"]), 1e-3, 10_001
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
     drift = -recovered_motion(array, still, 1e-3, StartState.pitched(tilt)).position[:, 0]

@@ -63,8 +63,8 @@ def fitted_order(steps: tuple[float, ...], errors_of_steps: list[float]) -> floa
 
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """A row for each integrator; the exact solution is DOP853 at a tolerance of 1e-13. A quick run has one halving of
-    the step over half a second."""
+    """A row for each integrator, compared with DOP853 at a tolerance of 1e-13. A quick run has one halving of the step
+    over half a second."""
     steps, duration = (QUICK_STEPS, QUICK_DURATION) if quick else (STEPS, DURATION)
     truth = simulate(
         road_scene(step=COMPARED_GRID, duration=duration),

@@ -20,7 +20,7 @@ SPEED = 22.0
 DIFFERENCE_TOLERANCE = 1e-10
 """Largest difference allowed, divided by the largest value."""
 STATE_COUNTS = {True: 10, False: 100}
-"""Number of random states, keyed by ``quick``."""
+"""Number of random states, for a quick run (True) and a full run (False)."""
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
@@ -42,8 +42,8 @@ def _energy_row(handling: Handling, quick: bool) -> Row:
 
 
 def _lane_change_rows(handling: Handling, duration: float) -> list[Row]:
-    """Rows: difference between both engines over a lane change, and of each engine's accelerations from the plain
-    equations at its end."""
+    """Rows: difference between both engines over a lane change, and of each engine's accelerations at its end from
+    independently written equations."""
     drives = {engine: drive_run(engine, handling, SPEED, duration) for engine in ("exudyn", "mujoco")}
     states = [drive.run.states for drive in drives.values()]
     rows = [

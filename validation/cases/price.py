@@ -50,11 +50,12 @@ FULL_RUN_PROBLEMS: tuple[MakeProblem, ...] = (
     partial(wheelset.problem, speed=1.0),
     contact_alone.problem,
 )
-"""Problems of a full run beside those of PROBLEMS."""
+"""Problems of a full run in addition to those of PROBLEMS."""
 TIMING_ROUNDS = {True: 1, False: 15}
-"""Number of interleaved timing rounds, keyed by ``quick``, of settings whose computing time decides something."""
+"""Number of interleaved timing rounds, for a quick run (True) and a full run (False), of settings whose computing time
+decides something."""
 SHORTEST_TIMED_RUN = {True: 0.004, False: 0.005}
-"""A short run is repeated until its timing takes so many seconds, keyed by ``quick``."""
+"""A short run is repeated until its timing takes so many seconds, for a quick run (True) and a full run (False)."""
 CALLBACK_RATIOS = {
     "all compiled to no forces": "ratio of every force in a compiled callback to the same model without forces",
     "to no callback": "ratio of native springs with a compiled callback for the road to the same without callback",
@@ -74,7 +75,7 @@ SECONDS_REASON = "a target about seconds, which are reported and never gated"
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of all problems, of the force calls, and of two claims about speed; a quick run has five of the eleven
-    problems, and a named share of their settings."""
+    problems, and a part of their settings."""
     rounds = TIMING_ROUNDS[quick]
     if quick:
         priced, (beside, data) = [_problem_rows(True, rounds, make) for make in PROBLEMS], _further_cases(True, rounds)
@@ -85,8 +86,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _further_cases(quick: bool, round_count: int) -> CaseAnswer:
-    """Rows and data of cost cases that are no problems for the common runner: ride, parts of a step, force calls,
-    claims about speed."""
+    """Rows and data of costs that the common runner does not measure: ride, parts of a step, force calls, claims about
+    speed."""
     road = assembly_of_scene(road_excited.scene())
     rows, prices = ride.measure(quick, round_count, SHORTEST_TIMED_RUN[True])
     twice, least, duration = 2 * round_count, 2 * SHORTEST_TIMED_RUN[quick], road_excited.DURATION

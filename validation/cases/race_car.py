@@ -52,14 +52,14 @@ small exceed it."""
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on a known car with repeated noise; a full run also has the measured race car."""
-    rows = _known_rows(folder)
+    rows = _known_car_rows(folder)
     if quick:
         return rows, {}
     data = data_folder()
     if data is None or not (data / RACE_CAR_FILE).is_file():
-        return [*rows, *_not_run(f"needs {RACE_CAR_FILE} in the folder that TWINRIG_DATA names")], {}
+        return [*rows, *_rows_not_run(f"needs {RACE_CAR_FILE} in the folder that TWINRIG_DATA names")], {}
     chosen = _identified_race_car(data / RACE_CAR_FILE, folder)
-    return [*rows, *_race_rows(chosen), _sensors_row(folder / "race.csv")], _saved_data(chosen)
+    return [*rows, *_race_car_rows(chosen), _sensors_row(folder / "race.csv")], _saved_data(chosen)
 
 
 def _car_scene(folder: Path, values: dict[str, float]) -> SingleTrackScene:
@@ -102,7 +102,7 @@ def _noisy_problem(scene: SingleTrackScene, seed: int) -> Problem:
     return problem_of(_car_scene(Path(scene.folder), START_PARAMETERS), path, list(TRUE_PARAMETERS), low_pass=5.0)
 
 
-def _known_rows(folder: Path) -> list[Row]:
+def _known_car_rows(folder: Path) -> list[Row]:
     _write_drive(folder)
     scene, truth = _car_scene(folder, TRUE_PARAMETERS), np.array(list(TRUE_PARAMETERS.values()))
     solved = [uncertainty(fit(_noisy_problem(scene, seed))) for seed in range(NOISE_REPEATS)]
@@ -161,7 +161,7 @@ def _identified_race_car(file: Path, folder: Path) -> Identified:
     return identified_vehicle(scenes[0], scenes[1], Search(IDENTIFIED_PARAMETERS, list(ERROR_AIMS), 5.0))
 
 
-def _race_rows(identified: Identified) -> list[Row]:
+def _race_car_rows(identified: Identified) -> list[Row]:
     answer, rows = identified.bands, []
     figures = zip(ERROR_AIMS.items(), answer.relative_error(), answer.share_inside(), answer.width(), strict=True)
     for (name, aim), error, inside, width in figures:
@@ -204,7 +204,7 @@ def _sensors_row(path: Path) -> Row:
     return Observed("race_car.sensors", SYSTEM, quantity, error, "").beside(0.0, why, "measured")
 
 
-def _not_run(reason: str) -> list[Row]:
+def _rows_not_run(reason: str) -> list[Row]:
     return [
         not_run(f"race_car.{name.replace(' ', '_')}.error", SYSTEM, f"{name} predicted", reason) for name in ERROR_AIMS
     ]

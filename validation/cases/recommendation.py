@@ -85,7 +85,7 @@ def scene_verdicts(system: str, scene_number: int, folder: Path, engines: tuple[
 
 
 def _promise_rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
-    """Rows on the promises of a recommendation; a scene counts as kept if every recommended setting keeps its
+    """Rows on the promises of a recommendation; a scene keeps them if every recommended setting keeps the scene's
     tolerance."""
     every = [verdict for of_scene in verdicts for verdict in of_scene]
     kept_scenes = sum(bool(of_scene) and all(verdict.meets for verdict in of_scene) for of_scene in verdicts)

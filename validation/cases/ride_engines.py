@@ -32,7 +32,7 @@ VEHICLE_NAMES = (
 )
 """Vehicles of a quick run, and of a full run."""
 MATRIX_TOLERANCES = {"exudyn": 1e-12, "mujoco": 1e-9}
-DIGRESSIVE = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-1500.0, -400.0, 0.0, 700.0, 2500.0))
+DIGRESSIVE_DAMPER = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-1500.0, -400.0, 0.0, 700.0, 2500.0))
 BUMP_STOPS = Curve((-0.2, -0.05, 0.05, 0.2), (-8000.0, 0.0, 0.0, 8000.0))
 DRY_FRICTION = 40.0
 DIFFERENCES_REASON = "central differences of order six leave 1e-13 of smooth laws, 1e-11 of curves with corners"
@@ -66,7 +66,7 @@ def with_nonlinear_springs(vehicle: SpatialVehicle) -> SpatialVehicle:
     """The vehicle with nonlinear elements in its first four springs: digressive and asymmetric dampers, bump stops and
     dry friction."""
     bent = [
-        replace(spring, damping=0.0, rate_force=DIGRESSIVE, travel_force=BUMP_STOPS, friction=DRY_FRICTION)
+        replace(spring, damping=0.0, rate_force=DIGRESSIVE_DAMPER, travel_force=BUMP_STOPS, friction=DRY_FRICTION)
         for spring in vehicle.springs[:4]
     ]
     return replace(vehicle, springs=(*bent, *vehicle.springs[4:]))

@@ -81,7 +81,7 @@ def vehicle_and_road(
 
 def _limit_rows(name: str, stops: SpeedProfile) -> list[Row]:
     """Rows on limits: stationary covariance long after a change of speed and at constant speed, the road's own
-    covariance, and half the step."""
+    covariance, and effect of half the step."""
     vehicle, road = vehicle_and_road(name)
     system = at_speed(vehicle, road, STEADY_SPEED)
     exact, settling = (
@@ -166,8 +166,8 @@ def _drive_comparison(profile: SpeedProfile) -> dict[str, Any]:
     copies, and computing times."""
     vehicle, road = vehicle_and_road("r19_ride")
     instants = profile.times[-1] * np.array([0.25, 0.6, 0.95])
-    copies, slow = _timed(variances_along_drive, vehicle, road, profile, instants, copies=COPY_COUNT, seed=SEED)
-    varied, fast = _timed(varying_speed, vehicle, road, profile, instants=copies.time)
+    copies, slow = _timed_call(variances_along_drive, vehicle, road, profile, instants, copies=COPY_COUNT, seed=SEED)
+    varied, fast = _timed_call(varying_speed, vehicle, road, profile, instants=copies.time)
     often = np.linspace(profile.times[0], profile.times[-1], 101)
     columns = [varied.names.index(point) for point in BODY_POINTS]
     near = np.abs(varied.time[:, None] - often).argmin(axis=0)
@@ -224,10 +224,12 @@ def _constant_speed_rows() -> list[Row]:
     vehicle, road = vehicle_and_road("r19_ride")
     exact = stationary_covariance(at_speed(vehicle, road, STEADY_SPEED))
     fast = (
-        _timed(lambda: [stationary_covariance(at_speed(vehicle, road, STEADY_SPEED)) for _ in range(TIMED_REPEATS)])[1]
+        _timed_call(
+            lambda: [stationary_covariance(at_speed(vehicle, road, STEADY_SPEED)) for _ in range(TIMED_REPEATS)]
+        )[1]
         / TIMED_REPEATS
     )
-    copies, slow = _timed(
+    copies, slow = _timed_call(
         at_constant_speed, vehicle, road, STEADY_SPEED, STEADY_SECONDS, copies=STEADY_COPY_COUNT, seed=SEED
     )
     columns = [copies.names.index(point) for point in BODY_POINTS]
@@ -268,7 +270,7 @@ def _constant_speed_rows() -> list[Row]:
     ]
 
 
-def _timed(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> tuple[Any, float]:
+def _timed_call(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> tuple[Any, float]:
     """Result of a function call, and its processor time (s)."""
     start = time.process_time()
     return function(*arguments, **keywords), time.process_time() - start

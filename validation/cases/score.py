@@ -193,29 +193,32 @@ def _verdict_rows(studied: list[Saved]) -> list[Row]:
         name, word, alone = row["method"], row["verdict"], row["without truth"]
         run_text = f"{row['engine']}, {row['road']}: {name}"
         if name in GOOD_METHODS or name in BAD_METHODS:
-            id, wanted = f"score.verdict.{_id(row)}", "accepted" if name in GOOD_METHODS else "rejected"
+            id, wanted = f"score.verdict.{_row_id(row)}", "accepted" if name in GOOD_METHODS else "rejected"
             rows.append(behaviour_row(id, SYSTEM, f"{run_text}, by damage", word, wanted, row["reason"], "closed form"))
         if name in BAD_METHODS:
             id, what, why = (
-                f"score.without-truth.{_id(row)}",
+                f"score.without-truth.{_row_id(row)}",
                 f"{run_text}, without the truth",
                 row["reason without truth"],
             )
             verdict_text = "accepted" if alone == "accepted" else "not accepted"
             rows.append(behaviour_row(id, SYSTEM, what, verdict_text, "not accepted", why, "none"))
         elif word != "accepted" and alone == "accepted":
-            id, what = f"score.unseen.{_id(row)}", f"{run_text}, damage ratio of f3x where the run itself shows nothing"
+            id, what = (
+                f"score.unseen.{_row_id(row)}",
+                f"{run_text}, damage ratio of f3x where the run itself shows nothing",
+            )
             why = "what an engineer without the truth cannot know"
             rows.append(Observed(id, SYSTEM, what, row["damage f3x"], "").beside(word, why, "none"))
     return rows
 
 
-def _slug(name: str) -> str:
+def _name_in_id(name: str) -> str:
     return name.replace(" ", "-").replace("/", "-")
 
 
-def _id(row: Saved) -> str:
-    return ".".join((_slug(row["method"]), row["road"], row["engine"]))
+def _row_id(row: Saved) -> str:
+    return ".".join((_name_in_id(row["method"]), row["road"], row["engine"]))
 
 
 def _vertical_damage_rows(studied: list[Saved]) -> list[Row]:
@@ -260,7 +263,7 @@ def _prototype_rows(long_runs: list[Saved]) -> list[Row]:
     rows = []
     for row in long_runs:
         pitch, upright, along = PROTOTYPE_RESULTS[row["method"]]
-        name = _slug(row["method"])
+        name = _name_in_id(row["method"])
         why = "the same road, model and levels of noise; other noise samples, and here the filter estimates the inertia"
         shown = (
             ("pitch", "pitch error max [rad]", "largest pitch error", "rad", pitch),
@@ -288,11 +291,11 @@ def tables(case_data: Saved) -> list[Table]:
                 "f3 is shown because it is blind. The last two columns: the verdict by damage, and that of an "
                 "engineer who has no true run."
             )
-            tables.append(Table(title, note, HEADINGS, tuple(_cells(row) for row in rows)))
+            tables.append(Table(title, note, TABLE_HEADINGS, tuple(_table_cells(row) for row in rows)))
     return tables
 
 
-HEADINGS = (
+TABLE_HEADINGS = (
     "engine",
     "road",
     "method",
@@ -306,7 +309,7 @@ HEADINGS = (
 )
 
 
-def _cells(row: Saved) -> tuple[str, ...]:
+def _table_cells(row: Saved) -> tuple[str, ...]:
     ratios = (row[f"damage {channel}"] for channel in SECTION_FORCE_CHANNELS)
     return (
         row.get("engine", "reference"),

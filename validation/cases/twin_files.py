@@ -1,5 +1,5 @@
-"""Models in MJCF and URDF: every build compared with the file as MuJoCo parsed it, and planted differences of two
-files."""
+"""Models in MJCF and URDF: the models of all engines compared with the file as MuJoCo parsed it, and planted
+differences of two files."""
 
 from importlib import import_module
 from pathlib import Path
@@ -78,7 +78,7 @@ def _exported_file(folder: Path, name: str) -> ModelFile:
 
 
 def _agreement_row(name: str, file: ModelFile, quick: bool) -> Row:
-    """Row: largest difference of accelerations from the model file, over all builds."""
+    """Row: largest difference of accelerations from the model file, over the models of all engines."""
     agreements = certificate(file.twin, QUICK_STATE_COUNT if quick else STATE_COUNT)
     worst: Agreement = max(agreements, key=lambda agreement: agreement.acceleration)
     return Observed(
@@ -92,8 +92,8 @@ def _agreement_row(name: str, file: ModelFile, quick: bool) -> Row:
 
 
 def _soft_constraint_row(folder: Path, name: str, text: str) -> Row:
-    """Row: accelerations with MuJoCo's soft constraints, compared with the law of MuJoCo's documentation applied to the
-    plain equations."""
+    """Row: accelerations with MuJoCo's soft constraints, compared with the law of MuJoCo's documentation in
+    independently written equations."""
     twin = _file_of_text(folder, name, text).twin
     states = states_of(twin, QUICK_STATE_COUNT)
     apart = agreement_of_build("", reference_of_file(twin, states, SOFT_BUILD), moved_at(softly_coupled(twin), states))
@@ -108,7 +108,8 @@ def _soft_constraint_row(folder: Path, name: str, text: str) -> Row:
 
 
 def _cart_rows(folder: Path) -> list[Row]:
-    """Rows: largest difference of the builds' states over 1 s, and balance of energy and work, of the cart model."""
+    """Rows: largest difference between the states of all engines' models over 1 s, and balance of energy and work, of
+    the cart model."""
     report = compare_paths(_file_of_text(folder, "cart", CART).twin)
     return [
         Observed(

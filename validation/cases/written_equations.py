@@ -1,5 +1,5 @@
-"""Cars by plain equations compared with both engines: accelerations at random states, whole simulations, and every
-force law in them."""
+"""Cars by independently written equations compared with both engines: accelerations at random states, whole
+simulations, and every force law in them."""
 
 from pathlib import Path
 
@@ -29,8 +29,8 @@ INDEPENDENCE_NOTE = (
     "the description alone is shared: mass matrix, kinematics, preloads and every force are written twice"
 )
 DURATION, QUICK_DURATION = 1.0, 0.02
-"""Length (s) of a simulation in a full and in a quick run. The plain equations of a car on tyres take about 20 s for
-each simulated second."""
+"""Length (s) of a simulation in a full and in a quick run. The independent equations of a car on tyres take about 20 s
+for each simulated second."""
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
@@ -41,7 +41,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _plain_equations_row(row_name: str, quantity: str, largest_error: float, unit: str, bound: float) -> Row:
-    """Row that compares the plain equations with another implementation of the same laws."""
+    """Row that compares the independently written equations with another implementation of the same laws."""
     return Observed(f"written.{row_name}", SYSTEM, quantity, largest_error, unit).at_most(
         bound, INDEPENDENCE_NOTE, "native"
     )
