@@ -120,8 +120,9 @@ def declared_changes(effect: str, engine: str) -> dict[str, int]:
 
 @allowing_breaches("what is computed is what is counted, whatever the vehicle does meanwhile")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows on absent and present effects. A quick run tests each effect of the vehicle in one engine (the engines take
-    turns), every third effect of other systems, and the imports of one process."""
+    """Rows: an effect that a scene does not name adds no computation, and an effect that it names changes the declared
+    numbers of components. A quick run tests each effect of the vehicle in one engine (the engines take turns), every
+    third effect of other systems, and the imports of one process."""
     with tempfile.TemporaryDirectory() as name:
         files_folder = Path(name)
         write_files(files_folder)

@@ -194,14 +194,17 @@ def _reaction_scales(mechanism: Mechanism, reaction: Reaction) -> tuple[float, f
 
 
 def _reaction_difference(
-    mechanism: Mechanism, first_reaction: Reaction, second_reaction: Reaction, rounding: tuple[Any, Any] = (0.0, 0.0)
+    mechanism: Mechanism,
+    first_reaction: Reaction,
+    second_reaction: Reaction,
+    rounding_errors: tuple[Any, Any] = (0.0, 0.0),
 ) -> float:
     """Largest difference of two reactions beyond their rounding errors, divided by the scales of
     ``_reaction_scales``."""
     force, moment = _reaction_scales(mechanism, second_reaction)
     off = (
-        np.abs(first_reaction.force - second_reaction.force) - rounding[0],
-        np.abs(first_reaction.moment - second_reaction.moment) - rounding[1],
+        np.abs(first_reaction.force - second_reaction.force) - rounding_errors[0],
+        np.abs(first_reaction.moment - second_reaction.moment) - rounding_errors[1],
     )
     return max(0.0, float(off[0].max()) / force, float(off[1].max()) / moment)
 

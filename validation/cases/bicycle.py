@@ -34,8 +34,8 @@ TRAIL_FACTOR = 1.001
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows of all comparisons. A quick run simulates half a second, and omits the predictions with one speed left
-    out."""
+    """Rows: published figures, the limit of ideal rolling, energy, and the measured bicycle. A quick run simulates half
+    a second, and omits the predictions with one speed left out."""
     benchmark = load_bicycle("benchmark")
     rows = [*_published_rows(benchmark), *_fault_rows(benchmark)]
     gaps = {engine: _eigenvalue_differences(benchmark, engine) for engine in ENGINES}

@@ -221,16 +221,16 @@ REFUSED_INPUTS: dict[str, Callable[[], Any]] = {
 """Inputs that are physically impossible, each with a function that must raise InputError."""
 
 
-def _refused_row(name: str, build_refused: Callable[[], Any]) -> Row:
+def _refused_row(input_name: str, build_refused: Callable[[], Any]) -> Row:
     try:
         build_refused()
         outcome = "taken"
     except InputError as error:
         outcome = "refused" if error.place and error.value is not None else "refused without its value"
     return behaviour_row(
-        f"braking_limits.refused.{name.replace(' ', '-')}",
+        f"braking_limits.refused.{input_name.replace(' ', '-')}",
         SYSTEM,
-        f"a scene with {name} is refused",
+        f"a scene with {input_name} is refused",
         outcome,
         "refused",
         "a vehicle that cannot be has no answer",

@@ -59,10 +59,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {}
 
 
-def _law_row(name: str) -> Row:
-    both, bound, what = LAW_COMPARISONS[name]
+def _law_row(law: str) -> Row:
+    both, bound, what = LAW_COMPARISONS[law]
     return Observed(
-        f"braking_reference.{name}", SYSTEM, what, laws.largest_difference(*both()), "by the largest"
+        f"braking_reference.{law}", SYSTEM, what, laws.largest_difference(*both()), "by the largest"
     ).at_most(bound, ROUNDING_REASON, "native")
 
 

@@ -111,8 +111,8 @@ def _errors_over_step(surface: str, slip: float, speed: float, steps: tuple[floa
     }
 
 
-def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
-    key, at = f"braking_stop.{name.replace(', ', '.').replace(' %', '').replace(' ', '.')}", curve["at"]
+def _headline_rows(case_name: str, curve: dict[str, Any]) -> list[Row]:
+    key, at = f"braking_stop.{case_name.replace(', ', '.').replace(' %', '').replace(' ', '.')}", curve["at"]
     errors = {scheme: curves[at] for scheme, curves in curve["errors"].items()}
     ours, _ = errors.pop("ours")
     why = f"asked for; the exact distance is {curve['exact']:.6f} m, from the slip's own equation to 1e-9"
@@ -120,14 +120,14 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
         Observed(
             f"{key}.distance",
             SYSTEM,
-            f"relative error of the stopping distance of a wheel that rolls first, {name}, steps of 5.5 ms",
+            f"relative error of the stopping distance of a wheel that rolls first, {case_name}, steps of 5.5 ms",
             ours,
             "",
         ).at_most(DISTANCE_BOUND, why, "closed form"),
         Observed(
             f"{key}.steady",
             SYSTEM,
-            f"relative error of the stopping distance at constant slip, {name}, steps of 5.5 ms",
+            f"relative error of the stopping distance at constant slip, {case_name}, steps of 5.5 ms",
             curve["steady"],
             "",
         ).at_most(1e-7, "m v^2 / (2 F); exact in each step but the last, at rest", "closed form"),
@@ -140,7 +140,7 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
             Observed(
                 f"{key}.{scheme.split()[-1].lower()}",
                 SYSTEM,
-                f"relative error of the stopping distance with {scheme}, {name}, steps of 5.5 ms{note}",
+                f"relative error of the stopping distance with {scheme}, {case_name}, steps of 5.5 ms{note}",
                 100.0 * error,
                 "%",
             ).beside(f"{100.0 * ours:.1e} % of ours", "the same vehicle, torque and table", "closed form")
@@ -149,7 +149,7 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
 
 
 def _further_case_row(
-    name: str, surface: str, slip: float, speed: float, mass_factor: float, spin_inertia_factor: float
+    case_name: str, surface: str, slip: float, speed: float, mass_factor: float, spin_inertia_factor: float
 ) -> Row:
     quarter = Quarter(
         mass=mass_factor * FRONT_WHEEL.mass,
@@ -162,9 +162,9 @@ def _further_case_row(
         constant_torque_stop(quarter, both, torque, speed).distance / exact_distance(quarter, tyre, torque, speed) - 1.0
     )
     return Observed(
-        f"braking_stop.further.{name.replace(', ', '.').replace(' ', '-')}",
+        f"braking_stop.further.{case_name.replace(', ', '.').replace(' ', '-')}",
         SYSTEM,
-        f"relative error of the stopping distance, {name} ({surface}, {100 * slip:g} % slip, {speed:g} "
+        f"relative error of the stopping distance, {case_name} ({surface}, {100 * slip:g} % slip, {speed:g} "
         "m/s), steps of 5.5 ms",
         error,
         "",

@@ -160,18 +160,18 @@ def _refusal_row() -> Row:
     ).within(4.0, 0.0, why, "none")
 
 
-def _reference_profile_rows(name: str) -> tuple[list[Row], dict[str, Any]]:
+def _reference_profile_rows(profile_name: str) -> tuple[list[Row], dict[str, Any]]:
     """Rows on one of the standard's reference profiles, and data for the figure."""
-    quantities = (f"{name}: amplitudes outside of the standard's limits", f"{name}: largest error")
+    quantities = (f"{profile_name}: amplitudes outside of the standard's limits", f"{profile_name}: largest error")
     data = data_folder()
-    table_file = None if data is None else data / TABLE_FOLDER / f"dr_ce_{name}.dat"
+    table_file = None if data is None else data / TABLE_FOLDER / f"dr_ce_{profile_name}.dat"
     if table_file is None or not table_file.is_file():
         reason = "TWINRIG_DATA names no folder with the standard's tables"
-        ids = (f"conicity.{name}.outside", f"conicity.{name}.error")
+        ids = (f"conicity.{profile_name}.outside", f"conicity.{profile_name}.error")
         return [not_run(id, SYSTEM, quantity, reason) for id, quantity in zip(ids, quantities, strict=True)], {}
     dr = np.array(table_file.read_text().split(), float)
     y = TABLE_SPACING * (np.arange(dr.size) - (dr.size - 1) / 2.0)
-    limits = np.loadtxt(table_file.with_name(f"ben_{name}.dat"))
+    limits = np.loadtxt(table_file.with_name(f"ben_{profile_name}.dat"))
     limits = limits[limits[:, 0] <= y[-1] + 1e-9]  # beyond, the table says nothing
     amplitudes, printed, upper, lower = limits[:, :4].T
     waves = [klingel_wave(RollingRadiusTable(y, dr), a) for a in amplitudes]
@@ -180,20 +180,20 @@ def _reference_profile_rows(name: str) -> tuple[list[Row], dict[str, Any]]:
     outside = float(((seen < lower) | (seen > upper)).sum())
     why = f"limits of EN 15302 at {len(amplitudes)} amplitudes, to the end of the table"
     rows = [
-        Observed(f"conicity.{name}.outside", SYSTEM, quantities[0], outside, "").at_most(0.0, why, "published"),
-        Observed(f"conicity.{name}.error", SYSTEM, quantities[1], float(np.abs(seen - printed).max()), "").at_most(
-            CONICITY_TOLERANCE, "printed to three digits; the bound asked for", "published"
-        ),
+        Observed(f"conicity.{profile_name}.outside", SYSTEM, quantities[0], outside, "").at_most(0.0, why, "published"),
         Observed(
-            f"conicity.{name}.harmonic",
+            f"conicity.{profile_name}.error", SYSTEM, quantities[1], float(np.abs(seen - printed).max()), ""
+        ).at_most(CONICITY_TOLERANCE, "printed to three digits; the bound asked for", "published"),
+        Observed(
+            f"conicity.{profile_name}.harmonic",
             SYSTEM,
-            f"{name}: largest error of the first harmonic",
+            f"{profile_name}: largest error of the first harmonic",
             float(np.abs(np.array(harmonic) - printed).max()),
             "",
         ).beside(0.0, "another definition, for comparison"),
     ]
     saved = {"amplitude": amplitudes, "upper": upper, "lower": lower, "seen": seen, "harmonic": harmonic}
-    return rows, {name: {key: np.asarray(values).tolist() for key, values in saved.items()}}
+    return rows, {profile_name: {key: np.asarray(values).tolist() for key, values in saved.items()}}
 
 
 def _harmonic_conicity(y: np.ndarray, dr: np.ndarray, wave: KlingelWave) -> float:

@@ -115,7 +115,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def all_setups() -> list[Setup]:
-    """All set-ups."""
+    """All timed combinations of engine, integrator, bridge, contact law and number of wheels."""
     setups = []
     for engine, (usual, fine) in INTEGRATORS.items():
         best, *other_bridges = ("native", "jitted", "plain") if engine == "mujoco" else (*ROUTES, "plain")

@@ -131,12 +131,12 @@ def _node_rows(nodes: Array) -> list[Row]:
     return rows
 
 
-def _worst_difference_row(name: str, deviations: Array, nodes: Array, range_text: str, bound: float) -> Row:
+def _worst_difference_row(coefficient: str, deviations: Array, nodes: Array, range_text: str, bound: float) -> Row:
     ratio, nu = nodes[int(deviations.argmax()), :2]
     return Observed(
-        f"contact_coefficients.{name}.{range_text.split()[1]}.{range_text.split()[-1]}",
+        f"contact_coefficients.{coefficient}.{range_text.split()[1]}.{range_text.split()[-1]}",
         SYSTEM,
-        f"relative difference of {name} of the published table from the exact theory, {range_text}: worst "
+        f"relative difference of {coefficient} of the published table from the exact theory, {range_text}: worst "
         f"of {len(deviations)}, at a/b {ratio:.4g}, nu {nu:g}",
         float(deviations.max()),
         "",

@@ -65,7 +65,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _bound_row(
-    name: str,
+    row_name: str,
     quantity: str,
     largest_error: float,
     bound: float,
@@ -73,7 +73,7 @@ def _bound_row(
     unit: str = "",
     independence: Any = "closed form",
 ) -> Row:
-    return Observed(f"contact_exact.{name}", SYSTEM, quantity, largest_error, unit).at_most(
+    return Observed(f"contact_exact.{row_name}", SYSTEM, quantity, largest_error, unit).at_most(
         bound, tolerance_reason, independence
     )
 

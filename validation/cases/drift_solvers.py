@@ -141,7 +141,13 @@ def _treatment_records(folder: Path) -> list[Saved]:
 
 
 def _treatment_record(
-    name: str, true_run: Result, quiet_assembly: Assembly, cutoff: float | None, engine: str, method: str, step: float
+    treatment: str,
+    true_run: Result,
+    quiet_assembly: Assembly,
+    cutoff: float | None,
+    engine: str,
+    method: str,
+    step: float,
 ) -> Saved:
     forces = quiet_assembly.input
     assert isinstance(forces, Sampled)
@@ -160,7 +166,7 @@ def _treatment_record(
         for record_of_run in (spread, law)
     )
     return {
-        "name": name,
+        "name": treatment,
         "law": expected,
         "growth": growth,
         "spread": float(spread[1]),
@@ -177,14 +183,14 @@ def _noisy_states(
     return build(engine, replace(assembly, input=forces), settings).run().states
 
 
-def _low_pass(values: np.ndarray, cutoff: float | None) -> np.ndarray:
+def _low_pass(force_samples: np.ndarray, cutoff: float | None) -> np.ndarray:
     """Samples filtered by a Butterworth low-pass of order 4, which runs forward and backward and so causes no delay;
     unchanged without a cut-off."""
     if cutoff is None:
-        return values
+        return force_samples
     from scipy.signal import butter, sosfiltfilt
 
-    return sosfiltfilt(butter(4, cutoff, fs=NOISE_SAMPLING_RATE, output="sos"), values, axis=0)
+    return sosfiltfilt(butter(4, cutoff, fs=NOISE_SAMPLING_RATE, output="sos"), force_samples, axis=0)
 
 
 def _damage_ratios(states: np.ndarray, true_run: Result, assembly: Assembly) -> dict[str, float]:

@@ -35,14 +35,14 @@ BEST_SETTINGS = {
 }
 
 
-def write_manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
+def write_manoeuvre(folder: Path, parameter_set_name: str, abrupt: bool = False) -> None:
     """Write pitch and wheel forces of a manoeuvre with frequencies up to 2.7 Hz, the range of a car's pitch and heave
     motion.
 
     The manoeuvre begins in the vehicle's equilibrium with zero angular acceleration, an ``abrupt`` one with
     4.4 rad/s^2 at once.
     """
-    p = parameter_set(parameters, "", folder)
+    p = parameter_set(parameter_set_name, "", folder)
     rest = equilibrium(p)
     t = SAMPLE_PERIOD * np.arange(round(DURATION / SAMPLE_PERIOD) + 1)
     s = np.clip(t / 1.0, 0, 1)
@@ -91,19 +91,20 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def _manoeuvre_rows(folder: Path, vehicles: tuple[str, ...], duration: float) -> list[Row]:
     rows = []
-    for parameters in vehicles:
-        write_manoeuvre(folder, parameters)
-        scene = force_scene(folder, parameters, STEP, duration, "smooth", effects=PRESCRIBED_PITCH)
+    for parameter_set_name in vehicles:
+        write_manoeuvre(folder, parameter_set_name)
+        scene = force_scene(folder, parameter_set_name, STEP, duration, "smooth", effects=PRESCRIBED_PITCH)
         true = exact_moment(scene)
-        if parameters == vehicles[0]:
+        if parameter_set_name == vehicles[0]:
             rows.append(_uncertainty_row(scene, true))
         for engine, settings in BEST_SETTINGS.items():
             route = "Lagrange multiplier" if engine == "exudyn" else "reduced model and inverse dynamics"
             rows.append(
                 Observed(
-                    f"moment.{engine}.{parameters}",
+                    f"moment.{engine}.{parameter_set_name}",
                     SYSTEM,
-                    f"error of the enforced moment at 1 ms, {engine} {settings.integrator} ({route}), {parameters}",
+                    f"error of the enforced moment at 1 ms, {engine} {settings.integrator} ({route}), "
+                    f"{parameter_set_name}",
                     relative_rms_error(enforced_moment(scene, engine, settings), true),
                     "of its rms",
                 ).at_most(

@@ -100,9 +100,9 @@ def creepage_contacts(kind_names: tuple[str, ...], creepage_levels: tuple[float,
     }
 
 
-def _relative_forces(columns: Contacts, **options: Any) -> Array:
+def _relative_forces(contacts: Contacts, **options: Any) -> Array:
     """Forces fx and fy (n, 2) divided by mu N."""
-    answers = fastsim(RollingEllipse(**columns), MATERIAL_PAIR, **options)
+    answers = fastsim(RollingEllipse(**contacts), MATERIAL_PAIR, **options)
     return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION * LOAD)
 
 
@@ -279,13 +279,13 @@ def _derivative_rows() -> list[Row]:
     ]
 
 
-def _forces_with_changed_input(columns: Contacts, name: str, step: float) -> Array:
+def _forces_with_changed_input(contacts: Contacts, input_name: str, step: float) -> Array:
     """Forces and moments (n, 3) with one input changed by ``step``. If the load changes, the ellipse changes with the
     load."""
-    moved = {**columns, name: columns[name] + step}
-    if name == "load":
-        grown = np.cbrt(moved["load"] / columns["load"])
-        moved |= {"a": columns["a"] * grown, "b": columns["b"] * grown}
+    moved = {**contacts, input_name: contacts[input_name] + step}
+    if input_name == "load":
+        grown = np.cbrt(moved["load"] / contacts["load"])
+        moved |= {"a": contacts["a"] * grown, "b": contacts["b"] * grown}
     creep = fastsim(RollingEllipse(**moved), MATERIAL_PAIR)
     return np.stack([creep.fx, creep.fy, creep.mz], axis=1)
 

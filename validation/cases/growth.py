@@ -62,7 +62,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         roads = {STUDY_ROAD: _growth_rates(folder, ROADS[STUDY_ROAD], 2)}
         return _deviation_rows(spread) + _growth_rows(roads), {"spread": spread, "roads": roads}
     roads = {name: _growth_rates(folder, road) for name, road in ROADS.items()}
-    roads["asymmetric twin"] = _growth_rates(folder, ROADS[STUDY_ROAD], parameters="asymmetric_twin")
+    roads["asymmetric twin"] = _growth_rates(folder, ROADS[STUDY_ROAD], parameter_set_name="asymmetric_twin")
     rows = [*_deviation_rows(spread), *_growth_rows(roads), _twin_row(folder), *_engine_rows(folder)]
     return [*rows, _step_row(folder), _linear_row(folder)], {"spread": spread, "roads": roads}
 
@@ -117,11 +117,13 @@ def _error_path(assembly: Assembly, start_state: np.ndarray, first_sample: int, 
     return TangentPath(replace(assembly, initial=start_state, input=forces), forces, 1, sample_count)
 
 
-def _growth_rates(folder: Path, road: Saved, window_count: int = WINDOW_COUNT, parameters: str = "itwm_drift") -> Saved:
+def _growth_rates(
+    folder: Path, road: Saved, window_count: int = WINDOW_COUNT, parameter_set_name: str = "itwm_drift"
+) -> Saved:
     """Growth rates (1/s) of the error on one road by four methods: from the run's pitch rate, from its forces, with
     other cut-off frequencies, and measured in time windows with forces in both frames."""
-    true = virtual_drive(folder, WINDOW_SECONDS * window_count, parameters=parameters, road=road)
-    assembly = assembly_of_scene(force_scene(folder, parameters, 1e-3, WINDOW_SECONDS * window_count))
+    true = virtual_drive(folder, WINDOW_SECONDS * window_count, parameters=parameter_set_name, road=road)
+    assembly = assembly_of_scene(force_scene(folder, parameter_set_name, 1e-3, WINDOW_SECONDS * window_count))
     p, rate = assembly.parameters, true["pitch_rate"]
     alone = pitch_rate_of_forces(_force_samples(assembly).values, 1 / SAMPLING_RATE, p)
     starts = np.rint(np.arange(window_count) * WINDOW_SECONDS * SAMPLING_RATE).astype(int)

@@ -69,9 +69,9 @@ def unstable_run_counts(engine: str, runner: Runner, quick: bool = False) -> dic
     return counts
 
 
-def _ending_of_unstable_run(engine: str, name: str, step: float, duration: float, runner: Runner) -> str:
+def _ending_of_unstable_run(engine: str, integrator: str, step: float, duration: float, runner: Runner) -> str:
     try:
-        states = runner(engine, road_assembly(), step, duration, name).states
+        states = runner(engine, road_assembly(), step, duration, integrator).states
     except InputError:
         return "refused"
     except RunFailed:

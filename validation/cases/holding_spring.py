@@ -145,10 +145,10 @@ def _smallest_stiffness(setting: SpringSetting, free_runs: FreeRuns) -> float:
     return high
 
 
-def _stiffness_row(index: int, name: str, stiffness: float, predicted_stiffness: float) -> Row:
+def _stiffness_row(index: int, setting_name: str, stiffness: float, predicted_stiffness: float) -> Row:
     key, what = (
         f"holding_spring.found.{index + 1}",
-        f"ratio of the predicted stiffness to the smallest that holds, which bisection gives, {name}",
+        f"ratio of the predicted stiffness to the smallest that holds, which bisection gives, {setting_name}",
     )
     if index >= len(JUDGED_SETTINGS):
         return Observed(key, SYSTEM, what, predicted_stiffness / stiffness, "").beside(

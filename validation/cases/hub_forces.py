@@ -60,7 +60,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + _fault_rows(scenes["hub"]), {frame: each.answer() for frame, each in comparisons.items()}
 
 
-def _acceleration_rows(name: str, vehicle: CutVehicle) -> list[Row]:
+def _acceleration_rows(vehicle_name: str, vehicle: CutVehicle) -> list[Row]:
     """Rows: accelerations of the engines at random states compared with written-out equations; these equations, without
     forces, compared with a second set of equations."""
     worst = 0.0
@@ -79,7 +79,7 @@ def _acceleration_rows(name: str, vehicle: CutVehicle) -> list[Row]:
     expected -= GRAVITY * np.eye(len(q))[Z]
     return [
         Observed(
-            f"hub_forces.accelerations_{name}",
+            f"hub_forces.accelerations_{vehicle_name}",
             SYSTEM,
             "relative difference of the accelerations in Exudyn and MuJoCo from the written-out "
             "equations at random states",
@@ -87,7 +87,7 @@ def _acceleration_rows(name: str, vehicle: CutVehicle) -> list[Row]:
             "1",
         ).at_most(1e-10, "one callback, three mass matrices", "shared kernel"),
         Observed(
-            f"hub_forces.free_fall_{name}",
+            f"hub_forces.free_fall_{vehicle_name}",
             SYSTEM,
             "relative difference of the accelerations of the freely falling, turning tree from a "
             "second set of equations",

@@ -124,12 +124,12 @@ def _inconsistency_rows(innovations: list[np.ndarray]) -> list[Row]:
     return rows
 
 
-def _outside_band_row(name: str, quantity: str, noise: str, values: np.ndarray, degrees_of_freedom: int) -> Row:
+def _outside_band_row(row_name: str, quantity: str, noise: str, values: np.ndarray, degrees_of_freedom: int) -> Row:
     """Row: a filter that assumes a wrong variance must fall outside the band."""
     low, high = _chi_square_band(degrees_of_freedom * len(values))
     mean = float(values.mean()) / degrees_of_freedom
     return behaviour_row(
-        f"kalman.{name}",
+        f"kalman.{row_name}",
         SYSTEM,
         f"{quantity} of a filter that assumes 4 times the variance of the {noise}",
         "inside" if low <= mean <= high else "outside",
@@ -147,7 +147,7 @@ def _chi_square_band(degrees_of_freedom: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _band_row(name: str, quantity: str, values: np.ndarray, degrees_of_freedom: int, sample: str) -> Row:
+def _band_row(row_name: str, quantity: str, values: np.ndarray, degrees_of_freedom: int, sample: str) -> Row:
     low, high = _chi_square_band(degrees_of_freedom * len(values))
     mean = float(values.mean()) / degrees_of_freedom
     why = (
@@ -155,7 +155,7 @@ def _band_row(name: str, quantity: str, values: np.ndarray, degrees_of_freedom: 
         f"{degrees_of_freedom * len(values)} degrees of freedom: {sample}"
     )
     return Observed(
-        f"kalman.{name}", SYSTEM, f"{quantity}, mean per degree of freedom, no model error", mean, ""
+        f"kalman.{row_name}", SYSTEM, f"{quantity}, mean per degree of freedom, no model error", mean, ""
     ).within((low + high) / 2, (high - low) / 2, why, "closed form")
 
 

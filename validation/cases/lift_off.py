@@ -44,8 +44,8 @@ NO_DAMPING = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows of all comparisons; a quick run has one vehicle, half a second of bounces, short runs on roads, and no hub
-    forces."""
+    """Rows: accelerations, bounces, energy and wheel loads of vehicles whose tyres lift off. A quick run has one
+    vehicle, half a second of bounces, short runs on roads, and no hub forces."""
     vehicles = VEHICLE_SETS[-1:] if quick else VEHICLE_SETS
     rows = [row for name in vehicles for row in (*_acceleration_rows(name), *_path_rows(name, 1.5 if quick else 20.0))]
     rows += [*_bounce_rows(0.5 if quick else 2.0), _order_row(4 if quick else 6), *_energy_rows(0.5 if quick else 2.0)]
@@ -53,7 +53,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def scene(
-    parameters: str = VEHICLE_SETS[-1],
+    parameter_set_name: str = VEHICLE_SETS[-1],
     geometry: str = "exact",
     duration: float = 1.0,
     step: float = STEP,
@@ -64,7 +64,7 @@ def scene(
     return build_scene(
         {
             "title": TITLE,
-            "vehicle": {"parameters": parameters, "geometry": geometry, "override": override or {}},
+            "vehicle": {"parameters": parameter_set_name, "geometry": geometry, "override": override or {}},
             "run": {"duration": duration, "step": step},
             "start": {} if on_study_road else START_MOTION,
             "effects": {"lift_off": {}, **({"road": STUDY_ROAD} if on_study_road else {})},
@@ -72,22 +72,22 @@ def scene(
     )
 
 
-def _acceleration_rows(parameters: str) -> list[Row]:
+def _acceleration_rows(parameter_set_name: str) -> list[Row]:
     """Rows: accelerations of both engines compared with the written equations at random states, some of them with
     wheels in the air."""
     rows = []
     for geometry in ("exact", "linear"):
-        lifting = scene(parameters, geometry, 2.0, 1e-3, on_study_road=True)
+        lifting = scene(parameter_set_name, geometry, 2.0, 1e-3, on_study_road=True)
         assembly = assembly_of_scene(lifting)
         for engine in ENGINES:
             error = acceleration_gap(checks.engine(engine), assembly, settings_of(lifting, engine))
             what = "acceleration at 100 random states, wheels in the air and hit among them"
             rows.append(
                 Observed(
-                    f"lift_off.audit.{engine}.{parameters}.{geometry}",
+                    f"lift_off.audit.{engine}.{parameter_set_name}.{geometry}",
                     SYSTEM,
                     f"largest difference of the {what} in {engine} from the written equations, "
-                    f"{parameters}, {geometry} geometry",
+                    f"{parameter_set_name}, {geometry} geometry",
                     error,
                     "of the largest",
                 ).at_most(1e-12, "a dozen products of doubles; the law stands in each by itself", "native")
@@ -95,17 +95,17 @@ def _acceleration_rows(parameters: str) -> list[Row]:
     return rows
 
 
-def _path_rows(parameters: str, duration: float) -> list[Row]:
+def _path_rows(parameter_set_name: str, duration: float) -> list[Row]:
     """Rows: largest difference of the engines' states from the reference's on the study road at the same step, and the
     least wheel load, which must be 0."""
-    lifting = scene(parameters, duration=duration, step=5e-4, on_study_road=True)
+    lifting = scene(parameter_set_name, duration=duration, step=5e-4, on_study_road=True)
     runs = {engine: simulate(lifting, engine) for engine in IMPLEMENTATIONS}
     rows = [
         Observed(
-            f"lift_off.path.{engine}.{parameters}",
+            f"lift_off.path.{engine}.{parameter_set_name}",
             SYSTEM,
             f"largest difference of the states in {engine} from the reference over {duration:g} s of "
-            f"the study road, {parameters}",
+            f"the study road, {parameter_set_name}",
             largest_difference(runs[engine], runs["reference"]),
             STATE_UNITS,
         ).at_most(1e-11, f"{ROUNDING_REASON}; each landing makes the difference some times as large", "native")
@@ -115,9 +115,9 @@ def _path_rows(parameters: str, duration: float) -> list[Row]:
     return [
         *rows,
         Observed(
-            f"lift_off.least.{parameters}",
+            f"lift_off.least.{parameter_set_name}",
             SYSTEM,
-            f"least wheel load over the study road, {parameters}",
+            f"least wheel load over the study road, {parameter_set_name}",
             float(least),
             "N",
         ).within(0.0, 0.0, "wheels leave the road, and no tyre pulls", "none"),

@@ -182,10 +182,10 @@ def _size_row(row_name: str, quantity: str, stated_size: float, unit: str, plant
     )
 
 
-def _no_findings_row(row_name: str, quantity: str, texts: list[str], tolerance_reason: str) -> Row:
+def _no_findings_row(row_name: str, quantity: str, finding_texts: list[str], tolerance_reason: str) -> Row:
     """Row that passes if there are no findings."""
-    id, finding_text = f"measured_checks.{row_name}", "; ".join(texts) or tolerance_reason
-    return Observed(id, SYSTEM, quantity, len(texts), "").within(0, 0, finding_text, "closed form")
+    id, finding_text = f"measured_checks.{row_name}", "; ".join(finding_texts) or tolerance_reason
+    return Observed(id, SYSTEM, quantity, len(finding_texts), "").within(0, 0, finding_text, "closed form")
 
 
 def _fault_rows(fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:

@@ -39,10 +39,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     run, memory, and exported files."""
     rows = [*_guide_rows(quick), *_counting_rows()]
     if quick:
-        return [*rows, _block_row(folder, "mujoco", "kalman", 0.3)], {}
+        return [*rows, _equal_blocks_row(folder, "mujoco", "kalman", 0.3)], {}
     lasting = {"mujoco": 0.5, "exudyn": 0.25, "reference": 0.2}
     rows += [
-        _block_row(folder, engine, method, seconds)
+        _equal_blocks_row(folder, engine, method, seconds)
         for engine, seconds in lasting.items()
         for method in ("none", "kalman", "prescribed")
     ]
@@ -141,21 +141,22 @@ def _counting_rows() -> list[Row]:
     ]
 
 
-def _block_row(folder: Path, engine: str, method: str, seconds: float) -> Row:
+def _equal_blocks_row(folder: Path, engine: str, stabiliser: str, seconds: float) -> Row:
     """Row: number of channels that differ between a run in one block and a run in uneven blocks."""
     run_folder = folder / f"blocks {seconds}"
     run_folder.mkdir(exist_ok=True)
-    job = run_of(run_folder, seconds, PATTERN_SECONDS, engine, AttitudeHold(method))  # type: ignore[arg-type]
+    job = run_of(run_folder, seconds, PATTERN_SECONDS, engine, AttitudeHold(stabiliser))  # type: ignore[arg-type]
     bits = []
     for block in (60.0, 0.073):
-        name = f"{engine} {method} {block}"
+        name = f"{engine} {stabiliser} {block}"
         run(job, run_folder / name, block=block)
         bits.append(np.frombuffer(answers_of(run_folder, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
-        f"measured_long.blocks_{engine}_{method}",
+        f"measured_long.blocks_{engine}_{stabiliser}",
         SYSTEM,
-        f"channels in {engine} whose bits change if {seconds:g} s are run in blocks of 0.073 s, stabiliser {method}",
+        f"channels in {engine} whose bits change if {seconds:g} s are run in blocks of 0.073 s, stabiliser "
+        f"{stabiliser}",
         changed,
         "1",
     ).at_most(0.0, "state, filter and inputs go from block to block as they are", "closed form")

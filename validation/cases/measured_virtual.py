@@ -72,8 +72,8 @@ CHAIN_TESTS = (
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows of every chain test with ten noise samples, of the engines, and of the predicted time of trust; a quick run
-    has one short noise sample."""
+    """Rows on virtual measurements through the whole chain of files, run and damage with ten noise samples, on the
+    engines, and on the predicted time of trust; a quick run has one short noise sample."""
     if quick:
         return _quick_rows(folder), {}
     rows, data = list[Row](), dict[str, Any]()

@@ -68,14 +68,14 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return [*rows, *walked, *_symmetric_part_rows(curves, quick)], {"gains": gains, "curves": curves}
 
 
-def _exact_rows(name: str) -> list[Row]:
+def _exact_rows(arrangement: str) -> list[Row]:
     """Rows: errors of quantities that need no integration, on a motion whose derivatives are known in closed form."""
-    array = sensor_array(SENSOR_ARRANGEMENTS[name])
+    array = sensor_array(SENSOR_ARRANGEMENTS[arrangement])
     clean = readings_on_path(array.positions)
-    spins, key = spin_from_readings(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
+    spins, key = spin_from_readings(array, clean), f"motion.exact.{arrangement.replace(',', '').replace(' ', '-')}"
     alpha = float(np.abs(angular_acceleration(spins, PATH.rates) - PATH.alpha).max())
     squares = (rates_up_to_sign(spins) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
-    what = f"sensors: {name}{', formula for a plane' if array.planar else ''}"
+    what = f"sensors: {arrangement}{', formula for a plane' if array.planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
     shown = (
         ("alpha", "error of the angular acceleration from clean readings", alpha, "rad/s^2"),

@@ -32,16 +32,16 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return [*rows, *([] if quick else _time_ratio_rows(r19()))], {}
 
 
-def _agreement_rows(name: str, car: CutVehicle, quick: bool) -> list[Row]:
+def _agreement_rows(car_name: str, car: CutVehicle, quick: bool) -> list[Row]:
     """Rows on one car: accelerations, states and numbers of native elements, compared with compiled forces."""
     states, steps = (
         random_states(car, QUICK_STATE_COUNT if quick else STATE_COUNT),
         QUICK_STEP_COUNT if quick else STEP_COUNT,
     )
-    where = f"{len(states)} states, any heading, roll and pitch to 0.3 rad, {name}"
+    where = f"{len(states)} states, any heading, roll and pitch to 0.3 rad, {car_name}"
     rows = [
         Observed(
-            f"native_builds.equations_{name}",
+            f"native_builds.equations_{car_name}",
             SYSTEM,
             "largest difference of the accelerations by compiled forces from written-out equations, "
             f"no hub forces, {where}",
@@ -52,32 +52,32 @@ def _agreement_rows(name: str, car: CutVehicle, quick: bool) -> list[Row]:
     for engine in NATIVE_ENGINES:
         rows += [
             Observed(
-                f"native_builds.accelerations_{name}_{engine}",
+                f"native_builds.accelerations_{car_name}_{engine}",
                 SYSTEM,
                 f"largest difference of the accelerations with {engine}'s springs from compiled forces, {where}",
                 acceleration_error(engine, car, states),
                 "1",
             ).at_most(1e-12, "of each coordinate's largest; the hub forces alone are shared", "native"),
             Observed(
-                f"native_builds.path_{name}_{engine}",
+                f"native_builds.path_{car_name}_{engine}",
                 SYSTEM,
                 f"largest difference of the states with {engine}'s springs from compiled forces, "
-                f"{steps} steps of 1 ms, {name}",
+                f"{steps} steps of 1 ms, {car_name}",
                 path_error(engine, car, steps),
                 "m, rad, 1/s",
             ).at_most(1e-10, "same tableau, same step", "native"),
-            _native_count_row(name, car, engine),
+            _native_count_row(car_name, car, engine),
         ]
     return rows
 
 
-def _native_count_row(name: str, car: CutVehicle, engine: str) -> Row:
+def _native_count_row(car_name: str, car: CutVehicle, engine: str) -> Row:
     share = native_share(engine, car)
     shared = "; ".join(f"{element}: {why}" for element, why in share.reasons.items()) or "nothing but hub forces"
     return Observed(
-        f"native_builds.count_{name}_{engine}",
+        f"native_builds.count_{car_name}_{engine}",
         SYSTEM,
-        f"number of springs, mounts and bars of {name} that are native elements in {engine}",
+        f"number of springs, mounts and bars of {car_name} that are native elements in {engine}",
         len(share.elements),
         "elements",
     ).within(len(car.elements), 0, f"all have stiffness and damping that every engine has; shared: {shared}", "native")

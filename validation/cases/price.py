@@ -106,14 +106,14 @@ def _further_cases(quick: bool, round_count: int) -> CaseAnswer:
 
 
 def _problem_rows(quick: bool, round_count: int, make_problem: MakeProblem) -> CaseAnswer:
-    """Rows and saved data of one problem."""
+    """Rows and saved data of one cost problem, which is a model with a range of integrators and settings."""
     problem = make_problem(quick)
     measured = runner.measure(problem, quick, round_count, SHORTEST_TIMED_RUN[quick])
     return rows_of(problem, measured, quick), asdict(measured)
 
 
 def _cases_in_processes(round_count: int) -> tuple[list[CaseAnswer], CaseAnswer]:
-    """Rows and data of all problems and of the further cases, computed by at most two processes."""
+    """Rows and data of all cost problems and of the further costs, computed by at most two processes."""
     with process_pool(min(2, os.cpu_count() or 1)) as pool:
         first, *other_problems = PROBLEMS + FULL_RUN_PROBLEMS
         road, beside = (

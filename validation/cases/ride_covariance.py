@@ -50,8 +50,8 @@ SYMMETRY_ZERO = 1e-20
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows of all comparisons; a quick run leaves out the engines' own linearisations, and compares two vehicles at one
-    speed each."""
+    """Rows: covariance compared with quadrature, closed forms and limits, and the fast method for many speeds. A quick
+    run leaves out the engines' own linearisations, and compares two vehicles at one speed each."""
     routes = [_quadrature_comparison(*job) for job in _comparisons(quick)]
     rows = [*_closed_form_rows(), *_quadrature_rows(routes), *_limit_rows(), *weighting_rows(SEED), *without_variance()]
     engines = () if quick else ("exudyn", "mujoco")
@@ -62,8 +62,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 @cache
-def _ride_vehicle(name: str, seed: int = 0) -> SpatialVehicle:
-    vehicle = load_vehicle(name)
+def _ride_vehicle(vehicle_name: str, seed: int = 0) -> SpatialVehicle:
+    vehicle = load_vehicle(vehicle_name)
     return changed_vehicle(vehicle, seed) if seed else vehicle
 
 
@@ -89,17 +89,17 @@ def _random_road(seed: int) -> TwoTrackRoad:
     return TwoTrackRoad(mean, roll)
 
 
-def _quadrature_comparison(name: str, seed: int, road: TwoTrackRoad | None, speed: float) -> dict[str, Any]:
+def _quadrature_comparison(vehicle_name: str, seed: int, road: TwoTrackRoad | None, speed: float) -> dict[str, Any]:
     """Largest relative difference between standard deviations by covariance and by quadrature, over all outputs and
     five cases of correlation, with the error that each method states."""
-    vehicle = linearise(_ride_vehicle(name, seed), speed)
+    vehicle = linearise(_ride_vehicle(vehicle_name, seed), speed)
     compared = [
         _covariance_difference(vehicle, vehicle, excitation, speed)
         for excitation in five_cases(vehicle.wheels, road).values()
     ]
     worst, by_covariance, by_quadrature, counts = zip(*compared, strict=True)
     return {
-        "vehicle": name + (f", twin {seed}" if seed else ""),
+        "vehicle": vehicle_name + (f", twin {seed}" if seed else ""),
         "speed": speed,
         "values": sum(counts),
         "worst": max(worst),

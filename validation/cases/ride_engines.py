@@ -95,17 +95,17 @@ def random_state(vehicle: SpatialVehicle, path: int) -> tuple[np.ndarray, np.nda
     return 0.05 * drawn[:n], 0.5 * drawn[n : 2 * n], 0.05 * drawn[2 * n :]
 
 
-def _matrix_rows(vehicle: SpatialVehicle, name: str, load_case: str, bounds: dict[str, float]) -> list[Row]:
+def _matrix_rows(vehicle: SpatialVehicle, vehicle_name: str, load_case: str, tolerances: dict[str, float]) -> list[Row]:
     expected = linearise(vehicle, SPEED)
     return [
         Observed(
-            f"ride_engines.matrices.{name}.{load_case}.{engine}",
+            f"ride_engines.matrices.{vehicle_name}.{load_case}.{engine}",
             SYSTEM,
-            f"difference of M, D, K, road columns and outputs of {name} in {engine} from the analytic ones, "
+            f"difference of M, D, K, road columns and outputs of {vehicle_name} in {engine} from the analytic ones, "
             f"{load_case}",
             matrix_difference(build(engine, vehicle, speed=SPEED).linearise(), expected),
             "relative",
-        ).at_most(bounds[engine], DIFFERENCES_REASON, "native")
+        ).at_most(tolerances[engine], DIFFERENCES_REASON, "native")
         for engine in ENGINES
     ]
 
@@ -126,13 +126,13 @@ def _frequency_rows() -> list[Row]:
     ]
 
 
-def _acceleration_rows(name: str) -> list[Row]:
+def _acceleration_rows(vehicle_name: str) -> list[Row]:
     """Rows: accelerations at random states with nonlinear springs, gravity and a road, compared between the engines and
     with the equations."""
     vehicle = (
-        with_nonlinear_springs(vehicle_of_name(name, GRAVITY))
-        if name != "quarter_car"
-        else vehicle_of_name(name, GRAVITY)
+        with_nonlinear_springs(vehicle_of_name(vehicle_name, GRAVITY))
+        if vehicle_name != "quarter_car"
+        else vehicle_of_name(vehicle_name, GRAVITY)
     )
     built = (build(engine, vehicle, speed=SPEED) for engine in ENGINES)
     models: list[SpatialModel | SpatialReference] = [*built, SpatialReference(vehicle, SPEED)]
@@ -144,9 +144,9 @@ def _acceleration_rows(name: str) -> list[Row]:
     names = ("exudyn against mujoco", "exudyn against equations", "mujoco against equations")
     return [
         Observed(
-            f"ride_engines.states.{name}.{what}",
+            f"ride_engines.states.{vehicle_name}.{what}",
             SYSTEM,
-            f"difference of the accelerations of {name} at {STATE_COUNT} random states, {what}",
+            f"difference of the accelerations of {vehicle_name} at {STATE_COUNT} random states, {what}",
             float(value),
             "relative",
         ).at_most(1e-12, SAME_LAWS_REASON, "native")

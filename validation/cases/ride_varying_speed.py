@@ -67,22 +67,22 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 @cache
 def vehicle_and_road(
-    name: str, tyre_damping: float = 0.0, cutoff: float | None = None
+    vehicle_name: str, tyre_damping: float = 0.0, cutoff: float | None = None
 ) -> tuple[LinearVehicle, Excitation]:
     """A shipped vehicle and the paper's road, which reaches the rear wheels with a delay. A vehicle without a track
     width has one track.
 
     ``cutoff`` (rad/m): a second corner of the road.
     """
-    spatial = load_vehicle(name)
+    spatial = load_vehicle(vehicle_name)
     vehicle = linearise(replace(spatial, tyres=tuple(replace(t, damping=tyre_damping) for t in spatial.tyres)))
     return vehicle, paper_road(vehicle.wheels, cutoff=cutoff)
 
 
-def _limit_rows(name: str, stops: SpeedProfile) -> list[Row]:
+def _limit_rows(vehicle_name: str, stops: SpeedProfile) -> list[Row]:
     """Rows on limits: stationary covariance long after a change of speed and at constant speed, the road's own
     covariance, and effect of half the step."""
-    vehicle, road = vehicle_and_road(name)
+    vehicle, road = vehicle_and_road(vehicle_name)
     system = at_speed(vehicle, road, STEADY_SPEED)
     exact, settling = (
         stationary_covariance(system).deviation,
@@ -98,31 +98,34 @@ def _limit_rows(name: str, stops: SpeedProfile) -> list[Row]:
     step = np.abs(stopped.at(often) ** 2 - fine.at(often) ** 2) / stopped.deviation.max(axis=0) ** 2
     return [
         Observed(
-            f"ride_varying_speed.settled.{name}",
+            f"ride_varying_speed.settled.{vehicle_name}",
             SYSTEM,
-            f"{name}, long after a change from 10 to 20 m/s: difference of all outputs from the Lyapunov equation",
+            f"{vehicle_name}, long after a change from 10 to 20 m/s: difference of all outputs from the Lyapunov "
+            "equation",
             largest_relative_error(settled[-1], exact),
             "",
         ).at_most(1e-10, "the stationary limit, relative", "closed form"),
         Observed(
-            f"ride_varying_speed.even.{name}",
+            f"ride_varying_speed.even.{vehicle_name}",
             SYSTEM,
-            f"{name}, at 20 m/s all the time: difference of all outputs from the Lyapunov equation, worst instant",
+            f"{vehicle_name}, at 20 m/s all the time: difference of all outputs from the Lyapunov equation, worst "
+            "instant",
             largest_relative_error(even, exact),
             "",
         ).at_most(1e-10, "nothing may drift", "closed form"),
         Observed(
-            f"ride_varying_speed.road.{name}",
+            f"ride_varying_speed.road.{vehicle_name}",
             SYSTEM,
-            f"{name}, through 0, 30 and 0 m/s with standing: error of the variance of the road under "
+            f"{vehicle_name}, through 0, 30 and 0 m/s with standing: error of the variance of the road under "
             "each wheel, worst instant",
             largest_relative_error((stopped.height / stopped.height[0]) ** 2, 1.0),
             "",
         ).at_most(1e-10, "the road does not know how fast it is driven over; relative", "closed form"),
         Observed(
-            f"ride_varying_speed.step.{name}",
+            f"ride_varying_speed.step.{vehicle_name}",
             SYSTEM,
-            f"{name}, through 0, 30 and 0 m/s: change of all variances at half the step, over their largest value",
+            f"{vehicle_name}, through 0, 30 and 0 m/s: change of all variances at half the step, over their largest "
+            "value",
             float(step.max()),
             "",
         ).at_most(1e-9, "ten times what was seen", "none"),
@@ -185,33 +188,34 @@ def _drive_comparison(profile: SpeedProfile) -> dict[str, Any]:
     }
 
 
-def _monte_carlo_rows(name: str, drive: dict[str, Any]) -> list[Row]:
+def _monte_carlo_rows(drive_name: str, drive: dict[str, Any]) -> list[Row]:
     """Rows: Monte Carlo copies at three instants, judged at three points of the body; all outputs and the error of the
     quasi-stationary solution are reported."""
     error = largest_relative_error(np.array(drive["quasi"]), np.array(drive["deviation"]))
     return [
         Observed(
-            f"ride_varying_speed.copies.{name}",
+            f"ride_varying_speed.copies.{drive_name}",
             SYSTEM,
-            f"r19_ride {name}: largest |z| of {COPY_COUNT} Monte Carlo copies at 3 instants in 3 points of the body",
+            f"r19_ride {drive_name}: largest |z| of {COPY_COUNT} Monte Carlo copies at 3 instants in 3 points of the "
+            "body",
             float(np.abs(drive["z"]).max()),
             "",
         ).at_most(4.0, "of 9 normal values one beyond 4 in 1800 times", "none"),
         Observed(
-            f"ride_varying_speed.outputs.{name}",
+            f"ride_varying_speed.outputs.{drive_name}",
             SYSTEM,
-            f"r19_ride {name}: largest |z| of {COPY_COUNT} Monte Carlo copies at 3 instants for all 16 outputs",
+            f"r19_ride {drive_name}: largest |z| of {COPY_COUNT} Monte Carlo copies at 3 instants for all 16 outputs",
             drive["all"],
             "",
         ).beside("below 4", "wheel loads and travels follow the same law", "none"),
         Observed(
-            f"ride_varying_speed.quasi.{name}",
+            f"ride_varying_speed.quasi.{drive_name}",
             SYSTEM,
-            f"r19_ride {name}: largest error of the quasi-stationary standard deviation in 3 points",
+            f"r19_ride {drive_name}: largest error of the quasi-stationary standard deviation in 3 points",
             error,
             "",
         ).beside(
-            {"accelerating": 0.017, "braking": 0.15}[name],
+            {"accelerating": 0.017, "braking": 0.15}[drive_name],
             "beside what a prototype sampled; the largest over all instants",
             "none",
         ),

@@ -252,9 +252,9 @@ def _long_results(folder: Path) -> list[Saved]:
     return [_score_of_method(bench, name) for name in PROTOTYPE_RESULTS]
 
 
-def _score_of_method(bench: Bench, name: str, engine: str = "reference") -> Saved:
-    effects = bench.methods[name]
-    return bench.row(name, effects, bench.simulate(engine, effects))
+def _score_of_method(bench: Bench, method: str, engine: str = "reference") -> Saved:
+    effects = bench.methods[method]
+    return bench.row(method, effects, bench.simulate(engine, effects))
 
 
 def _prototype_rows(long_runs: list[Saved]) -> list[Row]:

@@ -51,14 +51,14 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     duration = 0.5 if quick else 10.0
     rows: list[Row] = []
     with TemporaryDirectory() as name:
-        for parameters in VEHICLE_SETS:
-            scene = road_scene(parameters, STEP, duration)
-            measured, work = measure_road(scene), Path(name) / parameters
+        for parameter_set_name in VEHICLE_SETS:
+            scene = road_scene(parameter_set_name, STEP, duration)
+            measured, work = measure_road(scene), Path(name) / parameter_set_name
             work.mkdir()
             write_measurement(measured, work, STEP)
             follow, p = follower_builder(scene, work), scene.vehicle_parameters()
-            rows += _missing_mass_rows(parameters, p, measured, follow, work)
-            rows += _shifted_centre_rows(parameters, p, measured, follow, work)
+            rows += _missing_mass_rows(parameter_set_name, p, measured, follow, work)
+            rows += _shifted_centre_rows(parameter_set_name, p, measured, follow, work)
         rows += [
             *_dead_band_and_moment_rows(follow, min(duration, 4.0)),
             _high_pass_row(follow),
@@ -83,7 +83,7 @@ def prescribed_run(scene: Scene, engine: str) -> Result:
 
 
 def _missing_mass_rows(
-    parameters: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
+    parameter_set_name: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
 ) -> list[Row]:
     """Rows: if the model's chassis is 5 % too light by the mass dm, prescribing the heave takes a mean force of dm (g -
     z3'')."""
@@ -94,9 +94,9 @@ def _missing_mass_rows(
     wanted = MISSING_MASS_SHARE * p.m3 * (p.g - mean)
     return [
         Observed(
-            f"stabilisers.mass.{engine}.{parameters}",
+            f"stabilisers.mass.{engine}.{parameter_set_name}",
             SYSTEM,
-            f"{engine}, {parameters}: mean force that prescribes the heave, {MISSING_MASS_SHARE:.0%} of the "
+            f"{engine}, {parameter_set_name}: mean force that prescribes the heave, {MISSING_MASS_SHARE:.0%} of the "
             f"chassis missing (0.05 m3 g = {MISSING_MASS_SHARE * p.m3 * p.g:.1f} N)",
             float(prescribed_run(scene, engine)["enforced_force"].mean()),
             "N",
@@ -111,7 +111,7 @@ def _missing_mass_rows(
 
 
 def _shifted_centre_rows(
-    parameters: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
+    parameter_set_name: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
 ) -> list[Row]:
     """Rows: if the model's centre of mass lies ahead of the true one, prescribing the motion takes a moment, nose
     up."""
@@ -120,9 +120,9 @@ def _shifted_centre_rows(
     wanted = CENTRE_SHIFT * float(np.mean((measured_run["f3"] + measured_run["f4"]) * np.cos(measured_run["pitch"])))
     return [
         Observed(
-            f"stabilisers.centre.{engine}.{parameters}",
+            f"stabilisers.centre.{engine}.{parameter_set_name}",
             SYSTEM,
-            f"{engine}, {parameters}: mean moment that prescribes the pitch, centre of mass {CENTRE_SHIFT:g} "
+            f"{engine}, {parameter_set_name}: mean moment that prescribes the pitch, centre of mass {CENTRE_SHIFT:g} "
             f"m too far ahead (m3 g x = {CENTRE_SHIFT * p.m3 * p.g:.1f} N m)",
             float(prescribed_run(scene, engine)["enforced_moment"].mean()),
             "N m",

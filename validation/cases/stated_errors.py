@@ -40,8 +40,8 @@ ROUNDING_SHARE = 1e-12
 
 @allowing_breaches("what is judged is how well equations are solved, whatever a random vehicle does")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows of all systems that have samples; a quick run has a few samples of the pitch plane, and gives no verdict on
-    shares."""
+    """Rows on the stated errors of all systems that draw random samples; a quick run has a few samples of the pitch
+    plane, and gives no verdict on shares."""
     names = list(SAMPLE_MODULES)
     counts = QUICK_SAMPLE_COUNTS if quick else dict.fromkeys(names, -(-LEAST_SAMPLE_COUNT // len(names)))
     samples = [sample for of_system in _make_samples(counts) for sample in of_system]
@@ -51,7 +51,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _make_samples(sample_counts: dict[str, int]) -> list[list[Saved]]:
-    """Samples of each system, computed by at most two processes; by this process if there is only one system."""
+    """Random samples of stated and true errors for each system, computed by at most two processes; by this process if
+    there is only one system."""
     if len(sample_counts) == 1:
         return [samples_of_system(name, count) for name, count in sample_counts.items()]
     with process_pool(min(2, os.cpu_count() or 1)) as pool:
@@ -59,14 +60,14 @@ def _make_samples(sample_counts: dict[str, int]) -> list[list[Saved]]:
 
 
 def samples_of_system(system: str, sample_count: int) -> list[Saved]:
-    """Samples of one system as tables for JSON."""
+    """Random samples of stated and true errors for one system, as tables for JSON."""
     drawn: Iterator[Sample] = import_module(SAMPLE_MODULES[system]).samples(sample_count, SEED)
     return [_sample_as_table(system, sample) for sample in drawn]
 
 
 def _sample_as_table(system: str, sample: Sample) -> Saved:
-    """A sample as a table for JSON; its ``ratio`` is the ratio of the true to the stated error, None where no number is
-    stated."""
+    """A sample of stated and true error as a table for JSON; its ``ratio`` is the ratio of the true to the stated
+    error, None where no number is stated."""
     sample_table = {
         "system": system,
         "name": sample.name,

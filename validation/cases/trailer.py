@@ -47,34 +47,34 @@ def _static_loads_row() -> Row:
     ).at_most(1e-9, "statics of two bodies on a ball and three axles; rounding of a linear system", "closed form")
 
 
-def _engines_row(name: str, duration: float) -> Row:
-    first, second = (_rough_turn(engine, TRAINS[name](), duration).run for engine in ("mujoco", "exudyn"))
+def _engines_row(train_name: str, duration: float) -> Row:
+    first, second = (_rough_turn(engine, TRAINS[train_name](), duration).run for engine in ("mujoco", "exudyn"))
     gap = max(np.abs(first.positions - second.positions).max(), np.abs(first.rates - second.rates).max())
     return Observed(
-        f"trailer.engines.{name}",
+        f"trailer.engines.{train_name}",
         SYSTEM,
-        f"{duration:g} s of a turn of the {name} on a rough road: positions and rates of the two engines",
+        f"{duration:g} s of a turn of the {train_name} on a rough road: positions and rates of the two engines",
         float(gap),
         "m, rad, m/s, rad/s",
     ).at_most(1e-10, "the same tableau, step and forces around two engines' own trees: rounding alone", "shared kernel")
 
 
-def _turn_rows(name: str) -> list[Row]:
-    errors = towed_turn(STEADY_TRAINS[name](), TURN_SPEED)
+def _turn_rows(train_name: str) -> list[Row]:
+    errors = towed_turn(STEADY_TRAINS[train_name](), TURN_SPEED)
     why = "linear tyres, with trail and turning slip; a body that is towed balances about its hitch"
     return [
         Observed(
-            f"trailer.turn.{name}",
+            f"trailer.turn.{train_name}",
             SYSTEM,
-            f"yaw gain of a steady turn of small slip of the {name} at {TURN_SPEED:g} m/s, "
+            f"yaw gain of a steady turn of small slip of the {train_name} at {TURN_SPEED:g} m/s, "
             "over the closed form's, less 1",
             errors.yaw,
             "",
         ).at_most(TURN_TOLERANCE, why, "closed form"),
         Observed(
-            f"trailer.heading.{name}",
+            f"trailer.heading.{train_name}",
             SYSTEM,
-            f"headings of what is towed in it beside the car, less the closed form's, per rad of steer ({name})",
+            f"headings of what is towed in it beside the car, less the closed form's, per rad of steer ({train_name})",
             float(np.abs(errors.headings).max()),
             "rad/rad",
         ).at_most(TURN_TOLERANCE, why, "closed form"),

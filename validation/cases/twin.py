@@ -37,23 +37,25 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     has one vehicle at one step."""
     rows: list[Row] = []
     steps = STEPS[-1:] if quick else STEPS
-    for parameters in VEHICLE_SETS[-1:] if quick else VEHICLE_SETS:
-        rows += _engine_rows(f"study road, {parameters}", [road_scene(parameters, step) for step in steps])
-        measured = simulate(road_scene(parameters, STEPS[-1], 2.1), "reference")
-        rows += _force_rows(parameters, "study road", measured, steps)
-        rows += _course_rows(parameters, steps)
+    for parameter_set_name in VEHICLE_SETS[-1:] if quick else VEHICLE_SETS:
+        rows += _engine_rows(
+            f"study road, {parameter_set_name}", [road_scene(parameter_set_name, step) for step in steps]
+        )
+        measured = simulate(road_scene(parameter_set_name, STEPS[-1], 2.1), "reference")
+        rows += _force_rows(parameter_set_name, "study road", measured, steps)
+        rows += _course_rows(parameter_set_name, steps)
     return rows, {}
 
 
-def _force_rows(parameters: str, road_name: str, measured_run: Result, steps: tuple[float, ...]) -> list[Row]:
+def _force_rows(parameter_set_name: str, road_name: str, measured_run: Result, steps: tuple[float, ...]) -> list[Row]:
     """Rows: runs driven by the wheel forces of a road-excited run, whose samples are held constant or interpolated
     linearly."""
     with TemporaryDirectory() as name:
         write_measurement(measured_run, Path(name), 2e-3)
         rows = []
         for interpolation in ("held", "linear"):
-            scenes = [force_scene(Path(name), parameters, step, 2.0, interpolation) for step in steps]
-            rows += _engine_rows(f"{interpolation} wheel forces of the {road_name}, {parameters}", scenes)
+            scenes = [force_scene(Path(name), parameter_set_name, step, 2.0, interpolation) for step in steps]
+            rows += _engine_rows(f"{interpolation} wheel forces of the {road_name}, {parameter_set_name}", scenes)
         return rows
 
 
@@ -61,25 +63,32 @@ def _force_rows(parameters: str, road_name: str, measured_run: Result, steps: tu
     "edges of measured roads are shorter than a tyre's patch, and both sides read the same heights", "even road"
 )
 @allowing_breaches("the forces of a rough road topple a vehicle that nothing holds, on both sides alike", "upright")
-def _course_rows(parameters: str, steps: tuple[float, ...]) -> list[Row]:
+def _course_rows(parameter_set_name: str, steps: tuple[float, ...]) -> list[Row]:
     """Rows: runs on the measured course (250 m at 50 m/s), and runs driven by the wheel forces of its rough part."""
     data = data_folder()
     if data is None or not (data / COURSE_FILE).exists():
         reason = "TWINRIG_DATA names no folder with the measured course"
-        return [not_run(f"twin.course.{parameters}", SYSTEM, f"paths on the measured course, {parameters}", reason)]
+        return [
+            not_run(
+                f"twin.course.{parameter_set_name}",
+                SYSTEM,
+                f"paths on the measured course, {parameter_set_name}",
+                reason,
+            )
+        ]
     road = {"source": "opencrg", "file": COURSE_FILE, "speed": 50.0, "beyond_end": "refused"}
-    scenes = [road_scene(parameters, step, 5.0, road, data) for step in steps]
+    scenes = [road_scene(parameter_set_name, step, 5.0, road, data) for step in steps]
     measured = simulate(scenes[-1], "reference")
     rough = Result(
         measured.data.isel(time=slice(ROUGH_SAMPLES, None)).assign_coords(time=measured.data.time[:-ROUGH_SAMPLES])
     )
-    rows = _engine_rows(f"measured course, {parameters}", scenes) + _force_rows(
-        parameters, "measured course", rough, steps
+    rows = _engine_rows(f"measured course, {parameter_set_name}", scenes) + _force_rows(
+        parameter_set_name, "measured course", rough, steps
     )
     for name, speed, rule in OTHER_ROADS:
         road = {"source": "opencrg", "file": name, "speed": speed, "beyond_end": rule, "track": "left"}
         rows += _engine_rows(
-            f"{name}, left track, {rule}, {parameters}", [road_scene(parameters, 1e-3, 4.0, road, data)]
+            f"{name}, left track, {rule}, {parameter_set_name}", [road_scene(parameter_set_name, 1e-3, 4.0, road, data)]
         )
     return rows
 

@@ -61,7 +61,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         _soft_constraint_row(folder, "geared", GEARED),
         _soft_constraint_row(folder, "linked", LINKED),
         *_cart_rows(folder),
-        _planted_row(folder, quick),
+        _planted_differences_row(folder, quick),
     ], {}
 
 
@@ -71,37 +71,37 @@ def _file_of_text(folder: Path, name: str, text: str, ignored_content: tuple[str
     return read(path, ignored_content)
 
 
-def _exported_file(folder: Path, name: str) -> ModelFile:
-    scene = load(SCENES / f"{name}.toml")
+def _exported_file(folder: Path, scene_name: str) -> ModelFile:
+    scene = load(SCENES / f"{scene_name}.toml")
     answer = import_module(f"{SYSTEMS[scene.system].package}.export").exported(scene, "mujoco")
-    return _file_of_text(folder, f"exported_{name}", answer.text, IGNORED_CONTENT)
+    return _file_of_text(folder, f"exported_{scene_name}", answer.text, IGNORED_CONTENT)
 
 
-def _agreement_row(name: str, file: ModelFile, quick: bool) -> Row:
+def _agreement_row(model_name: str, file: ModelFile, quick: bool) -> Row:
     """Row: largest difference of accelerations from the model file, over the models of all engines."""
     agreements = certificate(file.twin, QUICK_STATE_COUNT if quick else STATE_COUNT)
     worst: Agreement = max(agreements, key=lambda agreement: agreement.acceleration)
     return Observed(
-        f"twin_files.{name}",
+        f"twin_files.{model_name}",
         SYSTEM,
         f"largest difference of accelerations in Exudyn, MuJoCo and plain equations from the file as MuJoCo parsed it, "
-        f"{file.twin.size} coordinates, {name}",
+        f"{file.twin.size} coordinates, {model_name}",
         worst.acceleration,
         "of its size",
     ).at_most(SAME, "what counts as alike; an acceleration near 0 is counted by what rounding may make of it", "native")
 
 
-def _soft_constraint_row(folder: Path, name: str, text: str) -> Row:
+def _soft_constraint_row(folder: Path, model_name: str, text: str) -> Row:
     """Row: accelerations with MuJoCo's soft constraints, compared with the law of MuJoCo's documentation in
     independently written equations."""
-    twin = _file_of_text(folder, name, text).twin
+    twin = _file_of_text(folder, model_name, text).twin
     states = states_of(twin, QUICK_STATE_COUNT)
     apart = agreement_of_build("", reference_of_file(twin, states, SOFT_BUILD), moved_at(softly_coupled(twin), states))
     return Observed(
-        f"twin_files.soft_{name}",
+        f"twin_files.soft_{model_name}",
         SYSTEM,
         "largest difference of accelerations with soft constraints in MuJoCo from the law of its documentation about "
-        f"the plain equations, at states that satisfy them, {name}",
+        f"the plain equations, at states that satisfy them, {model_name}",
         apart.acceleration,
         "of the largest",
     ).at_most(SOLVER_TOLERANCE, "what MuJoCo's constraint solver leaves, whose tolerance is 1e-8", "closed form")
@@ -129,7 +129,7 @@ def _cart_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _planted_row(folder: Path, quick: bool) -> Row:
+def _planted_differences_row(folder: Path, quick: bool) -> Row:
     """Row: number of planted differences that the comparison names first, with their right size."""
     first, named = _file_of_text(folder, "original", JOINTED).twin, 0
     chosen = PLANTED[::5] if quick else PLANTED

@@ -42,7 +42,8 @@ ENGINES = tuple(name for name in IMPLEMENTATION_MODULES if name != "reference")
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows of all comparisons; a quick run has the chosen wheelset alone, without planted faults."""
+    """Rows: wavelength, critical speed, accelerations, simulations, limit cycles, energy and planted faults. A quick
+    run has the chosen wheelset alone, without planted faults."""
     wheelsets = {"chosen": CHOSEN_WHEELSET} | ({} if quick else drawn_wheelsets())
     speeds = {name: critical_speeds(wheelset, quick or name != "chosen") for name, wheelset in wheelsets.items()}
     rows = [*_wave_rows(wheelsets), *_critical_rows(speeds), *_acceleration_rows(wheelsets)]
@@ -140,7 +141,7 @@ def _critical_rows(speeds: Speeds) -> list[Row]:
     ]
 
 
-def _no_critical_speed_row(name: str, wheelset: Wheelset, expected: str) -> Row:
+def _no_critical_speed_row(wheelset_name: str, wheelset: Wheelset, expected_outcome: str) -> Row:
     """Row: all implementations report that a wheelset has no critical speed, and why."""
     outcomes = set()
     for engine in IMPLEMENTATION_MODULES:
@@ -149,11 +150,11 @@ def _no_critical_speed_row(name: str, wheelset: Wheelset, expected: str) -> Row:
         except NoCriticalSpeed as error:
             outcomes.add("unstable" if error.unstable else "stable")
     return behaviour_row(
-        f"wheelset.critical.{name}",
+        f"wheelset.critical.{wheelset_name}",
         SYSTEM,
-        f"outcome of three implementations for a {name} wheelset at all speeds",
+        f"outcome of three implementations for a {wheelset_name} wheelset at all speeds",
         " or ".join(sorted(outcomes)),
-        expected,
+        expected_outcome,
         "nothing holds it, or more than creep forces can drive",
     )
 
@@ -182,9 +183,9 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     return rows
 
 
-def _simulation_speed(speeds: Speeds, name: str) -> float:
+def _simulation_speed(speeds: Speeds, wheelset_name: str) -> float:
     """Speed (m/s) of a wheelset's simulation: above its critical speed, or 60 m/s if it has none."""
-    critical = speeds[name]["reference"]
+    critical = speeds[wheelset_name]["reference"]
     return min(SPEED_RATIO * critical, 180.0) if critical is not None else 60.0
 
 
