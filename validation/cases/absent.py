@@ -47,7 +47,7 @@ EFFECTS = names_of(DEFAULT_SYSTEM)
 
 
 def required_effects(effect: str) -> dict[str, Any]:
-    """Scene tables of the effects that an effect needs beside it."""
+    """Scene tables of the effects without which an effect cannot be used."""
     module = module_of(DEFAULT_SYSTEM, effect)
     return {name: module_of(DEFAULT_SYSTEM, name).EXAMPLE for name in module.NEEDS} | module.BESIDE
 

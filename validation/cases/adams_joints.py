@@ -46,8 +46,8 @@ MJCF_STEP_RATIO = 5
 the start, where MuJoCo's tendon has no direction and so no damping. MuJoCo's first step errs by order 2 (5.7e-6 m by 5
 ms over 5 s, 1.4e-6 m by 2.5 ms), Exudyn's by order 5."""
 POSITION_BOUND, FORCE_BOUND = 1e-5, 1e-4
-"""Largest position error (m) and largest error of a reaction asked for; the latter is divided by the largest reaction,
-or by the weight where the weight is larger."""
+"""Largest position error (m) and largest error of a reaction that are asked for. The error of a reaction is divided by
+the largest reaction, or by the weight where the weight is larger."""
 ENGINE_TOLERANCE = 1e-6
 """Tolerance between engines and reference, of positions (m) and of reactions divided by the largest: steps of 5 ms
 leave 3e-7 of both."""
@@ -151,7 +151,7 @@ def fitted_constant_rows(family: str, constants: dict[str, float]) -> list[Row]:
 
 def family_rows(family: str, mechanism: Mechanism, output: OutputFile, quick: bool = False) -> list[Row]:
     """Rows for one joint family: positions and reactions of all engines compared with the output file, reactions on the
-    motion in the file, and the engines compared with the reference."""
+    motion in the file, and the engines compared with the reference equations."""
     duration = min(QUICK_DURATION if quick else DURATION, float(output.times[-1]))
     motion, reaction = ConstrainedBody(mechanism).run(duration, STEP, STEPS_PER_ROW)
     runs = {"reference": (motion, reaction)}

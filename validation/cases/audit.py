@@ -1,4 +1,5 @@
-"""Accelerations of both engines at random states compared with the paper's equations, before any time simulation."""
+"""Accelerations of Exudyn and MuJoCo at random states compared with the paper's equations, before any time
+simulation."""
 
 from pathlib import Path
 

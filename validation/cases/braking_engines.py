@@ -1,5 +1,5 @@
-"""A braked truck in the plane: both engines and hand-written equations compared with the compiled step, symmetries, and
-the trailer."""
+"""A braked truck in the plane: Exudyn, MuJoCo and hand-written equations compared with the compiled step, symmetries,
+and the trailer."""
 
 import time
 from collections.abc import Callable

@@ -46,7 +46,7 @@ ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the force laws, accelerations, steady circles and stops. A quick run has the car in one engine and a
-    short stop; a full run has all vehicles in both engines."""
+    short stop; a full run has all vehicles in Exudyn and MuJoCo."""
     vehicles, engines = (("car",), ENGINES[:1]) if quick else (tuple(whole.VEHICLES), ENGINES)
     rows = [_law_row(name) for name in LAW_COMPARISONS]
     rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]

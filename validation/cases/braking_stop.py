@@ -56,8 +56,8 @@ SMALLEST_FIGURE_STEP = 5e-4
 FULL_SWEEP_SURFACES = ("dry", "wet", "snow", "ice")
 """Surfaces on which the sweep takes every brake torque at every step."""
 TORQUE_LEVELS, LEVEL_SELECTION = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
-"""Brake torques of the sweep divided by the locking torque; and the selection of them that other surfaces take in steps
-below the paper's, as does the quick run."""
+"""Brake torques of the sweep divided by the locking torque; and the selection of these levels for the quick run, and
+for other surfaces in steps below the paper's."""
 SLOW_SPEED = 0.5
 """Initial speed (m/s) of the sweep with steps below 1 ms, which would otherwise take many steps."""
 STANDSTILL_SECONDS = 2.0

@@ -1,5 +1,5 @@
-"""A braked vehicle on its suspension in both engines: wheel loads, pitch and stops compared with closed forms and with
-the plane vehicle."""
+"""A braked vehicle on its suspension in Exudyn and MuJoCo: wheel loads, pitch and stops compared with closed forms and
+with the plane vehicle."""
 
 import math
 from pathlib import Path
@@ -37,8 +37,8 @@ TURN_TORQUES, HARD_TURN_TORQUES = (200.0, 200.0, 100.0, 100.0), (600.0, 600.0, 2
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows of stops with locked wheels, and of a J-turn and its mirror image; a full run also compares both engines,
-    the limit of a stiff suspension, and ice."""
+    """Rows of stops with locked wheels, and of a J-turn and its mirror image; a full run also compares Exudyn and
+    MuJoCo, the limit of a stiff suspension, and ice."""
     wet = table_of_surface("wet")
     turns = [
         braked_vehicle(car(), wet, steer=steer).run(steady_torques(*HARD_TURN_TORQUES), 6.0) for steer in (0.1, -0.1)
@@ -138,7 +138,7 @@ def _mirror_rows(left_turn: BrakingPath, mirrored_turn: BrakingPath) -> list[Row
 
 
 def _engine_rows(wet_table: TyreTable) -> list[Row]:
-    """Row: distance between both engines at the end of a braked turn with steps of 1 ms."""
+    """Row: distance between Exudyn and MuJoCo at the end of a braked turn with steps of 1 ms."""
     ends = [
         braked_vehicle(car(), wet_table, engine, 0.05, 1e-3)
         .run(steady_torques(*HARD_TURN_TORQUES), 15.0)

@@ -28,7 +28,7 @@ ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of axle loads, and of accelerations and stops. A quick run has one engine; a full run also has locked
-    wheels, slip control, planted faults, and more vehicles in both engines."""
+    wheels, slip control, planted faults, and more vehicles in Exudyn and MuJoCo."""
     vehicles, engines = (("caravan",), ENGINES[:1]) if quick else (tuple(whole.TRAINS), ENGINES)
     rows = [_axle_loads_row()]
     rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
@@ -136,7 +136,7 @@ def _slip_control_rows() -> list[Row]:
 
 
 def _fault_rows() -> list[Row]:
-    """Rows: faults planted in the force table that both engines share must be caught."""
+    """Rows: faults planted in the force table that Exudyn and MuJoCo share must be caught."""
     pulled = train.relative_difference(train.pulled_caravan(train.hold_on_to_the_car), train.pulled_by_levers())
     turned = whole.towing_car.__wrapped__()
     keep_to_the_car(turned.handling)

@@ -22,8 +22,8 @@ HALF_CAR_SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "ride_choice
 TITLE = "Effects that a ride scene calls for, chosen with a certificate"
 SYSTEM: System = "effects"
 SCENE_COUNT, FREQUENCY_JUDGED_COUNT = 40, 10
-"""Number of random scenes, three of four with detailed vehicles; and how many of them are also judged by frequency
-responses."""
+"""Number of random scenes, three of four with detailed vehicles; and number of these scenes that are also judged by
+frequency responses."""
 NEARBY_COUNT = 8
 """Number of random speeds, and of random parameter sets, at which a choice is checked."""
 TOLERANCE = 0.02

@@ -297,7 +297,7 @@ def _threads_row() -> Row:
 
 
 def _agreement_row() -> Row:
-    """Row: difference of the states in both engines after 0.1 s, by Runge-Kutta's method."""
+    """Row: difference of the states in Exudyn and MuJoCo after 0.1 s, by Runge-Kutta's method."""
     wheels, steps = Wheels(), 1000
     q, v = wheels.state()
     with installed(kernel_law(forces)):

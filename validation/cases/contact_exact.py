@@ -184,7 +184,7 @@ def _cattaneo_rows() -> list[Row]:
 
 def rolling_forces(case_name: str, cells: int, sign: float = 1.0, mirror_sign: float = 1.0) -> Array:
     """Forces (3,) of one of CASES: fx and fy divided by mu N, mz divided by mu N sqrt(ab). ``sign`` reverses the
-    creepages, ``mirror_sign`` mirrors them in y."""
+    creepages, ``mirror_sign`` mirrors the lateral creepage and the spin."""
     ratio, xi_x, xi_y, spin = CASES[case_name]
     creepage = FRICTION_LIMIT / (MATERIAL_PAIR.G * CONTACT_SIZE**2) * sign
     pressed = hertzian(CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5, LOAD, cells)

@@ -172,7 +172,8 @@ def _box_around(normal_contact: NormalContact) -> Box:
 
 
 def _computing_times() -> dict[str, list[float]]:
-    """Computing times (s) of the functions of both theories at about 45 x 45 cells."""
+    """Computing times (s) of FASTSIM of 1982, of the functions of the theory of 1983, and of the exact theory, at about
+    45 x 45 cells."""
     hertz = by_load(CURVATURE, 1.5 * CURVATURE, 1e5, MATERIAL_PAIR)
     a, b = float(hertz.a), float(hertz.b)
     distance, creepage = quadratic(CURVATURE, 1.5 * CURVATURE, 2.5 * a, 2.5 * b), (1e-3, 5e-4, 0.3)

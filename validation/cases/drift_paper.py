@@ -1,4 +1,4 @@
-"""The paper's six runs compared with its figures, and why they cannot all be reproduced."""
+"""The paper's six runs compared with the paper's figures, and why they cannot all be reproduced."""
 
 from collections.abc import Collection
 from math import log2
@@ -94,8 +94,8 @@ COMPARED_FIGURES = (
 @allowing_breaches("that runs drift off is what the paper shows", "upright")
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows for drift-off times, enforced moments and inertia term of the reference; a quick run has 15 s and one
-    sampling rate."""
+    """Rows for drift-off times, enforced moments and inertia term of the hand-written reference; a quick run has 15 s
+    and one sampling rate."""
     scene = load(STUDY_SCENE, QUICK_CHANGES if quick else ())
     runs, rate = _figures_by_run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
     rows = [
@@ -137,7 +137,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _figures_by_run(scene: Scene, run_names: Collection[str] = ()) -> dict[str, Saved]:
-    """Figures of the study's runs in the reference by name of the run, for the named runs or for all."""
+    """Figures of the study's runs in the hand-written reference by name of the run, for the named runs or for all."""
     with TemporaryDirectory() as folder:
         measured, _, scenes = measurement_and_runs(scene, Path(folder))
         return {

@@ -50,7 +50,7 @@ RIDE_STEP_COUNTS = {
     "mujoco": {True: 500, False: 1000},
 }
 """Number of steps of timed rides, by engine and ``quick``. A step of Exudyn takes as long as eight of MuJoCo, or as a
-step of all copies in the reference."""
+step of all copies in the hand-written reference."""
 HAND_WRITTEN_RIDES = {
     "reference": "the same copies one after the other, equations written out",
     "exudyn": "a car of its items whose path passes the same guard",
@@ -65,8 +65,8 @@ EFFECT_STEP_COUNT = 500
 
 @allowing_breaches("what is computed is what is counted, whatever the vehicle does meanwhile")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows of the ratios to hand-built models, and the price list of effects. A quick run simulates 2 s instead of 4 s,
-    takes a tenth of the rounds, and each effect in one of the three engines, in turn."""
+    """Rows of the computing times divided by those of hand-built models, and the price list of effects. A quick run
+    simulates 2 s instead of 4 s, takes a tenth of the rounds, and each effect in one of the three engines, in turn."""
     with tempfile.TemporaryDirectory() as name:
         files_folder = Path(name)
         write_files(files_folder)
@@ -173,8 +173,8 @@ def _wheelset_rows(step_count: int, quick: bool) -> list[Row]:
 
 
 def _ride_rows(quick: bool) -> list[Row]:
-    """Rows: a car with seven degrees of freedom on a rough road, compared in each engine with a model built by hand,
-    and in the reference with hand-written equations.
+    """Rows: a car with seven degrees of freedom on a rough road, compared in Exudyn and MuJoCo with a model built by
+    hand, and in the reference implementation with equations written for this car alone.
 
     In MuJoCo the suspension is of site actuators, as XML has them. All forces of this car alone in one callback, by
     hand, on addresses in MuJoCo's memory, beat the general callback by an eighth.
@@ -294,8 +294,8 @@ def _choice_row() -> Row:
 
 
 def _price_of_effect(effect: str, engine: str, folder: Path, round_count: int) -> Saved:
-    """Line of the price list: time per step (microseconds) that an effect adds in an engine, with the counts that it
-    changes."""
+    """Line of the price list: time per step (microseconds) that an effect adds in an engine, with the numbers of
+    components that the effect changes."""
     seconds = interleave(
         [_timed_run(bare, engine) for bare in scenes_without_and_with(effect, EFFECT_STEP_COUNT, folder)],
         round_count,

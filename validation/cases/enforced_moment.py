@@ -77,8 +77,8 @@ def relative_rms_error(computed_values: np.ndarray, true_moment: np.ndarray) -> 
 @on_paper_road()
 @allowing_breaches("the moment is compared, and its size is another matter", "little artificial")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows for both engines and vehicles, the ringing after an abrupt start, and the study road; a quick run has one
-    vehicle and no study road."""
+    """Rows for both vehicles in Exudyn and in MuJoCo, the ringing after an abrupt start, and the study road; a quick
+    run has one vehicle and no study road."""
     with TemporaryDirectory() as name:
         work = Path(name)
         rows = _manoeuvre_rows(

@@ -39,7 +39,7 @@ CREEPAGE_KINDS = {
 }
 CREEPAGE_LEVELS = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
 SLIDING_LEVELS = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
-"""Creepage levels around the one from which the whole contact area slides."""
+"""Creepage levels around the level from which the whole contact area slides."""
 LOAD, FRICTION, MEAN_SEMI_AXIS = 80e3, 0.3, 5e-3
 """Normal load (N), coefficient of friction, and sqrt(a b) (m) of the ellipses with the semi-axes a and b."""
 MATERIAL_PAIR = MaterialPair()

@@ -1,5 +1,5 @@
-"""The R19-free car on four brush tyres: agreement of both engines, the linear limit, friction, energy, standstill, and
-computing time."""
+"""The R19-free car on four brush tyres: agreement of Exudyn and MuJoCo, the linear limit, friction, energy, standstill,
+and computing time."""
 
 import time
 from collections.abc import Callable

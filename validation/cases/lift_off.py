@@ -73,7 +73,7 @@ def scene(
 
 
 def _acceleration_rows(parameter_set_name: str) -> list[Row]:
-    """Rows: accelerations of both engines compared with the written equations at random states, some of them with
+    """Rows: accelerations of Exudyn and MuJoCo compared with the written equations at random states, some of them with
     wheels in the air."""
     rows = []
     for geometry in ("exact", "linear"):
@@ -251,7 +251,7 @@ def _pull_rows(quick: bool) -> list[Row]:
 
 def _spatial_rows(quick: bool) -> list[Row]:
     """Rows on the R19-ride vehicle with tyres that lift off: accelerations compared with hand-written equations, and
-    both engines compared on a random road."""
+    Exudyn and MuJoCo compared on a random road."""
     ride = build_ride(
         {
             "title": TITLE,
@@ -301,8 +301,8 @@ def _spatial_rows(quick: bool) -> list[Row]:
 
 
 def _hub_force_rows() -> list[Row]:
-    """Rows: hub forces of a car whose wheels leave a class E road: difference of the engines from the reference, and
-    least force."""
+    """Rows: hub forces of a car whose wheels leave a class E road: difference of the engines from the reference
+    equations, and least force."""
     car, duration = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body"), 4.0
     left, right = (iso8608_road("E", seed) for seed in (1, 2))
     drive = two_tracks(car, left, right, SPEED, 1e-3, round(duration / 1e-3))

@@ -1,5 +1,5 @@
-"""A car on four tyres along a measured steer angle and speed: both engines, repetition of its own simulated drive, and
-identification of its tyres."""
+"""A car on four tyres along a measured steer angle and speed: Exudyn and MuJoCo, repetition of its own simulated drive,
+and identification of its tyres."""
 
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,8 @@ CHI_SQUARE_LIMIT = 18.4
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows of both engines and of the repeated drive over 2 s; a full run takes 8 s and also identifies the tyres."""
+    """Rows of the drive in Exudyn and MuJoCo and of the repeated drive over 2 s; a full run takes 8 s and also
+    identifies the tyres."""
     scene = _drive_scene([0.0, 2.0] if quick else [0.0, 8.0])
     first, second = (run(scene, engine) for engine in ("mujoco", "exudyn"))
     gap = max(float(np.abs(first[name] - second[name]).max()) for name in ("positions", "rates"))

@@ -228,7 +228,7 @@ def _damage_rows(
 def _other_run_rows(
     chain_test: ChainTest, recording: Recording, true_measurement: VirtualMeasurement, folder: Path
 ) -> list[Row]:
-    """Rows: the recording run in both engines, free and stabilised, and the verdicts on these runs."""
+    """Rows: the recording simulated in Exudyn and MuJoCo, free and stabilised, and the verdicts on these runs."""
     free = stabilised_run(recording, true_measurement.vehicle, AttitudeHold("none"))
     jobs = {
         engine: stabilised_run(recording, true_measurement.vehicle, chain_test.hold, engine) for engine in ENGINES[1:]

@@ -1,5 +1,5 @@
-"""Hub forces with the engines' native springs, mounts and bars: both engines compared with compiled forces and with
-written-out equations."""
+"""Hub forces with the engines' native springs, mounts and bars: Exudyn and MuJoCo compared with compiled forces and
+with written-out equations."""
 
 import time
 from pathlib import Path

@@ -42,7 +42,7 @@ def _energy_row(handling: Handling, quick: bool) -> Row:
 
 
 def _lane_change_rows(handling: Handling, duration: float) -> list[Row]:
-    """Rows: difference between both engines over a lane change, and of each engine's accelerations at its end from
+    """Rows: difference between Exudyn and MuJoCo over a lane change, and of each engine's accelerations at its end from
     independently written equations."""
     drives = {engine: drive_run(engine, handling, SPEED, duration) for engine in ("exudyn", "mujoco")}
     states = [drive.run.states for drive in drives.values()]

@@ -1,4 +1,5 @@
-"""Recommended settings for scenes that were not used to find them: do they keep the tolerance at the promised cost?"""
+"""Recommended settings on scenes that the recommendation has not used before: do the settings keep the tolerance at the
+promised cost?"""
 
 import os
 from concurrent.futures import ProcessPoolExecutor
@@ -85,8 +86,8 @@ def scene_verdicts(system: str, scene_number: int, folder: Path, engines: tuple[
 
 
 def _promise_rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
-    """Rows on the promises of a recommendation; a scene keeps them if every recommended setting keeps the scene's
-    tolerance."""
+    """Rows on the promises of a recommendation: tolerance, predicted error, and cost. A scene counts as met if every
+    recommended setting keeps the scene's tolerance."""
     every = [verdict for of_scene in verdicts for verdict in of_scene]
     kept_scenes = sum(bool(of_scene) and all(verdict.meets for verdict in of_scene) for of_scene in verdicts)
     factors = [verdict.factor for verdict in every]

@@ -1,5 +1,5 @@
-"""Vehicles in space in both engines: linearised matrices, accelerations at random states, simulations, and rest under
-gravity."""
+"""Vehicles in space in Exudyn and MuJoCo: linearised matrices, accelerations at random states, simulations, and rest
+under gravity."""
 
 import time
 from dataclasses import replace
@@ -159,8 +159,8 @@ def _settings(engine: str, duration: float = 1.0) -> Settings:
 
 
 def _simulation_rows() -> tuple[list[Row], list[list[str]]]:
-    """Rows and computing times: states of both engines from a random start over 1 s on a random road, with nonlinear
-    and with linear springs."""
+    """Rows and computing times: states of Exudyn and MuJoCo from a random start over 1 s on a random road, with
+    nonlinear and with linear springs."""
     rows, price = [], []
     for what in ("linear", "curved"):
         vehicle = vehicle_of_name("r19_ride", GRAVITY)
@@ -218,7 +218,8 @@ def _rest_rows() -> list[Row]:
 
 
 def _shift_rows() -> list[Row]:
-    """Rows: shift of the eigenvalues by gravity and preload, from both engines and from the analytic matrices."""
+    """Rows: shift of the eigenvalues by gravity and preload, from the matrices of Exudyn and MuJoCo and from the
+    analytic matrices."""
     rows = []
     for name in VEHICLE_NAMES[1]:
         analytic = shift(*(linearise(vehicle_of_name(name, gravity), SPEED) for gravity in (0.0, GRAVITY)))

@@ -1,4 +1,5 @@
-"""Nonlinear springs on a random road: statistical linearisation compared with Monte Carlo, and both engines in time."""
+"""Nonlinear springs on a random road: statistical linearisation compared with Monte Carlo, and Exudyn and MuJoCo in
+time."""
 
 from dataclasses import replace
 from itertools import pairwise

@@ -245,7 +245,7 @@ def _vertical_damage_rows(studied: list[Saved]) -> list[Row]:
 
 
 def _long_results(folder: Path) -> list[Saved]:
-    """Results of the prototype's stabilisers over 60 s at 1 kHz on the road, in the reference."""
+    """Results of the prototype's stabilisers over 60 s at 1 kHz on the road, in the hand-written reference."""
     scene = load(STUDY_SCENE, FULL_OPTIONS)
     (folder / "long").mkdir()
     bench = Bench(scene, "road", read(Options, scene.options, "", "options"), folder / "long")

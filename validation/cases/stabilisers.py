@@ -46,8 +46,8 @@ DEAD_BAND_SPRING = {"pitch_spring": {"stiffness": 3e3, "damping": 200.0, "dead_b
 @allowing_breaches("masses are wrong on purpose: what they leave to be held is what is measured")
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows of a missing mass and a misplaced centre of mass on both vehicles, and of the other stabilisers on the
-    asymmetric one; a quick run has half a second."""
+    """Rows: forces and moments that reveal a missing mass and a misplaced centre of mass on both vehicles, and the
+    other stabilisers on the asymmetric vehicle; a quick run has half a second."""
     duration = 0.5 if quick else 10.0
     rows: list[Row] = []
     with TemporaryDirectory() as name:
@@ -132,7 +132,8 @@ def _shifted_centre_rows(
 
 
 def _dead_band_and_moment_rows(build_follower: BuildFollower, duration: float) -> list[Row]:
-    """Rows: states with a dead-band spring, and with an added moment, in both engines compared with the reference."""
+    """Rows: states with a dead-band spring, and with an added moment, in Exudyn and MuJoCo compared with the reference
+    equations."""
     assembly = assembly_of_scene(build_follower({}, DEAD_BAND_SPRING))
     times = STEP * np.arange(round(duration / STEP) + 1)
     moment = Sampled(500.0 * np.sin(30.0 * times)[:, None], STEP, held=False)

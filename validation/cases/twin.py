@@ -94,7 +94,7 @@ def _course_rows(parameter_set_name: str, steps: tuple[float, ...]) -> list[Row]
 
 
 def _engine_rows(title: str, scenes: list[Scene]) -> list[Row]:
-    """Rows for both engines: largest difference of the states from the reference over all scenes."""
+    """Rows for Exudyn and MuJoCo: largest difference of the states from the reference equations over all scenes."""
     truths = [simulate(scene, "reference") for scene in scenes]
     steps = ", ".join(f"{1e3 * scene.run.step:g}" for scene in scenes)
     return [

@@ -233,7 +233,7 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> li
 
 
 def _time_step(equations: Equations) -> float:
-    """Time step (s) for the wheelset's fastest motion: STEP, or a smaller one that divides DURATION."""
+    """Time step (s) for the wheelset's fastest motion: STEP, or a smaller step that divides DURATION."""
     fastest = float(np.abs(np.linalg.eigvals(equations.state_matrix)).max())
     return DURATION / np.ceil(DURATION / min(STEP, 1.0 / fastest))
 

@@ -1,5 +1,5 @@
-"""Cars by independently written equations compared with both engines: accelerations at random states, whole
-simulations, and every force law in them."""
+"""Cars by independently written equations compared with Exudyn and MuJoCo: accelerations at random states, whole
+simulations, and every force law."""
 
 from pathlib import Path
 
