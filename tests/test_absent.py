@@ -24,11 +24,20 @@ from validation.absence.probes import (
     user_functions,
 )
 from validation.cases import absent, effect_prices
-from validation.cases.absent import EFFECTS, ENGINES, FORCES, added_to, change, declared, model, scene
+from validation.cases.absent import (
+    EFFECTS,
+    ENGINES,
+    FORCE_EFFECT,
+    count_changes,
+    declared_changes,
+    model,
+    required_effects,
+    scene,
+)
 from validation.cases.effect_prices import hand_built
 
 BARE = {"title": "bare", "run": {"duration": 0.02, "step": 0.001}, "start": {"pitch": 0.1}}
-FORCED = {**BARE, "effects": FORCES}
+FORCED = {**BARE, "effects": FORCE_EFFECT}
 ROAD = module_of(DEFAULT_SYSTEM, "road").EXAMPLE
 EFFECT_FILES = "systems/pitch_plane/effects"
 
@@ -101,10 +110,13 @@ def test_no_callback_before_during_and_after(folder):
 def test_user_functions_are_counted(folder):
     """Positive control, over Exudyn's own items: two loads per wheel on a road; two offsets of the constraint."""
     assert user_functions(model(scene({"road": ROAD}, 50, folder), "exudyn")) == 4
-    guided = {**added_to("prescribed_pitch"), "prescribed_pitch": module_of(DEFAULT_SYSTEM, "prescribed_pitch").EXAMPLE}
-    built = model(scene(guided, 50, folder, guided=True), "exudyn")
+    guided = {
+        **required_effects("prescribed_pitch"),
+        "prescribed_pitch": module_of(DEFAULT_SYSTEM, "prescribed_pitch").EXAMPLE,
+    }
+    built = model(scene(guided, 50, folder, prescribed=True), "exudyn")
     assert user_functions(built) == built.plan()["callbacks"] == 4
-    built = model(scene(FORCES, 50, folder), "exudyn")
+    built = model(scene(FORCE_EFFECT, 50, folder), "exudyn")
     assert user_functions(built) == built.plan()["callbacks"] == 3  # the step's own among them
 
 
@@ -133,7 +145,7 @@ def test_a_bare_scene_has_the_states_of_the_vehicle_and_no_others(folder):
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_an_effect_changes_the_counts_by_what_it_declares(effect, engine, folder):
-    assert change(effect, engine, folder) == declared(effect, engine)
+    assert count_changes(effect, engine, folder) == declared_changes(effect, engine)
 
 
 @pytest.mark.parametrize("kept", [(), ("wheel_forces",)], ids=["bare", "forced"])

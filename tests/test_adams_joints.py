@@ -233,7 +233,7 @@ def test_a_ball_swings_as_a_hinge_does_and_a_fault_is_seen(model, monkeypatch, t
     file = _file_of(hinge)
     monkeypatch.setattr(adams_joints, "read_output", lambda path: file)
     for mechanism, status in (ball, "passed"), (replace(ball, inertia=1.01 * ball.inertia), "failed"):
-        place, force, files = adams_joints._same_pendulum("Spherical", mechanism, file, tmp_path)
+        place, force, files = adams_joints._same_pendulum_rows("Spherical", mechanism, file, tmp_path)
         assert (place.status, force.status, files.value) == (status, status, 0.0)
 
 

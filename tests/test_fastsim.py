@@ -52,7 +52,7 @@ def test_a_call_is_the_function():
 
 def test_many_are_as_they_are_alone():
     """Contacts of several shapes, whose strips share a block of lanes."""
-    given = case.creepages(("x", "y-spin"), (0.3, 2.0))
+    given = case.creepage_contacts(("x", "y-spin"), (0.3, 2.0))
     together = fastsim(RollingEllipse(**given), PAIR)
     for i in range(len(given["a"])):
         alone = fastsim(RollingEllipse(**{name: values[i] for name, values in given.items()}), PAIR)
@@ -107,7 +107,7 @@ def test_the_moment_reaches_the_limit_of_friction_and_no_more():
 @pytest.mark.parametrize("growing", [True, False])
 @pytest.mark.parametrize("kind", ["blended", "one", "three"])
 def test_derivatives_are_those_of_the_march(kind, growing):
-    given = case.creepages(tuple(case.CREEPAGE_KINDS), (0.2, 2.0))
+    given = case.creepage_contacts(tuple(case.CREEPAGE_KINDS), (0.2, 2.0))
     own = derivatives(RollingEllipse(**given), PAIR, flexibilities=kind, growing=growing).slopes[..., 3] * case.LOAD
     ends = []
     for share in (1e-6, -1e-6):
@@ -115,7 +115,7 @@ def test_derivatives_are_those_of_the_march(kind, growing):
         moved = {**given, "load": given["load"] * (1 + share), "a": given["a"] * grown, "b": given["b"] * grown}
         found = fastsim(RollingEllipse(**moved), PAIR, flexibilities=kind)
         ends.append(np.stack([found.fx, found.fy, found.mz], axis=1))
-    off = np.abs((ends[0] - ends[1]) / 2e-6 - own) / case.UNITS
+    off = np.abs((ends[0] - ends[1]) / 2e-6 - own) / case.FORCE_SCALES
     assert np.quantile(off.max(axis=1), 0.95) < 1e-7
 
 

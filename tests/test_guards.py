@@ -139,7 +139,7 @@ def test_a_missing_check_fails_the_row(monkeypatch):
 
 def test_a_missing_balance_fails_the_row(monkeypatch):
     monkeypatch.setattr(exudyn_engine, "balanced", lambda *_: None)
-    assert set(guards.constrained_unchecked().values()) == {"answered"}
+    assert set(guards.unchecked_constrained_endings().values()) == {"answered"}
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from models.contact.simplified_theory import roll
 from models.core.errors import InputError
 from models.core.strict import read
 from models.systems.contact.run import interpenetrating
-from validation.cases.contact_hertz import ellipse, measure
+from validation.cases.contact_hertz import exact_contact, measure
 
 PAIR = MaterialPair()
 
@@ -22,7 +22,7 @@ def test_every_row_of_the_case_passes(tmp_path):
 @pytest.mark.grounds("published")
 def test_the_truth_is_johnson_s_circle():
     """The many-digit side by formulas of its own: p0 = (6 N E*^2 / (pi^3 R^2))^(1/3), a = (3 N R / (4 E*))^(1/3)."""
-    circle = {name: float(value) for name, value in ellipse(1.0).items()}
+    circle = {name: float(value) for name, value in exact_contact(1.0).items()}
     radius = 1 / (2 * circle["flat"])
     modulus = MaterialPair(STEEL, Material(E=7e10, nu=0.33)).modulus
     rounding = 1e-14  # of a power of 1/3 of a number of size 1e27
@@ -34,7 +34,7 @@ def test_the_truth_is_johnson_s_circle():
 
 def test_truth_passes_smoothly_into_the_circle():
     """K - E over e^2 has no step where the circle's own formula takes over."""
-    near, circle = ellipse(1 - 1e-12), ellipse(1.0)
+    near, circle = exact_contact(1 - 1e-12), exact_contact(1.0)
     assert float(near["flat"] / circle["flat"] - 1) == pytest.approx(-1.25e-12, rel=1e-3, abs=0.0)  # D's own slope: 5/4
 
 

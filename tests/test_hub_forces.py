@@ -32,7 +32,7 @@ def test_the_quick_share_passes(tmp_path):
 
 def test_without_symmetry_the_engines_agree_too():
     # 1e-10: a wrong product of inertia or arm would show at 1e-2
-    assert all(row.status == "passed" for row in case._accelerations("twin", cut(twin(), "body")))
+    assert all(row.status == "passed" for row in case._acceleration_rows("twin", cut(twin(), "body")))
 
 
 @pytest.mark.grounds("plain counterpart")

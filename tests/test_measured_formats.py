@@ -54,7 +54,7 @@ def test_a_value_that_is_off_by_one_bit_is_seen_by_the_case(tmp_path, monkeypatc
             yield block
 
     monkeypatch.setattr(OpenFile, "_checked", off)
-    rows, _ = case.round_trip(tmp_path / "trip.mf4", ".mf4")
+    rows, _ = case.round_trip_rows(tmp_path / "trip.mf4", ".mf4")
     assert [row.id for row in rows if row.status == "failed"] == ["measured_formats.mf4.values"]
 
 

@@ -39,7 +39,7 @@ def test_the_quick_share_passes(tmp_path):
 def whole(tmp_path_factory):
     """A short run in one piece."""
     folder = tmp_path_factory.mktemp("whole")
-    own = run_of(folder, SECONDS, case.REPEATED)
+    own = run_of(folder, SECONDS, case.PATTERN_SECONDS)
     return own, run(own, folder / "run"), answers_of(folder)
 
 
@@ -164,7 +164,7 @@ def test_rows_are_linear_between_samples_and_gyros_become_rates_of_angles(whole)
         assert StepGrid(step, 1e-3).rows(values, count) == pytest.approx(expected, abs=1e-12)
     with pytest.raises(InputError, match="part or a multiple"):
         StepGrid(3e-4, 1e-3).check()
-    signals, true = repeated_pattern(case.REPEATED)
+    signals, true = repeated_pattern(case.PATTERN_SECONDS)
     names = [signal.name for signal in signals]
     angles = true[:, [names.index("roll"), names.index("pitch")]]
     made = np.cumsum(Inputs(own.recording, own.vehicle).tilt(0, 201)[:, 2:], axis=0)

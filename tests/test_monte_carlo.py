@@ -10,13 +10,13 @@ from models.ride.monte_carlo import LEGENDRE_MODES, _Cells, at_constant_speed, p
 from models.ride.road_in_path import at_speed
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import varying_speed
-from validation.cases.ride_varying_speed import ride
+from validation.cases.ride_varying_speed import vehicle_and_road
 
 SEED = 3
 
 
 def test_both_axles_answer_to_a_cell_with_their_joint_covariance():
-    vehicle, road = ride("half_car")
+    vehicle, road = vehicle_and_road("half_car")
     cells = _Cells(vehicle, road, None, 6.0)
     front, rear = cells.length / 6.0, cells.length / 9.0  # the rear axle comes by faster
     first, second = (cells._cell_transition(duration)[1] for duration in (front, rear))
@@ -42,7 +42,7 @@ def test_a_cell_fits_all_distances():
 
 
 def test_copies_along_a_drive_agree_with_the_covariance():
-    vehicle, road = ride("half_car")
+    vehicle, road = vehicle_and_road("half_car")
     brake = SpeedProfile((0.0, 1.0), (16.0, 8.0))
     found = variances_along_drive(vehicle, road, brake, (0.5, 0.9), copies=1000, seed=SEED)
     exact = varying_speed(vehicle, road, brake, instants=found.time).at(found.time)
@@ -54,7 +54,7 @@ def test_copies_along_a_drive_agree_with_the_covariance():
 
 @pytest.mark.parametrize("case", ["delayed", "uncorrelated"])
 def test_copies_at_constant_speed_agree_with_the_covariance(case):
-    vehicle, road = ride("half_car")
+    vehicle, road = vehicle_and_road("half_car")
     road = road if case == "delayed" else type(road)(road.F, road.G, road.heights, road.lengths, independent=True)
     found = at_constant_speed(vehicle, road, 15.0, 6.0, copies=512, seed=SEED)
     exact = stationary_covariance(at_speed(vehicle, road, 15.0))
@@ -63,7 +63,7 @@ def test_copies_at_constant_speed_agree_with_the_covariance(case):
 
 
 def test_outputs_with_white_noise_have_no_variance_and_no_z():
-    found = at_constant_speed(*ride("half_car", 100.0), 15.0, 0.1, copies=16, seed=SEED)
+    found = at_constant_speed(*vehicle_and_road("half_car", 100.0), 15.0, 0.1, copies=16, seed=SEED)
     force = found.names.index("tyre force front left")
     assert np.isinf(found.variance[0, force])
     assert np.isnan(found.z(np.full((1, len(found.names)), np.inf))[0, force])
@@ -71,4 +71,4 @@ def test_outputs_with_white_noise_have_no_variance_and_no_z():
 
 def test_a_standstill_is_refused():
     with pytest.raises(InputError, match="steps along the road"):
-        variances_along_drive(*ride("half_car"), SpeedProfile((0.0, 1.0), (3.0, 0.0)), (0.5,))
+        variances_along_drive(*vehicle_and_road("half_car"), SpeedProfile((0.0, 1.0), (3.0, 0.0)), (0.5,))

@@ -55,7 +55,7 @@ def refusing(monkeypatch):
 
     def judge(number, engines):
         asked.append(number)
-        if number < 2 * case.STRIDE:
+        if number < 2 * case.REDRAW_STRIDE:
             raise InputError("--tolerance", "", 1e-9, "is finer than can be known")
         return [GOOD]
 
@@ -65,15 +65,15 @@ def refusing(monkeypatch):
 
 
 def test_a_refused_scene_is_drawn_anew_and_told(refusing, tmp_path):
-    found, refused = case.judged("pitch-plane", 5, tmp_path)
+    found, refused = case.scene_verdicts("pitch-plane", 5, tmp_path)
     assert found == [GOOD] and refusing == [5, 1005, 2005]
     assert [one.split(":")[0] for one in refused] == ["pitch-plane 5", "pitch-plane 1005"]
 
 
 def test_one_that_is_refused_again_and_again_is_not_held(refusing, tmp_path, monkeypatch):
     monkeypatch.setattr(case, "REDRAWS", 1)
-    found, refused = case.judged("pitch-plane", 5, tmp_path)
-    rows = {row.id: row for row in case._rows([found, *[[GOOD]] * 9], refused)}
+    found, refused = case.scene_verdicts("pitch-plane", 5, tmp_path)
+    rows = {row.id: row for row in case._promise_rows([found, *[[GOOD]] * 9], refused)}
     assert found == [] and rows["recommendation.met"].value == 0.9
     assert rows["recommendation.met"].status == rows["recommendation.refused"].status == "failed"  # 2 of 10
 
@@ -89,13 +89,13 @@ def test_one_that_is_refused_again_and_again_is_not_held(refusing, tmp_path, mon
 )
 def test_every_promise_that_is_broken_fails_its_row(row, change):
     good, bad = (
-        {one.id: one.status for one in case._rows([[own]] * 10, [])} for own in (GOOD, replace(GOOD, **change))
+        {one.id: one.status for one in case._promise_rows([[own]] * 10, [])} for own in (GOOD, replace(GOOD, **change))
     )
     assert good[f"recommendation.{row}"] == "passed" and bad[f"recommendation.{row}"] == "failed"
 
 
 def test_a_recommendation_that_is_slow_by_the_clock_misses_an_aim_and_fails_no_row():
-    bad = {row.id: row.status for row in case._rows([[replace(GOOD, slower=True, kind="seconds")]] * 10, [])}
+    bad = {row.id: row.status for row in case._promise_rows([[replace(GOOD, slower=True, kind="seconds")]] * 10, [])}
     assert bad.pop("recommendation.slower.seconds") == "missed" and "failed" not in bad.values()
 
 

@@ -11,7 +11,7 @@ from models.contact.normal_problem import PressureGrid, centres, hertzian, solve
 from models.contact.rolling_operator import SlipOperator
 from models.contact.rolling_problem import TOLERANCE, rigid_slip, solve_rolling, solve_shift
 from models.core.errors import InputError, RunFailed
-from validation.cases.contact_exact import CASES, carter, measure, roll
+from validation.cases.contact_exact import CASES, carter, measure, rolling_forces
 
 PAIR, LOAD, A, B, MU = MaterialPair(), 8e4, 6e-3, 4e-3, 0.3
 PRESSED = hertzian(A, B, LOAD, 16)
@@ -53,10 +53,10 @@ def test_every_condition_holds_by_a_plain_sum():
 @pytest.mark.parametrize("name", CASES)
 def test_laws_of_every_mixture(name):
     """On few cells: at most mu N, power taken from the motion, the opposite of it reversed."""
-    force = roll(name, 12)
+    force = rolling_forces(name, 12)
     assert np.hypot(force[0], force[1]) <= 1 + 1e-12
     assert force @ CASES[name][1:] < 0
-    assert roll(name, 12, -1.0) == pytest.approx(-force, abs=1e-7)
+    assert rolling_forces(name, 12, -1.0) == pytest.approx(-force, abs=1e-7)
 
 
 def test_slow_creepage_is_the_linear_theory():

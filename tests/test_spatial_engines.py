@@ -13,7 +13,15 @@ from models.engines.spatial_protocol import INTEGRATORS, METHODS, at_speeds, bui
 from models.engines.spatial_reference import SpatialReference
 from models.vehicles.spatial import AntiRollBar, Body, SpatialVehicle, SpringDamper, TurnOutput, Tyre
 from models.vehicles.spatial_linear import linearise
-from validation.cases.ride_engines import GRAVITY, SPEED, curved, difference, of_name, random_state, relative
+from validation.cases.ride_engines import (
+    GRAVITY,
+    SPEED,
+    matrix_difference,
+    random_state,
+    relative_difference,
+    vehicle_of_name,
+    with_nonlinear_springs,
+)
 
 ENGINES = ("exudyn", "mujoco")
 
@@ -26,32 +34,32 @@ def settings(engine, duration=0.02, step=1e-3):
 @pytest.mark.parametrize(("name", "gravity"), [("r19_ride", 0.0), ("spatial twin", GRAVITY)])
 def test_linear_vehicle_is_the_analytic_one(engine, name, gravity):
     """1e-11: a factor of 7 above what MuJoCo's differences leave of a force of 1 N beside preloads of 5 kN."""
-    vehicle = of_name(name, gravity)
+    vehicle = vehicle_of_name(name, gravity)
     found = build(engine, vehicle, speed=SPEED).linearise()
-    assert difference(found, linearise(vehicle, SPEED)) < 1e-11
+    assert matrix_difference(found, linearise(vehicle, SPEED)) < 1e-11
     assert found.source == f"{engine}, " + ("loaded" if gravity else "unloaded")
 
 
 @pytest.mark.parametrize("speed", [0.5, 30.0, 70.0])
 def test_three_linearisations_give_every_speed(speed):
     """Within and beyond the three speeds; 1e-11 of the largest damping as above."""
-    vehicle = of_name("r19_free")
+    vehicle = vehicle_of_name("r19_free")
     at = at_speeds("mujoco", vehicle)
-    assert difference(at(speed), linearise(vehicle, speed)) < 1e-11
+    assert matrix_difference(at(speed), linearise(vehicle, speed)) < 1e-11
     with pytest.raises(InputError, match="above 0"):
         at(0.0)
 
 
 def test_curves_are_linearised_by_their_mean_slope_at_rest():
     """Short steps keep 1e-11; a one-sided slope would miss by (1786 - 700 / 0.1) / max D, over 1e-2."""
-    vehicle = curved(of_name("quarter_car", GRAVITY))
+    vehicle = with_nonlinear_springs(vehicle_of_name("quarter_car", GRAVITY))
     for engine in ENGINES:
-        assert difference(build(engine, vehicle).linearise(), linearise(vehicle)) < 1e-9
+        assert matrix_difference(build(engine, vehicle).linearise(), linearise(vehicle)) < 1e-9
 
 
 def test_accelerations_agree_with_the_equations_by_hand():
     """Large random motion of the vehicle that no symmetry helps, curves, gravity, road: rounding only."""
-    vehicle = curved(of_name("spatial twin", GRAVITY))
+    vehicle = with_nonlinear_springs(vehicle_of_name("spatial twin", GRAVITY))
     exudyn, mujoco_, reference = (
         *(build(engine, vehicle, speed=SPEED) for engine in ENGINES),
         SpatialReference(vehicle, SPEED),
@@ -59,8 +67,8 @@ def test_accelerations_agree_with_the_equations_by_hand():
     for path in range(5):
         state = random_state(vehicle, path)
         expected = reference.acceleration(0.0, *state)
-        assert relative(exudyn.acceleration(0.0, *state), expected) < 1e-12
-        assert relative(mujoco_.acceleration(0.0, *state), expected) < 1e-12
+        assert relative_difference(exudyn.acceleration(0.0, *state), expected) < 1e-12
+        assert relative_difference(mujoco_.acceleration(0.0, *state), expected) < 1e-12
 
 
 def test_a_wheel_that_only_slides_is_linearised_wherever_its_spring_and_its_tyre_are():
@@ -78,7 +86,7 @@ def test_a_wheel_that_only_slides_is_linearised_wherever_its_spring_and_its_tyre
     for outputs in ((), (turning,)):
         vehicle = SpatialVehicle("odd", (roller, wheel), springs, (tyre,), (0.0,), (bar,), outputs=outputs)
         for engine in ENGINES:
-            assert difference(build(engine, vehicle).linearise(), linearise(vehicle)) < 1e-9
+            assert matrix_difference(build(engine, vehicle).linearise(), linearise(vehicle)) < 1e-9
 
 
 def test_equations_by_hand_keep_energy():
@@ -86,7 +94,7 @@ def test_equations_by_hand_keep_energy():
 
     The power is measured along the motion itself, d/dt (T + U) by differences of order six: 1e-9 of its parts.
     """
-    plain = of_name("spatial twin", GRAVITY)
+    plain = vehicle_of_name("spatial twin", GRAVITY)
     vehicle = replace(
         plain,
         side_forces=(),
@@ -121,7 +129,7 @@ def test_equations_by_hand_keep_energy():
 
 def test_paths_agree():
     """R19-ride with curves under gravity on a random road from a random start: 20 steps of the same tableau."""
-    vehicle = curved(of_name("r19_ride", GRAVITY))
+    vehicle = with_nonlinear_springs(vehicle_of_name("r19_ride", GRAVITY))
     road = 1e-4 * np.cumsum(np.ones((41, 8)), axis=0)
     exudyn, other = (
         build(engine, vehicle, settings(engine), None, road).run(*random_state(vehicle, 1)[:2]) for engine in ENGINES
@@ -158,13 +166,13 @@ def test_road_is_read_at_half_steps(engine):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_design_position_is_an_equilibrium(engine):
-    vehicle = of_name("spatial twin", GRAVITY)
+    vehicle = vehicle_of_name("spatial twin", GRAVITY)
     zero = np.zeros(len(vehicle.coordinates()))
     assert np.abs(build(engine, vehicle, speed=SPEED).acceleration(0.0, zero, zero)).max() < 1e-10
 
 
 def test_no_curve_code_without_curves():
-    plain, bent = of_name("r19_ride"), curved(of_name("r19_ride"))
+    plain, bent = vehicle_of_name("r19_ride"), with_nonlinear_springs(vehicle_of_name("r19_ride"))
     of_plain, of_bent = (build("exudyn", vehicle).plan() for vehicle in (plain, bent))
     assert of_plain["curves"] == 0
     # four springs with two curves and a friction each, one function for each spring
@@ -174,7 +182,7 @@ def test_no_curve_code_without_curves():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_would_be_wrong_is_refused(engine):
-    vehicle = of_name("quarter_car")
+    vehicle = vehicle_of_name("quarter_car")
     with pytest.raises(Refused, match="lets a mode of the vehicle grow; use at most"):
         build(engine, vehicle, settings(engine, 2.0, 0.1))
     with pytest.raises(Refused, match="does not divide"):
@@ -188,13 +196,13 @@ def test_what_would_be_wrong_is_refused(engine):
     with pytest.raises(Refused, match="needs settings"):
         build(engine, vehicle, None, None, np.zeros((41, 2)))
     with pytest.raises(InputError, match="needs a speed above 0"):
-        build(engine, of_name("r19_free"))
+        build(engine, vehicle_of_name("r19_free"))
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_every_method_is_of_its_order(engine):
     """A quarter car let go: halving the step divides the error beside RK4 at 0.25 ms by about 2^order."""
-    vehicle, start, rates = of_name("quarter_car"), np.array([0.02, 0.0]), np.array([0.0, 0.3])
+    vehicle, start, rates = vehicle_of_name("quarter_car"), np.array([0.02, 0.0]), np.array([0.0, 0.3])
 
     def end(method, step):
         return build(engine, vehicle, Settings(method, step, 0.2)).run(start, rates).positions[-1]
@@ -207,17 +215,17 @@ def test_every_method_is_of_its_order(engine):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_failed_runs_raise(engine):
-    model, n = build(engine, of_name("quarter_car"), settings(engine)), 2
+    model, n = build(engine, vehicle_of_name("quarter_car"), settings(engine)), 2
     for start in (1e6, np.nan):
         with pytest.raises(RunFailed):
             model.run(np.full(n, start), np.zeros(n))
     model.run(np.zeros(n), np.zeros(n))  # and leave no trace
     with pytest.raises(RunFailed, match="without settings"):
-        build(engine, of_name("quarter_car")).run(np.zeros(n), np.zeros(n))
+        build(engine, vehicle_of_name("quarter_car")).run(np.zeros(n), np.zeros(n))
 
 
 def test_other_callback_is_not_overruled():
-    model = build("mujoco", of_name("quarter_car"))
+    model = build("mujoco", vehicle_of_name("quarter_car"))
     mujoco.set_mjcb_passive(lambda model, data: None)
     try:
         with pytest.raises(RunFailed, match="another callback"):
@@ -229,7 +237,7 @@ def test_other_callback_is_not_overruled():
 @pytest.mark.parametrize("engine", ENGINES)
 def test_answers_do_not_depend_on_what_was_asked_before(engine):
     """A linearisation and a state on a road in between leave a run what it was, to the bit."""
-    vehicle = of_name("quarter_car", GRAVITY)
+    vehicle = vehicle_of_name("quarter_car", GRAVITY)
     road = 0.01 * np.ones((41, 2))
     model = build(engine, vehicle, settings(engine), None, road)
     start = random_state(vehicle, 2)
@@ -249,4 +257,4 @@ def test_body_may_bear_any_name():
         (0.0,),
     )
     for engine in ENGINES:
-        assert difference(build(engine, vehicle).linearise(), linearise(vehicle)) < 1e-12
+        assert matrix_difference(build(engine, vehicle).linearise(), linearise(vehicle)) < 1e-12

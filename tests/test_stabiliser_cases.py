@@ -59,13 +59,13 @@ def test_the_balance_sees_a_force_without_its_sign(monkeypatch):
 
 
 def test_a_missing_projection_fails_its_row(monkeypatch, tmp_path):
-    monkeypatch.setattr(index_case.IndexOne, "_back", lambda self, y, u: y)
+    monkeypatch.setattr(index_case.IndexOne, "_projection", lambda self, y, u: y)
     assert failed(index_case, tmp_path) == {"index_reduction.none.index_1.projection"}
 
 
 def test_a_wrong_multiplier_column_fails_every_law_at_index_1(monkeypatch, tmp_path):
     """The constraint on heave instead of pitch: nothing at index 1 follows any more."""
-    monkeypatch.setattr(index_case, "DIRECTION", np.array([[0.0, 0.0, 1.0, 0.0]]))
+    monkeypatch.setattr(index_case, "CONSTRAINT_JACOBIAN", np.array([[0.0, 0.0, 1.0, 0.0]]))
     assert {"index_reduction.law.index_1", "index_reduction.law.index_1.Baumgarte"} <= failed(index_case, tmp_path)
 
 

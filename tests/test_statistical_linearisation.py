@@ -26,7 +26,7 @@ from models.systems.ride.nonlinear import drive_over_road
 from models.vehicles.spatial import Curve
 from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
-from validation.cases.ride_nonlinear import expected
+from validation.cases.ride_nonlinear import normal_expectation
 from validation.ride.in_engines import NONLINEAR_VEHICLE, vehicle_and_road
 
 SPEED = 20.0
@@ -50,14 +50,16 @@ def test_moments_of_a_curve_are_their_integrals(mean, deviation):
     curve = Curve((-1.0, -0.2, 0.0, 0.3, 2.0), (-500.0, -300.0, 0.0, 60.0, 90.0))
     cuts = [(x - mean) / deviation for x in curve.arguments[1:-1]]
     force, gain = of_curve(curve, mean, deviation)
-    assert force == pytest.approx(expected(lambda x: curve(mean + deviation * x), cuts), rel=1e-9)
-    assert gain == pytest.approx(expected(lambda x: curve(mean + deviation * x) * x, cuts) / deviation, rel=1e-9)
+    assert force == pytest.approx(normal_expectation(lambda x: curve(mean + deviation * x), cuts), rel=1e-9)
+    assert gain == pytest.approx(
+        normal_expectation(lambda x: curve(mean + deviation * x) * x, cuts) / deviation, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("ratio", [0.05, 1.0, 300.0])
 def test_gain_of_friction_is_its_integral(ratio):
     """Deviations of the rate from far below that of friction, where it is a damper, to far above, Coulomb's law."""
-    gain = expected(lambda x: np.tanh(ratio * x) * x, (-1.0 / ratio, 0.0, 1.0 / ratio)) / ratio
+    gain = normal_expectation(lambda x: np.tanh(ratio * x) * x, (-1.0 / ratio, 0.0, 1.0 / ratio)) / ratio
     assert of_friction(40.0, 0.01, 0.01 * ratio) == pytest.approx(4000.0 * gain, rel=1e-9)
 
 

@@ -250,7 +250,7 @@ def sample(ratio, share=1e-3, cost=0.5, told=True):
 
 def rows_of(*drawn):
     found = [stated_errors._sample_as_table("ride", one) for one in drawn]
-    return {row.id.removeprefix("stated_errors."): row for row in stated_errors._rows(found, False)}
+    return {row.id.removeprefix("stated_errors."): row for row in stated_errors._common_rows(found, False)}
 
 
 def test_stated_errors_are_judged_by_the_bounds_that_are_asked():
@@ -270,8 +270,8 @@ def test_all_systems_that_have_samples_are_found_and_shown(monkeypatch, tmp_path
     modules = {"ride": "validation.stated_errors.systems.ride"}
     fake = type("Fake", (), {"samples": staticmethod(lambda count, seed: drawn[modules["ride"]][:count])})
     monkeypatch.setattr(stated_errors, "import_module", lambda name: fake)
-    monkeypatch.setattr(stated_errors, "SYSTEMS", modules)
-    monkeypatch.setattr(stated_errors, "QUICK_SAMPLES", {"ride": 3})
+    monkeypatch.setattr(stated_errors, "SAMPLE_MODULES", modules)
+    monkeypatch.setattr(stated_errors, "QUICK_SAMPLE_COUNTS", {"ride": 3})
     rows, data = stated_errors.measure(True, tmp_path)
     assert {row.id for row in rows} >= {"stated_errors.silent", "stated_errors.ride.near", "stated_errors.cost"}
     saved = json.loads(json.dumps(data))

@@ -13,7 +13,7 @@ from models.ride.varying_speed import quasi_stationary, varying_speed
 from models.road.two_track import CORRELATION_CASES, half_track, road_excitation, road_of_level
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.cases.ride_varying_speed import STOP_AND_GO, by_adjoint, ride
+from validation.cases.ride_varying_speed import STOP_AND_GO, by_adjoint, vehicle_and_road
 
 STOPS = SpeedProfile((0.0, 0.2, 1.2, 2.2, 8.0), (0.0, 0.0, 20.0, 0.0, 0.0))
 
@@ -43,14 +43,14 @@ def test_at_an_even_speed_every_instant_is_stationary(case):
 
 @pytest.mark.parametrize("damping", [0.0, 500.0])
 def test_a_stop_between_the_axles_agrees_with_the_adjoint(damping):
-    vehicle, road = ride("half_car", damping)
+    vehicle, road = vehicle_and_road("half_car", damping)
     found = varying_speed(vehicle, road, STOP_AND_GO).of("body rear")[-1]
     # 1e-8: the adjoint's solver at 1e-10; without its stop the drive would give another 10 %
     assert found == pytest.approx(by_adjoint(vehicle, road, STOP_AND_GO, "body rear"), rel=1e-8)
 
 
 def test_three_axles_at_distances_without_a_common_measure_agree_with_the_adjoint():
-    vehicle, road = ride("three_axle_truck")
+    vehicle, road = vehicle_and_road("three_axle_truck")
     odd = replace(road, lengths=(0.0, 0.5, 0.5 * 2.0**0.5))
     brake = SpeedProfile((0.0, 0.4), (9.0, 5.0))
     found = varying_speed(vehicle, odd, brake).of("travel second rear left")[-1]
@@ -58,7 +58,7 @@ def test_three_axles_at_distances_without_a_common_measure_agree_with_the_adjoin
 
 
 def test_the_road_keeps_its_variance_and_the_vehicle_comes_to_rest():
-    vehicle, road = ride("seven_freedoms")
+    vehicle, road = vehicle_and_road("seven_freedoms")
     found = varying_speed(vehicle, road, STOPS)
     assert found.height == pytest.approx(np.tile(found.height[0], (len(found.time), 1)), rel=1e-12)
     rest = quasi_stationary(vehicle, road, np.array([0.0]))[0]
@@ -72,7 +72,7 @@ def test_the_road_keeps_its_variance_and_the_vehicle_comes_to_rest():
 
 
 def test_the_road_is_cut_where_an_axle_passes_the_place_of_a_stop():
-    vehicle, road = ride("half_car")
+    vehicle, road = vehicle_and_road("half_car")
     halt = SpeedProfile((0.0, 0.3, 0.8, 1.3), (10.0, 0.0, 0.0, 15.0))  # the rear axle is there at 1.2 s
     coarse, fine = (
         varying_speed(vehicle, road, halt, instants=(1.25,), largest_rate_times_step=reach) for reach in (1.0, 0.2)
@@ -82,27 +82,27 @@ def test_the_road_is_cut_where_an_axle_passes_the_place_of_a_stop():
 
 
 def test_a_road_of_second_order_shows_its_rate_to_the_tyre():
-    vehicle, road = ride("half_car", 500.0, 10.0)
+    vehicle, road = vehicle_and_road("half_car", 500.0, 10.0)
     found = varying_speed(vehicle, road, STOP_AND_GO).of("tyre force rear left")[-1]
     assert found == pytest.approx(by_adjoint(vehicle, road, STOP_AND_GO, "tyre force rear left"), rel=1e-8)
 
 
 def test_white_noise_is_off_at_standstill():
-    found = varying_speed(*ride("half_car", 100.0), STOPS)
+    found = varying_speed(*vehicle_and_road("half_car", 100.0), STOPS)
     force = found.of("tyre force front left")
     assert np.array_equal(np.isinf(force), found.speed > 0.0)
     assert np.isfinite(found.of("body rear")).all()
 
 
 def test_weighted_outputs_run_along():
-    vehicle, road = ride("half_car", 100.0)
+    vehicle, road = vehicle_and_road("half_car", 100.0)
     found = varying_speed(vehicle, road, SpeedProfile((0.0, 0.1), (15.0, 15.0)), weightings={"body centre": "Wk"})
     exact = stationary_covariance(at_speed(vehicle, road, 15.0, {"body centre": "Wk"}))
     assert found.of("body centre Wk")[-1] == pytest.approx(exact.deviation[-1], rel=1e-10)
 
 
 def test_what_cannot_be_driven_is_refused():
-    vehicle, road = ride("half_car")
+    vehicle, road = vehicle_and_road("half_car")
     with pytest.raises(InputError, match=r"drive\.speed\.1 = -1\.0: must be 0 or above"):
         SpeedProfile((0.0, 1.0), (3.0, -1.0))
     with pytest.raises(InputError, match=r"drive\.time\.2 = 1\.0: must rise"):

@@ -1,4 +1,5 @@
-"""Validation cases, a module each: the compared values, the expected ones, the tolerance and its reason.
+"""Validation cases, one module for each: the compared quantities, the expected values, the tolerances and their
+reasons.
 
 A case module holds
 

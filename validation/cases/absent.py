@@ -1,4 +1,5 @@
-"""An effect that a scene does not name is not there; one that it names adds what it says."""
+"""Effects that a scene does not name cost no computation; effects that it names change the model's numbers of
+components exactly as they declare."""
 
 import tempfile
 from collections.abc import Sequence
@@ -33,32 +34,36 @@ SYSTEM: System = "effects"
 ENGINES = ("reference", "exudyn", "mujoco")
 STEP = 1e-3
 START_MOTION = {"pitch": 0.1, "z3": -0.1}
-"""m, rad: the vehicle moves, so that nothing is compared at rest."""
+"""Initial pitch (rad) and heave displacement (m); the vehicle moves, so that nothing is compared at rest."""
 
-FORCES = {"wheel_forces": {"file": "forces.csv", "interpolation": "held"}}
-GUIDED = {"integrator": "GeneralizedAlpha"}
-"""The one integrator of Exudyn that solves for a prescribed pitch; its neighbour without one takes it, too."""
+FORCE_EFFECT = {"wheel_forces": {"file": "forces.csv", "interpolation": "held"}}
+"""Scene table of the effect that applies sampled wheel forces from a file."""
+PRESCRIBED_SETTINGS = {"integrator": "GeneralizedAlpha"}
+"""Exudyn settings for a scene with a prescribed pitch: only this integrator solves for the prescribed pitch. The scene
+without the effect uses the same settings."""
 
 EFFECTS = names_of(DEFAULT_SYSTEM)
+"""Names of all effects of the pitch-plane vehicle."""
 
 
-def added_to(effect: str) -> dict[str, Any]:
-    """Tables of the effects that an effect needs."""
+def required_effects(effect: str) -> dict[str, Any]:
+    """Scene tables of the effects without which an effect cannot be used."""
     module = module_of(DEFAULT_SYSTEM, effect)
     return {name: module_of(DEFAULT_SYSTEM, name).EXAMPLE for name in module.NEEDS} | module.BESIDE
 
 
-def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = False) -> Scene:
-    """Scene: the asymmetric vehicle with some effects, released from a tilted position."""
-    start = {} if guided else START_MOTION
+def scene(effects: dict[str, Any], step_count: int, folder: Path, prescribed: bool = False) -> Scene:
+    """Scene of the asymmetric vehicle with the given effects, released from a tilted position unless its pitch is
+    prescribed."""
+    start = {} if prescribed else START_MOTION
     return build_scene(
         {
             "title": TITLE,
             "vehicle": {"parameters": "asymmetric_twin"},
-            "run": {"duration": steps * STEP, "step": STEP},
+            "run": {"duration": step_count * STEP, "step": STEP},
             "start": start,
             "effects": effects,
-            "engines": {"exudyn": GUIDED} if guided else {},
+            "engines": {"exudyn": PRESCRIBED_SETTINGS} if prescribed else {},
         },
         "absent",
         folder,
@@ -66,7 +71,8 @@ def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = Fals
 
 
 def write_files(folder: Path) -> None:
-    """Write files with two seconds of wheel forces and of pitch, both of which start smoothly."""
+    """Write CSV files with two seconds of wheel forces, of pitch, and of heave and pitch, all of which start
+    smoothly."""
     t = STEP * np.arange(2001)
     wave = np.sin(np.pi * t) ** 2
     write_time_series(folder / "forces.csv", {"front": ("N", 4e3 + 300 * wave), "rear": ("N", 3e3 - 200 * wave)}, STEP)
@@ -75,55 +81,62 @@ def write_files(folder: Path) -> None:
     write_time_series(folder / "motion.csv", {"z3": ("m", 0.06 + 0.01 * wave), **pitch}, STEP)
 
 
-def model(bare: Scene, engine: str) -> Model:
-    """An engine's model of a scene."""
-    return build(engine, assembly_of_scene(bare), settings_of(bare, engine))
+def model(simulated_scene: Scene, engine: str) -> Model:
+    """Model of a scene in one engine."""
+    return build(engine, assembly_of_scene(simulated_scene), settings_of(simulated_scene, engine))
 
 
-def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
-    """Two scenes that differ by one effect: without it and with it."""
-    base, guided, module = added_to(effect), effect.startswith("prescribed"), module_of(DEFAULT_SYSTEM, effect)
-    less = scene(base, steps, folder, guided)
+def scenes_without_and_with(effect: str, step_count: int, folder: Path) -> tuple[Scene, Scene]:
+    """Two scenes that differ by one effect: the first without the effect, the second with the effect."""
+    needed, prescribed, module = (
+        required_effects(effect),
+        effect.startswith("prescribed"),
+        module_of(DEFAULT_SYSTEM, effect),
+    )
+    scene_below = scene(needed, step_count, folder, prescribed)
     if hasattr(module, "leave_out"):  # the vehicle has it unless the scene says otherwise
-        return scene_without(less, effect), less
-    return less, scene({**base, effect: module.EXAMPLE}, steps, folder, guided)
+        return scene_without(scene_below, effect), scene_below
+    return scene_below, scene({**needed, effect: module.EXAMPLE}, step_count, folder, prescribed)
 
 
-def counts_of_scene(bare: Scene, engine: str) -> dict[str, int]:
+def counts_of_scene(simulated_scene: Scene, engine: str) -> dict[str, int]:
     """Numbers of components in an engine's model of a scene, and of the channels that are saved."""
-    return {**model(bare, engine).plan(), "channels": len(run(bare, engine).data.data_vars)}
+    return {**model(simulated_scene, engine).plan(), "channels": len(run(simulated_scene, engine).data.data_vars)}
 
 
-def change(effect: str, engine: str, folder: Path) -> dict[str, int]:
-    """Counts that an effect changes in an engine, each with its change."""
-    before, after = (counts_of_scene(bare, engine) for bare in pair(effect, 20, folder))
+def count_changes(effect: str, engine: str, folder: Path) -> dict[str, int]:
+    """Changes of the numbers of components in an engine's model when an effect is added; unchanged numbers are left
+    out."""
+    before, after = (counts_of_scene(bare, engine) for bare in scenes_without_and_with(effect, 20, folder))
     return {key: after[key] - before[key] for key in after if after[key] != before[key]}
 
 
-def declared(effect: str, engine: str) -> dict[str, int]:
-    """Changes of the counts that the effect's file declares for an engine."""
+def declared_changes(effect: str, engine: str) -> dict[str, int]:
+    """Changes of the numbers of components in an engine's model that an effect declares in its COUNTS; zero changes are
+    left out."""
     table = module_of(DEFAULT_SYSTEM, effect).COUNTS
     return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
 
 
 @allowing_breaches("what is computed is what is counted, whatever the vehicle does meanwhile")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """All counts of absence, with a positive control of every effect; a quick run has each control in one engine,
-    those of the vehicle in turn and of other systems every third, and one process that looks for what is imported.
-    """
+    """Rows: an effect that a scene does not name adds no computation, and an effect that it names changes the declared
+    numbers of components. A quick run tests each effect of the vehicle in one engine (the engines take turns), every
+    third effect of other systems, and the imports of one process."""
     with tempfile.TemporaryDirectory() as name:
         files_folder = Path(name)
         write_files(files_folder)
-        rows = [*_imports(), *(row for engine in ENGINES for row in _absence(engine, files_folder))]
+        rows = [*_import_rows(), *(row for engine in ENGINES for row in _absence_rows(engine, files_folder))]
         rows += [
-            _control(effect, files_folder, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
+            _positive_control_row(effect, files_folder, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
             for i, effect in enumerate(EFFECTS)
         ]
     return rows + ride.rows(quick) + wheelset.rows() + machinery.rows() + of_systems.rows(quick), {}
 
 
-def _imports() -> list[Row]:
-    """Modules imported and kernels compiled in a fresh process that ran a bare scene in all engines."""
+def _import_rows() -> list[Row]:
+    """Rows: number of effect modules imported, and of kernels compiled, by a fresh process that ran a scene without
+    effects in all engines."""
     probed = probe({"title": TITLE, "run": {"duration": 20 * STEP, "step": STEP}, "start": START_MOTION})
     foreign = [name for name in probed["modules"] if belongs_to_effects(name)]
     why = "a fresh process ran a scene without effects in all engines; counted in its list of modules"
@@ -142,9 +155,9 @@ def _imports() -> list[Row]:
     ]
 
 
-def _absence(engine: str, folder: Path) -> list[Row]:
-    """Rows: Python frames, memory and callbacks that a bare scene's march needs in 1,980 more steps; they must be
-    none."""
+def _absence_rows(engine: str, folder: Path) -> list[Row]:
+    """Rows: Python function calls, memory and callbacks that 1,980 more steps of a scene without effects need. All must
+    be zero."""
     for bare in (scene({}, steps, folder) for steps in (20, 20)):  # wrappers cache on their first calls
         march(engine, model(bare, engine))
     short, long = (leanest_march(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
@@ -173,25 +186,28 @@ def _absence(engine: str, folder: Path) -> list[Row]:
     ]
 
 
-def _control(effect: str, folder: Path, engines: Sequence[str] = ENGINES) -> Row:
-    """Rows of positive controls: each effect changes the counts of every engine by exactly what it declares."""
-    changed = {engine: change(effect, engine, folder) for engine in engines}
-    wanted = {engine: declared(effect, engine) for engine in engines}
+def _positive_control_row(effect: str, folder: Path, engines: Sequence[str] = ENGINES) -> Row:
+    """Row of a positive control: the effect changes the numbers of components in each engine's model exactly as it
+    declares."""
+    changed = {engine: count_changes(effect, engine, folder) for engine in engines}
+    wanted = {engine: declared_changes(effect, engine) for engine in engines}
     return behaviour_row(
         f"absent.present.{effect}",
         SYSTEM,
         f"counts that the effect {effect} adds to a bare scene",
-        _text(changed),
-        _text(wanted),
+        counts_text(changed),
+        counts_text(wanted),
         "positive control: the counts that are zero above do move, and by as much as they should",
     )
 
 
-def _text(table: dict[str, dict[str, int]]) -> str:
-    parts = [f"{engine} {changes(more)}" for engine, more in table.items() if more]
+def counts_text(changes_by_engine: dict[str, dict[str, int]]) -> str:
+    """Text that lists the numbers of components that an effect changes in each engine; "nothing" where it changes
+    none."""
+    parts = [f"{engine} {changes_text(more)}" for engine, more in changes_by_engine.items() if more]
     return "; ".join(parts) or "nothing"
 
 
-def changes(added_counts: dict[str, int]) -> str:
-    """Text of the counts that an effect changes."""
-    return ", ".join(f"{value:+d} {key}" for key, value in sorted(added_counts.items()))
+def changes_text(changes: dict[str, int]) -> str:
+    """Text that lists the signed change of each number of components that an effect changes."""
+    return ", ".join(f"{value:+d} {key}" for key, value in sorted(changes.items()))

@@ -1,4 +1,5 @@
-"""Build audit: accelerations at random states, before any trajectory."""
+"""Accelerations of Exudyn and MuJoCo at random states compared with the paper's equations, before any time
+simulation."""
 
 from pathlib import Path
 
@@ -10,37 +11,39 @@ from validation.common.rows import CaseAnswer, Observed, System
 
 TITLE = "Accelerations at 100 random states"
 SYSTEM: System = "pitch-plane"
-STATES = 100
+STATE_COUNT = 100
 
 
-def scene(parameters: str, geometry: str = "exact"):
-    """The scene of a vehicle on the study road, whose heights enter the comparison."""
+def scene(parameter_set_name: str, geometry: str = "exact"):
+    """Scene of a vehicle on the study road; the road makes its heights enter the comparison."""
     return build_scene(
         {
             "title": TITLE,
-            "vehicle": {"parameters": parameters, "geometry": geometry},
+            "vehicle": {"parameters": parameter_set_name, "geometry": geometry},
             "run": {"duration": 2.0, "step": 1e-3},
             "effects": {"road": {"source": "study", "speed": 20.0}},
         }
     )
 
 
-def difference(engine: str, parameters: str, geometry: str = "exact") -> float:
-    """Largest difference of an engine's accelerations from the reference over all states, divided by the largest
-    acceleration."""
-    audited = scene(parameters, geometry)
-    return acceleration_gap(checks.engine(engine), assembly_of_scene(audited), settings_of(audited, engine), STATES)
+def acceleration_difference(engine: str, parameter_set_name: str, geometry: str = "exact") -> float:
+    """Largest difference of an engine's accelerations from the reference's over all random states, divided by the
+    largest acceleration."""
+    audited = scene(parameter_set_name, geometry)
+    return acceleration_gap(
+        checks.engine(engine), assembly_of_scene(audited), settings_of(audited, engine), STATE_COUNT
+    )
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """A row per engine, vehicle and geometry, the same in quick."""
+    """Rows for each engine, vehicle and geometry; a quick run is the same."""
     rows = [
         Observed(
-            f"audit.{engine}.{parameters}.{geometry}",
+            f"audit.{engine}.{parameter_set_name}.{geometry}",
             SYSTEM,
             f"largest difference of the acceleration in {engine} from the paper's equations, "
-            f"{parameters}, {geometry} geometry",
-            difference(engine, parameters, geometry),
+            f"{parameter_set_name}, {geometry} geometry",
+            acceleration_difference(engine, parameter_set_name, geometry),
             "of the largest",
         ).at_most(
             1e-12,
@@ -48,7 +51,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             "handed over" if (engine, geometry) == ("exudyn", "linear") else "native",
         )
         for engine in ("exudyn", "mujoco")
-        for parameters in ("itwm_drift", "asymmetric_twin")
+        for parameter_set_name in ("itwm_drift", "asymmetric_twin")
         for geometry in ("exact", "linear")
     ]
     return rows, {}

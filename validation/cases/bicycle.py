@@ -1,4 +1,4 @@
-"""Whipple's bicycle: published figures, stiff tyres towards ideal rolling, energy, and a measured bicycle."""
+"""Whipple's bicycle: published figures, the limit of ideal rolling for stiff tyres, energy, and a measured bicycle."""
 
 import os
 from pathlib import Path
@@ -21,29 +21,31 @@ from validation.common.rows import Observed, Row, System, Table, not_run
 TITLE = "A bicycle: benchmark and measured"
 SYSTEM: System = "rolling-vehicle"
 ENGINES = ("exudyn", "mujoco")
-STIFFNESS = (4.0, 16.0, 64.0, 256.0)
+TYRE_STIFFNESS_FACTORS = (4.0, 16.0, 64.0, 256.0)
+"""Factors by which the tyres are stiffer than usual."""
 SPEED = 5.0
-"""m/s of the eigenvalues on tyres."""
-FEEDBACK = Control(gain=2.0)
-"""Of the measured bicycle."""
+"""Speed (m/s) at which eigenvalues of the bicycle on tyres are compared."""
+MEASURED_FEEDBACK = Control(gain=2.0)
+"""Feedback control of the measured bicycle."""
 LOWEST_JUDGED_SPEED = 2.0
-"""m/s from which on damping is judged with nothing fitted."""
-FAULT = 1.001
-"""Factor of a planted fault."""
+"""Lowest speed (m/s) at which the predicted weave damping, with nothing fitted, must meet the measured one."""
+TRAIL_FACTOR = 1.001
+"""Factor on the trail in the planted fault."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """All rows; quick: a run of half a second, no choice with a speed left out."""
+    """Rows: published figures, the limit of ideal rolling, energy, and the measured bicycle. A quick run simulates half
+    a second, and omits the predictions with one speed left out."""
     benchmark = load_bicycle("benchmark")
     rows = [*_published_rows(benchmark), *_fault_rows(benchmark)]
-    gaps = {engine: _gaps(benchmark, engine) for engine in ENGINES}
+    gaps = {engine: _eigenvalue_differences(benchmark, engine) for engine in ENGINES}
     rows += [*_limit_rows(gaps), *_energy_rows(0.5 if quick else 5.0)]
-    measured_rows, data = _measured(quick)
+    measured_rows, data = _measured_rows(quick)
     return [*rows, *measured_rows], {"gaps": {e: g.tolist() for e, g in gaps.items()}, "measured": data}
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Eigenvalues on stiffening tyres, and the measured bicycle where its recordings were there."""
+    """Tables of eigenvalues on tyres of rising stiffness, and of the measured bicycle if its recordings exist."""
     gaps = case_data["gaps"][ENGINES[0]]
     rows_of_tables = [
         Table(
@@ -51,8 +53,12 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
             f"Largest distance (1/s) of the benchmark's eigenvalues at {SPEED:g} m/s from those of ideal rolling.",
             ("stiffness", *ENGINES, "order"),
             tuple(
-                (f"{s:g}", *(f"{case_data['gaps'][e][i]:.3e}" for e in ENGINES), "" if i == 0 else _order(gaps, i))
-                for i, s in enumerate(STIFFNESS)
+                (
+                    f"{s:g}",
+                    *(f"{case_data['gaps'][e][i]:.3e}" for e in ENGINES),
+                    "" if i == 0 else _observed_order(gaps, i),
+                )
+                for i, s in enumerate(TYRE_STIFFNESS_FACTORS)
             ),
         )
     ]
@@ -69,8 +75,10 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     return rows_of_tables
 
 
-def _order(gaps: list[float], i: int) -> str:
-    return f"{np.log(gaps[i - 1] / gaps[i]) / np.log(STIFFNESS[i] / STIFFNESS[i - 1]):.3f}"
+def _observed_order(eigenvalue_gaps: list[float], i: int) -> str:
+    """Text of the order at which the eigenvalue differences fall from stiffness i - 1 to stiffness i."""
+    stiffer = TYRE_STIFFNESS_FACTORS[i] / TYRE_STIFFNESS_FACTORS[i - 1]
+    return f"{np.log(eigenvalue_gaps[i - 1] / eigenvalue_gaps[i]) / np.log(stiffer):.3f}"
 
 
 def _published_rows(bicycle: Whipple) -> list[Row]:
@@ -92,8 +100,9 @@ def _published_rows(bicycle: Whipple) -> list[Row]:
 
 
 def _fault_rows(bicycle: Whipple) -> list[Row]:
-    """Row: a trail that is 0.1 % longer must be told apart from the published bicycle."""
-    wrong = bicycle.changed(trail=FAULT * bicycle.trail)
+    """Row: a trail that is 0.1 % longer must change an eigenvalue by far more than the tolerance of the published
+    figures."""
+    wrong = bicycle.changed(trail=TRAIL_FACTOR * bicycle.trail)
     caught = float(np.abs(wrong.eigenvalues(SPEED) - PUBLISHED_EIGENVALUES[SPEED]).max())
     quantity = (
         "trail a thousandth longer: largest change of an eigenvalue by what the published figures allow (1e-12 1/s)"
@@ -102,20 +111,18 @@ def _fault_rows(bicycle: Whipple) -> list[Row]:
     return [seen.within(1e6, 1e-3, "a planted fault must be seen by far; counted up to a million", "closed form")]
 
 
-def _gaps(bicycle: Whipple, engine: str) -> np.ndarray:
-    """Largest distance (1/s) between the eigenvalues of the bicycle on tyres and with ideal rolling, for each tyre
-    stiffness."""
+def _eigenvalue_differences(bicycle: Whipple, engine: str) -> np.ndarray:
+    """Largest difference (1/s) between the eigenvalues on tyres and those of ideal rolling, for each tyre stiffness."""
     wanted = bicycle.eigenvalues(SPEED)
-    stiff = [RollingBicycle(bicycle, BicycleTyre(stiffness=s)) for s in STIFFNESS]
+    stiff = [RollingBicycle(bicycle, BicycleTyre(stiffness=s)) for s in TYRE_STIFFNESS_FACTORS]
     return np.array([np.abs(engine_eigenvalues(engine, rolling, SPEED) - wanted).max() for rolling in stiff])
 
 
-def _limit_rows(gaps: dict[str, np.ndarray]) -> list[Row]:
-    """Rows on the limit of stiff tyres: order of convergence in each engine, extrapolated limit, and difference between
-    the engines."""
+def _limit_rows(eigenvalue_gaps: dict[str, np.ndarray]) -> list[Row]:
+    """Rows on the limit of stiff tyres: order of convergence in each engine, and difference between the engines."""
     rows = []
-    for engine, gap in gaps.items():
-        order = np.log(gap[-2] / gap[-1]) / np.log(STIFFNESS[-1] / STIFFNESS[-2])
+    for engine, gap in eigenvalue_gaps.items():
+        order = np.log(gap[-2] / gap[-1]) / np.log(TYRE_STIFFNESS_FACTORS[-1] / TYRE_STIFFNESS_FACTORS[-2])
         rows.append(
             Observed(
                 f"bicycle.tyres.order.{engine}",
@@ -125,7 +132,7 @@ def _limit_rows(gaps: dict[str, np.ndarray]) -> list[Row]:
                 "",
             ).within(1.0, 0.02, "side slip, trail and patch fall as 1 / s; what is left is of order 2", "closed form")
         )
-    between = float(np.abs(gaps["exudyn"] / gaps["mujoco"] - 1.0).max())
+    between = float(np.abs(eigenvalue_gaps["exudyn"] / eigenvalue_gaps["mujoco"] - 1.0).max())
     rows.append(
         Observed(
             "bicycle.tyres.engines",
@@ -139,7 +146,8 @@ def _limit_rows(gaps: dict[str, np.ndarray]) -> list[Row]:
 
 
 def _energy_rows(duration: float) -> list[Row]:
-    """Rows: change of energy in the benchmark's run with ideal rolling, and energy balance on tyres."""
+    """Rows: change of energy in a run with ideal rolling, energy balance in runs on tyres, and a planted fault of
+    gravity."""
     table = {"title": "benchmark run", "system": "bicycle", "run": {"duration": duration}}
     scene, rows = build(table), []
     for engine in ("reference", *ENGINES):
@@ -167,9 +175,9 @@ def _energy_rows(duration: float) -> list[Row]:
     return [*rows, seen.within(1.019e-3, 1e-5, "the ledger sees a planted fault a hundred thousand times", "none")]
 
 
-def _measured(quick: bool) -> tuple[list[Row], list[list[str]]]:
-    """Rows on the measured bicycle: predictions with nothing fitted, and predictions of each speed from a choice on the
-    others."""
+def _measured_rows(quick: bool) -> tuple[list[Row], list[list[str]]]:
+    """Rows on the measured bicycle: predictions with nothing fitted, and predictions for each speed with parameters
+    that were chosen and fitted on the other speeds."""
     root = os.environ.get("TWINRIG_DATA")
     folder = Path(root) / "bicycle" if root else None
     if folder is None or not (folder / "windows.csv").is_file():
@@ -180,15 +188,21 @@ def _measured(quick: bool) -> tuple[list[Row], list[list[str]]]:
     for observation in seen:
         rows += _unfitted_rows(bicycle, observation)
         by = (
-            None if quick else ranked_suspects(bicycle, FEEDBACK, [other for other in seen if other is not observation])
+            None
+            if quick
+            else ranked_suspects(bicycle, MEASURED_FEEDBACK, [other for other in seen if other is not observation])
         )
         rows += [] if by is None else _predicted_rows(bicycle, by, observation)
-        table.append(_line(bicycle, by, observation))
-    return [*rows, *_choice_rows(ranked_suspects(bicycle, FEEDBACK, seen))], table
+        table.append(_table_line(bicycle, by, observation))
+    return [*rows, *_choice_rows(ranked_suspects(bicycle, MEASURED_FEEDBACK, seen))], table
 
 
 def _unfitted_rows(bicycle: Whipple, observation: Observation) -> list[Row]:
-    model, mean, deviation = predicted_weave(bicycle, FEEDBACK, observation), observation.mean, observation.deviation
+    model, mean, deviation = (
+        predicted_weave(bicycle, MEASURED_FEEDBACK, observation),
+        observation.mean,
+        observation.deviation,
+    )
     at = f"{observation.speed:g} m/s, {len(observation.weave)} windows"
     damping = Observed(
         f"bicycle.measured.damping.{observation.speed:g}",
@@ -214,7 +228,7 @@ def _unfitted_rows(bicycle: Whipple, observation: Observation) -> list[Row]:
 
 
 def _predicted_rows(bicycle: Whipple, choice: Choice, observation: Observation) -> list[Row]:
-    gaps = forecast_deviations(bicycle, FEEDBACK, choice, observation)
+    gaps = forecast_deviations(bicycle, MEASURED_FEEDBACK, choice, observation)
     why = (
         "scatter of the windows and error of the forecast; suspects chosen and fitted on the other speeds, by weights "
         "that were settled with all of these speeds in sight"
@@ -233,7 +247,8 @@ def _predicted_rows(bicycle: Whipple, choice: Choice, observation: Observation) 
 
 
 def _choice_rows(choice: Choice) -> list[Row]:
-    """Rows: suspects that the data call for at a significance level of 5 %, and what the experimenters suspected."""
+    """Rows: for each parameter that the experimenters suspected, the p value of the F test of leaving the parameter
+    out."""
     parameters_text = ", ".join(
         f"{name} {value:.3g}" for name, value in zip(choice.best_subset.names, choice.best_subset.values, strict=True)
     )
@@ -254,9 +269,13 @@ def _choice_rows(choice: Choice) -> list[Row]:
     ]
 
 
-def _line(bicycle: Whipple, choice: Choice | None, observation: Observation) -> list[str]:
-    model, mean, deviation = predicted_weave(bicycle, FEEDBACK, observation), observation.mean, observation.deviation
-    gaps = np.empty(0) if choice is None else forecast_deviations(bicycle, FEEDBACK, choice, observation)
+def _table_line(bicycle: Whipple, choice: Choice | None, observation: Observation) -> list[str]:
+    model, mean, deviation = (
+        predicted_weave(bicycle, MEASURED_FEEDBACK, observation),
+        observation.mean,
+        observation.deviation,
+    )
+    gaps = np.empty(0) if choice is None else forecast_deviations(bicycle, MEASURED_FEEDBACK, choice, observation)
     return [
         f"{observation.speed:g} m/s",
         f"{-mean[0]:.2f} +- {deviation[0]:.2f}",

@@ -1,4 +1,5 @@
-"""Brakes and controllers: the brake's loop, the supply, the five-phase limit cycle, stops without locking, substeps."""
+"""Brakes and controllers: hysteresis of the brake, air supply, limit cycle of the five-phase controller, stops without
+locked wheels, substeps."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -14,8 +15,7 @@ from models.brake.controllers.five_phase import FivePhase
 from models.brake.controllers.five_phase_cycle import WheelAtSpeed, limit_cycle, sampled_cycle
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.pressure import APPLY, RELEASE, Chambers, by_valves, resting_chambers
-from models.systems.braking.march import BrakingPath as Recorded
-from models.systems.braking.march import on_tyres
+from models.systems.braking.march import BrakingPath, on_tyres
 from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import table_of_surface
 from validation.braking.five_phase_exact import exact_cycle
@@ -27,36 +27,39 @@ TITLE = "Brakes and controllers of anti-lock braking"
 SYSTEM: System = "anti-lock"
 SEED = 22
 LINEAR_BRAKE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
-WIDE_BRAKE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)
-PHASES = {
+HYSTERETIC_BRAKE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)
+FIVE_PHASE_CONTROLLERS = {
     "deep": FivePhase(1, e1=40.0, e2=60.0, e3=40.0, e4=10.0, e5=150.0, falling=60.0, fast=20.0, slow=15.0),
     "shallow": FivePhase(1, e1=20.0, e2=30.0, e3=20.0, e4=2.0, e5=60.0, falling=60.0, fast=40.0, slow=8.0),
 }
-LOCK_FREE = 15.0 / 3.6
+"""Five-phase controllers with deep and with shallow slip cycles."""
+LOCK_FREE_SPEED = 15.0 / 3.6
 """Speed (m/s) above which no wheel may lock but briefly: UN Regulation 13, annex 13; not checked against its text."""
-BRIEF = 0.1
-"""s"""
-SUBSTEPS = (1, 2, 4, 8)
-CONTROLLED = tuple(CONTROLLERS)[1:]
+LONGEST_LOCK = 0.1
+"""Longest time (s) for which a wheel may lock above ``LOCK_FREE_SPEED``."""
+SUBSTEP_COUNTS = (1, 2, 4, 8)
+CONTROLLER_NAMES = tuple(CONTROLLERS)[1:]
+"""Names of the anti-lock controllers, without the first entry of CONTROLLERS, which applies the brakes fully."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Loop, supply, limit cycle; in the full run also stops of the truck, substeps and an ensemble."""
-    rows = [*_loop_rows(), _supply_row(), *_cycle_rows("shallow")]
+    """Rows of hysteresis, supply and limit cycle; a full run also has stops of the truck, substeps, and an ensemble of
+    stops."""
+    rows = [*_hysteresis_rows(), _air_supply_row(), *_limit_cycle_rows("shallow")]
     if quick:
         return rows, {}
-    rows += _cycle_rows("deep")
+    rows += _limit_cycle_rows("deep")
     stops = {
-        f"{on}, {speed:g} m/s, {name}": stop(on, name, speed)
+        f"{on}, {speed:g} m/s, {name}": stop_results(on, name, speed)
         for on in ("ice", "snow", "dry")
         for speed in (11.11, 22.2)
-        for name in CONTROLLED
+        for name in CONTROLLER_NAMES
     }
     return [*rows, *_stop_rows(stops), *_substep_rows(), *_ensemble_rows()], {"stops": stops}
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Stops of the truck."""
+    """Table of the truck's straight stops by controller."""
     if "stops" not in case_data:
         return []
     shown = (("distance", 2), ("time", 2), ("used", 3), ("locked", 0))
@@ -76,32 +79,36 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     ]
 
 
-def loop(brake: Brake, low: float, high: float, points: int = 2000) -> tuple[np.ndarray, np.ndarray]:
-    """Pressures (bar) and torques (N m) of one hysteresis loop from high to low pressure and back, after a first rise
+def hysteresis_loop(
+    brake: Brake, low_pressure: float, high_pressure: float, point_count: int = 2000
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pressures (bar) and torques (N m) of one hysteresis loop, from high to low pressure and back, after a first rise
     from zero."""
-    path = np.concatenate((np.linspace(high, low, points), np.linspace(low, high, points)))
+    path = np.concatenate(
+        (np.linspace(high_pressure, low_pressure, point_count), np.linspace(low_pressure, high_pressure, point_count))
+    )
     return path, torques_of_pressures(path, of_wheels(brake))
 
 
-def loop_area(brake: Brake, low: float, high: float) -> float:
-    """Area (N m bar) of the hysteresis loop in closed form, as a polygon of four corners on the lines of rising and
-    falling pressure."""
-    most = brake.rising * (high - brake.push_out)
-    least = brake.falling * max(low - brake.release, 0.0)
+def loop_area(brake: Brake, low_pressure: float, high_pressure: float) -> float:
+    """Area (N m bar) of the hysteresis loop by the closed form of its polygon, whose four corners lie on the lines of
+    rising and falling pressure."""
+    most = brake.rising * (high_pressure - brake.push_out)
+    least = brake.falling * max(low_pressure - brake.release, 0.0)
     a, b = brake.release + most / brake.falling, brake.push_out + least / brake.rising
-    end = max(low, brake.release)
-    down = most * (high - a) + 0.5 * (most + least) * (a - end)
-    return down - least * (b - end) - 0.5 * (least + most) * (high - b)
+    end = max(low_pressure, brake.release)
+    down = most * (high_pressure - a) + 0.5 * (most + least) * (a - end)
+    return down - least * (b - end) - 0.5 * (least + most) * (high_pressure - b)
 
 
-def _loop_rows() -> list[Row]:
+def _hysteresis_rows() -> list[Row]:
     worst, sense = 0.0, True
-    for brake in (WIDE_BRAKE, PAPER_FRONT):
+    for brake in (HYSTERETIC_BRAKE, PAPER_FRONT):
         for low in (0.0, 2.5):
-            p, t = loop(brake, low, 4.5)
+            p, t = hysteresis_loop(brake, low, 4.5)
             worst = max(worst, abs(-np.trapezoid(t, p) / loop_area(brake, low, 4.5) - 1.0))
             sense = sense and bool((np.diff(p) * np.diff(t) >= 0.0).all()) and t.min() >= 0.0
-    rise = torques_of_pressures(np.linspace(0.0, 0.75, 100), of_wheels(WIDE_BRAKE))
+    rise = torques_of_pressures(np.linspace(0.0, 0.75, 100), of_wheels(HYSTERETIC_BRAKE))
     return [
         Observed(
             "braking_controllers.loop",
@@ -129,7 +136,7 @@ def _loop_rows() -> list[Row]:
     ]
 
 
-def _supply_row() -> Row:
+def _air_supply_row() -> Row:
     """Row: pressure that remains at the fifth brake stroke when the supply is cut off, compared with a closed form."""
     volumes, reservoir = np.array([1.2, 1.2, 1.6, 1.6]), 40.0
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0, volumes, reservoir)
@@ -148,63 +155,73 @@ def _supply_row() -> Row:
     ).at_most(1e-6, "p V of reservoir and chambers together is kept but for what is let out", "closed form")
 
 
-def _frozen(inertia: float = FRONT_WHEEL.spin_inertia) -> WheelAtSpeed:
+def _wheel_at_constant_speed(inertia: float = FRONT_WHEEL.spin_inertia) -> WheelAtSpeed:
     return WheelAtSpeed(
         11.11, FRONT_WHEEL.mass * GRAVITY, FRONT_WHEEL.radius, inertia, LINEAR_BRAKE, table_of_surface("dry")
     )
 
 
-def _cycle_rows(name: str) -> list[Row]:
-    cycle, (period, used) = limit_cycle(_frozen(), PHASES[name]), exact_cycle(_frozen(), PHASES[name])
-    wrong = exact_cycle(_frozen(FRONT_WHEEL.spin_inertia * 1.001), PHASES[name])[0]
+def _limit_cycle_rows(controller_name: str) -> list[Row]:
+    cycle, (period, used) = (
+        limit_cycle(_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
+        exact_cycle(_wheel_at_constant_speed(), FIVE_PHASE_CONTROLLERS[controller_name]),
+    )
+    wrong = exact_cycle(
+        _wheel_at_constant_speed(FRONT_WHEEL.spin_inertia * 1.001), FIVE_PHASE_CONTROLLERS[controller_name]
+    )[0]
     return [
         Observed(
-            f"braking_controllers.period_{name}",
+            f"braking_controllers.period_{controller_name}",
             SYSTEM,
-            f"relative difference of the period of the five-phase limit cycle from the exact period, {name}",
+            f"relative difference of the period of the five-phase limit cycle from the exact period, {controller_name}",
             cycle.period / period - 1.0,
             "",
         ).at_most(1e-4, "frozen speed; every switch is located", "closed form"),
         Observed(
-            f"braking_controllers.utilisation_{name}",
+            f"braking_controllers.utilisation_{controller_name}",
             SYSTEM,
-            f"difference of the limit cycle's mean friction, as a share of the peak, from the exact mean, {name}",
+            f"difference of the limit cycle's mean friction, as a share of the peak, from the exact mean, "
+            f"{controller_name}",
             cycle.utilisation - used,
             "",
         ).at_most(1e-3, "as above", "closed form"),
         behaviour_row(
-            f"braking_controllers.planted_{name}",
+            f"braking_controllers.planted_{controller_name}",
             SYSTEM,
-            f"a planted error of 0.1 % in the spin inertia is noticed in the period, {name}",
+            f"a planted error of 0.1 % in the spin inertia is noticed in the period, {controller_name}",
             "told" if abs(cycle.period / wrong - 1.0) > 1e-4 else "missed",
             "told",
             "a planted fault",
         ),
         Observed(
-            f"braking_controllers.sampled_{name}",
+            f"braking_controllers.sampled_{controller_name}",
             SYSTEM,
             "relative difference of the period with samples of 5.5 ms from the period of the "
-            f"continuous controller, {name}",
-            sampled_cycle(_frozen(), replace(PHASES[name]), cycles=5, skip=3).period / cycle.period - 1.0,
+            f"continuous controller, {controller_name}",
+            sampled_cycle(
+                _wheel_at_constant_speed(), replace(FIVE_PHASE_CONTROLLERS[controller_name]), cycles=5, skip=3
+            ).period
+            / cycle.period
+            - 1.0,
             "",
         ).beside(0.0, "each switch comes up to a sample late", "native"),
     ]
 
 
-def truck_stop(surface_name: str, name: str, speed: float) -> Recorded:
-    """The paper's truck on one surface under a controller with its defaults."""
+def truck_stop(surface_name: str, controller_name: str, speed: float) -> BrakingPath:
+    """The paper's truck braked to a stop on a surface by a controller with its default parameters."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0)
     return on_tyres(plane_of_truck(PAPER_TRUCK), [table_of_surface(surface_name)], PAPER_BRAKES, chambers).run(
-        CONTROLLERS[name](4), speed
+        CONTROLLERS[controller_name](4), speed
     )
 
 
-def stop(surface_name: str, name: str, speed: float) -> dict[str, float]:
-    """Figures of one stop: distance (m), time (s), and above 15 km/h the friction utilisation and the longest wheel
-    lock (ms)."""
-    path = truck_stop(surface_name, name, speed)
+def stop_results(surface_name: str, controller_name: str, speed: float) -> dict[str, float]:
+    """Results of one straight stop of the truck: distance (m), time (s); above 15 km/h also the friction utilisation
+    and the longest wheel lock (ms)."""
+    path = truck_stop(surface_name, controller_name, speed)
     speeds = Stop(path).speed
-    last = int(np.argmax(speeds < LOCK_FREE))
+    last = int(np.argmax(speeds < LOCK_FREE_SPEED))
     used = (
         (speed**2 - speeds[last] ** 2)
         / (2.0 * path.states[last, 0, 0])
@@ -215,13 +232,13 @@ def stop(surface_name: str, name: str, speed: float) -> dict[str, float]:
         "distance": float(path.states[-1, 0, 0]),
         "time": float(path.times[-1]),
         "used": float(used),
-        "locked": 1e3 * SAMPLE * max(_longest(wheel > 0.0) for wheel in path.reports.locked[:last].T),
+        "locked": 1e3 * SAMPLE * max(_longest_true_sequence(wheel > 0.0) for wheel in path.reports.locked[:last].T),
         "stands": float(path.ended_at_rest),
     }
 
 
-def _longest(flags: np.ndarray) -> int:
-    """Length of the longest sequence of true values."""
+def _longest_true_sequence(flags: np.ndarray) -> int:
+    """Length of the longest uninterrupted sequence of true values."""
     ends = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
     return int((ends[1::2] - ends[::2]).max(initial=0))
 
@@ -234,7 +251,7 @@ def _stop_rows(stops: dict[str, dict[str, float]]) -> list[Row]:
             f"longest time for which a wheel locks above 15 km/h in {len(stops)} stops of four controllers",
             max(stop_figures["locked"] for stop_figures in stops.values()),
             "ms",
-        ).at_most(1e3 * BRIEF, "ice, snow and dry at 11.11 and 22.2 m/s; only briefly", "published"),
+        ).at_most(1e3 * LONGEST_LOCK, "ice, snow and dry at 11.11 and 22.2 m/s; only briefly", "published"),
         behaviour_row(
             "braking_controllers.stands",
             SYSTEM,
@@ -250,7 +267,7 @@ def _substep_rows() -> list[Row]:
     rows = []
     for on, speed in (("snow", 13.9), ("dry", 22.22)):
         tight = reference_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed)
-        for n in SUBSTEPS:
+        for n in SUBSTEP_COUNTS:
             distance = own_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
             rows.append(
                 Observed(
@@ -265,11 +282,11 @@ def _substep_rows() -> list[Row]:
     return rows
 
 
-def _ensemble_rows(runs: int = 24, fine_substeps: int = 32) -> list[Row]:
-    """Rows: two ensembles of stops on ice with different substeps, from slightly varied speeds, because single stops on
-    ice do not repeat."""
+def _ensemble_rows(run_count: int = 24, fine_substeps: int = 32) -> list[Row]:
+    """Rows: two ensembles of stops on ice from slightly varied speeds, with different numbers of substeps. Single stops
+    on ice do not repeat."""
     random = np.random.default_rng(SEED)
-    speeds = 11.11 * (1.0 + random.uniform(-0.002, 0.002, (2, runs)))
+    speeds = 11.11 * (1.0 + random.uniform(-0.002, 0.002, (2, run_count)))
     distances = [
         np.array(
             [
@@ -284,8 +301,8 @@ def _ensemble_rows(runs: int = 24, fine_substeps: int = 32) -> list[Row]:
         Observed(
             "braking_controllers.ice_mean",
             SYSTEM,
-            f"relative difference of the mean stopping distance on ice of {runs} runs with 4 substeps "
-            f"from {runs} others with {fine_substeps}",
+            f"relative difference of the mean stopping distance on ice of {run_count} runs with 4 substeps "
+            f"from {run_count} others with {fine_substeps}",
             float(distances[0].mean() / distances[1].mean() - 1.0),
             "",
         ).at_most(1e-2, "speeds drawn within 0.2 %; on ice single runs do not repeat", "shared kernel"),

@@ -1,4 +1,5 @@
-"""A braked truck in the plane: both engines and the written form beside the compiled step, symmetries, the trailer."""
+"""A braked truck in the plane: Exudyn, MuJoCo and hand-written equations compared with the compiled step, symmetries,
+and the trailer."""
 
 import time
 from collections.abc import Callable
@@ -30,19 +31,22 @@ from validation.common.rows import Observed, Row, System, Table
 TITLE = "Braking in a turn, in engines and with a trailer"
 SYSTEM: System = "anti-lock"
 STEP, SPEED, LAST_SPEED, STEER = 1e-3, 11.11, 0.5, 0.03
-TORQUES = (870.0, 580.0)
-"""Of each front and each rear wheel (N m): the truck goes 60 m, and no wheel locks."""
-STIFF_SLOPE = 100.0
-"""Slope of the trailer's tyres (1/rad), towards wheels that only roll."""
+"""Step (s), initial and final speed (m/s), and steer angle (rad) of the braked turn."""
+BRAKE_TORQUES = (870.0, 580.0)
+"""Brake torque (N m) of each front and of each rear wheel: the truck goes 60 m, and no wheel locks."""
+STIFF_TYRE_SLOPE = 100.0
+"""Slope (1/rad) of the lateral friction of the trailer's tyres, so steep that the wheels nearly roll without slip."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Turn by all means, mirror image, straight way, trailer; the quick share turns down to 10 m/s only."""
+    """Rows of the braked turn in engines, by hand-written equations and mirrored, of straight braking, and of the
+    trailer. A quick run brakes down to 10 m/s only."""
     until = 10.0 if quick else LAST_SPEED
-    compiled = turn(until)
-    beside = {"written out": braked_turn(PAPER_TRUCK, ICE_TABLE, STEER, TORQUES, SPEED, until)}
+    compiled = braked_truck_turn(until)
+    beside = {"written out": braked_turn(PAPER_TRUCK, ICE_TABLE, STEER, BRAKE_TORQUES, SPEED, until)}
     beside |= {
-        name: turn(until, step_function=CarriedChassis(name, PAPER_PLANE).advance) for name in ("exudyn", "mujoco")
+        name: braked_truck_turn(until, step_function=CarriedChassis(name, PAPER_PLANE).advance)
+        for name in ("exudyn", "mujoco")
     }
     rows = [
         Observed(
@@ -58,13 +62,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         )
         for name, end in beside.items()
     ]
-    rows += [*_symmetry_rows(until, compiled), *_load_rows(), *_trailer_rows(quick)]
+    rows += [*_symmetry_rows(until, compiled), *_axle_load_rows(), *_trailer_rows(quick)]
     rows += [
         Observed(
             f"braking_engines.speed.{steps}",
             SYSTEM,
             f"speed of a compiled truck with a bang-bang slip controller on ice, samples of 5.5 ms in {steps} step(s)",
-            speed(steps),
+            simulation_speed(steps),
             "times real time",
         ).aim(100.0, "asked for; by the processor's time, which wanders", "at least")
         for steps in (1, 4)
@@ -73,10 +77,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {name: list(where) for name, where in turns.items()}
 
 
-def turn(end_speed: float, steer: float = STEER, step_function: Callable[..., Any] = advance) -> TurnEnd:
-    """A braked turn of the truck on ice from SPEED down to ``end_speed`` (m/s). Its end is interpolated linearly within
-    the last step.
-    """
+def braked_truck_turn(end_speed: float, steer: float = STEER, step_function: Callable[..., Any] = advance) -> TurnEnd:
+    """End of a braked turn of the truck on ice from SPEED down to ``end_speed`` (m/s), interpolated linearly within the
+    last step."""
     truck = RollingTruck(
         on_road(PAPER_PLANE, stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering),
         SPEED,
@@ -85,24 +88,24 @@ def turn(end_speed: float, steer: float = STEER, step_function: Callable[..., An
     )
     while True:
         passed, position, fast = truck.time, truck.state[0].copy(), truck.speed
-        status, used = truck.on(np.repeat(TORQUES, 2), STEP)
+        status, used = truck.on(np.repeat(BRAKE_TORQUES, 2), STEP)
         if status != FINE or truck.speed <= end_speed:
             share = (fast - end_speed) / (fast - truck.speed)
             x, y, heading = (float(value) for value in position + share * (truck.state[0] - position))
             return TurnEnd(x, y, heading, float(passed + share * used))
 
 
-def speed(steps: int) -> float:
+def simulation_speed(substep_count: int) -> float:
     """Simulated seconds of a straight stop per second of processor time."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 6.0)
-    vehicle = on_tyres(PAPER_PLANE, [ICE_TABLE], PAPER_BRAKES, chambers, substeps=steps)
+    vehicle = on_tyres(PAPER_PLANE, [ICE_TABLE], PAPER_BRAKES, chambers, substeps=substep_count)
     vehicle.run(SlipBangBang(wheels=4), SPEED, 0.1)
     start = time.process_time()
     path = vehicle.run(SlipBangBang(wheels=4), SPEED)
     return float(path.times[-1]) / (time.process_time() - start)
 
 
-def _load_rows() -> list[Row]:
+def _axle_load_rows() -> list[Row]:
     rows = [
         Observed(
             f"braking_engines.transfer.{name.replace(' ', '-')}",
@@ -125,9 +128,11 @@ def _load_rows() -> list[Row]:
     ]
 
 
-def _symmetry_rows(end_speed: float, steered: TurnEnd) -> list[Row]:
-    mirrored, straight = turn(end_speed, -STEER), turn(end_speed, 0.0)
-    apart = max(abs(mirrored.x - steered.x), abs(mirrored.y + steered.y), abs(mirrored.heading + steered.heading))
+def _symmetry_rows(end_speed: float, steered_turn: TurnEnd) -> list[Row]:
+    mirrored, straight = braked_truck_turn(end_speed, -STEER), braked_truck_turn(end_speed, 0.0)
+    apart = max(
+        abs(mirrored.x - steered_turn.x), abs(mirrored.y + steered_turn.y), abs(mirrored.heading + steered_turn.heading)
+    )
     return [
         Observed(
             "braking_engines.mirror", SYSTEM, "difference between a turn and its mirror image", apart, "m, rad"
@@ -142,22 +147,23 @@ def _symmetry_rows(end_speed: float, steered: TurnEnd) -> list[Row]:
     ]
 
 
-def rolling(slope: float) -> Tables:
-    """Tyre tables with lateral friction alone, which rises with a slope (1/rad) up to 0.01 rad."""
+def lateral_tyre_tables(slope: float) -> Tables:
+    """Tyre tables with lateral friction alone. Its coefficient rises with a slope (1/rad) up to a slip angle of 0.01
+    rad."""
     mu = np.array([[0.0], [0.01 * slope], [0.01 * slope]])
     nodes = np.array([0.0, 0.01, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
     return stacked_tables([TyreTable(*nodes, np.zeros((3, 1, 3)), np.ones((3, 3)), mu)])
 
 
 def _trailer_rows(quick: bool) -> list[Row]:
-    """Rows on the trailer: pulled straight at 0.2 m/s; in the full share also on a circle of 15 m at 0.5 m/s."""
+    """Rows on the trailer: pulled straight at 0.2 m/s; in the full run also on a circle of 15 m radius at 0.5 m/s."""
     why = "wheels that only roll: low speed, stiff tyres"
     rows = [
         Observed(
             "braking_engines.pull",
             SYSTEM,
             "relative difference of the drawbar angle on a straight pull from its closed form",
-            straight_pull(),
+            straight_pull_error(),
             "",
         ).at_most(1e-4, why, "closed form")
     ]
@@ -170,42 +176,50 @@ def _trailer_rows(quick: bool) -> list[Row]:
                 off,
                 "",
             ).at_most(1e-4, why, "closed form")
-            for name, off in zip(("front", "rear"), circle(), strict=True)
+            for name, off in zip(("front", "rear"), circle_errors(), strict=True)
         ]
     return rows
 
 
-def straight_pull(angle: float = 0.5, v: float = 0.2, step: float = 5e-4, duration: float = 4.0) -> float:
-    """Relative error of the drawbar angle psi after a straight pull, where tan(psi / 2) = tan(psi_0 / 2) exp(-v t /
-    L)."""
+def straight_pull_error(angle: float = 0.5, v: float = 0.2, step: float = 5e-4, duration: float = 4.0) -> float:
+    """Relative error of the drawbar angle psi after a straight pull over the time t at speed v. Exact, with drawbar
+    length L: tan(psi / 2) = tan(psi_0 / 2) exp(-v t / L)."""
     n = round(duration / step)
     state = np.array([[0.0, 0.0, angle, angle], [v, 0.0, -v * np.sin(angle) / CHOSEN_TRAILER.drawbar, 0.0]])
     states, _ = follow_hook(
         plane_of_trailer(CHOSEN_TRAILER),
-        rolling(STIFF_SLOPE),
+        lateral_tyre_tables(STIFF_TYRE_SLOPE),
         state,
         np.tile([v, 0.0], (n + 1, 1)),
         step,
-        STIFF_SLOPE,
+        STIFF_TYRE_SLOPE,
         np.zeros(4),
     )
     exact = 2.0 * np.arctan(np.tan(angle / 2.0) * np.exp(-v * duration / CHOSEN_TRAILER.drawbar))
     return abs(float(states[-1, 0, 2] / exact - 1.0))
 
 
-def circle(radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: float = 20.0) -> tuple[float, float]:
-    """Relative errors of the axle radii on a steady circle, where R_front^2 = R_hook^2 - L^2 and R_rear^2 = R_front^2 -
-    wheelbase^2."""
-    turn, times = v / radius, step * np.arange(round(duration / step) + 1)
-    hook = v * np.column_stack((-np.sin(turn * times), np.cos(turn * times)))
+def circle_errors(
+    radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: float = 20.0
+) -> tuple[float, float]:
+    """Relative errors of the radii of the trailer's front and rear axle on a steady circle. Exact, with drawbar length
+    L: R_front^2 = R_hook^2 - L^2 and R_rear^2 = R_front^2 - wheelbase^2."""
+    yaw_rate, times = v / radius, step * np.arange(round(duration / step) + 1)
+    hook = v * np.column_stack((-np.sin(yaw_rate * times), np.cos(yaw_rate * times)))
     front = np.sqrt(radius**2 - CHOSEN_TRAILER.drawbar**2)
     rear = np.sqrt(front**2 - CHOSEN_TRAILER.wheelbase**2)
     first = np.pi / 2.0 - np.arcsin(CHOSEN_TRAILER.drawbar / radius)
     state = np.array(
-        [[radius, 0.0, first, first - np.arcsin(CHOSEN_TRAILER.wheelbase / front)], [*hook[0], turn, turn]]
+        [[radius, 0.0, first, first - np.arcsin(CHOSEN_TRAILER.wheelbase / front)], [*hook[0], yaw_rate, yaw_rate]]
     )
     states, _ = follow_hook(
-        plane_of_trailer(CHOSEN_TRAILER), rolling(STIFF_SLOPE), state, hook, step, STIFF_SLOPE, np.zeros(4)
+        plane_of_trailer(CHOSEN_TRAILER),
+        lateral_tyre_tables(STIFF_TYRE_SLOPE),
+        state,
+        hook,
+        step,
+        STIFF_TYRE_SLOPE,
+        np.zeros(4),
     )
     x, y, drawbar, body = states[-1, 0]
     at = np.array([x, y]) - CHOSEN_TRAILER.drawbar * np.array([np.cos(drawbar), np.sin(drawbar)])
@@ -214,7 +228,7 @@ def circle(radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: f
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Ends of the turn."""
+    """Table of position, heading and time at the end of the braked turn."""
     rows = tuple((name, *(f"{value:.6f}" for value in where)) for name, where in case_data.items())
     return [
         Table(

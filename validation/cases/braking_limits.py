@@ -1,4 +1,4 @@
-"""Where braking ends: legal stops that must finish, what rolls over or folds, slow vehicles, input beyond physics."""
+"""Limits of braking: legal stops that must finish, rollover and jackknife, slow vehicles, and refused input."""
 
 import math
 from collections.abc import Callable
@@ -28,26 +28,29 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row
 TITLE = "Limits of braking: stops that finish, vehicles that fall or fold, slow ones, and what cannot be"
 SYSTEM: System = "anti-lock"
 SEED = 19
-STOPS = {True: 3, False: 200}
-"""Random stops, by ``quick``."""
-LIMITS = ("rolls over", "pitches over", "jackknifes", "turns over")
-"""Ends by a limit of the vehicle, which a legal scene may meet."""
+STOP_COUNTS = {True: 3, False: 200}
+"""Number of random stops, for a quick run (True) and a full run (False)."""
+VEHICLE_LIMITS = ("rolls over", "pitches over", "jackknifes", "turns over")
+"""Words in the error of a run that ends at a physical limit of the vehicle, which a legal scene may reach."""
 LINEAR_BRAKE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
-ROLLING = FivePhase(1, e1=21.21, e2=26.62, e3=20.73, e4=2.07, e5=50.4, falling=74.51, fast=42.29, slow=6.42)
-"""Phases that a fast first application leaves with a release that does not end by the wheel's acceleration."""
+LONG_RELEASE_CONTROLLER = FivePhase(
+    1, e1=21.21, e2=26.62, e3=20.73, e4=2.07, e5=50.4, falling=74.51, fast=42.29, slow=6.42
+)
+"""Five-phase controller whose release does not end by the wheel's acceleration after a fast first application."""
 
 
 @allowing_breaches("stops at the limits, and random ones: that they end, or say why not, is judged")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """All rows; quick: three of the stops, one speed of the slow ones."""
-    ends = [ending_text(number) for number in range(STOPS[quick])]
-    rows = [_stops_row(ends), _jackknife_row(), *_roll_rows(), _slow_apply_row(), _cycle_row()]
+    """Rows of all limits. A quick run takes three of the random stops, and one speed of the slow stops on split
+    friction."""
+    ends = [ending_text(number) for number in range(STOP_COUNTS[quick])]
+    rows = [_random_stops_row(ends), _jackknife_row(), *_roll_rows(), _slow_apply_row(), _cycle_row()]
     rows += [_yaw_row(speed) for speed in ((1.0,) if quick else (0.5, 1.0, 3.0))]
-    return rows + [_refused_row(*refusal_arguments) for refusal_arguments in REFUSED.items()], {"ends": ends}
+    return rows + [_refused_row(*refusal_arguments) for refusal_arguments in REFUSED_INPUTS.items()], {"ends": ends}
 
 
 def ending_text(scene_number: int) -> str:
-    """Text on how a random stop ended; "" if the vehicle came to rest."""
+    """Text on how a random stop ended; empty if the vehicle came to rest."""
     try:
         path = run(build(random_stop(SEED, scene_number))).detail
     except RunFailed as error:
@@ -55,8 +58,8 @@ def ending_text(scene_number: int) -> str:
     return "" if path.ended_at_rest else "does not stand"
 
 
-def _stops_row(endings: list[str]) -> Row:
-    limits = [end for end in endings if any(limit in end for limit in LIMITS)]
+def _random_stops_row(endings: list[str]) -> Row:
+    limits = [end for end in endings if any(limit in end for limit in VEHICLE_LIMITS)]
     wrong = [f"{i}: {end}" for i, end in enumerate(endings) if end and end not in limits]
     what = (
         f"stops that do not finish, of {len(endings)} random legal ones, {len(limits)} of which end by a limit of the "
@@ -67,12 +70,12 @@ def _stops_row(endings: list[str]) -> Row:
     )
 
 
-def _scene(**tables: Any) -> Any:
+def _braking_scene(**tables: Any) -> Any:
     return build({"system": "braking", "title": "limit", **tables}, "limit.toml")
 
 
 def _error_of_procedure(scene: Any) -> RunFailed | None:
-    """The error with which a scene's only procedure fails; None if it runs."""
+    """Error with which the only braking procedure of a scene fails; None if the procedure runs to its end."""
     try:
         run(scene)
     except RunFailed as error:
@@ -81,9 +84,10 @@ def _error_of_procedure(scene: Any) -> RunFailed | None:
 
 
 def _jackknife_row() -> Row:
-    """Row: drawbar angle at which the run of a train ends whose truck slides round, compared with the limit angle."""
+    """Row: largest recorded hinge angle of a truck and trailer that jackknife while the truck's rear wheels slide,
+    compared with the limit angle."""
     end = _error_of_procedure(
-        _scene(
+        _braking_scene(
             vehicle={"override": {"mass": 4200.0, "yaw_inertia": 15000.0}},
             run={"duration": 6.0},
             road={"stretches": [{"left": "snow"}]},
@@ -110,12 +114,12 @@ def _jackknife_row() -> Row:
 
 
 def _roll_rows() -> list[Row]:
-    """Rows: a high truck with a narrow track in a J-turn on dry road, and the lateral acceleration at which rollover is
-    reported."""
+    """Rows: a high truck with a narrow track rolls over in a J-turn on dry road; compared is the lateral acceleration
+    that the error states."""
     track, height = 1.8, 2.2
     axle = {"track": track}
     end = _error_of_procedure(
-        _scene(
+        _braking_scene(
             vehicle={"override": {"height": height, "front": axle, "rear": axle}},
             load_transfer={"front": 0.5},
             road={"stretches": [{"left": "dry"}]},
@@ -146,7 +150,7 @@ def _roll_rows() -> list[Row]:
 
 
 def _slow_apply_row() -> Row:
-    """Row: pressure in a chamber that fills slowly, compared with its exponential."""
+    """Row: pressure in a brake chamber that fills slowly, compared with an exponential."""
     chambers = Chambers(np.full(1, 0.15), np.full(1, 0.1), 8.0, slow=np.full(1, 1.2))
     air, torques = resting_chambers(chambers, 0.01), np.empty((5, 1))
     for _ in range(50):
@@ -161,11 +165,11 @@ def _slow_apply_row() -> Row:
 
 
 def _cycle_row() -> Row:
-    """Row: limit cycle of the controller after a fast first application to a rolling wheel, compared with the exact
-    cycle after a slow one."""
+    """Row: period of the controller's limit cycle after a fast first application to a rolling wheel, compared with the
+    exact period after a slow first application."""
     frozen = WheelAtSpeed(20.0, 16900.0, 0.5, 13.35, LINEAR_BRAKE, table_of_surface("snow"))
-    period, _ = exact_cycle(frozen, ROLLING, ROLLING.slow)
-    reached = limit_cycle(frozen, replace(ROLLING), 1e-4).period
+    period, _ = exact_cycle(frozen, LONG_RELEASE_CONTROLLER, LONG_RELEASE_CONTROLLER.slow)
+    reached = limit_cycle(frozen, replace(LONG_RELEASE_CONTROLLER), 1e-4).period
     return Observed(
         "braking_limits.cycle_from_rolling",
         SYSTEM,
@@ -177,10 +181,10 @@ def _cycle_row() -> Row:
 
 
 def _yaw_row(speed: float) -> Row:
-    """Row: final yaw of a stop on split friction with steps of 20 ms, compared with steps of 0.1 ms."""
+    """Row: final yaw angle of a stop on split friction with steps of 20 ms, compared with steps of 0.1 ms."""
 
     def yaw(substeps: int) -> float:
-        scene = _scene(
+        scene = _braking_scene(
             procedures={"p": {"kind": "split", "speed": speed, "right": "ice"}},
             brakes={"supply": 2.0},
             road={"stretches": [{"left": "dry"}]},
@@ -204,27 +208,29 @@ def _yaw_row(speed: float) -> Row:
     )
 
 
-REFUSED: dict[str, Callable[[], Any]] = {
-    "a supply of 10000 bar": lambda: _scene(procedures={"p": {}}, brakes={"supply": 1e4}),
-    "a brake of 6e9 N m": lambda: _scene(procedures={"p": {}}, brakes={"front": {"gradient": 1e9}}),
-    "a truck lighter than its wheels": lambda: run(_scene(procedures={"p": {}}, vehicle={"override": {"mass": 0.1}})),
+REFUSED_INPUTS: dict[str, Callable[[], Any]] = {
+    "a supply of 10000 bar": lambda: _braking_scene(procedures={"p": {}}, brakes={"supply": 1e4}),
+    "a brake of 6e9 N m": lambda: _braking_scene(procedures={"p": {}}, brakes={"front": {"gradient": 1e9}}),
+    "a truck lighter than its wheels": lambda: run(
+        _braking_scene(procedures={"p": {}}, vehicle={"override": {"mass": 0.1}})
+    ),
     "a gain of 1e12": lambda: SlipPI(4, gain=1e12),
     "a complex threshold": lambda: FivePhase(4, e1=1j),  # type: ignore[arg-type]
-    "slow apply faster than apply": lambda: _scene(procedures={"p": {}}, pressure={"slow": 0.01}),
+    "slow apply faster than apply": lambda: _braking_scene(procedures={"p": {}}, pressure={"slow": 0.01}),
 }
-"""What is beyond physics, and must be refused before it runs."""
+"""Inputs that are physically impossible, each with a function that must raise InputError."""
 
 
-def _refused_row(name: str, ask_refused: Callable[[], Any]) -> Row:
+def _refused_row(input_name: str, build_refused: Callable[[], Any]) -> Row:
     try:
-        ask_refused()
+        build_refused()
         outcome = "taken"
     except InputError as error:
         outcome = "refused" if error.place and error.value is not None else "refused without its value"
     return behaviour_row(
-        f"braking_limits.refused.{name.replace(' ', '-')}",
+        f"braking_limits.refused.{input_name.replace(' ', '-')}",
         SYSTEM,
-        f"a scene with {name} is refused",
+        f"a scene with {input_name} is refused",
         outcome,
         "refused",
         "a vehicle that cannot be has no answer",
@@ -232,6 +238,6 @@ def _refused_row(name: str, ask_refused: Callable[[], Any]) -> Row:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Stops that a limit of the vehicle ended."""
+    """Table of the random stops that do not come to rest, with the reason."""
     ends = tuple((str(i), end) for i, end in enumerate(case_data["ends"]) if end)
     return [Table("Random stops that do not come to rest", "", ("number", "how it ended"), ends)] if ends else []

@@ -1,4 +1,5 @@
-"""A braked vehicle on its suspension beside the independent reference: every law, accelerations, and stops."""
+"""A braked vehicle on its suspension compared with the independent reference: every force law, accelerations, and
+stops."""
 
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,8 @@ TITLE = "Braking beside the independent reference"
 SYSTEM: System = "anti-lock"
 ENGINES = ("mujoco", "exudyn")
 QUICK_DURATION, FULL_DURATION = 0.05, 1.0
-"""s of a stop, in the quick share and in the full one."""
-LAWS = {
+"""Duration (s) of a stop, in the quick and in the full run."""
+LAW_COMPARISONS = {
     "friction": (
         laws.friction_of_random_states,
         1e-12,
@@ -38,17 +39,18 @@ LAWS = {
     ),
     "relaxation": (laws.slip_lags, 1e-12, "difference of slip angles that lag by a relaxation length from plain code"),
 }
-"""Both sides at random states, the bound, and what it is."""
+"""For each force law: the function that evaluates both implementations at random states, the tolerance, and the
+compared quantity."""
 ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Laws and, of the car in one engine, accelerations, a steady circle and a piece of a stop; in the full share both
-    engines, the twin, the car with curves and friction, and longer stops."""
+    """Rows of the force laws, accelerations, steady circles and stops. A quick run has the car in one engine and a
+    short stop; a full run has all vehicles in Exudyn and MuJoCo."""
     vehicles, engines = (("car",), ENGINES[:1]) if quick else (tuple(whole.VEHICLES), ENGINES)
-    rows = [_law_row(name) for name in LAWS]
+    rows = [_law_row(name) for name in LAW_COMPARISONS]
     rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
-    rows += [_relaxing_row(), *(_turn_row(vehicle) for vehicle in vehicles)]
+    rows += [_relaxing_turn_row(), *(_circle_row(vehicle) for vehicle in vehicles)]
     rows += [
         _stop_row(vehicle, engine, QUICK_DURATION if quick else FULL_DURATION)
         for vehicle in vehicles
@@ -57,10 +59,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {}
 
 
-def _law_row(name: str) -> Row:
-    both, bound, what = LAWS[name]
+def _law_row(law: str) -> Row:
+    both, bound, what = LAW_COMPARISONS[law]
     return Observed(
-        f"braking_reference.{name}", SYSTEM, what, laws.largest_difference(*both()), "by the largest"
+        f"braking_reference.{law}", SYSTEM, what, laws.largest_difference(*both()), "by the largest"
     ).at_most(bound, ROUNDING_REASON, "native")
 
 
@@ -76,7 +78,7 @@ def _acceleration_row(vehicle: str, engine: str) -> Row:
     ).at_most(1e-12, ROUNDING_REASON, "native")
 
 
-def _relaxing_row() -> Row:
+def _relaxing_turn_row() -> Row:
     return Observed(
         "braking_reference.relaxing_turn",
         SYSTEM,
@@ -89,7 +91,7 @@ def _relaxing_row() -> Row:
     )
 
 
-def _turn_row(vehicle: str) -> Row:
+def _circle_row(vehicle: str) -> Row:
     computed, plain = whole.circles_of_both_sides(whole.VEHICLES[vehicle]())
     return Observed(
         f"braking_reference.turn.{vehicle}",

@@ -1,4 +1,5 @@
-"""A quarter vehicle braked to a stop: distances against the exact answer, other schemes, locking and standstill."""
+"""A quarter vehicle braked to a stop: stopping distances compared with the exact ones and with other integration
+schemes, locked wheels, standstill."""
 
 import math
 from itertools import pairwise, product
@@ -26,13 +27,13 @@ from validation.common.rows import Observed, Row, System, Table
 
 TITLE = "Braking to a stop"
 SYSTEM: System = "anti-lock"
-HEADLINE = {
+HEADLINE_CASES = {
     "ice, 3 % slip": ("ice", 0.03, 11.11),
     "dry, 6 % slip": ("dry", 0.06, 22.22),
     "ice, light": ("ice", 0.003, 11.11),
     "dry, light": ("dry", 0.004, 22.22),
 }
-"""Surface, slip that settles, speed (m/s)."""
+"""Surface, steady slip and initial speed (m/s) of each headline case."""
 FURTHER_CASES = {
     "snow": ("snow", 0.04, 13.9, 1.0, 1.0),
     "snow, light": ("snow", 0.004, 13.9, 1.0, 1.0),
@@ -45,47 +46,50 @@ FURTHER_CASES = {
     "light wheel": ("wet", 0.03, 11.11, 1.0, 0.1),
     "heavy wheel": ("wet", 0.03, 11.11, 1.0, 4.0),
 }
-"""The same with factors of mass and spin inertia."""
+"""Surface, steady slip, initial speed (m/s), and factors of mass and of spin inertia of each further case."""
 DISTANCE_BOUND = 5e-4
-STEPS = {True: (PAPER_STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, PAPER_STEP, 1e-2, 2e-2)}
-"""Steps (s) of the sweep, by ``quick``."""
-FINE_STEP = 5e-4
-"""Least of them (s) in the figure."""
+"""Largest relative error of a stopping distance that is asked for."""
+SWEEP_STEPS = {True: (PAPER_STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, PAPER_STEP, 1e-2, 2e-2)}
+"""Steps (s) of the sweep over brake torques, for a quick run (True) and a full run (False)."""
+SMALLEST_FIGURE_STEP = 5e-4
+"""Smallest of the sweep's steps (s) that the figure shows."""
 FULL_SWEEP_SURFACES = ("dry", "wet", "snow", "ice")
-"""Surfaces of the sweep that take every level of the brake in every step."""
-TORQUE_LEVELS, SOME_LEVELS = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
-"""Torque of the brake divided by that of locking, and those of the other surfaces in steps below the paper's, which are
-many (and all that the quick share takes)."""
+"""Surfaces on which the sweep takes every brake torque at every step."""
+TORQUE_LEVELS, LEVEL_SELECTION = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
+"""Brake torques of the sweep divided by the locking torque; and the selection of these levels for the quick run, and
+for other surfaces in steps below the paper's."""
 SLOW_SPEED = 0.5
-"""Speed (m/s) of the sweep in steps below 1 ms, which are many."""
-WATCHED_SECONDS = 2.0
-"""Time (s) for which a vehicle that stands is watched."""
+"""Initial speed (m/s) of the sweep with steps below 1 ms, which would otherwise take many steps."""
+STANDSTILL_SECONDS = 2.0
+"""Time (s) for which the simulation goes on after a stop, to see that the vehicle stays at rest."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """All rows; quick: the four headline cases, two steps, two surfaces."""
-    steps = tuple(step for step in STEPS[quick] if step >= FINE_STEP)
-    curves = {name: _curve(*headline_arguments, steps) for name, headline_arguments in HEADLINE.items()}
+    """Rows of all stops. A quick run has the four headline cases, and a sweep with two steps on two surfaces."""
+    steps = tuple(step for step in SWEEP_STEPS[quick] if step >= SMALLEST_FIGURE_STEP)
+    curves = {
+        name: _errors_over_step(*headline_arguments, steps) for name, headline_arguments in HEADLINE_CASES.items()
+    }
     rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
     if not quick:
-        rows += [_further_row(name, *headline_arguments) for name, headline_arguments in FURTHER_CASES.items()]
+        rows += [_further_case_row(name, *headline_arguments) for name, headline_arguments in FURTHER_CASES.items()]
     rows += [
         _sweep_row(
             ("ice", "dry") if quick else tuple(NAMED_SURFACES),
-            TORQUE_LEVELS[SOME_LEVELS] if quick else TORQUE_LEVELS,
-            STEPS[quick],
+            TORQUE_LEVELS[LEVEL_SELECTION] if quick else TORQUE_LEVELS,
+            SWEEP_STEPS[quick],
         ),
-        _locked_row(),
-        _release_row(),
-        _friction_row(9 if quick else 25),
+        _locked_wheel_row(),
+        _wheel_release_row(),
+        _friction_level_row(9 if quick else 25),
     ]
     return rows, {"curves": curves, "steps": steps}
 
 
-def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> dict[str, Any]:
-    """For twinrig's scheme and the others, over the step: relative error of the stopping distance, and the speed that
-    is left where a scheme does not stop."""
-    tyre, _ = both = friction_table(name)
+def _errors_over_step(surface: str, slip: float, speed: float, steps: tuple[float, ...]) -> dict[str, Any]:
+    """Errors of twinrig's and of other integration schemes over the step: relative error of the stopping distance, and
+    the remaining speed (m/s) if a scheme does not stop."""
+    tyre, _ = both = friction_table(surface)
     force, torque = steady_torque(FRONT_WHEEL, tyre, slip)
     true = exact_distance(FRONT_WHEEL, tyre, torque, speed)
     distances = {
@@ -107,8 +111,8 @@ def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> di
     }
 
 
-def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
-    key, at = f"braking_stop.{name.replace(', ', '.').replace(' %', '').replace(' ', '.')}", curve["at"]
+def _headline_rows(case_name: str, curve: dict[str, Any]) -> list[Row]:
+    key, at = f"braking_stop.{case_name.replace(', ', '.').replace(' %', '').replace(' ', '.')}", curve["at"]
     errors = {scheme: curves[at] for scheme, curves in curve["errors"].items()}
     ours, _ = errors.pop("ours")
     why = f"asked for; the exact distance is {curve['exact']:.6f} m, from the slip's own equation to 1e-9"
@@ -116,14 +120,14 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
         Observed(
             f"{key}.distance",
             SYSTEM,
-            f"relative error of the stopping distance of a wheel that rolls first, {name}, steps of 5.5 ms",
+            f"relative error of the stopping distance of a wheel that rolls first, {case_name}, steps of 5.5 ms",
             ours,
             "",
         ).at_most(DISTANCE_BOUND, why, "closed form"),
         Observed(
             f"{key}.steady",
             SYSTEM,
-            f"relative error of the stopping distance at constant slip, {name}, steps of 5.5 ms",
+            f"relative error of the stopping distance at constant slip, {case_name}, steps of 5.5 ms",
             curve["steady"],
             "",
         ).at_most(1e-7, "m v^2 / (2 F); exact in each step but the last, at rest", "closed form"),
@@ -136,7 +140,7 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
             Observed(
                 f"{key}.{scheme.split()[-1].lower()}",
                 SYSTEM,
-                f"relative error of the stopping distance with {scheme}, {name}, steps of 5.5 ms{note}",
+                f"relative error of the stopping distance with {scheme}, {case_name}, steps of 5.5 ms{note}",
                 100.0 * error,
                 "%",
             ).beside(f"{100.0 * ours:.1e} % of ours", "the same vehicle, torque and table", "closed form")
@@ -144,9 +148,13 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
     return rows
 
 
-def _further_row(name: str, surface: str, slip: float, speed: float, mass: float, spin: float) -> Row:
+def _further_case_row(
+    case_name: str, surface: str, slip: float, speed: float, mass_factor: float, spin_inertia_factor: float
+) -> Row:
     quarter = Quarter(
-        mass=mass * FRONT_WHEEL.mass, radius=FRONT_WHEEL.radius, spin_inertia=spin * FRONT_WHEEL.spin_inertia
+        mass=mass_factor * FRONT_WHEEL.mass,
+        radius=FRONT_WHEEL.radius,
+        spin_inertia=spin_inertia_factor * FRONT_WHEEL.spin_inertia,
     )
     tyre, _ = both = friction_table(surface)
     torque = steady_torque(quarter, tyre, slip)[1]
@@ -154,24 +162,24 @@ def _further_row(name: str, surface: str, slip: float, speed: float, mass: float
         constant_torque_stop(quarter, both, torque, speed).distance / exact_distance(quarter, tyre, torque, speed) - 1.0
     )
     return Observed(
-        f"braking_stop.further.{name.replace(', ', '.').replace(' ', '-')}",
+        f"braking_stop.further.{case_name.replace(', ', '.').replace(' ', '-')}",
         SYSTEM,
-        f"relative error of the stopping distance, {name} ({surface}, {100 * slip:g} % slip, {speed:g} "
+        f"relative error of the stopping distance, {case_name} ({surface}, {100 * slip:g} % slip, {speed:g} "
         "m/s), steps of 5.5 ms",
         error,
         "",
     ).at_most(DISTANCE_BOUND, "as the four above", "closed form")
 
 
-def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
-    """Names of the rules of plausibility that a stop breaks."""
+def broken_rules(stopped: QuarterStop, radius: float, is_braked: bool) -> list[str]:
+    """Names of the rules of plausibility that a simulated stop breaks."""
     path, speed = stopped.path, stopped.path.speed
     rim = radius * path.turning
     broken = {
         "no number": not all(np.isfinite(path_field).all() for path_field in path),
         "turns backwards": rim.min() < 0.0,
         "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
-        "does not stop": brakes and stopped.step_of_rest < 0,
+        "does not stop": is_braked and stopped.step_of_rest < 0,
         "creeps": stopped.step_of_rest >= 0
         and bool(
             np.abs(speed[stopped.step_of_rest :]).max() > 0.0 or np.ptp(path.position[stopped.step_of_rest :]) > 0.0
@@ -187,10 +195,10 @@ def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tu
         lock = float(tyre[0].mu_x.max()) * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
         speed = 11.11 if step >= 1e-3 else SLOW_SPEED
         for level in (
-            friction_levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else friction_levels[SOME_LEVELS]
+            friction_levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else friction_levels[LEVEL_SELECTION]
         ):
-            faults = faults_of(
-                constant_torque_stop(FRONT_WHEEL, tyre, level * lock, speed, step, WATCHED_SECONDS),
+            faults = broken_rules(
+                constant_torque_stop(FRONT_WHEEL, tyre, level * lock, speed, step, STANDSTILL_SECONDS),
                 FRONT_WHEEL.radius,
                 bool(level),
             )
@@ -201,7 +209,7 @@ def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tu
     what = (
         f"wrong stops of {runs} from 11.11 m/s, in steps below 1 ms from {SLOW_SPEED:g}: {len(surfaces)} surfaces, "
         f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(steps):g} to {1e3 * max(steps):g} ms{some}, "
-        f"watched for {WATCHED_SECONDS:g} s of standstill; wrong is no number, a wheel speed outside 0 to v / r, no "
+        f"watched for {STANDSTILL_SECONDS:g} s of standstill; wrong is no number, a wheel speed outside 0 to v / r, no "
         "stop, "
         f"or any motion after it: {'; '.join(wrong[:3])}"
     )
@@ -210,7 +218,7 @@ def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tu
     )
 
 
-def _locked_row() -> Row:
+def _locked_wheel_row() -> Row:
     errors = []
     for on in NAMED_SURFACES:
         tyre = friction_table(on)
@@ -227,7 +235,7 @@ def _locked_row() -> Row:
     ).at_most(1e-9, "asked for", "closed form")
 
 
-def _release_row() -> Row:
+def _wheel_release_row() -> Row:
     errors = []
     for on, step in product(NAMED_SURFACES, (1e-3, PAPER_STEP, 2e-2)):
         tyre, tables = friction_table(on)
@@ -247,7 +255,7 @@ def _release_row() -> Row:
     ).at_most(1e-3, "asked for: the time at which torque falls to that of sliding", "closed form")
 
 
-def _friction_row(level_count: int) -> Row:
+def _friction_level_row(level_count: int) -> Row:
     torque = 3.0 * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
     distances = [
         constant_torque_stop(FRONT_WHEEL, friction_table("ice", float(scale)), torque, 11.11).distance
@@ -263,7 +271,7 @@ def _friction_row(level_count: int) -> Row:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Error of the stopping distance by scheme and step."""
+    """Table of the error of the stopping distance by scheme and step."""
     lines = [
         (case, scheme, *(f"{100.0 * error:+.2g}{'*' if left else ''}" for error, left in errors))
         for case, curve in case_data["curves"].items()
@@ -278,7 +286,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Error over step, a panel per headline case."""
+    """Plot the error of the stopping distance over the step, in a panel for each headline case."""
     from models.drawing.figures import COLUMN_WIDTH, GREY, add_heading, legend_below, subplots
 
     figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 5.8), sharex=True, sharey=True)

@@ -1,4 +1,5 @@
-"""A braked vehicle on its suspension in both engines: loads, pitch and stops by closed forms, and the plane vehicle."""
+"""A braked vehicle on its suspension in Exudyn and MuJoCo: wheel loads, pitch and stops compared with closed forms and
+with the plane vehicle."""
 
 import math
 from pathlib import Path
@@ -11,7 +12,7 @@ from models.brake.controller import Command, Controller, Sample
 from models.brake.controllers.slip import SlipBangBang
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.sprung import PITCH
-from models.systems.braking.march import BrakingPath as Run
+from models.systems.braking.march import BrakingPath
 from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import TyreTable
@@ -30,26 +31,35 @@ from validation.common.rows import Observed, Row, System, Table
 TITLE = "Braking on the suspension"
 SYSTEM: System = "anti-lock"
 GENTLE_FRICTION, HARD_FRICTION = 0.05, 0.5
-"""Friction of locked wheels."""
-TURNING, HARDER = (200.0, 200.0, 100.0, 100.0), (600.0, 600.0, 200.0, 200.0)
-"""Torques (N m) of J-turns: no wheel locks."""
+"""Coefficients of friction of locked wheels."""
+TURN_TORQUES, HARD_TURN_TORQUES = (200.0, 200.0, 100.0, 100.0), (600.0, 600.0, 200.0, 200.0)
+"""Brake torques (N m) of the four wheels in J-turns; no wheel locks."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Locked wheels, a J-turn and its mirror image; both engines, the stiff limit and ice in the full share."""
+    """Rows of stops with locked wheels, and of a J-turn and its mirror image; a full run also compares Exudyn and
+    MuJoCo, the limit of a stiff suspension, and ice."""
     wet = table_of_surface("wet")
-    turns = [braked_vehicle(car(), wet, steer=steer).run(steady_torques(*HARDER), 6.0) for steer in (0.1, -0.1)]
-    rows = [*_locked_rows(GENTLE_FRICTION), *_mirror_rows(*turns)]
+    turns = [
+        braked_vehicle(car(), wet, steer=steer).run(steady_torques(*HARD_TURN_TORQUES), 6.0) for steer in (0.1, -0.1)
+    ]
+    rows = [*_locked_wheel_rows(GENTLE_FRICTION), *_mirror_rows(*turns)]
     data: dict[str, Any] = {"limit": []}
     if not quick:
-        rows += [*_locked_rows(HARD_FRICTION), *_engine_rows(wet), *_ice_rows(), *_order_rows(wet), _speed_row(wet)]
-        data["limit"] = limit(wet)
-        rows += _limit_rows(data["limit"])
+        rows += [
+            *_locked_wheel_rows(HARD_FRICTION),
+            *_engine_rows(wet),
+            *_ice_rows(),
+            *_step_rows(wet),
+            _simulation_speed_row(wet),
+        ]
+        data["limit"] = stiff_limit(wet)
+        rows += _stiff_limit_rows(data["limit"])
     return rows, data
 
 
-def _locked_rows(mu: float) -> list[Row]:
-    """Rows of the box and the car with locked wheels, from a speed at which the stop takes 4 s."""
+def _locked_wheel_rows(mu: float) -> list[Row]:
+    """Rows of stops of the box and the car with locked wheels, from a speed at which the stop takes 4 s."""
     speed, rows = 4.0 * mu * GRAVITY, []
     for name, vehicle_kind in (("box", box()), ("car", car())):
         vehicle, row_name = braked_vehicle(vehicle_kind, constant_friction(mu)), f"{name}.{mu:g}"
@@ -100,7 +110,7 @@ def _locked_rows(mu: float) -> list[Row]:
     return rows
 
 
-def _pitch_rows(mu: float, pitch: float, gained: float) -> list[Row]:
+def _pitch_rows(mu: float, pitch: float, axle_load_gain: float) -> list[Row]:
     exact, bound = pitch_and_transfer(mu * GRAVITY), 2e-2 if mu == HARD_FRICTION else 2e-3
     return [
         Observed(
@@ -110,12 +120,12 @@ def _pitch_rows(mu: float, pitch: float, gained: float) -> list[Row]:
             abs(value / theory - 1.0),
             "relative",
         ).at_most(bound, "closed form to first order in the pitch angle", "closed form")
-        for what, value, theory in zip(("pitch", "axle-loads"), (pitch, gained), exact, strict=True)
+        for what, value, theory in zip(("pitch", "axle-loads"), (pitch, axle_load_gain), exact, strict=True)
     ]
 
 
-def _mirror_rows(left_turn: Run, mirrored: Run) -> list[Row]:
-    apart = np.abs(left_turn.states[-1, 0, :3] * (1.0, -1.0, -1.0) - mirrored.states[-1, 0, :3]).max()
+def _mirror_rows(left_turn: BrakingPath, mirrored_turn: BrakingPath) -> list[Row]:
+    apart = np.abs(left_turn.states[-1, 0, :3] * (1.0, -1.0, -1.0) - mirrored_turn.states[-1, 0, :3]).max()
     return [
         Observed(
             "braking_suspension.mirror",
@@ -128,9 +138,11 @@ def _mirror_rows(left_turn: Run, mirrored: Run) -> list[Row]:
 
 
 def _engine_rows(wet_table: TyreTable) -> list[Row]:
-    """Rows of stops in both engines with steps of 1 ms."""
+    """Row: distance between Exudyn and MuJoCo at the end of a braked turn with steps of 1 ms."""
     ends = [
-        braked_vehicle(car(), wet_table, engine, 0.05, 1e-3).run(steady_torques(*HARDER), 15.0).states[-1, 0, :2]
+        braked_vehicle(car(), wet_table, engine, 0.05, 1e-3)
+        .run(steady_torques(*HARD_TURN_TORQUES), 15.0)
+        .states[-1, 0, :2]
         for engine in ("mujoco", "exudyn")
     ]
     return [
@@ -144,9 +156,11 @@ def _engine_rows(wet_table: TyreTable) -> list[Row]:
     ]
 
 
-def _order_rows(wet_table: TyreTable) -> list[Row]:
+def _step_rows(wet_table: TyreTable) -> list[Row]:
     distances = [
-        braked_vehicle(car(), wet_table, steer=0.05, substeps=n).run(steady_torques(*HARDER), 10.0).states[-1, 0, 0]
+        braked_vehicle(car(), wet_table, steer=0.05, substeps=n)
+        .run(steady_torques(*HARD_TURN_TORQUES), 10.0)
+        .states[-1, 0, 0]
         for n in (1, 4, 16)
     ]
     return [
@@ -168,7 +182,7 @@ def _order_rows(wet_table: TyreTable) -> list[Row]:
 
 
 def _ice_rows() -> list[Row]:
-    """Rows: the slip controller on ice with the suspension, compared with the plane vehicle with load transfer."""
+    """Rows: stop on ice by the slip controller, with the suspension and with the plane vehicle with load transfer."""
     ice, speed = table_of_surface("ice"), 11.11
     stops = [
         Stop(braked_vehicle(car(), ice, engine, substeps=4, gradient=150.0).run(SlipBangBang(wheels=4), speed))
@@ -193,23 +207,27 @@ def _ice_rows() -> list[Row]:
     ]
 
 
-class _Timed:
-    """Wrapper of a controller that records how many seconds the vehicle's model took before each sample."""
+class _TimedController:
+    """Wrapper of a controller that records the time (s) that the vehicle's model takes from each command to the next
+    sample."""
 
     def __init__(self, controller: Controller) -> None:
-        self.controller, self.answered, self.seconds = controller, math.nan, list[float]()
+        self.controller, self.command_time, self.seconds = controller, math.nan, list[float]()
 
     def sample(self, sample: Sample) -> Command:
-        """The controller's commands for a sample, timed."""
-        self.seconds.append(perf_counter() - self.answered)
+        """The controller's command for a sample; the time since the last command is recorded."""
+        self.seconds.append(perf_counter() - self.command_time)
         command = self.controller.sample(sample)
-        self.answered = perf_counter()
+        self.command_time = perf_counter()
         return command
 
 
-def _speed_row(wet_table: TyreTable) -> Row:
-    """Row on the computing time, from the fastest tenth of the samples, which other processes disturb least."""
-    vehicle, controller = braked_vehicle(car(), wet_table, substeps=4, gradient=150.0), _Timed(SlipBangBang(wheels=4))
+def _simulation_speed_row(wet_table: TyreTable) -> Row:
+    """Row of the simulation speed, from the fastest tenth of the samples, which other processes disturb least."""
+    vehicle, controller = (
+        braked_vehicle(car(), wet_table, substeps=4, gradient=150.0),
+        _TimedController(SlipBangBang(wheels=4)),
+    )
     vehicle.run(controller, 15.0, 2.0)
     speed = vehicle.sample / float(np.nanquantile(controller.seconds, 0.1))
     return Observed(
@@ -225,15 +243,16 @@ def _speed_row(wet_table: TyreTable) -> Row:
     )
 
 
-def limit(tyre: TyreTable) -> list[list[float]]:
+def stiff_limit(tyre: TyreTable) -> list[list[float]]:
     """Distance (m) between the ends of a J-turn of the box on its suspension and of the plane vehicle with load
-    transfer, for three stiffnesses. Rows: stiffness factor, distance. The wheels have hardly any inertia."""
+    transfer, for three stiffness factors. Each row of the result: stiffness factor, distance. The wheels have hardly
+    any inertia."""
     distances = []
     for stiffer in (1.0, 10.0, 100.0):
         stiff_box = box(stiffer, 0.01)
         ends = [
             braked_vehicle(stiff_box, tyre, engine, 0.015, substeps=4)
-            .run(steady_torques(*TURNING), 10.0)
+            .run(steady_torques(*TURN_TORQUES), 10.0)
             .states[-1, 0, :2]
             for engine in ("mujoco", None)
         ]
@@ -241,7 +260,7 @@ def limit(tyre: TyreTable) -> list[list[float]]:
     return distances
 
 
-def _limit_rows(ends: list[list[float]]) -> list[Row]:
+def _stiff_limit_rows(ends: list[list[float]]) -> list[Row]:
     return [
         Observed(
             "braking_suspension.limit",
@@ -255,7 +274,7 @@ def _limit_rows(ends: list[list[float]]) -> list[Row]:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """The limit of a stiff suspension."""
+    """Table of the limit of a stiff suspension."""
     rows = tuple((f"{stiffer:g}", f"{apart:.6f}") for stiffer, apart in case_data["limit"])
     return [
         Table(

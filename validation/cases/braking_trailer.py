@@ -1,4 +1,5 @@
-"""A car that brakes with a caravan, on suspensions: levers, locked wheels, plain equations, control, and faults."""
+"""A car that brakes with a caravan, both on suspensions: statics, locked wheels, independently written equations, slip
+control, and planted faults."""
 
 from pathlib import Path
 from typing import Any
@@ -18,18 +19,18 @@ TITLE = "Braking with a trailer on the suspension"
 SYSTEM: System = "anti-lock"
 ENGINES = ("mujoco", "exudyn")
 QUICK_DURATION, FULL_DURATION = 0.05, 1.0
-"""s of a stop, in the quick share and in the full one."""
-STATICS = 1e-3
-"""Of the closed form of a caravan that brakes alone, which knows no lean: pitched by 2.7 mrad its centre of mass, half
-a metre above the ball, comes ahead by 5e-4 of its arm."""
+"""Duration (s) of a stop, in the quick and in the full run."""
+STATICS_TOLERANCE = 1e-3
+"""Relative tolerance of the closed form of a caravan that brakes alone. The closed form has no pitch; a pitch of 2.7
+mrad moves the centre of mass, half a metre above the ball, forward by 5e-4 of its lever arm."""
 ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Loads, and accelerations and a piece of a stop in one engine; in the full run locked wheels, control, faults, the
-    train, both routes of its springs, and longer stops in both engines."""
+    """Rows of axle loads, and of accelerations and stops. A quick run has one engine; a full run also has locked
+    wheels, slip control, planted faults, and more vehicles in Exudyn and MuJoCo."""
     vehicles, engines = (("caravan",), ENGINES[:1]) if quick else (tuple(whole.TRAINS), ENGINES)
-    rows = [_levers_row()]
+    rows = [_axle_loads_row()]
     rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
     rows += [
         _stop_row(vehicle, engine, QUICK_DURATION if quick else FULL_DURATION)
@@ -37,11 +38,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         for engine in engines
     ]
     if not quick:
-        rows += [_locked_row(), *_alone_rows(), *_control_rows(), *_fault_rows()]
+        rows += [_locked_wheels_row(), *_caravan_brakes_rows(), *_slip_control_rows(), *_fault_rows()]
     return rows, {}
 
 
-def _levers_row() -> Row:
+def _axle_loads_row() -> Row:
     car = whole.towing_car()
     path = braked_vehicle(car, constant_friction(0.1)).run(steady_torques(*6 * (0.0,)), 2.0, 0.05)
     front, rear, axle, _ = loads_and_lengths(car.handling)
@@ -80,7 +81,7 @@ def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
     ).at_most(1e-10, "the same steps, in another code from the valves to the bodies", "native")
 
 
-def _locked_row() -> Row:
+def _locked_wheels_row() -> Row:
     stopping_way, wanted = train.locked_stop()
     return Observed(
         "braking_trailer.locked",
@@ -91,7 +92,7 @@ def _locked_row() -> Row:
     ).at_most(1e-3, "wheels lock within a millisecond, and the car leans ahead by less than one", "closed form")
 
 
-def _alone_rows() -> list[Row]:
+def _caravan_brakes_rows() -> list[Row]:
     errors = train.caravan_errors()
     quantities = {
         "deceleration": "deceleration of a train whose caravan brakes alone, wheels locked",
@@ -101,13 +102,15 @@ def _alone_rows() -> list[Row]:
     return [
         Observed(
             f"braking_trailer.alone.{key}", SYSTEM, f"{what} / closed form - 1", abs(float(getattr(errors, key))), ""
-        ).at_most(STATICS, "moments about the ball and momentum of both; springs lean by 2.7 mrad", "closed form")
+        ).at_most(
+            STATICS_TOLERANCE, "moments about the ball and momentum of both; springs lean by 2.7 mrad", "closed form"
+        )
         for key, what in quantities.items()
     ]
 
 
-def _control_rows() -> list[Row]:
-    """Rows: slip control of all six wheels on ice, compared with locked wheels."""
+def _slip_control_rows() -> list[Row]:
+    """Rows: stop on ice with slip control of all six wheels, compared with locked wheels."""
     ice, speed = table_of_surface("ice"), 11.11
     vehicle = braked_vehicle(whole.towing_car(), ice, substeps=4, gradient=150.0)
     controlled, locked = (
@@ -133,13 +136,16 @@ def _control_rows() -> list[Row]:
 
 
 def _fault_rows() -> list[Row]:
-    """Rows: faults planted in the force table that both engines share."""
+    """Rows: faults planted in the force table that Exudyn and MuJoCo share must be caught."""
     pulled = train.relative_difference(train.pulled_caravan(train.hold_on_to_the_car), train.pulled_by_levers())
     turned = whole.towing_car.__wrapped__()
     keep_to_the_car(turned.handling)
     apart = whole.relative_difference(whole.accelerations(turned, "exudyn", 5), whole.plain_accelerations("caravan", 5))
     seen = {
-        "brakes": ("brakes of the caravan hold on to the car, by the load of its axle", abs(pulled.load) > STATICS),
+        "brakes": (
+            "brakes of the caravan hold on to the car, by the load of its axle",
+            abs(pulled.load) > STATICS_TOLERANCE,
+        ),
         "heading": ("wheels of the caravan keep to the car's heading, by plain code", apart > 1e-12),
     }
     return [

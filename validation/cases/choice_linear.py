@@ -1,4 +1,5 @@
-"""Effects of linear stationary ride scenes chosen within a tolerance: is the choice right, and what does it save?"""
+"""Effects chosen for linear stationary ride scenes within a tolerance: is each choice right, and how many force calls
+does it save?"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,97 +17,100 @@ from validation.choice.price_of_choice import whole_car
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.ride.drawn_rides import DrawnRide, drawn_ride
 
-SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "ride_choice.toml"
-"""The published half car."""
+HALF_CAR_SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "ride_choice.toml"
+"""Scene file of the published half car."""
 TITLE = "Effects that a ride scene calls for, chosen with a certificate"
 SYSTEM: System = "effects"
-SCENES_DRAWN, SECOND_ROUTE = 40, 10
-"""Scenes, three of four of detailed vehicles; how many are judged by the frequency route, too."""
-DRAWS = 8
-"""Random speeds and parameters at which a choice is looked at."""
+SCENE_COUNT, FREQUENCY_JUDGED_COUNT = 40, 10
+"""Number of random scenes, three of four with detailed vehicles; and number of these scenes that are also judged by
+frequency responses."""
+NEARBY_COUNT = 8
+"""Number of random speeds, and of random parameter sets, at which a choice is checked."""
 TOLERANCE = 0.02
-"""Of every other scene; the others have their own, from 0.5 to 10 %."""
+"""Relative tolerance of every other scene; the others have random tolerances from 0.5 to 10 %."""
 QUICK_SEEDS = (2, 5)
-"""Seeds of the quick share, in both of which effects are left out."""
-PREDICTED_CONFIRMED = ("predicted", "confirmed")
-JUDGED_CHANGES = (1e-4, 0.05)
-"""Confirmed changes whose predictions are judged: larger than rounding could be blamed for, below 5 %."""
+"""Seeds of the random scenes of a quick run; in both scenes effects are left out."""
+CHANGE_STAGES = ("predicted", "confirmed")
+JUDGED_RANGE = (1e-4, 0.05)
+"""Smallest and largest relative change whose prediction is judged: above rounding errors, and below 5 %."""
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A random scene with its choice of effects and what independent routes say of it. identity: largest error of the
-    identity that relates covariance and adjoint; by_frequency: changes (quantities,) by frequency responses, or None.
+class JudgedChoice:
+    """A choice of effects for a random scene, with its results by independent methods. identity_error : largest error
+    of the identity that relates covariance and adjoint; frequency_changes (quantities,) : changes by frequency
+    responses, or None.
 
-    nearby : worst change at random speeds and with random parameters, by the tolerance; measured : saving by the
-    covariance of what runs sample.
+    nearby_ratio : largest change at random speeds and with random parameters, divided by the tolerance;
+    sampled_saving : saving by the covariance of sampled runs.
     """
 
     scene: DrawnRide
     choice: RideChoice
-    identity: float
-    by_frequency: np.ndarray | None
-    nearby: float
-    measured: float
+    identity_error: float
+    frequency_changes: np.ndarray | None
+    nearby_ratio: float
+    sampled_saving: float
 
     @property
     def saving(self) -> float:
-        """Ratio of the calls at equal accuracy of the complete scene to those of the reduced scene."""
+        """Number of force calls that the complete scene needs, divided by that of the reduced scene, at equal
+        accuracy."""
         return self.choice.cost_before.calls / self.choice.cost_after.calls
 
     @property
-    def honest(self) -> bool:
-        """False if the choice claims to keep the tolerance and another route finds that it does not."""
-        changes = self.choice.confirmed_change if self.by_frequency is None else self.by_frequency
+    def is_honest(self) -> bool:
+        """False if the choice claims to keep the tolerance although frequency responses show that it does not."""
+        changes = self.choice.confirmed_change if self.frequency_changes is None else self.frequency_changes
         return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
-def judged(scene: DrawnRide, on_second: bool) -> Judged:
+def judged_choice_of(scene: DrawnRide, by_frequency: bool) -> JudgedChoice:
     """Choose effects for a scene, then check the choice by the identity of covariance and adjoint and, if
-    ``on_second``, by frequency responses.
-    """
+    ``by_frequency``, by frequency responses."""
     chooser = asked_speeds(scene)
     choice, full_scene = chooser.choose(), chooser.full_scenes[0]
     rest = full_scene.reduced(reduced_without(scene.scene, choice.left_out))
     two, deviation = Screen(full_scene.full, chooser.rows).certificate_sides(rest)
     chosen, none = frozenset(choice.left_out), frozenset[Effect]()
-    return Judged(
+    return JudgedChoice(
         scene,
         choice,
         float(abs(two / deviation - 1).max()),
-        changes_by_frequency(chooser, choice) if on_second else None,
-        worst_nearby(chooser, chosen, DRAWS if chosen else 0, DRAWS),
+        changes_by_frequency(chooser, choice) if by_frequency else None,
+        worst_nearby(chooser, chosen, NEARBY_COUNT if chosen else 0, NEARBY_COUNT),
         measured_step(chooser, chosen) / measured_step(chooser, none) if chosen else 1.0,
     )
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Forty scenes of random vehicles and ranges of speed, and the published pair; quick: two of the first and the
-    pair.
-    """
-    seeds = QUICK_SEEDS if quick else range(SCENES_DRAWN)
+    """Rows of forty scenes of random vehicles and speed ranges, and of the published half car. A quick run has two
+    random scenes and the half car."""
+    seeds = QUICK_SEEDS if quick else range(SCENE_COUNT)
     choices = [
-        judged(
-            drawn_ride(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0), quick or seed < SECOND_ROUTE
+        judged_choice_of(
+            drawn_ride(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0),
+            quick or seed < FREQUENCY_JUDGED_COUNT,
         )
         for seed in seeds
     ]
-    rows = [*_kept_rows(choices), _identity_row(choices), *_equal_rows(choices)]
+    rows = [*_tolerance_rows(choices), _adjoint_identity_row(choices), *_nearby_and_saving_rows(choices)]
     if not quick:
-        rows += [_prediction_row(choices), _saving_row(choices), *_count_rows()]
-    pair_rows, pair = _pair()
+        rows += [_prediction_row(choices), _saving_row(choices), *_solver_count_rows()]
+    pair_rows, pair = _half_car_rows()
     return [*rows, *pair_rows, *_activity_rows()], {
         "scenes": [_summary_of_choice(choice) for choice in choices],
         "pair": pair,
     }
 
 
-def _kept_rows(choices: list[Judged]) -> list[Row]:
+def _tolerance_rows(choices: list[JudgedChoice]) -> list[Row]:
     share = float(np.mean([judged_choice.choice.within_tolerance for judged_choice in choices]))
-    lies = sum(not judged_choice.honest for judged_choice in choices)
-    second = [judged_choice for judged_choice in choices if judged_choice.by_frequency is not None]
+    lies = sum(not judged_choice.is_honest for judged_choice in choices)
+    second = [judged_choice for judged_choice in choices if judged_choice.frequency_changes is not None]
     gap = max(
-        float(abs(judged_choice.by_frequency - judged_choice.choice.confirmed_change).max()) for judged_choice in second
+        float(abs(judged_choice.frequency_changes - judged_choice.choice.confirmed_change).max())
+        for judged_choice in second
     )
     return [
         Observed(
@@ -136,14 +140,14 @@ def _kept_rows(choices: list[Judged]) -> list[Row]:
     ]
 
 
-def _prediction_row(choices: list[Judged]) -> Row:
-    """Row: ratios of predicted to confirmed changes, over all choices and quantities whose change is above zero and
-    below 5 %."""
+def _prediction_row(choices: list[JudgedChoice]) -> Row:
+    """Row: share of predicted changes that are within a factor of 2 of the confirmed ones, over all choices and all
+    quantities whose change is above rounding and below 5 %."""
     predicted, confirmed_ = (
         np.concatenate([getattr(judged_choice.choice, f"{stage}_change") for judged_choice in choices])
-        for stage in PREDICTED_CONFIRMED
+        for stage in CHANGE_STAGES
     )
-    is_judged = (abs(confirmed_) > JUDGED_CHANGES[0]) & (abs(confirmed_) < JUDGED_CHANGES[1])
+    is_judged = (abs(confirmed_) > JUDGED_RANGE[0]) & (abs(confirmed_) < JUDGED_RANGE[1])
     ratios = predicted[is_judged] / confirmed_[is_judged]
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0)))
     return Observed(
@@ -160,33 +164,33 @@ def _prediction_row(choices: list[Judged]) -> Row:
     )
 
 
-def _identity_row(choices: list[Judged]) -> Row:
+def _adjoint_identity_row(choices: list[JudgedChoice]) -> Row:
     return Observed(
         "choice_linear.identity",
         SYSTEM,
         "difference of the variance of what is left, from the whole scene's covariance and the "
         "reduced adjoint, from the reduced covariance, worst of all scenes",
-        max(judged_choice.identity for judged_choice in choices),
+        max(judged_choice.identity_error for judged_choice in choices),
         "",
     ).at_most(1e-12, "asked; an identity", "closed form")
 
 
-def _equal_rows(choices: list[Judged]) -> list[Row]:
-    """Rows over all scenes: whether the tolerance holds near each scene as well, and the saving, both by routes that
-    the choice itself does not use."""
+def _nearby_and_saving_rows(choices: list[JudgedChoice]) -> list[Row]:
+    """Rows over all scenes: whether the tolerance also holds at other speeds and with changed parameters, and the
+    saving. Both are computed by methods that the choice does not use."""
     told_in_advance = sum(
         bool(judged_choice.choice.said) and not judged_choice.choice.left_out for judged_choice in choices
     )
-    gaps = [abs(judged_choice.saving / judged_choice.measured - 1.0) for judged_choice in choices]
+    gaps = [abs(judged_choice.saving / judged_choice.sampled_saving - 1.0) for judged_choice in choices]
     saving = [judged_choice for judged_choice in choices if judged_choice.choice.left_out]
     return [
         Observed(
             "choice_linear.nearby",
             SYSTEM,
             f"largest ratio of the change to the tolerance in {len(saving)} of {len(choices)} scenes in "
-            f"which effects were left out, {DRAWS} random speeds each, every mass, stiffness and "
+            f"which effects were left out, {NEARBY_COUNT} random speeds each, every mass, stiffness and "
             "damping up to 5 % off at random",
-            max(judged_choice.nearby for judged_choice in choices),
+            max(judged_choice.nearby_ratio for judged_choice in choices),
             "",
         ).at_most(1.0, "the tolerance holds nearby, too, or nothing is left out", "native"),
         Observed(
@@ -222,7 +226,7 @@ def _equal_rows(choices: list[Judged]) -> list[Row]:
     ]
 
 
-def _saving_row(choices: list[Judged]) -> Row:
+def _saving_row(choices: list[JudgedChoice]) -> Row:
     saved = [judged_choice.saving for judged_choice in choices if judged_choice.scene.tolerance == TOLERANCE]
     return Observed(
         "choice_linear.saving",
@@ -234,9 +238,9 @@ def _saving_row(choices: list[Judged]) -> Row:
     ).beside("", "it depends on what is asked of which vehicle: a wheel's force needs the wheel", "none")
 
 
-def _count_rows() -> list[Row]:
-    """Rows: numbers of eigenvalue problems and Lyapunov equations that a choice solves for a car of 19 degrees of
-    freedom."""
+def _solver_count_rows() -> list[Row]:
+    """Rows: numbers of eigenvalue problems and of Lyapunov equations that a choice solves for a car of 19 degrees of
+    freedom, divided by the square of its number of effects."""
     chooser = Chooser.of(whole_car())
     chooser.choose()
     pairs = len(chooser.effects) ** 2
@@ -256,14 +260,14 @@ def _count_rows() -> list[Row]:
     ]
 
 
-def _paper() -> Chooser:
-    return Chooser.of(load(SCENE))
+def _half_car_chooser() -> Chooser:
+    return Chooser.of(load(HALF_CAR_SCENE))
 
 
-def _pair() -> tuple[list[Row], dict[str, Any]]:
-    """Rows on wheel mass and tyre damper of the published half car: leaving out one alone spoils the result, leaving
-    out both hardly changes it."""
-    chooser = _paper()
+def _half_car_rows() -> tuple[list[Row], dict[str, Any]]:
+    """Rows on wheel mass and tyre damper of the published half car: leaving out the wheel mass alone spoils the result;
+    leaving out both hardly changes it."""
+    chooser = _half_car_chooser()
     choice = chooser.choose()
     named = {effect.name: effect for effect in choice.candidates}
     mass, damper = named["mass of all wheels"], named["tyre damping"]
@@ -301,7 +305,7 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
 def _activity_rows() -> list[Row]:
     """Rows: the pitch inertia has a large energy activity, yet locking the pitch does not change the bounce of a
     symmetric body."""
-    chooser = _paper()
+    chooser = _half_car_chooser()
     watts = activity_by_element(chooser.full_scenes[0])
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}
     share = finite["inertia body ry"] / sum(finite.values())
@@ -326,7 +330,7 @@ def _activity_rows() -> list[Row]:
     ]
 
 
-def _summary_of_choice(judged_choice: Judged) -> dict[str, Any]:
+def _summary_of_choice(judged_choice: JudgedChoice) -> dict[str, Any]:
     choice = judged_choice.choice
     return {
         "tolerance": judged_choice.scene.tolerance,
@@ -334,8 +338,8 @@ def _summary_of_choice(judged_choice: Judged) -> dict[str, Any]:
         "confirmed": choice.confirmed_change.tolist(),
         "saving": judged_choice.saving,
         "kept": choice.within_tolerance,
-        "nearby": judged_choice.nearby,
-        "measured": judged_choice.measured,
+        "nearby": judged_choice.nearby_ratio,
+        "measured": judged_choice.sampled_saving,
         "said": list(choice.said),
         "left out": len(choice.left_out),
         "of": len(choice.candidates),
@@ -344,7 +348,7 @@ def _summary_of_choice(judged_choice: Judged) -> dict[str, Any]:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """The choices by how they fared."""
+    """Table of percentiles of the saving over all random scenes."""
     scenes = case_data["scenes"]
     saved = np.array([judged_choice["saving"] for judged_choice in scenes])
     rows = tuple((f"{share:g} %", f"{np.percentile(saved, share):.3g}") for share in (10, 25, 50, 75, 90))
@@ -356,13 +360,13 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Plot predicted over confirmed changes, and the saved computing time over the tolerance."""
+    """Plot predicted over confirmed changes, and the saving in force calls over the tolerance."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     predicted, confirmed_ = (
         100 * abs(np.array([v for judged_choice in case_data["scenes"] for v in judged_choice[key]]))
-        for key in PREDICTED_CONFIRMED
+        for key in CHANGE_STAGES
     )
     ends = np.array([1e-4, 12.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
@@ -389,4 +393,4 @@ FIGURE_TEXT = (
     "as far as the tolerance allows, predicted from one covariance and one adjoint solve of the whole scene, and "
     "confirmed by the exact solve of what is left, between the speeds and with parameters off."
 )
-"""Text of the figure."""
+"""Caption of the figure."""

@@ -1,4 +1,5 @@
-"""Effects of scenes that are run in time, chosen within a tolerance: is the choice right, and what does it save?"""
+"""Effects chosen within a tolerance for scenes that are simulated in time: is each choice right, and how many force
+calls does it save?"""
 
 from pathlib import Path
 
@@ -16,72 +17,73 @@ from validation.ride.drawn_rides import COPIES, BentRide, drawn_bent
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
-COUNTS = {"pitch-plane": 22, "wheelset": 3, "braking": 3, "ride": 7}
-"""Scenes drawn of each system."""
+SCENE_COUNTS = {"pitch-plane": 22, "wheelset": 3, "braking": 3, "ride": 7}
+"""Number of random scenes of each system."""
 ENGINES = {
     "pitch-plane": ("reference", "mujoco"),
     "wheelset": ("reference", "mujoco", "exudyn"),
     "braking": ("mujoco", "reference", "reference"),
     "ride": ("reference",),
 }
-"""Implementations that take turns."""
+"""Engines of each system that take turns over its scenes."""
 FRESH_COPIES_RATIO, FRESH_SEED = 4, 77
-"""Rides are judged by so many times as many copies as they were chosen with, on roads of this seed."""
-NOISY_RIDE, FINE_TOLERANCE = 4, 0.005
-"""A ride, and a tolerance for which its copies are too few if they are the fewest."""
-RESAMPLED, UNSURE = 4000, 0.0015
-"""Of copies, to tell what they are sure of: this quantile is left below."""
-QUICK_SCENES = (0, 2, 3)
-"""Scenes of the pitch plane alone in the quick share, by both implementations."""
-JUDGED_CHANGES = (1e-4, 0.05)
-"""Confirmed changes whose predictions are judged: as for linear scenes."""
+"""Factor on the number of Monte Carlo copies with which a choice for a ride is judged, and the seed of the roads of
+these copies."""
+UNDERSAMPLED_SEED, FINE_TOLERANCE = 4, 0.005
+"""Seed of a random ride, and a tolerance that is too fine for the fewest Monte Carlo copies."""
+RESAMPLE_COUNT, LOW_QUANTILE = 4000, 0.0015
+"""Number of bootstrap samples of the copies, and the quantile of the resampled changes that counts as significant."""
+QUICK_SEEDS = (0, 2, 3)
+"""Seeds of the pitch-plane scenes in a quick run, which has no other system."""
+JUDGED_RANGE = (1e-4, 0.05)
+"""Smallest and largest relative change whose prediction is judged, as for linear scenes."""
 
 
-def judged(system: str, seed: int) -> JudgedByRuns:
+def judge_choice(system: str, seed: int) -> JudgedByRuns:
     """Choose effects for the random scene of a seed, and judge the choice."""
     if system == "ride":
-        return judged_ride(drawn_bent(seed))
+        return judge_ride(drawn_bent(seed))
     return judged_of(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
-def judged_ride(asked: BentRide) -> JudgedByRuns:
-    """Choose effects for a ride, then compare the complete and the reduced vehicle on new roads that the choice did not
-    use."""
+def judge_ride(bent_ride: BentRide) -> JudgedByRuns:
+    """Choose effects for a ride with nonlinear springs, then compare the complete and the reduced vehicle on new roads
+    that the choice did not use."""
     engine = ENGINES["ride"][0]
-    choice = Chooser(asked.opened(), engine, list(asked.quantities), asked.tolerance).choose()
-    fresh = Variants(asked.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
+    choice = Chooser(bent_ride.opened(), engine, list(bent_ride.quantities), bent_ride.tolerance).choose()
+    fresh = Variants(bent_ride.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
     full_scene, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
     if full_scene is None or rest is None:
-        return JudgedByRuns("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
-    again = [_least_certain_change(full_scene.of(name).cases[0], rest.of(name).cases[0]) for name in asked.quantities]
-    return JudgedByRuns("ride", engine, asked, choice, np.array(again))
+        return JudgedByRuns("ride", engine, bent_ride, choice, np.full(len(bent_ride.quantities), np.inf))
+    again = [_significant_change(full_scene.of(name).cases[0], rest.of(name).cases[0]) for name in bent_ride.quantities]
+    return JudgedByRuns("ride", engine, bent_ride, choice, np.array(again))
 
 
-def _least_certain_change(full_mean_squares: np.ndarray, reduced: np.ndarray) -> float:
+def _significant_change(full_mean_squares: np.ndarray, reduced_mean_squares: np.ndarray) -> float:
     """Smallest relative change of a standard deviation that is significant, by resampling the mean squares (m,) of the
     Monte Carlo copies."""
     picked = np.random.default_rng(FRESH_SEED).integers(
-        len(full_mean_squares), size=(RESAMPLED, len(full_mean_squares))
+        len(full_mean_squares), size=(RESAMPLE_COUNT, len(full_mean_squares))
     )
-    changes = np.abs(np.sqrt(reduced[picked].mean(axis=1) / full_mean_squares[picked].mean(axis=1)) - 1.0)
-    return float(np.quantile(changes, UNSURE))
+    changes = np.abs(np.sqrt(reduced_mean_squares[picked].mean(axis=1) / full_mean_squares[picked].mean(axis=1)) - 1.0)
+    return float(np.quantile(changes, LOW_QUANTILE))
 
 
 @allowing_breaches("random scenes: whether what is left changes them as foretold is judged")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Random scenes of four systems; the quick share has three of the pitch plane."""
-    seeds = {"pitch-plane": QUICK_SCENES} if quick else {system: range(count) for system, count in COUNTS.items()}
-    choices = [judged(system, seed) for system, seeds_of in seeds.items() for seed in seeds_of]
+    """Rows of random scenes of four systems; a quick run has three scenes of the pitch plane."""
+    seeds = {"pitch-plane": QUICK_SEEDS} if quick else {system: range(count) for system, count in SCENE_COUNTS.items()}
+    choices = [judge_choice(system, seed) for system, seeds_of in seeds.items() for seed in seeds_of]
     rows = [
-        *_row_of_kept_tolerances(choices),
-        _predictions(choices, quick),
-        *(row for system in seeds for row in _saving(choices, system)),
+        *_kept_tolerance_rows(choices),
+        _prediction_row(choices, quick),
+        *(row for system in seeds for row in _saving_rows(choices, system)),
     ]
-    rows += [] if quick else [_refused()]
+    rows += [] if quick else [_refusal_row()]
     return rows, {"scenes": [_summary_of_choice(judged_choice) for judged_choice in choices], "systems": list(seeds)}
 
 
-def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
+def _kept_tolerance_rows(choices: list[JudgedByRuns]) -> list[Row]:
     kept_share = float(
         np.mean([judged_choice.choice.within_tolerance and judged_choice.is_honest for judged_choice in choices])
     )
@@ -103,10 +105,10 @@ def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
     ]
 
 
-def _refused() -> Row:
-    """Row: a choice is refused for a ride with few copies and a fine tolerance, since random scatter could exceed this
+def _refusal_row() -> Row:
+    """Row: a choice is refused for a ride with few copies and a fine tolerance, since random scatter could exceed the
     tolerance."""
-    asked, outcome = drawn_bent(NOISY_RIDE), "a choice"
+    asked, outcome = drawn_bent(UNDERSAMPLED_SEED), "a choice"
     try:
         Chooser(asked.opened(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE).choose()
     except InputError as error:
@@ -122,18 +124,18 @@ def _refused() -> Row:
     )
 
 
-def _pairs(choices: list[JudgedByRuns]) -> np.ndarray:
-    """Predicted and confirmed changes (n, 2) of all quantities whose change is significant and below 5 %."""
+def _predicted_and_confirmed(choices: list[JudgedByRuns]) -> np.ndarray:
+    """Predicted and confirmed relative changes (n, 2) of all quantities whose confirmed change is in JUDGED_RANGE."""
     pairs = [
         (p, c)
         for judged_choice in choices
         for p, c in zip(judged_choice.choice.predicted_change, judged_choice.choice.confirmed_change, strict=True)
     ]
-    return np.array([pair for pair in pairs if JUDGED_CHANGES[0] < pair[1] < JUDGED_CHANGES[1]]).reshape(-1, 2)
+    return np.array([pair for pair in pairs if JUDGED_RANGE[0] < pair[1] < JUDGED_RANGE[1]]).reshape(-1, 2)
 
 
-def _predictions(choices: list[JudgedByRuns], quick: bool) -> Row:
-    ratios = np.divide(*_pairs(choices).T)
+def _prediction_row(choices: list[JudgedByRuns], quick: bool) -> Row:
+    ratios = np.divide(*_predicted_and_confirmed(choices).T)
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0))) if len(ratios) else 1.0
     name, asked = "choice_nonlinear.predictions", "asked: within a factor of 2"
     quantity = f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones"
@@ -144,7 +146,7 @@ def _predictions(choices: list[JudgedByRuns], quick: bool) -> Row:
     return Observed(name, SYSTEM, quantity, share, "").within(1.0, 0.05, asked, "none")
 
 
-def _saving(choices: list[JudgedByRuns], system: str) -> list[Row]:
+def _saving_rows(choices: list[JudgedByRuns], system: str) -> list[Row]:
     of_system = [judged_choice for judged_choice in choices if judged_choice.system == system]
     calls = np.array([judged_choice.choice.calls for judged_choice in of_system], float)
     seconds = np.array([judged_choice.choice.seconds for judged_choice in of_system])
@@ -194,7 +196,7 @@ def _summary_of_choice(judged_choice: JudgedByRuns) -> Saved:
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Savings by system, and which effects went how often."""
+    """Table of savings by system, and of how often each effect was left out."""
     rows = []
     for system in case_data["systems"]:
         of_system = [judged_choice for judged_choice in case_data["scenes"] if judged_choice["system"] == system]
@@ -222,7 +224,7 @@ def tables(case_data: Saved) -> list[Table]:
 
 
 def draw(case_data: Saved) -> Drawn:
-    """Plot predicted over confirmed changes, and savings over the tolerance."""
+    """Plot predicted over confirmed changes, and savings in force calls over the tolerance."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
@@ -264,4 +266,4 @@ FIGURE_TEXT = (
     "quantities can do without are left out and steps lengthened as far as the tolerance allows, predicted from runs "
     "without one and two effects in steps as long as hardly matters, and confirmed by the whole run."
 )
-"""Text of the figure."""
+"""Caption of the figure."""

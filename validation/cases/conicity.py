@@ -1,4 +1,5 @@
-"""Equivalent conicity: closed forms of Klingel's nonlinear wave, and the limits of EN 15302 on its reference tables."""
+"""Equivalent conicity of wheel and rail profiles: closed forms of Klingel's nonlinear wave, and the limits of EN 15302
+for its reference profiles."""
 
 import math
 from pathlib import Path
@@ -16,26 +17,27 @@ from validation.common.scenes import data_folder
 
 TITLE = "Equivalent conicity by EN 15302"
 SYSTEM: System = "contact"
-FOLDER, PROFILES = "en15302", ("E1", "E2", "E3", "E4")
-SPACING = 0.1
-"""mm between the rows of the standard's tables, which lie symmetrically."""
-LARGEST_ERROR = 0.003
-"""Error asked for; the standard prints three digits."""
-ROUNDING = 1e-11
-Y = np.linspace(-8.0, 8.0, 161)
-"""mm"""
+TABLE_FOLDER, PROFILE_NAMES = "en15302", ("E1", "E2", "E3", "E4")
+TABLE_SPACING = 0.1
+"""Lateral distance (mm) between the rows of the standard's tables, which are symmetric about zero."""
+CONICITY_TOLERANCE = 0.003
+"""Largest error of the conicity that is asked for; the standard prints three digits."""
+ROUNDING_TOLERANCE = 1e-11
+LATERAL_SHIFTS = np.linspace(-8.0, 8.0, 161)
+"""Lateral displacements (mm) of the wheelset in the tables of the closed forms."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Closed forms and the standard's tables; in full also wheels of profiles that are not alike."""
-    rows = [*_closed_forms(), _cubic(), _refused()]
+    """Rows of the closed forms and of the standard's profiles; a full run also has a wheelset with wheels of unequal
+    radii."""
+    rows = [*_closed_form_rows(), _cubic_difference_row(), _refusal_row()]
     saved_data: dict[str, Any] = {}
-    for name in PROFILES:
-        of_standard, saved = _standard(name)
+    for name in PROFILE_NAMES:
+        of_standard, saved = _reference_profile_rows(name)
         rows += of_standard
         saved_data |= saved
     if not quick:
-        rows += _mirrored_profiles()
+        rows += _mirror_rows()
     return rows, {"standard": saved_data}
 
 
@@ -43,22 +45,36 @@ def _relative_error(wave_period: float, exact: float) -> float:
     return abs(wave_period / exact - 1.0)
 
 
-def _closed_form_row(id: str, quantity: str, off: float, tolerance_reason: str) -> Row:
-    return Observed(f"conicity.{id}", SYSTEM, quantity, off, "").at_most(ROUNDING, tolerance_reason, "closed form")
+def _closed_form_row(row_name: str, quantity: str, error: float, tolerance_reason: str) -> Row:
+    return Observed(f"conicity.{row_name}", SYSTEM, quantity, error, "").at_most(
+        ROUNDING_TOLERANCE, tolerance_reason, "closed form"
+    )
 
 
-def _closed_forms() -> list[Row]:
-    """Rows on tables of rolling radii that are linear between their rows, so that errors are due to rounding alone."""
-    cone = max(abs(equivalent_conicity(Y, 0.1 * Y, a) / 0.05 - 1.0) for a in (0.1, 3.0, 8.0))
-    wave = klingel_wave(RollingRadiusTable(Y, 0.1 * Y + 1.0 * 0.1), 3.0)
-    tread = np.where(np.abs(Y) < 3.0, 0.05 * Y, np.sign(Y) * (0.15 + 0.8 * (np.abs(Y) - 3.0)))
+def _closed_form_rows() -> list[Row]:
+    """Rows on tables of the difference of rolling radii that are exact between their rows, so that errors are due to
+    rounding alone."""
+    cone = max(abs(equivalent_conicity(LATERAL_SHIFTS, 0.1 * LATERAL_SHIFTS, a) / 0.05 - 1.0) for a in (0.1, 3.0, 8.0))
+    wave = klingel_wave(RollingRadiusTable(LATERAL_SHIFTS, 0.1 * LATERAL_SHIFTS + 1.0 * 0.1), 3.0)
+    tread = np.where(
+        np.abs(LATERAL_SHIFTS) < 3.0,
+        0.05 * LATERAL_SHIFTS,
+        np.sign(LATERAL_SHIFTS) * (0.15 + 0.8 * (np.abs(LATERAL_SHIFTS) - 3.0)),
+    )
     bent = max(
-        _relative_error(klingel_wave(RollingRadiusTable(Y, tread), a).period, two_slopes(0.05, 0.8, 3.0, a))
+        _relative_error(
+            klingel_wave(RollingRadiusTable(LATERAL_SHIFTS, tread), a).period, two_slope_period(0.05, 0.8, 3.0, a)
+        )
         for a in (3.1, 5.0, 7.9)
     )
     jump = klingel_wave(RollingRadiusTable(np.array([-5.0, 0.0, 0.0, 5.0]), np.array([-0.3, -0.3, 0.3, 0.3])), 2.0)
     left, right = 0.1, 0.4
-    uneven = klingel_wave(RollingRadiusTable(Y, np.where(Y < 0.0, left * Y, right * Y)), 3.0)
+    uneven = klingel_wave(
+        RollingRadiusTable(
+            LATERAL_SHIFTS, np.where(LATERAL_SHIFTS < 0.0, left * LATERAL_SHIFTS, right * LATERAL_SHIFTS)
+        ),
+        3.0,
+    )
     halves = math.pi / math.sqrt(left) + math.pi / math.sqrt(right)
     off_centre = 3.0 * (math.sqrt(right) - math.sqrt(left)) / (math.sqrt(right) + math.sqrt(left))
     return [
@@ -99,20 +115,19 @@ def _closed_forms() -> list[Row]:
     ]
 
 
-def two_slopes(inner_slope: float, outer: float, bend: float, amplitude: float) -> float:
-    """Period of the wave where the radius difference dr has the slope ``inner_slope`` up to ``bend``, and ``outer``
-    beyond it. The amplitude is larger than ``bend``.
-    """
-    rest = inner_slope * bend / outer
-    deep, root = amplitude - bend + rest, math.sqrt(outer)
+def two_slope_period(inner_slope: float, outer_slope: float, bend: float, amplitude: float) -> float:
+    """Period of Klingel's wave if the difference of rolling radii has the slope ``inner_slope`` up to the displacement
+    ``bend`` and ``outer_slope`` beyond. The amplitude is larger than ``bend``."""
+    rest = inner_slope * bend / outer_slope
+    deep, root = amplitude - bend + rest, math.sqrt(outer_slope)
     speed = root * math.sqrt(deep**2 - rest**2)
     within = math.atan(math.sqrt(inner_slope) * bend / speed) / math.sqrt(inner_slope)
     return 4.0 * (within + math.acos(rest / deep) / root)
 
 
-def _cubic() -> Row:
-    """Row: a cubic dr in a table, against an elliptic integral. The error is due to the table's spacing, and falls with
-    its square."""
+def _cubic_difference_row() -> Row:
+    """Row: observed order of the period's error in the table spacing, for a difference of rolling radii that is cubic
+    in the displacement. The exact period is an elliptic integral."""
     a, b, amplitude = 0.1, 0.02, 4.0
     stiff = a + b * amplitude**2
     exact = 4.0 * float(ellipk(b * amplitude**2 / (2.0 * stiff))) / math.sqrt(stiff)
@@ -126,10 +141,15 @@ def _cubic() -> Row:
     return observed.within(2.0, 0.1, why, "closed form")
 
 
-def _refused() -> Row:
-    """Row: tables of rolling radii that have no periodic wave are refused."""
+def _refusal_row() -> Row:
+    """Row: tables of the difference of rolling radii that allow no periodic wave are refused."""
     refused = 0
-    for y, dr, amplitude in ((Y, -Y, 3.0), (Y, 0.1 * Y + 1.0, 3.0), (Y, 0.1 * Y, 8.1), (Y, 0.1 * (Y + 6.0), 3.0)):
+    for y, dr, amplitude in (
+        (LATERAL_SHIFTS, -LATERAL_SHIFTS, 3.0),
+        (LATERAL_SHIFTS, 0.1 * LATERAL_SHIFTS + 1.0, 3.0),
+        (LATERAL_SHIFTS, 0.1 * LATERAL_SHIFTS, 8.1),
+        (LATERAL_SHIFTS, 0.1 * (LATERAL_SHIFTS + 6.0), 3.0),
+    ):
         try:
             equivalent_conicity(y, dr, amplitude)
         except InputError:
@@ -140,48 +160,49 @@ def _refused() -> Row:
     ).within(4.0, 0.0, why, "none")
 
 
-def _standard(name: str) -> tuple[list[Row], dict[str, Any]]:
+def _reference_profile_rows(profile_name: str) -> tuple[list[Row], dict[str, Any]]:
     """Rows on one of the standard's reference profiles, and data for the figure."""
-    quantities = (f"{name}: amplitudes outside of the standard's limits", f"{name}: largest error")
+    quantities = (f"{profile_name}: amplitudes outside of the standard's limits", f"{profile_name}: largest error")
     data = data_folder()
-    table_file = None if data is None else data / FOLDER / f"dr_ce_{name}.dat"
+    table_file = None if data is None else data / TABLE_FOLDER / f"dr_ce_{profile_name}.dat"
     if table_file is None or not table_file.is_file():
         reason = "TWINRIG_DATA names no folder with the standard's tables"
-        ids = (f"conicity.{name}.outside", f"conicity.{name}.error")
+        ids = (f"conicity.{profile_name}.outside", f"conicity.{profile_name}.error")
         return [not_run(id, SYSTEM, quantity, reason) for id, quantity in zip(ids, quantities, strict=True)], {}
     dr = np.array(table_file.read_text().split(), float)
-    y = SPACING * (np.arange(dr.size) - (dr.size - 1) / 2.0)
-    limits = np.loadtxt(table_file.with_name(f"ben_{name}.dat"))
+    y = TABLE_SPACING * (np.arange(dr.size) - (dr.size - 1) / 2.0)
+    limits = np.loadtxt(table_file.with_name(f"ben_{profile_name}.dat"))
     limits = limits[limits[:, 0] <= y[-1] + 1e-9]  # beyond, the table says nothing
     amplitudes, printed, upper, lower = limits[:, :4].T
     waves = [klingel_wave(RollingRadiusTable(y, dr), a) for a in amplitudes]
     seen = np.array([wave.conicity for wave in waves])
-    harmonic = [_harmonic(y, dr, wave) for wave in waves]
+    harmonic = [_harmonic_conicity(y, dr, wave) for wave in waves]
     outside = float(((seen < lower) | (seen > upper)).sum())
     why = f"limits of EN 15302 at {len(amplitudes)} amplitudes, to the end of the table"
     rows = [
-        Observed(f"conicity.{name}.outside", SYSTEM, quantities[0], outside, "").at_most(0.0, why, "published"),
-        Observed(f"conicity.{name}.error", SYSTEM, quantities[1], float(np.abs(seen - printed).max()), "").at_most(
-            LARGEST_ERROR, "printed to three digits; the bound asked for", "published"
-        ),
+        Observed(f"conicity.{profile_name}.outside", SYSTEM, quantities[0], outside, "").at_most(0.0, why, "published"),
         Observed(
-            f"conicity.{name}.harmonic",
+            f"conicity.{profile_name}.error", SYSTEM, quantities[1], float(np.abs(seen - printed).max()), ""
+        ).at_most(CONICITY_TOLERANCE, "printed to three digits; the bound asked for", "published"),
+        Observed(
+            f"conicity.{profile_name}.harmonic",
             SYSTEM,
-            f"{name}: largest error of the first harmonic",
+            f"{profile_name}: largest error of the first harmonic",
             float(np.abs(np.array(harmonic) - printed).max()),
             "",
         ).beside(0.0, "another definition, for comparison"),
     ]
     saved = {"amplitude": amplitudes, "upper": upper, "lower": lower, "seen": seen, "harmonic": harmonic}
-    return rows, {name: {key: np.asarray(values).tolist() for key, values in saved.items()}}
+    return rows, {profile_name: {key: np.asarray(values).tolist() for key, values in saved.items()}}
 
 
-def _harmonic(y: np.ndarray, dr: np.ndarray, wave: KlingelWave) -> float:
+def _harmonic_conicity(y: np.ndarray, dr: np.ndarray, wave: KlingelWave) -> float:
     return harmonic_linearised_conicity(y, dr, wave.amplitude * (1.0 - 1e-9), wave.centre)
 
 
-def _mirrored_profiles() -> list[Row]:
-    """Rows: wheels of 920 and 918 mm with their rails, and the mirror image with both exchanged."""
+def _mirror_rows() -> list[Row]:
+    """Rows: conicity and centre of the wave for wheels of 920 and 918 mm diameter, compared with the mirror image with
+    both wheels exchanged."""
     profiles, y = Profiles(), np.arange(-8e-3, 8.0001e-3, 5e-4)
     large, small = profiles.side(0.460), profiles.side(0.459)
     there, back = (
@@ -199,7 +220,8 @@ def _mirrored_profiles() -> list[Row]:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Plot both conicities of the standard's profiles with the standard's limits."""
+    """Plot the conicities by Klingel's wave and by the first harmonic for the standard's profiles, with the standard's
+    limits."""
     from models.drawing.figures import BLUE, VERMILION, add_heading, legend_below, panels
 
     standard = case_data["standard"]

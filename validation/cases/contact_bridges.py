@@ -1,4 +1,5 @@
-"""Cost of a contact kernel inside an engine: the kernel itself, the bridge to it, and the engine around both."""
+"""Computing time of a contact kernel inside a multibody engine, split into the kernel itself, the call from the engine,
+and the engine's own step."""
 
 import time
 from collections.abc import Callable
@@ -30,35 +31,47 @@ from validation.contact import slow_wheels
 TITLE = "What a contact kernel costs inside an engine"
 SYSTEM: System = "rolling-vehicle"
 STEP = 2e-5
-STEPS = {"none": 1000, "empty": 600, "native": 160, "jitted": 160, "plain": 6, "simplified": 4, "plain simplified": 2}
-"""Steps of a run with one call each: runs of a few milliseconds, which now and then nothing else disturbs."""
-LAWS = (("linear", 0), ("fastsim", 7), ("fastsim", 11), ("fastsim", 21), ("fastsim", 41), ("simplified", 21))
-"""Theories and cells per strip."""
-MAIN = LAWS[3]
-COUNTS = (1, 4, 8)
-EVALUATIONS = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
-"""Calls of the callback per step."""
+STEP_COUNTS = {
+    "none": 1000,
+    "empty": 600,
+    "native": 160,
+    "jitted": 160,
+    "plain": 6,
+    "simplified": 4,
+    "plain simplified": 2,
+}
+"""Number of steps of a timed run, by bridge, for an integrator with one force call per step. The runs take a few
+milliseconds, so that some of them are not disturbed by other processes."""
+CONTACT_LAWS = (("linear", 0), ("fastsim", 7), ("fastsim", 11), ("fastsim", 21), ("fastsim", 41), ("simplified", 21))
+"""Contact theories, each with a number of cells per strip."""
+MAIN_LAW = CONTACT_LAWS[3]
+WHEEL_COUNTS = (1, 4, 8)
+CALLS_PER_STEP = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
+"""Number of force calls per step of each integrator."""
 ENGINE_NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
 THEORY_NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
-ENGINES = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
+INTEGRATORS = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
+"""Usual integrator and fine integrator of each engine."""
 TIMING_ROUNDS, FIGURE_ROUNDS = 48, 6
-"""Rounds of what rows tell, timed by itself, as work between its turns slows short ones; of all, for the table."""
-SHORTEST_TURN = 0.001
+"""Timing rounds of the set-ups that have rows, which are timed separately because other work between them slows short
+runs; and timing rounds of all set-ups for the table."""
+SHORTEST_RUN = 0.001
 TIMING_NOTE = "median of the ratios within interleaved rounds, seconds of the processor; start of a run taken out"
 
 
 @dataclass(frozen=True)
 class Setup:
-    """One way to march wheels with contact. bridge: how the engine calls the contact forces (none, empty, native,
-    jitted, plain, or a route of Exudyn's); law: contact theory and cells, None where no contact is computed."""
+    """One way to simulate wheels with contact. bridge: how the engine calls the contact forces (none, empty, native,
+    jitted, plain, or a route of Exudyn's); law: contact theory and number of cells, None where no contact is
+    computed."""
 
     engine: str
     method: str
     bridge: str
     law: tuple[str, int] | None
-    count: int
+    wheel_count: int
 
-    def what(self) -> str:
+    def law_name(self) -> str:
         """Name of the contact law."""
         if self.law is None:
             return "no contact" if self.bridge == "none" else "empty callback"
@@ -66,88 +79,100 @@ class Setup:
         return f"FASTSIM, {cells} cells" if theory == "fastsim" else THEORY_NAMES[theory]
 
     @property
-    def told(self) -> bool:
-        """Whether the report has a row on this set-up's cost."""
-        return (self.law, self.count) == (MAIN, 4) and self.bridge in ("native", ROUTES[0])
+    def is_reported(self) -> bool:
+        """Whether the report has a row on the cost of this set-up."""
+        return (self.law, self.wheel_count) == (MAIN_LAW, 4) and self.bridge in ("native", ROUTES[0])
 
     @property
-    def without(self) -> "Setup":
+    def without_contact(self) -> "Setup":
         """The same set-up without contact."""
         return replace(self, bridge="none", law=None)
 
     def wheels(self) -> Wheels:
-        """The wheels of this set-up."""
+        """The wheels that this set-up simulates."""
         theory, cells = self.law or ("none", 21)
-        return Wheels(self.count, cast(Theory, theory), cells or 21)
+        return Wheels(self.wheel_count, cast(Theory, theory), cells or 21)
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Whether threads and engines agree, and low speed; in the full run also the price of every law and bridge.
+    """Rows on equal results of threads and engines, and on low speeds; a full run also has the cost of every contact
+    law and bridge.
 
-    Prices are only told by the full run: a few rounds tell little.
+    Costs are measured by the full run only: a few timing rounds are not enough.
     """
     rows, done = slow_wheels.rows(quick)
     rows += [_threads_row(), _agreement_row()]
     data: dict[str, Any] = {"slow": [asdict(run) for run in done]}
     if quick:
         return rows, data
-    setups = every()
-    listed_setups = [setup for setup in setups if setup.told]
-    rows += _price_rows(Prices([*listed_setups, *(setup.without for setup in listed_setups)], TIMING_ROUNDS))
-    shown = Prices(setups, FIGURE_ROUNDS)
-    return rows, {**data, "points": [shown.point(setup) for setup in setups]}
+    setups = all_setups()
+    listed_setups = [setup for setup in setups if setup.is_reported]
+    rows += _cost_rows(
+        MeasuredTimes([*listed_setups, *(setup.without_contact for setup in listed_setups)], TIMING_ROUNDS)
+    )
+    shown = MeasuredTimes(setups, FIGURE_ROUNDS)
+    return rows, {**data, "points": [shown.table_entry(setup) for setup in setups]}
 
 
-def every() -> list[Setup]:
-    """All set-ups."""
+def all_setups() -> list[Setup]:
+    """All timed combinations of engine, integrator, bridge, contact law and number of wheels."""
     setups = []
-    for engine, (usual, fine) in ENGINES.items():
+    for engine, (usual, fine) in INTEGRATORS.items():
         best, *other_bridges = ("native", "jitted", "plain") if engine == "mujoco" else (*ROUTES, "plain")
-        for method, count in (*((usual, count) for count in COUNTS), (fine, 4)):
+        for method, count in (*((usual, count) for count in WHEEL_COUNTS), (fine, 4)):
             setups += [Setup(engine, method, bridge, None, count) for bridge in ("none", "empty")]
-            setups += [Setup(engine, method, best, law, count) for law in (LAWS if method == usual else (MAIN,))]
+            setups += [
+                Setup(engine, method, best, law, count) for law in (CONTACT_LAWS if method == usual else (MAIN_LAW,))
+            ]
         setups += [
-            Setup(engine, method, other_bridge, MAIN, 4) for method in (usual, fine) for other_bridge in other_bridges
+            Setup(engine, method, other_bridge, MAIN_LAW, 4)
+            for method in (usual, fine)
+            for other_bridge in other_bridges
         ]
-    return [*setups, Setup("mujoco", "Euler", "plain", LAWS[-1], 4)]
+    return [*setups, Setup("mujoco", "Euler", "plain", CONTACT_LAWS[-1], 4)]
 
 
-class Prices:
-    """Measured times (s) of every round: per step for each set-up, and per evaluation of the forces on all wheels."""
+class MeasuredTimes:
+    """Measured times (s) of every timing round: per step of each set-up, and per evaluation of the contact forces of
+    all wheels."""
 
     def __init__(self, setups: list[Setup], round_count: int) -> None:
         self.setups = setups
-        kernels = sorted({(setup.law, setup.count) for setup in setups if setup.law is not None})
-        runs, loops = [_job(setup) for setup in setups], [_kernel_job(law, count) for law, count in kernels]
+        kernels = sorted({(setup.law, setup.wheel_count) for setup in setups if setup.law is not None})
+        runs, loops = (
+            [_timed_march(setup) for setup in setups],
+            [_timed_kernel(law, wheel_count) for law, wheel_count in kernels],
+        )
         jobs = [part for march, steps in runs for part in (partial(march, steps), partial(march, 1))]
-        seconds = interleave([*jobs, *(job for job, _ in loops)], round_count, SHORTEST_TURN, clock=time.process_time)
+        seconds = interleave([*jobs, *(job for job, _ in loops)], round_count, SHORTEST_RUN, clock=time.process_time)
         full_time, first, alone = seconds[: len(jobs) : 2], seconds[1 : len(jobs) : 2], seconds[len(jobs) :]
         self._steps = {
             setup: (a, b, steps - 1) for setup, a, b, (_, steps) in zip(setups, full_time, first, runs, strict=True)
         }
         self._calls = {kernel: setup / calls for kernel, setup, (_, calls) in zip(kernels, alone, loops, strict=True)}
 
-    def rounds(self, setup: Setup) -> tuple[Any, Any, Any]:
-        """Times (s) of each round: of a step, of a step without contact (the engine's share), and of the contact kernel
-        in a step."""
+    def times_by_round(self, setup: Setup) -> tuple[Any, Any, Any]:
+        """Times (s) by timing round: of a step, of a step without contact (the engine's own share), and of the contact
+        kernel in a step."""
         step, bare = (
-            (full_time - first) / steps for full_time, first, steps in (self._steps[setup], self._steps[setup.without])
+            (full_time - first) / steps
+            for full_time, first, steps in (self._steps[setup], self._steps[setup.without_contact])
         )
-        calls = 1 if setup.bridge == "before each step" else EVALUATIONS[setup.method]
-        return step, bare, 0.0 if setup.law is None else calls * self._calls[setup.law, setup.count]
+        calls = 1 if setup.bridge == "before each step" else CALLS_PER_STEP[setup.method]
+        return step, bare, 0.0 if setup.law is None else calls * self._calls[setup.law, setup.wheel_count]
 
-    def point(self, setup: Setup) -> dict[str, Any]:
-        """Median time (s) of a step, its parts for engine, kernel and bridge, and the bridge's share of it."""
-        a, b, c = self.rounds(setup)
+    def table_entry(self, setup: Setup) -> dict[str, Any]:
+        """Median time (s) of a step, its parts for engine, kernel and bridge, and the bridge's share of the step."""
+        a, b, c = self.times_by_round(setup)
         step, bare, kernel = (float(np.median(round_times)) for round_times in (a, b, c))
         share = median((a - b - c) / a)
         return {
             "engine": setup.engine,
             "method": setup.method,
             "bridge": setup.bridge,
-            "law": setup.what(),
-            "wheels": setup.count,
-            "main": setup.law == MAIN,
+            "law": setup.law_name(),
+            "wheels": setup.wheel_count,
+            "main": setup.law == MAIN_LAW,
             "step": step,
             "own": bare,
             "kernel": kernel,
@@ -157,31 +182,31 @@ class Prices:
         }
 
 
-def _kernel_job(law: tuple[str, int], wheel_count: int) -> tuple[Callable[[], Any], int]:
+def _timed_kernel(law: tuple[str, int], wheel_count: int) -> tuple[Callable[[], Any], int]:
     wheels = Setup("", "", "native", law, wheel_count).wheels()
     q, v = wheels.state()
     f, numbers, calls = np.zeros(wheels.size), wheels.numbers, 4 if law[0] == "simplified" else 200
-    return lambda: _repeat(numbers, q, v, f, calls), calls
+    return lambda: _repeat_kernel(numbers, q, v, f, calls), calls
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat(table_of_wheels, q, v, force_sum, repeats):
+def _repeat_kernel(table_of_wheels, q, v, force_sum, repeats):
     for _ in range(repeats):
         forces(start(table_of_wheels), 0.0, start(q), start(v), start(force_sum))
 
 
-def _job(setup: Setup) -> tuple[Callable[[int], Any], int]:
-    """A function that marches a number of steps, and the number of steps to time."""
+def _timed_march(setup: Setup) -> tuple[Callable[[int], Any], int]:
+    """Function that simulates a given number of steps, and the number of steps to time."""
     wheels = setup.wheels()
-    kind = setup.bridge if setup.bridge in STEPS else "native"
+    kind = setup.bridge if setup.bridge in STEP_COUNTS else "native"
     if wheels.theory == "simplified":
         kind = "plain simplified" if setup.bridge == "plain" else "simplified"
-    law = plain(wheels) if setup.bridge == "plain" else None
-    march = (_mujoco_job if setup.engine == "mujoco" else _exudyn_job)(setup, wheels, law)
-    return march, max(2, STEPS[kind] // EVALUATIONS[setup.method])
+    law = library_law(wheels) if setup.bridge == "plain" else None
+    march = (_mujoco_march if setup.engine == "mujoco" else _exudyn_march)(setup, wheels, law)
+    return march, max(2, STEP_COUNTS[kind] // CALLS_PER_STEP[setup.method])
 
 
-def _mujoco_job(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
+def _mujoco_march(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
     start, march = np.concatenate(wheels.state())[None], Marcher(model(wheels, STEP, setup.method))
     callback = {
         "none": lambda: None,
@@ -201,7 +226,7 @@ def _mujoco_job(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
     return job
 
 
-def _exudyn_job(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
+def _exudyn_march(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
     zeros, of = [0.0] * wheels.size, None
     if setup.bridge == "empty":
         of = lambda q, v: zeros  # noqa: E731
@@ -211,8 +236,8 @@ def _exudyn_job(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
     return lambda steps: rolling.run(*state, steps, STEP, setup.method)
 
 
-def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
-    """A contact law that calls the Python functions of the library: FASTSIM, or the simplified theory of 1983."""
+def library_law(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
+    """Contact law that calls the library's Python functions: FASTSIM, or the simplified theory of 1983."""
     bodies = separate(wheels.bodies) if wheels.theory == "simplified" else None
 
     def add(table_of_wheels: Array, q: Array, v: Array, force_sum: Array) -> None:
@@ -233,13 +258,13 @@ def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
     return add
 
 
-def _price_rows(prices: Prices) -> list[Row]:
+def _cost_rows(measured_times: MeasuredTimes) -> list[Row]:
     rows = []
-    for setup in prices.setups:
-        if not setup.told:
+    for setup in measured_times.setups:
+        if not setup.is_reported:
             continue
-        step, bare, kernel = prices.rounds(setup)
-        name, calls = f"contact_bridges.{setup.engine}.{setup.method}", EVALUATIONS[setup.method]
+        step, bare, kernel = measured_times.times_by_round(setup)
+        name, calls = f"contact_bridges.{setup.engine}.{setup.method}", CALLS_PER_STEP[setup.method]
         if setup.engine == "mujoco":
             value, low, high = median(step / (bare + kernel))
             what, bound = f"ratio to the step without contact plus {4 * calls} kernel times", 1.3
@@ -255,7 +280,7 @@ def _price_rows(prices: Prices) -> list[Row]:
 
 
 def _threads_row() -> Row:
-    """Row: runs from ten starting states give the same bits in two threads as in one."""
+    """Row: runs from ten initial states give the same bits in two threads as in one."""
     wheels = Wheels()
     states, built = np.array([np.concatenate(wheels.state(seed)) for seed in range(10)]), model(wheels, 1e-4, "RK4")
     with installed(kernel_law(forces)):
@@ -272,7 +297,7 @@ def _threads_row() -> Row:
 
 
 def _agreement_row() -> Row:
-    """Row: agreement of both engines by Runge-Kutta's method over 0.1 s."""
+    """Row: difference of the states in Exudyn and MuJoCo after 0.1 s, by Runge-Kutta's method."""
     wheels, steps = Wheels(), 1000
     q, v = wheels.state()
     with installed(kernel_law(forces)):
@@ -291,7 +316,7 @@ def _agreement_row() -> Row:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Every cost per step, and runs at low speed."""
+    """Tables of the cost per step, and of runs at low speed."""
     slow = slow_wheels.table(case_data["slow"])
     if "points" not in case_data:
         return [slow]
@@ -320,7 +345,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Plot cost per step for each law, and shares of engine, kernel and bridge."""
+    """Plot the cost per step for each contact law, and the shares of engine, kernel and bridge."""
     if "points" not in case_data:
         return []
     from validation.contact.contact_bridges_figure import figure

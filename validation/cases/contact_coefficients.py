@@ -1,4 +1,5 @@
-"""Kalker's coefficients against the exact theory: every printed node, between the nodes, and beyond the table.
+"""Kalker's creepage coefficients compared with the exact theory: at every printed node of his table, between the nodes,
+and beyond the table.
 
 The exact side is the half-space of ``models.contact.rolling_problem`` with every cell sticking, on three grids
 that extrapolate to none: its error has a part of first and one of second order in the size of the cells. Lengths are
@@ -21,18 +22,21 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
 TITLE = "Creepage and spin coefficients of the linear theory"
 SYSTEM: System = "contact"
-CELLS = 10
-"""Cells per axis of the coarsest grid; the others have twice and four times as many. A long axis has more."""
+COARSEST_CELLS = 10
+"""Cells per axis of the coarsest of three grids; the others have twice and four times as many. The long axis of a
+slender ellipse has more."""
 COEFFICIENT_NAMES = ("C11", "C22", "C23", "C33")
-BOUNDS = {"C11": 0.015, "C22": 0.015, "C23": 0.015, "C33": 0.05}
-"""Of the published table, against the exact theory; C33 has twice as much beyond a/b = 0.2 to 5."""
-NUS = (0.0, 0.25, 0.5)
+COEFFICIENT_TOLERANCES = {"C11": 0.015, "C22": 0.015, "C23": 0.015, "C33": 0.05}
+"""Relative tolerance of the published table compared with the exact theory; for C33 it is doubled outside a/b = 0.2 to
+5."""
+POISSON_RATIOS = (0.0, 0.25, 0.5)
 QUICK_RATIOS = (0.8, 2.0)
-MISPRINT = 1.15
-"""C23 at a/b = 0.8, nu = 1/4 as some copies of the table have it; 1.25 is right."""
-INNER, RESIDUAL = 3e-6, 1e-4
-"""Relative residual at which the linear solver stops, and the slip that may be left, by the largest rigid slip."""
-SLENDER = (
+MISPRINTED_C23 = 1.15
+"""C23 at a/b = 0.8 and Poisson's ratio 1/4 as some copies of the table print it; 1.25 is right."""
+SOLVER_RESIDUAL, SLIP_RESIDUAL = 3e-6, 1e-4
+"""Relative residual at which the linear solver stops, and the largest remaining slip divided by the largest rigid
+slip."""
+SLENDER_ELLIPSES = (
     (1 / 30, 0.28),
     (1 / 20, 0.0),
     (1 / 20, 0.28),
@@ -43,37 +47,38 @@ SLENDER = (
     (30.0, 0.28),
     (30.0, 0.5),
 )
-"""Ratios a/b beyond the table, and Poisson's ratios."""
+"""Axis ratios a/b beyond the table, each with a Poisson's ratio."""
 REFERENCE_NOTE = "the same continuum problem solved on cells, extrapolated to none"
 
 
-def exact(ratio: float, nu: float, cells: int = CELLS) -> Array:
-    """Creepage coefficients C11, C22, C23, C33 (4,) by the exact theory."""
-    coarse, middle, fine = (_on_grid(ratio, nu, n) for n in (cells, 2 * cells, 4 * cells))
+def exact_coefficients(axis_ratio: float, poisson_ratio: float, cells: int = COARSEST_CELLS) -> Array:
+    """Creepage coefficients C11, C22, C23, C33 (4,) by the exact theory, extrapolated from three grids to infinitely
+    small cells."""
+    coarse, middle, fine = (_coefficients_on_grid(axis_ratio, poisson_ratio, n) for n in (cells, 2 * cells, 4 * cells))
     limit = (coarse - 6.0 * middle + 8.0 * fine) / 3.0
-    if ratio > RATIOS[-1]:  # C33 of long patches changes by a fourth from grid to grid: second order alone
+    if axis_ratio > RATIOS[-1]:  # C33 of long patches changes by a fourth from grid to grid: second order alone
         limit[3] = fine[3] + (fine[3] - middle[3]) / 3.0
     return limit
 
 
-def _on_grid(ratio: float, nu: float, cells: int) -> Array:
-    """Creepage coefficients by the exact linear theory on a grid, from unit creepages. C23 is the mean of two values:
-    lateral force by spin and moment by lateral creepage."""
-    a, b = ratio**0.5, ratio**-0.5
-    more = max(1.0, max(ratio, 1.0 / ratio) / 10.0)
+def _coefficients_on_grid(axis_ratio: float, poisson_ratio: float, cells: int) -> Array:
+    """Creepage coefficients (4,) by the exact linear theory on one grid, from unit creepages. C23 is the mean of two
+    values: lateral force due to spin, and moment due to lateral creepage."""
+    a, b = axis_ratio**0.5, axis_ratio**-0.5
+    more = max(1.0, max(axis_ratio, 1.0 / axis_ratio) / 10.0)
     columns, rows = round(cells * (more if a > b else 1.0)), round(cells * (more if b > a else 1.0))
     dx, dy = 2.0 * a / columns, 2.0 * b / rows
     x, y = centres(columns, dx), centres(rows, dy)
     inside = (x / a) ** 2 + (y[:, None] / b) ** 2 < 1.0
-    body = Material(E=2e11, nu=nu)
+    body = Material(E=2e11, nu=poisson_ratio)
     operator = SlipOperator(columns, rows, dx, dy, MaterialPair(body, body))
     system = FreeSystem(operator, inside[..., None, None] * np.eye(2), np.zeros(inside.shape))
     sums = []
     for motion in np.eye(3):
         rigid = rigid_slip(x, y, *motion)
-        traction = -system.solve(rigid, INNER)  # leaves no free cell any slip
+        traction = -system.solve(rigid, SOLVER_RESIDUAL)  # leaves no free cell any slip
         left = np.abs(system.free @ (rigid + operator(traction))[..., None]).max()
-        if left > RESIDUAL * np.abs(rigid).max():
+        if left > SLIP_RESIDUAL * np.abs(rigid).max():
             raise RunFailed("exact linear theory", f"slip of {left:.2g} left")
         p = traction * (dx * dy)
         sums.append([*p.sum(axis=(0, 1)), (x * p[..., 1] - y[:, None] * p[..., 0]).sum()])
@@ -83,79 +88,84 @@ def _on_grid(ratio: float, nu: float, cells: int) -> Array:
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows for the nodes of the table and the planted misprint; in the full run between and beyond the nodes, too."""
-    ratios, nus = (QUICK_RATIOS, (0.25,)) if quick else (RATIOS.tolist(), NUS)
-    nodes = [[ratio, nu, *exact(ratio, nu)] for ratio in ratios for nu in nus]
+    """Rows for the nodes of the table and for a planted misprint; a full run also compares between and beyond the
+    nodes."""
+    ratios, nus = (QUICK_RATIOS, (0.25,)) if quick else (RATIOS.tolist(), POISSON_RATIOS)
+    nodes = [[ratio, nu, *exact_coefficients(ratio, nu)] for ratio in ratios for nu in nus]
     data: dict[str, Any] = {"nodes": nodes}
-    rows = [*_node_rows(np.array(nodes)), _misprint(np.array(nodes))]
+    rows = [*_node_rows(np.array(nodes)), _misprint_row(np.array(nodes))]
     if not quick:
         middle = [(float(ratio), 0.25) for ratio in np.sqrt(RATIOS[1:] * RATIOS[:-1])]  # of every two ratios
         middle += [(ratio, nu) for ratio in (0.1, 1.0, 10.0) for nu in (0.125, 0.375)]
-        data["between"] = [[ratio, nu, *exact(ratio, nu)] for ratio, nu in middle]
-        data["beyond"] = [[ratio, nu, *exact(ratio, nu)] for ratio, nu in SLENDER]
+        data["between"] = [[ratio, nu, *exact_coefficients(ratio, nu)] for ratio, nu in middle]
+        data["beyond"] = [[ratio, nu, *exact_coefficients(ratio, nu)] for ratio, nu in SLENDER_ELLIPSES]
         rows += _between_rows(np.array(data["between"]), np.array(nodes)) + _beyond_rows(np.array(data["beyond"]))
     return rows, data
 
 
-def deviation(solved: Array) -> Array:
-    """Relative deviation (n, 4) of the library's coefficients from the exact ones. solved: rows (n, 6) of ratio,
-    Poisson's ratio and exact coefficients."""
-    c = coefficients(solved[:, 0], solved[:, 1])
-    return np.stack([c.c11, c.c22, c.c23, c.c33], axis=-1) / solved[:, 2:] - 1.0
+def relative_deviations(exact_rows: Array) -> Array:
+    """Relative deviations (n, 4) of the library's coefficients from the exact ones. exact_rows (n, 6): axis ratio,
+    Poisson's ratio, and the four exact coefficients."""
+    c = coefficients(exact_rows[:, 0], exact_rows[:, 1])
+    return np.stack([c.c11, c.c22, c.c23, c.c33], axis=-1) / exact_rows[:, 2:] - 1.0
 
 
 def _node_rows(nodes: Array) -> list[Row]:
-    off = np.abs(deviation(nodes))
+    off = np.abs(relative_deviations(nodes))
     middle = (nodes[:, 0] > 0.19) & (nodes[:, 0] < 5.1)
     rows = [
-        _worst_difference_row(name, off[middle, i], nodes[middle], "a/b 0.2 to 5", BOUNDS[name])
+        _worst_difference_row(name, off[middle, i], nodes[middle], "a/b 0.2 to 5", COEFFICIENT_TOLERANCES[name])
         for i, name in enumerate(COEFFICIENT_NAMES)
     ]
     if not middle.all():
         rows += [
             _worst_difference_row(
-                name, off[~middle, i], nodes[~middle], "a/b 0.1 and 10", BOUNDS[name] * (1 + (name == "C33"))
+                name,
+                off[~middle, i],
+                nodes[~middle],
+                "a/b 0.1 and 10",
+                COEFFICIENT_TOLERANCES[name] * (1 + (name == "C33")),
             )
             for i, name in enumerate(COEFFICIENT_NAMES)
         ]
     return rows
 
 
-def _worst_difference_row(name: str, off: Array, nodes: Array, where: str, bound: float) -> Row:
-    ratio, nu = nodes[int(off.argmax()), :2]
+def _worst_difference_row(coefficient: str, deviations: Array, nodes: Array, range_text: str, bound: float) -> Row:
+    ratio, nu = nodes[int(deviations.argmax()), :2]
     return Observed(
-        f"contact_coefficients.{name}.{where.split()[1]}.{where.split()[-1]}",
+        f"contact_coefficients.{coefficient}.{range_text.split()[1]}.{range_text.split()[-1]}",
         SYSTEM,
-        f"relative difference of {name} of the published table from the exact theory, {where}: worst "
-        f"of {len(off)}, at a/b {ratio:.4g}, nu {nu:g}",
-        float(off.max()),
+        f"relative difference of {coefficient} of the published table from the exact theory, {range_text}: worst "
+        f"of {len(deviations)}, at a/b {ratio:.4g}, nu {nu:g}",
+        float(deviations.max()),
         "",
     ).at_most(bound, REFERENCE_NOTE, "published")
 
 
-def _misprint(nodes: Array) -> Row:
+def _misprint_row(nodes: Array) -> Row:
     """Row: the comparison detects a widespread misprint of C23."""
     node = nodes[(np.abs(nodes[:, 0] - 0.8) < 1e-9) & (nodes[:, 1] == 0.25)][0]
-    off = abs(MISPRINT / node[4] - 1.0)
+    off = abs(MISPRINTED_C23 / node[4] - 1.0)
     return behaviour_row(
         "contact_coefficients.misprint",
         SYSTEM,
-        f"C23 = {MISPRINT} at a/b = 0.8, nu = 1/4 is a misprint that is widespread, off by {off:.1%}",
-        "found" if off > BOUNDS["C23"] else "passed",
+        f"C23 = {MISPRINTED_C23} at a/b = 0.8, nu = 1/4 is a misprint that is widespread, off by {off:.1%}",
+        "found" if off > COEFFICIENT_TOLERANCES["C23"] else "passed",
         "found",
         "a table that no one computes again keeps its misprints",
         "native",
     )
 
 
-def _between_rows(interpolated: Array, nodes: Array) -> list[Row]:
-    """Rows: error of interpolation alone. It is the deviation between two nodes of the table minus the mean deviation
-    at these nodes."""
-    at_nodes = deviation(nodes).reshape(len(RATIOS), len(NUS), 4)
+def _between_rows(exact_rows: Array, nodes: Array) -> list[Row]:
+    """Rows: interpolation error of the coefficients. This is the deviation between two nodes of the table minus the
+    mean deviation at these nodes."""
+    at_nodes = relative_deviations(nodes).reshape(len(RATIOS), len(POISSON_RATIOS), 4)
     count = len(RATIOS) - 1
     along_ratio = (at_nodes[1:, 1] + at_nodes[:-1, 1]) / 2.0
     along_nu = [(at_nodes[i, k] + at_nodes[i, k + 1]) / 2.0 for i in (0, 9, 18) for k in (0, 1)]
-    off = np.abs(deviation(interpolated) - np.concatenate((along_ratio, along_nu)))
+    off = np.abs(relative_deviations(exact_rows) - np.concatenate((along_ratio, along_nu)))
     spans = {"ratios": slice(0, count), "nu": slice(count, None)}
     why = "1 % is asked; the deviation of the nodes on both sides is taken off"
     return [
@@ -171,19 +181,19 @@ def _between_rows(interpolated: Array, nodes: Array) -> list[Row]:
     ]
 
 
-def _beyond_rows(beyond: Array) -> list[Row]:
-    """Rows on slender contact patches beyond the table. C33 of patches that are long in the rolling direction has nodes
-    of its own at ratios 20 and 50, because it is a small difference of large terms."""
-    off = np.abs(deviation(beyond))
-    long = beyond[:, 0] > 1.0
+def _beyond_rows(exact_rows: Array) -> list[Row]:
+    """Rows on slender contact ellipses beyond the table. C33 of ellipses that are long in the rolling direction has
+    separate nodes at axis ratios 20 and 50, because it is a small difference of large terms."""
+    off = np.abs(relative_deviations(exact_rows))
+    long = exact_rows[:, 0] > 1.0
     asymptotes, nodes = "Kalker's asymptotes, led on from the table", "nodes by the same theory; 30 lies between them"
     parts = [
-        (f"beyond.{name}", f"{name} at a/b {_span(beyond)}", off[:, i], 0.03, asymptotes)
+        (f"beyond.{name}", f"{name} at a/b {_ratios_text(exact_rows)}", off[:, i], 0.03, asymptotes)
         for i, name in enumerate(COEFFICIENT_NAMES[:3])
     ]
     parts += [
-        ("beyond.C33", f"C33 at a/b {_span(beyond[~long])}", off[~long, 3], 0.03, asymptotes),
-        ("beyond.C33.long", f"C33 at a/b {_span(beyond[long])}", off[long, 3], 0.1, nodes),
+        ("beyond.C33", f"C33 at a/b {_ratios_text(exact_rows[~long])}", off[~long, 3], 0.03, asymptotes),
+        ("beyond.C33.long", f"C33 at a/b {_ratios_text(exact_rows[long])}", off[long, 3], 0.1, nodes),
     ]
     return [
         Observed(
@@ -197,13 +207,13 @@ def _beyond_rows(beyond: Array) -> list[Row]:
     ]
 
 
-def _span(rows: Array) -> str:
-    """Text with the axis ratios of some rows."""
-    return ", ".join(f"{ratio:g}" if ratio >= 1 else f"1/{1 / ratio:g}" for ratio in np.unique(rows[:, 0]))
+def _ratios_text(exact_rows: Array) -> str:
+    """Text that lists the axis ratios of some rows."""
+    return ", ".join(f"{ratio:g}" if ratio >= 1 else f"1/{1 / ratio:g}" for ratio in np.unique(exact_rows[:, 0]))
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Deviation of the table from the exact theory, node by node at nu = 1/4."""
+    """Table of the published coefficients' deviation from the exact theory, node by node at Poisson's ratio 1/4."""
     nodes = np.array(case_data["nodes"])
     some = nodes[nodes[:, 1] == 0.25]
     rows = tuple(
@@ -211,7 +221,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
             f"{node[0]:.4g}",
             *(f"{value:.4g} ({100 * part_name:+.2f} %)" for value, part_name in zip(node[2:], parts, strict=True)),
         )
-        for node, parts in zip(some, deviation(some), strict=True)
+        for node, parts in zip(some, relative_deviations(some), strict=True)
     )
     note = (
         "Coefficients of the exact theory, nu = 1/4, and how far the published table is above them. C33 of the "
@@ -221,7 +231,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Plot coefficients over the axis ratio, and the library's deviation from the exact theory."""
+    """Plot the coefficients over the axis ratio, and the library's deviation from the exact theory."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))
@@ -232,7 +242,9 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     for i, (name, curve) in enumerate(zip(COEFFICIENT_NAMES, (c.c11, c.c22, c.c23, c.c33), strict=True)):
         left.loglog(ratio, curve, color=f"C{i}", label=name)
         left.loglog(quarter[:, 0], quarter[:, 2 + i], "o", color=f"C{i}", markersize=3.5)
-        right.semilogx(solved[:, 0], 100 * deviation(solved)[:, i], "o", color=f"C{i}", markersize=3.5, label=name)
+        right.semilogx(
+            solved[:, 0], 100 * relative_deviations(solved)[:, i], "o", color=f"C{i}", markersize=3.5, label=name
+        )
     left.set(title="Coefficients [-], ν = 1/4 (dots: exact theory)", xlabel="a/b [-]")
     right.set(title="Library above exact theory [%], ν = 0 to 1/2", xlabel="a/b [-]", ylim=(-5, 20))
     for axes in (left, right):

@@ -1,4 +1,5 @@
-"""The exact theory of contact on cells: closed forms, its own refinement, and another program's sample."""
+"""The exact theory of contact, discretised in cells, compared with closed forms, with finer grids, and with a sample of
+another program's results."""
 
 import csv
 from pathlib import Path
@@ -19,11 +20,12 @@ from validation.common.scenes import data_folder
 TITLE = "The exact theory of contact on cells"
 SYSTEM: System = "contact"
 MATERIAL_PAIR, MU, LOAD, CONTACT_SIZE = MaterialPair(), 0.3, 8e4, 5e-3
-"""Materials, friction, N, and sqrt(ab) in m."""
+"""Materials, coefficient of friction mu, normal load N (N), and sqrt(a b) (m) of the contact ellipse with the semi-axes
+a and b."""
 FRICTION_LIMIT = MU * LOAD
 SAMPLE_FILE = "contact_sample.csv"
-STRIP = 0.02
-"""a/b of the ellipse whose middle is nearly a cylinder's."""
+STRIP_AXIS_RATIO = 0.02
+"""Axis ratio a/b of a slender ellipse, whose middle is nearly a cylinder contact."""
 CASES: dict[str, tuple[float, float, float, float]] = {
     "little x": (1.0, 0.04, 0.0, 0.0),
     "x": (1.0, 0.2, 0.0, 0.0),
@@ -34,34 +36,36 @@ CASES: dict[str, tuple[float, float, float, float]] = {
     "x, y against spin": (2.0, 0.12, -0.13, 0.25),
     "spin, long": (5.0, 0.0, 0.0, 0.15),
 }
-"""a/b, creepages divided by mu N / (G ab), spin divided by mu N / (G (ab)^(3/2))."""
-DRAWN_CONTACTS, SEED = 12, 47
-"""Contacts that are drawn to see whether the solver converges: ellipses, creepages with spin and cells at random."""
-ERROR_SHARE = 0.0075
-"""Of mu N: the error that 40 cells along each axis are said to have at most, 80 half of it."""
+"""Axis ratio a/b, longitudinal and lateral creepage divided by mu N / (G ab), and spin divided by mu N / (G
+(ab)^(3/2)); N is the normal load, G the shear modulus."""
+RANDOM_CONTACT_COUNT, SEED = 12, 47
+"""Number of random contacts that test the solver's convergence, and their seed. Ellipses, creepages with spin, and
+numbers of cells are random."""
+DISCRETISATION_ERROR = 0.0075
+"""Stated bound of the force error with 40 cells along each axis, divided by mu N; it halves with 80 cells."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows for both problems against closed forms, their refinement, symmetries, and the sample where there is one;
-    quick: two cases up to 32 cells instead of all up to 80, every fourth contact of the sample by half the cells.
-    """
+    """Rows for the normal and the rolling problem compared with closed forms, finer grids, symmetries, and the sample
+    if it exists. A quick run has two cases up to 32 cells instead of all up to 80, and every fourth contact of the
+    sample with half the cells."""
     grids, names = ((8, 16, 32), ("x", "spin")) if quick else ((10, 20, 40, 80), tuple(CASES))
-    refined = {name: [[cells, *roll(name, cells).tolist()] for cells in grids] for name in names}
+    refined = {name: [[cells, *rolling_forces(name, cells).tolist()] for cells in grids] for name in names}
     rows = [
         *_hertz_rows(),
-        *_strip_rows(20 if quick else 80),
-        *_shift_rows(),
+        *_carter_rows(20 if quick else 80),
+        *_cattaneo_rows(),
         *_sliding_rows(),
         *_symmetry_rows(),
         *_refinement_rows(refined),
     ]
-    sample, sample_rows = _rows_of_contact_sample(quick)
+    sample, sample_rows = _sample_rows(quick)
     rows += [] if quick else [_converged_row()]
-    return rows + sample_rows, {"refined": refined, "sample": sample, "strip": _strip(40, 0.5)[:2]}
+    return rows + sample_rows, {"refined": refined, "sample": sample, "strip": _strip_traction(40, 0.5)[:2]}
 
 
-def _row(
-    name: str,
+def _bound_row(
+    row_name: str,
     quantity: str,
     largest_error: float,
     bound: float,
@@ -69,15 +73,15 @@ def _row(
     unit: str = "",
     independence: Any = "closed form",
 ) -> Row:
-    return Observed(f"contact_exact.{name}", SYSTEM, quantity, largest_error, unit).at_most(
+    return Observed(f"contact_exact.{row_name}", SYSTEM, quantity, largest_error, unit).at_most(
         bound, tolerance_reason, independence
     )
 
 
-def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, Array]:
-    """Numerical solution of the normal problem for a Hertzian ellipse with a/b = ratio, and its relative errors (3,) of
-    approach, peak pressure and area."""
-    a, b = CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5
+def numerical_hertz(axis_ratio: float, cells: int) -> tuple[NormalSolution, Array]:
+    """Numerical solution of the normal problem for a Hertzian ellipse with the axis ratio a/b, and its relative errors
+    (3,) of approach, peak pressure and area."""
+    a, b = CONTACT_SIZE * axis_ratio**0.5, CONTACT_SIZE / axis_ratio**0.5
     truth = by_axes(a, b, MATERIAL_PAIR, load=LOAD)
     dx, dy = 2 * a / cells, 2 * b / cells
     x, y = centres(cells + 5, dx), centres(cells + 5, dy)
@@ -87,16 +91,17 @@ def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, Array]:
 
 
 def _hertz_rows() -> list[Row]:
-    """Rows: approach, peak pressure and area on odd numbers of cells, for which one cell lies in the centre."""
+    """Rows: errors of approach, peak pressure and area on grids with an odd number of cells, so that one cell lies in
+    the centre."""
     rows = []
     for ratio in (1.0, 3.0):
-        (coarse, wide), (fine, narrow) = (pressed_by_hertz(ratio, cells) for cells in (21, 63))
+        (coarse, wide), (fine, narrow) = (numerical_hertz(ratio, cells) for cells in (21, 63))
         order = np.log(np.abs(wide / narrow)) / np.log(3.0)
         name, where = f"hertz.{ratio:g}", f"Hertz, a/b {ratio:g}, 63 cells"
         rows += [
-            _row(f"{name}.approach", f"{where}: approach", abs(narrow[0]), 2e-4, "of order 2"),
-            _row(f"{name}.pressure", f"{where}: greatest pressure", abs(narrow[1]), 4e-4, "of order 2"),
-            _row(f"{name}.area", f"{where}: area", abs(narrow[2]), 0.02, "to a part of the cells along its edge"),
+            _bound_row(f"{name}.approach", f"{where}: approach", abs(narrow[0]), 2e-4, "of order 2"),
+            _bound_row(f"{name}.pressure", f"{where}: greatest pressure", abs(narrow[1]), 4e-4, "of order 2"),
+            _bound_row(f"{name}.area", f"{where}: area", abs(narrow[2]), 0.02, "to a part of the cells along its edge"),
             Observed(
                 f"contact_exact.{name}.order",
                 SYSTEM,
@@ -104,7 +109,7 @@ def _hertz_rows() -> list[Row]:
                 float(order[1]),
                 "",
             ).within(2.0, 0.4, "collocation at the middle of cells", "closed form"),
-            _row(
+            _bound_row(
                 f"{name}.residual",
                 f"{where}: unmet contact conditions, over the displacement",
                 max(coarse.residual, fine.residual),
@@ -116,8 +121,8 @@ def _hertz_rows() -> list[Row]:
 
 
 def carter(x: Array, a: float, share: float) -> Array:
-    """Traction divided by mu p0 on a strip -a < x < a that rolls in the direction +x. share: ratio of the creepage to
-    the creepage of full sliding.
+    """Carter's traction (divided by mu p0) on a strip -a < x < a that rolls in the direction +x. share: creepage
+    divided by the creepage of full sliding.
 
     Carter (1926) as in Johnson, Contact Mechanics, 1985, section 8.3: two semi-ellipses, of which the second fills the
     zone that sticks, a (1 - share) wide each way, at the leading edge.
@@ -127,11 +132,11 @@ def carter(x: Array, a: float, share: float) -> Array:
     return full_traction - half / a * np.sqrt(np.maximum(1 - ((x - (a - half)) / half) ** 2, 0.0))
 
 
-def _strip(cells: int, share: float) -> tuple[list[float], list[float], float]:
-    """For the middle line of a slender ellipse: x/a, traction divided by mu p0, and error of the integrated traction
-    relative to full sliding."""
-    b = CONTACT_SIZE / STRIP**0.5
-    a = STRIP * b
+def _strip_traction(cells: int, share: float) -> tuple[list[float], list[float], float]:
+    """Middle line of a slender ellipse: x / a, traction divided by mu p0, and error of the integrated traction divided
+    by that of full sliding. share: creepage divided by the creepage of full sliding."""
+    b = CONTACT_SIZE / STRIP_AXIS_RATIO**0.5
+    a = STRIP_AXIS_RATIO * b
     pressed = hertzian(a, b, LOAD, cells + 1)  # odd: one strip of cells lies in the middle
     bound = MU * 1.5 * LOAD / (np.pi * a * b)
     solved = solve_rolling(pressed, MU, 2 * share * bound / MATERIAL_PAIR.modulus, 0.0, 0.0, MATERIAL_PAIR)
@@ -140,13 +145,13 @@ def _strip(cells: int, share: float) -> tuple[list[float], list[float], float]:
     return (pressed.x / a).tolist(), traction.tolist(), error
 
 
-def _strip_rows(cells: int) -> list[Row]:
+def _carter_rows(cells: int) -> list[Row]:
     why = "first order in the cells: the leading edge of the zone that sticks; and the ellipse is no cylinder by 1e-3"
     return [
-        _row(
+        _bound_row(
             f"carter.{share:g}",
             f"error of the force on Carter's cylinder over mu N, {share:g} of the creepage of sliding, {cells} cells",
-            abs(_strip(cells, share)[2]),
+            abs(_strip_traction(cells, share)[2]),
             0.2 / cells,
             why,
         )
@@ -154,22 +159,22 @@ def _strip_rows(cells: int) -> list[Row]:
     ]
 
 
-def shift(share: float, nu: float, cells: int) -> RollingSolution:
-    """Exact solution for a ball that is shifted by the distance at which the tangential force is ``share`` of mu N, by
-    Cattaneo and Mindlin."""
+def shifted_ball(share: float, nu: float, cells: int) -> RollingSolution:
+    """Exact solution for a ball that is shifted by the distance at which Cattaneo and Mindlin's tangential force is
+    ``share`` times mu N."""
     body = Material(E=2.1e11, nu=nu)
     pair = MaterialPair(body, body)
     shift_distance = 3 * FRICTION_LIMIT * (2 - nu) / (8 * CONTACT_SIZE * pair.G) * (1 - (1 - share) ** (2 / 3))
     return solve_shift(hertzian(CONTACT_SIZE, CONTACT_SIZE, LOAD, cells), MU, shift_distance, 0.0, pair)
 
 
-def _shift_rows() -> list[Row]:
+def _cattaneo_rows() -> list[Row]:
     why = "exact for nu = 0 (Johnson, Contact Mechanics, 1985, section 7.2); the cells err by 4e-4"
     return [
-        _row(
+        _bound_row(
             f"cattaneo.{share:g}",
             f"error of the force on Cattaneo and Mindlin's shifted ball over mu N, {share:g} of sliding",
-            abs(shift(share, 0.0, 40).fx / FRICTION_LIMIT + share),
+            abs(shifted_ball(share, 0.0, 40).fx / FRICTION_LIMIT + share),
             1e-3,
             why,
         )
@@ -177,19 +182,19 @@ def _shift_rows() -> list[Row]:
     ]
 
 
-def roll(name: str, cells: int, sign: float = 1.0, mirrored: float = 1.0) -> Array:
-    """Forces (3,) of one of CASES: fx and fy divided by mu N, mz divided by mu N sqrt(ab). The creepages may be
-    reversed (``sign``) or mirrored in y."""
-    ratio, xi_x, xi_y, spin = CASES[name]
+def rolling_forces(case_name: str, cells: int, sign: float = 1.0, mirror_sign: float = 1.0) -> Array:
+    """Forces (3,) of one of CASES: fx and fy divided by mu N, mz divided by mu N sqrt(ab). ``sign`` reverses the
+    creepages, ``mirror_sign`` mirrors the lateral creepage and the spin."""
+    ratio, xi_x, xi_y, spin = CASES[case_name]
     creepage = FRICTION_LIMIT / (MATERIAL_PAIR.G * CONTACT_SIZE**2) * sign
     pressed = hertzian(CONTACT_SIZE * ratio**0.5, CONTACT_SIZE / ratio**0.5, LOAD, cells)
-    across = mirrored * creepage
+    across = mirror_sign * creepage
     solved = solve_rolling(pressed, MU, creepage * xi_x, across * xi_y, across * spin / CONTACT_SIZE, MATERIAL_PAIR)
     return np.array([solved.fx, solved.fy, solved.mz / CONTACT_SIZE]) / FRICTION_LIMIT
 
 
 def _sliding_rows() -> list[Row]:
-    """Rows on creepages that are so large that the whole patch slides."""
+    """Rows on creepages so large that the whole contact area slides."""
     pressed = hertzian(CONTACT_SIZE, CONTACT_SIZE, LOAD, 20)
     rows = []
     for angle in (0.0, 0.7, 2.0):
@@ -199,7 +204,7 @@ def _sliding_rows() -> list[Row]:
             / FRICTION_LIMIT
         )
         rows.append(
-            _row(
+            _bound_row(
                 f"sliding.{angle:g}",
                 "difference of the force from mu N against the creepage, over mu N, sliding "
                 f"at creepage 1, {angle:g} rad from x",
@@ -211,18 +216,23 @@ def _sliding_rows() -> list[Row]:
     most = np.hypot(solved.fx, solved.fy) / FRICTION_LIMIT - 1.0
     return [
         *rows,
-        _row("sliding.most", "excess of the force above mu N, over mu N", max(float(most), 0.0), 1e-12, "Coulomb"),
+        _bound_row(
+            "sliding.most", "excess of the force above mu N, over mu N", max(float(most), 0.0), 1e-12, "Coulomb"
+        ),
     ]
 
 
 def _symmetry_rows() -> list[Row]:
-    """Rows: reversed and mirrored creepages must give reversed and mirrored forces, apart from the solver's
-    residual."""
+    """Rows: reversed and mirrored creepages must give reversed and mirrored forces, up to the solver's residual."""
     name, cells = "x, y against spin", 20
-    there, back, mirror = roll(name, cells), roll(name, cells, -1.0), roll(name, cells, 1.0, -1.0)
+    there, back, mirror = (
+        rolling_forces(name, cells),
+        rolling_forces(name, cells, -1.0),
+        rolling_forces(name, cells, 1.0, -1.0),
+    )
     return [
-        _row("reversed", "F(-creepage) + F(creepage), over mu N", float(np.abs(there + back).max()), 1e-7, "odd"),
-        _row(
+        _bound_row("reversed", "F(-creepage) + F(creepage), over mu N", float(np.abs(there + back).max()), 1e-7, "odd"),
+        _bound_row(
             "mirrored",
             "difference of the forces from those of the mirror image in y, over mu N",
             float(np.abs(there - mirror * [1, -1, -1]).max()),
@@ -234,14 +244,14 @@ def _symmetry_rows() -> list[Row]:
 
 def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
     """Rows: error relative to the limit of infinitely small cells, which is extrapolated from the two finest grids at
-    order 1."""
+    order 1; and the observed order."""
     rows = []
     for name, values in refined.items():
         left = 2.0 * np.linalg.norm(np.diff(np.array(values)[:, 1:3], axis=0), axis=1)
         cells = int(values[-2][0])
-        bound = ERROR_SHARE * 40 / cells
+        bound = DISCRETISATION_ERROR * 40 / cells
         rows.append(
-            _row(
+            _bound_row(
                 f"refined.{name.replace(', ', '.').replace(' ', '_')}",
                 f"error of the rolling force with {cells} cells along each axis, over mu N, {name}",
                 float(left[-1]),
@@ -265,9 +275,9 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
     ]
 
 
-def drawn_case(generator: np.random.Generator) -> tuple[ContactCase, int]:
-    """A random contact with spin, a/b from 0.2 to 5 and Poisson's ratio from 0 to 0.5, with no forces computed; and 60
-    to 120 cells."""
+def random_contact(generator: np.random.Generator) -> tuple[ContactCase, int]:
+    """A random contact with spin, a/b from 0.2 to 5 and Poisson's ratio from 0 to 0.5, with no forces computed; and its
+    number of cells along each axis, 60 to 120."""
     ratio, level = (
         float(np.exp(generator.uniform(np.log(low), np.log(high)))) for low, high in ((0.2, 5.0), (0.1, 10.0))
     )
@@ -288,14 +298,14 @@ def drawn_case(generator: np.random.Generator) -> tuple[ContactCase, int]:
 
 def _converged_row() -> Row:
     rng, failed = np.random.default_rng(SEED), 0
-    for case, cells in (drawn_case(rng) for _ in range(DRAWN_CONTACTS)):
+    for case, cells in (random_contact(rng) for _ in range(RANDOM_CONTACT_COUNT)):
         try:
             solve_rolling(hertzian(case.a, case.b, LOAD, cells), MU, *case.motion, case.pair)
         except RunFailed:
             failed += 1
-    return _row(
+    return _bound_row(
         "converged",
-        f"{DRAWN_CONTACTS} contacts drawn at random, a/b 0.2 to 5, with spin, 60 to 120 cells along each "
+        f"{RANDOM_CONTACT_COUNT} contacts drawn at random, a/b 0.2 to 5, with spin, 60 to 120 cells along each "
         "axis: how many the solver gave up",
         float(failed),
         0.0,
@@ -304,9 +314,9 @@ def _converged_row() -> Row:
     )
 
 
-def _rows_of_contact_sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
-    """Comparison with every row of another program's sample, if the folder of data has it, and the largest
-    difference."""
+def _sample_rows(quick: bool) -> tuple[list[list[Any]], list[Row]]:
+    """Differences from every row of another program's sample, and rows with the largest; without the sample file, a row
+    that was not run."""
     words = "largest difference from the forces of CONTACT's sample (40 cells, error 0.6 %) over mu N"
     folder = data_folder()
     if folder is None or not (folder / SAMPLE_FILE).is_file():
@@ -316,8 +326,8 @@ def _rows_of_contact_sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
     solved = [_differences_from_file(row, 20 if quick else 40) for row in table]
     force, moment = (max(solved_row[i] for solved_row in solved) for i in (2, 3))
     return solved, [
-        _row("sample", words, force, 0.01, "its own error and ours", independence="native"),
-        _row(
+        _bound_row("sample", words, force, 0.01, "its own error and ours", independence="native"),
+        _bound_row(
             "sample.moment",
             words.replace("forces", "moments").replace("mu N", "mu N sqrt(ab)"),
             moment,
@@ -329,8 +339,8 @@ def _rows_of_contact_sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
 
 
 def _differences_from_file(row: dict[str, str], cells: int) -> list[Any]:
-    """Kind, a/b, difference of the force divided by mu N, and of the moment divided by mu N sqrt(ab), for a row of the
-    file. The file's units are mm, N and MPa."""
+    """Kind and axis ratio of a row of the sample file, difference of the force divided by mu N, and difference of the
+    moment divided by mu N sqrt(ab). The file's units are mm, N and MPa."""
     value = {name: float(text) for name, text in row.items() if name != "kind"}
     a, b, nu = value["a_mm"] / 1e3, value["b_mm"] / 1e3, value["nu"]
     body = Material(E=2e6 * value["G_MPa"] * (1 + nu), nu=nu)
@@ -349,7 +359,7 @@ def _differences_from_file(row: dict[str, str], cells: int) -> list[Any]:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Forces over grids, and the sample."""
+    """Tables of the rolling forces over the grids, and of the differences from the sample."""
     grids = [f"{int(row[0])} cells" for row in next(iter(case_data["refined"].values()))]
     rows = tuple(
         (name, *(f"{100 * fx:z.2f}, {100 * fy:z.2f}" for _, fx, fy, _ in values))
@@ -380,7 +390,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Carter's strip, and how the forces settle with the cells."""
+    """Plot Carter's traction on a strip, and the change of the rolling forces with the number of cells."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))

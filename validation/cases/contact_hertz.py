@@ -1,4 +1,5 @@
-"""Hertz against the closed form in many decimal digits, from thin lines to the circle, and what it refuses."""
+"""Hertz's contact compared with the closed form in many decimal digits, from thin lines to the circle, and the input
+that is refused."""
 
 from collections.abc import Callable
 from decimal import Decimal, localcontext
@@ -14,16 +15,16 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
 TITLE = "Hertz: two smooth bodies touch on an ellipse"
 SYSTEM: System = "contact"
-DIGITS = 60
-RELATIVE_BOUND = 1e-10
+DECIMAL_DIGITS = 60
+RELATIVE_TOLERANCE = 1e-10
 LOAD = 1e5
-PRESSURE, SHORT_SEMI_AXIS = Decimal(10) ** 9, Decimal(1) / 1000
-"""Largest pressure (Pa) and short semi-axis (m) of the contacts compared."""
+PEAK_PRESSURE, SHORT_SEMI_AXIS = Decimal(10) ** 9, Decimal(1) / 1000
+"""Peak pressure (Pa) and short semi-axis (m) of the contacts compared."""
 MATERIAL_PAIR = MaterialPair(STEEL, Material(E=7e10, nu=0.33))
 """Steel on aluminium: the combined modulus is exact for any two materials as long as there is no friction."""
-NEAR_CIRCLE = tuple(1.0 - 10.0**-k for k in range(1, 16))
+NEAR_CIRCLE_RATIOS = tuple(1.0 - 10.0**-k for k in range(1, 16))
 AXIS_RATIOS = tuple(float(g) for g in 10.0 ** np.linspace(-6, 0, 49))
-"""Ratios of axes: 1e-4 and a curvature ratio of 1e-4 are inside."""
+"""Ratios of the short to the long semi-axis of the contacts compared."""
 QUANTITY_NAMES = {"long": "longer semi-axis", "short": "shorter semi-axis", "p0": "largest pressure"}
 BOUND_REASON = (
     "K and E by the arithmetic-geometric mean in 60 decimal digits, which leaves 30 where K - E cancels: no digit "
@@ -32,10 +33,9 @@ BOUND_REASON = (
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows for axes, pressure, approach and load over all ratios of axes, for one published contact, for refusals;
-    the same in quick.
-    """
-    errors = _errors((*AXIS_RATIOS, *NEAR_CIRCLE))
+    """Rows for axes, pressure, approach and load over all axis ratios, for one published contact, and for refusals; a
+    quick run is the same."""
+    errors = _largest_errors((*AXIS_RATIOS, *NEAR_CIRCLE_RATIOS))
     rows = [
         Observed(
             f"contact_hertz.{name}",
@@ -43,37 +43,39 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             f"largest relative error of {QUANTITY_NAMES.get(name, name)}, axis ratios 1e-6 to 1e6",
             max(worst),
             "",
-        ).at_most(RELATIVE_BOUND, BOUND_REASON, "closed form")
+        ).at_most(RELATIVE_TOLERANCE, BOUND_REASON, "closed form")
         for name, worst in errors.items()
     ]
-    return rows + _published() + _behaviour(), {"ratio": [*AXIS_RATIOS, *NEAR_CIRCLE], "errors": errors}
+    return rows + _published_rows() + _refusal_rows(), {"ratio": [*AXIS_RATIOS, *NEAR_CIRCLE_RATIOS], "errors": errors}
 
 
-def ellipse(ratio: float) -> dict[str, Decimal]:
-    """Exact curvatures, load and approach (many digits) of a contact with a ratio of short to long semi-axis."""
-    with localcontext(prec=DIGITS):
-        g, modulus = Decimal(ratio), Decimal(MATERIAL_PAIR.modulus)
-        k, e = _complete(g)
-        if ratio == 1.0:
-            flat = steep = _pi() * PRESSURE / (4 * SHORT_SEMI_AXIS * modulus)
+def exact_contact(axis_ratio: float) -> dict[str, Decimal]:
+    """Exact semi-axes, curvatures, pressure, load and approach (60 decimal digits) of a contact with a given ratio of
+    short to long semi-axis."""
+    with localcontext(prec=DECIMAL_DIGITS):
+        g, modulus = Decimal(axis_ratio), Decimal(MATERIAL_PAIR.modulus)
+        k, e = _elliptic_integrals(g)
+        if axis_ratio == 1.0:
+            flat = steep = _pi() * PEAK_PRESSURE / (4 * SHORT_SEMI_AXIS * modulus)
         else:
-            scale = PRESSURE * g * g / (modulus * (1 - g * g) * SHORT_SEMI_AXIS)
+            scale = PEAK_PRESSURE * g * g / (modulus * (1 - g * g) * SHORT_SEMI_AXIS)
             flat, steep = scale * (k - e), scale * (e / (g * g) - k)
         return {
             "short": SHORT_SEMI_AXIS,
             "long": SHORT_SEMI_AXIS / g,
-            "p0": PRESSURE,
-            "approach": PRESSURE * SHORT_SEMI_AXIS * k / modulus,
+            "p0": PEAK_PRESSURE,
+            "approach": PEAK_PRESSURE * SHORT_SEMI_AXIS * k / modulus,
             "flat": flat,
             "steep": steep,
-            "load": 2 * _pi() * PRESSURE * SHORT_SEMI_AXIS**2 / (3 * g),
+            "load": 2 * _pi() * PEAK_PRESSURE * SHORT_SEMI_AXIS**2 / (3 * g),
         }
 
 
-def _complete(axis_ratio: Decimal) -> tuple[Decimal, Decimal]:
-    """K and E at the modulus sqrt(1 - g^2): K = pi / (2 M(1, g)), E = K (1 - sum 2^(n-1) c_n^2)."""
+def _elliptic_integrals(axis_ratio: Decimal) -> tuple[Decimal, Decimal]:
+    """Complete elliptic integrals K and E at the modulus sqrt(1 - g^2), where g is the axis ratio and M the
+    arithmetic-geometric mean: K = pi / (2 M(1, g)), E = K (1 - sum 2^(n-1) c_n^2)."""
     a, b, total, weight = Decimal(1), axis_ratio, (1 - axis_ratio * axis_ratio) / 2, Decimal(1) / 2
-    while abs(a - b) > Decimal(10) ** (4 - DIGITS) * a:
+    while abs(a - b) > Decimal(10) ** (4 - DECIMAL_DIGITS) * a:
         weight, c = 2 * weight, (a - b) / 2
         a, b = (a + b) / 2, (a * b).sqrt()
         total += weight * c * c
@@ -89,10 +91,10 @@ def _pi() -> Decimal:
     return (a + b) ** 2 / (4 * t)
 
 
-def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
-    """Largest relative error of every quantity at each axis ratio; the contacts are computed from load and from
+def _largest_errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
+    """Largest relative error of every quantity at each axis ratio. The contacts are computed from the load and from the
     approach, with the long axis along x and along y."""
-    truth = [ellipse(g) for g in ratios]
+    truth = [exact_contact(g) for g in ratios]
     flat, steep, load, approach = (
         np.array([float(computed[name]) for computed in truth]) for name in ("flat", "steep", "load", "approach")
     )
@@ -113,12 +115,13 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
 
 
 def _exchange_axes(touching: Hertz) -> Hertz:
-    """The contact with x and y exchanged."""
+    """The contact with the axes x and y exchanged."""
     return Hertz(touching.b, touching.a, touching.p0, touching.approach, touching.load, touching.B, touching.A)
 
 
-def _published() -> list[Row]:
-    """Rows: comparison with a contact computed by another program on a grid, and scaling of the axes with the load."""
+def _published_rows() -> list[Row]:
+    """Rows: comparison with a contact that another program computed on a grid, and scaling of the axes with the
+    load."""
     touching, eight = (by_load(1 / 0.92, 1 / 0.6, load, MaterialPair()) for load in (1e5, 8e5))
     why = "CONTACT, half-space solved on cells of 0.25 mm, that is 1/29 of an axis"
     return [
@@ -146,7 +149,7 @@ def _published() -> list[Row]:
     ]
 
 
-def _behaviour() -> list[Row]:
+def _refusal_rows() -> list[Row]:
     """Rows: zero and negative loads give zero, and input that is no Hertzian contact is refused."""
     nothing = [by_load(1.0, 2.0, load, MATERIAL_PAIR) for load in (0.0, -1.0, -1e6)] + [
         by_approach(1.0, 2.0, -1e-3, MATERIAL_PAIR)
@@ -197,16 +200,16 @@ def _behaviour() -> list[Row]:
     ]
 
 
-def _outcome(ask_refused: Callable[[], object]) -> str:
+def _outcome(compute: Callable[[], object]) -> str:
     try:
-        ask_refused()
+        compute()
     except InputError:
         return "refused"
     return "accepted"
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Worst errors by range of the ratio of axes."""
+    """Table of the largest relative errors by range of the axis ratio."""
     ratio = np.array(case_data["ratio"])
     ranges = {"1e-6 to 1e-4": (0.0, 1e-4), "1e-4 to 0.1": (1e-4, 0.1), "0.1 to 0.9": (0.1, 0.9), "0.9 to 1": (0.9, 1.0)}
     rows = tuple(
@@ -220,14 +223,14 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
         for title, (low, high) in ranges.items()
     )
     note = (
-        f"Worst relative error against {DIGITS} digits, driven by load and by approach, the long axis along x and "
-        "along y."
+        f"Worst relative error against {DECIMAL_DIGITS} digits, driven by load and by approach, the long axis along x "
+        "and along y."
     )
     return [Table("Hertz: relative error by the ratio of axes", note, ("axes", *case_data["errors"]), rows)]
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Plot semi-axes over the ratio of curvatures, and errors over the axis ratio."""
+    """Plot the semi-axes over the ratio of curvatures, and the errors over the axis ratio."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
@@ -242,7 +245,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
         right.loglog(
             ratio[: len(AXIS_RATIOS)], np.maximum(errors[: len(AXIS_RATIOS)], 1e-17), ".", markersize=4, label=name
         )
-    right.axhline(RELATIVE_BOUND, color="black", linestyle=":", label="allowed")
+    right.axhline(RELATIVE_TOLERANCE, color="black", linestyle=":", label="allowed")
     right.set(title="Relative error against 60 digits [-]", xlabel="short axis / long axis [-]", ylim=(3e-18, 1e-9))
     right.legend(loc="center", ncols=3)
     add_heading(figure, "Hertzian contact loses no digits from a thin line to the circle")

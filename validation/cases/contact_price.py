@@ -1,4 +1,4 @@
-"""Errors that are stated with creep forces: whether they hold, and what a table of contacts takes.
+"""Stated errors of creep forces: whether they hold, and the time to compute a table of contacts.
 
 What accuracy costs in rolling contact stands among the problems of ``price``.
 """
@@ -33,7 +33,7 @@ from validation.contact.programs import compare, table
 
 TITLE = "Stated errors of rolling contact"
 SYSTEM: System = "contact"
-REPEATED = (
+RECOMPUTED_CASES = (
     (1.0, "x", 0.5),
     (1.0, "spin", 1.2),
     (0.5, "x+y", 0.8),
@@ -41,29 +41,34 @@ REPEATED = (
     (5.0, "x-y+spin", 0.5),
     (0.2, "y-spin", 1.2),
 )
-"""Cases of the set that are computed anew; a quick run takes the first two on coarser grids."""
-NETS = (7, 11, 21, 41)
-"""Cells per strip whose stated errors are judged; a quick run takes 21 alone."""
+"""Axis ratio, kind and size of creepage of the stored contacts whose exact forces are computed anew; a quick run takes
+the first two on coarser grids."""
+CELL_COUNTS = (7, 11, 21, 41)
+"""Cells per strip at which the stated discretisation errors are judged; a quick run takes 21 alone."""
 JUDGED_CHOICES: tuple[dict[str, str], ...] = ({}, {"bound": "elliptic"}, {"march": "plain"}, {"flexibilities": "one"})
-"""Choices of FASTSIM_BANDS whose cells are judged, beside the best ones; a quick run takes the first alone."""
-REFERENCE = {True: 0.01, False: 0.005}
-"""By mu N: the exact theory's own error on the grids of a quick and of a full run."""
+"""Options of FASTSIM, changed from the best ones, whose stated discretisation errors are judged; a quick run takes the
+first alone."""
+REFERENCE_TOLERANCES = {True: 0.01, False: 0.005}
+"""Error of the exact theory, divided by mu N, on the grids of a quick run (True) and of a full run (False)."""
 MISSED_SHARE = 0.06
-"""Share of contacts of the set that a stated error may miss: the band's 5 % and a row or two."""
-MOMENTS = {"intermediate": (0.024, 0.06), "elliptic": (0.013, 0.045)}
-"""Mean error of the moment divided by mu N sqrt(ab) that is asked for, and the error that 95 % are to keep to."""
-CONVERGED = 161
-"""Cells that are taken for the truth about fewer."""
-SLENDER = (
+"""Largest share of contacts whose error may exceed the stated one: the 5 % for which the band is made, and a contact or
+two."""
+MOMENT_TOLERANCES = {"intermediate": (0.024, 0.06), "elliptic": (0.013, 0.045)}
+"""Bounds of the moment's error divided by mu N sqrt(ab), by the traction bound of FASTSIM: of its mean, and of its 95 %
+quantile."""
+CONVERGED_CELLS = 161
+"""Cells per strip whose result counts as exact when fewer cells are judged."""
+SLENDER_REASON = (
     "reached for a/b 0.2 to 5 at every Poisson's ratio, not beyond: by mu N and the longer semi-axis the error "
     "is alike on slender ellipses, and that semi-axis is up to 3.2 sqrt(ab)"
 )
-"""Why the moments of the wide contacts by the elliptic bound miss their aim."""
-ROWS, SEED = 100_000, 41
+"""Reason why the moments of slender contacts by the elliptic traction bound miss their tolerance."""
+TABLE_ROWS, SEED = 100_000, 41
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Whether stated errors hold; in the full run also Kalker's two programs and a long table."""
+    """Rows on whether the stated errors hold; a full run also compares Kalker's two programs, and times a long table of
+    contacts."""
     cases = read_contacts()
     wide = read_wide(JUDGED_PART)
     rows = _reference_rows(cases, quick) + _band_rows(cases, quick) + _total_rows(wide)
@@ -71,14 +76,14 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, {}
     programs = compare(cases[::2])
-    return [*rows, *_program_rows(programs), _table_row(folder)], {"programs": programs}
+    return [*rows, *_program_rows(programs), _long_table_row(folder)], {"programs": programs}
 
 
 def _reference_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
-    """Row: stored exact forces compared with those that the exact theory gives now."""
+    """Row: difference of the stored exact forces from those that the exact theory computes now."""
     known = {(round(c.a / c.b, 6), c.kind, c.level): c for c in cases}
     answers = []
-    for key in REPEATED[:2] if quick else REPEATED:
+    for key in RECOMPUTED_CASES[:2] if quick else RECOMPUTED_CASES:
         now = with_exact_forces(known[key], (20,) if quick else (40,))
         answers.append(float(np.linalg.norm(now.force - known[key].force)))
     return [
@@ -88,13 +93,15 @@ def _reference_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
             f"largest difference of exact forces computed anew from those kept, over mu N, {len(answers)} cases",
             max(answers),
             "",
-        ).at_most(REFERENCE[quick], "what the cells leave uncertain after their first order is taken out", "none")
+        ).at_most(
+            REFERENCE_TOLERANCES[quick], "what the cells leave uncertain after their first order is taken out", "none"
+        )
     ]
 
 
 def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
-    """Rows: share of contacts whose error exceeds the stated error band. The contacts are those of the calibration set
-    and randomly drawn ones."""
+    """Rows: share of contacts whose error exceeds the stated error band, for the contacts of the calibration set and
+    for random ones."""
     unseen, rows = read_drawn(JUDGED_PART), []
     against = np.array([case.parts[1] * case.parts[2] < 0 for case in unseen])
     for name in ["blended intermediate"] if quick else [*FASTSIM_BANDS, "simplified"]:
@@ -122,8 +129,8 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
 
 
 def _total_rows(cases: list[ContactCase]) -> list[Row]:
-    """Rows: share of random contacts whose error exceeds the stated total error of cells and theory, at 21 cells, for
-    every Poisson's ratio."""
+    """Rows: share of random contacts whose error at 21 cells exceeds the stated total error of discretisation and
+    theory, for every Poisson's ratio."""
     ratios, off, stated = np.array([case.pair.nu for case in cases]), [], []
     for case in cases:
         contact = case.contact(Fastsim, **BEST_CHOICES)
@@ -147,7 +154,7 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
 
 
 def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide_cases: list[ContactCase]) -> list[Row]:
-    """Rows: error of FASTSIM_BANDS's moment relative to the exact theory."""
+    """Rows: error of FASTSIM's moment compared with the exact theory, by traction bound and set of contacts."""
     rows = []
     range_of_set = [case for case in wide_cases if AXIS_RATIOS[0] <= case.a / case.b <= AXIS_RATIOS[-1]]
     sets = {
@@ -156,7 +163,7 @@ def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide_cases
         "less_wide": (range_of_set, "the wide contacts of a/b 0.2 to 5, Poisson's ratio 0 to 0.5"),
         "wide": (wide_cases, "the wide contacts, a/b 0.1 to 10, Poisson's ratio 0 to 0.5"),
     }
-    for (bound, (mean, most)), (row_name, (some, words)) in product(MOMENTS.items(), sets.items()):
+    for (bound, (mean, most)), (row_name, (some, words)) in product(MOMENT_TOLERANCES.items(), sets.items()):
         lever = np.array([max(c.a, c.b) / np.sqrt(c.a * c.b) for c in some])
         error = theory_errors(f"blended {bound}", some).moment_error * lever
         for what, value, allowed in (("mean", error.mean(), mean), ("95 %", np.quantile(error, 0.95), most)):
@@ -168,7 +175,7 @@ def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide_cases
                 "mu N sqrt(ab)",
             )
             rows.append(
-                observed.aim(allowed, SLENDER)
+                observed.aim(allowed, SLENDER_REASON)
                 if (bound, row_name) == ("elliptic", "wide")
                 else observed.at_most(allowed, "the exact theory, kept", "native")
             )
@@ -176,9 +183,9 @@ def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide_cases
 
 
 def _cell_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
-    """Rows: share of contacts whose discretisation error, found with many cells, exceeds the stated one."""
+    """Rows: share of contacts whose discretisation error, measured with many cells, exceeds the stated one."""
     rows, some = [], cases[::9] if quick else cases
-    for choices, cells in product(JUDGED_CHOICES[: 1 if quick else None], (21,) if quick else NETS):
+    for choices, cells in product(JUDGED_CHOICES[: 1 if quick else None], (21,) if quick else CELL_COUNTS):
         share = _shares_beyond_stated(some, cells, choices)
         name = ".".join([f"{cells}", *choices.values()])
         for what, value in zip(("force", "moment"), share, strict=True):
@@ -201,7 +208,7 @@ def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[st
     answers = []
     for case in cases:
         contact = case.contact(Fastsim, **{**BEST_CHOICES, **choices})
-        fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED)
+        fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED_CELLS)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
         answers.append(
             np.array(off) > np.array(remaining_errors(contact, case.motion, cells, fine)) + ROUNDING * case.limit
@@ -209,8 +216,9 @@ def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[st
     return [float(value) for value in np.mean(answers, axis=0)]
 
 
-def _program_rows(program_answers: dict[str, Any]) -> list[Row]:
-    t = {name: np.array(values) for name, values in program_answers["seconds"].items()}
+def _program_rows(program_times: dict[str, Any]) -> list[Row]:
+    """Row: ratio of the computing times of Kalker's programs of 1983 and of 1982."""
+    t = {name: np.array(values) for name, values in program_times["seconds"].items()}
     why = "the paper's figure is of a computer and a Fortran program of 1983"
     what = "ratio of the time of contact and forces by the program of 1983 to that of the program of 1982"
     ratio, low, high = paired_ratio(t["1983"] + t["press"], t["1982"])
@@ -221,14 +229,14 @@ def _program_rows(program_answers: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _table_row(folder: Path) -> Row:
+def _long_table_row(folder: Path) -> Row:
     """Row: computing time of a long table of contacts."""
     rng = np.random.default_rng(SEED)
     low, high = np.array([2.0, 2.0, 1.0, 0.1, -0.5, -0.5, -1.0]), np.array([9.0, 9.0, 150.0, 0.5, 0.5, 0.5, 1.0])
     path, out = folder / "contact_cases.csv", folder / "contact_forces.csv"
     np.savetxt(
         path,
-        rng.uniform(low, high, (ROWS, 7)),
+        rng.uniform(low, high, (TABLE_ROWS, 7)),
         fmt="%.8g",
         delimiter=",",
         comments="",
@@ -239,15 +247,15 @@ def _table_row(folder: Path) -> Row:
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()
-    assert answers == {"rows": ROWS, "wrong": 0}
-    what = f"time to answer a CSV of {ROWS:,} contacts with errors and status, measured once"
+    assert answers == {"rows": TABLE_ROWS, "wrong": 0}
+    what = f"time to answer a CSV of {TABLE_ROWS:,} contacts with errors and status, measured once"
     return Observed("contact_price.table", SYSTEM, what, seconds, "s").beside(
         "seconds", "reported and never gated", "none"
     )
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """The paper's comparison."""
+    """Table that compares Kalker's two programs."""
     return [table(case_data["programs"])] if case_data else []
 
 

@@ -1,4 +1,4 @@
-"""Wheel on rail: the built-in profiles, and where they touch as the wheelset moves sideways."""
+"""Wheel on rail: the built-in profiles, and the contact points over the lateral displacement of the wheelset."""
 
 from pathlib import Path
 from typing import Any
@@ -21,40 +21,43 @@ from validation.contact.contact_shapes import Shape, exact_normal
 TITLE = "Rolling contact of profiles: S1002 on UIC 60"
 SYSTEM: System = "contact"
 WHEEL_FILE, RAIL_FILE = "MBench_S1002_v3.prw", "MBench_UIC60_v3.prr"
-PROFILE_DISTANCE = 2e-5
-"""Largest distance (m) of a built-in profile from the benchmark's."""
-SHIFTS = np.arange(0.0, 10.1, 0.5)
+PROFILE_TOLERANCE = 2e-5
+"""Largest distance (m) allowed between a built-in profile and the benchmark's."""
+LATERAL_SHIFTS = np.arange(0.0, 10.1, 0.5)
+"""Lateral displacements (mm) of the wheelset."""
 QUICK_SHIFTS = np.array([0.0, 4.5, 5.0, 6.0, 6.5])
-LOAD = 1e4
-"""Vertical load of a wheel (N): the benchmark has 20 kN on a wheelset."""
-CELLS = 40
+WHEEL_LOAD = 1e4
+"""Vertical load (N) of a wheel; the benchmark has 20 kN on a wheelset."""
+EXACT_CELLS = 40
 MATERIAL_PAIR = MaterialPair()
 BENCHMARK = (
     "Manchester contact benchmark, case A (Shackleton and Iwnicki, Vehicle Syst. Dyn. 46, 2008, 129-149), "
     "S1002 on UIC 60 at 1:40, gauge 1435 mm, back to back 1360 mm, radius 460 mm"
 )
-TWO_PATCHES = {"from": -22.6, "to": -33.4, "peak": 1556.0}
-"""Where the benchmark's contact on the right rail jumps at 5 mm (mm), and its peak pressure there (MPa)."""
-LABELS = {"no yaw": "no yaw", "yaw": "yaw of 2.4 mrad per mm of shift"}
-FLANGE = 6.5
-"""Shift (mm) from which the benchmark's flange touches."""
+CONTACT_JUMP = {"from": -22.6, "to": -33.4, "peak": 1556.0}
+"""Lateral positions (mm) on the right rail between which the benchmark's contact jumps at a displacement of 5 mm, and
+its peak pressure there (MPa)."""
+FIGURE_LABELS = {"no yaw": "no yaw", "yaw": "yaw of 2.4 mrad per mm of shift"}
+FLANGE_SHIFT = 6.5
+"""Lateral displacement (mm) from which the benchmark's flange touches the rail."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows on the built-in profiles and on the places of contact; in the full run at every shift, and with yaw."""
-    shifts = QUICK_SHIFTS if quick else SHIFTS
+    """Rows on the built-in profiles and on the contact points; a full run has every lateral displacement, also with
+    yaw."""
+    shifts = QUICK_SHIFTS if quick else LATERAL_SHIFTS
     data: dict[str, Any] = {"no yaw": [_right_wheel_contact(float(shift), 0.0, not quick) for shift in shifts]}
     if not quick:
         data["yaw"] = [_right_wheel_contact(float(shift), 2.4e-3 * float(shift), False) for shift in shifts]
-    rows = _file_rows() + _place_rows(data["no yaw"])
+    rows = _profile_file_rows() + _contact_point_rows(data["no yaw"])
     return rows + ([] if quick else _benchmark_rows(data["no yaw"])), data
 
 
-def _right_wheel_contact(lateral_shift: float, yaw: float, exact: bool) -> dict[str, Any]:
-    """Contact of the right wheel at a lateral shift (mm) and yaw (rad): contact points, their loads, and peak
-    pressure."""
+def _right_wheel_contact(lateral_shift: float, yaw: float, with_exact_peak: bool) -> dict[str, Any]:
+    """Contact of the right wheel at a lateral displacement (mm) and yaw angle (rad): contact points, their loads, area
+    and peak pressure."""
     touches = wheel_on_rail(s1002(), uic60(), lateral_shift=lateral_shift * 1e-3, yaw=yaw)
-    pressed = press([touch.patch for touch in touches], MATERIAL_PAIR, load=LOAD)
+    pressed = press([touch.patch for touch in touches], MATERIAL_PAIR, load=WHEEL_LOAD)
     loads = {id(patch_pressure.patch): patch_pressure.load for patch_pressure in pressed.patches}
     contact_points = [
         {
@@ -75,23 +78,25 @@ def _right_wheel_contact(lateral_shift: float, yaw: float, exact: bool) -> dict[
         "peak": pressed.peak / 1e6,
     }
     heaviest = max(pressed.patches, key=lambda patch_pressure: patch_pressure.load)
-    return contact_facts | {"exact": _exact_peak(heaviest.patch, heaviest.load, heaviest.box) if exact else None}
+    return contact_facts | {
+        "exact": _exact_peak(heaviest.patch, heaviest.load, heaviest.box) if with_exact_peak else None
+    }
 
 
 def _exact_peak(patch: Any, load: float, box_ends: tuple[float, float, float, float]) -> float | None:
-    """Peak pressure (MPa) of one contact patch under its load, by the exact theory; None where the patch merges with
-    its neighbour."""
+    """Peak pressure (MPa) of one contact patch under its load, by the exact theory; None if the patch merges with its
+    neighbour."""
     x0, x1, y0, y1 = box_ends
     distance = patch.distance
     wide, high = 0.15 * (x1 - x0), 0.3 * (y1 - y0)
     grid = (x0 - wide, x1 + wide, max(y0 - high, distance.y[0]), min(y1 + high, distance.y[-1]))
     try:
-        return float(exact_normal(Shape("", distance, load), CELLS, grid).pressure.max() / 1e6)
+        return float(exact_normal(Shape("", distance, load), EXACT_CELLS, grid).pressure.max() / 1e6)
     except InputError:
         return None
 
 
-def _file_rows() -> list[Row]:
+def _profile_file_rows() -> list[Row]:
     folder = data_folder()
     if folder is None or not (folder / WHEEL_FILE).is_file():
         reason = "TWINRIG_DATA names no folder with the benchmark's profiles"
@@ -105,7 +110,7 @@ def _file_rows() -> list[Row]:
             for name in ("S1002", "UIC60")
         ]
     wheel, rail = read_profile(folder / WHEEL_FILE, "wheel"), read_profile(folder / RAIL_FILE, "rail")
-    off = {"S1002": wheel_off(wheel), "UIC60": rail_off(rail)}
+    off = {"S1002": wheel_profile_difference(wheel), "UIC60": rail_profile_distance(rail)}
     return [
         Observed(
             f"contact_profiles.{name}",
@@ -113,57 +118,57 @@ def _file_rows() -> list[Row]:
             f"largest distance of the built-in {name} from the benchmark's file",
             1e3 * value,
             "mm",
-        ).at_most(1e3 * PROFILE_DISTANCE, "the figure set for the built-in profiles", "published")
+        ).at_most(1e3 * PROFILE_TOLERANCE, "the figure set for the built-in profiles", "published")
         for name, value in off.items()
     ]
 
 
-def wheel_off(wheel: ContactProfile) -> float:
-    """Largest difference in height (m) between the built-in S1002 profile and a file's wheel profile, where both
-    exist."""
+def wheel_profile_difference(wheel: ContactProfile) -> float:
+    """Largest difference in height (m) between the built-in S1002 profile and the wheel profile of a file, where both
+    are defined."""
     rail_profile = s1002()
     inside = (wheel.y >= rail_profile.y[0]) & (wheel.y <= rail_profile.y[-1])
     return float(np.abs(rail_profile.curve(wheel.y[inside]) - wheel.z[inside]).max())
 
 
-def rail_off(rail: ContactProfile) -> float:
+def rail_profile_distance(rail: ContactProfile) -> float:
     """Largest distance (m) of a file's rail profile from the built-in inclined rail. The file has another origin, so
-    the best shift is applied first."""
+    the best shift is subtracted first."""
     laid = uic60().turned(Track().inclination)
     tree = KDTree(np.column_stack([laid.y, laid.z]))
     points = np.column_stack([rail.y, rail.z])[rail.z < 0.036]
 
-    def far(lateral_shift: np.ndarray) -> float:
+    def largest_distance(lateral_shift: np.ndarray) -> float:
         return float(tree.query(points - lateral_shift)[0].max())
 
     start = np.array([rail.y[np.argmin(rail.z)] - laid.y[np.argmin(laid.z)], 0.0])
-    return float(minimize(far, start, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-8}).fun)
+    return float(minimize(largest_distance, start, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-8}).fun)
 
 
-def _main(case: dict[str, Any]) -> dict[str, float]:
+def _main_contact(case: dict[str, Any]) -> dict[str, float]:
     """The contact point with the largest normal force."""
     return max(case["places"], key=lambda contact_point: contact_point["load"])
 
 
-def _place_rows(cases: list[dict[str, Any]]) -> list[Row]:
+def _contact_point_rows(cases: list[dict[str, Any]]) -> list[Row]:
     by = {case["shift"]: case for case in cases}
-    flange = min(case["shift"] for case in cases if _main(case)["angle"] > 45.0)
-    at5 = _main(by[5.0])
+    flange = min(case["shift"] for case in cases if _main_contact(case)["angle"] > 45.0)
+    at5 = _main_contact(by[5.0])
     return [
         Observed(
             "contact_profiles.flange", SYSTEM, "sideways shift from which the flange carries the wheel", flange, "mm"
-        ).within(FLANGE, 0.25, f"{BENCHMARK}; half of its steps", "published"),
+        ).within(FLANGE_SHIFT, 0.25, f"{BENCHMARK}; half of its steps", "published"),
         Observed(
             "contact_profiles.jump_from",
             SYSTEM,
             "place of contact on the rail at a shift of 4.5 mm",
-            _main(by[4.5])["rail"],
+            _main_contact(by[4.5])["rail"],
             "mm",
-        ).within(TWO_PATCHES["from"], 1.0, f"{BENCHMARK}; where the patch is before it jumps", "published"),
+        ).within(CONTACT_JUMP["from"], 1.0, f"{BENCHMARK}; where the patch is before it jumps", "published"),
         Observed(
             "contact_profiles.jump_to", SYSTEM, "place of contact on the rail at a shift of 5 mm", at5["rail"], "mm"
         ).within(
-            TWO_PATCHES["to"],
+            CONTACT_JUMP["to"],
             1.0,
             f"{BENCHMARK}; a touching point here, the middle of a patch 4 mm wide there",
             "published",
@@ -183,7 +188,7 @@ def _benchmark_rows(cases: list[dict[str, Any]]) -> list[Row]:
     vertical = max(
         abs(
             sum(contact_point["load"] * np.cos(np.radians(contact_point["angle"])) for contact_point in case["places"])
-            - LOAD
+            - WHEEL_LOAD
         )
         for case in cases
     )
@@ -201,19 +206,19 @@ def _benchmark_rows(cases: list[dict[str, Any]]) -> list[Row]:
             "largest pressure at a shift of 5 mm, exact theory, of the patch that carries most",
             by[5.0]["exact"],
             "MPa",
-        ).beside(TWO_PATCHES["peak"], BENCHMARK),
+        ).beside(CONTACT_JUMP["peak"], BENCHMARK),
         Observed(
             "contact_profiles.flange_peak",
             SYSTEM,
             "largest pressure at a shift of 6.5 mm, exact theory",
-            by[FLANGE]["exact"],
+            by[FLANGE_SHIFT]["exact"],
             "MPa",
         ).beside("about 2600", BENCHMARK),
     ]
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Every shift: places, loads, pressures."""
+    """Table of contact points, loads and pressures at every lateral displacement."""
     heads = (
         "shift [mm]",
         "yaw [mrad]",
@@ -226,8 +231,8 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
         "exact peak [MPa]",
     )
     note = (
-        f"{BENCHMARK}; {LOAD / 1e3:g} kN on the right wheel, vertical. A row for every place closer than 0.2 mm; y on "
-        "the rail from its highest point, on the wheel from the taping line; pressures of the theory of 1983."
+        f"{BENCHMARK}; {WHEEL_LOAD / 1e3:g} kN on the right wheel, vertical. A row for every place closer than 0.2 mm; "
+        "y on the rail from its highest point, on the wheel from the taping line; pressures of the theory of 1983."
     )
     return [
         Table(f"Places of contact, {name}", note, heads, tuple(_table_rows(cases))) for name, cases in case_data.items()
@@ -253,7 +258,7 @@ def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Plot position and load of the contact points over the lateral shift."""
+    """Plot position and load of the contact points over the lateral displacement."""
     from models.drawing.figures import add_heading, subplots
 
     figure, axis = subplots(figsize=(7.0, 3.6))
@@ -267,7 +272,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
         hollow: dict[str, Any] = {} if name == "no yaw" else {"markerfacecolor": "none", "markersize": 10}
         style: dict[str, Any] = {"marker": "o", "linestyle": "none", **hollow}
         axis.plot(shift[load == 0], rail[load == 0], color="0.75", **style)
-        axis.plot(shift[load > 0], rail[load > 0], label=f"in contact, {LABELS[name]}", **style)
+        axis.plot(shift[load > 0], rail[load > 0], label=f"in contact, {FIGURE_LABELS[name]}", **style)
     axis.set(xlabel="lateral shift of the wheelset [mm]", ylabel="place of contact on the rail [mm]")
     axis.legend()
     add_heading(figure, "S1002 on UIC 60: where the right wheel touches its rail")

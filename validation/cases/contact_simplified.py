@@ -1,4 +1,5 @@
-"""Kalker's theory of 1983 against the exact contact of half-spaces: approach, area, peak pressure, forces, and time."""
+"""Kalker's simplified theory of 1983 compared with the exact contact of half-spaces: approach, area, peak pressure,
+forces, and computing time."""
 
 import re
 from collections.abc import Callable
@@ -44,71 +45,79 @@ FITTING_OPTIONS = {
     "paper, gradient": replace(PAPER, fit="gradient"),
     "elliptic, one net": replace(PLAIN, separate=False),
 }
-"""Ways to use the theory; the first is the default, the second the paper to the letter."""
+"""Variants of the theory; the first is the default, the second follows the paper to the letter."""
 TIMING_ROUNDS = 10
-"""Of timing."""
-NETS = (5, 7, 9, 11, 15, 19, 25)
-HERTZ = (0.05, 0.2, 1.0, 5.0, 20.0)
-"""B/A of the ellipses whose exact answer is closed."""
-APPROACH, JUMP = 0.02, 1e-6
-FIGURE = "the figure set for the theory"
-ABOUT = "the theory has one W for the whole contact: nothing is claimed, the figure tells what it is worth"
+"""Number of timing rounds."""
+NET_SIZES = (5, 7, 9, 11, 15, 19, 25)
+"""Meshes per side of the coarse net of the normal problem."""
+CURVATURE_RATIOS = (0.05, 0.2, 1.0, 5.0, 20.0)
+"""Ratios of curvatures B/A of the ellipses for which Hertz's closed form is exact."""
+APPROACH_TOLERANCE, JUMP_TOLERANCE = 0.02, 1e-6
+"""Relative tolerance of the approach, and largest jump (N) of the load as a function of depth."""
+APPROACH_REASON = "the figure set for the theory"
+NO_CLAIM_REASON = "the theory has one W for the whole contact: nothing is claimed, the figure tells what it is worth"
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows on Hertz's ellipses and on the continuity; in the full run on all shapes, ways, nets and the time."""
-    hertz = {f"{ratio:g}": _hertz(ratio, PLAIN) | {"paper": _hertz(ratio, PAPER)["approach"]} for ratio in HERTZ}
+    """Rows on Hertz's ellipses and on the continuity of the load; a full run has all shapes, variants and net sizes,
+    and computing times."""
+    hertz = {
+        f"{ratio:g}": _hertz_errors(ratio, PLAIN) | {"paper": _hertz_errors(ratio, PAPER)["approach"]}
+        for ratio in CURVATURE_RATIOS
+    }
     jump = largest_jump(separate(shapes_by_formula()[4].distance)[0], 20 if quick else 200)
     data: dict[str, Any] = {"hertz": hertz, "jump": jump}
     rows = [*_hertz_rows(hertz), _jump_row(jump)]
     if quick:
         return rows, data
-    data["shapes"] = {shape.name: _against_exact(shape) for shape in shapes_by_formula() + profile_shapes()}
-    data["grown"] = {shape.name: _approach_of(shape) for shape in merged_shapes()} | _errors_on_rails()
-    data["nets"] = {str(net): _hertz(5.0, replace(PLAIN, net=net)) for net in NETS}
-    data["time"] = _times()
-    return rows + _shape_rows(data["shapes"]) + _grown_rows(data["grown"]) + _time_rows(data["time"]), data
+    data["shapes"] = {shape.name: _errors_of_variants(shape) for shape in shapes_by_formula() + profile_shapes()}
+    data["grown"] = {shape.name: _approach_errors(shape) for shape in merged_shapes()} | _rail_approach_errors()
+    data["nets"] = {str(net): _hertz_errors(5.0, replace(PLAIN, net=net)) for net in NET_SIZES}
+    data["time"] = _computing_times()
+    return rows + _shape_rows(data["shapes"]) + _merged_rows(data["grown"]) + _time_rows(data["time"]), data
 
 
-def _hertz(ratio: float, options: SimplifiedOptions) -> dict[str, float]:
-    """Relative errors of approach, area and peak pressure on Hertz's ellipse."""
-    exact = by_load(CURVATURE, CURVATURE * ratio, 1e5, MATERIAL_PAIR)
+def _hertz_errors(curvature_ratio: float, options: SimplifiedOptions) -> dict[str, float]:
+    """Relative errors of approach, area and peak pressure on a Hertzian ellipse with the ratio of curvatures B/A."""
+    exact = by_load(CURVATURE, CURVATURE * curvature_ratio, 1e5, MATERIAL_PAIR)
     a, b = float(exact.a), float(exact.b)
-    contact = press(quadratic(CURVATURE, CURVATURE * ratio, 2.5 * a, 2.5 * b), MATERIAL_PAIR, load=1e5, options=options)
-    return _errors(contact, float(exact.approach), np.pi * a * b, float(exact.p0))
+    contact = press(
+        quadratic(CURVATURE, CURVATURE * curvature_ratio, 2.5 * a, 2.5 * b), MATERIAL_PAIR, load=1e5, options=options
+    )
+    return _relative_errors(contact, float(exact.approach), np.pi * a * b, float(exact.p0))
 
 
-def _errors(contact: NormalContact, approach: float, area: float, peak: float) -> dict[str, float]:
+def _relative_errors(contact: NormalContact, approach: float, area: float, peak: float) -> dict[str, float]:
     exact = {"approach": approach, "area": area, "peak": peak}
     return {key: getattr(contact, key) / value - 1.0 for key, value in exact.items()}
 
 
-def largest_jump(patch: Patch, steps: int) -> float:
-    """Largest jump (N) of the load as a function of depth. Each step of a sweep is bisected towards the larger change
-    until rounding."""
+def largest_jump(patch: Patch, step_count: int) -> float:
+    """Largest jump (N) of the load as a function of depth. Each step of a sweep over depths is bisected towards the
+    larger change, down to rounding."""
 
     def load(depth: float) -> float:
         return load_at_depth(patch, depth, MATERIAL_PAIR).load
 
-    return max(_jump(load, *ends) for ends in pairwise(np.linspace(2e-6, 6e-5, steps + 1).tolist()))
+    return max(_jump(load, *ends) for ends in pairwise(np.linspace(2e-6, 6e-5, step_count + 1).tolist()))
 
 
-def _jump(load: Callable[[float], float], low: float, high: float) -> float:
-    """Jump (N) of the load, located by bisection, between two depths that are 1e-15 of the larger one apart."""
-    at_low, at_high = load(low), load(high)
-    while high - low > 1e-15 * high:
-        middle = 0.5 * (low + high)
+def _jump(load: Callable[[float], float], low_depth: float, high_depth: float) -> float:
+    """Jump (N) of the load between two depths, located by bisection down to a relative distance of 1e-15."""
+    at_low, at_high = load(low_depth), load(high_depth)
+    while high_depth - low_depth > 1e-15 * high_depth:
+        middle = 0.5 * (low_depth + high_depth)
         at_middle = load(middle)
         if abs(at_middle - at_low) > abs(at_high - at_middle):
-            high, at_high = middle, at_middle
+            high_depth, at_high = middle, at_middle
         else:
-            low, at_low = middle, at_middle
+            low_depth, at_low = middle, at_middle
     return abs(at_high - at_low)
 
 
-def _against_exact(contact_shape: Shape) -> dict[str, Any]:
-    """Errors of every way of fitting, and the exact values. Errors of approach, area and peak are relative; those of
-    forces are in % of mu N."""
+def _errors_of_variants(contact_shape: Shape) -> dict[str, Any]:
+    """Errors of every variant of the theory for one contact shape, and the exact values. Errors of approach, area and
+    peak pressure are relative; those of forces are in % of mu N."""
     contacts = {
         name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options)
         for name, fitting_options in FITTING_OPTIONS.items()
@@ -125,12 +134,12 @@ def _against_exact(contact_shape: Shape) -> dict[str, Any]:
             for rolled, true in ((roll(contact, FRICTION, *motions[key]), true) for key, true in solved.items())
         ]
         mean, most = (float(np.mean(forces)), float(np.max(forces))) if forces else (np.nan, np.nan)
-        errors_by_fitting[name] = _errors(contact, **figures) | {"force": mean, "force_max": most}
+        errors_by_fitting[name] = _relative_errors(contact, **figures) | {"force": mean, "force_max": most}
     return {"exact": figures, "ways": errors_by_fitting, "rolling": len(solved), "asked": len(exact)}
 
 
-def _approach_of(contact_shape: Shape) -> dict[str, float]:
-    """Relative errors of the approach with a grid for each patch, and with one grid for all patches."""
+def _approach_errors(contact_shape: Shape) -> dict[str, float]:
+    """Relative errors of the approach with a separate grid for each patch, and with one grid for all patches."""
     exact = exact_normal(contact_shape, EXACT_CELLS, contact_shape.box or (0.0, 0.0, 0.0, 0.0)).approach
     return {
         name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options).approach
@@ -140,8 +149,8 @@ def _approach_of(contact_shape: Shape) -> dict[str, float]:
     }
 
 
-def _errors_on_rails() -> dict[str, dict[str, float]]:
-    """Relative errors of the approach of wheels on rails, whose patches have each a grid of its own; NaN for one common
+def _rail_approach_errors() -> dict[str, dict[str, float]]:
+    """Relative errors of the approach of wheels on rails with a separate grid for each patch; NaN for one common
     grid."""
     errors = {}
     for position in placed_wheelsets():
@@ -162,8 +171,9 @@ def _box_around(normal_contact: NormalContact) -> Box:
     return low_x - wide, high_x + wide, low_y - high, high_y + high
 
 
-def _times() -> dict[str, list[float]]:
-    """Computing times (s) of the functions of both theories at about 45 x 45 cells."""
+def _computing_times() -> dict[str, list[float]]:
+    """Computing times (s) of FASTSIM of 1982, of the functions of the theory of 1983, and of the exact theory, at about
+    45 x 45 cells."""
     hertz = by_load(CURVATURE, 1.5 * CURVATURE, 1e5, MATERIAL_PAIR)
     a, b = float(hertz.a), float(hertz.b)
     distance, creepage = quadratic(CURVATURE, 1.5 * CURVATURE, 2.5 * a, 2.5 * b), (1e-3, 5e-4, 0.3)
@@ -178,21 +188,21 @@ def _times() -> dict[str, list[float]]:
     return dict(zip(jobs, interleave(list(jobs.values()), TIMING_ROUNDS).tolist(), strict=True))
 
 
-def _hertz_rows(hertz: dict[str, dict[str, float]]) -> list[Row]:
-    worst = {key: max(abs(case[key]) for case in hertz.values()) for key in ("approach", "paper")}
+def _hertz_rows(errors_by_ratio: dict[str, dict[str, float]]) -> list[Row]:
+    worst = {key: max(abs(case[key]) for case in errors_by_ratio.values()) for key in ("approach", "paper")}
     why = "the figure set for the theory; the closed form is Hertz's"
     rows = [
         Observed(
             f"contact_simplified.hertz.{key}",
             SYSTEM,
-            f"largest error of the approach, B/A {HERTZ[0]:g} to "
-            f"{HERTZ[-1]:g}, {'pressure to the letter of the paper' if key == 'paper' else 'default'}",
+            f"largest error of the approach, B/A {CURVATURE_RATIOS[0]:g} to "
+            f"{CURVATURE_RATIOS[-1]:g}, {'pressure to the letter of the paper' if key == 'paper' else 'default'}",
             100.0 * value,
             "%",
-        ).at_most(100.0 * APPROACH, why, "closed form")
+        ).at_most(100.0 * APPROACH_TOLERANCE, why, "closed form")
         for key, value in worst.items()
     ]
-    circle = hertz["1"]
+    circle = errors_by_ratio["1"]
     rows += [
         Observed(
             f"contact_simplified.hertz_circle.{key}",
@@ -210,7 +220,9 @@ def _jump_row(jump: float) -> Row:
     return Observed(
         "contact_simplified.continuity", SYSTEM, "largest jump of the load N(a3) of a lopsided contact", jump, "N"
     ).at_most(
-        JUMP, "every step of the sweep is bisected to neighbouring numbers; the figure set for the theory", "none"
+        JUMP_TOLERANCE,
+        "every step of the sweep is bisected to neighbouring numbers; the figure set for the theory",
+        "none",
     )
 
 
@@ -222,29 +234,31 @@ def _shape_rows(errors_by_shape: dict[str, dict[str, Any]]) -> list[Row]:
         rows.append(
             Observed(
                 f"{row_name}.approach", SYSTEM, f"error of the approach, {name}", 100.0 * abs(best["approach"]), "%"
-            ).at_most(100.0 * APPROACH, FIGURE, "native")
+            ).at_most(100.0 * APPROACH_TOLERANCE, APPROACH_REASON, "native")
         )
         for key, what in (("area", "area"), ("peak", "peak pressure")):
             rows.append(
                 Observed(f"{row_name}.{key}", SYSTEM, f"error of the {what}, {name}", 100.0 * best[key], "%").beside(
-                    0.0, ABOUT, "native"
+                    0.0, NO_CLAIM_REASON, "native"
                 )
             )
         asked = f"{case['rolling']} of {case['asked']} creepages"
         rows.append(
             Observed(
                 f"{row_name}.force", SYSTEM, f"mean error of the force, {name}, {asked}", best["force"], "% of mu N"
-            ).beside(0.0, ABOUT, "native")
+            ).beside(0.0, NO_CLAIM_REASON, "native")
         )
     return rows
 
 
-def _grown_rows(grown: dict[str, dict[str, float]]) -> list[Row]:
-    """Rows: largest error of the approach among contact areas that have merged, and among wheels on rails."""
+def _merged_rows(errors_by_contact: dict[str, dict[str, float]]) -> list[Row]:
+    """Rows: largest error of the approach among contacts whose patches have merged, and among wheels on rails."""
     rows = []
     kinds = (("grown", "distances with several valleys", False), ("wheels", "wheels on rails", True))
     for row_name, what, chosen in kinds:
-        errors = {name: abs(case["each"]) for name, case in grown.items() if name.startswith("S1002") == chosen}
+        errors = {
+            name: abs(case["each"]) for name, case in errors_by_contact.items() if name.startswith("S1002") == chosen
+        }
         worst = max(errors, key=errors.__getitem__)
         rows.append(
             Observed(
@@ -253,7 +267,7 @@ def _grown_rows(grown: dict[str, dict[str, float]]) -> list[Row]:
                 f"error of the approach, {len(errors)} {what}, worst: {worst}",
                 100.0 * errors[worst],
                 "%",
-            ).at_most(100.0 * APPROACH, FIGURE, "native")
+            ).at_most(100.0 * APPROACH_TOLERANCE, APPROACH_REASON, "native")
         )
     return rows
 
@@ -266,7 +280,7 @@ def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
             SYSTEM,
             f"ratio of the time of FASTSIM twice with the refit, {cost(seconds_by_program['roll'])}, to that of "
             f"the 1982 program, {cost(seconds_by_program['1982'])}",
-            _ratio(seconds_by_program, "roll", "1982"),
+            _time_ratio(seconds_by_program, "roll", "1982"),
             "",
         ).beside("about 3 with the contact, which contact_price compares", why),
         Observed(
@@ -274,18 +288,19 @@ def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
             SYSTEM,
             "ratio of the time of the exact normal problem at the same fineness, "
             f"{cost(seconds_by_program['exact'])}, to that of this method, {cost(seconds_by_program['press'])}",
-            _ratio(seconds_by_program, "exact", "press"),
+            _time_ratio(seconds_by_program, "exact", "press"),
             "",
         ).beside("", "what the theory saves", "none"),
     ]
 
 
-def _ratio(seconds_by_program: dict[str, list[float]], first: str, other_program: str) -> float:
-    return float(np.median(seconds_by_program[first]) / np.median(seconds_by_program[other_program]))
+def _time_ratio(seconds_by_program: dict[str, list[float]], numerator: str, denominator: str) -> float:
+    return float(np.median(seconds_by_program[numerator]) / np.median(seconds_by_program[denominator]))
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Hertz's ellipses; and in the full run every shape and way, and the size of the net."""
+    """Tables of the errors on Hertz's ellipses; a full run also has every shape and variant, and the size of the
+    net."""
     signed = "{:+.2f}".format
     hertz = tuple(
         (ratio, *(signed(100.0 * case[key]) for key in ("approach", "area", "peak", "paper")))
@@ -342,7 +357,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
 
 
 def _errors_text(errors_by_shape: dict[str, dict[str, Any]]) -> str:
-    """Sentence on the errors of the ways of fitting: means over all shapes."""
+    """Sentences on the mean errors of the variants over all shapes."""
 
     def mean(variant: str, key: str) -> str:
         scale = 1.0 if key == "force" else 100.0
@@ -362,7 +377,7 @@ def _errors_text(errors_by_shape: dict[str, dict[str, Any]]) -> str:
 
 
 def _net_errors_text(nets: dict[str, dict[str, float]]) -> str:
-    """Sentence on the errors by the size of the net."""
+    """Sentences on the errors by the size of the net."""
     sizes = (next(iter(nets)), str(PLAIN.net), list(nets)[-1])
     first, used, last = (100.0 * abs(nets[net]["approach"]) for net in sizes)
     area, peak = (100.0 * nets[sizes[-1]][key] for key in ("area", "peak"))
@@ -374,7 +389,7 @@ def _net_errors_text(nets: dict[str, dict[str, float]]) -> str:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Plot the errors of the two pressure profiles for each shape."""
+    """Plot the errors of the two pressure profiles for each contact shape."""
     if "shapes" not in case_data:
         return []
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots

@@ -1,4 +1,5 @@
-"""When a run drifts off: predicted before it starts, and measured, over roads, speeds, sampling rates and sources.
+"""Time at which a force-excited run drifts off: predicted before the run starts, and measured, over roads, speeds,
+sampling rates and sources of error.
 
 A run has drifted off when its pitch is 0.05 rad from the true one, that of the road-excited run. Noise is random, so
 its ensemble has paths. The other sources are not: the ensemble of the error between the samples is made of
@@ -28,70 +29,74 @@ from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 TITLE = "When a force-excited run drifts off, predicted before it starts"
 SYSTEM: System = "drift"
 SEED = 12
-PATHS, QUICK_PATHS = 300, 60
+PATH_COUNT, QUICK_PATH_COUNT = 300, 60
+"""Number of noise paths, in the full and in the quick run."""
 STEP = 5e-4
-"""Of the runs, s."""
-MODELS = 15
-"""Random models; seven neighbouring roads stand for the error between the samples."""
-SPEEDS = (0.94, 0.96, 0.98, 1.0, 1.02, 1.04, 1.06)
-"""Factors on the speed."""
+"""Step (s) of the runs without noise."""
+MODEL_COUNT = 15
+"""Number of random vehicle models. The ensemble of the sampling error has seven neighbouring roads instead."""
+SPEED_FACTORS = (0.94, 0.96, 0.98, 1.0, 1.02, 1.04, 1.06)
+"""Factors on the speed that give neighbouring roads."""
 
 
 @dataclass(frozen=True)
 class Combination:
-    """One combination to compare. source : cause of the error: noise, interpolation or model; road : settings of the
-    road effect; rate : sampling rate (Hz); size : noise (N)."""
+    """One combination of road, source of error and sampling rate. source : cause of the error: noise, interpolation or
+    model; road : settings of the road effect; rate : sampling rate (Hz); noise_deviation : standard deviation of the
+    force noise (N)."""
 
     name: str
     source: str
     road: Saved
     rate: float
     duration: float
-    size: float = 0.0
+    noise_deviation: float = 0.0
     interpolation: str = "linear"
 
 
-STUDY = {"source": "study"}
-ISO = {"source": "iso8608", "road_class": "D", "level": "one-sided"}
+STUDY_ROAD = {"source": "study"}
+ISO_ROAD = {"source": "iso8608", "road_class": "D", "level": "one-sided"}
 COMBINATIONS = (
-    Combination("study 20 m/s", "noise", {**STUDY, "speed": 20.0}, 1000.0, 16.0, 30.7),
-    Combination("study 20 m/s", "noise", {**STUDY, "speed": 20.0}, 200.0, 16.0, 30.7),
-    Combination("study 10 m/s", "noise", {**STUDY, "speed": 10.0}, 500.0, 24.0, 30.0),
-    Combination("study 20 m/s, smoother", "noise", {**STUDY, "speed": 20.0, "gd": 6e-4}, 1000.0, 30.0, 10.0),
-    Combination("study 30 m/s, smoother", "noise", {**STUDY, "speed": 30.0, "gd": 1.2e-3}, 1000.0, 30.0, 3.0),
-    Combination("ISO class D 25 m/s", "noise", {**ISO, "speed": 25.0, "seed": 3}, 500.0, 30.0, 15.0),
-    Combination("study 20 m/s", "interpolation", {**STUDY, "speed": 20.0}, 100.0, 30.0),
-    Combination("study 20 m/s", "interpolation", {**STUDY, "speed": 20.0}, 500.0, 40.0),
-    Combination("study 20 m/s", "interpolation", {**STUDY, "speed": 20.0}, 1000.0, 40.0),
-    Combination("study 15 m/s", "interpolation", {**STUDY, "speed": 15.0}, 200.0, 50.0, interpolation="held"),
-    Combination("ISO class E 20 m/s", "interpolation", {**ISO, "road_class": "E", "speed": 20.0}, 200.0, 40.0),
-    Combination("study 20 m/s", "model", {**STUDY, "speed": 20.0}, 1000.0, 30.0),
-    Combination("study 10 m/s", "model", {**STUDY, "speed": 10.0}, 500.0, 40.0),
-    Combination("ISO class D 25 m/s", "model", {**ISO, "speed": 25.0, "seed": 3}, 1000.0, 40.0),
+    Combination("study 20 m/s", "noise", {**STUDY_ROAD, "speed": 20.0}, 1000.0, 16.0, 30.7),
+    Combination("study 20 m/s", "noise", {**STUDY_ROAD, "speed": 20.0}, 200.0, 16.0, 30.7),
+    Combination("study 10 m/s", "noise", {**STUDY_ROAD, "speed": 10.0}, 500.0, 24.0, 30.0),
+    Combination("study 20 m/s, smoother", "noise", {**STUDY_ROAD, "speed": 20.0, "gd": 6e-4}, 1000.0, 30.0, 10.0),
+    Combination("study 30 m/s, smoother", "noise", {**STUDY_ROAD, "speed": 30.0, "gd": 1.2e-3}, 1000.0, 30.0, 3.0),
+    Combination("ISO class D 25 m/s", "noise", {**ISO_ROAD, "speed": 25.0, "seed": 3}, 500.0, 30.0, 15.0),
+    Combination("study 20 m/s", "interpolation", {**STUDY_ROAD, "speed": 20.0}, 100.0, 30.0),
+    Combination("study 20 m/s", "interpolation", {**STUDY_ROAD, "speed": 20.0}, 500.0, 40.0),
+    Combination("study 20 m/s", "interpolation", {**STUDY_ROAD, "speed": 20.0}, 1000.0, 40.0),
+    Combination("study 15 m/s", "interpolation", {**STUDY_ROAD, "speed": 15.0}, 200.0, 50.0, interpolation="held"),
+    Combination("ISO class E 20 m/s", "interpolation", {**ISO_ROAD, "road_class": "E", "speed": 20.0}, 200.0, 40.0),
+    Combination("study 20 m/s", "model", {**STUDY_ROAD, "speed": 20.0}, 1000.0, 30.0),
+    Combination("study 10 m/s", "model", {**STUDY_ROAD, "speed": 10.0}, 500.0, 40.0),
+    Combination("ISO class D 25 m/s", "model", {**ISO_ROAD, "speed": 25.0, "seed": 3}, 1000.0, 40.0),
 )
 
 
 @on_paper_road()
 @allowing_breaches("that runs drift off is what is shown", "upright")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """A row per combination; quick: the first one, by few paths."""
+    """A row for each combination; a quick run has the first one with few noise paths."""
     combinations = [
-        _combination(combination, folder, quick) for combination in (COMBINATIONS[:1] if quick else COMBINATIONS)
+        _drift_off_figures(combination, folder, quick) for combination in (COMBINATIONS[:1] if quick else COMBINATIONS)
     ]
-    return [_row(figures) for figures in combinations], {"combinations": combinations}
+    return [_drift_off_row(figures) for figures in combinations], {"combinations": combinations}
 
 
-def _combination(combination: Combination, folder: Path, quick: bool) -> Saved:
-    """Predicted and measured drift-off times of all members of a combination; infinite for members that never drift
-    off."""
-    members = {"noise": _noise, "interpolation": _run_neighbours, "model": _models}[combination.source]
-    predicted, measured = members(combination, folder, QUICK_PATHS if quick else PATHS)
+def _drift_off_figures(combination: Combination, folder: Path, quick: bool) -> Saved:
+    """Statistics of the predicted and measured drift-off times of a combination's ensemble; the time is infinite for
+    runs that never drift off."""
+    members = {"noise": _drift_by_noise, "interpolation": _drift_by_sampling, "model": _drift_by_model_error}[
+        combination.source
+    ]
+    predicted, measured = members(combination, folder, QUICK_PATH_COUNT if quick else PATH_COUNT)
     late = [np.inf if time is None else time for time in predicted]
     median, low, high = quantile_with_interval(np.array(measured), 0.5)
     inner = [quantile_with_interval(np.array(measured), level)[0] for level in (0.25, 0.75)]
     source_text = (
         combination.source
-        + (f" {combination.size:g} N" if combination.size else "")
+        + (f" {combination.noise_deviation:g} N" if combination.noise_deviation else "")
         + ("" if combination.interpolation == "linear" else ", held")
     )
     return {
@@ -107,22 +112,24 @@ def _combination(combination: Combination, folder: Path, quick: bool) -> Saved:
     }
 
 
-def _noise(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
-    """One predicted drift-off time, and the drift-off time of every noise path."""
+def _drift_by_noise(combination: Combination, folder: Path, path_count: int) -> tuple[list[float | None], list[float]]:
+    """Predicted drift-off time (s), and the drift-off time of every noise path."""
     true = virtual_drive(folder, combination.duration, 1 / combination.rate, road=combination.road)
-    effects = {"force_noise": {"deviation": combination.size, "seed": SEED}}
+    effects = {"force_noise": {"deviation": combination.noise_deviation, "seed": SEED}}
     scene = force_scene(folder, duration=combination.duration, effects=effects)
-    times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), paths)["drift_off"]
+    times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), path_count)["drift_off"]
     quiet = assembly_of_scene(force_scene(folder, duration=combination.duration))
-    return [noise(quiet, combination.size).passing_time()], times.tolist()
+    return [noise(quiet, combination.noise_deviation).passing_time()], times.tolist()
 
 
-def _run_neighbours(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
-    """Predicted and measured drift-off times on roads that are similar: with other speeds, or with other seeds."""
+def _drift_by_sampling(
+    combination: Combination, folder: Path, path_count: int
+) -> tuple[list[float | None], list[float]]:
+    """Predicted and measured drift-off times (s) on similar roads, which have other speeds or other seeds."""
     speed = combination.road["speed"]
     roads = [
         combination.road | ({"seed": i} if combination.road["source"] == "iso8608" else {"speed": speed * factor})
-        for i, factor in enumerate(SPEEDS)
+        for i, factor in enumerate(SPEED_FACTORS)
     ]
     predicted, measured = [], []
     for road in roads:
@@ -131,36 +138,38 @@ def _run_neighbours(combination: Combination, folder: Path, paths: int) -> tuple
             force_scene(folder, step=STEP, duration=combination.duration, interpolation=combination.interpolation)
         )
         predicted.append(interpolation(assembly).passing_time())
-        measured.append(_drift_off(assembly, true))
+        measured.append(_drift_off_time(assembly, true))
     return predicted, measured
 
 
-def _models(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
-    """Predicted and measured drift-off times of vehicles with random parameters, all started from the true state."""
+def _drift_by_model_error(
+    combination: Combination, folder: Path, path_count: int
+) -> tuple[list[float | None], list[float]]:
+    """Predicted and measured drift-off times (s) of vehicles with random parameters, all started from the true
+    state."""
     true = virtual_drive(folder, combination.duration, 1 / combination.rate, STEP, road=combination.road)
     assembly = assembly_of_scene(force_scene(folder, step=STEP, duration=combination.duration))
     p, other_vehicles = assembly.parameters, list[Parameters]()
-    for i in range(MODELS):
+    for i in range(MODEL_COUNT):
         factors = np.random.Generator(np.random.Philox(key=[SEED, i])).uniform(0.9, 1.1, len(PAPER_FACTORS))
         other_vehicles.append(
             p.model_copy(update=perturbed_parameters(p, dict(zip(PAPER_FACTORS, factors, strict=True))))
         )
     return (
         [model_error_curve(assembly, other_vehicle).passing_time() for other_vehicle in other_vehicles],
-        [_drift_off(replace(assembly, parameters=other_vehicle), true) for other_vehicle in other_vehicles],
+        [_drift_off_time(replace(assembly, parameters=other_vehicle), true) for other_vehicle in other_vehicles],
     )
 
 
-def _drift_off(assembly: Assembly, true_run: Result) -> float:
+def _drift_off_time(assembly: Assembly, true_run: Result) -> float:
     """First time (s) at which the run's pitch differs from the true pitch by UNTRUSTED_PITCH; infinite if it never
-    does.
-    """
+    does."""
     run = simulate(assembly.scene, "reference", assembly=assembly)
     time = GrowthCurve(run.times, np.abs(run["pitch"] - true_run["pitch"])).passing_time()
     return np.inf if time is None else time
 
 
-def _row(combination: Saved) -> Row:
+def _drift_off_row(combination: Saved) -> Row:
     key = f"drift_off.{combination['source']}.{combination['name']}.{combination['rate']:g}Hz".replace(
         " ", "-"
     ).replace(",", "")
@@ -177,7 +186,7 @@ def _row(combination: Saved) -> Row:
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """All combinations."""
+    """Table of predicted and measured drift-off times of all combinations."""
     rows = tuple(
         (
             combination["name"],

@@ -1,4 +1,4 @@
-"""The paper's six runs beside its figures, and why they cannot all be reproduced."""
+"""The paper's six runs compared with the paper's figures, and why they cannot all be reproduced."""
 
 from collections.abc import Collection
 from math import log2
@@ -15,15 +15,15 @@ from validation.common.scenes import on_paper_road
 
 TITLE = "The paper's six runs"
 SYSTEM: System = "drift"
-SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "six_runs.toml"
-FORCE_NOISE_ALONE = ("options.noise_samples=1", "options.perturbed_models=0")
-"""Without the random models and all noise samples but one."""
-RATES = (200.0, 400.0, 1000.0, 2000.0)
-"""Sampling rates (Hz) of the full report; the quick one has the study's own alone."""
-QUICK_CHANGES = (*FORCE_NOISE_ALONE, "run.duration=15")
-"""Of the quick share: a quarter of a minute, in which undisturbed forces do not drift off."""
+STUDY_SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "six_runs.toml"
+SINGLE_NOISE_SAMPLE = ("options.noise_samples=1", "options.perturbed_models=0")
+"""Changes of the scene that leave out the random models and all noise samples but one."""
+SAMPLING_RATES = (200.0, 400.0, 1000.0, 2000.0)
+"""Sampling rates (Hz) of the full run; a quick run has only the study's."""
+QUICK_CHANGES = (*SINGLE_NOISE_SAMPLE, "run.duration=15")
+"""Changes of the scene in a quick run: 15 s, in which undisturbed forces do not drift off."""
 
-FIGURES = (
+COMPARED_FIGURES = (
     (
         "undisturbed",
         "undisturbed",
@@ -88,18 +88,19 @@ FIGURES = (
         "|I beta''| <= b|f3| + a|f4| rules out 85 kN m, and 5 % of 15 kN m is the 800 N m",
     ),
 )
-"""Id, run, figure of that run, words, unit, what the paper has, why they may differ."""
+"""For each row: id, run, figure of that run, description, unit, the paper's value, and why both may differ."""
 
 
 @allowing_breaches("that runs drift off is what the paper shows", "upright")
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows for drift-off times, enforced moments, inertia term of the reference; quick: 15 s, one sampling rate."""
-    scene = load(SCENE, QUICK_CHANGES if quick else ())
-    runs, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
+    """Rows for drift-off times, enforced moments and inertia term of the hand-written reference; a quick run has 15 s
+    and one sampling rate."""
+    scene = load(STUDY_SCENE, QUICK_CHANGES if quick else ())
+    runs, rate = _figures_by_run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
     rows = [
         Observed(f"drift.{name}", SYSTEM, f"{words}, {rate}", runs[which][what], unit).beside(paper, why)
-        for name, which, what, words, unit, paper, why in FIGURES
+        for name, which, what, words, unit, paper, why in COMPARED_FIGURES
         if runs[which][what] is not None
     ]
     lacking = runs["guided, perturbed"]
@@ -117,7 +118,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             "closed form",
         )
     )
-    rates = {} if quick else {rate: _at_rate(rate) for rate in RATES}
+    rates = {} if quick else {rate: _undisturbed_figures(rate) for rate in SAMPLING_RATES}
     if rates:
         rows.append(
             Observed(
@@ -135,21 +136,21 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     }
 
 
-def _run(scene: Scene, names: Collection[str] = ()) -> dict[str, Saved]:
-    """Figures of the study's runs in the reference, by the run's name; for some of the runs, or for all."""
+def _figures_by_run(scene: Scene, run_names: Collection[str] = ()) -> dict[str, Saved]:
+    """Figures of the study's runs in the hand-written reference by name of the run, for the named runs or for all."""
     with TemporaryDirectory() as folder:
         measured, _, scenes = measurement_and_runs(scene, Path(folder))
         return {
             name: figures_of_run("reference", name, measured, simulate(scenes[name], "reference"))
-            for name in names or scenes
+            for name in run_names or scenes
         }
 
 
-def _at_rate(rate: float) -> dict[str, float]:
-    """Drift-off time (s) and largest enforced moment (N m) of undisturbed runs at one sampling rate, with steps of 0.5
-    ms."""
-    scene = load(SCENE, (*FORCE_NOISE_ALONE, "run.step=5e-4", f"options.sampling_rate={rate}"))
-    rows = _run(scene, ("undisturbed", "guided, undisturbed"))
+def _undisturbed_figures(sampling_rate: float) -> dict[str, float]:
+    """Drift-off time (s) and largest enforced moment (N m) of undisturbed runs at one sampling rate (Hz), with steps of
+    0.5 ms."""
+    scene = load(STUDY_SCENE, (*SINGLE_NOISE_SAMPLE, "run.step=5e-4", f"options.sampling_rate={sampling_rate}"))
+    rows = _figures_by_run(scene, ("undisturbed", "guided, undisturbed"))
     return {"drift-off": rows["undisturbed"]["drift-off"], "moment max": rows["guided, undisturbed"]["moment max"]}
 
 
@@ -158,11 +159,11 @@ def tables(case_data: Saved) -> list[Table]:
     rows = tuple(
         (
             row["run"],
-            _cell(row["drift-off"], ".1f") or "never",
+            _cell_text(row["drift-off"], ".1f") or "never",
             f"{row['heave error']:.1e}",
-            _cell(row.get("moment rms"), ".1f"),
-            _cell(row.get("moment max"), ".0f"),
-            _cell(row.get("inertia max"), ".0f"),
+            _cell_text(row.get("moment rms"), ".1f"),
+            _cell_text(row.get("moment max"), ".0f"),
+            _cell_text(row.get("inertia max"), ".0f"),
         )
         for row in case_data["rows"]
     )
@@ -171,7 +172,7 @@ def tables(case_data: Saved) -> list[Table]:
     tables = [Table(f"The six runs, {case_data['duration']:g} s on the study road", note, heads, rows)]
     if case_data["rates"]:
         rates = tuple(
-            (f"{rate:g}", _cell(when, ".1f") or "never", f"{most:.1f}") for rate, when, most in case_data["rates"]
+            (f"{rate:g}", _cell_text(when, ".1f") or "never", f"{most:.1f}") for rate, when, most in case_data["rates"]
         )
         note = "Undisturbed forces, linear between the samples. The paper's 70 N m fits a rate of about 400 Hz."
         columns = ("sampling rate [Hz]", "drift-off [s]", "moment max [N m]")
@@ -179,5 +180,5 @@ def tables(case_data: Saved) -> list[Table]:
     return tables
 
 
-def _cell(cell_value: float | None, format_name: str) -> str:
+def _cell_text(cell_value: float | None, format_name: str) -> str:
     return "" if cell_value is None else format(cell_value, format_name)

@@ -1,4 +1,4 @@
-"""Drift's dependence: solver and tolerance, interpolation, smoothing, the order of the scheme.
+"""What drift depends on: solver and tolerance, interpolation, smoothing, and the order of the integration scheme.
 
 The paper remarks that drift does not depend on the solver, and that smoothing or better schemes only rescale the
 error. Here the error of the interpolation between the samples stands apart from that of the integrator: the first
@@ -29,7 +29,8 @@ TITLE = "What drift depends on: samples and noise, not solvers"
 SYSTEM: System = "drift"
 SEED = 14
 SAMPLING_RATE, DURATION = 50.0, 15.0
-"""Sampling rate (Hz) of the runs by solver and their length (s): few samples, as adaptive solvers restart at each."""
+"""Sampling rate (Hz) and length (s) of the runs by solver; the samples are few because adaptive solvers restart at
+each."""
 SOLVERS = (
     ("reference", "RK4", 1e-3),
     ("reference", "RK4", 5e-4),
@@ -48,51 +49,55 @@ SOLVERS = (
     ("mujoco", "RK4", 1e-3),
     ("mujoco", "RK4", 5e-4),
 )
-"""Steps (s) of fixed-step methods, relative tolerances of adaptive ones. LSODA is Adams' and the BDF methods.
+"""Engine, method, and step (s) of a fixed-step method or relative tolerance of an adaptive one. LSODA is Adams' and the
+BDF methods.
 
 DOPRI5 steps over the kinks of the samples, and rounding decides which of its steps it rejects: changes of the tolerance
-by 1e-9 of itself move its drift-off by 0.5 % at 1e-7, which is TIGHT_SHARE, and by 0.02 % at 1e-8."""
-TIGHT_SHARE, LOOSE_SHARE = 0.005, 0.1
-"""Allowed difference of drift-off divided by that of the first solver; LOOSE_SHARE is for tolerances of 1e-5 and above,
-whose own error is as large as that of the samples."""
-ADAPTIVE = ("DOP853", "LSODA", "Radau", "DOPRI5")
-NOISE, NOISY_RATE, NOISY = 30.7, 1000.0, 8.0
-"""Noise (N) on the samples at this rate (Hz), and the length (s) of the runs that are smoothed or not."""
-CUTOFFS = (5.0, 15.0, 50.0)
-"""Of the low-pass before the run, Hz."""
-SCHEMES = (("ExplicitEuler", 1, 2.5e-4), ("ExplicitMidpoint", 2, 1e-3), ("RK44", 4, 1e-3))
-"""Methods of Exudyn, their order and step (s). What is smoothed before the run goes through the reference's RK4, which
-is Exudyn's RK44 to rounding."""
-PATHS = 20
+by 1e-9 of itself move its drift-off by 0.5 % at 1e-7, which is TIGHT_TOLERANCE, and by 0.02 % at 1e-8.
+"""
+TIGHT_TOLERANCE, LOOSE_TOLERANCE = 0.005, 0.1
+"""Allowed difference of drift-off times divided by the time of the first solver. LOOSE_TOLERANCE holds for solver
+tolerances of 1e-5 and above, whose error is as large as that of the samples."""
+ADAPTIVE_METHODS = ("DOP853", "LSODA", "Radau", "DOPRI5")
+FORCE_NOISE, NOISE_SAMPLING_RATE, NOISY_SECONDS = 30.7, 1000.0, 8.0
+"""Standard deviation (N) of the noise on each force sample, the sampling rate (Hz), and the length (s) of the noisy
+runs with and without smoothing."""
+LOW_PASS_CUTOFFS = (5.0, 15.0, 50.0)
+"""Cut-off frequencies (Hz) of the low-pass filter that smooths the forces before the run."""
+INTEGRATION_SCHEMES = (("ExplicitEuler", 1, 2.5e-4), ("ExplicitMidpoint", 2, 1e-3), ("RK44", 4, 1e-3))
+"""Exudyn's methods, with order and step (s). Forces that were smoothed before the run are integrated by the reference's
+RK4, which equals Exudyn's RK44 to rounding."""
+PATH_COUNT = 20
 GROWTH_WINDOW = (4.0, 8.0)
 """Times (s) between which the growth of the spread is measured: after the start, before the pitch tumbles."""
-SCORED = 5.0
+DAMAGE_SECONDS = 5.0
 """Time (s) up to which section forces are compared, before drift-off."""
 
 
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Compares the drift-off of solvers and of interpolations, and growth and bias of smoothings and schemes; quick:
-    four solvers."""
-    solvers = _solvers(folder, (*SOLVERS[:2], *SOLVERS[-2:]) if quick else SOLVERS)
+    """Rows on the drift-off times of solvers and interpolations, and on growth and damage with smoothing and
+    integration schemes; a quick run has four solvers."""
+    solvers = _drift_by_solver(folder, (*SOLVERS[:2], *SOLVERS[-2:]) if quick else SOLVERS)
     rows = _solver_rows(solvers)
     if quick:
         return rows, {"solvers": solvers, "smoothing": []}
-    smoothing = _smoothing(folder)
+    smoothing = _treatment_records(folder)
     return rows + _smoothing_rows(smoothing), {"solvers": solvers, "smoothing": smoothing}
 
 
-def _solvers(folder: Path, solvers: Any) -> list[Saved]:
-    """Drift-off time (s) for each solver under three inputs: linear samples, smooth samples, and noisy linear samples.
+def _drift_by_solver(folder: Path, solvers: Any) -> list[Saved]:
+    """Drift-off time (s) and final pitch error (rad) of each solver under three inputs: linear samples, smooth samples,
+    and noisy linear samples.
 
-    Every solver takes the undisturbed linear samples; the others are left to the tighter half of them, and noise to
-    fixed steps.
+    Every solver takes the undisturbed linear samples. Only the half with the tighter tolerances takes the smooth ones,
+    and only fixed-step solvers of this half take the noise.
     """
     true = virtual_drive(folder, DURATION, 1 / SAMPLING_RATE, 2.5e-4)
-    noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
+    noise = {"force_noise": {"deviation": FORCE_NOISE, "seed": SEED}}
     drifted = []
     tight = solvers[1::2]
-    fixed = tuple(solver_record for solver_record in tight if solver_record[1] not in ADAPTIVE)
+    fixed = tuple(solver_record for solver_record in tight if solver_record[1] not in ADAPTIVE_METHODS)
     inputs: tuple[tuple[str, str, Saved, Any], ...] = (
         ("linear", "linear", {}, solvers),
         ("smooth", "smooth", {}, tight),
@@ -103,16 +108,16 @@ def _solvers(folder: Path, solvers: Any) -> list[Saved]:
         assembly = assembly_of_scene(scene)
         for engine, method, value in chosen:
             solver = {"engine": engine, "method": method, "value": value, "input": name}
-            drifted.append(solver | _drift(assembly, engine, method, value, true))
+            drifted.append(solver | _drift_of_run(assembly, engine, method, value, true))
     return drifted
 
 
-def _drift(
+def _drift_of_run(
     assembly: Assembly, engine: str, method: str, step_or_tolerance: float, true_run: Result
 ) -> dict[str, float]:
-    """Drift-off time (s) of a run (its duration if it does not drift off), and its pitch error (rad) at the end."""
+    """Drift-off time (s) of a run (its duration if it does not drift off), and its final pitch error (rad)."""
     settings = Settings(method, step_or_tolerance, DURATION)
-    if method in ADAPTIVE:
+    if method in ADAPTIVE_METHODS:
         settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, step_or_tolerance)
     run = build(engine, assembly, settings).run()
     error = np.abs(run.states[:, 3] - np.interp(run.times, true_run.times, true_run["pitch"]))
@@ -120,84 +125,97 @@ def _drift(
     return {"drift-off": DURATION if time is None else time, "error": float(error[-1])}
 
 
-def _smoothing(folder: Path) -> list[Saved]:
-    """For each smoothing filter and integration scheme, on the same noise files: growth of the pitch's spread, and
-    damage of the section forces."""
-    true = virtual_drive(folder, NOISY, 1 / NOISY_RATE, 2.5e-4)
-    quiet = assembly_of_scene(force_scene(folder, step=1e-3, duration=NOISY))
+def _treatment_records(folder: Path) -> list[Saved]:
+    """For each smoothing filter and each integration scheme, with the same noise: growth rate of the pitch's standard
+    deviation, and damage ratio of the section forces."""
+    true = virtual_drive(folder, NOISY_SECONDS, 1 / NOISE_SAMPLING_RATE, 2.5e-4)
+    quiet = assembly_of_scene(force_scene(folder, step=1e-3, duration=NOISY_SECONDS))
     treatments = [
-        _record_of_solver(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
-        for cutoff in CUTOFFS
+        _treatment_record(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
+        for cutoff in LOW_PASS_CUTOFFS
     ]
     return treatments + [
-        _record_of_solver(f"not smoothed, order {order}", true, quiet, None, "exudyn", method, step)
-        for method, order, step in SCHEMES
+        _treatment_record(f"not smoothed, order {order}", true, quiet, None, "exudyn", method, step)
+        for method, order, step in INTEGRATION_SCHEMES
     ]
 
 
-def _record_of_solver(
-    name: str, true_run: Result, quiet_assembly: Assembly, cutoff: float | None, engine: str, method: str, step: float
+def _treatment_record(
+    treatment: str,
+    true_run: Result,
+    quiet_assembly: Assembly,
+    cutoff: float | None,
+    engine: str,
+    method: str,
+    step: float,
 ) -> Saved:
     forces = quiet_assembly.input
     assert isinstance(forces, Sampled)
-    settings = Settings(method, step, NOISY)
-    clean = _run(engine, quiet_assembly, forces.values, cutoff, settings)
+    settings = Settings(method, step, NOISY_SECONDS)
+    clean = _noisy_states(engine, quiet_assembly, forces.values, cutoff, settings)
     rows = np.rint(np.array(GROWTH_WINDOW) / step).astype(int)
     spread = np.zeros(2)
-    for path in range(PATHS):
-        noise = NOISE * normal_samples(SEED, path, len(forces.values), 2)
-        spread += (_run(engine, quiet_assembly, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]) ** 2
-    spread, law = np.sqrt(spread / PATHS), _law(_low_pass(forces.values, cutoff), quiet_assembly)
+    for path in range(PATH_COUNT):
+        noise = FORCE_NOISE * normal_samples(SEED, path, len(forces.values), 2)
+        spread += (
+            _noisy_states(engine, quiet_assembly, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]
+        ) ** 2
+    spread, law = np.sqrt(spread / PATH_COUNT), _pitch_deviation_law(_low_pass(forces.values, cutoff), quiet_assembly)
     growth, expected = (
         float(np.log(record_of_run[1] / record_of_run[0]) / np.diff(GROWTH_WINDOW)[0])
         for record_of_run in (spread, law)
     )
     return {
-        "name": name,
+        "name": treatment,
         "law": expected,
         "growth": growth,
         "spread": float(spread[1]),
-        **_bias(clean[:: round(1e-3 / step)], true_run, quiet_assembly),
+        **_damage_ratios(clean[:: round(1e-3 / step)], true_run, quiet_assembly),
     }
 
 
-def _run(engine: str, assembly: Assembly, values: np.ndarray, cutoff: float | None, settings: Settings) -> np.ndarray:
+def _noisy_states(
+    engine: str, assembly: Assembly, force_samples: np.ndarray, cutoff: float | None, settings: Settings
+) -> np.ndarray:
     """States (n, 8) of a run under force samples (n, 2), which are low-passed before the run if ``cutoff`` (Hz) is
     given."""
-    forces = Sampled(_low_pass(values, cutoff), 1 / NOISY_RATE, held=False)
+    forces = Sampled(_low_pass(force_samples, cutoff), 1 / NOISE_SAMPLING_RATE, held=False)
     return build(engine, replace(assembly, input=forces), settings).run().states
 
 
-def _low_pass(values: np.ndarray, cutoff: float | None) -> np.ndarray:
-    """Samples after a Butterworth filter of order 4, run forward and backward so that it causes no delay."""
+def _low_pass(force_samples: np.ndarray, cutoff: float | None) -> np.ndarray:
+    """Samples filtered by a Butterworth low-pass of order 4, which runs forward and backward and so causes no delay;
+    unchanged without a cut-off."""
     if cutoff is None:
-        return values
+        return force_samples
     from scipy.signal import butter, sosfiltfilt
 
-    return sosfiltfilt(butter(4, cutoff, fs=NOISY_RATE, output="sos"), values, axis=0)
+    return sosfiltfilt(butter(4, cutoff, fs=NOISE_SAMPLING_RATE, output="sos"), force_samples, axis=0)
 
 
-def _bias(states: np.ndarray, true_run: Result, assembly: Assembly) -> dict[str, float]:
-    """Ratio of the pseudo-damage of the front section force to the true one, for both components, without noise and
-    before drift-off."""
-    end = round(SCORED * NOISY_RATE)
+def _damage_ratios(states: np.ndarray, true_run: Result, assembly: Assembly) -> dict[str, float]:
+    """Damage of the front section force divided by the true damage, for both components, without noise and before
+    drift-off."""
+    end = round(DAMAGE_SECONDS * NOISE_SAMPLING_RATE)
     wanted = section_forces(*(true_run[name][::4][:end] for name in ("f3", "f4", "pitch")))
     f3, f4, _ = suspension_loads(states[:end].T, assembly.parameters, "exact")
     loads = section_forces(f3, f4, states[:end, 3])
     return {f"damage {name}": damage_ratio(loads[name], wanted[name]) for name in ("f3x", "f3z")}
 
 
-def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
-    """Standard deviation (2,) of the pitch in rad at the times WINDOW by the closed law, computed from the smoothed
-    forces (n, 2)."""
-    p, period = assembly.parameters, 1 / NOISY_RATE
+def _pitch_deviation_law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
+    """Standard deviation (2,) of the pitch in rad at the two times of GROWTH_WINDOW by the closed law, computed from
+    the smoothed forces (n, 2)."""
+    p, period = assembly.parameters, 1 / NOISE_SAMPLING_RATE
     rates = sinh_law_rate(pitch_rate_of_forces(forces, period, p), period, p)
     at = np.rint(np.array(GROWTH_WINDOW) / period).astype(int)
-    return np.sqrt(pitch_variance(np.array(GROWTH_WINDOW), rates[at], rigid_pitch(p).noise_intensity(NOISE, period)))
+    return np.sqrt(
+        pitch_variance(np.array(GROWTH_WINDOW), rates[at], rigid_pitch(p).noise_intensity(FORCE_NOISE, period))
+    )
 
 
 def _solver_rows(solvers: list[Saved]) -> list[Row]:
-    """Rows on the drift-off times of the solvers."""
+    """Rows on the drift-off times of the solvers, and on the pitch errors of both interpolations."""
     rows = []
     for name in ("linear", "noisy"):
         of_input = [solver_record for solver_record in solvers if solver_record["input"] == name]
@@ -214,9 +232,9 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
                     "",
                 ).within(
                     1.0,
-                    LOOSE_SHARE
-                    if solver_record["value"] >= 1e-5 and solver_record["method"] in ADAPTIVE
-                    else TIGHT_SHARE,
+                    LOOSE_TOLERANCE
+                    if solver_record["value"] >= 1e-5 and solver_record["method"] in ADAPTIVE_METHODS
+                    else TIGHT_TOLERANCE,
                     "the samples make the error, so accurate solvers agree; a loose tolerance adds to it",
                     "native",
                 )
@@ -237,7 +255,8 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
 
 
 def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
-    """Rows: with every smoothing or scheme, the spread of the pitch grows by the closed law of the smoothed forces."""
+    """Rows: with every smoothing and scheme, the pitch's standard deviation grows by the closed law of the smoothed
+    forces."""
     rows = []
     for smoothing_record in smoothing:
         key = smoothing_record["name"].replace(" ", "-").replace(",", "")
@@ -249,7 +268,7 @@ def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
                 f"the closed law, {smoothing_record['name']}",
                 smoothing_record["growth"] / smoothing_record["law"],
                 "",
-            ).within(1.0, 0.1, f"the same {PATHS} noise files in all; their own chance is 3 %", "closed form")
+            ).within(1.0, 0.1, f"the same {PATH_COUNT} noise files in all; their own chance is 3 %", "closed form")
         ]
         for axis, what in (
             (
@@ -269,7 +288,7 @@ def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Drift-off by solver, and what smoothing and schemes do."""
+    """Tables of the drift-off by solver, and of the effects of smoothing and integration scheme."""
     rows = tuple(
         (
             solver_record["input"],
@@ -284,7 +303,7 @@ def tables(case_data: Saved) -> list[Table]:
     note = (
         f"Study road at 20 m/s, {SAMPLING_RATE:g} Hz, {DURATION:g} s. Value: step (s), or relative tolerance of "
         "an adaptive "
-        f"solver. Linear and smooth: undisturbed; noisy: {NOISE} N, linear."
+        f"solver. Linear and smooth: undisturbed; noisy: {FORCE_NOISE} N, linear."
     )
     heads = ("input", "engine", "method", "value", "drift-off [s]", "pitch error at the end [rad]")
     tables = [Table("Drift-off by solver and interpolation", note, heads, rows)]
@@ -303,8 +322,8 @@ def tables(case_data: Saved) -> list[Table]:
             "damage f3x / true damage",
         )
         about = (
-            f"{PATHS} noise files of {NOISE} N at {NOISY_RATE:g} Hz; damage without noise, first {SCORED:g} s, "
-            "front section force in the chassis' frame."
+            f"{PATH_COUNT} noise files of {FORCE_NOISE} N at {NOISE_SAMPLING_RATE:g} Hz; damage without noise, "
+            f"first {DAMAGE_SECONDS:g} s, front section force in the chassis' frame."
         )
         tables.append(Table("Smoothing before the run, and schemes", about, columns, lines))
     return tables

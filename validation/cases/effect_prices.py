@@ -1,4 +1,5 @@
-"""Cost of a scene without effects beside a model built by hand, and the cost that each effect of the vehicle adds."""
+"""Computing time of a scene without effects compared with a model built by hand, and the time that each effect of the
+pitch-plane vehicle adds."""
 
 import tempfile
 import time
@@ -17,84 +18,104 @@ from validation.absence.hand_built import exudyn_run, mujoco_run
 from validation.absence.hand_built_braking import ratio_of_stops
 from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
-from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files
+from validation.cases.absent import (
+    EFFECTS,
+    ENGINES,
+    STEP,
+    changes_text,
+    count_changes,
+    model,
+    scene,
+    scenes_without_and_with,
+    write_files,
+)
 from validation.choice.price_of_choice import price_of_choice
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table
 
 TITLE = "What the machinery costs, and each effect"
 SYSTEM: System = "effects"
-STEPS = {True: 2000, False: 4000}
-"""Steps of the runs that are timed against hand-built ones, by ``quick``: 4 s are a fifth of a study scene, and short
-enough for both of a pair to meet the machine in one mood."""
+TIMED_STEP_COUNTS = {True: 2000, False: 4000}
+"""Number of steps of the runs that are timed against hand-built models, for a quick run (True) and a full run (False).
+4 s are a fifth of a study scene, and short enough that the load of the machine hardly changes between the two runs of a
+comparison."""
 RATIO_ROUNDS, PRICE_ROUNDS = {True: 7, False: 80}, {True: 5, False: 15}
-"""Rounds of these runs, and of those that tell what an effect adds, by ``quick``."""
-SELDOM = 4
-"""Of how many rounds the unchecked run is in the first."""
-RIDES = {"reference": {True: 50, False: 500}, "exudyn": {True: 50, False: 300}, "mujoco": {True: 500, False: 1000}}
-"""Steps of rides: one of Exudyn takes as long as eight of MuJoCo or of the reference's copies together."""
-WRITTEN = {
+"""Numbers of timing rounds, for a quick run (True) and a full run (False): of the ratios to hand-built models, and of
+the price of each effect."""
+UNCHECKED_INTERVAL = 4
+"""The hand-built run without a result check is timed in the first of every so many rounds."""
+RIDE_STEP_COUNTS = {
+    "reference": {True: 50, False: 500},
+    "exudyn": {True: 50, False: 300},
+    "mujoco": {True: 500, False: 1000},
+}
+"""Number of steps of timed rides, by engine and ``quick``. A step of Exudyn takes as long as eight of MuJoCo, or as a
+step of all copies in the hand-written reference."""
+HAND_WRITTEN_RIDES = {
     "reference": "the same copies one after the other, equations written out",
     "exudyn": "a car of its items whose path passes the same guard",
     "mujoco": "a car of its XML with site actuators whose path passes the same guard",
 }
-DEAREST = 1.03
-"""Ratio of the time of a bare scene to that of a hand-built model."""
-TIMED_STEPS = 500
-"""Steps of the runs whose seconds tell what an effect adds."""
+"""Description of the hand-written model of the ride, by engine."""
+TIME_RATIO_BOUND = 1.03
+"""Largest ratio asked for of the time of a scene without effects to that of a hand-built model."""
+EFFECT_STEP_COUNT = 500
+"""Number of steps of the runs that measure the time an effect adds."""
 
 
 @allowing_breaches("what is computed is what is counted, whatever the vehicle does meanwhile")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """The ratio to hand-built models and the price list; a quick run has runs of 2 s instead of 4 s, a tenth of
-    the rounds, and each effect in one of the three engines, in turn.
-    """
+    """Rows of the computing times divided by those of hand-built models, and the price list of effects. A quick run
+    simulates 2 s instead of 4 s, takes a tenth of the rounds, and each effect in one of the three engines, in turn."""
     with tempfile.TemporaryDirectory() as name:
         files_folder = Path(name)
         write_files(files_folder)
         ratios = {
-            engine: _ratio(engine, files_folder, STEPS[quick], RATIO_ROUNDS[quick]) for engine in ("exudyn", "mujoco")
+            engine: _ratio_to_hand_built(engine, files_folder, TIMED_STEP_COUNTS[quick], RATIO_ROUNDS[quick])
+            for engine in ("exudyn", "mujoco")
         }
         price = [
-            _price(effect, engine, files_folder, PRICE_ROUNDS[quick])
+            _price_of_effect(effect, engine, files_folder, PRICE_ROUNDS[quick])
             for i, effect in enumerate(EFFECTS)
             for j, engine in enumerate(ENGINES)
             if not quick or i % len(ENGINES) == j
         ]
-    rows = [row for engine, ratio in ratios.items() for row in _machinery(engine, ratio, STEPS[quick])]
-    rows += _wheelset(STEPS[quick] // 4, quick) + _rides(quick) + _contact(quick)
-    rows += _cars(STEPS[quick] // 20, quick) + _stops(quick) + ([] if quick else [_choice()])
+    rows = [
+        row for engine, ratio in ratios.items() for row in _hand_built_rows(engine, ratio, TIMED_STEP_COUNTS[quick])
+    ]
+    rows += _wheelset_rows(TIMED_STEP_COUNTS[quick] // 4, quick) + _ride_rows(quick) + _contact_rows(quick)
+    rows += _car_rows(TIMED_STEP_COUNTS[quick] // 20, quick) + _stop_rows(quick) + ([] if quick else [_choice_row()])
     return rows, {"price": price, "ratios": ratios}
 
 
-def hand_built(engine: str, bare: Scene) -> Any:
-    """The hand-built model of the bare vehicle in an engine."""
-    assembly, settings = assembly_of_scene(bare), settings_of(bare, engine)
+def hand_built(engine: str, bare_scene: Scene) -> Any:
+    """Run of the hand-built model of the vehicle without effects in an engine: a function that returns the states."""
+    assembly, settings = assembly_of_scene(bare_scene), settings_of(bare_scene, engine)
     run = {"exudyn": exudyn_run, "mujoco": mujoco_run}[engine]
     return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
 
 
-def _ratio(engine: str, folder: Path, steps: int, round_count: int) -> Saved:
-    """Ratio of computing times between twinrig's bare model and the hand-built one, and the largest difference of their
-    states.
+def _ratio_to_hand_built(engine: str, folder: Path, step_count: int, round_count: int) -> Saved:
+    """Ratio of the computing time of twinrig's model of a scene without effects to that of the hand-built model, and
+    the largest difference of their states.
 
     Every run of the machinery passes the guard; the hand-built model is timed with it and without it.
     """
-    bare = scene({}, steps, folder)
-    ours, theirs, times = model(bare, engine), hand_built(engine, bare), STEP * np.arange(steps + 1)
+    bare = scene({}, step_count, folder)
+    ours, theirs, times = model(bare, engine), hand_built(engine, bare), STEP * np.arange(step_count + 1)
     gap = float(np.abs(ours.run().states - theirs()).max())
     jobs = [ours.run, lambda: guard(engine, times, theirs(), bare.run.duration), theirs]
-    seconds = interleave(jobs, round_count, round_interval=(1, 1, SELDOM), clock=time.process_time)
+    seconds = interleave(jobs, round_count, round_interval=(1, 1, UNCHECKED_INTERVAL), clock=time.process_time)
     return {
         "ratio": paired_ratio(seconds[0], seconds[1]),
         "gap": gap,
-        "unchecked": paired_ratio(seconds[0, ::SELDOM], seconds[2, ::SELDOM]),
+        "unchecked": paired_ratio(seconds[0, ::UNCHECKED_INTERVAL], seconds[2, ::UNCHECKED_INTERVAL]),
     }
 
 
-def _machinery(engine: str, machinery: Saved, steps: int) -> list[Row]:
+def _hand_built_rows(engine: str, comparison: Saved, step_count: int) -> list[Row]:
     why = (
-        f"interleaved runs of {steps:,} steps, seconds of the processor, median of paired ratios: what the "
+        f"interleaved runs of {step_count:,} steps, seconds of the processor, median of paired ratios: what the "
         "machinery costs where no effect is named"
     )
     return [
@@ -102,36 +123,37 @@ def _machinery(engine: str, machinery: Saved, steps: int) -> list[Row]:
             f"effect_prices.same.{engine}",
             SYSTEM,
             f"{engine}: largest difference of the states of a bare scene from those of a hand-built model",
-            machinery["gap"],
+            comparison["gap"],
             "m, rad, m/s, rad/s",
         ).at_most(0.0, "the same items in the same order give the same numbers", "native"),
         ratio_row(
             f"effect_prices.ratio.{engine}",
             f"{engine}: ratio of the time of a bare scene to that of a hand-built model "
             "whose result passes the same guard",
-            machinery["ratio"],
+            comparison["ratio"],
             why,
         ),
         ratio_row(
             f"effect_prices.unchecked.{engine}",
             f"{engine}: ratio of the time of a bare scene to that of a hand-built model whose result nobody checks",
-            machinery["unchecked"],
+            comparison["unchecked"],
             why,
         ),
     ]
 
 
-def ratio_row(row: str, title: str, ratio: tuple[float, float, float], tolerance_reason: str) -> Row:
-    """Row with a ratio of computing times and its interval."""
-    value, low, high = ratio
-    return Observed(row, SYSTEM, f"{title}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(
-        DEAREST, tolerance_reason
+def ratio_row(row_id: str, title: str, ratio_and_interval: tuple[float, float, float], tolerance_reason: str) -> Row:
+    """Row with a ratio of computing times and its 95 % interval."""
+    value, low, high = ratio_and_interval
+    return Observed(row_id, SYSTEM, f"{title}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(
+        TIME_RATIO_BOUND, tolerance_reason
     )
 
 
-def _wheelset(steps: int, quick: bool) -> list[Row]:
-    """Rows: a free wheelset with linear creep on cones, compared with code written for this alone."""
-    gap, ratio = ratio_of_wheelsets(steps, RATIO_ROUNDS[quick])
+def _wheelset_rows(step_count: int, quick: bool) -> list[Row]:
+    """Rows: difference and time of a free wheelset with linear creep on cones, compared with code written for this case
+    alone."""
+    gap, ratio = ratio_of_wheelsets(step_count, RATIO_ROUNDS[quick])
     return [
         Observed(
             "effect_prices.same.wheelset",
@@ -150,21 +172,21 @@ def _wheelset(steps: int, quick: bool) -> list[Row]:
     ]
 
 
-def _rides(quick: bool) -> list[Row]:
-    """Rows: a car with seven freedoms on a rough road, compared with a model built by hand in each engine, and with
-    hand-written equations.
+def _ride_rows(quick: bool) -> list[Row]:
+    """Rows: a car with seven degrees of freedom on a rough road, compared in Exudyn and MuJoCo with a model built by
+    hand, and in the reference implementation with equations written for this car alone.
 
     In MuJoCo the suspension is of site actuators, as XML has them. All forces of this car alone in one callback, by
     hand, on addresses in MuJoCo's memory, beat the general callback by an eighth.
     """
     rows = []
-    for engine, steps in RIDES.items():
+    for engine, steps in RIDE_STEP_COUNTS.items():
         gap, ratio = ratio_of_rides(engine, steps[quick], 3 if quick else RATIO_ROUNDS[quick])
         rows += [
             Observed(
                 f"effect_prices.same.ride.{engine}",
                 SYSTEM,
-                f"{engine}: largest difference of the states of a bare ride from those of {WRITTEN[engine]}",
+                f"{engine}: largest difference of the states of a bare ride from those of {HAND_WRITTEN_RIDES[engine]}",
                 gap,
                 "m, rad, m/s, rad/s",
             ).at_most(
@@ -174,7 +196,7 @@ def _rides(quick: bool) -> list[Row]:
             ),
             ratio_row(
                 f"effect_prices.ratio.ride.{engine}",
-                f"{engine}: ratio of the time of a bare ride to that of {WRITTEN[engine]}",
+                f"{engine}: ratio of the time of a bare ride to that of {HAND_WRITTEN_RIDES[engine]}",
                 ratio,
                 "what the machinery of all vehicles in space costs where no effect is named",
             ),
@@ -182,13 +204,14 @@ def _rides(quick: bool) -> list[Row]:
     return rows
 
 
-def _cars(steps: int, quick: bool) -> list[Row]:
-    """Rows: a car that rolls freely on a flat road in MuJoCo, compared with code written for this alone.
+def _car_rows(step_count: int, quick: bool) -> list[Row]:
+    """Rows: difference and time of a car that rolls freely on a flat road in MuJoCo, compared with code written for
+    this case alone.
 
     MuJoCo's own step is the same and so is the march of the tyres' cells, three fifths of the time; what is
     left, a microsecond of every call of the forces, is the walk through a table that any vehicle has.
     """
-    gap, ratio = ratio_of_cars(steps, RATIO_ROUNDS[quick])
+    gap, ratio = ratio_of_cars(step_count, RATIO_ROUNDS[quick])
     return [
         Observed(
             "effect_prices.same.handling",
@@ -208,8 +231,9 @@ def _cars(steps: int, quick: bool) -> list[Row]:
     ]
 
 
-def _stops(quick: bool) -> list[Row]:
-    """Rows: a truck brakes in a turn on snow, in the reference, compared with code written for this stop alone.
+def _stop_rows(quick: bool) -> list[Row]:
+    """Rows: difference and time of a truck that brakes in a turn on snow, compared with code written for this stop
+    alone.
 
     A step compiled for any number of tyre tables and of their loads, where the written one has one of each,
     takes a third longer; asking for samples and recording them adds a tenth.
@@ -233,8 +257,9 @@ def _stops(quick: bool) -> list[Row]:
     ]
 
 
-def _contact(quick: bool) -> list[Row]:
-    """Rows: FASTSIM on one ellipse without spin, called from Python, compared with code written for this alone."""
+def _contact_rows(quick: bool) -> list[Row]:
+    """Rows: difference and time of FASTSIM on one ellipse without spin, called from Python, compared with code written
+    for this case alone."""
     gap, ratio = ratio_of_contacts(RATIO_ROUNDS[quick])
     return [
         Observed(
@@ -254,8 +279,8 @@ def _contact(quick: bool) -> list[Row]:
     ]
 
 
-def _choice() -> Row:
-    """Row: ratio of the time to choose the effects of a linear car to the time of its full covariance."""
+def _choice_row() -> Row:
+    """Row: ratio of the time of a choice of effects for a linear car to the time of the car's full covariance."""
     (ratio, low, high), predicted_seconds = price_of_choice()
     return Observed(
         "effect_prices.choice",
@@ -268,29 +293,35 @@ def _choice() -> Row:
     ).aim(20.0, "seconds of the processor, median of interleaved rounds")
 
 
-def _price(effect: str, engine: str, folder: Path, round_count: int) -> Saved:
-    """One line of the price list: time per step in microseconds that an effect adds in an engine, with its counts."""
-    seconds = interleave([_job(bare, engine) for bare in pair(effect, TIMED_STEPS, folder)], round_count, 5e-3)
-    added = (seconds[1] - seconds[0]) / TIMED_STEPS * 1e6
+def _price_of_effect(effect: str, engine: str, folder: Path, round_count: int) -> Saved:
+    """Line of the price list: time per step (microseconds) that an effect adds in an engine, with the numbers of
+    components that the effect changes."""
+    seconds = interleave(
+        [_timed_run(bare, engine) for bare in scenes_without_and_with(effect, EFFECT_STEP_COUNT, folder)],
+        round_count,
+        5e-3,
+    )
+    added = (seconds[1] - seconds[0]) / EFFECT_STEP_COUNT * 1e6
     return {
         "effect": effect,
         "engine": engine,
-        "adds": changes(change(effect, engine, folder)) or "nothing",
-        "step": float(np.median(seconds[0])) / TIMED_STEPS * 1e6,
+        "adds": changes_text(count_changes(effect, engine, folder)) or "nothing",
+        "step": float(np.median(seconds[0])) / EFFECT_STEP_COUNT * 1e6,
         "us": describe(added),
         "ratio": paired_ratio(seconds[1], seconds[0]),
     }
 
 
-def _job(bare: Scene, engine: str) -> Any:
-    """A run of a scene, channels included, whose model is built already."""
-    assembly = assembly_of_scene(bare)
-    built = build(engine, assembly, settings_of(bare, engine))
+def _timed_run(simulated_scene: Scene, engine: str) -> Any:
+    """Function that runs a scene and computes its output channels; the model is built beforehand, outside the timed
+    call."""
+    assembly = assembly_of_scene(simulated_scene)
+    built = build(engine, assembly, settings_of(simulated_scene, engine))
     return lambda: output_channels(assembly, built.run(), built)
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """The price list of effects."""
+    """Table of the computing time that each effect adds."""
     note = (
         "Each effect is added to the scene without it: wheel_forces, road, pitch_spring and the sensors to the "
         "bare vehicle, geometry to one of small angles, gyro_bias to one with a gyro, the others to one under "
@@ -300,10 +331,10 @@ def tables(case_data: Saved) -> list[Table]:
         "costs nothing."
     )
     headings = ("effect", "engine", "adds", "without it, us per step", "adds, us per step", "factor")
-    return [Table("Price list of effects", note, headings, tuple(_line(entry) for entry in case_data["price"]))]
+    return [Table("Price list of effects", note, headings, tuple(_table_line(entry) for entry in case_data["price"]))]
 
 
-def _line(saved_entry: Saved) -> tuple[str, ...]:
+def _table_line(saved_entry: Saved) -> tuple[str, ...]:
     value, low, high = saved_entry["ratio"]
     return (
         saved_entry["effect"],

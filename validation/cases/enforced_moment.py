@@ -1,4 +1,5 @@
-"""The moment that a prescribed pitch takes: Exudyn's multiplier, MuJoCo's inverse dynamics, the eliminated form."""
+"""Moment that enforces a prescribed pitch: Exudyn's multiplier and MuJoCo's inverse dynamics compared with the
+equations without multiplier."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,27 +22,27 @@ from validation.common.scenes import VEHICLE_SETS, force_scene, on_paper_road, v
 
 TITLE = "Enforced moment of a prescribed pitch"
 SYSTEM: System = "pitch-plane"
-DURATION, QUICK_DURATION, ABRUPT_START, ROUGH_FACTOR = 4.0, 1.5, 1.0, 2.0
-"""Of a manoeuvre, in full and in quick, of an abrupt start whose ringing must not be most of the run, and of the study
-road (s)."""
+DURATION, QUICK_DURATION, ABRUPT_SECONDS, ROUGH_ROAD_SECONDS = 4.0, 1.5, 1.0, 2.0
+"""Lengths (s) of the runs: of the manoeuvre in a full and in a quick run, of the abrupt start (so long that its ringing
+is not most of the run), and on the study road."""
 SAMPLE_PERIOD = 1e-3
 STEP = 1e-3
-MOMENT_BOUND = 1e-4
-GUIDE = {"prescribed_pitch": {"file": "pitch.csv"}}
+MOMENT_TOLERANCE = 1e-4
+PRESCRIBED_PITCH = {"prescribed_pitch": {"file": "pitch.csv"}}
 BEST_SETTINGS = {
     "exudyn": Settings("GeneralizedAlpha", STEP, DURATION, spectral_radius=0.6),
     "mujoco": Settings("RK4", STEP, DURATION),
 }
 
 
-def manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
+def write_manoeuvre(folder: Path, parameter_set_name: str, abrupt: bool = False) -> None:
     """Write pitch and wheel forces of a manoeuvre with frequencies up to 2.7 Hz, the range of a car's pitch and heave
     motion.
 
-    It begins in the vehicle's own equilibrium with zero angular acceleration; ``abrupt`` begins with
+    The manoeuvre begins in the vehicle's equilibrium with zero angular acceleration, an ``abrupt`` one with
     4.4 rad/s^2 at once.
     """
-    p = parameter_set(parameters, "", folder)
+    p = parameter_set(parameter_set_name, "", folder)
     rest = equilibrium(p)
     t = SAMPLE_PERIOD * np.arange(round(DURATION / SAMPLE_PERIOD) + 1)
     s = np.clip(t / 1.0, 0, 1)
@@ -56,54 +57,58 @@ def manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, SAMPLE_PERIOD)
 
 
-def moment(scene: Scene, engine: str, settings: Settings) -> np.ndarray:
+def enforced_moment(scene: Scene, engine: str, settings: Settings) -> np.ndarray:
     """Enforced moment (n,) in N m at every millisecond of a scene."""
     finer = replace(settings, duration=scene.run.duration)
     return simulate(scene, engine, finer)["enforced_moment"][:: round(SAMPLE_PERIOD / settings.step)]
 
 
-def truth(scene: Scene) -> np.ndarray:
-    """True enforced moment (n,) in N m, from the form without multiplier (eq. 39) by Runge-Kutta with steps of a
+def exact_moment(scene: Scene) -> np.ndarray:
+    """Exact enforced moment (n,) in N m, from the equations without multiplier (eq. 39) by Runge-Kutta with steps of a
     sixteenth of the sampling period."""
-    return moment(scene, "reference", Settings("RK4", SAMPLE_PERIOD / 16, scene.run.duration))
+    return enforced_moment(scene, "reference", Settings("RK4", SAMPLE_PERIOD / 16, scene.run.duration))
 
 
-def relative(computed_values: np.ndarray, true_moment: np.ndarray) -> float:
-    """Ratio of the rms difference to the rms of the true moment."""
+def relative_rms_error(computed_values: np.ndarray, true_moment: np.ndarray) -> float:
+    """Rms difference of two moments divided by the rms of the true moment."""
     return float(np.sqrt(np.mean((computed_values - true_moment) ** 2) / np.mean(true_moment**2)))
 
 
 @on_paper_road()
 @allowing_breaches("the moment is compared, and its size is another matter", "little artificial")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows for both engines and vehicles, start-up ringing, and the study road; quick: one vehicle, no road."""
+    """Rows for both vehicles in Exudyn and in MuJoCo, the ringing after an abrupt start, and the study road; a quick
+    run has one vehicle and no study road."""
     with TemporaryDirectory() as name:
         work = Path(name)
-        rows = _manoeuvre(work, VEHICLE_SETS[-1:] if quick else VEHICLE_SETS, QUICK_DURATION if quick else DURATION)
-        ringing, paths = _ringing(work)
-        rough, table = ([], []) if quick else _study_road(work, (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5))
+        rows = _manoeuvre_rows(
+            work, VEHICLE_SETS[-1:] if quick else VEHICLE_SETS, QUICK_DURATION if quick else DURATION
+        )
+        ringing, paths = _ringing_rows(work)
+        rough, table = ([], []) if quick else _study_road_rows(work, (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5))
     return rows + ringing + rough, {"table": table, "ringing": paths}
 
 
-def _manoeuvre(folder: Path, vehicles: tuple[str, ...], duration: float) -> list[Row]:
+def _manoeuvre_rows(folder: Path, vehicles: tuple[str, ...], duration: float) -> list[Row]:
     rows = []
-    for parameters in vehicles:
-        manoeuvre(folder, parameters)
-        scene = force_scene(folder, parameters, STEP, duration, "smooth", effects=GUIDE)
-        true = truth(scene)
-        if parameters == vehicles[0]:
-            rows.append(_uncertainty(scene, true))
+    for parameter_set_name in vehicles:
+        write_manoeuvre(folder, parameter_set_name)
+        scene = force_scene(folder, parameter_set_name, STEP, duration, "smooth", effects=PRESCRIBED_PITCH)
+        true = exact_moment(scene)
+        if parameter_set_name == vehicles[0]:
+            rows.append(_uncertainty_row(scene, true))
         for engine, settings in BEST_SETTINGS.items():
             route = "Lagrange multiplier" if engine == "exudyn" else "reduced model and inverse dynamics"
             rows.append(
                 Observed(
-                    f"moment.{engine}.{parameters}",
+                    f"moment.{engine}.{parameter_set_name}",
                     SYSTEM,
-                    f"error of the enforced moment at 1 ms, {engine} {settings.integrator} ({route}), {parameters}",
-                    relative(moment(scene, engine, settings), true),
+                    f"error of the enforced moment at 1 ms, {engine} {settings.integrator} ({route}), "
+                    f"{parameter_set_name}",
+                    relative_rms_error(enforced_moment(scene, engine, settings), true),
                     "of its rms",
                 ).at_most(
-                    MOMENT_BOUND,
+                    MOMENT_TOLERANCE,
                     f"the rms is {np.sqrt(np.mean(true**2)):.0f} N m; a second-order scheme leaves (2 pi f h)^2 / 12, "
                     "which is 2e-5 at 2.7 Hz and 1 ms",
                     "native",
@@ -112,31 +117,33 @@ def _manoeuvre(folder: Path, vehicles: tuple[str, ...], duration: float) -> list
     return rows
 
 
-def _uncertainty(scene: Scene, true_moment: np.ndarray) -> Row:
-    """Row: uncertainty of the true moment, as its difference from an adaptive solver of another family at a tolerance
-    of 1e-11."""
-    by_other_solver = moment(scene, "reference", Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-11))
+def _uncertainty_row(scene: Scene, true_moment: np.ndarray) -> Row:
+    """Row: uncertainty of the true moment, measured by its difference from an adaptive solver of another family at a
+    tolerance of 1e-11."""
+    by_other_solver = enforced_moment(scene, "reference", Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-11))
     return Observed(
         "moment.reference",
         SYSTEM,
         "uncertainty of the moment of the eliminated form: Runge-Kutta at 1/16 ms against Dormand-Prince 8 at 1e-11",
-        relative(by_other_solver, true_moment),
+        relative_rms_error(by_other_solver, true_moment),
         "of its rms",
-    ).at_most(MOMENT_BOUND / 100, "a hundredth of the bound that it has to judge", "shared kernel")
+    ).at_most(MOMENT_TOLERANCE / 100, "a hundredth of the bound that it has to judge", "shared kernel")
 
 
-def _ringing(folder: Path) -> CaseAnswer:
-    """Rows and data on an abrupt start: error of the multiplier over the first 0.1 s, with and without consistent
+def _ringing_rows(folder: Path) -> CaseAnswer:
+    """Rows and data on an abrupt start: error of Exudyn's multiplier over the first 0.1 s, with and without consistent
     initial accelerations."""
-    manoeuvre(folder, "itwm_drift", abrupt=True)
-    scene = force_scene(folder, step=STEP, duration=ABRUPT_START, interpolation="smooth", effects=GUIDE)
-    true = truth(scene)
+    write_manoeuvre(folder, "itwm_drift", abrupt=True)
+    scene = force_scene(folder, step=STEP, duration=ABRUPT_SECONDS, interpolation="smooth", effects=PRESCRIBED_PITCH)
+    true = exact_moment(scene)
     first = slice(1, 101)
     paths: Saved = {"time": (STEP * np.arange(1, 101)).tolist()}
     for radius in (0.6, 0.9):
-        settings = Settings("GeneralizedAlpha", STEP, ABRUPT_START, spectral_radius=radius)
-        paths[f"inconsistent start, spectral radius {radius}"] = (_inconsistent(scene, settings) - true)[first].tolist()
-        consistent = moment(scene, "exudyn", settings) - true
+        settings = Settings("GeneralizedAlpha", STEP, ABRUPT_SECONDS, spectral_radius=radius)
+        paths[f"inconsistent start, spectral radius {radius}"] = (_inconsistent_multiplier(scene, settings) - true)[
+            first
+        ].tolist()
+        consistent = enforced_moment(scene, "exudyn", settings) - true
         paths[f"consistent start, spectral radius {radius}"] = consistent[first].tolist()
     peak = {name: float(np.abs(path).max()) for name, path in paths.items() if name != "time"}
     rows = [
@@ -164,30 +171,42 @@ def _ringing(folder: Path) -> CaseAnswer:
     return rows, paths
 
 
-def _inconsistent(scene: Scene, settings: Settings) -> np.ndarray:
-    """Exudyn's multiplier (n,) when its initial accelerations are not made consistent with the constraint."""
+def _inconsistent_multiplier(scene: Scene, settings: Settings) -> np.ndarray:
+    """Exudyn's multiplier (n,) in N m if its initial accelerations are not made consistent with the constraint."""
     model: Any = build("exudyn", assembly_of_scene(scene), settings)
     model._first = 0.0
     model._consistent_start = lambda options: None
-    moment = model.run().moment
-    assert moment is not None
-    return moment
+    multiplier = model.run().moment
+    assert multiplier is not None
+    return multiplier
 
 
-def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
-    """Rows and table on the paper's guided run on the study road: error of the enforced moment at each step, divided by
-    the rms of the moment."""
-    virtual_drive(folder, ROUGH_FACTOR + 0.1, SAMPLE_PERIOD, SAMPLE_PERIOD)
+def _study_road_rows(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
+    """Rows and table on the paper's run with prescribed pitch on the study road: error of the enforced moment at each
+    step, divided by the rms of the moment."""
+    virtual_drive(folder, ROUGH_ROAD_SECONDS + 0.1, SAMPLE_PERIOD, SAMPLE_PERIOD)
     paper = perturbed_parameters(PARAMETERS)
     scene = force_scene(
-        folder, step=SAMPLE_PERIOD, duration=ROUGH_FACTOR, interpolation="smooth", override=paper, effects=GUIDE
+        folder,
+        step=SAMPLE_PERIOD,
+        duration=ROUGH_ROAD_SECONDS,
+        interpolation="smooth",
+        override=paper,
+        effects=PRESCRIBED_PITCH,
     )
-    true = truth(scene)
+    true = exact_moment(scene)
     table: list[list[Any]] = []
     for engine, best in BEST_SETTINGS.items():
         for step in steps:
-            settings = Settings(best.integrator, step, ROUGH_FACTOR, spectral_radius=best.spectral_radius)
-            table.append([engine, best.integrator, step, relative(moment(scene, engine, settings)[20:], true[20:])])
+            settings = Settings(best.integrator, step, ROUGH_ROAD_SECONDS, spectral_radius=best.spectral_radius)
+            table.append(
+                [
+                    engine,
+                    best.integrator,
+                    step,
+                    relative_rms_error(enforced_moment(scene, engine, settings)[20:], true[20:]),
+                ]
+            )
     rows = [
         Observed(
             f"moment.rough.{engine}",
@@ -196,7 +215,7 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
             next(row[3] for row in table if row[0] == engine and row[2] == STEP),
             "of its rms",
         ).beside(
-            MOMENT_BOUND,
+            MOMENT_TOLERANCE,
             "40 Hz of roughness at 1 ms: (2 pi f h)^2 / 12 is 5e-3 of I beta'', twenty times the moment; the "
             "table shows the step that it takes",
             "native",
@@ -207,7 +226,7 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Error by step on the study road, where it was driven."""
+    """Table of the moment's error by step on the study road; none if it was not simulated."""
     if not case_data["table"]:
         return []
     rows = tuple((engine, name, f"{1e3 * step:g}", f"{error:.1e}") for engine, name, step, error in case_data["table"])

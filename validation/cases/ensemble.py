@@ -1,4 +1,5 @@
-"""Thousands of noise paths: the same bits whoever computes them, what they cost, and how the paths scatter."""
+"""Thousands of noise paths: equal bits whatever computes them, computing time and memory, and the scatter of the
+paths."""
 
 import time
 from collections.abc import Callable
@@ -24,40 +25,41 @@ from validation.common.scenes import force_scene, virtual_drive
 TITLE = "Noise paths by the thousand"
 SYSTEM: System = "drift"
 SEED = 17
-DEVIATION = 35.0
-"""Noise (N) on each sample: 0.2 % of the largest force on the study road."""
+NOISE_DEVIATION = 35.0
+"""Standard deviation (N) of the noise on each force sample: 0.2 % of the largest force on the study road."""
 STEP = 1e-3
 LARGE_ENSEMBLE_PATHS, LARGE_ENSEMBLE_SECONDS = 10_000, 60.0
-"""Paths and seconds of the large ensemble."""
+"""Number of paths and their length (s) in the large ensemble."""
 RECOMPUTED_PATHS = 200
-"""Paths that are computed again by one worker, and by a run that is killed."""
-SECONDS, MEMORY = 120.0, 2e9
-"""Targets of the large ensemble on two cores."""
-STATE, MARKS = 8 * 8, 2 * 8
-"""Bytes of a state that is kept, and of the times of drift-off and of failure of a path."""
+"""Number of paths that are computed again by one worker, and by a run that is killed and resumed."""
+TARGET_SECONDS, TARGET_MEMORY = 120.0, 2e9
+"""Target computing time (s) and memory (bytes) of the large ensemble on two cores."""
+STATE_BYTES, TIME_BYTES = 8 * 8, 2 * 8
+"""Bytes of a saved state, and of a path's saved times of drift-off and of failure."""
 TABLE_TIMES = (1.0, 2.0, 5.0, 10.0, 15.0)
-"""Times (s) of the table of spreads."""
+"""Times (s) in the table of standard deviations."""
 SAME_BITS = "the same bits"
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Equality of bits by path, workers and interruption, agreement of engines; in full also scale and price."""
+    """Rows on equal bits by path, workers and interruption, and on the agreement of engines; a full run also has the
+    large ensemble and computing times."""
     with TemporaryDirectory() as name:
         forces, duration = Path(name), 1.0 if quick else LARGE_ENSEMBLE_SECONDS
         measured = virtual_drive(forces, duration, STEP, STEP)
         truth = measured["pitch"]
-        scene, times = _scene(forces, duration), np.arange(0.0, duration + 0.5)
+        scene, times = _noisy_scene(forces, duration), np.arange(0.0, duration + 0.5)
         job = noise_paths(scene, times, truth)
         if quick:
-            return _quick(forces, scene, job, times), {}
-        large = _in_own_process(_large_ensemble, job, LARGE_ENSEMBLE_PATHS, forces / "large")
+            return _quick_rows(forces, scene, job, times), {}
+        large = _in_separate_process(_large_ensemble, job, LARGE_ENSEMBLE_PATHS, forces / "large")
         paths = large.pop("found")
-        rows = [_path_row(forces, duration, paths), *_scale_rows(large)]
+        rows = [_single_run_row(forces, duration, paths), *_scale_rows(large)]
         with process_pool(2) as pool:
             again, half = pool.submit(run_paths, job, RECOMPUTED_PATHS), pool.submit(_half_step_row, forces)
             killed = _killed_row(job, paths, forces / "killed")
             rows += [
-                _same_row(
+                _equal_bits_row(
                     "workers",
                     f"{RECOMPUTED_PATHS} paths have the same bits with 1 worker and with 2",
                     paths,
@@ -66,34 +68,34 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
                 killed,
             ]
             halved = half.result()  # nothing else runs while the engines are timed
-            engines, prices = _engines(scene, truth, times, paths, 4, pool)
+            engines, prices = _engine_rows_and_times(scene, truth, times, paths, 4, pool)
         prices = {"reference, 2 processes": large["seconds"] / large["path-steps"], **prices}
         rows += [*engines, halved, *_price_rows(prices)]
-        return rows, _data(measured.states, times, paths, large, prices)
+        return rows, _saved_data(measured.states, times, paths, large, prices)
 
 
-def _scene(forces: Path, duration: float, path: int = 0, step: float = STEP) -> Scene:
-    noise = {"force_noise": {"deviation": DEVIATION, "seed": SEED, "path": path}}
-    return force_scene(forces, duration=duration, step=step, effects=noise)
+def _noisy_scene(force_folder: Path, duration: float, path: int = 0, step: float = STEP) -> Scene:
+    noise = {"force_noise": {"deviation": NOISE_DEVIATION, "seed": SEED, "path": path}}
+    return force_scene(force_folder, duration=duration, step=step, effects=noise)
 
 
-def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> list[Row]:
-    """Rows of the quick report: a few paths of one second, computed in threads because these start at once."""
+def _quick_rows(force_folder: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> list[Row]:
+    """Rows of a quick run: a few paths of one second, computed in threads because these start at once."""
     paths = run_paths(job, 12)
     with ThreadPoolExecutor(2) as pool:
         two = run_paths(job, 12, executor=pool, blocks=Blocks(3))
-    engines, _ = _engines(scene, job.truth, times, paths, 2, None)
+    engines, _ = _engine_rows_and_times(scene, job.truth, times, paths, 2, None)
     return [
-        _path_row(forces, 1.0, paths),
-        _same_row("workers", "12 paths have the same bits with 1 worker and with 2", paths, two),
-        _interrupted_row(job, paths, forces / "stopped"),
+        _single_run_row(force_folder, 1.0, paths),
+        _equal_bits_row("workers", "12 paths have the same bits with 1 worker and with 2", paths, two),
+        _interrupted_row(job, paths, force_folder / "stopped"),
         *engines,
     ]
 
 
-def _path_row(forces: Path, duration: float, paths: Arrays) -> Row:
+def _single_run_row(force_folder: Path, duration: float, paths: Arrays) -> Row:
     """Row: path 7 of the ensemble equals a single run of the scene with ``path = 7``."""
-    alone = simulate(_scene(forces, duration, path=7), "reference")
+    alone = simulate(_noisy_scene(force_folder, duration, path=7), "reference")
     worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - paths["states"][7]).max())
     return Observed(
         "ensemble.path",
@@ -104,12 +106,12 @@ def _path_row(forces: Path, duration: float, paths: Arrays) -> Row:
     ).within(0.0, 0.0, "the same samples through the same march: the same bits", "shared kernel")
 
 
-def _same_row(id: str, title: str, first: Arrays, other_paths: Arrays) -> Row:
+def _equal_bits_row(row_name: str, title: str, paths: Arrays, other_paths: Arrays) -> Row:
     """Row: two ensembles are equal to the last bit."""
     count = len(other_paths["drift_off"])
-    equal = all(np.array_equal(first[name][:count], other_paths[name], equal_nan=True) for name in first)
+    equal = all(np.array_equal(paths[name][:count], other_paths[name], equal_nan=True) for name in paths)
     return behaviour_row(
-        f"ensemble.{id}",
+        f"ensemble.{row_name}",
         SYSTEM,
         title,
         SAME_BITS if equal else "different bits",
@@ -119,38 +121,38 @@ def _same_row(id: str, title: str, first: Arrays, other_paths: Arrays) -> Row:
     )
 
 
-def _interrupted_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
+def _interrupted_row(job: NoisePaths, paths: Arrays, block_folder: Path) -> Row:
     def stop(state: Any) -> None:
         if state.done >= 6:
             raise KeyboardInterrupt
 
     try:
-        run_paths(job, 12, blocks, blocks=Blocks(3), progress=stop)
+        run_paths(job, 12, block_folder, blocks=Blocks(3), progress=stop)
     except KeyboardInterrupt:
-        again = run_paths(job, 12, blocks, blocks=Blocks(3))
-        return _same_row(
+        again = run_paths(job, 12, block_folder, blocks=Blocks(3))
+        return _equal_bits_row(
             "resumed", "12 paths have the same bits if they are interrupted half-way and resumed", paths, again
         )
     raise AssertionError("the interrupt was lost")
 
 
-def _killed_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
+def _killed_row(job: NoisePaths, paths: Arrays, block_folder: Path) -> Row:
     """Row: a run is killed after two of its blocks, then resumed, and must give the same ensemble."""
-    child = get_context("spawn").Process(target=_run_slow_job, args=(job, blocks))
+    child = get_context("spawn").Process(target=_run_slow_job, args=(job, block_folder))
     child.start()
-    while child.is_alive() and len(list(blocks.glob("block*.npz"))) < 2:
+    while child.is_alive() and len(list(block_folder.glob("block*.npz"))) < 2:
         time.sleep(0.02)
     child.kill()
     child.join()
-    modification_times = {path: path.stat().st_mtime_ns for path in blocks.glob("block*.npz")}
-    again = run_paths(job, RECOMPUTED_PATHS, blocks, blocks=Blocks(20))
+    modification_times = {path: path.stat().st_mtime_ns for path in block_folder.glob("block*.npz")}
+    again = run_paths(job, RECOMPUTED_PATHS, block_folder, blocks=Blocks(20))
     if (
         not modification_times
         or len(modification_times) == RECOMPUTED_PATHS // 20
         or any(path.stat().st_mtime_ns != when for path, when in modification_times.items())
     ):
         raise AssertionError(f"not killed half-way, or computed again: {len(modification_times)} blocks were kept")
-    return _same_row(
+    return _equal_bits_row(
         "resumed",
         f"{RECOMPUTED_PATHS} paths, killed half-way and resumed: the kept blocks are not touched, the "
         "whole is compared with a run in one piece",
@@ -159,23 +161,23 @@ def _killed_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
     )
 
 
-def _run_slow_job(job: NoisePaths, blocks: Path) -> None:
-    run_paths(job, RECOMPUTED_PATHS, blocks, blocks=Blocks(20), progress=lambda state: time.sleep(0.1))
+def _run_slow_job(job: NoisePaths, block_folder: Path) -> None:
+    run_paths(job, RECOMPUTED_PATHS, block_folder, blocks=Blocks(20), progress=lambda state: time.sleep(0.1))
 
 
-def _in_own_process(function: Callable[..., Any], *args: Any) -> Any:
-    """Value of a function that is run in a process of its own, so that its memory can be measured alone."""
+def _in_separate_process(function: Callable[..., Any], *args: Any) -> Any:
+    """Value of a function that is run in a separate process, so that its memory can be measured alone."""
     with process_pool(1) as pool:
         return pool.submit(function, *args).result()
 
 
-def _large_ensemble(job: NoisePaths, many: int, blocks: Path) -> Saved:
+def _large_ensemble(job: NoisePaths, path_count: int, block_folder: Path) -> Saved:
     """A large ensemble with its computing time (s) and the peak memory (bytes) of this process and its workers."""
     import resource
 
     start = time.perf_counter()
     with process_pool(2) as pool:
-        paths = run_paths(job, many, blocks, pool)
+        paths = run_paths(job, path_count, block_folder, pool)
     seconds = time.perf_counter() - start
     parent, child = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     busy = parent.ru_utime + parent.ru_stime + child.ru_utime + child.ru_stime
@@ -217,7 +219,7 @@ def _scale_rows(large_ensemble: Saved) -> list[Row]:
             "bytes of results, by paths",
             large_ensemble["kept"],
             "byte",
-            STATE * (LARGE_ENSEMBLE_SECONDS + 1.0) + MARKS,
+            STATE_BYTES * (LARGE_ENSEMBLE_SECONDS + 1.0) + TIME_BYTES,
             "a count: a state of eight numbers every second, and when it drifts off or fails",
         ),
     )
@@ -227,7 +229,7 @@ def _scale_rows(large_ensemble: Saved) -> list[Row]:
             f"start of the processes to the last path, once, with {share}",
             large_ensemble["seconds"],
             "s",
-            SECONDS,
+            TARGET_SECONDS,
             "target on two free cores; what other programs take of them adds to it",
         ),
         (
@@ -235,7 +237,7 @@ def _scale_rows(large_ensemble: Saved) -> list[Row]:
             "processor time of all processes by two cores, once",
             large_ensemble["busy"] / 2,
             "s",
-            SECONDS,
+            TARGET_SECONDS,
             "what it takes on two free cores, whoever else uses them now",
         ),
         (
@@ -243,7 +245,7 @@ def _scale_rows(large_ensemble: Saved) -> list[Row]:
             "largest memory of all processes together, once",
             large_ensemble["bytes"],
             "byte",
-            MEMORY,
+            TARGET_MEMORY,
             "target; libraries included, of which a machine's own are a part",
         ),
     )
@@ -258,11 +260,11 @@ def _scale_rows(large_ensemble: Saved) -> list[Row]:
     return [steps, failed, *aims, bytes_kept]
 
 
-def _engines(
+def _engine_rows_and_times(
     scene: Scene, truth: np.ndarray, times: np.ndarray, ensemble: Arrays, path_count: int, pool: Executor | None
 ) -> tuple[list[Row], dict[str, float]]:
-    """Rows on how well the first paths agree between engines, and the time (s) per path and step for each way of
-    computing."""
+    """Rows on the agreement of the first paths between engines, and the wall time (s) per path and step of each
+    engine."""
     exudyn = noise_paths(scene, times, truth, engine="exudyn")
     single, two = (mujoco_threads(scene, times, truth, threads=threads) for threads in (1, 2))
     seconds_by_method: dict[str, Callable[[], Arrays]] = {
@@ -283,7 +285,11 @@ def _engines(
         )
         rows.append(
             Observed(
-                f"ensemble.engines.{_slug(method_name)}", SYSTEM, what, largest_difference(ensemble, paths, times), ""
+                f"ensemble.engines.{_row_name(method_name)}",
+                SYSTEM,
+                what,
+                largest_difference(ensemble, paths, times),
+                "",
             ).at_most(1e-9, "the same tableau on the same samples: rounding, grown by the instability", "native")
         )
     return rows, prices
@@ -292,7 +298,7 @@ def _engines(
 def _price_rows(prices: dict[str, float]) -> list[Row]:
     return [
         Observed(
-            f"ensemble.price.{_slug(method_name)}",
+            f"ensemble.price.{_row_name(method_name)}",
             SYSTEM,
             f"wall time per path and step, {method_name}, measured once",
             1e9 * price,
@@ -302,14 +308,15 @@ def _price_rows(prices: dict[str, float]) -> list[Row]:
     ]
 
 
-def _slug(label: str) -> str:
+def _row_name(label: str) -> str:
     return label.replace(", ", ".").replace(" ", "-")
 
 
-def _half_step_row(forces: Path) -> Row:
-    """Row: with half the step the noise samples are the same, so only the integrator's error changes."""
+def _half_step_row(force_folder: Path) -> Row:
+    """Row: change of the pitch when the step is halved. The noise samples stay the same, so only the integrator's error
+    changes."""
     pitch = [
-        run_paths(noise_paths(_scene(forces, 10.0, step=step), np.array([10.0])), 100)["states"][:, 0, 3]
+        run_paths(noise_paths(_noisy_scene(force_folder, 10.0, step=step), np.array([10.0])), 100)["states"][:, 0, 3]
         for step in (STEP, STEP / 2)
     ]
     change = float(np.abs(pitch[0] - pitch[1]).max() / pitch[1].std())
@@ -322,7 +329,7 @@ def _half_step_row(forces: Path) -> Row:
     ).at_most(1e-4, "the samples are the same, so only the integrator's error differs", "shared kernel")
 
 
-def _data(
+def _saved_data(
     truth: np.ndarray, times: np.ndarray, paths: Arrays, large_ensemble: Saved, prices: dict[str, float]
 ) -> Saved:
     """Saved numbers for the tables and the figure."""
@@ -347,11 +354,11 @@ def _data(
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Spreads, drift-off times and prices; none in the quick report."""
+    """Tables of standard deviations, drift-off times and computing times; none after a quick run."""
     if not case_data:
         return []
     paths = (
-        f"{LARGE_ENSEMBLE_PATHS:,} paths of {LARGE_ENSEMBLE_SECONDS:g} s, noise {DEVIATION:g} N at 1 kHz "
+        f"{LARGE_ENSEMBLE_PATHS:,} paths of {LARGE_ENSEMBLE_SECONDS:g} s, noise {NOISE_DEVIATION:g} N at 1 kHz "
         "on the study road"
     )
     spreads = tuple(
@@ -394,7 +401,7 @@ def tables(case_data: Saved) -> list[Table]:
 
 
 def draw(case_data: Saved) -> Drawn:
-    """Fan of the pitch error and histogram of the drift-off times."""
+    """Plot the percentiles of the pitch error over time, and a histogram of the drift-off times."""
     if not case_data:
         return []
     from models.drawing.drift import draw_fan

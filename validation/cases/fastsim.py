@@ -1,4 +1,4 @@
-"""FASTSIM: discretisation error, model error, invariants, derivatives, and the cost of a call."""
+"""FASTSIM: discretisation error, model error, invariants, derivatives, and computing time."""
 
 from pathlib import Path
 from typing import Any
@@ -23,10 +23,10 @@ from validation.contact.fuzzed_creepage import COMPUTED_OPTIONS, SUM_ROUNDING, r
 TITLE = "FASTSIM"
 SYSTEM: System = "contact"
 SEED = 41
-"""Of the fuzzing; the quick share and the full one draw different streams of it, the tests one of their own."""
-RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
-ELLIPSES = (0.1, *RATIOS, 10.0)
-"""a/b of the ellipses that slide under spin."""
+"""Seed of the random contacts; a quick and a full run draw different streams of this seed, the tests a third one."""
+AXIS_RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
+SPIN_AXIS_RATIOS = (0.1, *AXIS_RATIOS, 10.0)
+"""Axis ratios a/b of the ellipses that slide under spin alone."""
 CREEPAGE_KINDS = {
     "x": (1.0, 0.0, 0.0),
     "y": (0.0, 1.0, 0.0),
@@ -37,20 +37,22 @@ CREEPAGE_KINDS = {
     "x+spin": (0.7071, 0.0, 0.7071),
     "x-y+spin": (0.5774, -0.5774, 0.5774),
 }
-LEVELS = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
-SLIDING = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
-"""Levels from where all begins to slide."""
-LOAD, FRICTION, MEAN_AXIS = 80e3, 0.3, 5e-3
+CREEPAGE_LEVELS = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
+SLIDING_LEVELS = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
+"""Creepage levels around the level from which the whole contact area slides."""
+LOAD, FRICTION, MEAN_SEMI_AXIS = 80e3, 0.3, 5e-3
+"""Normal load (N), coefficient of friction, and sqrt(a b) (m) of the ellipses with the semi-axes a and b."""
 MATERIAL_PAIR = MaterialPair()
-UNITS = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
-"""Of fx, fy (N) and mz (N m)."""
+FORCE_SCALES = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_SEMI_AXIS])
+"""Scales of fx and fy (N) and of mz (N m)."""
 Contacts = dict[str, Any]
-"""Arrays by the names of the parameters of ``fastsim``."""
-CELLS = (11, 21, 41, 81)
+"""Type of a set of contacts: arrays by the names of the parameters of ``fastsim``."""
+CELL_COUNTS = (11, 21, 41, 81)
 CONVERGED_CELLS, FINE_CELLS = 161, 321
-"""Of the model beside the exact theory, and of what cells are measured by."""
+"""Cells per strip for the error of the model compared with the exact theory, and for the solution with which the
+discretisation error is measured."""
 EXACT_TO_ROUNDING = (0.0, "exact in floating point")
-ALLOWED = {
+INVARIANT_TOLERANCES = {
     "finite": EXACT_TO_ROUNDING,
     "reversal": EXACT_TO_ROUNDING,
     "zero": EXACT_TO_ROUNDING,
@@ -61,31 +63,32 @@ GRID_REASON = "the same model with 321 cells per strip; a fifth of the model's o
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows for the discretisation, the invariants and the derivatives; in full the model's error and the speed too.
+    """Rows for the discretisation, the invariants and the derivatives; a full run also has the model's error and the
+    computing time.
 
-    On drawn contacts the model's error is found in every run, as their exact forces are kept.
+    Every run computes the model's error on random contacts, whose exact forces are stored.
     """
-    rows, data = _discretisation()
-    rows += _invariants(2 if quick else 64, 10_000 if quick else 16_000, 0 if quick else 100)
-    rows += _limits() + _spun() + _derivatives() + _errors_on_random_contacts()
+    rows, data = _discretisation_rows()
+    rows += _invariant_rows(2 if quick else 64, 10_000 if quick else 16_000, 0 if quick else 100)
+    rows += _limit_rows() + _spin_rows() + _derivative_rows() + _random_contact_rows()
     if quick:
         return rows, data
-    answers, data["model"] = _model()
-    timed, data["speed"] = speed(MATERIAL_PAIR, LOAD, FRICTION, MEAN_AXIS)
+    answers, data["model"] = _model_error_rows()
+    timed, data["speed"] = speed(MATERIAL_PAIR, LOAD, FRICTION, MEAN_SEMI_AXIS)
     return rows + answers + timed, data
 
 
-def creepages(kind_names: tuple[str, ...], creepage_levels: tuple[float, ...]) -> Contacts:
+def creepage_contacts(kind_names: tuple[str, ...], creepage_levels: tuple[float, ...]) -> Contacts:
     """Contacts, as columns, for every axis ratio, kind and level of creepage. Creepages have the unit mu N / (G c^2 C),
-    where C is C11, C22 or C23 c."""
+    where c is sqrt(a b) and C is C11, C22 or C23 c."""
     ratio, kind, level = (
-        grid.ravel() for grid in np.meshgrid(RATIOS, np.arange(len(kind_names)), creepage_levels, indexing="ij")
+        grid.ravel() for grid in np.meshgrid(AXIS_RATIOS, np.arange(len(kind_names)), creepage_levels, indexing="ij")
     )
     creepage_parts = np.array([CREEPAGE_KINDS[name] for name in kind_names])[kind] * level[:, None]
-    known, unit = coefficients(ratio, MATERIAL_PAIR.nu), FRICTION * LOAD / (MATERIAL_PAIR.G * MEAN_AXIS**2)
-    scale = unit / np.stack([known.c11, known.c22, known.c23 * MEAN_AXIS], axis=1)
+    known, unit = coefficients(ratio, MATERIAL_PAIR.nu), FRICTION * LOAD / (MATERIAL_PAIR.G * MEAN_SEMI_AXIS**2)
+    scale = unit / np.stack([known.c11, known.c22, known.c23 * MEAN_SEMI_AXIS], axis=1)
     xi_x, xi_y, spin = (creepage_parts * scale).T
-    a, b = MEAN_AXIS * np.sqrt(ratio), MEAN_AXIS / np.sqrt(ratio)
+    a, b = MEAN_SEMI_AXIS * np.sqrt(ratio), MEAN_SEMI_AXIS / np.sqrt(ratio)
     return {
         "a": a,
         "b": b,
@@ -97,21 +100,23 @@ def creepages(kind_names: tuple[str, ...], creepage_levels: tuple[float, ...]) -
     }
 
 
-def _vector(columns: Contacts, **options: Any) -> Array:
-    """Forces (n, 2) divided by mu N."""
-    answers = fastsim(RollingEllipse(**columns), MATERIAL_PAIR, **options)
+def _relative_forces(contacts: Contacts, **options: Any) -> Array:
+    """Forces fx and fy (n, 2) divided by mu N."""
+    answers = fastsim(RollingEllipse(**contacts), MATERIAL_PAIR, **options)
     return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION * LOAD)
 
 
-def _discretisation() -> tuple[list[Row], dict[str, Any]]:
-    """Rows and data on the discretisation: mean and largest error on every grid, and order of convergence."""
-    columns = creepages(tuple(CREEPAGE_KINDS), LEVELS)
+def _discretisation_rows() -> tuple[list[Row], dict[str, Any]]:
+    """Rows and data on the discretisation: mean and largest error on every grid, and observed order of convergence."""
+    columns = creepage_contacts(tuple(CREEPAGE_KINDS), CREEPAGE_LEVELS)
     rows: list[Row] = []
     data: dict[str, Any] = {}
     for bound in POWERS:
-        truth = _vector(columns, cells=FINE_CELLS, bound=bound)
+        truth = _relative_forces(columns, cells=FINE_CELLS, bound=bound)
         for march in ("second-order", "plain"):
-            errors = [np.hypot(*(_vector(columns, cells=n, bound=bound, march=march) - truth).T) for n in CELLS]
+            errors = [
+                np.hypot(*(_relative_forces(columns, cells=n, bound=bound, march=march) - truth).T) for n in CELL_COUNTS
+            ]
             data[f"{bound}, {march}"] = [[float(e.mean()), float(e.max())] for e in errors]
             if march == "plain":
                 continue
@@ -125,7 +130,7 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
                 ).at_most(0.004, GRID_REASON, "none")
             )
             mean = np.array([np.sqrt(np.mean(e**2)) for e in errors])
-            order = float(np.log(mean[0] / mean[-1]) / np.log(CELLS[-1] / CELLS[0]))
+            order = float(np.log(mean[0] / mean[-1]) / np.log(CELL_COUNTS[-1] / CELL_COUNTS[0]))
             if bound == "parabolic":
                 rows.append(
                     Observed(
@@ -144,13 +149,13 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
     return rows, {"cells": data}
 
 
-def _invariants(batch_count: int, contact_count: int, first: int) -> list[Row]:
+def _invariant_rows(batch_count: int, contact_count: int, first_stream: int) -> list[Row]:
     """Rows on invariants of the forces, over random contacts."""
     answers: dict[str, float] = {}
     for i in range(batch_count):
         options = COMPUTED_OPTIONS[i % len(COMPUTED_OPTIONS)]
         for name, value in worst_violation(
-            random_contacts(SEED, first + i, contact_count), options, MATERIAL_PAIR
+            random_contacts(SEED, first_stream + i, contact_count), options, MATERIAL_PAIR
         ).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
             answers[name] = max(answers.get(name, 0.0), value)
@@ -176,21 +181,22 @@ def _invariants(batch_count: int, contact_count: int, first: int) -> list[Row]:
             f"{what[name]}, worst of {total:,} random contacts",
             value,
             "mu N",
-        ).at_most(*ALLOWED.get(name, (SUM_ROUNDING, "rounding of some hundred sums")), "none")
+        ).at_most(*INVARIANT_TOLERANCES.get(name, (SUM_ROUNDING, "rounding of some hundred sums")), "none")
         for name, value in answers.items()
     ]
 
 
-def _limits() -> list[Row]:
-    """Rows: agreement with the linear theory at small creepages, and direction of the force in full sliding."""
-    columns = creepages(("x", "y", "spin"), (1e-6,))
+def _limit_rows() -> list[Row]:
+    """Rows: agreement with the linear theory at small creepages, and size and direction of the force in full
+    sliding."""
+    columns = creepage_contacts(("x", "y", "spin"), (1e-6,))
     answers = fastsim(RollingEllipse(**columns), MATERIAL_PAIR)
     linear = np.stack(
         linear_forces(columns["a"], columns["b"], columns["xi_x"], columns["xi_y"], columns["spin"], MATERIAL_PAIR)
     )
     size = np.hypot(linear[0], linear[1])
     slope = np.hypot(answers.fx - linear[0], answers.fy - linear[1]) / size
-    sliding = creepages(("x", "y"), SLIDING)
+    sliding = creepage_contacts(("x", "y"), SLIDING_LEVELS)
     turn = np.random.default_rng((SEED, 999)).uniform(-np.pi, np.pi, len(sliding["a"]))
     most = np.hypot(sliding["xi_x"], sliding["xi_y"])
     sliding["xi_x"], sliding["xi_y"] = most * np.cos(turn), most * np.sin(turn)
@@ -220,11 +226,11 @@ def _limits() -> list[Row]:
     ]
 
 
-def _spun() -> list[Row]:
+def _spin_rows() -> list[Row]:
     """Rows: moment in full sliding under spin alone, on 21 cells, compared with the integral of mu times Hertz's
     pressure."""
-    ratio = np.array(ELLIPSES)
-    a, b = MEAN_AXIS * np.sqrt(ratio), MEAN_AXIS / np.sqrt(ratio)
+    ratio = np.array(SPIN_AXIS_RATIOS)
+    a, b = MEAN_SEMI_AXIS * np.sqrt(ratio), MEAN_SEMI_AXIS / np.sqrt(ratio)
     longer, shorter = np.maximum(a, b), np.minimum(a, b)
     most = FRICTION * LOAD * 0.375 * longer * ellipe(1.0 - (shorter / longer) ** 2)
     rows = []
@@ -248,14 +254,14 @@ def _spun() -> list[Row]:
     return rows
 
 
-def _derivatives() -> list[Row]:
-    """Rows: analytic derivatives of the forces compared with central differences."""
-    columns = creepages(tuple(CREEPAGE_KINDS), LEVELS)
-    scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_AXIS, "load": LOAD}
+def _derivative_rows() -> list[Row]:
+    """Row: difference of the forces' analytic derivatives from central differences."""
+    columns = creepage_contacts(tuple(CREEPAGE_KINDS), CREEPAGE_LEVELS)
+    scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_SEMI_AXIS, "load": LOAD}
     known, off = derivatives(RollingEllipse(**columns), MATERIAL_PAIR), []
     for k, (name, unit) in enumerate(scale.items()):
-        ends = [_with_changed_column(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]
-        off.append(np.abs((ends[0] - ends[1]) / 2e-6 - known.slopes[..., k] * unit) / UNITS)
+        ends = [_forces_with_changed_input(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]
+        off.append(np.abs((ends[0] - ends[1]) / 2e-6 - known.slopes[..., k] * unit) / FORCE_SCALES)
     share = np.quantile(np.max(off, axis=(0, 2)), 0.98)
     return [
         Observed(
@@ -273,18 +279,18 @@ def _derivatives() -> list[Row]:
     ]
 
 
-def _with_changed_column(columns: Contacts, name: str, step: float) -> Array:
-    """Forces and moments (n, 3) with one input changed by ``step``. If the load changes, the ellipse changes with
-    it."""
-    moved = {**columns, name: columns[name] + step}
-    if name == "load":
-        grown = np.cbrt(moved["load"] / columns["load"])
-        moved |= {"a": columns["a"] * grown, "b": columns["b"] * grown}
+def _forces_with_changed_input(contacts: Contacts, input_name: str, step: float) -> Array:
+    """Forces and moments (n, 3) with one input changed by ``step``. If the load changes, the ellipse changes with the
+    load."""
+    moved = {**contacts, input_name: contacts[input_name] + step}
+    if input_name == "load":
+        grown = np.cbrt(moved["load"] / contacts["load"])
+        moved |= {"a": contacts["a"] * grown, "b": contacts["b"] * grown}
     creep = fastsim(RollingEllipse(**moved), MATERIAL_PAIR)
     return np.stack([creep.fx, creep.fy, creep.mz], axis=1)
 
 
-def _errors_on_random_contacts() -> list[Row]:
+def _random_contact_rows() -> list[Row]:
     """Rows: error of the model on random contacts that were not used to calibrate it."""
     error = theory_errors("blended intermediate", read_drawn(JUDGED_PART)).error
     why = "exact theory with its cells' first order taken out, kept; the target of the regular set"
@@ -300,9 +306,9 @@ def _errors_on_random_contacts() -> list[Row]:
     ]
 
 
-def _model() -> tuple[list[Row], list[list[Any]]]:
-    """Error of the model relative to the exact theory on a converged grid, for every traction bound and kind of
-    flexibility: rows and table."""
+def _model_error_rows() -> tuple[list[Row], list[list[Any]]]:
+    """Rows and table: error of the model relative to the exact theory on a converged grid, for every traction bound and
+    kind of flexibility."""
     table, known = list[list[Any]](), read_contacts()
     for bound in POWERS:
         for kind in KINDS_OF_FLEXIBILITY:
@@ -318,7 +324,7 @@ def _model() -> tuple[list[Row], list[list[Any]]]:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Errors by cells, and in full those of the model and the price."""
+    """Tables of the errors by number of cells; a full run also has those of the model and the computing time."""
     rows = tuple(
         (name, *(f"{100 * mean:.2g} / {100 * most:.2g}" for mean, most in values))
         for name, values in case_data["cells"].items()
@@ -328,7 +334,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
             "FASTSIM: error of the cells",
             "Mean / largest error of the force in % of mu N against "
             f"{FINE_CELLS} cells per strip, over all ellipses, kinds and levels of creepage.",
-            ("bound, march", *(f"{n} cells" for n in CELLS)),
+            ("bound, march", *(f"{n} cells" for n in CELL_COUNTS)),
             rows,
         )
     ]
@@ -362,14 +368,14 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.4))
     for i, (name, values) in enumerate(case_data["cells"].items()):
         axis.loglog(
-            CELLS,
+            CELL_COUNTS,
             [100 * most for _, most in values],
             "o-" if "second" in name else "s--",
             color=f"C{i // 2}",
             label=name,
         )
     axis.axhline(0.4, color="black", linestyle=":", label="0.4 % asked for at 21")
-    axis.set_xticks(CELLS, [str(n) for n in CELLS])
+    axis.set_xticks(CELL_COUNTS, [str(n) for n in CELL_COUNTS])
     axis.minorticks_off()
     axis.set(xlabel="cells per strip [-]", ylabel="largest error of the force [% of μN]")
     axis.set_yticks([0.01, 0.1, 0.4, 1, 10], ["0.01", "0.1", "0.4", "1", "10"])

@@ -1,7 +1,7 @@
-"""The growth of a tilt error and of noise against the laws: forces, frames, vehicles, engines, steps.
+"""Growth of a tilt error and of noise compared with closed laws: forces in both frames, vehicles, engines, steps.
 
-The closed law takes the growth rate from the fast pitch rate of the true run; Monte Carlo paths are those of
-``models.ensemble``, counter-based noise on the samples of a virtual measurement of the study road.
+The closed law takes the growth rate from the fast pitch rate of the true run. Monte Carlo paths have counter-based
+noise (``models.ensemble``) on the samples of a virtual measurement of the study road.
 """
 
 from dataclasses import replace
@@ -25,8 +25,7 @@ from models.ensemble.runner import run_paths
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, changed_scene
-from models.systems.pitch_plane.tangent import TangentPath as ErrorPath
-from models.systems.pitch_plane.tangent import covariance, measured_growth, path_of, slow_swing_frequency
+from models.systems.pitch_plane.tangent import TangentPath, covariance, measured_growth, path_of, slow_swing_frequency
 from models.systems.pitch_plane.virtual_measurement import perturbed_parameters, write_measurement
 from models.vehicles.parameters.itwm_drift import PARAMETERS
 from models.vehicles.pitch_plane import STATES
@@ -36,51 +35,55 @@ from validation.common.scenes import force_scene, on_paper_road, road_scene, vir
 TITLE = "Why a force-excited vehicle runs away: growth of errors and of noise"
 SYSTEM: System = "drift"
 SEED = 11
-PATHS = 3000
-"""Paths of the Monte Carlo: a standard deviation is known to 1/sqrt(2 N) = 1.3 %."""
-DEVIATION, SAMPLING_RATE = 30.7, 1000.0
-"""Noise of each sample (N), 0.2 % of the largest force, at this sampling rate (Hz)."""
+PATH_COUNT = 3000
+"""Number N of Monte Carlo paths; the relative error of a standard deviation is 1/sqrt(2 N) = 1.3 %."""
+NOISE_DEVIATION, SAMPLING_RATE = 30.7, 1000.0
+"""Standard deviation (N) of the noise on each force sample, 0.2 % of the largest force; and the sampling rate (Hz)."""
 MONTE_CARLO_SECONDS = 10
-"""Length (s) of the Monte Carlo."""
+"""Length (s) of the Monte Carlo paths."""
 WINDOW_SECONDS, WINDOW_COUNT = 20, 4
 """Length (s) and number of the windows in which the growth rate is measured."""
-STUDY = "20 m/s, Gd 2.4e-3"
+STUDY_ROAD = "20 m/s, Gd 2.4e-3"
 ROADS = {
     f"{speed} m/s, Gd {gd}": {"source": "study", "speed": float(speed), "gd": float(gd)}
     for speed, gd in ((20, "2.4e-3"), (20, "6e-4"), (20, "1.5e-4"), (10, "2.4e-3"))
 }
 """The study road at other speeds and roughnesses."""
-LAW = "the averaged law holds to its next order in growth rate over frequency; 3 % is twice what was seen"
+LAW_REASON = "the averaged law holds to its next order in growth rate over frequency; 3 % is twice what was seen"
 
 
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Growth rate, spread of noise, and what neither step nor engine may change; quick: one road, no Monte Carlo."""
+    """Rows on the growth rate, the standard deviation by noise, and the differences between steps and between engines;
+    a quick run has one road and no Monte Carlo."""
     true = virtual_drive(folder, MONTE_CARLO_SECONDS)
-    spread = _spread(true, folder, quick)
+    spread = _deviations_by_method(true, folder, quick)
     if quick:
-        roads = {STUDY: _growth(folder, ROADS[STUDY], 2)}
-        return _spread_rows(spread) + _growth_rows(roads), {"spread": spread, "roads": roads}
-    roads = {name: _growth(folder, road) for name, road in ROADS.items()}
-    roads["asymmetric twin"] = _growth(folder, ROADS[STUDY], parameters="asymmetric_twin")
-    rows = [*_spread_rows(spread), *_growth_rows(roads), _twin_row(folder), *_engine_rows(folder)]
+        roads = {STUDY_ROAD: _growth_rates(folder, ROADS[STUDY_ROAD], 2)}
+        return _deviation_rows(spread) + _growth_rows(roads), {"spread": spread, "roads": roads}
+    roads = {name: _growth_rates(folder, road) for name, road in ROADS.items()}
+    roads["asymmetric twin"] = _growth_rates(folder, ROADS[STUDY_ROAD], parameter_set_name="asymmetric_twin")
+    rows = [*_deviation_rows(spread), *_growth_rows(roads), _twin_row(folder), *_engine_rows(folder)]
     return [*rows, _step_row(folder), _linear_row(folder)], {"spread": spread, "roads": roads}
 
 
-def _noisy(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> Scene:
-    noise = {"force_noise": {"deviation": DEVIATION, "seed": SEED, "path": path}}
+def _noisy_scene(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> Scene:
+    noise = {"force_noise": {"deviation": NOISE_DEVIATION, "seed": SEED, "path": path}}
     return force_scene(folder, step=step, duration=duration, effects=noise)
 
 
-def _spread(true_run: Result, folder: Path, quick: bool) -> Saved:
-    """Standard deviations of pitch and heave at 1 to 10 s by three routes: Monte Carlo (full run only), covariance
+def _deviations_by_method(true_run: Result, folder: Path, quick: bool) -> Saved:
+    """Standard deviations of pitch and heave at 1 to 10 s by three methods: Monte Carlo (full run only), covariance
     along the path, and closed laws."""
-    times, assembly = np.arange(1, MONTE_CARLO_SECONDS + 1), assembly_of_scene(_noisy(folder, MONTE_CARLO_SECONDS))
+    times, assembly = (
+        np.arange(1, MONTE_CARLO_SECONDS + 1),
+        assembly_of_scene(_noisy_scene(folder, MONTE_CARLO_SECONDS)),
+    )
     at = np.rint(times * SAMPLING_RATE).astype(int)
     p, quiet = assembly.parameters, assembly_of_scene(force_scene(folder, duration=MONTE_CARLO_SECONDS))
-    q = rigid_pitch(p).noise_intensity(DEVIATION, 1 / SAMPLING_RATE)
-    carried = covariance(quiet, DEVIATION)
-    alone = pitch_rate_of_forces(_samples(quiet).values, 1 / SAMPLING_RATE, p)
+    q = rigid_pitch(p).noise_intensity(NOISE_DEVIATION, 1 / SAMPLING_RATE)
+    carried = covariance(quiet, NOISE_DEVIATION)
+    alone = pitch_rate_of_forces(_force_samples(quiet).values, 1 / SAMPLING_RATE, p)
     rates = {"run": true_run["pitch_rate"], "forces": alone}
     spreads = {
         f"law, {name}": np.sqrt(pitch_variance(times, sinh_law_rate(rate, 1 / SAMPLING_RATE, p)[at], q))
@@ -90,38 +93,43 @@ def _spread(true_run: Result, folder: Path, quick: bool) -> Saved:
         "time": times,
         "covariance": carried.deviation("pitch")[at],
         "t^1.5": np.sqrt(pitch_variance(times, 0.0, q)),
-        "heave law": np.sqrt(heave_variance(times, p, DEVIATION, 1 / SAMPLING_RATE)),
+        "heave law": np.sqrt(heave_variance(times, p, NOISE_DEVIATION, 1 / SAMPLING_RATE)),
         "heave covariance": carried.deviation("z3")[at],
     }
     if not quick:
-        job = noise_paths(_noisy(folder, MONTE_CARLO_SECONDS), times.astype(float), true_run["pitch"])
-        off = run_paths(job, PATHS)["states"] - path_of(quiet).carry_errors(np.zeros((1, 8)))[0][at]
+        job = noise_paths(_noisy_scene(folder, MONTE_CARLO_SECONDS), times.astype(float), true_run["pitch"])
+        off = run_paths(job, PATH_COUNT)["states"] - path_of(quiet).carry_errors(np.zeros((1, 8)))[0][at]
         spreads["pitch"], spreads["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
     return {name: values.tolist() for name, values in spreads.items()}
 
 
-def _samples(assembly: Assembly) -> Sampled:
+def _force_samples(assembly: Assembly) -> Sampled:
     assert isinstance(assembly.input, Sampled)
     return assembly.input
 
 
-def _path(assembly: Assembly, start_state: np.ndarray, first: int, samples: int) -> ErrorPath:
-    """Error path over a section of a run that starts at sample ``first`` in the state ``start_state`` (8,)."""
-    forces = replace(_samples(assembly), values=_samples(assembly).values[first : first + samples + 1])
-    return ErrorPath(replace(assembly, initial=start_state, input=forces), forces, 1, samples)
+def _error_path(assembly: Assembly, start_state: np.ndarray, first_sample: int, sample_count: int) -> TangentPath:
+    """Error path over a section of a run that starts at sample number ``first_sample`` in the state ``start_state``
+    (8,)."""
+    forces = replace(
+        _force_samples(assembly), values=_force_samples(assembly).values[first_sample : first_sample + sample_count + 1]
+    )
+    return TangentPath(replace(assembly, initial=start_state, input=forces), forces, 1, sample_count)
 
 
-def _growth(folder: Path, road: Saved, windows: int = WINDOW_COUNT, parameters: str = "itwm_drift") -> Saved:
-    """Growth rates of the error on one road, by four routes: from the run, from its forces, with other cut-offs, and
-    measured in time windows with forces in both frames."""
-    true = virtual_drive(folder, WINDOW_SECONDS * windows, parameters=parameters, road=road)
-    assembly = assembly_of_scene(force_scene(folder, parameters, 1e-3, WINDOW_SECONDS * windows))
+def _growth_rates(
+    folder: Path, road: Saved, window_count: int = WINDOW_COUNT, parameter_set_name: str = "itwm_drift"
+) -> Saved:
+    """Growth rates (1/s) of the error on one road by four methods: from the run's pitch rate, from its forces, with
+    other cut-off frequencies, and measured in time windows with forces in both frames."""
+    true = virtual_drive(folder, WINDOW_SECONDS * window_count, parameters=parameter_set_name, road=road)
+    assembly = assembly_of_scene(force_scene(folder, parameter_set_name, 1e-3, WINDOW_SECONDS * window_count))
     p, rate = assembly.parameters, true["pitch_rate"]
-    alone = pitch_rate_of_forces(_samples(assembly).values, 1 / SAMPLING_RATE, p)
-    starts = np.rint(np.arange(windows) * WINDOW_SECONDS * SAMPLING_RATE).astype(int)
+    alone = pitch_rate_of_forces(_force_samples(assembly).values, 1 / SAMPLING_RATE, p)
+    starts = np.rint(np.arange(window_count) * WINDOW_SECONDS * SAMPLING_RATE).astype(int)
     paths = {
         mode: [
-            _path(replace(assembly, mode=mode), true.states[i], i, round(WINDOW_SECONDS * SAMPLING_RATE))
+            _error_path(replace(assembly, mode=mode), true.states[i], i, round(WINDOW_SECONDS * SAMPLING_RATE))
             for i in starts
         ]
         for mode in ("force", "force-body")
@@ -142,10 +150,10 @@ def _growth(folder: Path, road: Saved, windows: int = WINDOW_COUNT, parameters: 
     }
 
 
-def _spread_rows(spread_record: Saved) -> list[Row]:
-    """Rows: spread of the pitch by noise at every second, compared with its closed laws."""
+def _deviation_rows(spread_record: Saved) -> list[Row]:
+    """Rows: standard deviations of pitch and heave under noise, compared with their closed laws."""
     seen = "pitch" if "pitch" in spread_record else "covariance"
-    by = f"Monte Carlo of {PATHS} paths" if seen == "pitch" else "covariance along the path"
+    by = f"Monte Carlo of {PATH_COUNT} paths" if seen == "pitch" else "covariance along the path"
     why = "5 % is asked; " + ("1.3 % is chance" if seen == "pitch" else "no chance in it")
     rows = [
         Observed(
@@ -210,7 +218,7 @@ def _growth_rows(roads: Saved) -> list[Row]:
                 f"ratio of the growth rate along the true path to the rms of the fast pitch rate, {name}",
                 road["measured"] / road["run"],
                 "",
-            ).within(1.0, 0.03, LAW, "closed form"),
+            ).within(1.0, 0.03, LAW_REASON, "closed form"),
             Observed(
                 f"growth.forces.{key}",
                 SYSTEM,
@@ -218,7 +226,7 @@ def _growth_rows(roads: Saved) -> list[Row]:
                 road["forces"] / road["run"],
                 "",
             ).within(1.0, 0.03, "struts that give way are left out: 1 %", "closed form"),
-            _body_row(f"growth.body.{key}", f"growth rate with body-fixed forces, {name}", road),
+            _body_force_row(f"growth.body.{key}", f"growth rate with body-fixed forces, {name}", road),
             Observed(
                 f"growth.swing.{key}",
                 SYSTEM,
@@ -242,29 +250,30 @@ def _growth_rows(roads: Saved) -> list[Row]:
     ]
 
 
-def _body_row(key: str, title: str, road: Saved) -> Row:
-    """Row: with body-fixed forces the error does not grow, if the vehicle does not couple heave to pitch. The growth of
-    a vehicle that does is reported without a verdict.
+def _body_force_row(row_id: str, title: str, road: Saved) -> Row:
+    """Row: with body-fixed forces the error does not grow if the vehicle does not couple heave to pitch. The growth of
+    a vehicle with this coupling is reported without a verdict.
 
-    Its wheels weigh c g cos(pitch) about the common centre of mass, against forces that do not turn away: on a hill
-    of pitch beta a stiffness of 2 c g beta is left, of either sign.
+    With coupling c, the wheels' weight has a moment c g cos(pitch) about the common centre of mass, which body-fixed
+    forces do not follow: on a hill of pitch beta a stiffness of 2 c g beta remains, of either sign.
     """
     if road["coupling"] != 0.0:
         why = "its wheels' weight leaves a moment that changes with the pitch of the hills: a true, small growth"
-        return Observed(key, SYSTEM, title, road["body"], "1/s").beside("small", why, "none")
-    return Observed(key, SYSTEM, title, road["body"], "1/s").within(
+        return Observed(row_id, SYSTEM, title, road["body"], "1/s").beside("small", why, "none")
+    return Observed(row_id, SYSTEM, title, road["body"], "1/s").within(
         0.0, road["body error"], "zero within its error; the wheels' inertia makes a slow swing of it", "closed form"
     )
 
 
 def _twin_row(folder: Path) -> Row:
-    """Row: the law of growth for a vehicle with unequal ends, whose lever arms count from the common centre of mass."""
+    """Row: growth law of a vehicle with unequal front and rear, whose lever arms count from the common centre of
+    mass."""
     true = virtual_drive(folder, 5.0, parameters="asymmetric_twin")
     assembly = assembly_of_scene(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
     p, at = assembly.parameters, round(5.0 * SAMPLING_RATE)
-    q = rigid_pitch(p).noise_intensity(DEVIATION, 1 / SAMPLING_RATE)
+    q = rigid_pitch(p).noise_intensity(NOISE_DEVIATION, 1 / SAMPLING_RATE)
     expected = np.sqrt(float(pitch_variance(5.0, sinh_law_rate(true["pitch_rate"], 1 / SAMPLING_RATE, p)[at], q)))
-    deviation = covariance(assembly, DEVIATION).deviation("pitch")[at]
+    deviation = covariance(assembly, NOISE_DEVIATION).deviation("pitch")[at]
     what, why = (
         "asymmetric twin: ratio of the covariance along the path at 5 s to the closed law",
         "as for the published vehicle",
@@ -273,11 +282,12 @@ def _twin_row(folder: Path) -> Row:
 
 
 def _engine_rows(folder: Path) -> list[Row]:
-    """Rows: largest difference between the engines' paths under one noise file, until the pitch error reaches 0.05
+    """Rows: largest difference between the engines' states under the same noise, until the pitch error reaches 0.05
     rad."""
     true = virtual_drive(folder, MONTE_CARLO_SECONDS)
     runs = {
-        engine: simulate(_noisy(folder, MONTE_CARLO_SECONDS), engine) for engine in ("reference", "exudyn", "mujoco")
+        engine: simulate(_noisy_scene(folder, MONTE_CARLO_SECONDS), engine)
+        for engine in ("reference", "exudyn", "mujoco")
     }
     base = runs["reference"]
     off = np.abs(base["pitch"] - true["pitch"]) > 0.05
@@ -299,10 +309,14 @@ def _engine_rows(folder: Path) -> list[Row]:
 
 
 def _step_row(folder: Path) -> Row:
-    """Row: with half the step and the same noise, the change of the pitch divided by its spread."""
+    """Row: change of the pitch by half the step under the same noise, divided by the standard deviation of the
+    pitch."""
     runs = {
         step: np.array(
-            [simulate(_noisy(folder, MONTE_CARLO_SECONDS, step, path), "reference").states[-1] for path in range(20)]
+            [
+                simulate(_noisy_scene(folder, MONTE_CARLO_SECONDS, step, path), "reference").states[-1]
+                for path in range(20)
+            ]
         )
         for step in (5e-4, 2.5e-4)
     }
@@ -329,13 +343,13 @@ def _linear_row(folder: Path) -> Row:
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Spread over time, and growth rates by road."""
+    """Tables of the standard deviations over time, and of the growth rates by road."""
     spread = case_data["spread"]
     known = ("pitch", "covariance", "law, run", "law, forces", "t^1.5", "heave", "heave law")
     names = [name for name in known if name in spread]
     rows = tuple((str(t), *(f"{spread[name][i]:.4g}" for name in names)) for i, t in enumerate(spread["time"]))
     note = (
-        f"White noise of {DEVIATION} N at {SAMPLING_RATE:g} Hz on the study road at 20 m/s. Law, run: with the "
+        f"White noise of {NOISE_DEVIATION} N at {SAMPLING_RATE:g} Hz on the study road at 20 m/s. Law, run: with the "
         "growth rate "
         "of the true run; law, forces: from the wheel forces alone."
     )
@@ -357,13 +371,13 @@ def tables(case_data: Saved) -> list[Table]:
 
 
 def draw(case_data: Saved) -> Drawn:
-    """Spread of the pitch over time with its laws, on logarithmic axes."""
+    """Plot the pitch's standard deviation over time with its laws, on logarithmic axes."""
     from models.drawing.figures import add_heading, subplots
 
     spread = case_data["spread"]
     figure, axis = subplots(figsize=(7.0, 3.6))
     marks = {
-        "pitch": ("ok", f"Monte Carlo, {PATHS} paths"),
+        "pitch": ("ok", f"Monte Carlo, {PATH_COUNT} paths"),
         "covariance": ("x", "covariance along the true path"),
         "law, run": ("-", "closed law, rate from the run"),
         "t^1.5": ("--", "noise alone, without growth: t^1.5"),

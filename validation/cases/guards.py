@@ -1,4 +1,5 @@
-"""Guards: whatever cannot be right is refused before the run or raised after it, in every implementation."""
+"""Guards against wrong results: what cannot be right is refused before the run or raised after it, in every
+implementation."""
 
 from collections.abc import Callable
 from functools import cache, partial
@@ -17,12 +18,12 @@ from validation.hard_cases import prescribed_pitch, sampled_input, setups
 
 TITLE = "Guards against silent wrong answers"
 SYSTEM: System = "pitch-plane"
-STEPS = (2e-3, 4e-3, 5e-3, 8e-3, 1e-2)
+UNSTABLE_STEPS = (2e-3, 4e-3, 5e-3, 8e-3, 1e-2)
 DURATIONS = (0.04, 0.2, 2.0)
-QUICK_STEPS, QUICK_DURATIONS = STEPS[::2], DURATIONS[:2]
-"""Steps and durations (s) of the runs at unstable steps, in full and in quick."""
-WRONG_SHARE = 1.0
-"""A complete run is silent if its error exceeds the motion itself: 100 % wrong and no word about it."""
+QUICK_STEPS, QUICK_DURATIONS = UNSTABLE_STEPS[::2], DURATIONS[:2]
+"""Steps and durations (s) of the runs at unstable steps, in a quick run."""
+SILENT_ERROR = 1.0
+"""Error, divided by the motion, above which a complete run counts as silently wrong: 100 % wrong without a warning."""
 Runner = Callable[..., Any]
 
 
@@ -38,7 +39,7 @@ def ending(attempt_run: Callable[[], Any]) -> str:
 
 
 def integrators(engine: str, adaptive: bool | None = None) -> list[str]:
-    """Integrators that an engine really offers, fixed-step or adaptive."""
+    """Integrators that an engine offers: fixed-step, adaptive, or both if ``adaptive`` is None."""
     return [
         name
         for name, facts in CATALOGUE[engine].items()
@@ -46,7 +47,7 @@ def integrators(engine: str, adaptive: bool | None = None) -> list[str]:
     ]
 
 
-def road() -> Assembly:
+def road_assembly() -> Assembly:
     """Assembly of the vehicle on the study road."""
     return setups.vehicle(effects={"road": {"source": "study", "speed": 20.0}})
 
@@ -54,34 +55,34 @@ def road() -> Assembly:
 @cache
 def _tight_solution(duration: float) -> np.ndarray:
     """States at every millisecond by an integrator with tight tolerances."""
-    return setups.tight_solution(road(), 1e-3, duration).states
+    return setups.tight_solution(road_assembly(), 1e-3, duration).states
 
 
-def unstable(engine: str, runner: Runner, quick: bool = False) -> dict[str, int]:
+def unstable_run_counts(engine: str, runner: Runner, quick: bool = False) -> dict[str, int]:
     """Numbers of runs that end right, refused, raised or silently wrong, for every fixed-step integrator at steps of 2
-    to 10 ms and several durations (0.04 and 0.2 s; in full also 2 s)."""
+    to 10 ms and durations of 0.04 and 0.2 s, in a full run also of 2 s."""
     counts = {"right": 0, "refused": 0, "raised": 0, "SILENT": 0}
     for name in integrators(engine, adaptive=False):
-        for step in QUICK_STEPS if quick else STEPS:
+        for step in QUICK_STEPS if quick else UNSTABLE_STEPS:
             for duration in QUICK_DURATIONS if quick else DURATIONS:
-                counts[_word(engine, name, step, duration, runner)] += 1
+                counts[_ending_of_unstable_run(engine, name, step, duration, runner)] += 1
     return counts
 
 
-def _word(engine: str, name: str, step: float, duration: float, runner: Runner) -> str:
+def _ending_of_unstable_run(engine: str, integrator: str, step: float, duration: float, runner: Runner) -> str:
     try:
-        states = runner(engine, road(), step, duration, name).states
+        states = runner(engine, road_assembly(), step, duration, integrator).states
     except InputError:
         return "refused"
     except RunFailed:
         return "raised"
     truth = _tight_solution(duration)[:: round(step / 1e-3)]
     share = np.abs(states - truth).max() / np.abs(truth - truth[0]).max()
-    return "right" if share <= WRONG_SHARE else "SILENT"
+    return "right" if share <= SILENT_ERROR else "SILENT"
 
 
-def not_a_number(engine: str) -> dict[str, str]:
-    """How runs end if a force sample is NaN, passed around the file reader, for every integrator and both
+def nan_force_endings(engine: str) -> dict[str, str]:
+    """How runs end if a force sample is NaN and has not passed the file reader, for every integrator and both
     interpolations."""
     base, endings = setups.vehicle(), {}
     for name in integrators(engine):
@@ -93,13 +94,13 @@ def not_a_number(engine: str) -> dict[str, str]:
     return endings
 
 
-def constrained(engine: str) -> dict[str, str]:
+def constrained_endings(engine: str) -> dict[str, str]:
     """How runs with a prescribed pitch end in each integrator that cannot solve constraints."""
     wrong = [name for name in integrators(engine) if not CATALOGUE[engine][name].constraints]
     return {name: ending(partial(setups.run, engine, prescribed_pitch.scene(), 1e-3, 0.5, name)) for name in wrong}
 
 
-def constrained_unchecked() -> dict[str, str]:
+def unchecked_constrained_endings() -> dict[str, str]:
     """How runs with a prescribed pitch end in Exudyn's explicit integrators if the check before the run is bypassed.
     The guard after the run compares the multiplier with the balance of moments."""
     names = [
@@ -111,19 +112,19 @@ def constrained_unchecked() -> dict[str, str]:
 
 
 def _unexpected_endings(endings: dict[str, str], expected: str) -> str:
-    """The expected word if all runs ended in this way; else a list of the runs that did not."""
+    """The expected ending if all runs ended so; else text that lists the runs that did not."""
     unexpected = [f"{name}: {ended}" for name, ended in endings.items() if ended != expected]
     return "; ".join(unexpected) or expected
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows per engine; all of them in both modes, over fewer unstable steps and durations in quick."""
+    """Rows for each engine; a quick run has all of them, over fewer unstable steps and durations."""
     rows: list[Row] = []
     endings: Saved = {}
     for engine in CATALOGUE:
         rows += _unstable_rows(engine, endings, quick)
         rows += _input_rows(engine)
-    for name, endings_of in (("refused", constrained("exudyn")), ("raised", constrained_unchecked())):
+    for name, endings_of in (("refused", constrained_endings("exudyn")), ("raised", unchecked_constrained_endings())):
         how = "" if name == "refused" else ", with the check bypassed"
         rows.append(
             behaviour_row(
@@ -135,12 +136,12 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
                 "Exudyn's explicit solvers freeze or free the pitch without a word",
             )
         )
-    rows += [_reduced_row(engine) for engine in ("reference", "mujoco")]
-    return [*rows, *_outside_rows(), _disk_row(folder)], {"unstable": endings}
+    rows += [_explicit_solver_row(engine) for engine in ("reference", "mujoco")]
+    return [*rows, *_outside_engine_rows(), _disk_row(folder)], {"unstable": endings}
 
 
-def _outside_rows() -> list[Row]:
-    """Rows: the guards report wrong integrators of outside engines in every run, and pass a right one."""
+def _outside_engine_rows() -> list[Row]:
+    """Rows: the guards report wrong integrators from outside the project in every run, and pass a right one."""
     silent, right = wrong_engines.integrators_that_pass(), wrong_engines.integrators_that_pass((wrong_engines.Right,))
     names = ", ".join(kind.__name__ for kind in wrong_engines.WRONG_ENGINES)
     return [
@@ -163,7 +164,7 @@ def _outside_rows() -> list[Row]:
 
 
 def _disk_row(folder: Path) -> Row:
-    """Files that a full disk leaves half written."""
+    """Row: number of moments at which a full disk leaves an incomplete file or is not reported."""
     return Observed(
         "guards.full_disk",
         SYSTEM,
@@ -175,10 +176,10 @@ def _disk_row(folder: Path) -> Row:
 
 
 def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
-    """Rows: no run at an unstable step gives a silent wrong answer; if the check before it is bypassed, the guard after
-    it raises an error."""
-    checked = unstable(engine, setups.run, quick)
-    past = unstable(engine, setups.unchecked_run, quick)
+    """Rows: no run at an unstable step gives a silent wrong result; if the check before the run is bypassed, the guard
+    after the run raises an error."""
+    checked = unstable_run_counts(engine, setups.run, quick)
+    past = unstable_run_counts(engine, setups.unchecked_run, quick)
     endings[engine] = {"checked": checked, "unchecked": past}
     total = sum(checked.values())
     return [
@@ -193,7 +194,7 @@ def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
             f"guards.unstable.{engine}.unchecked",
             SYSTEM,
             f"RK4 at 5 ms over 2 s with the step check bypassed, {engine}",
-            ending(lambda: setups.unchecked_run(engine, road(), 5e-3, 2.0)),
+            ending(lambda: setups.unchecked_run(engine, road_assembly(), 5e-3, 2.0)),
             "raised",
             "finite, size and time are checked after every run",
         ),
@@ -201,7 +202,7 @@ def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
 
 
 def _input_rows(engine: str) -> list[Row]:
-    numbers = not_a_number(engine)
+    numbers = nan_force_endings(engine)
     caught = {name: "caught" if ended in ("raised", "refused") else ended for name, ended in numbers.items()}
     with TemporaryDirectory() as files_folder:
         file = ending(lambda: sampled_input.damaged(engine, Path(files_folder)))
@@ -241,9 +242,9 @@ def _input_rows(engine: str) -> list[Row]:
     ]
 
 
-def _reduced_row(engine: str) -> Row:
-    """Row: in the reference and MuJoCo the pitch is an input and no constraint, so that an explicit solver gives the
-    right enforced moment."""
+def _explicit_solver_row(engine: str) -> Row:
+    """Row: error of the enforced moment by an explicit solver in the hand-written reference and in MuJoCo, where the
+    pitch is an input and no constraint."""
     error = prescribed_pitch.explicit(engine, Path())
     return Observed(
         f"guards.constraint.{engine}",
@@ -255,7 +256,7 @@ def _reduced_row(engine: str) -> Row:
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """How the runs at unstable and stable steps end, with the check and past it."""
+    """Table of how runs end at stable and unstable steps, with the check before the run and without it."""
     words = ("right", "refused", "raised", "SILENT")
     rows = tuple(
         (engine, how, *(str(counts[word]) for word in words))
@@ -263,7 +264,7 @@ def tables(case_data: Saved) -> list[Table]:
         for how, counts in both.items()
     )
     note = (
-        f"Every fixed-step integrator at steps of {', '.join(f'{1e3 * step:g}' for step in STEPS)} ms over "
+        f"Every fixed-step integrator at steps of {', '.join(f'{1e3 * step:g}' for step in UNSTABLE_STEPS)} ms over "
         f"{', '.join(f'{duration:g}' for duration in DURATIONS)} s on the study road. Silent: a complete run that is "
         "wrong by more than the motion itself. Past the check, short unstable runs are finite, small and wrong."
     )

@@ -1,4 +1,5 @@
-"""R19-free on four brush tyres: both engines, the linear limit, friction, energy, standstill, and computing cost."""
+"""The R19-free car on four brush tyres: agreement of Exudyn and MuJoCo, the linear limit, friction, energy, standstill,
+and computing time."""
 
 import time
 from collections.abc import Callable
@@ -30,41 +31,53 @@ from validation.spatial.cars import cornering_error, mirrored_coordinates
 TITLE = "A car on four rolling tyres"
 SYSTEM: System = "rolling-vehicle"
 R19 = load_vehicle("r19_free")
-NO_DRAG = replace(R19, drags=())
+R19_WITHOUT_DRAG = replace(R19, drags=())
 WHEELS = ("fl", "fr", "rl", "rr")
-LANE = Controls(steer=((0.0, 0.0), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)))
-SMALL_STEER = Controls(steer=tuple((time, 0.5 * angle) for time, angle in LANE.steer))
+LANE_CHANGE = Controls(steer=((0.0, 0.0), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)))
+SMALL_LANE_CHANGE = Controls(steer=tuple((time, 0.5 * angle) for time, angle in LANE_CHANGE.steer))
 ROAD_LEVEL, SEED, SPEED = 4e-6, 3, 25.0
-SLOPE, GENTLE = 0.1, 0.05
+SLOPE, GENTLE_FRICTION = 0.1, 0.05
 TIMING_ROUNDS = 60
 
 
 def lane_change(**changes: Any) -> Handling:
-    """A lane change on a rough road."""
-    return Handling(R19, controls=LANE, waves=plane_waves(ROAD_LEVEL, seed=SEED)).changed(**changes)
+    """The car in a lane change on a rough road; keyword arguments replace its settings."""
+    return Handling(R19, controls=LANE_CHANGE, waves=plane_waves(ROAD_LEVEL, seed=SEED)).changed(**changes)
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Tyre, engines and mirror image; in the full run also turns, stops, slopes, energy, planted faults, price."""
+    """Rows on tyre forces, engines and mirror image; a full run also has turns, stops, slopes, energy, planted faults
+    and computing time."""
     duration = 0.3 if quick else 1.0
     drives = {engine: drive_run(engine, lane_change(), SPEED, duration) for engine in ("mujoco", "exudyn")}
-    rows = [_engines_row(drives), *_tyre_rows(), _power_row(drives["mujoco"]), _mirror_row(duration), _threads_row()]
+    rows = [
+        _engines_row(drives),
+        *_tyre_rows(),
+        _friction_power_row(drives["mujoco"]),
+        _mirror_row(duration),
+        _threads_row(),
+    ]
     if not quick:
         rows += [
-            *_turn_rows(),
-            *_stop_rows(),
-            *_transfer_rows(),
-            _slope_row(),
+            *_steady_turn_rows(),
+            *_locked_stop_rows(),
+            *_load_transfer_rows(),
+            _slope_standstill_row(),
             *_energy_rows(),
             *_fault_rows(),
-            _price_row(),
+            _tyre_cost_row(),
         ]
     return rows, {}
 
 
-def _gap(a: Drive, b: Drive) -> float:
+def _drive_difference(first_drive: Drive, second_drive: Drive) -> float:
     """Largest difference of coordinates and rates between two drives."""
-    return float(max(np.abs(a.run.positions - b.run.positions).max(), np.abs(a.run.rates - b.run.rates).max()))
+    return float(
+        max(
+            np.abs(first_drive.run.positions - second_drive.run.positions).max(),
+            np.abs(first_drive.run.rates - second_drive.run.rates).max(),
+        )
+    )
 
 
 def _engines_row(drives: dict[str, Drive]) -> Row:
@@ -72,13 +85,13 @@ def _engines_row(drives: dict[str, Drive]) -> Row:
         "handling.engines",
         SYSTEM,
         "lane change on a rough road: positions and rates of the two engines",
-        _gap(drives["mujoco"], drives["exudyn"]),
+        _drive_difference(drives["mujoco"], drives["exudyn"]),
         "m, rad, m/s, rad/s",
     ).at_most(1e-10, "the same tableau, step and forces around two engines' own trees: rounding alone", "shared kernel")
 
 
-def locked_error() -> float:
-    """Largest error of the force on wheels that do not turn, divided by mu N; the exact force has the size mu N and
+def locked_wheel_error() -> float:
+    """Largest error of the force on wheels that do not turn, divided by mu N. The exact force has the size mu N and
     opposes the sliding."""
     angles, speeds = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), [0.1, 1.0, 40.0])
     slides = np.zeros((angles.size, 4))
@@ -100,13 +113,13 @@ def _tyre_rows() -> list[Row]:
             "handling.locked",
             SYSTEM,
             "deviation of the force on a locked wheel from mu N against its sliding velocity, relative to mu N",
-            locked_error(),
+            locked_wheel_error(),
             "",
         ).at_most(1e-9, "all bristles slide one way", "closed form"),
     ]
 
 
-def _power_row(drive: Drive) -> Row:
+def _friction_power_row(drive: Drive) -> Row:
     return behaviour_row(
         "handling.power",
         SYSTEM,
@@ -117,7 +130,7 @@ def _power_row(drive: Drive) -> Row:
     )
 
 
-def mirror_gap(handling: Handling, duration: float) -> float:
+def mirror_difference(handling: Handling, duration: float) -> float:
     """Largest difference between a steer step to the left and the mirror image of a steer step to the right."""
     left, right = (
         drive_run(
@@ -134,30 +147,30 @@ def _mirror_row(duration: float) -> Row:
         "handling.mirror",
         SYSTEM,
         "difference of a step steer to the left from the mirror image of a step steer to the right, inclined wheels",
-        mirror_gap(inclined, duration),
+        mirror_difference(inclined, duration),
         "m, rad",
     ).at_most(1e-10, "a symmetric vehicle", "none")
 
 
-def turn_error(change: Callable[[Handling], None] | None = None, speed: float = 20.0) -> float:
-    """Relative error of the yaw gain in a steady turn with small slip, compared with the closed form; change: plants a
-    fault in the table."""
+def yaw_gain_error(plant_fault: Callable[[Handling], None] | None = None, speed: float = 20.0) -> float:
+    """Relative error of the yaw gain in a steady turn with small slip, compared with the closed form. ``plant_fault``
+    may change the table of the vehicle first."""
     steer = 2e-5
-    handling = Handling(NO_DRAG, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
+    handling = Handling(R19_WITHOUT_DRAG, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
     gain = steady_turn(handling, speed).yaw_gain
-    if change is not None:
-        change(handling)
+    if plant_fault is not None:
+        plant_fault(handling)
     return float(drive_run("mujoco", handling, speed, 5.0).velocity()[-1, 2] / steer / gain - 1.0)
 
 
-def _turn_rows() -> list[Row]:
-    turn = steady_turn(Handling(NO_DRAG), 20.0)
+def _steady_turn_rows() -> list[Row]:
+    turn = steady_turn(Handling(R19_WITHOUT_DRAG), 20.0)
     return [
         Observed(
             "handling.turn",
             SYSTEM,
             "yaw gain of a steady turn of small slip at 20 m/s / that of the single-track vehicle - 1",
-            turn_error(),
+            yaw_gain_error(),
             "",
         ).at_most(1e-3, "linear tyres, with trail and turning slip", "closed form"),
         Observed("handling.understeer", SYSTEM, "its understeer gradient", turn.understeer, "s^2/m").beside(
@@ -166,9 +179,9 @@ def _turn_rows() -> list[Row]:
     ]
 
 
-def _stop_rows() -> list[Row]:
+def _locked_stop_rows() -> list[Row]:
     mu, speed = 0.7, 15.0
-    handling = Handling(NO_DRAG, Tyres(friction=mu, fixed=WHEELS))
+    handling = Handling(R19_WITHOUT_DRAG, Tyres(friction=mu, fixed=WHEELS))
     drive = drive_run("mujoco", handling, speed, 2.0)
     ahead = drive.velocity()[:, 0]
     left = drive["fx"] + drive.grip()
@@ -191,18 +204,19 @@ def _stop_rows() -> list[Row]:
     ]
 
 
-def _transfer_rows() -> list[Row]:
-    """Rows: load transfer of the car, and of a box on four springs, compared with the balance of all bodies."""
+def _load_transfer_rows() -> list[Row]:
+    """Rows: load transfer of the car, and of a box on four springs, compared with the balance of moments of all
+    bodies."""
     rows = []
-    for name, vehicle in (("car", NO_DRAG), ("box", box().handling.given)):
-        braking = braked_error(drive_run("mujoco", sliding_car(vehicle, GENTLE), 10.0, 2.0), GENTLE)
+    for name, vehicle in (("car", R19_WITHOUT_DRAG), ("box", box().handling.given)):
+        braking = braked_error(drive_run("mujoco", sliding_car(vehicle, GENTLE_FRICTION), 10.0, 2.0), GENTLE_FRICTION)
         turn = turning_error(drive_run("mujoco", turning_car(vehicle, 2e-3), SPEED, 3.0))
         rows += [
             Observed(
                 f"handling.transfer.{name}",
                 SYSTEM,
                 f"load transfer of the {name} between its axles, wheels "
-                f"locked at mu = {GENTLE:g}, by m_total a h / L and weight that leans, less 1",
+                f"locked at mu = {GENTLE_FRICTION:g}, by m_total a h / L and weight that leans, less 1",
                 braking,
                 "",
             ).at_most(5e-3, "first order in the pitch angle; 2 s of settling", "closed form"),
@@ -217,7 +231,7 @@ def _transfer_rows() -> list[Row]:
     return rows
 
 
-def _slope_row() -> Row:
+def _slope_standstill_row() -> Row:
     handling = Handling(R19, Tyres(fixed=WHEELS), slope=SLOPE)
     drive = drive_run("mujoco", handling, 0.0, 2.0, 1e-4)
     last = slice(-2000, None)
@@ -229,7 +243,7 @@ def _slope_row() -> Row:
 
 def _energy_rows() -> list[Row]:
     gaps = {}
-    for name, friction, controls in (("held", 20.0, SMALL_STEER), ("sliding", 0.9, LANE)):
+    for name, friction, controls in (("held", 20.0, SMALL_LANE_CHANGE), ("sliding", 0.9, LANE_CHANGE)):
         for step in (1e-3, 5e-4):
             drive = drive_run(
                 "mujoco", lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step
@@ -269,7 +283,7 @@ def _swap_axles(handling: Handling) -> None:
         ahead[at.BRISTLES], behind[at.BRISTLES] = float(behind[at.BRISTLES]), float(ahead[at.BRISTLES])
 
 
-def _turn_wrong(handling: Handling) -> None:
+def _reverse_steer(handling: Handling) -> None:
     """Plant a fault: one front wheel is steered in the opposite direction."""
     handling.tyre_numbers(1)[at.STEERED] *= -1.0
 
@@ -280,9 +294,9 @@ def _fault_rows() -> list[Row]:
     rough.tyre_numbers(2)[at.GRIP] *= 1.0 + 1e-6
     seen = {
         "bristles of one tyre 1 % too stiff, by the cornering stiffness": cornering_error(soft) > 1e-3,
-        "bristles of front and rear swapped, by the steady turn": abs(turn_error(_swap_axles)) > 1e-3,
-        "one wheel steered the other way, by the steady turn": abs(turn_error(_turn_wrong)) > 1e-3,
-        "friction of one tyre 1e-6 off in one engine, by the engines": _gap(
+        "bristles of front and rear swapped, by the steady turn": abs(yaw_gain_error(_swap_axles)) > 1e-3,
+        "one wheel steered the other way, by the steady turn": abs(yaw_gain_error(_reverse_steer)) > 1e-3,
+        "friction of one tyre 1e-6 off in one engine, by the engines": _drive_difference(
             drive_run("mujoco", rough, SPEED, 1.0), drive_run("exudyn", lane_change(), SPEED, 1.0)
         )
         > 1e-10,
@@ -300,10 +314,10 @@ def _fault_rows() -> list[Row]:
     ]
 
 
-def _price_row() -> Row:
+def _tyre_cost_row() -> Row:
     steps, (car, bare) = 50, (lane_change(waves=np.empty((0, 4))) for _ in range(2))
     bare.numbers[at.TYRES] = 0.0
-    jobs = _march(car, steps), _march(bare, steps), lambda: _repeat_tyres(4 * steps)
+    jobs = _timed_march(car, steps), _timed_march(bare, steps), lambda: _repeat_four_tyres(4 * steps)
     full, none, kernel = interleave(jobs, TIMING_ROUNDS, 0.001, clock=time.process_time)
     ratio, low, high = median(full / (none + kernel) - 1.0)
     return Observed(
@@ -336,29 +350,31 @@ def _threads_row() -> Row:
     )
 
 
-def _march(handling: Handling, steps: int) -> Callable[[], Any]:
-    """A job of some steps in MuJoCo's own loop, without preparation or channels."""
+def _timed_march(handling: Handling, step_count: int) -> Callable[[], Any]:
+    """Function that runs a number of steps in MuJoCo's own loop, without preparation or output channels."""
     built = FreeMujoco(driven_by(handling))
     built.model.opt.timestep = 1e-4
     start, marcher = np.concatenate(handling.straight(SPEED))[None], Marcher(built.model)
 
     def job() -> None:
         with installed(built.law):
-            marcher.run(start, steps)
+            marcher.run(start, step_count)
 
     return job
 
 
-def _repeat_tyres(repeats: int) -> None:
+def _repeat_four_tyres(repeats: int) -> None:
     """Evaluate the forces of four slightly slipping tyres a number of times."""
     of = net(21)
     contacts, forces = np.zeros((4, 10)), np.empty((4, 4))
     contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9
     contacts[:, FIRST_FLEXIBILITY:] = 2e-8
-    _repeat_forces(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, repeats)
+    _repeat_tyre_forces(
+        contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, repeats
+    )
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces, repeats):
+def _repeat_tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces, repeats):
     for _ in range(repeats):
         tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces)

@@ -1,6 +1,6 @@
-"""The table of hard cases: outcome of each implementation, and what an obvious build does instead.
+"""Hard cases: outcome of each implementation, and of a straightforward model without the guard or rule in question.
 
-In full every case is run; the quick share runs the last of each family and every QUICK_SPACING-th before it.
+A full run has every case; a quick run has the last case of each family and every QUICK_SPACING-th before it.
 """
 
 from collections import Counter
@@ -18,25 +18,26 @@ from validation.hard_cases.catalogue import COVERED_CLASSES, cases_beyond_catalo
 TITLE = "Hard cases"
 SYSTEM: System = "hard-cases"
 FEWEST_CASES = 80
-"""Cases that there must be, without measurement files, which are many of a kind."""
-FILES = ("measured_files",)
+"""Least number of hard cases asked for; files of measurements count as one, since there are many."""
+FILE_FAMILIES = ("measured_files",)
 QUICK_SPACING = 24
 
 
 @allowing_breaches("hard cases go beyond what is taken for granted: that they stay stable, or say so, is judged")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """A row per case and implementation; quick: the last case of each family and every twenty-fourth before it."""
+    """A row for each case and implementation; a quick run has the last case of each family and every twenty-fourth
+    before it."""
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()
     for family, case in quick_cases(known) if quick else known:
         with TemporaryDirectory() as files_folder:
             outcomes = {name: judge(case, name, Path(files_folder)) for name in case.judged()}
             naive = case.naive(Path(files_folder)) if case.naive else ""
-        rows += [_row(case, name, outcome) for name, outcome in outcomes.items()]
+        rows += [_outcome_row(case, name, outcome) for name, outcome in outcomes.items()]
         told_errors = {key: getattr(case, key) for key in ("name", "hard", "check", "unit", "tolerance")}
         sentence = {name: asdict(outcome) for name, outcome in outcomes.items()}
         data.append({"family": family, **told_errors, "outcomes": sentence, "naive": naive})
     words = [[outcome["word"] for outcome in entry["outcomes"].values()] for entry in data]
-    counted = sum(family not in FILES for family, _ in known)
+    counted = sum(family not in FILE_FAMILIES for family, _ in known)
     share = f"{len(data)} of {len(known)}" if quick else f"all {len(known)}"
     rows += [
         Observed(
@@ -65,13 +66,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def quick_cases(cases: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
-    """The quick share: the last case of each family, and every QUICK_SPACING-th before it."""
+    """Cases of a quick run: the last case of each family, and every QUICK_SPACING-th before it."""
     families = dict.fromkeys(family for family, _ in cases)
     return [pair for name in families for pair in [case for case in cases if case[0] == name][::-QUICK_SPACING]]
 
 
-def _row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
-    """Row of a hard case: its error where an answer is expected and given, else how it behaved."""
+def _outcome_row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
+    """Row of a hard case: its error if a result is expected and given, else its outcome."""
     id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.once else implementation}"
     quantity = f"{case.name}{'' if case.once else f', {implementation}'}: {case.check}"
     if case.wanted(implementation) == "right" and outcome.error is not None:
@@ -81,12 +82,12 @@ def _row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """The catalogue, counts by family, and the one table of hard cases."""
-    return [_catalogue(case_data), _counts_by_family(case_data), _table_of_cases(case_data["cases"])]
+    """Tables of the catalogue of failures, of the counts by family, and of all hard cases."""
+    return [_catalogue_table(case_data), _family_table(case_data), _case_table(case_data["cases"])]
 
 
-def _catalogue(case_data: Saved) -> Table:
-    """Table of the catalogue's failure classes with the cases that belong to each."""
+def _catalogue_table(case_data: Saved) -> Table:
+    """Table of the catalogue's classes of failures with the hard cases that belong to each."""
     words = {name: ["in full"] for _, name in case_data["known"]}
     words |= {entry["name"]: sorted({o["word"] for o in entry["outcomes"].values()}) for entry in case_data["cases"]}
     rows = tuple(
@@ -103,8 +104,8 @@ def _catalogue(case_data: Saved) -> Table:
     )
 
 
-def _counts_by_family(case_data: Saved) -> Table:
-    """Table with the number of cases, of cases that were run, and of their outcomes, for every family and for all."""
+def _family_table(case_data: Saved) -> Table:
+    """Table with the numbers of cases, of cases that were run, and of their outcomes, for every family and for all."""
     known = Counter(family for family, _ in case_data["known"])
     groups = {name: [entry for entry in case_data["cases"] if entry["family"] == name] for name in known}
     groups["all"] = case_data["cases"]
@@ -125,14 +126,17 @@ def _counts_by_family(case_data: Saved) -> Table:
     )
 
 
-def _table_of_cases(entries: list[Saved]) -> Table:
-    """Table of all cases: what is hard, what it is checked against, and the outcome in each implementation."""
+def _case_table(entries: list[Saved]) -> Table:
+    """Table of all cases: what is hard, the check, and the outcome in each implementation."""
     rows = tuple(
         (
             entry["name"],
             entry["hard"],
-            f"{entry['check']}{_allowed(entry)}",
-            *(_cell(entry["outcomes"][name]) if name in entry["outcomes"] else "as left" for name in IMPLEMENTATIONS),
+            f"{entry['check']}{_tolerance_text(entry)}",
+            *(
+                _outcome_text(entry["outcomes"][name]) if name in entry["outcomes"] else "as left"
+                for name in IMPLEMENTATIONS
+            ),
             entry["naive"],
         )
         for entry in entries
@@ -145,9 +149,9 @@ def _table_of_cases(entries: list[Saved]) -> Table:
     return Table(TITLE, note, ("case", "what is hard", "checked against", *IMPLEMENTATIONS, "without the guard"), rows)
 
 
-def _allowed(saved_entry: Saved) -> str:
+def _tolerance_text(saved_entry: Saved) -> str:
     return f" (allowed {saved_entry['tolerance']:.0e} {saved_entry['unit']})" if saved_entry["unit"] else ""
 
 
-def _cell(outcome: Saved) -> str:
+def _outcome_text(outcome: Saved) -> str:
     return outcome["word"] if outcome["error"] is None else f"{outcome['word']}, {outcome['error']:.1e}"

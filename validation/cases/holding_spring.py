@@ -1,7 +1,8 @@
-"""The smallest rotational spring that holds a force-excited run, from the wheel forces alone and by bisection.
+"""Smallest rotational spring that keeps a force-excited run from drifting off: predicted from the wheel forces alone,
+and measured by bisection.
 
-A run of 60 s on the study road is held if its pitch stays within 0.2 rad of the true one. The law
-(I + J) lambda^2 is the stiffness at which a tilt stops to grow. Judged are springs without and with damping,
+A spring holds a run of 60 s on the study road if the pitch stays within 0.2 rad of the true one. The law
+(I + J) lambda^2 is the stiffness at which a tilt stops growing. Judged are springs without and with damping,
 undisturbed, and with noise and the paper's perturbed model at once: without damping noise would pile up on a spring
 of any stiffness. An undamped spring stiffer than the law comes into resonance with the hills: at half as much again
 the error is 0.36 rad. Much damping holds with less, for within 60 s what grows slowly has not grown yet; critical
@@ -30,16 +31,16 @@ from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 TITLE = "The smallest spring that holds a force-excited run"
 SYSTEM: System = "drift"
 SEED = 13
-DURATION, STEP, HELD_PITCH = 60.0, 1e-3, 0.2
-"""Length and step of the runs (s), pitch error of a run that is held (rad)."""
-NOISE = 30.7
-"""N, on each sample at 1 kHz."""
-HALVINGS = 7
-"""Of the bracket from 0.5 to 1.3 times the law: to 1 %."""
+DURATION, STEP, ALLOWED_PITCH_ERROR = 60.0, 1e-3, 0.2
+"""Length and step (s) of the runs, and largest pitch error (rad) of a run that the spring holds."""
+FORCE_NOISE = 30.7
+"""Standard deviation (N) of the noise on each force sample at 1 kHz."""
+BISECTION_COUNT = 7
+"""Number of bisections of the range from 0.5 to 1.3 times the predicted stiffness; the result is known to 1 %."""
 
 
 @dataclass(frozen=True)
-class Setting:
+class SpringSetting:
     """One setting of the holding spring. damping : ratio to the spring's critical damping with the inertia I + J;
     disturbed : whether there is noise and a perturbed model."""
 
@@ -50,13 +51,19 @@ class Setting:
         return f"{'noise, perturbed model' if self.disturbed else 'undisturbed'}, damping ratio {self.damping:g}"
 
 
-JUDGED = (Setting(0.0, False), Setting(0.3, False), Setting(0.7, False), Setting(0.7, True))
-TOLD_SETTINGS = (Setting(1.0, False), Setting(0.0, True))
+JUDGED_SETTINGS = (
+    SpringSetting(0.0, False),
+    SpringSetting(0.3, False),
+    SpringSetting(0.7, False),
+    SpringSetting(0.7, True),
+)
+REPORTED_SETTINGS = (SpringSetting(1.0, False), SpringSetting(0.0, True))
 
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """True pitch (n,), and for each value of ``disturbed`` a run without the spring that starts in the true state."""
+    """True pitch (n,) in rad, a run without the spring that starts in the true state for each value of ``disturbed``,
+    and the predicted stiffness (N m/rad)."""
 
     pitch: np.ndarray
     runs: dict[bool, Assembly]
@@ -66,24 +73,27 @@ class FreeRuns:
 @allowing_breaches("a spring that is too soft lets the run drift off, which is what is shown", "upright")
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows: for each setting a spring of 0.6 of the predicted stiffness fails, of 1.2 holds; in full also the stiffness
-    by bisection; quick: one setting."""
-    measured = _measure(folder)
-    settings = JUDGED[2:3] if quick else JUDGED
-    rows = [row for setting in settings for row in _rows_of_limits(setting, measured, "reference")]
+    """Rows: in each setting, a spring of 0.6 of the predicted stiffness fails and one of 1.2 holds; a full run also has
+    the smallest stiffness by bisection. A quick run has one setting."""
+    measured = _prepared_runs(folder)
+    settings = JUDGED_SETTINGS[2:3] if quick else JUDGED_SETTINGS
+    rows = [row for setting in settings for row in _limit_rows(setting, measured, "reference")]
     smallest: list[Any] = []
     if not quick:
-        rows += [row for engine in ("exudyn", "mujoco") for row in _rows_of_limits(JUDGED[3], measured, engine)]
-        smallest = [(str(setting), _smallest(setting, measured)) for setting in (*JUDGED, *TOLD_SETTINGS)]
+        rows += [row for engine in ("exudyn", "mujoco") for row in _limit_rows(JUDGED_SETTINGS[3], measured, engine)]
+        smallest = [
+            (str(setting), _smallest_stiffness(setting, measured)) for setting in (*JUDGED_SETTINGS, *REPORTED_SETTINGS)
+        ]
         rows += [
-            _found_row(i, name, stiffness, measured.predicted_stiffness) for i, (name, stiffness) in enumerate(smallest)
+            _stiffness_row(i, name, stiffness, measured.predicted_stiffness)
+            for i, (name, stiffness) in enumerate(smallest)
         ]
     return rows, {"law": measured.predicted_stiffness, "found": smallest}
 
 
-def _measure(folder: Path) -> FreeRuns:
+def _prepared_runs(folder: Path) -> FreeRuns:
     true = virtual_drive(folder, DURATION, STEP, STEP)
-    noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
+    noise = {"force_noise": {"deviation": FORCE_NOISE, "seed": SEED}}
     quiet = assembly_of_scene(force_scene(folder, step=STEP, duration=DURATION))
     noisy = assembly_of_scene(
         force_scene(folder, step=STEP, duration=DURATION, override=perturbed_parameters(PARAMETERS), effects=noise)
@@ -92,51 +102,55 @@ def _measure(folder: Path) -> FreeRuns:
     return FreeRuns(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, predicted_stiffness)
 
 
-def _error(setting: Setting, stiffness: float, free_runs: FreeRuns, engine: str = "reference") -> float:
-    """Largest pitch error (rad) of a run with a holding spring of a stiffness (N m/rad)."""
+def _largest_pitch_error(
+    setting: SpringSetting, stiffness: float, free_runs: FreeRuns, engine: str = "reference"
+) -> float:
+    """Largest pitch error (rad) of a run with a holding spring of a given stiffness (N m/rad)."""
     free = free_runs.runs[setting.disturbed]
     damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(free_runs.runs[False].parameters).total_inertia)
     held_assembly = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
     return float(np.abs(simulate(free.scene, engine, assembly=held_assembly)["pitch"] - free_runs.pitch).max())
 
 
-def _rows_of_limits(setting: Setting, free_runs: FreeRuns, engine: str) -> list[Row]:
-    """Rows: a spring of 0.6 of the predicted stiffness fails to hold the pitch, and one of 1.2 holds it."""
+def _limit_rows(setting: SpringSetting, free_runs: FreeRuns, engine: str) -> list[Row]:
+    """Rows: a spring of 0.6 of the predicted stiffness fails to hold the pitch, and one of 1.2 holds the pitch."""
     rows = []
     for factor, expected in ((0.6, "fails"), (1.2, "holds")):
-        off = _error(setting, factor * free_runs.predicted_stiffness, free_runs, engine)
+        off = _largest_pitch_error(setting, factor * free_runs.predicted_stiffness, free_runs, engine)
         key = f"holding_spring.{expected}.{engine}.{setting.damping:g}{'.disturbed' if setting.disturbed else ''}"
         rows.append(
             behaviour_row(
                 key,
                 SYSTEM,
                 f"spring of {factor} of the predicted {free_runs.predicted_stiffness:.1f} N m/rad, {setting}, {engine}",
-                "holds" if off <= HELD_PITCH else "fails",
+                "holds" if off <= ALLOWED_PITCH_ERROR else "fails",
                 expected,
-                f"largest pitch error {off:.3f} rad in {DURATION:g} s, {HELD_PITCH} allowed",
+                f"largest pitch error {off:.3f} rad in {DURATION:g} s, {ALLOWED_PITCH_ERROR} allowed",
                 "closed form",
             )
         )
     return rows
 
 
-def _smallest(setting: Setting, free_runs: FreeRuns) -> float:
+def _smallest_stiffness(setting: SpringSetting, free_runs: FreeRuns) -> float:
     """Smallest stiffness (N m/rad) that holds the pitch, by bisection; NaN if even the upper end of the range fails."""
     low, high = 0.5 * free_runs.predicted_stiffness, 1.3 * free_runs.predicted_stiffness
-    if _error(setting, high, free_runs) > HELD_PITCH:
+    if _largest_pitch_error(setting, high, free_runs) > ALLOWED_PITCH_ERROR:
         return math.nan
-    for _ in range(HALVINGS):
+    for _ in range(BISECTION_COUNT):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if _error(setting, middle, free_runs) <= HELD_PITCH else (middle, high)
+        low, high = (
+            (low, middle) if _largest_pitch_error(setting, middle, free_runs) <= ALLOWED_PITCH_ERROR else (middle, high)
+        )
     return high
 
 
-def _found_row(index: int, name: str, stiffness: float, predicted_stiffness: float) -> Row:
+def _stiffness_row(index: int, setting_name: str, stiffness: float, predicted_stiffness: float) -> Row:
     key, what = (
         f"holding_spring.found.{index + 1}",
-        f"ratio of the predicted stiffness to the smallest that holds, which bisection gives, {name}",
+        f"ratio of the predicted stiffness to the smallest that holds, which bisection gives, {setting_name}",
     )
-    if index >= len(JUDGED):
+    if index >= len(JUDGED_SETTINGS):
         return Observed(key, SYSTEM, what, predicted_stiffness / stiffness, "").beside(
             "1 for little damping and no noise", "said, not judged"
         )
@@ -146,11 +160,11 @@ def _found_row(index: int, name: str, stiffness: float, predicted_stiffness: flo
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Table of the least stiffness that holds in each setting."""
+    """Table of the smallest stiffness that holds the pitch in each setting."""
     rows = tuple(
         (name, "none below 1.3 of the law" if math.isnan(stiffness) else f"{stiffness:.1f}", f"{case_data['law']:.1f}")
         for name, stiffness in case_data["found"]
     )
     heads = ("setting", "smallest found [N m/rad]", "predicted [N m/rad]")
-    note = f"Study road at 20 m/s, {DURATION:g} s; held is a pitch error of at most {HELD_PITCH} rad."
+    note = f"Study road at 20 m/s, {DURATION:g} s; held is a pitch error of at most {ALLOWED_PITCH_ERROR} rad."
     return [Table("Smallest holding stiffness", note, heads, rows)] if rows else []

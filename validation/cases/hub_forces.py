@@ -1,4 +1,5 @@
-"""R19-free cut at its wheels and driven by hub forces: engines, gravity error, toppling, growth, filter, faults."""
+"""The R19-free car cut at its wheels and driven by hub forces: agreement of engines, gravity error, toppling, growth of
+errors, tilt filter, planted faults."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -29,38 +30,39 @@ from validation.spatial.cars import by_jacobians, r19, random_states, random_wre
 
 TITLE = "A car of 19 freedoms on noisy hub forces"
 SYSTEM: System = "drift"
-SEED, COPIES, LASTING = 31, 48, 4.0
-"""Of the ensemble: seed, paths and their length (s)."""
-TILT = 0.1
-"""rad, of the gravity error."""
+SEED, PATH_COUNT, NOISE_SECONDS = 31, 48, 4.0
+"""Seed, number of paths and their length (s) in the ensemble."""
+TILT_ANGLE = 0.1
+"""Roll angle (rad) with which the effect of gravity on a tilted vehicle is tested."""
 STEP = 1e-3
 
 
 @allowing_breaches("runs that nothing holds drift off, which is what is shown")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Engines and closed forms; in full also measurement, growth, stabilisers, the twin and planted faults."""
+    """Rows of engines and closed forms; a full run also has measurements, error growth, stabilisers, the asymmetric
+    twin and planted faults."""
     car = r19()
     rows = [
-        *_accelerations("r19_free", car),
-        _wrenches(car),
-        *_gravity(car),
-        _toppling(car),
-        _noisy_free_runs(car, 0.2 if quick else 2.0),
+        *_acceleration_rows("r19_free", car),
+        _wrench_row(car),
+        *_gravity_rows(car),
+        _toppling_row(car),
+        _noisy_engines_row(car, 0.2 if quick else 2.0),
         *hub_inputs.rows(car, quick),
     ]
     if quick:
         return rows, {}
-    rows += [*_accelerations("twin", cut(twin(), "body")), *_reproduced(car), *_growth(car)]
-    scenes = {frame: _scene(frame) for frame in ("hub", "inertial")}
+    rows += [*_acceleration_rows("twin", cut(twin(), "body")), *_reproduction_rows(car), *_growth_rows(car)]
+    scenes = {frame: _study_scene(frame) for frame in ("hub", "inertial")}
     comparisons = {frame: compare(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
     for frame, comparison in comparisons.items():
-        rows += [*_stabilised(frame, comparison), _prescribed_truth(frame, comparison)]
-    return rows + _faults(scenes["hub"]), {frame: each.answer() for frame, each in comparisons.items()}
+        rows += [*_stabilised_rows(frame, comparison), _prescribed_angles_row(frame, comparison)]
+    return rows + _fault_rows(scenes["hub"]), {frame: each.answer() for frame, each in comparisons.items()}
 
 
-def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
-    """Rows: accelerations of the engines at random states, compared with written-out equations; and these equations,
-    without forces, compared with others."""
+def _acceleration_rows(vehicle_name: str, vehicle: CutVehicle) -> list[Row]:
+    """Rows: accelerations of the engines at random states compared with written-out equations; these equations, without
+    forces, compared with a second set of equations."""
     worst = 0.0
     for i, (frame, guide) in enumerate((("hub", False), ("inertial", True), ("body", True))):
         q, v = random_states(vehicle, i)
@@ -77,7 +79,7 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
     expected -= GRAVITY * np.eye(len(q))[Z]
     return [
         Observed(
-            f"hub_forces.accelerations_{name}",
+            f"hub_forces.accelerations_{vehicle_name}",
             SYSTEM,
             "relative difference of the accelerations in Exudyn and MuJoCo from the written-out "
             "equations at random states",
@@ -85,7 +87,7 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
             "1",
         ).at_most(1e-10, "one callback, three mass matrices", "shared kernel"),
         Observed(
-            f"hub_forces.free_fall_{name}",
+            f"hub_forces.free_fall_{vehicle_name}",
             SYSTEM,
             "relative difference of the accelerations of the freely falling, turning tree from a "
             "second set of equations",
@@ -95,7 +97,7 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
     ]
 
 
-def _wrenches(vehicle: CutVehicle) -> Row:
+def _wrench_row(vehicle: CutVehicle) -> Row:
     """Row: generalised forces of the hub wrenches by the compiled kernel, compared with those by MuJoCo's own
     Jacobians."""
     (q, _), worst = random_states(vehicle, 3), 0.0
@@ -117,7 +119,7 @@ def _wrenches(vehicle: CutVehicle) -> Row:
     ).at_most(1e-12, "places, axes, frames", "native")
 
 
-def _tilted(vehicle: CutVehicle, frame: str, tilt: float, duration: float) -> HubRun:
+def _tilted_run(vehicle: CutVehicle, frame: str, tilt: float, duration: float) -> HubRun:
     steps, start = round(duration / STEP), np.zeros(2 * vehicle.size)
     start[ROLL] = tilt
     return build("mujoco", vehicle, static_forces(vehicle, 2 * steps + 1, frame), STEP, duration).run(
@@ -125,11 +127,11 @@ def _tilted(vehicle: CutVehicle, frame: str, tilt: float, duration: float) -> Hu
     )
 
 
-def _gravity(vehicle: CutVehicle) -> list[Row]:
-    """Rows: a tilted vehicle under body-fixed static forces slides sideways as a rigid body, and its section forces do
+def _gravity_rows(vehicle: CutVehicle) -> list[Row]:
+    """Rows: a tilted vehicle under body-fixed static forces moves sideways as a rigid body, and its section forces do
     not change."""
-    run = _tilted(vehicle, "hub", TILT, 1.0)
-    fall = -0.5 * GRAVITY * np.array([np.sin(TILT), 1 - np.cos(TILT)]) * run.times[:, None] ** 2
+    run = _tilted_run(vehicle, "hub", TILT_ANGLE, 1.0)
+    fall = -0.5 * GRAVITY * np.array([np.sin(TILT_ANGLE), 1 - np.cos(TILT_ANGLE)]) * run.times[:, None] ** 2
     preloads = np.array([element.held for element in vehicle.elements])
     return [
         Observed(
@@ -154,9 +156,9 @@ def _gravity(vehicle: CutVehicle) -> list[Row]:
     ]
 
 
-def _toppling(vehicle: CutVehicle) -> Row:
+def _toppling_row(vehicle: CutVehicle) -> Row:
     """Row: under forces that keep their directions in space, the vehicle topples like an inverted pendulum."""
-    run, expected = _tilted(vehicle, "inertial", 1e-6, 2.0), float(rigid(vehicle).toppling()[0])
+    run, expected = _tilted_run(vehicle, "inertial", 1e-6, 2.0), float(rigid(vehicle).toppling()[0])
     late = np.abs(run.states[[1000, 2000], ROLL])
     return Observed(
         "hub_forces.toppling",
@@ -168,8 +170,8 @@ def _toppling(vehicle: CutVehicle) -> Row:
     ).within(expected, 0.02 * expected, "springs that give change it by less than one per cent", "closed form")
 
 
-def _noisy_free_runs(vehicle: CutVehicle, duration: float) -> Row:
-    """Row: difference between free runs of all engines under the same noisy forces."""
+def _noisy_engines_row(vehicle: CutVehicle, duration: float) -> Row:
+    """Row: difference between the runs of all engines under the same noisy forces, without a stabiliser."""
     steps = round(duration / STEP)
     hub_inputs = static_forces(vehicle, steps + 1)
     noisy = HubForces(hub_inputs.hubs, STEP, "hub").noisy(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
@@ -184,17 +186,17 @@ def _noisy_free_runs(vehicle: CutVehicle, duration: float) -> Row:
     ).at_most(1e-9, "same tableau, same step", "shared kernel")
 
 
-def _rough(vehicle: CutVehicle, duration: float) -> HubInputs:
-    """Road input of a class C road at 20 m/s."""
+def _road_input(vehicle: CutVehicle, duration: float) -> HubInputs:
+    """Input of the vehicle on a class C road at 20 m/s."""
     left, right = (iso8608_road("C", seed) for seed in (1, 2))
     return two_tracks(vehicle, left, right, 20.0, STEP, round(duration / STEP))
 
 
-def _reproduced(vehicle: CutVehicle) -> list[Row]:
-    """Rows: hub forces recorded on a road without noise reproduce the motion, apart from errors of interpolation
-    between samples."""
+def _reproduction_rows(vehicle: CutVehicle) -> list[Row]:
+    """Rows: hub forces recorded on a road without noise reproduce the motion, up to interpolation errors between the
+    samples."""
     duration = 2.0
-    true = true_run("mujoco", vehicle, _rough(vehicle, duration), "hub", STEP, duration)
+    true = true_run("mujoco", vehicle, _road_input(vehicle, duration), "hub", STEP, duration)
     off = {}
     readings: tuple[Interpolation, ...] = ("linear", "smooth")
     for interpolation in readings:
@@ -221,28 +223,29 @@ def _reproduced(vehicle: CutVehicle) -> list[Row]:
     ]
 
 
-def _growth(vehicle: CutVehicle) -> list[Row]:
-    """Rows: ratios of an ensemble's mean squares to their laws. They follow a chi-square distribution with as many
-    degrees of freedom as paths."""
-    steps, step = round(LASTING / 2e-3), 2e-3
+def _growth_rows(vehicle: CutVehicle) -> list[Row]:
+    """Rows: mean squares of an ensemble under white noise divided by their laws. They follow a chi-square distribution
+    with as many degrees of freedom as paths."""
+    steps, step = round(NOISE_SECONDS / 2e-3), 2e-3
     rest, deviation = static_forces(vehicle, steps + 1), np.tile([20.0] * 3 + [4.0] * 3, len(vehicle.hubs))
     still = HubForces(rest.hubs, step, "hub")
     ends = np.array(
         [
-            hub_model("mujoco", vehicle, still.noisy(deviation, SEED, path), step, LASTING).run().states[-1]
-            for path in range(COPIES)
+            hub_model("mujoco", vehicle, still.noisy(deviation, SEED, path), step, NOISE_SECONDS).run().states[-1]
+            for path in range(PATH_COUNT)
         ]
     )
-    body, at = rigid(vehicle), np.array([LASTING])
+    body, at = rigid(vehicle), np.array([NOISE_SECONDS])
     law = body.angle_variance(deviation, step, at)[0]
     sliding = body.position_variance(deviation, step, at, "hub")[0, 1]
-    low, high = chi2.ppf([5e-4, 1 - 5e-4], COPIES) / COPIES
+    low, high = chi2.ppf([5e-4, 1 - 5e-4], PATH_COUNT) / PATH_COUNT
     named = [("roll", ROLL, law[0]), ("pitch", PITCH, law[1]), ("heading", HEADING, law[2]), ("y", Y, sliding)]
     return [
         Observed(
             f"hub_forces.growth_{name}",
             SYSTEM,
-            f"ratio of the mean square of {name} after {LASTING:g} s of white noise to its law, {COPIES} paths",
+            f"ratio of the mean square of {name} after {NOISE_SECONDS:g} s of white noise to its law, "
+            f"{PATH_COUNT} paths",
             float(np.mean(ends[:, i] ** 2) / variance),
             "1",
         ).within(
@@ -255,15 +258,15 @@ def _growth(vehicle: CutVehicle) -> list[Row]:
     ]
 
 
-def _scene(frame: str) -> HubScene:
-    """The scene of the study, 8 s long."""
+def _study_scene(frame: str) -> HubScene:
+    """Scene of the hub force study, 8 s long."""
     tables = {"vehicle": {"file": "r19_free"}, "run": {"duration": 8.0}, "road": {}, "forces": {"frame": frame}}
     return scene_of({"title": TITLE, "system": "hub-forces", "study": "hub_forces"} | tables)
 
 
-def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
-    """Rows: difference between the engines before drift-off, errors of both angles with the filter, and damage that
-    each run predicts."""
+def _stabilised_rows(frame: str, comparison: Comparison) -> list[Row]:
+    """Rows: difference between the engines before drift-off, errors of roll and pitch with the tilt filter, and damage
+    that each run predicts."""
     off = np.abs(comparison.errors(comparison.runs[FILTERED_RUN])).max(axis=0)
     rows = [
         Observed(
@@ -306,7 +309,7 @@ def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
     return rows
 
 
-def _prescribed_truth(frame: str, comparison: Comparison) -> Row:
+def _prescribed_angles_row(frame: str, comparison: Comparison) -> Row:
     """Row: damage ratios if the true roll and pitch are prescribed, so that only the noise of the forces remains."""
     measurement = comparison.measurement
     assert measurement.truth is not None
@@ -325,14 +328,14 @@ def _prescribed_truth(frame: str, comparison: Comparison) -> Row:
     ).at_most(0.1, "force noise of 0.2 % alone changes lightly loaded bushes by some per cent", "none")
 
 
-def _faults(scene: HubScene) -> list[Row]:
-    """Rows: hub forces in a wrong frame, or with hubs exchanged, are refused because they contradict the measured
-    angles.
+def _fault_rows(scene: HubScene) -> list[Row]:
+    """Rows: hub forces in a wrong frame, or of exchanged hubs, are refused because they contradict the measured angles.
 
-    Over 5 s: in 2 s another frame cannot be told from an offset of 30 N at a wheel, which is no contradiction.
+    The runs take 5 s: in 2 s, another frame cannot be distinguished from an offset of 30 N at a wheel, which is no
+    contradiction.
     """
     vehicle, duration = r19(), 5.0
-    hub_inputs = _rough(vehicle, duration)
+    hub_inputs = _road_input(vehicle, duration)
     clean, angles = recorded_measurement(true_run("mujoco", vehicle, hub_inputs, "hub", STEP, duration), "hub", 2)
     in_space, _ = recorded_measurement(
         true_run("mujoco", vehicle, hub_inputs, "inertial", STEP, duration), "inertial", 2
@@ -359,7 +362,7 @@ def _faults(scene: HubScene) -> list[Row]:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Damage of every section force, run by run."""
+    """Tables of the damage by every section force in each run."""
     shown = []
     for frame, of_runs in case_data.items():
         runs = {name: run["damage"] for name, run in of_runs.items() if "exudyn" not in name and "damage" in run}

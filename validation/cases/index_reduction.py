@@ -1,4 +1,5 @@
-"""Drift by index reduction beside drift by noise: which formulation has which, and what cures it."""
+"""Drift by index reduction compared with drift by noise: which constraint formulations have which, and what cures
+it."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,20 +25,22 @@ TITLE = "Drift by index reduction, and drift by noise"
 SYSTEM: System = "drift"
 STEP = 1e-3
 START_ERROR, START_RATE_ERROR = 1e-4, 1e-4
-"""Error of the start, rad and rad/s: what a measured start has, and what a long run's rounding adds up to."""
-ALPHA = 10.0
-"""Baumgarte's rate, 1/s: slow beside a step of 1 ms, fast beside a run."""
-SEED, FORCE_NOISE, WALK = 31, 31.0, np.deg2rad(0.2)
-"""Seed of the noise; N per sample of each force; rad per sqrt(s) of the integrated rate of a cheap gyro."""
+"""Error of the initial angle (rad) and rate (rad/s), of the size that a measured start has or that rounding accumulates
+in a long run."""
+BAUMGARTE_RATE = 10.0
+"""Rate (1/s) of Baumgarte's stabilisation: slow compared with a step of 1 ms, fast compared with a run."""
+SEED, FORCE_NOISE, RATE_WALK = 31, 31.0, np.deg2rad(0.2)
+"""Seed of the noise; standard deviation (N) of the noise on each force sample; angle random walk (rad per sqrt(s)) of a
+cheap gyro."""
 PITCH_BANDWIDTH = 5.0
-"""Bandwidth (Hz) of the pitch that such a gyro gives."""
-HAND: dict[str, Saved] = {
+"""Bandwidth (Hz) of the pitch angle that is integrated from such a gyro."""
+HAND_WRITTEN_FORMULATIONS: dict[str, Saved] = {
     "index 1": {},
-    "index 1, Baumgarte": {"alpha": ALPHA},
+    "index 1, Baumgarte": {"alpha": BAUMGARTE_RATE},
     "index 1, projection": {"projected": True},
 }
-EXUDYN = {"index 2": "TrapezoidalIndex2", "index 3": "GeneralizedAlpha"}
-LACKING = (
+EXUDYN_INTEGRATORS = {"index 2": "TrapezoidalIndex2", "index 3": "GeneralizedAlpha"}
+MISSING_FORMULATIONS = (
     (
         "exudyn.1",
         "Exudyn is asked to run at index 1",
@@ -53,12 +56,12 @@ LACKING = (
         "level of accelerations, so the adapter leaves the pitch out of the coordinates",
     ),
 )
-"""Id, words, why it is not there (Exudyn 1.13, MuJoCo 4)."""
+"""Formulations that an engine does not have: row id, description, and reason (Exudyn 1.13, MuJoCo 4)."""
 
 
 @dataclass(frozen=True)
-class Files:
-    """A drive on the study road in a folder, with its true pitch; it makes scenes that are driven by its files."""
+class MeasuredDrive:
+    """Virtual measurement on the study road: folder with its files, duration (s), and true pitch (n,) in rad."""
 
     folder: Path
     duration: float
@@ -68,23 +71,26 @@ class Files:
         """Scene of the vehicle under the measured forces, which are interpolated linearly."""
         return force_scene(self.folder, step=STEP, duration=self.duration, effects=effects)
 
-    def guided(self, file: str = "pitch.csv", **values: Any) -> Assembly:
+    def prescribed_assembly(self, file: str = "pitch.csv", **values: Any) -> Assembly:
         """Assembly of the vehicle whose pitch is prescribed by one of the files."""
         return assembly_of_scene(self.scene(prescribed_pitch={"file": file, **values}))
 
 
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Gaps from a start off the constraint by formulation, then both drifts by noise; quick: over short runs."""
+    """Rows of pitch gaps after a start off the constraint, by formulation, and of drift by noise with and without
+    prescribed pitch. A quick run has short runs."""
     with TemporaryDirectory() as name:
-        files = _drive(Path(name), 0.2 if quick else 4.0)
-        gaps, laws = _gaps(files), _laws(files)
-        walked = _paths(files.guided("gyro.csv", bandwidth=PITCH_BANDWIDTH), files)  # from a start on the constraint
-        loose = _unguided_pitch_errors(_drive(Path(name), 1.0 if quick else 12.0))
+        drive = _measured_drive(Path(name), 0.2 if quick else 4.0)
+        gaps, laws = _pitch_gaps(drive), _gap_laws(drive)
+        walked = _pitch_errors(
+            drive.prescribed_assembly("gyro.csv", bandwidth=PITCH_BANDWIDTH), drive
+        )  # from a start on the constraint
+        loose = _unguided_pitch_errors(_measured_drive(Path(name), 1.0 if quick else 12.0))
     rows = [
-        *_gap_rows(gaps, laws, files.duration),
+        *_gap_rows(gaps, laws, drive.duration),
         *_noise_rows(walked, loose),
-        *(not_run(f"index_reduction.{id}", SYSTEM, words, why) for id, words, why in LACKING),
+        *(not_run(f"index_reduction.{id}", SYSTEM, words, why) for id, words, why in MISSING_FORMULATIONS),
     ]
     times = STEP * np.arange(len(next(iter(gaps.values()))))
     return rows, {
@@ -95,66 +101,68 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     }
 
 
-def _drive(folder: Path, duration: float) -> Files:
-    """Make a virtual measurement on the study road; write its forces, its pitch, and the pitch that a noisy gyro's
-    integrated rate gives."""
+def _measured_drive(folder: Path, duration: float) -> MeasuredDrive:
+    """Make a virtual measurement on the study road; write its forces, its pitch, and the pitch integrated from a noisy
+    gyro."""
     measured = virtual_drive(folder, duration, STEP, STEP)
-    walk = WALK * np.sqrt(STEP) * np.cumsum(normal_samples(SEED, 0, len(measured.times), 1)[:, 0])
+    walk = RATE_WALK * np.sqrt(STEP) * np.cumsum(normal_samples(SEED, 0, len(measured.times), 1)[:, 0])
     write_time_series(folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, STEP)
-    return Files(folder, duration, measured["pitch"])
+    return MeasuredDrive(folder, duration, measured["pitch"])
 
 
-def _paths(assembly: Assembly, files: Files) -> dict[str, np.ndarray]:
-    """Difference (n,) in rad of pitch and true pitch for every constraint formulation, from the assembly's initial
-    state."""
-    duration = files.duration
-    paths = {name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND.items()}
-    for name, integrator in EXUDYN.items():
+def _pitch_errors(assembly: Assembly, drive: MeasuredDrive) -> dict[str, np.ndarray]:
+    """Difference (n,) in rad between the run's pitch and the true pitch for every constraint formulation, from the
+    assembly's initial state."""
+    duration = drive.duration
+    paths = {
+        name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND_WRITTEN_FORMULATIONS.items()
+    }
+    for name, integrator in EXUDYN_INTEGRATORS.items():
         paths[name] = AsItComes(assembly, Settings(integrator, STEP, duration, spectral_radius=0.6)).run().states
     paths |= {
         f"eliminated, {engine}": build(engine, assembly, Settings("RK4", STEP, duration)).run().states
         for engine in ("reference", "mujoco")
     }
-    return {name: states[:, 3] - files.pitch for name, states in paths.items()}
+    return {name: states[:, 3] - drive.pitch for name, states in paths.items()}
 
 
-def _gaps(files: Files) -> dict[str, np.ndarray]:
-    """Difference (n,) in rad of pitch and prescribed pitch for every constraint formulation, if the start is wrong by
-    START_ERROR and START_RATE_ERROR."""
-    guided = files.guided()
-    start = guided.initial.copy()
+def _pitch_gaps(drive: MeasuredDrive) -> dict[str, np.ndarray]:
+    """Difference (n,) in rad between the run's pitch and the prescribed pitch for every constraint formulation, if the
+    start is wrong by START_ERROR and START_RATE_ERROR."""
+    prescribed_assembly = drive.prescribed_assembly()
+    start = prescribed_assembly.initial.copy()
     start[[3, 7]] += START_ERROR, START_RATE_ERROR
-    return _paths(replace(guided, initial=start), files)
+    return _pitch_errors(replace(prescribed_assembly, initial=start), drive)
 
 
-def _unguided_pitch_errors(files: Files) -> dict[str, np.ndarray]:
-    """Difference (n,) in rad of pitch and true pitch under noisy forces and without a prescribed pitch, for several
-    solvers."""
-    noisy = assembly_of_scene(files.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
+def _unguided_pitch_errors(drive: MeasuredDrive) -> dict[str, np.ndarray]:
+    """Difference (n,) in rad between the run's pitch and the true pitch under noisy forces and without a prescribed
+    pitch, for several solvers."""
+    noisy = assembly_of_scene(drive.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
     solvers = {
         "Exudyn's solver of index 2": ("exudyn", "TrapezoidalIndex2"),
         "Exudyn's solver of index 3": ("exudyn", "GeneralizedAlpha"),
         "Runge-Kutta": ("reference", "RK4"),
     }
     return {
-        name: build(engine, noisy, Settings(integrator, STEP, files.duration, spectral_radius=0.6)).run().states[:, 3]
-        - files.pitch
+        name: build(engine, noisy, Settings(integrator, STEP, drive.duration, spectral_radius=0.6)).run().states[:, 3]
+        - drive.pitch
         for name, (engine, integrator) in solvers.items()
     }
 
 
-def _laws(files: Files) -> dict[str, tuple[np.ndarray, str]]:
+def _gap_laws(drive: MeasuredDrive) -> dict[str, tuple[np.ndarray, str]]:
     """For each formulation, the closed form of the pitch error (n,) in rad after the wrong start, and the reason for
-    it."""
-    times = STEP * np.arange(len(files.pitch))
+    this form."""
+    times = STEP * np.arange(len(drive.pitch))
     return {
         "index 1": (gap_law(times, START_ERROR, START_RATE_ERROR), "g'' = 0 keeps both errors: g = g(0) + g'(0) t"),
         "index 1, Baumgarte": (
-            gap_law(times, START_ERROR, START_RATE_ERROR, ALPHA),
+            gap_law(times, START_ERROR, START_RATE_ERROR, BAUMGARTE_RATE),
             "g'' + 2 alpha g' + alpha^2 g = 0",
         ),
         "index 2": (
-            np.append(START_ERROR, START_ERROR + STEP / 2 * START_RATE_ERROR + _quadrature(files)[1:]),
+            np.append(START_ERROR, START_ERROR + STEP / 2 * START_RATE_ERROR + _quadrature_error(drive)[1:]),
             "g' = 0 keeps the error of the angle, and adds that of the trapezoidal rule over the rate",
         ),
     }
@@ -164,7 +172,7 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
     start = f"from a start off by {START_ERROR:g} rad and {START_RATE_ERROR:g} rad/s"
     rows = [
         Observed(
-            f"index_reduction.law.{_id(name)}",
+            f"index_reduction.law.{_row_id(name)}",
             SYSTEM,
             f"{name}: difference of the gap {start} from its law",
             float(np.abs(gaps[name] - law).max() / START_ERROR),
@@ -180,7 +188,7 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
     }
     rows += [
         Observed(
-            f"index_reduction.none.{_id(name)}",
+            f"index_reduction.none.{_row_id(name)}",
             SYSTEM,
             f"{name}: gap after the first step {start}",
             float(np.abs(gaps[name][1:]).max()),
@@ -197,20 +205,20 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
             "",
         ).beside(1 + START_RATE_ERROR / START_ERROR * duration, "it never stops", "none")
     )
-    return [*rows, _index_two_refused()]
+    return [*rows, _index_two_row()]
 
 
-def _quadrature(files: Files) -> np.ndarray:
-    """Error (n,) in rad of the prescribed pitch's rate after integration by the trapezoidal rule."""
-    signal = files.guided().input
+def _quadrature_error(drive: MeasuredDrive) -> np.ndarray:
+    """Error (n,) in rad of the prescribed pitch if its rate is integrated by the trapezoidal rule."""
+    signal = drive.prescribed_assembly().input
     assert signal is not None
-    angle, rate = signal.sample(0.0, STEP, len(files.pitch))[:, 2:4].T
+    angle, rate = signal.sample(0.0, STEP, len(drive.pitch))[:, 2:4].T
     summed = np.concatenate(([0.0], np.cumsum(0.5 * STEP * (rate[1:] + rate[:-1]))))
     return summed - (angle - angle[0])
 
 
-def _index_two_refused() -> Row:
-    """Exudyn's generalised-alpha with its flag for index 2."""
+def _index_two_row() -> Row:
+    """Row: outcome of Exudyn's generalised-alpha solver with its flag for index 2."""
     import exudyn as exu
 
     system = exu.SystemContainer().AddSystem()
@@ -235,7 +243,7 @@ def _index_two_refused() -> Row:
 
 
 def _noise_rows(guided_errors: dict[str, np.ndarray], unguided_errors: dict[str, np.ndarray]) -> list[Row]:
-    """Rows: the drift caused by noise, with and without prescribed pitch, is the same in all formulations."""
+    """Rows: the drift by noise, with and without prescribed pitch, is the same in all formulations."""
     rows = []
     guided = "guided by the integrated rate of a noisy gyro"
     free = f"without guidance, {FORCE_NOISE:g} N of noise on each sample of the forces"
@@ -261,12 +269,13 @@ def _noise_rows(guided_errors: dict[str, np.ndarray], unguided_errors: dict[str,
     return rows
 
 
-def _id(name: str) -> str:
+def _row_id(name: str) -> str:
     return name.replace(", ", ".").replace(" ", "_")
 
 
 def draw(case_data: Saved) -> Drawn:
-    """Gaps from a wrong start by formulation, and errors by noise, in which all formulations lie on each other."""
+    """Plot pitch gaps after a wrong start by formulation, and pitch errors by noise, which are equal in all
+    formulations."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6))
@@ -294,12 +303,12 @@ def draw(case_data: Saved) -> Drawn:
     return [(caption, figure)]
 
 
-DIRECTION = np.array([[0.0, 0.0, 0.0, 1.0]])
-"""G: the pitch alone is prescribed."""
+CONSTRAINT_JACOBIAN = np.array([[0.0, 0.0, 0.0, 1.0]])
+"""Constraint matrix G (1, 4): the pitch alone is prescribed."""
 
 
 class IndexOne:
-    """The guided vehicle with its constraint differentiated twice.
+    """The vehicle with prescribed pitch, its constraint differentiated twice (index 1).
 
     alpha : Baumgarte's rate in 1/s, 0 for none; projected : whether each step ends on the constraint
     """
@@ -307,12 +316,15 @@ class IndexOne:
     def __init__(self, assembly: Assembly, alpha: float = 0.0, projected: bool = False) -> None:
         self.assembly, self.alpha, self.projected = assembly, alpha, projected
         self._mass = matrices(assembly.vehicle)[0]
-        self._solve = np.linalg.inv(np.block([[self._mass, -DIRECTION.T], [DIRECTION, np.zeros((1, 1))]]))
+        self._solve = np.linalg.inv(
+            np.block([[self._mass, -CONSTRAINT_JACOBIAN.T], [CONSTRAINT_JACOBIAN, np.zeros((1, 1))]])
+        )
         self._free = derivative_of("force", assembly.vehicle.geometry)
         self._p = numbers(assembly.parameters, assembly.vehicle)
 
     def run(self, step: float, duration: float) -> np.ndarray:
-        """States (n + 1, 8) by classical Runge-Kutta from the assembly's initial state, on the constraint or not."""
+        """States (n + 1, 8) by classical Runge-Kutta from the assembly's initial state, which may be off the
+        constraint."""
         assert self.assembly.input is not None
         count = round(duration / step)
         inputs = self.assembly.input.sample(0.0, step / 2, 2 * count + 1)
@@ -321,27 +333,28 @@ class IndexOne:
         acting = dict[float, np.ndarray]()
 
         def rate(time: float, y: np.ndarray) -> np.ndarray:
-            return self._rate(y, acting[time])
+            return self._derivative(y, acting[time])
 
         for i in range(count):
             acting |= zip((0.0, 0.5 * step, step), inputs[2 * i : 2 * i + 3], strict=True)
             y = step_on(rate, 0.0, y, step)
-            states[i + 1] = y = self._back(y, acting[step]) if self.projected else y
+            states[i + 1] = y = self._projection(y, acting[step]) if self.projected else y
         return states
 
-    def _rate(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def _derivative(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Derivative y' (8,) of the state under the input u = (f1, f2, beta, beta', beta'')."""
         dy = self._free(y, u[:2].copy(), self._p)
         wanted = u[4] - 2 * self.alpha * (y[7] - u[3]) - self.alpha**2 * (y[3] - u[2])
         dy[4:] = (self._solve @ np.append(self._mass @ dy[4:], wanted))[:4]
         return dy
 
-    def _back(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def _projection(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Projection of a state onto the constraint: the nearest state by the metric of the kinetic energy."""
         along = self._solve[:4, 4]
         return y - np.concatenate((along * (y[3] - u[2]), along * (y[7] - u[3])))
 
 
-def gap_law(times: np.ndarray, start_gap: float, rate: float, alpha: float = 0.0) -> np.ndarray:
-    """Gap g (n,) in rad of g'' + 2 alpha g' + alpha^2 g = 0 from g(0) = start (rad) and g'(0) = rate (rad/s)."""
-    return (start_gap + (rate + alpha * start_gap) * times) * np.exp(-alpha * times)
+def gap_law(times: np.ndarray, start_gap: float, start_rate: float, alpha: float = 0.0) -> np.ndarray:
+    """Solution g (n,) in rad of g'' + 2 alpha g' + alpha^2 g = 0 from g(0) = start_gap (rad) and g'(0) = start_rate
+    (rad/s)."""
+    return (start_gap + (start_rate + alpha * start_gap) * times) * np.exp(-alpha * times)

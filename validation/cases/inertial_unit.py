@@ -1,4 +1,5 @@
-"""The inertial unit of the paper's Section 3.2: attitude from noisy rates, its exact laws, and a moving car."""
+"""The inertial unit of the paper's Section 3.2: attitude integrated from noisy rates, its exact laws, and a recording
+from a real car."""
 
 import math
 from pathlib import Path
@@ -47,26 +48,37 @@ from validation.measured import recording
 
 TITLE = "Attitude from a gyro's rates"
 SYSTEM: System = "drift"
-STANDARD_ERRORS = 3.3
-"""Standard errors within which a mean lies 999 times in 1,000."""
-UNEQUAL = np.array([0.1, 0.3, 0.6])
-"""Random walk of each axis, rad per sqrt(s)."""
-EQUAL = 0.5
+MEAN_BAND = 3.3
+"""Number of standard errors within which a mean lies 999 times in 1,000."""
+UNEQUAL_WALKS = np.array([0.1, 0.3, 0.6])
+"""Angle random walk of each axis, rad per sqrt(s)."""
+EQUAL_WALK = 0.5
+"""Angle random walk, rad per sqrt(s), where all axes have the same."""
 SAMPLE_PERIOD, RUN_SECONDS = 5e-3, 2.0
-"""s, of the Monte Carlo runs; a step's share of the law is then some 1e-4 of it."""
+"""Sampling period and length (s) of the Monte Carlo runs; one step contributes some 1e-4 of the law's value."""
 
 
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows for clean data, the laws, the ten minutes, the bias, the recording; in full the section forces, too."""
+    """Rows for exact rates, the laws, the ten-minute example, gyro bias and the recording; a full run also has the
+    section forces."""
     paths = 200 if quick else 4000
-    rows = [*_attitude_from_exact_rates(), *_one_axis(paths), *_three_axes(paths), *_norms(paths), *_bias(paths)]
-    example, data = _ten_minutes(0 if quick else 60)
-    recorded, seen = _recording(paths)
-    return [*rows, *example, *recorded, *([] if quick else _section_forces())], {"ten minutes": data, "recording": seen}
+    rows = [
+        *_exact_rate_rows(),
+        *_one_axis_rows(paths),
+        *_three_axes_rows(paths),
+        *_norm_rows(paths),
+        *_bias_rows(paths),
+    ]
+    example, data = _ten_minute_rows(0 if quick else 60)
+    recorded, seen = _recording_rows(paths)
+    return [*rows, *example, *recorded, *([] if quick else _section_force_rows())], {
+        "ten minutes": data,
+        "recording": seen,
+    }
 
 
-def _attitude_from_exact_rates() -> list[Row]:
+def _exact_rate_rows() -> list[Row]:
     """Rows: error of the attitude integrated from exact rates, about a fixed axis and about an axis that moves on a
     cone."""
     rate, h = np.array([0.3, -1.1, 0.7]), 1e-3
@@ -89,21 +101,21 @@ def _attitude_from_exact_rates() -> list[Row]:
 
 
 def _closed_form_row(
-    id: str, quantity: str, error_value: float, unit: str, tolerance_reason: str, bound: float = 1e-12
+    row_name: str, quantity: str, error_value: float, unit: str, tolerance_reason: str, bound: float = 1e-12
 ) -> Row:
     """Row for an error relative to a closed form."""
-    return Observed(f"inertial_unit.{id}", SYSTEM, quantity, error_value, unit).at_most(
+    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity, error_value, unit).at_most(
         bound, tolerance_reason, "closed form"
     )
 
 
-def _one_axis(paths: int) -> list[Row]:
+def _one_axis_rows(path_count: int) -> list[Row]:
     """Rows on eqs (27) to (30): with noise on one gyro axis and no rotation, the angle about this axis is a Brownian
     motion."""
     rows = []
     for axis in range(3):
-        deviation = EQUAL / SAMPLE_PERIOD**0.5 * np.eye(3)[axis]
-        turns = rotation_vector(attitude_errors(np.zeros((200, 3)), SAMPLE_PERIOD, deviation, paths))
+        deviation = EQUAL_WALK / SAMPLE_PERIOD**0.5 * np.eye(3)[axis]
+        turns = rotation_vector(attitude_errors(np.zeros((200, 3)), SAMPLE_PERIOD, deviation, path_count))
         spill = float(np.abs(np.delete(turns, axis, axis=1)).max())
         rows += [
             mean_square(
@@ -114,9 +126,9 @@ def _one_axis(paths: int) -> list[Row]:
                     float(np.mean(turns[:, axis] ** 2)),
                     "rad^2",
                 ),
-                EQUAL**2 * 200 * SAMPLE_PERIOD,
-                paths,
-                f"s^2 t; {paths:,} paths, seed {SEED}",
+                EQUAL_WALK**2 * 200 * SAMPLE_PERIOD,
+                path_count,
+                f"s^2 t; {path_count:,} paths, seed {SEED}",
             ),
             _closed_form_row(
                 f"one_axis.{axis + 1}.spill",
@@ -129,58 +141,57 @@ def _one_axis(paths: int) -> list[Row]:
     return rows
 
 
-def _mean(id: str, quantity: str, samples: np.ndarray, law: float, tolerance_reason: str) -> Row:
-    """Row for a mean that must lie within LEVEL standard errors of its theoretical value."""
+def _mean_row(row_name: str, quantity: str, samples: np.ndarray, expected_mean: float, tolerance_reason: str) -> Row:
+    """Row for a mean that must lie within MEAN_BAND standard errors of its theoretical value."""
     error = float(samples.std(ddof=1) / math.sqrt(len(samples)))
-    return Observed(f"inertial_unit.{id}", SYSTEM, quantity, float(samples.mean()), "").within(
-        law,
-        STANDARD_ERRORS * error,
-        f"{tolerance_reason}; {len(samples):,} paths, seed {SEED}, within {STANDARD_ERRORS} standard errors of "
-        f"{error:.2g}",
+    return Observed(f"inertial_unit.{row_name}", SYSTEM, quantity, float(samples.mean()), "").within(
+        expected_mean,
+        MEAN_BAND * error,
+        f"{tolerance_reason}; {len(samples):,} paths, seed {SEED}, within {MEAN_BAND} standard errors of {error:.2g}",
         "closed form",
     )
 
 
-def _three_axes(paths: int) -> list[Row]:
-    """Rows on noise about three axes: with equal noise the mean trace of the error; with unequal noise on a turning
-    body the mean error matrix and the mean quaternion."""
+def _three_axes_rows(path_count: int) -> list[Row]:
+    """Rows on noise about three axes. Equal noise: mean trace of the error matrix; unequal noise on a turning body:
+    mean error matrix and mean quaternion."""
     count = round(RUN_SECONDS / SAMPLE_PERIOD)
     rates, root = turning_rates(count, SAMPLE_PERIOD), SAMPLE_PERIOD**0.5
-    equal = attitude_errors(rates, SAMPLE_PERIOD, EQUAL / root * np.ones(3), paths)
-    wandered = attitude_errors(rates, SAMPLE_PERIOD, UNEQUAL / root, paths)
+    equal = attitude_errors(rates, SAMPLE_PERIOD, EQUAL_WALK / root * np.ones(3), path_count)
+    wandered = attitude_errors(rates, SAMPLE_PERIOD, UNEQUAL_WALKS / root, path_count)
     trace, exact = (
         np.trace(rotation_matrix(equal), axis1=1, axis2=2),
-        mean_error(UNEQUAL, rates, SAMPLE_PERIOD, START_ATTITUDE),
+        mean_error(UNEQUAL_WALKS, rates, SAMPLE_PERIOD, START_ATTITUDE),
     )
-    resting = mean_error(UNEQUAL, np.zeros_like(rates), SAMPLE_PERIOD, START_ATTITUDE)
-    all_equal = np.full(3, EQUAL)
+    resting = mean_error(UNEQUAL_WALKS, np.zeros_like(rates), SAMPLE_PERIOD, START_ATTITUDE)
+    all_equal = np.full(3, EQUAL_WALK)
     same = float(np.trace(mean_error(all_equal, rates, SAMPLE_PERIOD, START_ATTITUDE)))
     return [
-        _mean(
+        _mean_row(
             "trace",
             "mean trace of the error's rotation matrix, three equal axes, turning body",
             trace,
-            mean_trace(EQUAL, RUN_SECONDS),
+            mean_trace(EQUAL_WALK, RUN_SECONDS),
             "3 exp(-s^2 t)",
         ),
-        _mean(
+        _mean_row(
             "scalar",
             "mean scalar part q1 of the error's quaternion, three equal axes, turning body",
             equal[:, 0],
             mean_scalar(all_equal, RUN_SECONDS),
             "exp(-3 s^2 t / 8), of the normalised quaternion",
         ),
-        _mean(
+        _mean_row(
             "scalar.unequal",
             "mean scalar part q1 of the error's quaternion, unequal axes, turning body",
             wandered[:, 0],
-            mean_scalar(UNEQUAL, RUN_SECONDS),
+            mean_scalar(UNEQUAL_WALKS, RUN_SECONDS),
             "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy",
         ),
         _closed_form_row(
             "matrix.equal",
             "difference of the matrix law with equal noise from 3 exp(-s^2 t)",
-            abs(same - mean_trace(EQUAL, RUN_SECONDS)),
+            abs(same - mean_trace(EQUAL_WALK, RUN_SECONDS)),
             "",
             "both are exact",
         ),
@@ -189,9 +200,9 @@ def _three_axes(paths: int) -> list[Row]:
             "error of the mean rotation matrix with unequal noise, turning body, worst entry over its standard error",
             standard_errors(wandered, exact),
             "",
-            f"{paths:,} paths, seed {SEED}; entries differ from the identity by "
+            f"{path_count:,} paths, seed {SEED}; entries differ from the identity by "
             f"up to {np.abs(exact - np.eye(3)).max():.2f}",
-            STANDARD_ERRORS,
+            MEAN_BAND,
         ),
         Observed(
             "inertial_unit.matrix.resting",
@@ -200,25 +211,27 @@ def _three_axes(paths: int) -> list[Row]:
             "rest, worst entry over its standard error",
             standard_errors(wandered, resting),
             "",
-        ).beside(f"far beyond {STANDARD_ERRORS}", "the rows above can tell the laws apart", "closed form"),
+        ).beside(f"far beyond {MEAN_BAND}", "the rows above can tell the laws apart", "closed form"),
     ]
 
 
-STRATONOVICH = "exp(-k s^2 t / 8), as after Stratonovich"
+STRATONOVICH_REASON = "exp(-k s^2 t / 8), as after Stratonovich"
 
 
-def _norms(paths: int) -> list[Row]:
-    """Rows on Ito's theory: the norm of a quaternion that is never normalised grows by a law, and its mean is the true
-    quaternion."""
+def _norm_rows(path_count: int) -> list[Row]:
+    """Rows on Ito's theory: the norm of a quaternion that is never normalised grows by a law, and the mean quaternion
+    is the true one."""
     rows, steps, span = [], 100, 4.0
     period = span / steps
     for axes in (1, 3):
-        noise = np.zeros((steps, paths, 3))
-        noise[:, :, :axes] = normal_samples(SEED, axes, steps * paths, axes, source=GYRO).reshape(steps, paths, axes)
-        q = euler_quaternions(EQUAL * period**0.5 * noise, START_ATTITUDE)
+        noise = np.zeros((steps, path_count, 3))
+        noise[:, :, :axes] = normal_samples(SEED, axes, steps * path_count, axes, source=GYRO).reshape(
+            steps, path_count, axes
+        )
+        q = euler_quaternions(EQUAL_WALK * period**0.5 * noise, START_ATTITUDE)
         square = np.sum(q**2, axis=1)
-        law = euler_mean_square(EQUAL, axes, period, steps)
-        scalar, true, noisy = mean_scalar(np.full(axes, EQUAL), span), q[:, 0], f"{axes} noisy axes"
+        law = euler_mean_square(EQUAL_WALK, axes, period, steps)
+        scalar, true, noisy = mean_scalar(np.full(axes, EQUAL_WALK), span), q[:, 0], f"{axes} noisy axes"
         means = (
             (
                 "norm",
@@ -239,23 +252,23 @@ def _norms(paths: int) -> list[Row]:
                 f"mean scalar part q1 by explicit Euler, normalised at the end, {noisy}",
                 true / square**0.5,
                 scalar,
-                STRATONOVICH,
+                STRATONOVICH_REASON,
             ),
         )
         rows += [
-            *(_mean(f"{id}.{axes}", *figures) for id, *figures in means),
+            *(_mean_row(f"{id}.{axes}", *figures) for id, *figures in means),
             Observed(
                 f"inertial_unit.growth.{axes}",
                 SYSTEM,
                 f"root of the explicit Euler law at 4e6 steps, {axes} noisy axes",
-                euler_mean_square(EQUAL, axes, 1e-6, 4_000_000) ** 0.5,
+                euler_mean_square(EQUAL_WALK, axes, 1e-6, 4_000_000) ** 0.5,
                 "",
-            ).within(ito_norm(np.full(axes, EQUAL), span), 1e-6, "exp(k s^2 t / 8), eq. (28)", "closed form"),
+            ).within(ito_norm(np.full(axes, EQUAL_WALK), span), 1e-6, "exp(k s^2 t / 8), eq. (28)", "closed form"),
         ]
     return rows
 
 
-def _ten_minutes(paths: int) -> CaseAnswer:
+def _ten_minute_rows(path_count: int) -> CaseAnswer:
     """Rows and data on the paper's example: 600 s of a car's motion at 1 kHz, with white noise of 0.1 rad/s on each
     gyro sample."""
     walk = random_walk(RATE_DEVIATION, SAMPLING_RATE)
@@ -285,13 +298,13 @@ def _ten_minutes(paths: int) -> CaseAnswer:
             )
         ),
     ]
-    if not paths:
+    if not path_count:
         return rows, {}
     every = round(SAMPLING_RATE)
     t = np.arange(round(TEN_MINUTES * SAMPLING_RATE)) / SAMPLING_RATE
     rates = np.column_stack([0.05 * np.sin(5 * t), 0.08 * np.sin(7 * t), 0.1 * np.sin(0.2 * t)])  # a car on a road
     true = true_attitude(rates, 1 / SAMPLING_RATE, START_ATTITUDE)[::every]
-    wandered = np.array([_path(path, rates, true) for path in range(paths)])
+    wandered = np.array([_error_angles(path, rates, true) for path in range(path_count)])
     rows.append(
         mean_square(
             Observed(
@@ -302,21 +315,20 @@ def _ten_minutes(paths: int) -> CaseAnswer:
                 "deg^2",
             ),
             axis**2,
-            3 * paths,
-            f"{paths} paths of 600,000 steps, seed {SEED}",
+            3 * path_count,
+            f"{path_count} paths of 600,000 steps, seed {SEED}",
         )
     )
     return rows, {
         "paths": wandered[:8].tolist(),
         "rms": np.sqrt(np.mean(wandered**2, axis=(0, 2))).tolist(),
-        "count": paths,
+        "count": path_count,
     }
 
 
-def _path(path: int, rates: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
+def _error_angles(path: int, rates: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
     """Error angles (601, 3) in degrees of one noisy path, about the global axes, at the times of ``true_attitudes``
-    (601, 4).
-    """
+    (601, 4)."""
     attitudes = measured_attitude(
         rates, 1 / SAMPLING_RATE, RATE_DEVIATION * np.ones(3), START_ATTITUDE, range(path, path + 1), SEED
     )
@@ -325,15 +337,17 @@ def _path(path: int, rates: np.ndarray, true_attitudes: np.ndarray) -> np.ndarra
     )
 
 
-def _bias(paths: int) -> list[Row]:
-    """Rows: mean square angle error from simulated gyro biases, constant and wandering, compared with its law."""
+def _bias_rows(path_count: int) -> list[Row]:
+    """Rows: mean square angle error by simulated gyro biases, constant and wandering, compared with its law."""
     rows, grade, tau = [], 10.0 * DEGREES_PER_HOUR, 100.0
     for name, turn_on, instability, span in (
         ("constant", grade, 0.0, 60),
         ("wandering", 0.0, grade, 60),
         ("forgetful", 0.0, grade, 600),
     ):
-        angles = np.array([bias_path(span, 1.0, turn_on, instability, tau, SEED, path).sum() for path in range(paths)])
+        angles = np.array(
+            [bias_path(span, 1.0, turn_on, instability, tau, SEED, path).sum() for path in range(path_count)]
+        )
         law = float(angle_variance(np.array(float(span)), 0.0, turn_on, instability, tau))
         rows.append(
             mean_square(
@@ -345,14 +359,14 @@ def _bias(paths: int) -> list[Row]:
                     "rad^2",
                 ),
                 law,
-                paths,
-                f"b^2 t^2 or 2 b^2 tau^2 (t/tau - 1 + exp(-t/tau)), tau = 100 s; {paths:,} paths, seed {SEED}",
+                path_count,
+                f"b^2 t^2 or 2 b^2 tau^2 (t/tau - 1 + exp(-t/tau)), tau = 100 s; {path_count:,} paths, seed {SEED}",
             )
         )
     return rows
 
 
-def _section_forces() -> list[Row]:
+def _section_force_rows() -> list[Row]:
     """Rows: a slowly growing pitch error only rotates the section forces, shown with runs whose pitch is prescribed."""
     scene, size = road_scene(duration=10.0), 0.1
     with TemporaryDirectory() as name:
@@ -380,9 +394,9 @@ def _section_forces() -> list[Row]:
     ]
 
 
-def _recording(paths: int) -> CaseAnswer:
-    """Rows and data from a minute of recording in a real car: gyro compared with camera, and the noise law on the car's
-    motion."""
+def _recording_rows(path_count: int) -> CaseAnswer:
+    """Rows and data from a recording of a minute in a real car: gyro compared with camera, and the noise law on the
+    car's motion."""
     path = recording.find()
     if path is None:
         reason = f"needs {recording.RECORDING_FILE} in the folder that TWINRIG_DATA names"
@@ -394,7 +408,7 @@ def _recording(paths: int) -> CaseAnswer:
     off = np.degrees(recording.gyro_error(recorded))
     rates, period = recorded.rates[::5], 5 * recording.SAMPLE_PERIOD
     deviation = np.array([0.02, 0.05, 0.1]) / period**0.5
-    wandered = attitude_errors(rates, period, deviation, paths)
+    wandered = attitude_errors(rates, period, deviation, path_count)
     law = mean_error(deviation * period**0.5, rates, period, START_ATTITUDE)
     return [
         Observed(
@@ -410,7 +424,7 @@ def _recording(paths: int) -> CaseAnswer:
             "error of the mean rotation matrix of noise on the car's motion, worst entry over its standard error",
             standard_errors(wandered, law),
             "",
-            f"the recorded rates, read each 50 ms, as the true motion; {paths:,} paths, seed {SEED}",
-            STANDARD_ERRORS,
+            f"the recorded rates, read each 50 ms, as the true motion; {path_count:,} paths, seed {SEED}",
+            MEAN_BAND,
         ),
     ], {"off": off[::20].tolist()}

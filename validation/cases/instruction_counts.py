@@ -1,9 +1,10 @@
-"""Cost of a step in instructions, which do not wander as seconds do, and how well their count repeats.
+"""Cost of a step in processor instructions, whose number does not scatter as seconds do, and how well this number
+repeats.
 
-Every method with fixed steps is counted by valgrind. Two processes march the same, copies of one that has loaded
-everything without being counted; within each, two numbers of steps are differenced, so that the start of a run drops
-out. Counts compare the same code over time and between settings: valgrind offers the program another processor than
-this one, and its instructions are no time.
+Valgrind counts every method with fixed steps. Two processes run the same steps; both are copies of one process that has
+loaded everything without being counted. Within each, runs of two lengths are differenced, so that the start of a run
+drops out. Counts compare the same code over time and between settings: valgrind offers the program another processor
+than this one, and its instructions are no time.
 """
 
 import json
@@ -39,48 +40,48 @@ METHODS = {
     ),
     "mujoco": ("Euler", "implicit", "implicitfast", "discrete", "RK4"),
 }
-CURVES = tuple(f"{engine} {method}" for engine, methods in METHODS.items() for method in methods)
-STEPS = (40, 120)
-"""Steps of the runs that are differenced."""
-COUNT_BOUND = 1e-6
+ENGINE_METHODS = tuple(f"{engine} {method}" for engine, methods in METHODS.items() for method in methods)
+STEP_COUNTS = (40, 120)
+"""Numbers of steps of the two runs that are differenced."""
+COUNT_TOLERANCE = 1e-6
 PROCESS_TIMEOUT = 900
-"""Seconds until a process is given up."""
-ID, WHAT = "instruction_counts", f"instructions of {len(CURVES)} methods counted in two processes"
+"""Time (s) after which a counting process is given up."""
+CASE_ID, CASE_QUANTITY = "instruction_counts", f"instructions of {len(ENGINE_METHODS)} methods counted in two processes"
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Counts of every method in two processes under valgrind, in full alone: they have no quick share."""
+    """Rows of instruction counts of every method in two processes under valgrind; a quick run has none."""
     if quick:
         return [], {"instructions": {}}
     if shutil.which("valgrind") is None:
-        return [not_run(ID, SYSTEM, WHAT, "valgrind is not installed")], {"instructions": {}}
+        return [not_run(CASE_ID, SYSTEM, CASE_QUANTITY, "valgrind is not installed")], {"instructions": {}}
     try:
-        first, second = _instructions(folder / "instructions")
+        first, second = _instruction_counts(folder / "instructions")
     except (subprocess.SubprocessError, OSError) as error:
         reason = f"valgrind failed: {str(error).splitlines()[0][:120]}"
-        return [not_run(ID, SYSTEM, WHAT, reason)], {"instructions": {}}
+        return [not_run(CASE_ID, SYSTEM, CASE_QUANTITY, reason)], {"instructions": {}}
     off = np.abs(second / first - 1.0).max(axis=1)
     rows = [
         Observed(
-            f"{ID}.{engine}",
+            f"{CASE_ID}.{engine}",
             SYSTEM,
-            f"{WHAT}: largest difference of a run in {LABELS[engine]}",
+            f"{CASE_QUANTITY}: largest difference of a run in {LABELS[engine]}",
             float(largest.max()),
             "relative",
         ).at_most(
-            COUNT_BOUND,
+            COUNT_TOLERANCE,
             "the same instructions in the same order: seed of hashes and "
             "number of threads are set, and no clock's reading is printed while they are counted",
             "none",
         )
         for engine, largest in zip(METHODS, np.split(off, [len(METHODS["exudyn"])]), strict=True)
     ]
-    per_step = np.diff(first, axis=1)[:, 0] / (STEPS[1] - STEPS[0])
-    return rows, {"instructions": dict(zip(CURVES, per_step.tolist(), strict=True))}
+    per_step = np.diff(first, axis=1)[:, 0] / (STEP_COUNTS[1] - STEP_COUNTS[0])
+    return rows, {"instructions": dict(zip(ENGINE_METHODS, per_step.tolist(), strict=True))}
 
 
-def _instructions(folder: Path) -> np.ndarray:
-    """Numbers of instructions (2 processes, methods, 2 step counts), as the profiler dumps them between the marches."""
+def _instruction_counts(folder: Path) -> np.ndarray:
+    """Numbers of instructions (2 processes, methods, 2 step counts), as the profiler writes them between the runs."""
     folder.mkdir()
     mass, damping, stiffness, *_ = linearised(assembly_of_scene(road_scene()).vehicle)
     march = {
@@ -88,7 +89,7 @@ def _instructions(folder: Path) -> np.ndarray:
         "damping": damping.tolist(),
         "stiffness": stiffness.tolist(),
         "methods": METHODS,
-        "steps": STEPS,
+        "steps": STEP_COUNTS,
     }
     settled = {**os.environ, "PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     command = [
@@ -102,25 +103,25 @@ def _instructions(folder: Path) -> np.ndarray:
         json.dumps(march),
     ]
     subprocess.run(command, env=settled, check=True, capture_output=True, timeout=PROCESS_TIMEOUT)
-    marches = len(CURVES) * len(STEPS)
+    marches = len(ENGINE_METHODS) * len(STEP_COUNTS)
     counts = [
-        [_total(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
+        [_count_of_dump(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
         for path in folder.glob("count.*")
         if path.with_name(f"{path.name}.{marches + 1}").exists()
     ]
     shutil.rmtree(folder)
-    return np.array(counts, float).reshape(2, -1, len(STEPS))
+    return np.array(counts, float).reshape(2, -1, len(STEP_COUNTS))
 
 
-def _total(dump: Path) -> int:
-    """Number of instructions in one dump of the profiler."""
-    matched = re.search(r"^totals: (\d+)", dump.read_text(errors="replace"), re.MULTILINE)
+def _count_of_dump(dump_file: Path) -> int:
+    """Number of instructions in one dump file of the profiler."""
+    matched = re.search(r"^totals: (\d+)", dump_file.read_text(errors="replace"), re.MULTILINE)
     assert matched is not None
     return int(matched[1])
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Instructions per step, where they were counted."""
+    """Table of instructions per step; none if they were not counted."""
     rows = tuple((curve_name(curve), f"{count / 1e3:,.1f}") for curve, count in case_data["instructions"].items())
     note = (
         f"Linear pitch-plane vehicle, steps of {1e3 * instructions_run.STEP:g} ms, all forces from one Python "

@@ -1,4 +1,5 @@
-"""The Kalman filter of the pitch: consistency, stationary covariance, gaps, and what is left of the damage."""
+"""Kalman filter of the pitch: consistency, stationary covariance, measurement gaps, and damage ratios of the stabilised
+runs."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -29,17 +30,17 @@ from validation.drift.kalman_runs import (
 TITLE = "The Kalman filter of the pitch"
 SYSTEM: System = "drift"
 SEED = 2000
-"""First seed; the filter's settings were chosen on seeds 101 to 103."""
+"""Seed of the first run; the filter's settings were chosen on seeds 101 to 103."""
 BAND_PROBABILITY = 0.999
-"""Of every band."""
+"""Probability with which a correct filter lies inside each chi-square band."""
 ENGINES = ("reference", "exudyn", "mujoco")
-SAMPLES, DURATION = 20, 30.0
-"""Noise samples and length (s) of the runs that are judged by damage."""
-LOOP_RUNS, LOOP = 6, 60.0
-OUTAGE, LOST = (20.0, 25.0), 0.3
-"""s without any measurement, and share of all other samples that are lost."""
-FILTERS = {"right": (1.0, 1.0), "Q": (4.0, 1.0), "R": (1.0, 4.0)}
-"""Factors on the variances of force noise and measurement noise that a filter is told."""
+SAMPLE_COUNT, DURATION = 20, 30.0
+"""Number of noise samples and length (s) of the runs that are judged by damage."""
+LOOP_RUN_COUNT, LOOP_SECONDS = 6, 60.0
+OUTAGE, LOST_SHARE = (20.0, 25.0), 0.3
+"""Start and end (s) of an outage without any measurement, and share of all other samples that are lost."""
+VARIANCE_FACTORS = {"right": (1.0, 1.0), "Q": (4.0, 1.0), "R": (1.0, 4.0)}
+"""For each filter: factors on the variances of force noise and of measurement noise that the filter assumes."""
 SENSORS = {"angle": (PITCH,), "rate": (PITCH_RATE,), "angle and rate": (PITCH, PITCH_RATE)}
 
 
@@ -49,17 +50,18 @@ SENSORS = {"angle": (PITCH,), "rate": (PITCH_RATE,), "angle and rate": (PITCH, P
 )
 @allowing_breaches("without a measured pitch a run is lost, which is what is shown", "upright")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Consistency, gaps and a short stabilised run; in full also covariances, damage and a gyro alone."""
+    """Rows on consistency, measurement gaps and a short stabilised run; a full run also has covariances, damage, and a
+    filter with a gyro alone."""
     run_folder = folder / "kalman"
     run_folder.mkdir(exist_ok=True)
     if quick:
         rows = _consistency_rows(run_folder, 2, 4.0, ("right",)) + _gap_rows(run_folder, 4.0, None, ("angle",))
-        return rows + _short_rows(run_folder), {"damage": [], "deviations": []}
-    rows = _consistency_rows(run_folder, 24, 12.0, tuple(FILTERS))
+        return rows + _short_run_rows(run_folder), {"damage": [], "deviations": []}
+    rows = _consistency_rows(run_folder, 24, 12.0, tuple(VARIANCE_FACTORS))
     rows += _gap_rows(run_folder, 40.0, OUTAGE, tuple(SENSORS))
     loop_rows, deviations = _loop_rows(run_folder)
     gyro = gyro_alone(run_folder, 600.0, SEED)
-    damage = [scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES) for i in range(SAMPLES)]
+    damage = [scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES) for i in range(SAMPLE_COUNT)]
     right = [
         scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES[:1], wrong=False)["reference"] for i in range(2)
     ]
@@ -67,12 +69,12 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"damage": damage, "deviations": deviations, "gyro": gyro}
 
 
-def _consistency_rows(folder: Path, run_count: int, duration: float, filters: tuple[str, ...]) -> list[Row]:
-    """Rows: mean NEES and NIS per degree of freedom. Filters with a wrong noise level are run in a quarter of the
-    runs."""
-    by_filter: dict[str, list[Any]] = {name: [] for name in filters}
+def _consistency_rows(folder: Path, run_count: int, duration: float, filter_names: tuple[str, ...]) -> list[Row]:
+    """Rows: mean normalised squares of estimation errors (NEES) and innovations (NIS) per degree of freedom. Filters
+    with a wrong noise level take a quarter of the runs."""
+    by_filter: dict[str, list[Any]] = {name: [] for name in filter_names}
     for i in range(run_count):
-        scales = {name: FILTERS[name] for name in filters if name == "right" or i < run_count // 4}
+        scales = {name: VARIANCE_FACTORS[name] for name in filter_names if name == "right" or i < run_count // 4}
         for name, consistent in runs.consistency(folder, duration, SEED + i, scales).items():
             by_filter[name].append(consistent)
     errors, surprises = (
@@ -83,28 +85,31 @@ def _consistency_rows(folder: Path, run_count: int, duration: float, filters: tu
     rows = [
         _band_row("nees", "normalised error squared of 6 states", errors["right"], 6, run_scores),
         _band_row("nis", "normalised innovation squared", surprises["right"], 1, every),
-        *_named_rows([consistent[2] for consistent in by_filter["right"]]),
+        *_inconsistency_rows([consistent[2] for consistent in by_filter["right"]]),
     ]
-    if "Q" in filters:
+    if "Q" in filter_names:
         rows += [
-            _outside_row("wrong-q", "NEES", "force noise", errors["Q"], 6),
-            _outside_row("wrong-r", "NIS", "measurement noise", surprises["R"], 1),
+            _outside_band_row("wrong-q", "NEES", "force noise", errors["Q"], 6),
+            _outside_band_row("wrong-r", "NIS", "measurement noise", surprises["R"], 1),
         ]
     return rows
 
 
-BIAS, SLUGGISH = 0.2, 0.3
-"""Planted into the innovations of right filters: a mean, in deviations, and a correlation with the sample before."""
+INNOVATION_MEAN, INNOVATION_CORRELATION = 0.2, 0.3
+"""Faults planted into the innovations of correct filters: a mean, in standard deviations, and a correlation with the
+sample before."""
 
 
-def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
-    """Rows: number of correct filters that the consistency test rejects, and of wrong filters that it accepts."""
+def _inconsistency_rows(innovations: list[np.ndarray]) -> list[Row]:
+    """Rows: number of correct filters that the consistency test rejects, and of wrong filters that the test accepts."""
     count = len(innovations)
     alarms = sum(not consistency(innovation_series, ("pitch",)).consistent for innovation_series in innovations)
     planted: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         "larger by a quarter": lambda w: 1.25 * w,
-        f"with a mean of {BIAS:g} deviations": lambda w: w + BIAS,
-        f"correlated by {SLUGGISH:g}": lambda w: np.vstack([w[:1], w[1:] + SLUGGISH * w[:-1]]),
+        f"with a mean of {INNOVATION_MEAN:g} deviations": lambda w: w + INNOVATION_MEAN,
+        f"correlated by {INNOVATION_CORRELATION:g}": lambda w: np.vstack(
+            [w[:1], w[1:] + INNOVATION_CORRELATION * w[:-1]]
+        ),
     }
     stated = f"of {count} runs; stated level {ALARMS:g} of all runs"
     rows = [
@@ -119,12 +124,12 @@ def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
     return rows
 
 
-def _outside_row(name: str, quantity: str, noise: str, values: np.ndarray, freedom: int) -> Row:
+def _outside_band_row(row_name: str, quantity: str, noise: str, values: np.ndarray, degrees_of_freedom: int) -> Row:
     """Row: a filter that assumes a wrong variance must fall outside the band."""
-    low, high = _band(freedom * len(values))
-    mean = float(values.mean()) / freedom
+    low, high = _chi_square_band(degrees_of_freedom * len(values))
+    mean = float(values.mean()) / degrees_of_freedom
     return behaviour_row(
-        f"kalman.{name}",
+        f"kalman.{row_name}",
         SYSTEM,
         f"{quantity} of a filter that assumes 4 times the variance of the {noise}",
         "inside" if low <= mean <= high else "outside",
@@ -134,31 +139,33 @@ def _outside_row(name: str, quantity: str, noise: str, values: np.ndarray, freed
     )
 
 
-def _band(freedom: int) -> tuple[float, float]:
-    """Confidence band for the mean of a chi-square sample, per degree of freedom."""
-    low, high = chi2.ppf([(1 - BAND_PROBABILITY) / 2, (1 + BAND_PROBABILITY) / 2], freedom) / freedom
+def _chi_square_band(degrees_of_freedom: int) -> tuple[float, float]:
+    """Band for the mean of a chi-square sample at BAND_PROBABILITY, per degree of freedom."""
+    low, high = (
+        chi2.ppf([(1 - BAND_PROBABILITY) / 2, (1 + BAND_PROBABILITY) / 2], degrees_of_freedom) / degrees_of_freedom
+    )
     return float(low), float(high)
 
 
-def _band_row(name: str, quantity: str, values: np.ndarray, freedom: int, sample: str) -> Row:
-    low, high = _band(freedom * len(values))
-    mean = float(values.mean()) / freedom
+def _band_row(row_name: str, quantity: str, values: np.ndarray, degrees_of_freedom: int, sample: str) -> Row:
+    low, high = _chi_square_band(degrees_of_freedom * len(values))
+    mean = float(values.mean()) / degrees_of_freedom
     why = (
-        f"{100 * BAND_PROBABILITY:g} % band {low:.3f} to {high:.3f} of chi-square with {freedom * len(values)} "
-        "degrees of "
-        f"freedom: {sample}"
+        f"{100 * BAND_PROBABILITY:g} % band {low:.3f} to {high:.3f} of chi-square with "
+        f"{degrees_of_freedom * len(values)} degrees of freedom: {sample}"
     )
     return Observed(
-        f"kalman.{name}", SYSTEM, f"{quantity}, mean per degree of freedom, no model error", mean, ""
+        f"kalman.{row_name}", SYSTEM, f"{quantity}, mean per degree of freedom, no model error", mean, ""
     ).within((low + high) / 2, (high - low) / 2, why, "closed form")
 
 
 def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None, sensors: tuple[str, ...]) -> list[Row]:
-    """Rows: pitch error if the file of the angle, of the rate, or of both has missing samples."""
+    """Rows: pitch error and count of missing samples if the file of the angle, of the rate, or of both has missing
+    samples."""
     rows = []
     for name in sensors:
-        gaps = with_gaps(folder, duration, SEED, SENSORS[name], LOST, outage)
-        gaps_text = f"{LOST:.0%} of the samples lost" + (
+        gaps = with_gaps(folder, duration, SEED, SENSORS[name], LOST_SHARE, outage)
+        gaps_text = f"{LOST_SHARE:.0%} of the samples lost" + (
             f", none from {outage[0]:g} to {outage[1]:g} s" if outage else ""
         )
         id, words = f"kalman.gaps.{name.replace(' ', '-')}", "largest ratio of the pitch error to its stated deviation"
@@ -176,7 +183,7 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
     return rows
 
 
-def _short_rows(folder: Path) -> list[Row]:
+def _short_run_rows(folder: Path) -> list[Row]:
     error = scores_of_stabilised(folder, 3.0, SEED, ENGINES[:1])["reference"]["pitch"]
     what = "largest pitch error of a stabilised run of 3 s, wrong model and noise"
     why = "until the inertia is learnt, 5 % of the fast pitch are missing"
@@ -184,18 +191,21 @@ def _short_rows(folder: Path) -> list[Row]:
 
 
 def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
-    """Rows and table: variances of the errors of filter estimate and run, compared with the discrete Lyapunov
-    equation."""
+    """Rows and table: variances of the errors of filter estimate and of stabilised run, compared with the discrete
+    Lyapunov equation."""
     force = at_period(35.0, COARSE_PERIOD)
     step, covariance = closed_loop(folder, force)
-    errors = [loop_errors(folder, force, LOOP, SEED + i) for i in range(LOOP_RUNS)]
+    errors = [loop_errors(folder, force, LOOP_SECONDS, SEED + i) for i in range(LOOP_RUN_COUNT)]
     squares = np.mean([np.mean(error_series**2, axis=0) for error_series in errors], axis=0)
     spread = spread_of_mean_square(step, covariance, sum(map(len, errors)))
     names = ("z1 - z3", "z2 - z3", "pitch", "z1' - z3'", "z2' - z3'", "pitch rate")
     rows, table = [], []
     for i in range(12):
         who, what = ("estimate", "run")[i // 6], names[i % 6]
-        why = f"{LOOP_RUNS} runs of {LOOP:g} s; spread {spread[i]:.1%} from the loop's own autocorrelation, times 3.29"
+        why = (
+            f"{LOOP_RUN_COUNT} runs of {LOOP_SECONDS:g} s; spread {spread[i]:.1%} from the loop's own autocorrelation, "
+            "times 3.29"
+        )
         rows.append(
             Observed(
                 f"kalman.covariance.{who}.{i % 6}",
@@ -262,13 +272,13 @@ def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
     return rows
 
 
-LACKS = "the model lacks 5 % of the inertia"
-ESTIMATED = "mean share by which the estimated 1/I is above the model's"
+INERTIA_REASON = "the model lacks 5 % of the inertia"
+INERTIA_QUANTITY = "mean share by which the estimated 1/I is above the model's"
 
 
 def _moment_rows(damage: list[dict[str, dict[str, float]]], right_model: list[dict[str, float]]) -> list[Row]:
-    """Rows: ratio of the filter's artificial moments to the inertia moment I beta''. With a wrong model, the share that
-    the inertia error does not explain is judged."""
+    """Rows: ratio of the filter's artificial moments to the inertia moment I beta''. With a wrong model, only moments
+    that the error of the inertia does not explain are judged."""
     reference = [run_damage["reference"] for run_damage in damage]
     rows = []
     for name, words, some, key in (
@@ -287,8 +297,15 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right_model: list[di
             )
     total, inertia = (np.array([run_damage[key] for run_damage in reference]) for key in ("all, band", "inertia"))
     shown = (
-        ("moment.wrong", "all artificial moments, wrong model, up to 15 Hz", total, 0.05, 0.005, LACKS),
-        ("inertia", ESTIMATED, inertia, -0.05, 3e-3, f"I is 5 % too small; samples spread by {np.std(inertia):.1e}"),
+        ("moment.wrong", "all artificial moments, wrong model, up to 15 Hz", total, 0.05, 0.005, INERTIA_REASON),
+        (
+            "inertia",
+            INERTIA_QUANTITY,
+            inertia,
+            -0.05,
+            3e-3,
+            f"I is 5 % too small; samples spread by {np.std(inertia):.1e}",
+        ),
     )
     return rows + [
         Observed(f"kalman.{id}", SYSTEM, what, float(np.mean(values)), "").within(wanted, band, why, "closed form")
@@ -297,7 +314,7 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right_model: list[di
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Damage and moments per implementation, and the deviations of the linear closed loop."""
+    """Tables of damage and moments per implementation, and of the standard deviations of the linear closed loop."""
     if not case_data["damage"]:
         return []
     keys = (*SECTION_FORCE_CHANNELS, "pull", "all, band", "pitch")

@@ -1,4 +1,5 @@
-"""Tyres that only push: accelerations, whole paths, exact bounces, energy, and what the linear tyre pulls."""
+"""Tyres that only push: accelerations, states over time, exact bounces, energy, and the pull of the linear tyre on the
+road."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -34,64 +35,59 @@ TITLE = "Tyres that only push"
 SYSTEM: System = "pitch-plane"
 ENGINES = ("exudyn", "mujoco")
 IMPLEMENTATIONS = ("reference", *ENGINES)
-STATES = "m, rad, m/s, rad/s"
+STATE_UNITS = "m, rad, m/s, rad/s"
 START_MOTION = {"z1": -0.3, "z2": -0.2, "z3": -0.4, "pitch": 0.05}
-"""m, rad: both wheels in the air, one higher."""
-DROPPED = "a vehicle is dropped so hard that its laws are met far out; the other side has the same laws"
-"""Why bounces may break assumptions."""
+"""Initial displacements (m) and pitch (rad): both wheels are in the air, one higher than the other."""
 STEP, SEED, SPEED = 1e-4, 7, 20.0
-ROUNDING = "the same tableau and laws; sums are taken in another order"
-UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
+ROUNDING_REASON = "the same tableau and laws; sums are taken in another order"
+NO_DAMPING = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """All rows; quick: one vehicle, half a second of bounces, short paths, no hub forces."""
+    """Rows: accelerations, bounces, energy and wheel loads of vehicles whose tyres lift off. A quick run has one
+    vehicle, half a second of bounces, short runs on roads, and no hub forces."""
     vehicles = VEHICLE_SETS[-1:] if quick else VEHICLE_SETS
-    rows = [row for name in vehicles for row in (*_accelerations(name), *_paths(name, 1.5 if quick else 20.0))]
-    rows += [
-        *_bounces_by_exponentials(0.5 if quick else 2.0),
-        _order(4 if quick else 6),
-        *_energy(0.5 if quick else 2.0),
-    ]
-    return [*rows, *_pulls(quick), *_in_space(quick), *([] if quick else _above_a_cut())], {}
+    rows = [row for name in vehicles for row in (*_acceleration_rows(name), *_path_rows(name, 1.5 if quick else 20.0))]
+    rows += [*_bounce_rows(0.5 if quick else 2.0), _order_row(4 if quick else 6), *_energy_rows(0.5 if quick else 2.0)]
+    return [*rows, *_pull_rows(quick), *_spatial_rows(quick), *([] if quick else _hub_force_rows())], {}
 
 
 def scene(
-    parameters: str = VEHICLE_SETS[-1],
+    parameter_set_name: str = VEHICLE_SETS[-1],
     geometry: str = "exact",
     duration: float = 1.0,
     step: float = STEP,
-    road: bool = False,
+    on_study_road: bool = False,
     override: dict[str, float] | None = None,
 ) -> Scene:
     """Scene of the half car on tyres that can lift off: on the study road from rest, or dropped onto a flat road."""
     return build_scene(
         {
             "title": TITLE,
-            "vehicle": {"parameters": parameters, "geometry": geometry, "override": override or {}},
+            "vehicle": {"parameters": parameter_set_name, "geometry": geometry, "override": override or {}},
             "run": {"duration": duration, "step": step},
-            "start": {} if road else START_MOTION,
-            "effects": {"lift_off": {}, **({"road": STUDY_ROAD} if road else {})},
+            "start": {} if on_study_road else START_MOTION,
+            "effects": {"lift_off": {}, **({"road": STUDY_ROAD} if on_study_road else {})},
         }
     )
 
 
-def _accelerations(parameters: str) -> list[Row]:
-    """Rows: accelerations of both engines and of the written equations at random states, some of them with wheels in
-    the air."""
+def _acceleration_rows(parameter_set_name: str) -> list[Row]:
+    """Rows: accelerations of Exudyn and MuJoCo compared with the written equations at random states, some of them with
+    wheels in the air."""
     rows = []
     for geometry in ("exact", "linear"):
-        lifting = scene(parameters, geometry, 2.0, 1e-3, road=True)
+        lifting = scene(parameter_set_name, geometry, 2.0, 1e-3, on_study_road=True)
         assembly = assembly_of_scene(lifting)
         for engine in ENGINES:
             error = acceleration_gap(checks.engine(engine), assembly, settings_of(lifting, engine))
             what = "acceleration at 100 random states, wheels in the air and hit among them"
             rows.append(
                 Observed(
-                    f"lift_off.audit.{engine}.{parameters}.{geometry}",
+                    f"lift_off.audit.{engine}.{parameter_set_name}.{geometry}",
                     SYSTEM,
                     f"largest difference of the {what} in {engine} from the written equations, "
-                    f"{parameters}, {geometry} geometry",
+                    f"{parameter_set_name}, {geometry} geometry",
                     error,
                     "of the largest",
                 ).at_most(1e-12, "a dozen products of doubles; the law stands in each by itself", "native")
@@ -99,36 +95,36 @@ def _accelerations(parameters: str) -> list[Row]:
     return rows
 
 
-def _paths(parameters: str, duration: float) -> list[Row]:
-    """Rows: difference of complete paths on the study road at the same step, and the least wheel load, which must
-    be 0."""
-    lifting = scene(parameters, duration=duration, step=5e-4, road=True)
+def _path_rows(parameter_set_name: str, duration: float) -> list[Row]:
+    """Rows: largest difference of the engines' states from the reference's on the study road at the same step, and the
+    least wheel load, which must be 0."""
+    lifting = scene(parameter_set_name, duration=duration, step=5e-4, on_study_road=True)
     runs = {engine: simulate(lifting, engine) for engine in IMPLEMENTATIONS}
     rows = [
         Observed(
-            f"lift_off.path.{engine}.{parameters}",
+            f"lift_off.path.{engine}.{parameter_set_name}",
             SYSTEM,
             f"largest difference of the states in {engine} from the reference over {duration:g} s of "
-            f"the study road, {parameters}",
+            f"the study road, {parameter_set_name}",
             largest_difference(runs[engine], runs["reference"]),
-            STATES,
-        ).at_most(1e-11, f"{ROUNDING}; each landing makes the difference some times as large", "native")
+            STATE_UNITS,
+        ).at_most(1e-11, f"{ROUNDING_REASON}; each landing makes the difference some times as large", "native")
         for engine in ENGINES
     ]
-    least = min(_loads(run).min() for run in runs.values())
+    least = min(_wheel_loads(run).min() for run in runs.values())
     return [
         *rows,
         Observed(
-            f"lift_off.least.{parameters}",
+            f"lift_off.least.{parameter_set_name}",
             SYSTEM,
-            f"least wheel load over the study road, {parameters}",
+            f"least wheel load over the study road, {parameter_set_name}",
             float(least),
             "N",
         ).within(0.0, 0.0, "wheels leave the road, and no tyre pulls", "none"),
     ]
 
 
-def _loads(run: Result) -> np.ndarray:
+def _wheel_loads(run: Result) -> np.ndarray:
     return np.array([run["f1"], run["f2"]])
 
 
@@ -137,8 +133,9 @@ def _loads(run: Result) -> np.ndarray:
     "springs compressed",
     "tyres not flat",
 )
-def _bounces_by_exponentials(duration: float) -> list[Row]:
-    """Rows: bounces on a flat road, compared with matrix exponentials between the times at which tyres lift or land."""
+def _bounce_rows(duration: float) -> list[Row]:
+    """Rows: bounces on a flat road, compared with matrix exponentials between the times at which tyres lift off or
+    land."""
     rows = []
     dampers: dict[str, dict[str, float]] = {"as they are": {}, "of 5 kN s/m": {"d1": 5e3, "d2": 5e3}}
     for what, override in dampers.items():
@@ -155,7 +152,7 @@ def _bounces_by_exponentials(duration: float) -> list[Row]:
                     f"largest difference of a vehicle dropped from 0.3 m in {engine} at 0.1 ms from "
                     f"matrix exponentials between the switches, tyre dampers {what}",
                     error,
-                    STATES,
+                    STATE_UNITS,
                 ).at_most(2e-4, "a corner within a step costs its square, at every landing", "closed form")
             )
     return rows
@@ -166,17 +163,17 @@ def _bounces_by_exponentials(duration: float) -> list[Row]:
     "springs compressed",
     "tyres not flat",
 )
-def _order(halvings: int) -> Row:
+def _order_row(halving_count: int) -> Row:
     """Row: observed order of the error in the step, for a run with landings."""
     lifting = scene(geometry="linear")
-    steps, coarse = 1e-3 / 2.0 ** np.arange(halvings), 1e-3
+    steps, coarse = 1e-3 / 2.0 ** np.arange(halving_count), 1e-3
     exact = Bounces(assembly_of_scene(lifting), coarse).path(assembly_of_scene(lifting).initial, round(1.0 / coarse))
     errors = []
     for step in steps:
         states = simulate(lifting, "reference", Settings("RK4", step, 1.0)).states[:: round(coarse / step)]
         errors.append(float(np.abs(states - exact).max()))
     slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-    what = f"observed order of RK4 through landings, {halvings - 1} halvings of 1 ms"
+    what = f"observed order of RK4 through landings, {halving_count - 1} halvings of 1 ms"
     why = "the force has corners: 2 on the average, 4 between them"
     return Observed("lift_off.order", SYSTEM, what, slope, "").beside(2.0, why, "closed form")
 
@@ -186,11 +183,12 @@ def _order(halvings: int) -> Row:
     "springs compressed",
     "tyres not flat",
 )
-def _energy(duration: float) -> list[Row]:
-    """Rows: energy that a bouncing vehicle gains, and that a vehicle without dampers loses."""
+def _energy_rows(duration: float) -> list[Row]:
+    """Rows: change of energy of a bouncing vehicle without dampers, and gain of energy of a vehicle with dampers in the
+    tyres alone."""
     rows = []
     for engine in IMPLEMENTATIONS:
-        undamped = scene(duration=duration, override=UNDAMPED)
+        undamped = scene(duration=duration, override=NO_DAMPING)
         states = simulate(undamped, engine).states
         energies = bounce_energy(assembly_of_scene(undamped), states)
         size = energies[0] - bounce_energy(assembly_of_scene(undamped), np.zeros((1, 8)))[0]  # by its fall to the road
@@ -203,7 +201,7 @@ def _energy(duration: float) -> list[Row]:
                 "of the fall's",
             ).at_most(1e-4, "the error of the step", "closed form")
         )
-        damped = scene(duration=duration, override=UNDAMPED | {"d1": 2e3, "d2": 500.0})
+        damped = scene(duration=duration, override=NO_DAMPING | {"d1": 2e3, "d2": 500.0})
         energies = bounce_energy(assembly_of_scene(damped), simulate(damped, engine).states)
         gain = float((energies - np.minimum.accumulate(energies)).max() / size)
         rows.append(
@@ -219,16 +217,16 @@ def _energy(duration: float) -> list[Row]:
 
 
 @allowing_breaches("what the linear tyre does is what is shown")
-def _pulls(quick: bool) -> list[Row]:
-    """Rows: how strongly and how often the paper's linear tyre pulls on the study road, and how this changes the wheel
-    loads."""
-    lifting_scene = scene(VEHICLE_SETS[0], duration=4.0 if quick else 20.0, step=5e-4, road=True)
+def _pull_rows(quick: bool) -> list[Row]:
+    """Rows: how strongly and how often the paper's linear tyre pulls on the study road, and the ratio of the dynamic
+    wheel loads with tyres that lift off to those of linear tyres."""
+    lifting_scene = scene(VEHICLE_SETS[0], duration=4.0 if quick else 20.0, step=5e-4, on_study_road=True)
     lifting, linear = (
         simulate(lifting_scene, "reference"),
         simulate(scene_without(lifting_scene, "lift_off"), "reference"),
     )
-    loads = _loads(linear)
-    deviations = [root_mean_square(_loads(run) - loads.mean(axis=1)[:, None]) for run in (linear, lifting)]
+    loads = _wheel_loads(linear)
+    deviations = [root_mean_square(_wheel_loads(run) - loads.mean(axis=1)[:, None]) for run in (linear, lifting)]
     what = f"the paper's vehicle and tyre on the study road, {lifting_scene.run.duration:g} s"
     share = 100.0 * float((loads < 0.0).any(axis=0).mean())
     words = "ratio of the rms of the dynamic wheel loads with tyres that lift to that of linear tyres"
@@ -251,9 +249,9 @@ def _pulls(quick: bool) -> list[Row]:
     ]
 
 
-def _in_space(quick: bool) -> list[Row]:
-    """Rows on R19-ride with tyres that lift off: accelerations compared with hand-written equations, and both engines
-    compared on a random road."""
+def _spatial_rows(quick: bool) -> list[Row]:
+    """Rows on the R19-ride vehicle with tyres that lift off: accelerations compared with hand-written equations, and
+    Exudyn and MuJoCo compared on a random road."""
     ride = build_ride(
         {
             "title": TITLE,
@@ -297,13 +295,14 @@ def _in_space(quick: bool) -> list[Row]:
             "ride",
             "largest difference of R19-ride's states between Exudyn and MuJoCo on 20 times the paper's road",
             float(apart),
-            STATES,
-        ).at_most(1e-10, ROUNDING, "native"),
+            STATE_UNITS,
+        ).at_most(1e-10, ROUNDING_REASON, "native"),
     ]
 
 
-def _above_a_cut() -> list[Row]:
-    """Rows: hub forces of a car whose wheels leave a class E road: difference between the engines, and least force."""
+def _hub_force_rows() -> list[Row]:
+    """Rows: hub forces of a car whose wheels leave a class E road: difference of the engines from the reference
+    equations, and least force."""
     car, duration = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body"), 4.0
     left, right = (iso8608_road("E", seed) for seed in (1, 2))
     drive = two_tracks(car, left, right, SPEED, 1e-3, round(duration / 1e-3))
@@ -317,7 +316,7 @@ def _above_a_cut() -> list[Row]:
             "largest difference of R19-free's states in Exudyn and MuJoCo from the reference, class "
             f"E road, {duration:g} s",
             apart,
-            STATES,
+            STATE_UNITS,
         ).at_most(1e-10, "one law, three mass matrices", "shared kernel"),
         Observed(
             "lift_off.hubs.least",

@@ -1,4 +1,5 @@
-"""The Manchester contact benchmark: places, angles and forces of both wheels, against CONTACT and second ways."""
+"""The Manchester contact benchmark: contact positions, angles and forces of both wheels, compared with CONTACT and with
+second methods."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -28,23 +29,26 @@ from validation.contact.manchester_references import (
 
 TITLE = "The Manchester contact benchmark, cases A"
 SYSTEM: System = "contact"
-PLACE_BOUND, FORCE_BOUND = 0.3, 2.0
-"""Bounds asked for: mm and %."""
+POSITION_TOLERANCE, FORCE_TOLERANCE = 0.3, 2.0
+"""Tolerances asked for, of contact positions (mm) and of forces (%)."""
 QUICK_SHIFTS = (1.0, 6.5)
-"""Shifts (mm) of case A-2 in the quick share."""
-FILES = (0.0, 2.0, 5.0, 6.0, 6.5, 10.0)
-"""Shifts (mm) at which the built-in profiles are compared with the benchmark's files."""
-PUBLISHED = "CONTACT's reference output of case A-2.2, exact theory on one plane, cells of 0.2 mm; the bound asked for"
-WHEELS = {"right": 2, "left": 5}
+"""Lateral displacements (mm) of case A-2 in a quick run."""
+FILE_SHIFTS = (0.0, 2.0, 5.0, 6.0, 6.5, 10.0)
+"""Lateral displacements (mm) at which the built-in profiles are compared with the benchmark's files."""
+PUBLISHED_REASON = (
+    "CONTACT's reference output of case A-2.2, exact theory on one plane, cells of 0.2 mm; the bound asked for"
+)
+FIRST_COLUMNS = {"right": 2, "left": 5}
 """First column of each wheel in the published table."""
 
 
 @allowing_breaches("the benchmark takes elastic steel, as its codes do", "elastic")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows on case A-2 against what is published; in full also on case A-1 at every mm, searches, files, the price."""
+    """Rows on case A-2 compared with the published results; a full run also has case A-1 at every mm, searches, profile
+    files, and computing times."""
     published = CONTACT[np.isin(CONTACT[:, 0], QUICK_SHIFTS)] if quick else CONTACT
     placed, position_seconds = _timed_positions("A-2", published[:, 0])
-    rows = [row for wheel in WHEELS for row in _published_rows(wheel, placed, published)]
+    rows = [row for wheel in FIRST_COLUMNS for row in _published_rows(wheel, placed, published)]
     rows.append(
         Observed(
             "manchester.two_patches",
@@ -62,26 +66,26 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         static, each_still = _timed_positions("A-1", CONTACT[::2, 0])
         data["A-1"] = [_table_of_patches(position_seconds) for position_seconds in static]
         rows += [
-            *_static_rows(static),
-            *_split_rows(placed[10]),
+            *_first_contact_rows(static),
+            *_load_share_rows(placed[10]),
             *_file_rows(placed),
             _load_row(static),
             _axle_row(placed[0]),
-            *_price_rows({"A-1": each_still, "A-2": position_seconds}),
+            *_time_rows({"A-1": each_still, "A-2": position_seconds}),
         ]
     return rows, data
 
 
 def _timed_positions(case: str, shifts: np.ndarray) -> tuple[list[WheelsetPlacement], float]:
-    """The wheelset at every lateral shift (mm), and the processor time (s) per position, because other cases run at the
-    same time."""
+    """The wheelset at every lateral displacement (mm), and the processor time (s) per position. Wall time would count
+    other cases that run at the same time."""
     positions = Positions(start=1e-3 * float(shifts[0]), stop=1e-3 * float(shifts[-1]), count=len(shifts))
     placed_run = run(SCENE.model_copy(update={"positions": positions}), case=case)
     return placed_run.detail.placed, placed_run.seconds / len(shifts)
 
 
 def _published_rows(wheel: str, placements: list[WheelsetPlacement], published: np.ndarray) -> list[Row]:
-    published_sums = published[:, WHEELS[wheel] : WHEELS[wheel] + 3]
+    published_sums = published[:, FIRST_COLUMNS[wheel] : FIRST_COLUMNS[wheel] + 3]
     off = np.abs(np.array([patch_sums(position, wheel) for position in placements]) - published_sums)
     patch, _, _ = off.max(axis=0).tolist()
     _, force, peak = (100.0 * off / published_sums).max(axis=0).tolist()
@@ -92,10 +96,10 @@ def _published_rows(wheel: str, placements: list[WheelsetPlacement], published: 
             f"largest difference of the {wheel} wheel's mean place of contact",
             patch,
             "mm",
-        ).at_most(PLACE_BOUND, PUBLISHED, "published"),
+        ).at_most(POSITION_TOLERANCE, PUBLISHED_REASON, "published"),
         Observed(
             f"manchester.forces.{wheel}", SYSTEM, f"largest difference of the {wheel} wheel's normal force", force, "%"
-        ).at_most(FORCE_BOUND, PUBLISHED, "published"),
+        ).at_most(FORCE_TOLERANCE, PUBLISHED_REASON, "published"),
         Observed(
             f"manchester.peaks.{wheel}",
             SYSTEM,
@@ -115,7 +119,7 @@ def _published_rows(wheel: str, placements: list[WheelsetPlacement], published: 
     return rows
 
 
-def _static_rows(placements: list[WheelsetPlacement]) -> list[Row]:
+def _first_contact_rows(placements: list[WheelsetPlacement]) -> list[Row]:
     """Rows: first contact points compared with a search over surface points, and contact compared with its mirror
     image."""
     contact, gaps = contact_of("A-1"), []
@@ -134,8 +138,8 @@ def _static_rows(placements: list[WheelsetPlacement]) -> list[Row]:
     why = "search over points of the wheel's surface, straight between points of both profiles"
     asked, corner = f"{why}; the bound asked for", f"{why}, as far as an angle changes in 0.3 mm of the gauge corner"
     found_facts = (
-        ("rail", "first touch on the rail, case A-1", "mm", PLACE_BOUND, asked),
-        ("wheel", "first touch on the wheel, case A-1", "mm", PLACE_BOUND, asked),
+        ("rail", "first touch on the rail, case A-1", "mm", POSITION_TOLERANCE, asked),
+        ("wheel", "first touch on the wheel, case A-1", "mm", POSITION_TOLERANCE, asked),
         ("angle", "angle there", "rad", 0.02, corner),
     )
     return [
@@ -155,14 +159,14 @@ def _static_rows(placements: list[WheelsetPlacement]) -> list[Row]:
     ]
 
 
-def _axle_row(placements: WheelsetPlacement) -> Row:
-    """Row: the axle turns freely, so that the forces of each wheel must have no moment about it in the middle of the
-    track."""
+def _axle_row(placement: WheelsetPlacement) -> Row:
+    """Row: the axle turns freely, so that the creep forces of each wheel must have no moment about the axle in the
+    middle of the track."""
     moments = [
         sum(p.fx * p.rolling_radius - p.mz * np.sin(p.angle) for p in wheel)
-        for wheel in (placements.right, placements.left)
+        for wheel in (placement.right, placement.left)
     ]
-    most = SCENE.cases["A-2"].friction * SCENE.wheelset.load * placements.right[0].rolling_radius
+    most = SCENE.cases["A-2"].friction * SCENE.wheelset.load * placement.right[0].rolling_radius
     return Observed(
         "manchester.axle",
         SYSTEM,
@@ -176,12 +180,12 @@ def _axle_row(placements: WheelsetPlacement) -> Row:
     )
 
 
-def _split_rows(placements: WheelsetPlacement) -> list[Row]:
-    """Rows: shares of the load on two patches at 5 mm, in case A-2."""
-    forces = [patch.normal for patch in placements.right]
+def _load_share_rows(placement: WheelsetPlacement) -> list[Row]:
+    """Rows: shares of the wheel load on two patches at a displacement of 5 mm, in case A-2."""
+    forces = [patch.normal for patch in placement.right]
     total = sum(forces)
     contact = contact_of("A-2")
-    alone, (mean, _, plane) = patch_forces(contact, placements), on_one_plane(contact, placements)
+    alone, (mean, _, plane) = patch_forces(contact, placement), on_one_plane(contact, placement)
     far = {
         name: 100.0 * max(abs(a - b) for a, b in zip(forces, other_contact, strict=True)) / total
         for name, other_contact in (("apart", alone), ("one plane", plane))
@@ -193,24 +197,24 @@ def _split_rows(placements: WheelsetPlacement) -> list[Row]:
             "error of the shares of two patches at 5 mm in the wheel's force",
             far["apart"],
             "%",
-        ).at_most(FORCE_BOUND, "each on a half-space of its own that the other's resultant sinks", "closed form"),
+        ).at_most(FORCE_TOLERANCE, "each on a half-space of its own that the other's resultant sinks", "closed form"),
         Observed(
             "manchester.split.plane",
             SYSTEM,
             "error of the shares of two patches at 5 mm on the same plane",
             far["one plane"],
             "%",
-        ).at_most(FORCE_BOUND, "exact theory on CONTACT's plane, lowered as the wheel is", "native"),
+        ).at_most(FORCE_TOLERANCE, "exact theory on CONTACT's plane, lowered as the wheel is", "native"),
         Observed("manchester.split.mean", SYSTEM, "mean place at 5 mm on CONTACT's own plane", mean, "mm").beside(
             float(CONTACT[10, 2]), "CONTACT lays more on the smaller patch; 4 um of shift do the same"
         ),
     ]
 
 
-def _load_row(static: list[WheelsetPlacement]) -> Row:
+def _load_row(static_placements: list[WheelsetPlacement]) -> Row:
     off = max(
         abs(sum(patch.vertical for patch in wheel) / SCENE.wheelset.load - 1.0)
-        for placement in static
+        for placement in static_placements
         for wheel in (placement.right, placement.left)
     )
     return Observed(
@@ -223,9 +227,9 @@ def _load_row(static: list[WheelsetPlacement]) -> Row:
 
 
 def _file_rows(placements: list[WheelsetPlacement]) -> list[Row]:
-    """Rows: contact with the built-in profiles, compared with the benchmark's own profile files; in these the rail lies
-    inclined."""
-    names = {"places": ("mm", PLACE_BOUND, 0), "forces": ("%", FORCE_BOUND, 1)}
+    """Rows: contact with the built-in profiles, compared with the benchmark's profile files, in which the rail is
+    already inclined."""
+    names = {"places": ("mm", POSITION_TOLERANCE, 0), "forces": ("%", FORCE_TOLERANCE, 1)}
     words = "difference between built-in profiles and the benchmark's files, case A-2"
     folder = data_folder()
     if folder is None or not (folder / WHEEL_FILE).is_file():
@@ -237,10 +241,12 @@ def _file_rows(placements: list[WheelsetPlacement]) -> list[Row]:
     chosen = [
         (placement, other_contact.at(placement.shift, placement.yaw))
         for placement in placements
-        if round(1e3 * placement.shift, 6) in FILES
+        if round(1e3 * placement.shift, 6) in FILE_SHIFTS
     ]
     pairs = [
-        (patch_sums(placement, wheel), patch_sums(theirs, wheel)) for placement, theirs in chosen for wheel in WHEELS
+        (patch_sums(placement, wheel), patch_sums(theirs, wheel))
+        for placement, theirs in chosen
+        for wheel in FIRST_COLUMNS
     ]
     off = [(abs(a[0] - b[0]), 100.0 * abs(a[1] / b[1] - 1.0)) for a, b in pairs]
     return [
@@ -255,7 +261,7 @@ def _file_rows(placements: list[WheelsetPlacement]) -> list[Row]:
     ]
 
 
-def _price_rows(seconds_by_part: dict[str, float]) -> list[Row]:
+def _time_rows(seconds_by_case: dict[str, float]) -> list[Row]:
     why = "geometry, roll, exact normal contact; rolling also the speed of spin"
     return [
         Observed(
@@ -265,24 +271,24 @@ def _price_rows(seconds_by_part: dict[str, float]) -> list[Row]:
             seconds,
             "s",
         ).beside("-", why)
-        for name, seconds in seconds_by_part.items()
+        for name, seconds in seconds_by_case.items()
     ]
 
 
-def _table_of_patches(placements: WheelsetPlacement) -> dict[str, Any]:
-    """For each shift (mm) and patch: contact position on rail and wheel (mm), angle (deg), force (kN) and peak pressure
-    (MPa)."""
-    return {"shift": 1e3 * placements.shift} | {
+def _table_of_patches(placement: WheelsetPlacement) -> dict[str, Any]:
+    """Displacement (mm), and for each patch: contact position on rail and wheel (mm), angle (deg), force (kN) and peak
+    pressure (MPa)."""
+    return {"shift": 1e3 * placement.shift} | {
         wheel: [
             [1e3 * p.y, 1e3 * p.wheel_centre, float(np.degrees(-p.centre_angle)), p.normal / 1e3, p.peak / 1e6]
-            for p in getattr(placements, wheel)
+            for p in getattr(placement, wheel)
         ]
-        for wheel in WHEELS
+        for wheel in FIRST_COLUMNS
     }
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Every patch of every position."""
+    """Tables of every patch at every displacement."""
     heads = (
         "shift [mm]",
         "wheel",
@@ -301,7 +307,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
             tuple(
                 (f"{position_row['shift']:g}", wheel, *(f"{value:.3f}" for value in patch[:4]), f"{patch[4]:.0f}")
                 for position_row in case_data[name]
-                for wheel in WHEELS
+                for wheel in FIRST_COLUMNS
                 for patch in position_row[wheel]
             ),
         )
@@ -311,7 +317,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Plot mean position and force of the right wheel, together with CONTACT's."""
+    """Plot contact position and normal force of the right wheel, together with CONTACT's."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, GREY, add_heading, legend_below, subplots
 
     published = np.array(case_data["published"])

@@ -1,4 +1,5 @@
-"""A recording is checked before it is believed: planted faults are named with their size, clean recordings pass."""
+"""Checks of a recording before it is used: planted faults must be named with their size, and clean recordings must
+pass."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -37,32 +38,50 @@ from validation.spatial.cars import r19
 TITLE = "Checks of a recording"
 SYSTEM: System = "drift"
 ROADS: tuple[Ride, ...] = (("A", 1, 30.0, 15.0), ("B", 2, 20.0, 5.0), ("C", 3, 20.0, 20.0), ("D", 5, 10.0, 15.0))
-"""Of clean recordings."""
-SAMPLES = 4
+"""ISO class, seed, speed (m/s) and duration (s) of the roads of clean recordings."""
+NOISE_SAMPLE_COUNT = 4
 SIZE_TOLERANCE = 0.2
-"""Part of a planted size by which what is found may be off."""
-VERTICAL = tuple(f"{hub}_fz" for hub in ("fl", "fr", "rl", "rr"))
-DEGREES = 180 / np.pi
-DELAY = 3e-3
+"""Relative tolerance of the size that a check states for a planted fault."""
+VERTICAL_FORCE_CHANNELS = tuple(f"{hub}_fz" for hub in ("fl", "fr", "rl", "rr"))
+DEGREES_PER_RADIAN = 180 / np.pi
+PLANTED_DELAY = 3e-3
 QUICK_FAULTS = (
-    PlantedMeasurementFault("3 ms late, one force", "shift", "fl_fz", DELAY, "s", faults={"delay": {"fl_fz": DELAY}}),
+    PlantedMeasurementFault(
+        "3 ms late, one force", "shift", "fl_fz", PLANTED_DELAY, "s", faults={"delay": {"fl_fz": PLANTED_DELAY}}
+    ),
     PlantedMeasurementFault(
         "left and right front wheel swapped", "swapped", "fl with fr", 1.0, "", exchanged_hubs(("fl", "fr"))
     ),
     PlantedMeasurementFault("gap of 0.5 s", "gaps", "rr_fz", 0.5, "s", drop_samples("rr_fz", 3.0, 0.5)),
 )
-AMOUNTS: tuple[tuple[str, str, str, float, str, str, dict[str, float]], ...] = (
-    ("3 ms late, one hub", "shift", "all channels of rr", DELAY, "s", "delay", {"rr": DELAY}),
-    ("3 ms early, one force", "shift", "rl_fz", -DELAY, "s", "delay", {**dict.fromkeys(NOISE, DELAY), "rl_fz": 0.0}),
-    ("3 ms late, one accelerometer", "shift", "all channels of shelf", DELAY, "s", "delay", {"shelf": DELAY}),
+TRANSDUCER_FAULTS: tuple[tuple[str, str, str, float, str, str, dict[str, float]], ...] = (
+    ("3 ms late, one hub", "shift", "all channels of rr", PLANTED_DELAY, "s", "delay", {"rr": PLANTED_DELAY}),
+    (
+        "3 ms early, one force",
+        "shift",
+        "rl_fz",
+        -PLANTED_DELAY,
+        "s",
+        "delay",
+        {**dict.fromkeys(NOISE, PLANTED_DELAY), "rl_fz": 0.0},
+    ),
+    (
+        "3 ms late, one accelerometer",
+        "shift",
+        "all channels of shelf",
+        PLANTED_DELAY,
+        "s",
+        "delay",
+        {"shelf": PLANTED_DELAY},
+    ),
     (
         "3 ms late, all inertial channels",
         "shift",
         "all inertial",
-        DELAY,
+        PLANTED_DELAY,
         "s",
         "delay",
-        dict.fromkeys(("acceleration", "angular rate", "angle"), DELAY),
+        dict.fromkeys(("acceleration", "angular rate", "angle"), PLANTED_DELAY),
     ),
     ("40 ms late, one force", "shift", "fr_fz", 4e-2, "s", "delay", {"fr_fz": 4e-2}),
     ("2 % too much, front wheel", "gain", "fl_fz", 2.0, "%", "gain", {"fl_fz": 0.02}),
@@ -71,24 +90,25 @@ AMOUNTS: tuple[tuple[str, str, str, float, str, str, dict[str, float]], ...] = (
     ("3 % too much, accelerometer", "gain", "tower_az", 3.0, "%", "gain", {"tower_az": 0.03}),
     ("noise four times as stated", "noise", "rr_fy", 32.0, "N", "noise", {"rr_fy": 32.0}),
 )
-"""What transducers add: name, check, place, size and unit of what is found, and the fault."""
-FACTORS: tuple[tuple[str, str, float, tuple[str, ...]], ...] = (
+"""Faults of transducers: name, check that must detect the fault, place, size and unit of the expected finding, kind of
+the fault, and its amount by channel."""
+SCALE_FAULTS: tuple[tuple[str, str, float, tuple[str, ...]], ...] = (
     ("kN for N, one wheel", "unit", 1e-3, ("fr_fz",)),
-    ("N for kN, all wheels", "unit", 1e3, VERTICAL),
-    ("degrees for radians, angle", "unit", DEGREES, ("roll",)),
-    ("degrees for radians, rate", "unit", DEGREES, ("pitch_rate",)),
+    ("N for kN, all wheels", "unit", 1e3, VERTICAL_FORCE_CHANNELS),
+    ("degrees for radians, angle", "unit", DEGREES_PER_RADIAN, ("roll",)),
+    ("degrees for radians, rate", "unit", DEGREES_PER_RADIAN, ("pitch_rate",)),
     ("g for m/s^2", "unit", 1 / 9.80665, ("rail_az",)),
     ("sign of a side force", "sign", -1.0, ("rl_fy",)),
     ("sign of a vertical force", "sign", -1.0, ("fl_fz",)),
     ("sign of an angle", "sign", -1.0, ("roll",)),
     ("sign of an accelerometer", "sign", -1.0, ("tower_ay",)),
 )
-SWAPPED = {
+SWAPPED_HUBS = {
     "front and rear left wheel swapped": (("fl", "rl"),),
     "wheels swapped across": (("fl", "rr"),),
     "sides swapped, both axles": (("fl", "fr"), ("rl", "rr")),
 }
-LEVERS = {
+LEVER_FAULTS = {
     "moments about the contact patch, all wheels": (-0.3, ("fl", "fr", "rl", "rr")),
     "moments about the contact patch, one wheel": (-0.34, ("rr",)),
     "moments referred to the hub twice, one axle": (0.3, ("fl", "fr")),
@@ -96,24 +116,24 @@ LEVERS = {
 FULL_FAULTS = (
     *(
         PlantedMeasurementFault(name, check, place, size, unit, faults={key: amounts})
-        for name, check, place, size, unit, key, amounts in AMOUNTS
+        for name, check, place, size, unit, key, amounts in TRANSDUCER_FAULTS
     ),
     PlantedMeasurementFault(
         "gravity not included", "gravity", "tower_az", 9.81, "m/s^2", scaled_channels(1.0, "tower_az", add=-9.81)
     ),
     *(
         PlantedMeasurementFault(name, check, of[0], factor, "1", scaled_channels(factor, *of))
-        for name, check, factor, of in FACTORS
+        for name, check, factor, of in SCALE_FAULTS
     ),
     *(
         PlantedMeasurementFault(
             name, "swapped", " and ".join(f"{a} with {b}" for a, b in pairs), 1.0, "", exchanged_hubs(*pairs)
         )
-        for name, pairs in SWAPPED.items()
+        for name, pairs in SWAPPED_HUBS.items()
     ),
     *(
         PlantedMeasurementFault(name, "lever", " and ".join(hubs), lever, "m", moments_about_point(lever, *hubs))
-        for name, (lever, hubs) in LEVERS.items()
+        for name, (lever, hubs) in LEVER_FAULTS.items()
     ),
     PlantedMeasurementFault("clipped, 0.5 % of samples", "clipped", "fl_fz", 0.5, "%", clipped_channel("fl_fz", 0.005)),
     PlantedMeasurementFault("value held for 0.3 s", "clipped", "rl_mx", 0.3, "s", hold_sample("rl_mx", 4.0, 0.3)),
@@ -124,48 +144,53 @@ FULL_FAULTS = (
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Single faults on one road; in full also clean recordings on four, faults together, and other noise."""
+    """Rows of single faults on one road; a full run also has clean recordings on four roads, several faults at once,
+    and other noise samples."""
     virtual = measurement(road=("C", 1, 20.0, 5.0)) if quick else measurement()
     rows, finding_texts = [], dict[str, str]()
     for fault in QUICK_FAULTS if quick else QUICK_FAULTS + FULL_FAULTS:
         findings = planted_findings(virtual, folder, fault.spoil, **fault.faults)
-        rows += _rows(fault, findings)
+        rows += _fault_rows(fault, findings)
         finding_texts[fault.name] = findings[0].text if findings else "nothing"
     rows.append(_clean_recordings_row("quick", [planted_findings(virtual, folder)]))
     if not quick:
         rows += [
-            *_clean_recordings(folder),
-            *_wrong_vehicles(folder),
+            *_clean_recording_rows(folder),
+            *_wrong_vehicle_rows(folder),
             *_three_faults_rows(virtual, folder),
-            _spread(virtual, folder),
+            _mean_delay_row(virtual, folder),
         ]
-        size = 1e6 * _size(drifting_findings(virtual, 5e-4, folder), "drift")
-        rows += [_sized("clocks", "drift between the clocks of two files", size, "1e-6", 500.0), *_moving_car(folder)]
+        size = 1e6 * _stated_size(drifting_findings(virtual, 5e-4, folder), "drift")
+        rows += [
+            _size_row("clocks", "drift between the clocks of two files", size, "1e-6", 500.0),
+            *_moving_car_rows(folder),
+        ]
     return rows, {"said": finding_texts}
 
 
-def _size(findings: Sequence[Finding], check: str, finding_place: str = "") -> float:
+def _stated_size(findings: Sequence[Finding], check: str, finding_place: str = "") -> float:
     """Size that the first finding of a check states at a place; NaN if there is no such finding."""
     sizes = [finding.size for finding in findings if finding.check == check and finding_place in finding.place]
     return float("nan") if not sizes or sizes[0] is None else sizes[0]
 
 
-def _sized(key: str, quantity: str, size_found: float, unit: str, planted_size: float) -> Row:
-    """Row that compares a found size with the size of the planted fault."""
-    id, why = f"measured_checks.{key}", "what was planted, 20 %"
-    return Observed(id, SYSTEM, quantity, size_found, unit).within(
+def _size_row(row_name: str, quantity: str, stated_size: float, unit: str, planted_size: float) -> Row:
+    """Row that compares the size that a check states with the size of the planted fault."""
+    id, why = f"measured_checks.{row_name}", "what was planted, 20 %"
+    return Observed(id, SYSTEM, quantity, stated_size, unit).within(
         planted_size, SIZE_TOLERANCE * abs(planted_size), why, "closed form"
     )
 
 
-def _row_of_no_findings(key: str, quantity: str, texts: list[str], tolerance_reason: str) -> Row:
+def _no_findings_row(row_name: str, quantity: str, finding_texts: list[str], tolerance_reason: str) -> Row:
     """Row that passes if there are no findings."""
-    id, finding_text = f"measured_checks.{key}", "; ".join(texts) or tolerance_reason
-    return Observed(id, SYSTEM, quantity, len(texts), "").within(0, 0, finding_text, "closed form")
+    id, finding_text = f"measured_checks.{row_name}", "; ".join(finding_texts) or tolerance_reason
+    return Observed(id, SYSTEM, quantity, len(finding_texts), "").within(0, 0, finding_text, "closed form")
 
 
-def _rows(fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:
-    """Rows on one planted fault: it is named at the right place, no other fault is named, and its size is right."""
+def _fault_rows(fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:
+    """Rows on one planted fault: the right check names the fault at the right place, no other fault is named, and the
+    size is right."""
     key = fault.name.replace(" ", "_").replace(",", "").replace("%", "percent").replace("^", "")
     named = any(finding.check == fault.check and fault.place in finding.place for finding in findings)
     alone = all(finding.check == fault.check for finding in findings)
@@ -177,15 +202,15 @@ def _rows(fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list
         )
     ]
     if fault.check != "swapped":
-        size = _size(findings, fault.check, fault.place)
-        rows.append(_sized(f"{key}.size", f"{fault.name}: its size", size, fault.unit, fault.size))
+        size = _stated_size(findings, fault.check, fault.place)
+        rows.append(_size_row(f"{key}.size", f"{fault.name}: its size", size, fault.unit, fault.size))
     return rows
 
 
 def _clean_recordings_row(name: str, recordings: list[tuple[Finding, ...]]) -> Row:
     """Row: the checks report no error and no doubt for recordings without a fault."""
     what = f"errors and doubts in {len(recordings)} clean recordings"
-    return _row_of_no_findings(
+    return _no_findings_row(
         f"clean.{name}",
         what,
         [finding.text for findings in recordings for finding in findings],
@@ -193,8 +218,8 @@ def _clean_recordings_row(name: str, recordings: list[tuple[Finding, ...]]) -> R
     )
 
 
-def _clean_recordings(folder: Path) -> list[Row]:
-    """Rows: no errors or doubts on clean recordings of 5 to 20 s, from four roads, two vehicles and two noise samples
+def _clean_recording_rows(folder: Path) -> list[Row]:
+    """Rows: no errors or doubts for clean recordings of 5 to 20 s, from four roads, two vehicles and two noise samples
     each."""
     return [
         _clean_recordings_row(
@@ -205,7 +230,7 @@ def _clean_recordings(folder: Path) -> list[Row]:
     ]
 
 
-def _wrong_vehicles(folder: Path) -> list[Row]:
+def _wrong_vehicle_rows(folder: Path) -> list[Row]:
     """Rows on recordings of a car that differs from its vehicle file R19-free: heavier, with stiffer springs, or with
     weaker dampers."""
     findings_by_car = {
@@ -221,21 +246,21 @@ def _wrong_vehicles(folder: Path) -> list[Row]:
         if finding.weight == "error"
     ]
     what = "80 kg more on board than in the file: excess of weight"
-    wanted, excess = 100 * 80 / (r19().loads.sum() / GRAVITY), _size(findings_by_car["loaded"], "weight")
+    wanted, excess = 100 * 80 / (r19().loads.sum() / GRAVITY), _stated_size(findings_by_car["loaded"], "weight")
     id, why = "measured_checks.loaded", "what was loaded, 20 %"
     quantity = (
         "errors named where the car is 80 kg heavier, has springs 20 % stiffer or dampers 30 % weaker than its file"
     )
     return [
         Observed(id, SYSTEM, what, excess, "%").within(wanted, SIZE_TOLERANCE * 6.6, why, "closed form"),
-        _row_of_no_findings("strangers", quantity, errors, "doubts are allowed, errors would stop a good recording"),
+        _no_findings_row("strangers", quantity, errors, "doubts are allowed, errors would stop a good recording"),
     ]
 
 
 def _three_faults_rows(virtual_measurement: VirtualMeasurement, folder: Path) -> list[Row]:
-    """Rows: three faults at once are all named."""
+    """Rows: three faults at once are all named, and the size of one of them is right."""
     spoil = exchanged_hubs(("fl", "fr")), scaled_channels(1e-3, "rr_fz")
-    findings = planted_findings(virtual_measurement, folder, *spoil, delay={"rl_fz": DELAY})
+    findings = planted_findings(virtual_measurement, folder, *spoil, delay={"rl_fz": PLANTED_DELAY})
     what, checks = (
         "wheels swapped, kN for N, 3 ms late at once: the findings",
         ", ".join(sorted({f.check for f in findings})),
@@ -244,25 +269,29 @@ def _three_faults_rows(virtual_measurement: VirtualMeasurement, folder: Path) ->
     last = [finding for finding in findings if finding.check == "shift"][-1:]
     return [
         behaviour_row(id, SYSTEM, what, checks, "shift, swapped, unit", "each at its place"),
-        _sized("together.size", "size of the delay among several faults", _size(last, "shift"), "s", DELAY),
+        _size_row(
+            "together.size", "size of the delay among several faults", _stated_size(last, "shift"), "s", PLANTED_DELAY
+        ),
     ]
 
 
-def _spread(virtual_measurement: VirtualMeasurement, folder: Path) -> Row:
-    """Row: mean of the delay found in one channel over several noise samples, as a check of its bias."""
+def _mean_delay_row(virtual_measurement: VirtualMeasurement, folder: Path) -> Row:
+    """Row: mean over several noise samples of the delay that the check states for one channel, as a test of its
+    bias."""
     samples = [
-        planted_findings(virtual_measurement, folder, seed=seed, **QUICK_FAULTS[0].faults) for seed in range(SAMPLES)
+        planted_findings(virtual_measurement, folder, seed=seed, **QUICK_FAULTS[0].faults)
+        for seed in range(NOISE_SAMPLE_COUNT)
     ]
     late = 1e3 * float(
-        np.mean([_size(findings[:1], findings[0].check) if findings else np.nan for findings in samples])
+        np.mean([_stated_size(findings[:1], findings[0].check) if findings else np.nan for findings in samples])
     )
-    what = f"3 ms late, one force: mean over {SAMPLES} samples of noise"
+    what = f"3 ms late, one force: mean over {NOISE_SAMPLE_COUNT} samples of noise"
     why = "5 %: the response is linear, the vehicle is not"
     return Observed("measured_checks.spread", SYSTEM, what, late, "ms").within(3.0, 0.15, why, "closed form")
 
 
-def _moving_car(folder: Path) -> list[Row]:
-    """Rows: inertial checks on a real car's telephone recording, where it is available."""
+def _moving_car_rows(folder: Path) -> list[Row]:
+    """Rows: inertial checks of a telephone recording in a real car, if the recording is available."""
     path = car.find()
     if path is None:
         return [
@@ -270,7 +299,7 @@ def _moving_car(folder: Path) -> list[Row]:
         ]
     clean = measured_car.samples(path)
     degrees, down = clean.copy(), clean.copy()
-    degrees[:, 4] *= DEGREES
+    degrees[:, 4] *= DEGREES_PER_RADIAN
     down[:, :6] *= np.tile(measured_car.TELEPHONE_TO_CAR, 2)
     findings = {
         name: check(measured_car.recording(values, folder / f"{name}.columns"), None)
@@ -300,12 +329,18 @@ def _moving_car(folder: Path) -> list[Row]:
             "az, q and pitch",
             "gravity and the turning of the pose tell",
         ),
-        _sized("car.degrees", "moving car with degrees for radians in pitch: size of the fault", size, "1", DEGREES),
+        _size_row(
+            "car.degrees",
+            "moving car with degrees for radians in pitch: size of the fault",
+            size,
+            "1",
+            DEGREES_PER_RADIAN,
+        ),
         Observed(
             "measured_checks.car.ratio",
             SYSTEM,
             "ratio of the gyro's pitch rate to that of the camera's pose, moving car",
-            _size(findings["clean"], "turning", "pitch"),
+            _stated_size(findings["clean"], "turning", "pitch"),
             "1",
         ).beside(1.0, "a telephone beside a camera at 20 Hz"),
     ]

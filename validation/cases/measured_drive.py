@@ -1,4 +1,5 @@
-"""A car on four tyres along a measured steer angle and speed: both engines, its own drive, its tyres found again."""
+"""A car on four tyres along a measured steer angle and speed: Exudyn and MuJoCo, repetition of its own simulated drive,
+and identification of its tyres."""
 
 from pathlib import Path
 from typing import Any
@@ -16,18 +17,19 @@ from validation.common.rows import Observed, Row, System
 TITLE = "A car on four rolling tyres along a measured drive"
 SYSTEM: System = "rolling-vehicle"
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
-WRITTEN_DRIVE = SCENES / "single_track.csv"
+SIMULATED_DRIVE_FILE = SCENES / "single_track.csv"
 SENSORS = {"yaw rate": (3, 0.004), "side slip": (5, 0.0008)}
-"""Column of the file, and standard deviation (rad/s, rad) of the noise that its maker put on it."""
+"""Column of the file, and standard deviation of the noise (rad/s, rad) that was added to the simulated signal."""
 START_RATIOS = (0.8, 1.2)
-"""Ratios of both axles' cornering stiffness from which the search begins; the truth is 1."""
-OUTER = 18.4
-"""Of chi-square with 2 freedoms 99.99 % lie below."""
+"""Ratios of both axles' cornering stiffness to the true ones at which the identification starts."""
+CHI_SQUARE_LIMIT = 18.4
+"""99.99 % quantile of the chi-square distribution with 2 degrees of freedom."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Engines and own motion over a short stretch; in full over 8 s, and the tyres found again."""
-    scene = _scene([0.0, 2.0] if quick else [0.0, 8.0])
+    """Rows of the drive in Exudyn and MuJoCo and of the repeated drive over 2 s; a full run takes 8 s and also
+    identifies the tyres."""
+    scene = _drive_scene([0.0, 2.0] if quick else [0.0, 8.0])
     first, second = (run(scene, engine) for engine in ("mujoco", "exudyn"))
     gap = max(float(np.abs(first[name] - second[name]).max()) for name in ("positions", "rates"))
     rows = [
@@ -43,16 +45,16 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return (rows, {}) if quick else ([*rows, *_tyre_rows()], {})
 
 
-def _scene(stretch: list[float], cornering: tuple[float, float] = (1.0, 1.0)) -> HandlingScene:
+def _drive_scene(stretch: list[float], stiffness_ratios: tuple[float, float] = (1.0, 1.0)) -> HandlingScene:
     table = parse(SCENES / "measured_drive.toml")
-    table["tyres"]["cornering"] = list(cornering)
+    table["tyres"]["cornering"] = list(stiffness_ratios)
     table["manoeuvres"]["measured"]["stretch"] = stretch
     return build(table, "measured drive", SCENES)
 
 
 def _motion_rows(drive: Any) -> list[Row]:
     every = round(0.02 / float(drive.times[1] - drive.times[0]))
-    made = np.genfromtxt(WRITTEN_DRIVE, delimiter=",", skip_header=1)[: len(drive.times[::every])]
+    made = np.genfromtxt(SIMULATED_DRIVE_FILE, delimiter=",", skip_header=1)[: len(drive.times[::every])]
     return [
         Observed(
             f"measured_drive.{name.replace(' ', '_')}",
@@ -67,7 +69,9 @@ def _motion_rows(drive: Any) -> list[Row]:
 
 def _tyre_rows() -> list[Row]:
     keys = ["tyres.cornering.0=0.3:3", "tyres.cornering.1=0.3:3"]
-    known = uncertainty(fit(problem_of(_scene([0.0, 6.0], START_RATIOS), WRITTEN_DRIVE, keys, "mujoco", low_pass=5.0)))
+    known = uncertainty(
+        fit(problem_of(_drive_scene([0.0, 6.0], START_RATIOS), SIMULATED_DRIVE_FILE, keys, "mujoco", low_pass=5.0))
+    )
     off = known.fit.values - 1.0
     scaled = off / known.fit.problem.scale
     return [
@@ -77,7 +81,9 @@ def _tyre_rows() -> list[Row]:
             "squared Mahalanobis distance of both axles' identified cornering stiffness from the truth",
             float(scaled @ np.linalg.solve(known.covariance, scaled)),
             "",
-        ).at_most(OUTER, "chi-square: larger where standard errors are too small, or estimates off", "closed form"),
+        ).at_most(
+            CHI_SQUARE_LIMIT, "chi-square: larger where standard errors are too small, or estimates off", "closed form"
+        ),
         Observed(
             "measured_drive.stiffness",
             SYSTEM,

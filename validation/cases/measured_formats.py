@@ -1,4 +1,5 @@
-"""Measurement files in four formats: what is written comes back, in each format's own library too, and by block."""
+"""Measurement files in four formats: written data are read back unchanged, by twinrig block by block and by each
+format's own library."""
 
 import subprocess
 import sys
@@ -25,10 +26,10 @@ from validation.measured.measured_files.own_libraries import LIBRARIES
 TITLE = "Measurement files"
 SYSTEM: System = "measured"
 SEED = 41
-FLOAT = 2.0**-24
-"""Of a value: what floating-point numbers of 32 bits keep."""
-RESOLUTION = {".csv": 0.0, ".mf4": 0.0, ".rsp": FLOAT, ".tdms": 0.0}
-"""Of a value, by format."""
+SINGLE_PRECISION = 2.0**-24
+"""Relative rounding error of 32-bit floating-point numbers."""
+RELATIVE_RESOLUTION = {".csv": 0.0, ".mf4": 0.0, ".rsp": SINGLE_PRECISION, ".tdms": 0.0}
+"""Largest relative change of a value that is written and read, by format."""
 FORMATS = {".csv": "CSV", ".mf4": "MDF 4", ".rsp": "RPC III", ".tdms": "TDMS"}
 START_DATE = datetime(2026, 11, 21, 8, 0, 0, 123456, tzinfo=timezone(timedelta(hours=1)))
 COMMENT = "Prüfgelände, Runde 3 <nass>\nFahrer & Beifahrer"
@@ -36,18 +37,18 @@ CHANNEL_NAMES = ("Kraft vorn links, Fz", "Größe µ", "a [x]")
 UNITS = ("kN", "°", "m/s^2")
 COMMENTS = ('Rad 1: "neu"', "", "zweite Zeile\nfolgt")
 SAMPLE_COUNT, SAMPLE_PERIOD, BLOCK_SAMPLES = 5000, 1e-3, 1234
-"""Samples, s between them, samples of a block that is read."""
+"""Number of samples, sampling period (s), and samples in a block that is read."""
 
 
-def samples() -> np.ndarray:
-    """Values (count, 3) of many sizes, with a gap."""
+def sample_values() -> np.ndarray:
+    """Values (SAMPLE_COUNT, 3) of widely different sizes, with a gap."""
     values = normal_samples(SEED, 0, SAMPLE_COUNT, 3) * np.array([1e3, 1e-6, 1.0])
     values[100:200, 1] = np.nan
     return values
 
 
-def written(path: Path, values: np.ndarray) -> Path:
-    """Write the values to a file in blocks of 700 samples; returns its path."""
+def write_in_blocks(path: Path, values: np.ndarray) -> Path:
+    """Write the values to a file in blocks of 700 samples; returns the file's path."""
     blocks = (values[i : i + 700] for i in range(0, len(values), 700))
     return write(
         path, [ChannelGroup(CHANNEL_NAMES, UNITS, COMMENTS, SAMPLE_PERIOD, len(values), blocks)], START_DATE, COMMENT
@@ -62,7 +63,7 @@ def largest_difference(values: np.ndarray, truth: np.ndarray) -> float:
     return float(np.nanmax(np.abs(values - truth) / np.abs(truth)))
 
 
-def is_kept(measurement_source: Source) -> dict[str, bool]:
+def preserved_texts(measurement_source: Source) -> dict[str, bool]:
     """Whether names, units, comments and start time are read back as they were written, and nothing else was
     reported."""
     return {
@@ -76,31 +77,32 @@ def is_kept(measurement_source: Source) -> dict[str, bool]:
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Round trips through each format, mixed rates, the choice of resolution; the full share watches memory, too."""
+    """Rows of round trips through each format, of two sampling rates in one file, and of the choice of number format; a
+    full run also measures memory."""
     rows: list[Row] = []
     lines: list[dict[str, Any]] = []
     with TemporaryDirectory() as name:
         for extension in FORMATS:
-            format_rows, line = round_trip(Path(name) / f"trip{extension}", extension)
+            format_rows, line = round_trip_rows(Path(name) / f"trip{extension}", extension)
             rows += format_rows
             lines.append(line)
-        rows += [two_rates(Path(name) / f"rates{extension}", extension) for extension in (".mf4", ".tdms")]
-        rows += resolution(Path(name))
-        rows += forms(Path(name))
+        rows += [two_rates_row(Path(name) / f"rates{extension}", extension) for extension in (".mf4", ".tdms")]
+        rows += resolution_rows(Path(name))
+        rows += form_rows(Path(name))
         if not quick:
             rows += [
                 row
                 for extension in (".mf4", ".rsp", ".tdms")
-                for row in memory(Path(name) / f"long{extension}", extension)
+                for row in memory_rows(Path(name) / f"long{extension}", extension)
             ]
     return rows, {"formats": lines}
 
 
-def round_trip(path: Path, file_extension: str) -> tuple[list[Row], dict[str, Any]]:
-    """Rows: a file is written, read back block by block, and opened with the format's own library."""
-    truth, form = samples(), FORMATS[file_extension]
+def round_trip_rows(path: Path, file_extension: str) -> tuple[list[Row], dict[str, Any]]:
+    """Rows and data: a file is written, read back block by block, and read with the format's own library."""
+    truth, form = sample_values(), FORMATS[file_extension]
     began = time.perf_counter()
-    source = open_source(written(path, truth))
+    source = open_source(write_in_blocks(path, truth))
     blocks = list(source.blocks(CHANNEL_NAMES, BLOCK_SAMPLES))
     seconds = time.perf_counter() - began
     values, times = (np.concatenate([getattr(block, key) for block in blocks]) for key in ("values", "times"))
@@ -113,7 +115,7 @@ def round_trip(path: Path, file_extension: str) -> tuple[list[Row], dict[str, An
         float(np.abs(times - SAMPLE_PERIOD * np.arange(SAMPLE_COUNT)).max()),
         largest_difference(there, truth),
     )
-    lost = ", ".join(what for what, good in is_kept(source).items() if not good)
+    lost = ", ".join(what for what, good in preserved_texts(source).items() if not good)
     key, why = f"measured_formats.{file_extension[1:]}", "what the format can hold; every bit where it is 0"
     return [
         Observed(
@@ -122,7 +124,7 @@ def round_trip(path: Path, file_extension: str) -> tuple[list[Row], dict[str, An
             f"{form}: largest change of values that are written and read by block",
             error,
             "of the value",
-        ).at_most(RESOLUTION[file_extension], why, "closed form"),
+        ).at_most(RELATIVE_RESOLUTION[file_extension], why, "closed form"),
         Observed(
             f"{key}.times", SYSTEM, f"{form}: largest change of times that are written and read", off, "s"
         ).at_most(1e-12, "a thousand millionth of a period; CSV writes times with 15 digits", "closed form"),
@@ -140,7 +142,7 @@ def round_trip(path: Path, file_extension: str) -> tuple[list[Row], dict[str, An
             f"{form}: difference of the values from those that {library} reads",
             by_library,
             "of the value",
-        ).at_most(RESOLUTION[file_extension], f"{why}; names and units are compared, too", "native"),
+        ).at_most(RELATIVE_RESOLUTION[file_extension], f"{why}; names and units are compared, too", "native"),
     ], {
         "format": form,
         "library": library,
@@ -152,8 +154,9 @@ def round_trip(path: Path, file_extension: str) -> tuple[list[Row], dict[str, An
     }
 
 
-def two_rates(path: Path, file_extension: str) -> Row:
-    """Largest change of times and values of two groups with different rates, written to one file and read back."""
+def two_rates_row(path: Path, file_extension: str) -> Row:
+    """Row: largest change of times and values of two groups with different sampling rates, written to one file and read
+    back."""
     values = {("fast",): (1e-3, np.arange(4000.0)), ("slow",): (2e-2, np.arange(200.0) ** 2)}
     write(
         path,
@@ -177,7 +180,7 @@ def two_rates(path: Path, file_extension: str) -> Row:
     ).at_most(1e-12, "each group has a clock of its own", "closed form")
 
 
-def forms(folder: Path) -> list[Row]:
+def form_rows(folder: Path) -> list[Row]:
     """Rows: CSV files in the forms that loggers, spreadsheets and scripts write, and files of other kinds, are read
     exactly or refused."""
     files = (*csv_forms.FILES, *kinds.FILES)
@@ -214,11 +217,11 @@ def forms(folder: Path) -> list[Row]:
     ]
 
 
-def _difference_or_error(odd: OddFile, folder: Path) -> float | str | None:
+def _difference_or_error(odd_file: OddFile, folder: Path) -> float | str | None:
     """Error of the values read from a file; None if the file is refused with a reason; text of any other error that is
     raised."""
     try:
-        return odd.error(folder)
+        return odd_file.error(folder)
     except InputError:
         return None
     except Exception as error:
@@ -233,9 +236,9 @@ def wheel_force() -> np.ndarray:
     return load
 
 
-def resolution(folder: Path) -> list[Row]:
-    """Rows: damage of the road without its pothole, with integer and with floating-point samples; RPC III files are
-    written in floating point for this reason."""
+def resolution_rows(folder: Path) -> list[Row]:
+    """Rows: change of the damage of the road without its pothole by integer and by floating-point samples. RPC III
+    files are written in floating point for this reason."""
     load = wheel_force()
     path = write(folder / "choice.rsp", [ChannelGroup(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
     floating = read(open_source(path))["Fz"][1]
@@ -263,31 +266,33 @@ def resolution(folder: Path) -> list[Row]:
     ]
 
 
-STATUS = Path("/proc/self/status")
-WATCHED = f"""
+STATUS_FILE = Path("/proc/self/status")
+MEMORY_SCRIPT = f"""
 import sys
 from models.measured.formats import open_source
 source = open_source(sys.argv[1])
 count = sum(len(block.times) for block in source.blocks([one.name for one in source.channels]))
-print(count, next(line for line in open("{STATUS}") if line.startswith("VmHWM")).split()[1])
+print(count, next(line for line in open("{STATUS_FILE}") if line.startswith("VmHWM")).split()[1])
 """
 
 
-def memory(path: Path, file_extension: str) -> list[Row]:
+def memory_rows(path: Path, file_extension: str) -> list[Row]:
     """Rows: peak memory of a fresh process that reads five minutes of sixty channels block by block."""
     key, form = f"measured_formats.{file_extension[1:]}.memory", FORMATS[file_extension]
-    if not STATUS.exists():
+    if not STATUS_FILE.exists():
         return [not_run(key, SYSTEM, f"{form}: peak memory", "this system does not tell the peak of a process")]
     count, base = 300_000, 1e3 * normal_samples(SEED, 2, 60_000, 60)
     blocks: Iterator[np.ndarray] = (base + i for i in range(count // len(base)))
     write(path, [ChannelGroup(tuple(f"ch{i}" for i in range(60)), ("N",) * 60, ("",) * 60, 1e-3, count, blocks)])
-    out = subprocess.run([sys.executable, "-c", WATCHED, str(path)], capture_output=True, text=True, check=True).stdout
-    samples, peak = (int(word) for word in out.split())
+    out = subprocess.run(
+        [sys.executable, "-c", MEMORY_SCRIPT, str(path)], capture_output=True, text=True, check=True
+    ).stdout
+    sample_total, peak = (int(word) for word in out.split())
     size = path.stat().st_size / 1e6
     path.unlink()
     return [
         Observed(
-            f"{key}.samples", SYSTEM, f"{form}: samples of five minutes that are read by block", samples, ""
+            f"{key}.samples", SYSTEM, f"{form}: samples of five minutes that are read by block", sample_total, ""
         ).within(count, 0, "a count: none is lost between blocks", "none"),
         Observed(
             key,

@@ -1,4 +1,5 @@
-"""Long recordings: bits of a run in blocks and of a killed one, memory, section forces by the engines, counting."""
+"""Long recordings: equal bits of runs in blocks and of killed runs, memory, section forces compared with the engines,
+and cycle counting."""
 
 import subprocess
 import sys
@@ -24,30 +25,31 @@ from validation.spatial.joint_forces import exudyn_guides, mujoco_guides
 
 TITLE = "Long recordings, section forces, what is handed on"
 SYSTEM: System = "measured"
-ASTM = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
-"""The load of figure 6 of ASTM E1049-85, with the counts that it prints for ranges 3, 4, 6, 8 and 9."""
-COUNTED = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
-REPEATED = 2.5
-"""s, of the pattern."""
+ASTM_LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
+"""The load of figure 6 of ASTM E1049-85; ASTM_COUNTS has the printed counts for ranges 3, 4, 6, 8 and 9."""
+ASTM_COUNTS = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
+PATTERN_SECONDS = 2.5
+"""Length (s) of the pattern that a long recording repeats."""
 LONG_DURATION = 24.0
-"""s, of the run whose memory is watched."""
+"""Length (s) of the run whose memory is measured."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Section forces, counting, blocks in MuJoCo; in full all engines, a killed run, memory and files."""
-    rows = [*_guides(quick), *_counting()]
+    """Rows of section forces, of counting, and of a run in blocks in MuJoCo; a full run also has all engines, a killed
+    run, memory, and exported files."""
+    rows = [*_guide_rows(quick), *_counting_rows()]
     if quick:
-        return [*rows, _blocks(folder, "mujoco", "kalman", 0.3)], {}
+        return [*rows, _equal_blocks_row(folder, "mujoco", "kalman", 0.3)], {}
     lasting = {"mujoco": 0.5, "exudyn": 0.25, "reference": 0.2}
     rows += [
-        _blocks(folder, engine, method, seconds)
+        _equal_blocks_row(folder, engine, method, seconds)
         for engine, seconds in lasting.items()
         for method in ("none", "kalman", "prescribed")
     ]
-    return [*rows, _run_killed_twice(folder), *_memory(folder), *_handed_on(folder)], {}
+    return [*rows, _killed_row(folder), *_memory_rows(folder), *_export_rows(folder)], {}
 
 
-def _guides(quick: bool) -> list[Row]:
+def _guide_rows(quick: bool) -> list[Row]:
     """Rows: forces and moments of the suspension guides in a turning, shaken car without symmetry, compared with the
     engines' own sensors."""
     car, worst = cut(twin(), "body"), 0.0
@@ -56,7 +58,7 @@ def _guides(quick: bool) -> list[Row]:
     numbers, wrenches = build("reference", car, drive, 1e-3, 1e-3).numbers, drive.hubs[0].reshape(-1, 6)
     for seed in range(1 if quick else 5):
         q, v = random_states(car, seed)
-        guided, by_mujoco = _transmitted(sections, numbers, q, v), mujoco_guides(car, q, v, wrenches)
+        guided, by_mujoco = _guide_forces(sections, numbers, q, v), mujoco_guides(car, q, v, wrenches)
         worst = max(worst, float(np.abs(guided - by_mujoco).max() / np.abs(by_mujoco).max()))
     rows = [
         Observed(
@@ -73,7 +75,7 @@ def _guides(quick: bool) -> list[Row]:
     q, v = random_states(car, 0)
     for i, (body, freedom) in enumerate(car.tree.coordinates()):
         q[i] = 0.0 if body == "engine" and freedom.startswith("r") else q[i]
-    guided, by_mujoco = _transmitted(sections, numbers, q, 0 * v), exudyn_guides(car, q, wrenches)
+    guided, by_mujoco = _guide_forces(sections, numbers, q, 0 * v), exudyn_guides(car, q, wrenches)
     off = float(np.abs(guided - by_mujoco).max() / np.abs(by_mujoco).max())
     return [
         *rows,
@@ -88,8 +90,9 @@ def _guides(quick: bool) -> list[Row]:
     ]
 
 
-def _transmitted(sections: Sections, table: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Forces and moments (guides, 6) that guides transmit; components in which a guide lets its body slide are 0."""
+def _guide_forces(sections: Sections, table: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Forces and moments (guides, 6) that the suspension guides transmit (N, N m); components along which a guide lets
+    its body slide are 0."""
     read = sections.read(table, np.concatenate((q, v))[None], 2)[0]
     values = {answer.name: value for answer, value in zip(sections.answers, read, strict=True)}
     return np.array(
@@ -100,9 +103,9 @@ def _transmitted(sections: Sections, table: np.ndarray, q: np.ndarray, v: np.nda
     )
 
 
-def _counting() -> list[Row]:
+def _counting_rows() -> list[Row]:
     """Rows: rainflow counting of the standard's example, and damage and counts of a sine, which are known exactly."""
-    spans, _, counts = rainflow_cycles(ASTM)
+    spans, _, counts = rainflow_cycles(ASTM_LOAD)
     by_span = {float(span): float(counts[spans == span].sum()) for span in np.unique(spans)}
     sine = np.sin(2 * np.pi * np.arange(100 * 64 + 1) / 64)  # 100 periods from 0: half cycles of 1, whole ones of 2
     counted = counted_load(sine, (5.0,))
@@ -115,7 +118,7 @@ def _counting() -> list[Row]:
             SYSTEM,
             "rainflow counts of the example of ASTM E1049-85",
             str(by_span),
-            str(COUNTED),
+            str(ASTM_COUNTS),
             "the standard's own table",
             "published",
         ),
@@ -138,35 +141,36 @@ def _counting() -> list[Row]:
     ]
 
 
-def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
+def _equal_blocks_row(folder: Path, engine: str, stabiliser: str, seconds: float) -> Row:
     """Row: number of channels that differ between a run in one block and a run in uneven blocks."""
     run_folder = folder / f"blocks {seconds}"
     run_folder.mkdir(exist_ok=True)
-    job = run_of(run_folder, seconds, REPEATED, engine, AttitudeHold(method))  # type: ignore[arg-type]
+    job = run_of(run_folder, seconds, PATTERN_SECONDS, engine, AttitudeHold(stabiliser))  # type: ignore[arg-type]
     bits = []
     for block in (60.0, 0.073):
-        name = f"{engine} {method} {block}"
+        name = f"{engine} {stabiliser} {block}"
         run(job, run_folder / name, block=block)
         bits.append(np.frombuffer(answers_of(run_folder, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
-        f"measured_long.blocks_{engine}_{method}",
+        f"measured_long.blocks_{engine}_{stabiliser}",
         SYSTEM,
-        f"channels in {engine} whose bits change if {seconds:g} s are run in blocks of 0.073 s, stabiliser {method}",
+        f"channels in {engine} whose bits change if {seconds:g} s are run in blocks of 0.073 s, stabiliser "
+        f"{stabiliser}",
         changed,
         "1",
     ).at_most(0.0, "state, filter and inputs go from block to block as they are", "closed form")
 
 
-def _run_killed_twice(folder: Path) -> Row:
-    """Row: number of channels that differ between a run that was killed twice and one that was not."""
+def _killed_row(folder: Path) -> Row:
+    """Row: number of channels that differ between a run that was killed twice and a run that was not."""
     seconds, bits = 3.0, list[np.ndarray]()
     for times in (0, 2):
         run_folder = folder / f"killed {times}"
         run_folder.mkdir()
-        job = run_of(run_folder, seconds, REPEATED)
+        job = run_of(run_folder, seconds, PATTERN_SECONDS)
         if times:
-            run_killed_process(run_folder, seconds, REPEATED, 0.25, times)
+            run_killed_process(run_folder, seconds, PATTERN_SECONDS, 0.25, times)
         else:
             run(job, run_folder / "run")
         bits.append(np.frombuffer(answers_of(run_folder), np.int64))
@@ -181,10 +185,10 @@ def _run_killed_twice(folder: Path) -> Row:
     ).at_most(0.0, "a checkpoint is written whole or not at all", "closed form")
 
 
-def _memory(folder: Path) -> list[Row]:
-    """Rows: peak memory for an hour of recording, extrapolated from a shorter one, and the speed of the run."""
-    run_of(folder, LONG_DURATION, REPEATED)
-    words = map(str, (folder, LONG_DURATION, REPEATED, LONG_DURATION / 10, 2e-3))
+def _memory_rows(folder: Path) -> list[Row]:
+    """Rows: peak memory for an hour of recording, extrapolated from a shorter recording, and speed of the run."""
+    run_of(folder, LONG_DURATION, PATTERN_SECONDS)
+    words = map(str, (folder, LONG_DURATION, PATTERN_SECONDS, LONG_DURATION / 10, 2e-3))
     command = [sys.executable, "-m", "validation.measured.long_recording", *words]
     output_lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
     lines = np.array([line.split() for line in output_lines], float)  # of every block: seconds, memory, processor
@@ -209,11 +213,11 @@ def _memory(folder: Path) -> list[Row]:
     ]
 
 
-def _handed_on(folder: Path) -> list[Row]:
-    """Rows: section forces written in every format and read back; measured check channels compared with the run."""
+def _export_rows(folder: Path) -> list[Row]:
+    """Rows: section forces written in every format and read back; a measured check channel compared with the run."""
     run_folder = folder / "handed on"
     run_folder.mkdir()
-    job = run_of(run_folder, 2.0, REPEATED)
+    job = run_of(run_folder, 2.0, PATTERN_SECONDS)
     outcome = run(job, run_folder / "run")
     wanted = outcome.answers[:6]
     values = np.column_stack([outcome.samples(answer) for answer in wanted])
@@ -256,10 +260,10 @@ def _handed_on(folder: Path) -> list[Row]:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """None: the rows say it all."""
+    """No tables."""
     return []
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """None."""
+    """No figures."""
     return []

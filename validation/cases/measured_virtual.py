@@ -1,4 +1,4 @@
-"""A virtual measurement, written to files, read back, held and compared with the truth that it came from."""
+"""A virtual measurement that is written to files, read back, stabilised, and compared with its true run."""
 
 import re
 from dataclasses import dataclass
@@ -38,23 +38,24 @@ from validation.measured import recording as moving_car
 
 TITLE = "Measurement files against the truth"
 SYSTEM: System = "drift"
-SEED, SAMPLES = 61, 10
+SEED, NOISE_SAMPLE_COUNT = 61, 10
 FORMATS = ("csv", "mf4", "rsp", "tdms")
-NOISE = {"force": 8.0, "moment": 1.0, "angle": np.radians(0.1), "angular rate": 5e-3}
-"""N, N m, rad, rad/s: hub forces to 0.2 % of their largest, an inertial unit to 0.1 degrees."""
+NOISE_LEVELS = {"force": 8.0, "moment": 1.0, "angle": np.radians(0.1), "angular rate": 5e-3}
+"""Standard deviations of the noise (N, N m, rad, rad/s): hub forces to 0.2 % of their largest, angles of an inertial
+unit to 0.1 degrees."""
 RECORDER_DELAY = 0.003
-"""s, by which the inertial unit's recorder is late, which the scene states."""
-DAMAGE = 0.03
+"""Delay (s) of the inertial unit's recorder, which the scene states."""
+DAMAGE_TOLERANCE = 0.03
 SAMPLING_RATE, DURATION = 500.0, 5.0
-"""Hz, s, of the proofs."""
-COPIES = 16
-"""Paths of the ensembles beside a predicted time of trust."""
+"""Sampling rate (Hz) and length (s) of the virtual measurements."""
+PATH_COUNT = 16
+"""Number of paths in the ensembles that are compared with a predicted time of trust."""
 
 
 @dataclass(frozen=True)
-class Proof:
-    """One virtual measurement to prove the whole chain: vehicle file, frame of the hub forces, bits of the converter,
-    stabiliser, and file formats."""
+class ChainTest:
+    """One virtual measurement that tests the whole chain from sensor to damage: vehicle file, frame of the hub forces,
+    bits of the converter, stabiliser, and file formats."""
 
     name: str
     vehicle: str
@@ -64,26 +65,28 @@ class Proof:
     formats: tuple[str, ...]
 
 
-PROOFS = (
-    Proof("r19_free", "r19_free", "hub", 16, AttitudeHold(), FORMATS),
-    Proof("own", "own.toml", "inertial", 12, AttitudeHold(bandwidth=1.0), ("mf4",)),
+CHAIN_TESTS = (
+    ChainTest("r19_free", "r19_free", "hub", 16, AttitudeHold(), FORMATS),
+    ChainTest("own", "own.toml", "inertial", 12, AttitudeHold(bandwidth=1.0), ("mf4",)),
 )
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows: in full every proof with ten samples of noise, the engines and the predicted time of trust."""
+    """Rows on virtual measurements through the whole chain of files, run and damage with ten noise samples, on the
+    engines, and on the predicted time of trust; a quick run has one short noise sample."""
     if quick:
-        return _quick(folder), {}
+        return _quick_rows(folder), {}
     rows, data = list[Row](), dict[str, Any]()
-    for proof in PROOFS:
-        proved, ratios = _run_all_formats(proof, folder / proof.name)
+    for proof in CHAIN_TESTS:
+        proved, ratios = _format_rows(proof, folder / proof.name)
         rows += proved
         data[proof.name] = ratios
-    return [*rows, *_trust_times(), *_moving(folder / "moving")], data
+    return [*rows, *_trust_time_rows(), *_moving_car_rows(folder / "moving")], data
 
 
-def own_vehicle(folder: Path) -> str:
-    """A vehicle file of a user's own: R19-free with every spring, damper and mass another, none symmetric."""
+def write_user_vehicle(folder: Path) -> str:
+    """Write a vehicle file that differs from R19-free in every spring, damper and mass, without symmetry; returns its
+    name."""
     text, number = (SHIPPED / "r19_free.toml").read_text(encoding="utf-8"), count()
 
     def scaled(number_match: re.Match[str]) -> str:
@@ -93,22 +96,22 @@ def own_vehicle(folder: Path) -> str:
     return "own.toml"
 
 
-def measured(proof_case: Proof, folder: Path, duration: float) -> VirtualMeasurement:
-    """The virtual measurement of a vehicle on its road; faults and noise are added to each sample later."""
+def measurement_of_test(chain_test: ChainTest, folder: Path, duration: float) -> VirtualMeasurement:
+    """The virtual measurement of a vehicle on a road; faults and noise are added to each sample later."""
     table = {
         "duration": duration,
         "sampling_rate": SAMPLING_RATE,
-        "frame": proof_case.frame,
+        "frame": chain_test.frame,
         "sections": ["front left"],
     }
-    vehicle = cut(load_vehicle(proof_case.vehicle, folder), "body")
+    vehicle = cut(load_vehicle(chain_test.vehicle, folder), "body")
     return virtual_measurement(vehicle, read(VirtualTable, table, ""), "mujoco")
 
 
-def faults(bits: int) -> Faults:
+def planted_faults(bits: int) -> Faults:
     """All faults that are planted in the measurement."""
     table = {
-        "noise": NOISE,
+        "noise": NOISE_LEVELS,
         "delay": dict.fromkeys(("angle", "angular rate"), RECORDER_DELAY),
         "quantisation": {"bits": bits},
         "dropouts": {"rate": 0.1, "length": 0.02, "channels": ["force", "moment"]},
@@ -116,11 +119,11 @@ def faults(bits: int) -> Faults:
     return read(Faults, table, "")
 
 
-def recorded(
+def recording_from_files(
     virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, format_name: str, folder: Path
 ) -> Recording:
-    """Samples written as two recorders would, one for hubs and one for the inertial unit, in a file format, and read
-    back through a scene."""
+    """Recording read back through a scene, after two recorders, one for hubs and one for the inertial unit, have
+    written the samples in a file format."""
     folder.mkdir(parents=True)
     inertial = np.array([signal.at == virtual.vehicle.chassis for signal in virtual.signals])
     text = ['title = "proof"', 'system = "measured"', "[vehicle]", f'file = "{vehicle}"']
@@ -134,24 +137,24 @@ def recorded(
     return read_files(load(folder / "scene.toml"), folder)
 
 
-def held_run(recording: Recording, vehicle: CutVehicle, hold: AttitudeHold, engine: str = "mujoco") -> SectionRun:
-    """The run of a recording, ready to be marched, with the vehicle's attitude stabilised as ``hold`` says."""
+def stabilised_run(recording: Recording, vehicle: CutVehicle, hold: AttitudeHold, engine: str = "mujoco") -> SectionRun:
+    """Run of a recording, ready to be started, with the vehicle's attitude stabilised as ``hold`` says."""
     return SectionRun(vehicle, recording, Sections(vehicle), engine, hold)
 
 
-def _run_all_formats(proof_case: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
-    """Rows and mean damage of ten noise samples through every file format, stabilised. The first sample is also run
-    free and in the other engine."""
+def _format_rows(chain_test: ChainTest, folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
+    """Rows and mean damage ratios of ten noise samples through every file format, stabilised. The first sample is also
+    run free and in the other engine."""
     folder.mkdir()
-    own_vehicle(folder)
-    true, planted = measured(proof_case, folder, DURATION), faults(proof_case.bits)
-    ratios: dict[str, list[dict[str, float]]] = {form: [] for form in proof_case.formats}
-    off = dict.fromkeys(proof_case.formats, 0.0)
-    for path in range(SAMPLES):
+    write_user_vehicle(folder)
+    true, planted = measurement_of_test(chain_test, folder, DURATION), planted_faults(chain_test.bits)
+    ratios: dict[str, list[dict[str, float]]] = {form: [] for form in chain_test.formats}
+    off = dict.fromkeys(chain_test.formats, 0.0)
+    for path in range(NOISE_SAMPLE_COUNT):
         samples, known = true.samples(planted, SEED, path), list[tuple[np.ndarray, dict[str, float]]]()
-        for form in proof_case.formats:
+        for form in chain_test.formats:
             format_folder = folder / f"{form}{path}"
-            recording = recorded(true, samples, proof_case.vehicle, form, format_folder)
+            recording = recording_from_files(true, samples, chain_test.vehicle, form, format_folder)
             off[form] = max(off[form], _largest_channel_change(recording, true, samples))
             values = recording.columns.block(recording.columns.names, 0, recording.count)
             damage = next(
@@ -159,7 +162,7 @@ def _run_all_formats(proof_case: Proof, folder: Path) -> tuple[list[Row], dict[s
             )
             if damage is None:
                 damage = errors_of_run(
-                    march(held_run(recording, true.vehicle, proof_case.hold), format_folder / "run"), true
+                    march(stabilised_run(recording, true.vehicle, chain_test.hold), format_folder / "run"), true
                 ).damage
                 known.append((values, damage))
             ratios[form].append(damage)
@@ -167,20 +170,19 @@ def _run_all_formats(proof_case: Proof, folder: Path) -> tuple[list[Row], dict[s
         form: {name: float(np.mean([damages[name] for damages in ratios_of])) for name in ratios_of[0]}
         for form, ratios_of in ratios.items()
     }
-    rows = [row for form in proof_case.formats for row in _rows(proof_case, form, off[form], means[form])]
-    first = recorded(true, true.samples(planted, SEED), proof_case.vehicle, "csv", folder / "beside")
-    return [*rows, *_rows_of_other_runs(proof_case, first, true, folder)], means
+    rows = [row for form in chain_test.formats for row in _damage_rows(chain_test, form, off[form], means[form])]
+    first = recording_from_files(true, true.samples(planted, SEED), chain_test.vehicle, "csv", folder / "beside")
+    return [*rows, *_other_run_rows(chain_test, first, true, folder)], means
 
 
-def _differ_by_rounding(first: np.ndarray, second_samples: np.ndarray) -> bool:
-    """Whether two recordings differ only by rounding from unit conversion, in which case a single run serves for
-    both."""
-    largest = np.maximum(np.nanmax(np.abs(first), axis=0), 1e-300)
-    return bool(np.allclose(first / largest, second_samples / largest, rtol=0.0, atol=1e-12, equal_nan=True))
+def _differ_by_rounding(first_samples: np.ndarray, second_samples: np.ndarray) -> bool:
+    """Whether two recordings differ only by rounding of the unit conversion; then one run serves for both."""
+    largest = np.maximum(np.nanmax(np.abs(first_samples), axis=0), 1e-300)
+    return bool(np.allclose(first_samples / largest, second_samples / largest, rtol=0.0, atol=1e-12, equal_nan=True))
 
 
 def _largest_channel_change(recording: Recording, true_measurement: VirtualMeasurement, samples: np.ndarray) -> float:
-    """Largest change of a hub channel by writing, mapping and resampling, relative to the channel's largest value;
+    """Largest change of a hub channel by writing, mapping and resampling, divided by the channel's largest value;
     infinite if other samples are missing."""
     largest_change = 0.0
     for i, signal in enumerate(true_measurement.signals):
@@ -194,15 +196,17 @@ def _largest_channel_change(recording: Recording, true_measurement: VirtualMeasu
     return largest_change
 
 
-def _rows(proof_case: Proof, format_name: str, off: float, means: dict[str, float]) -> list[Row]:
-    worst = max(means, key=lambda name: abs(means[name] - 1))
-    what = f"{proof_case.name}, frame {proof_case.frame!r}, {proof_case.bits} bit, through {format_name}"
+def _damage_rows(
+    chain_test: ChainTest, format_name: str, channel_change: float, mean_damage_ratios: dict[str, float]
+) -> list[Row]:
+    worst = max(mean_damage_ratios, key=lambda name: abs(mean_damage_ratios[name] - 1))
+    what = f"{chain_test.name}, frame {chain_test.frame!r}, {chain_test.bits} bit, through {format_name}"
     return [
         Observed(
-            f"measured_virtual.values_{proof_case.name}_{format_name}",
+            f"measured_virtual.values_{chain_test.name}_{format_name}",
             SYSTEM,
             f"change of hub channels by writing, reading and mapping, relative to their largest value; {what}",
-            off,
+            channel_change,
             "1",
         ).at_most(
             2**-23 if format_name == "rsp" else 1e-12,
@@ -210,22 +214,25 @@ def _rows(proof_case: Proof, format_name: str, off: float, means: dict[str, floa
             "native",
         ),
         Observed(
-            f"measured_virtual.damage_{proof_case.name}_{format_name}",
+            f"measured_virtual.damage_{chain_test.name}_{format_name}",
             SYSTEM,
             f"ratio of the damage (slope 5) of {worst} to the true damage, the farthest of "
-            f"{len(means)} springs, mounts and bars, mean of {SAMPLES} samples of noise; {what}",
-            means[worst],
+            f"{len(mean_damage_ratios)} springs, mounts and bars, mean of "
+            f"{NOISE_SAMPLE_COUNT} samples of noise; {what}",
+            mean_damage_ratios[worst],
             "1",
-        ).within(1.0, DAMAGE, "demanded; body-frame section forces of the run held by the filter", "none"),
+        ).within(1.0, DAMAGE_TOLERANCE, "demanded; body-frame section forces of the run held by the filter", "none"),
     ]
 
 
-def _rows_of_other_runs(
-    proof_case: Proof, first: Recording, true_measurement: VirtualMeasurement, folder: Path
+def _other_run_rows(
+    chain_test: ChainTest, recording: Recording, true_measurement: VirtualMeasurement, folder: Path
 ) -> list[Row]:
-    """Rows: the recording run in both engines, free and stabilised, and the verdicts on these runs."""
-    free = held_run(first, true_measurement.vehicle, AttitudeHold("none"))
-    jobs = {engine: held_run(first, true_measurement.vehicle, proof_case.hold, engine) for engine in ENGINES[1:]}
+    """Rows: the recording simulated in Exudyn and MuJoCo, free and stabilised, and the verdicts on these runs."""
+    free = stabilised_run(recording, true_measurement.vehicle, AttitudeHold("none"))
+    jobs = {
+        engine: stabilised_run(recording, true_measurement.vehicle, chain_test.hold, engine) for engine in ENGINES[1:]
+    }
     runs = {engine: march(job, folder / engine) for engine, job in jobs.items()}
     beside, two = (run.columns.block(run.columns.names, 0, run.done) for run in runs.values())
     apart = float((np.abs(beside - two).max(axis=0) / np.maximum(np.abs(beside).max(axis=0), 1e-6)).max())
@@ -233,26 +240,26 @@ def _rows_of_other_runs(
     blind = judge(jobs[ENGINES[-1]], last_run)
     rows = [
         Observed(
-            f"measured_virtual.engines_{proof_case.name}",
+            f"measured_virtual.engines_{chain_test.name}",
             SYSTEM,
             "difference between the channels of Exudyn and MuJoCo, over the largest value of each; "
-            f"{proof_case.name}, stabilised, {first.duration:g} s",
+            f"{chain_test.name}, stabilised, {recording.duration:g} s",
             apart,
             "1",
         ).at_most(1e-6, "same tableau, same step", "shared kernel"),
         behaviour_row(
-            f"measured_virtual.verdict_{proof_case.name}",
+            f"measured_virtual.verdict_{chain_test.name}",
             SYSTEM,
-            f"verdict of the stabilised run without the truth; {proof_case.name}",
+            f"verdict of the stabilised run without the truth; {chain_test.name}",
             blind.word,
             "accepted",
             f"{blind.reason}; beside the truth, 5 % for each damage of this one "
-            f"sample of noise: {judge_beside_truth(last_run, true_measurement, proof_case.hold).word}",
+            f"sample of noise: {judge_beside_truth(last_run, true_measurement, chain_test.hold).word}",
         ),
     ]
-    level = Level(NOISE["force"], NOISE["moment"])
+    level = Level(NOISE_LEVELS["force"], NOISE_LEVELS["moment"])
     until = predicted_drift(
-        true_measurement.vehicle, level, first.period, first.duration, proof_case.frame
+        true_measurement.vehicle, level, recording.period, recording.duration, chain_test.frame
     ).trusted_time
     try:
         run = march(free, folder / "free")
@@ -262,19 +269,19 @@ def _rows_of_other_runs(
     sentence = judge(free, run, trusted=until)
     rows.append(
         Observed(
-            f"measured_virtual.free_{proof_case.name}",
+            f"measured_virtual.free_{chain_test.name}",
             SYSTEM,
-            f"time at which the free vehicle's run ends on these forces, frame {proof_case.frame!r}; "
+            f"time at which the free vehicle's run ends on these forces, frame {chain_test.frame!r}; "
             f"verdict: {sentence.word}, {sentence.reason}",
             (run.done - 1) * run.period,
             "s",
-        ).beside(first.duration, "stated")
+        ).beside(recording.duration, "stated")
     )
     return rows
 
 
-def _trust_times() -> list[Row]:
-    """Rows: ratio of the median drift-off time of an ensemble to the predicted time of trust."""
+def _trust_time_rows() -> list[Row]:
+    """Rows: median drift-off time of an ensemble divided by the predicted drift-off time."""
     vehicle, rows = cut(load_vehicle("r19_free"), "body"), list[Row]()
     bias = np.zeros(6 * len(vehicle.hubs))
     bias[2] = 3.0
@@ -290,13 +297,13 @@ def _trust_times() -> list[Row]:
         true = virtual_measurement(vehicle, virtual, "mujoco")
         predicted = predicted_drift(vehicle, level, 1 / SAMPLING_RATE, duration, frame).passing_time()
         assert predicted is not None
-        drift_off = float(np.median([_drift_off(vehicle, true, level, path) for path in range(COPIES)]))
+        drift_off = float(np.median([_drift_off_time(vehicle, true, level, path) for path in range(PATH_COUNT)]))
         rows.append(
             Observed(
                 f"measured_virtual.trust_{name}",
                 SYSTEM,
                 "ratio of the median time at which roll or pitch is off by 0.05 rad to the predicted "
-                f"time, {COPIES} free runs on a rough road ({name}, {frame!r})",
+                f"time, {PATH_COUNT} free runs on a rough road ({name}, {frame!r})",
                 drift_off / predicted,
                 "1",
             ).within(1.0, 0.2, "demanded; the median of 16 has a deviation of 3 to 10 %", "closed form")
@@ -304,12 +311,12 @@ def _trust_times() -> list[Row]:
     return rows
 
 
-def _drift_off(vehicle: CutVehicle, true_measurement: VirtualMeasurement, drift_level: Level, path: int) -> float:
+def _drift_off_time(vehicle: CutVehicle, true_measurement: VirtualMeasurement, drift_level: Level, path: int) -> float:
     samples = true_measurement.run.wrenches.reshape(len(true_measurement.run.times), -1)
     forces = HubForces(
         samples + (0.0 if drift_level.bias is None else drift_level.bias),
         true_measurement.step,
-        true_frame(true_measurement),
+        frame_of_measurement(true_measurement),
     )
     deviation = np.tile(np.repeat([drift_level.force, drift_level.moment], 3), len(vehicle.hubs))
     start = np.zeros(2 * vehicle.size)
@@ -327,12 +334,12 @@ def _drift_off(vehicle: CutVehicle, true_measurement: VirtualMeasurement, drift_
     return float(true_measurement.run.times[off.argmax()]) if off.any() else np.inf
 
 
-def true_frame(true_measurement: VirtualMeasurement) -> str:
+def frame_of_measurement(true_measurement: VirtualMeasurement) -> str:
     """Frame of the hub forces of a virtual measurement."""
     return next(signal.frame for signal in true_measurement.signals if signal.at in true_measurement.vehicle.hubs)
 
 
-def _moving(folder: Path) -> list[Row]:
+def _moving_car_rows(folder: Path) -> list[Row]:
     """Rows on a real car: a telephone's gyro and accelerometers compared with the angles of its camera, from two files
     with different clocks."""
     path, what = moving_car.find(), "telephone and camera of a moving car, two files on one clock:"
@@ -360,14 +367,14 @@ def _moving(folder: Path) -> list[Row]:
     ]
 
 
-def _quick(folder: Path) -> list[Row]:
-    """Rows of the quick share: one short noise sample through a file, the damage of a spring, and the closed law of
+def _quick_rows(folder: Path) -> list[Row]:
+    """Rows of a quick run: one short noise sample through a file, the damage of a spring, and the closed law of
     drift."""
-    proof = PROOFS[0]
-    true = measured(proof, folder, 0.6)
-    samples = true.samples(read(Faults, {"noise": NOISE}, ""), SEED)
-    recording = recorded(true, samples, proof.vehicle, "csv", folder / "quick")
-    run = march(held_run(recording, true.vehicle, proof.hold), folder / "quick" / "run")
+    proof = CHAIN_TESTS[0]
+    true = measurement_of_test(proof, folder, 0.6)
+    samples = true.samples(read(Faults, {"noise": NOISE_LEVELS}, ""), SEED)
+    recording = recording_from_files(true, samples, proof.vehicle, "csv", folder / "quick")
+    run = march(stabilised_run(recording, true.vehicle, proof.hold), folder / "quick" / "run")
     wrong = errors_of_run(run, true)
     level = Level(8.0, 1.0)
     law = rigid(true.vehicle).angle_variance(np.tile([8.0] * 3 + [1.0] * 3, 4), true.period, np.array([10.0]))
@@ -398,14 +405,14 @@ def _quick(folder: Path) -> list[Row]:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Mean damage of every section force, through every format."""
+    """Tables of the mean damage ratio of every section force, through every format."""
     tables = []
     for name, means in case_data.items():
         elements = next(iter(means.values()))
         rows = tuple((element, *(f"{of_form[element]:.4f}" for of_form in means.values())) for element in elements)
         tables.append(
             Table(
-                f"Ratio of the damage to the true damage, {name}, mean of {SAMPLES} samples of noise",
+                f"Ratio of the damage to the true damage, {name}, mean of {NOISE_SAMPLE_COUNT} samples of noise",
                 "Section forces in the chassis' axes, slope 5, held by the filter.",
                 ("element", *means),
                 rows,

@@ -1,4 +1,5 @@
-"""Motion from accelerometers (Section 3.1): exact with clean data, honest about planes, noise and loose mounts."""
+"""Motion recovered from accelerometers (Section 3.1): exact for clean readings; effect of sensors in a plane, of noise,
+and of loose mounts."""
 
 from pathlib import Path
 
@@ -35,42 +36,46 @@ TITLE = "Motion from accelerometers"
 SYSTEM: System = "drift"
 SEED = 30
 CLOSED_FORM_BOUND = 1e-12
-HEIGHTS = {1.0: 0.69, 0.3: 1.9, 0.1: 5.8, 0.03: 18.9}
-"""Height (m) of the fifth sensor over a floor of 2 m by 1.2 m -> known gain relative to the last sensor (1/m)."""
-NOISE = 0.3
-"""m/s^2 on each sample of the drift rows."""
+GAINS_BY_HEIGHT = {1.0: 0.69, 0.3: 1.9, 0.1: 5.8, 0.03: 18.9}
+"""Height (m) of the fifth sensor above a floor of 2 m by 1.2 m, with the known noise gain relative to the last sensor
+(1/m)."""
+NOISE_DEVIATION = 0.3
+"""Standard deviation (m/s^2) of the noise on each sample in the drift rows."""
 SAMPLE_PERIOD = 0.01
-RIGID = {
+RIGID_SENSORS = {
     "front left": (1.1, -0.6, 0.2),
     "front right": (1.1, 0.6, 0.2),
     "rear left": (-0.9, -0.6, 0.2),
     "rear right": (-0.9, 0.6, 0.2),
     "roof": (0.1, 0.0, -0.9),
 }
-BRACKET = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}
+"""Positions (m) of rigidly mounted sensors."""
+LOOSE_SENSOR = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}
+"""Position (m) of a sensor on a bracket, with frequency (Hz) and damping ratio of the bracket."""
 
 
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Clean motions in space, noise, each engine's own readings, and drift; quick: few paths, runs of 1 s."""
-    rows = [row for name in SENSOR_ARRANGEMENTS for row in _rows_without_integration(name)]
-    rows += [_plain(), _order(), _tilt()]
-    gains, gain_rows = _gains(4000 if quick else 40_000)
+    """Rows of clean motions in space, noise, each engine's simulated readings, and drift; a quick run has few paths and
+    runs of 1 s."""
+    rows = [row for name in SENSOR_ARRANGEMENTS for row in _exact_rows(name)]
+    rows += [_printed_formula_row(), _order_row(), _tilt_error_row()]
+    gains, gain_rows = _gain_rows(4000 if quick else 40_000)
     rows += gain_rows
     for engine in IMPLEMENTATIONS:
-        rows += _engine(engine, 1.0 if quick else 5.0)
-    walked, curves = _random_walk(20 if quick else 300)
-    return [*rows, *walked, *_symmetric_part_measured(curves, quick)], {"gains": gains, "curves": curves}
+        rows += _engine_rows(engine, 1.0 if quick else 5.0)
+    walked, curves = _random_walk_rows(20 if quick else 300)
+    return [*rows, *walked, *_symmetric_part_rows(curves, quick)], {"gains": gains, "curves": curves}
 
 
-def _rows_without_integration(name: str) -> list[Row]:
+def _exact_rows(arrangement: str) -> list[Row]:
     """Rows: errors of quantities that need no integration, on a motion whose derivatives are known in closed form."""
-    array = sensor_array(SENSOR_ARRANGEMENTS[name])
+    array = sensor_array(SENSOR_ARRANGEMENTS[arrangement])
     clean = readings_on_path(array.positions)
-    spins, key = spin_from_readings(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
+    spins, key = spin_from_readings(array, clean), f"motion.exact.{arrangement.replace(',', '').replace(' ', '-')}"
     alpha = float(np.abs(angular_acceleration(spins, PATH.rates) - PATH.alpha).max())
     squares = (rates_up_to_sign(spins) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
-    what = f"sensors: {name}{', formula for a plane' if array.planar else ''}"
+    what = f"sensors: {arrangement}{', formula for a plane' if array.planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
     shown = (
         ("alpha", "error of the angular acceleration from clean readings", alpha, "rad/s^2"),
@@ -88,7 +93,7 @@ def _rows_without_integration(name: str) -> list[Row]:
     ]
 
 
-def _plain() -> Row:
+def _printed_formula_row() -> Row:
     """Row: angular acceleration by eq. (18) exactly as printed, which is wrong if all sensors lie in a plane."""
     floor = np.array(list(SENSOR_ARRANGEMENTS["5 in a plane"].values()))
     relative = readings_on_path(floor) - readings_on_path(floor).mean(axis=1, keepdims=True)
@@ -108,7 +113,7 @@ def _plain() -> Row:
     )
 
 
-def _order() -> Row:
+def _order_row() -> Row:
     """Row: order of convergence in the sampling period of the position recovered from the readings."""
     array = sensor_array(SENSOR_ARRANGEMENTS["5 in a tilted plane"])
     clean = readings_on_path(array.positions)
@@ -127,7 +132,7 @@ def _order() -> Row:
     ).within(4.0, 0.4, "cubics through four neighbours and a fourth-order step of the quaternion", "closed form")
 
 
-def _tilt() -> Row:
+def _tilt_error_row() -> Row:
     array, tilt, count = sensor_array(SENSOR_ARRANGEMENTS["4"]), 1e-3, 10_001
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
     drift = -recovered_motion(array, still, 1e-3, StartState.pitched(tilt)).position[:, 0]
@@ -142,10 +147,11 @@ def _tilt() -> Row:
     )
 
 
-def _gains(sample_count: int) -> tuple[list[list[float]], list[Row]]:
-    """Noise of the angular acceleration by Monte Carlo and by its law, for several heights of the fifth sensor."""
+def _gain_rows(sample_count: int) -> tuple[list[list[float]], list[Row]]:
+    """Table and rows: noise of the angular acceleration by Monte Carlo and by its law, for several heights of the fifth
+    sensor."""
     rows, lines = [], []
-    for i, height in enumerate((*HEIGHTS, 0.0)):
+    for i, height in enumerate((*GAINS_BY_HEIGHT, 0.0)):
         line = [height]
         for formula in ("spatial", "plane") if height else ("plane",):
             array = sensor_array(tilted_sensors(height, np.eye(3)), formula)
@@ -170,7 +176,7 @@ def _gains(sample_count: int) -> tuple[list[list[float]], list[Row]]:
                 )
             )
             line += [law**0.5, variance**0.5]
-        if height in HEIGHTS:
+        if height in GAINS_BY_HEIGHT:
             rows.append(
                 Observed(
                     f"motion.known_gain.{height:g}",
@@ -179,8 +185,8 @@ def _gains(sample_count: int) -> tuple[list[list[float]], list[Row]]:
                     line[1],
                     "1/m",
                 ).within(
-                    HEIGHTS[height],
-                    0.04 * HEIGHTS[height],
+                    GAINS_BY_HEIGHT[height],
+                    0.04 * GAINS_BY_HEIGHT[height],
                     "figures relative to the last sensor; relative to the mean up to 3 % less",
                     "published",
                 )
@@ -189,10 +195,12 @@ def _gains(sample_count: int) -> tuple[list[list[float]], list[Row]]:
     return lines, rows
 
 
-def _engine(engine: str, duration: float) -> list[Row]:
+def _engine_rows(engine: str, duration: float) -> list[Row]:
     """Rows: motion recovered from five rigid sensors in an engine's run on the study road, and detection of a loose
-    sixth one."""
-    sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in RIGID.items()} | {"battery": BRACKET}
+    sixth sensor."""
+    sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in RIGID_SENSORS.items()} | {
+        "battery": LOOSE_SENSOR
+    }
     scene = build_scene(
         {
             "title": TITLE,
@@ -205,7 +213,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
         }
     )
     run, p = simulate(scene, engine), scene.effects["accelerometers"]
-    readings, array = readings_of(run, p), sensor_array(RIGID)
+    readings, array = readings_of(run, p), sensor_array(RIGID_SENSORS)
     felt = readings[:, :5]
     turning = run["gyro"][:, None] * [0.0, 1.0, 0.0]
     acceleration = angular_acceleration(spin_from_readings(array, felt), turning)[:, 1]
@@ -213,8 +221,8 @@ def _engine(engine: str, duration: float) -> list[Row]:
     true = np.array([equations.acceleration(t, *np.split(y, 2))[3] for t, y in zip(run.times, run.states, strict=True)])
     loose = fit_quality(sensor_array(p.positions()), readings)
     return [
-        *_recovered_errors("accelerometers", engine, array, felt, run.states, None),
-        *_recovered_errors("gyro", engine, array, felt, run.states, turning),
+        *_recovery_rows("accelerometers", engine, array, felt, run.states, None),
+        *_recovery_rows("gyro", engine, array, felt, run.states, turning),
         Observed(
             f"motion.pitch_acceleration.{engine}",
             SYSTEM,
@@ -247,7 +255,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
     ]
 
 
-def _recovered_errors(
+def _recovery_rows(
     integration_rule: str,
     engine: str,
     array: SensorArray,
@@ -255,8 +263,8 @@ def _recovered_errors(
     states: np.ndarray,
     rates: np.ndarray | None,
 ) -> list[Row]:
-    """Rows: errors of pitch and heave recovered from noise-free readings of a run, with or without its gyro, relative
-    to its states (n, 8)."""
+    """Rows: errors of pitch and heave recovered from noise-free readings of a run, with or without its gyro, compared
+    with its states (n, 8)."""
     followed = recovered_motion(
         array, specific_forces, 1e-3, StartState.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates
     )
@@ -277,8 +285,9 @@ def _recovered_errors(
     ]
 
 
-def _moving(sample_count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
-    """A body that turns all the time: true rates (n, 3), sensor array, and noise-free readings without gravity."""
+def _turning_body(sample_count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
+    """A body that turns all the time: true angular rates (n, 3) in rad/s, sensor array, and noise-free readings (n,
+    sensors, 3) without gravity."""
     t = SAMPLE_PERIOD * np.arange(sample_count)
     rates = np.column_stack([0.5 * np.sin(2 * t), 0.4 * np.cos(1.3 * t), 0.3 + 0.1 * np.sin(t)])
     alpha = np.column_stack([np.cos(2 * t), -0.52 * np.sin(1.3 * t), 0.1 * np.cos(t)])
@@ -290,17 +299,20 @@ def _moving(sample_count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
     )
 
 
-def _noise(path: int, sample_count: int) -> np.ndarray:
-    return NOISE * normal_samples(SEED + 1, path, sample_count, 15, source=ACCELEROMETERS).reshape(sample_count, 5, 3)
+def _noise_samples(path: int, sample_count: int) -> np.ndarray:
+    return NOISE_DEVIATION * normal_samples(SEED + 1, path, sample_count, 15, source=ACCELEROMETERS).reshape(
+        sample_count, 5, 3
+    )
 
 
-def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
-    """Row and curves: if rates are only integrated, their error grows with the square root of time."""
+def _random_walk_rows(path_count: int) -> tuple[list[Row], dict[str, list[float]]]:
+    """Row and curves: if angular rates are only integrated from noisy readings, their error grows with the square root
+    of time."""
     count, array = 6001, sensor_array(SENSOR_ARRANGEMENTS["5, one 1 m up"])
     errors = np.array(
         [
-            integrate_rates(spin_from_readings(array, _noise(path, count)), SAMPLE_PERIOD, np.zeros(3))
-            for path in range(paths)
+            integrate_rates(spin_from_readings(array, _noise_samples(path, count)), SAMPLE_PERIOD, np.zeros(3))
+            for path in range(path_count)
         ]
     )
     row = mean_square(
@@ -311,36 +323,40 @@ def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
             float(np.mean((errors[:, -1] / array.noise_gains()) ** 2)),
             "m^2/s^2",
         ),
-        NOISE**2 * SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD,
-        3 * paths,
-        f"{paths} paths of {NOISE:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time",
+        NOISE_DEVIATION**2 * SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD,
+        3 * path_count,
+        f"{path_count} paths of {NOISE_DEVIATION:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time",
     )
     curves = {
         "time": SAMPLE_PERIOD * np.arange(count),
         "integrated": np.sqrt(np.mean(errors**2, axis=(0, 2))),
-        "law": NOISE * root_mean_square(array.noise_gains()) * np.sqrt(SAMPLE_PERIOD**2 * np.arange(count)),
+        "law": NOISE_DEVIATION * root_mean_square(array.noise_gains()) * np.sqrt(SAMPLE_PERIOD**2 * np.arange(count)),
     }
     return [row], {name: curve[::25].tolist() for name, curve in curves.items()}
 
 
-def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
-    """Rows: if the symmetric part of the angular matrix is used as a measurement, the rate error stays bounded."""
+def _symmetric_part_rows(curves: Saved, quick: bool) -> list[Row]:
+    """Rows: if the symmetric part of the angular matrix serves as a measurement, the rate error stays bounded."""
     count, paths = (1001, 1) if quick else (6001, 8)
-    rates, array, clean = _moving(count)
+    rates, array, clean = _turning_body(count)
     filtered = [
-        filter_rates(spin_from_readings(array, clean + _noise(path, count)), SAMPLE_PERIOD, rates[0], NOISE)
+        filter_rates(
+            spin_from_readings(array, clean + _noise_samples(path, count)), SAMPLE_PERIOD, rates[0], NOISE_DEVIATION
+        )
         for path in range(paths)
     ]
     squares = np.mean([np.mean((held_rates - rates) ** 2, axis=1) for held_rates, _ in filtered], axis=0)
     stated = np.sqrt(np.mean(filtered[0][1] ** 2, axis=1))
     curves["held"], curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
-    walked = NOISE * root_mean_square(array.noise_gains()) * np.sqrt(SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD)
+    walked = (
+        NOISE_DEVIATION * root_mean_square(array.noise_gains()) * np.sqrt(SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD)
+    )
     late, early = (
         float(np.sqrt(np.mean(covariance_part)))
         for covariance_part in (squares[-count // 3 :], squares[count // 6 : count // 3])
     )
     why = (
-        f"{paths} paths of {SAMPLE_PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended "
+        f"{paths} paths of {SAMPLE_PERIOD * (count - 1):g} s, {NOISE_DEVIATION:g} m/s^2 at 100 Hz; filterpy's extended "
         "Kalman filter"
     )
     rows = [
@@ -371,7 +387,7 @@ def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Table of the errors of a flat arrangement of sensors."""
+    """Table of the noise gain of sensors that lie nearly in one plane."""
     rows = tuple(
         (f"{height:g}", *(("half and a bias", "") if len(gains) == 2 else ()), *(f"{value:.3g}" for value in gains))
         for height, *gains in case_data["gains"]
@@ -386,7 +402,7 @@ def tables(case_data: Saved) -> list[Table]:
 
 
 def draw(case_data: Saved) -> Drawn:
-    """Noise gain by height, and the error of the rate over time."""
+    """Plot the noise gain over the sensor's height, and the error of the angular rate over time."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))

@@ -1,4 +1,5 @@
-"""Hub forces with the engines' own springs, mounts and bars: both engines, compiled forces, written-out equations."""
+"""Hub forces with the engines' native springs, mounts and bars: Exudyn and MuJoCo compared with compiled forces and
+with written-out equations."""
 
 import time
 from pathlib import Path
@@ -18,26 +19,29 @@ from validation.spatial.native_builds import (
 
 TITLE = "Springs, mounts and bars of the engines' own under hub forces"
 SYSTEM: System = "drift"
-STATES, STEPS = 100, 1000
-QUICK_STATES, QUICK_STEPS = 10, 50
-TIMING_ROUNDS, TIMED_STEPS = 5, 1000
-"""Interleaved runs for the ratio of seconds, and the steps of each."""
+STATE_COUNT, STEP_COUNT = 100, 1000
+QUICK_STATE_COUNT, QUICK_STEP_COUNT = 10, 50
+TIMING_ROUNDS, TIMED_STEP_COUNT = 5, 1000
+"""Number of interleaved timing rounds for the ratio of computing times, and number of steps of each timed run."""
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Three cars in full; quick: the shipped one, and a tenth of the states."""
+    """Rows of three cars; a quick run has the shipped car and a tenth of the states."""
     cars = {"r19_free": r19()} if quick else {"r19_free": r19(), "twin": cut(twin(), "body"), "rough": rough_car()}
-    rows = [row for name, car in cars.items() for row in _agreement(name, car, quick)]
-    return [*rows, *([] if quick else _seconds(r19()))], {}
+    rows = [row for name, car in cars.items() for row in _agreement_rows(name, car, quick)]
+    return [*rows, *([] if quick else _time_ratio_rows(r19()))], {}
 
 
-def _agreement(name: str, car: CutVehicle, quick: bool) -> list[Row]:
-    """Rows on one car: accelerations, paths and counts of the native builds, compared with those of compiled forces."""
-    states, steps = random_states(car, QUICK_STATES if quick else STATES), QUICK_STEPS if quick else STEPS
-    where = f"{len(states)} states, any heading, roll and pitch to 0.3 rad, {name}"
+def _agreement_rows(car_name: str, car: CutVehicle, quick: bool) -> list[Row]:
+    """Rows on one car: accelerations, states and numbers of native elements, compared with compiled forces."""
+    states, steps = (
+        random_states(car, QUICK_STATE_COUNT if quick else STATE_COUNT),
+        QUICK_STEP_COUNT if quick else STEP_COUNT,
+    )
+    where = f"{len(states)} states, any heading, roll and pitch to 0.3 rad, {car_name}"
     rows = [
         Observed(
-            f"native_builds.equations_{name}",
+            f"native_builds.equations_{car_name}",
             SYSTEM,
             "largest difference of the accelerations by compiled forces from written-out equations, "
             f"no hub forces, {where}",
@@ -48,43 +52,42 @@ def _agreement(name: str, car: CutVehicle, quick: bool) -> list[Row]:
     for engine in NATIVE_ENGINES:
         rows += [
             Observed(
-                f"native_builds.accelerations_{name}_{engine}",
+                f"native_builds.accelerations_{car_name}_{engine}",
                 SYSTEM,
                 f"largest difference of the accelerations with {engine}'s springs from compiled forces, {where}",
                 acceleration_error(engine, car, states),
                 "1",
             ).at_most(1e-12, "of each coordinate's largest; the hub forces alone are shared", "native"),
             Observed(
-                f"native_builds.path_{name}_{engine}",
+                f"native_builds.path_{car_name}_{engine}",
                 SYSTEM,
                 f"largest difference of the states with {engine}'s springs from compiled forces, "
-                f"{steps} steps of 1 ms, {name}",
+                f"{steps} steps of 1 ms, {car_name}",
                 path_error(engine, car, steps),
                 "m, rad, 1/s",
             ).at_most(1e-10, "same tableau, same step", "native"),
-            _row_of_native_parts(name, car, engine),
+            _native_count_row(car_name, car, engine),
         ]
     return rows
 
 
-def _row_of_native_parts(name: str, car: CutVehicle, engine: str) -> Row:
+def _native_count_row(car_name: str, car: CutVehicle, engine: str) -> Row:
     share = native_share(engine, car)
     shared = "; ".join(f"{element}: {why}" for element, why in share.reasons.items()) or "nothing but hub forces"
     return Observed(
-        f"native_builds.count_{name}_{engine}",
+        f"native_builds.count_{car_name}_{engine}",
         SYSTEM,
-        f"number of springs, mounts and bars of {name} that are native elements in {engine}",
+        f"number of springs, mounts and bars of {car_name} that are native elements in {engine}",
         len(share.elements),
         "elements",
     ).within(len(car.elements), 0, f"all have stiffness and damping that every engine has; shared: {shared}", "native")
 
 
-def _seconds(car: CutVehicle) -> list[Row]:
-    """Rows, without a verdict: ratio of the computing time of a step with native springs to that with compiled
-    forces."""
+def _time_ratio_rows(car: CutVehicle) -> list[Row]:
+    """Rows, without a verdict: computing time of a step with native springs divided by that with compiled forces."""
     rows = []
     for engine, usual in (("exudyn", 3.0), ("mujoco", 1.2)):
-        models = {route: hub_model(engine, car, route, TIMED_STEPS) for route in ("native", "compiled")}
+        models = {route: hub_model(engine, car, route, TIMED_STEP_COUNT) for route in ("native", "compiled")}
         best: dict[str, float] = {}
         for _ in range(TIMING_ROUNDS):
             for route, built in models.items():

@@ -1,4 +1,4 @@
-"""Observed order of convergence of every fixed-step family on the study road."""
+"""Observed order of convergence of every fixed-step integrator on the study road."""
 
 from pathlib import Path
 
@@ -13,9 +13,9 @@ TITLE = "Observed order of the largest state error on the study road"
 SYSTEM: System = "pitch-plane"
 DURATION = 2.0
 COMPARED_GRID = 1e-3
-"""Coarse grid (s) on which all runs are compared."""
+"""Time grid (s) on which all runs are compared."""
 
-FAMILIES: tuple[tuple[str, str, dict[str, float], float, float], ...] = (
+INTEGRATORS: tuple[tuple[str, str, dict[str, float], float, float], ...] = (
     ("reference", "RK4", {}, 4.0, 0.15),
     ("exudyn", "RK44", {}, 4.0, 0.15),
     ("mujoco", "RK4", {}, 4.0, 0.15),
@@ -31,27 +31,28 @@ FAMILIES: tuple[tuple[str, str, dict[str, float], float, float], ...] = (
     ("mujoco", "implicitfast", {}, 1.0, 0.1),
     ("mujoco", "discrete", {}, 1.0, 0.1),
 )
+"""Engine, integrator, options, expected order, and tolerance of the observed order."""
 STEPS = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5)
 QUICK_STEPS, QUICK_DURATION = STEPS[1:3], 0.5
-"""Of the quick share: one halving over half a second."""
+"""Steps (s) and length (s) of a quick run: one halving of the step over half a second."""
 ORDER_REASON = "halvings inside the asymptotic range; the band leaves room for the next term of the error"
 
 
-def errors(
+def errors_by_step(
     engine: str,
     integrator: str,
     options: dict[str, float],
-    truth: np.ndarray,
+    exact_states: np.ndarray,
     duration: float,
     steps: tuple[float, ...],
 ) -> list[float]:
-    """Largest state error at each step over a duration (s), on the common grid."""
+    """Largest state error of an integrator at each step, over a duration (s), on the common time grid."""
     errors_of_steps = []
     for step in steps:
         run = simulate(
             road_scene(step=step, duration=duration), engine, Settings(integrator, step, duration, **options)
         )
-        errors_of_steps.append(float(np.abs(run.states[:: round(COMPARED_GRID / step)] - truth).max()))
+        errors_of_steps.append(float(np.abs(run.states[:: round(COMPARED_GRID / step)] - exact_states).max()))
     return errors_of_steps
 
 
@@ -62,7 +63,8 @@ def fitted_order(steps: tuple[float, ...], errors_of_steps: list[float]) -> floa
 
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """A row per family; the truth is DOP853 at a tolerance of 1e-13; quick: one halving over half a second."""
+    """A row for each integrator, compared with DOP853 at a tolerance of 1e-13. A quick run has one halving of the step
+    over half a second."""
     steps, duration = (QUICK_STEPS, QUICK_DURATION) if quick else (STEPS, DURATION)
     truth = simulate(
         road_scene(step=COMPARED_GRID, duration=duration),
@@ -70,8 +72,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         Settings("DOP853", COMPARED_GRID, duration, 1e-13),
     ).states
     rows, table = [], []
-    for engine, integrator, options, order, band in FAMILIES:
-        errors_of_steps = errors(engine, integrator, options, truth, duration, steps)
+    for engine, integrator, options, order, band in INTEGRATORS:
+        errors_of_steps = errors_by_step(engine, integrator, options, truth, duration, steps)
         name = " ".join([integrator, *(f"{value:g}" for value in options.values())])
         rows.append(
             Observed(
@@ -87,7 +89,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Largest state error by step."""
+    """Table of the largest state error by integrator and step."""
     heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in case_data["steps"]))
     rows = tuple(
         (engine, name, *(f"{value:.2e}" for value in errors_of_steps))

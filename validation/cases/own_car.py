@@ -1,4 +1,5 @@
-"""A car in MJCF as the vehicle of handling: energies beside those of MuJoCo's model of its file, a lane change."""
+"""A car in MJCF as the vehicle of a handling scene: energies compared with MuJoCo's model of the file, and a lane
+change."""
 
 from pathlib import Path
 
@@ -13,36 +14,36 @@ from validation.own_model.cars import SALOON
 
 TITLE = "A user's own car: MJCF as the vehicle of a scene"
 SYSTEM: System = "rolling-vehicle"
-CONTROLS = Controls(steer=((0.1, 0.0), (0.4, 0.04), (0.9, -0.04), (1.2, 0.0)))
+LANE_CHANGE_CONTROLS = Controls(steer=((0.1, 0.0), (0.4, 0.04), (0.9, -0.04), (1.2, 0.0)))
 SPEED = 22.0
-"""m/s."""
-ALLOWED_DIFFERENCE = 1e-10
-"""Of the largest."""
-STATES = {True: 10, False: 100}
-"""By whether the case is quick."""
+"""Speed (m/s) of the lane change."""
+DIFFERENCE_TOLERANCE = 1e-10
+"""Largest difference allowed, divided by the largest value."""
+STATE_COUNTS = {True: 10, False: 100}
+"""Number of random states, for a quick run (True) and a full run (False)."""
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Quick: 0.5 s of the lane change; in full 1.5 s."""
+    """Rows of energies and of a lane change, which takes 0.5 s in a quick run and 1.5 s in a full one."""
     path = folder / "saloon.xml"
     path.write_text(SALOON, encoding="utf-8")
-    handling = Handling(vehicle_of_file(path), controls=CONTROLS)
-    return [_energy(handling, quick), *_lane_change(handling, 0.5 if quick else 1.5)], {}
+    handling = Handling(vehicle_of_file(path), controls=LANE_CHANGE_CONTROLS)
+    return [_energy_row(handling, quick), *_lane_change_rows(handling, 0.5 if quick else 1.5)], {}
 
 
-def _energy(handling: Handling, quick: bool) -> Row:
+def _energy_row(handling: Handling, quick: bool) -> Row:
     return Observed(
         "own_car.energy",
         SYSTEM,
         "largest difference of kinetic and potential energy from MuJoCo's own model of the file, at random states",
-        energies_apart(handling, STATES[quick]),
+        energies_apart(handling, STATE_COUNTS[quick]),
         "of the largest",
     ).at_most(1e-11, "rounding, and rotors that weigh 1e-9 kg more; equal energies make equal equations", "native")
 
 
-def _lane_change(handling: Handling, duration: float) -> list[Row]:
-    """Rows: difference between both engines in a lane change, and of each from the plain equations at the state at its
-    end."""
+def _lane_change_rows(handling: Handling, duration: float) -> list[Row]:
+    """Rows: difference between Exudyn and MuJoCo over a lane change, and of each engine's accelerations at its end from
+    independently written equations."""
     drives = {engine: drive_run(engine, handling, SPEED, duration) for engine in ("exudyn", "mujoco")}
     states = [drive.run.states for drive in drives.values()]
     rows = [
@@ -52,7 +53,7 @@ def _lane_change(handling: Handling, duration: float) -> list[Row]:
             f"largest difference of the states of Exudyn and MuJoCo over {duration:g} s of a lane change",
             float(np.abs(states[0] - states[1]).max() / np.abs(states[1]).max()),
             "of the largest",
-        ).at_most(ALLOWED_DIFFERENCE, "rounding: same tableau, same step", "shared kernel")
+        ).at_most(DIFFERENCE_TOLERANCE, "rounding: same tableau, same step", "shared kernel")
     ]
     run = drives["mujoco"].run
     last = run.times[-1], run.positions[-1], run.rates[-1]
@@ -66,6 +67,6 @@ def _lane_change(handling: Handling, duration: float) -> list[Row]:
                 f"largest difference of accelerations between {engine} and the plain equations, at the end of the run",
                 float(apart),
                 "of the largest",
-            ).at_most(ALLOWED_DIFFERENCE, "rounding", "native")
+            ).at_most(DIFFERENCE_TOLERANCE, "rounding", "native")
         )
     return rows

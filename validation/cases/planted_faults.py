@@ -1,7 +1,8 @@
-"""Planted faults of all systems: each is put into one side on purpose, and the checks must see it.
+"""Planted faults of all systems: each is put on purpose into one of two compared implementations, and the checks must
+detect it.
 
-In full every fault is planted. The quick share plants two of the pitch plane on one vehicle and every sixteenth of the
-other systems, beside all runs without a fault that these need.
+A full run plants every fault. A quick run plants two faults of the pitch plane on one vehicle and every sixteenth of
+the other systems, beside all runs without a fault that these need.
 """
 
 from pathlib import Path
@@ -42,11 +43,12 @@ CAMPAIGNS = (
 )
 QUICK_FAULTS = (DESCRIPTION_FAULTS[0], EQUATIONS_FAULTS[0])
 QUICK_SPACING, FEWEST_FAULTS = 16, 40
-"""Quick share of the campaigns; faults that there must be in all."""
+"""Every so many faults of a campaign are planted in a quick run; and the least number of faults that must be caught."""
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows on planted faults by system and, in full, over all systems; quick: every sixteenth fault of each system."""
+    """Rows on planted faults by system; a full run also has a row over all systems. A quick run plants every sixteenth
+    fault of each system."""
     plane = (
         pitch_plane.measure(QUICK_FAULTS, CONTROLS_WITHOUT_FAULT[:1], (pitch_plane.ASYMMETRIC_SET,))
         if quick
@@ -57,23 +59,23 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         **{campaign.id: campaign.measure(QUICK_SPACING if quick else 1) for campaign in CAMPAIGNS},
     }
     rows = [*pitch_plane.rows(plane), *(row for campaign in CAMPAIGNS for row in campaign.rows(data[campaign.id]))]
-    return [*rows, *([] if quick else [_row_of_fault_count(data)])], data
+    return [*rows, *([] if quick else [_fault_count_row(data)])], data
 
 
-def _row_of_fault_count(case_data: Saved) -> Row:
-    caught = sum(line[3] != "none" for line in _lines(case_data))
+def _fault_count_row(case_data: Saved) -> Row:
+    caught = sum(line[3] != "none" for line in _fault_lines(case_data))
     return Observed(
         "planted.count",
         FAULT_SYSTEM,
         f"shortfall of the number of faults that are caught in all systems from {FEWEST_FAULTS}",
         max(0, FEWEST_FAULTS - caught),
         "faults",
-    ).at_most(0, f"{caught} of {len(_lines(case_data))} are", "native")
+    ).at_most(0, f"{caught} of {len(_fault_lines(case_data))} are", "native")
 
 
-def _lines(case_data: Saved) -> list[tuple[str, ...]]:
-    """Table lines, one for each fault: system, the part with the fault, fault, checks that see it, checks that had
-    missed it."""
+def _fault_lines(case_data: Saved) -> list[tuple[str, ...]]:
+    """Table lines, one for each fault: system, component with the fault, fault, checks that detect it, and checks that
+    alone would have missed it."""
     return [
         *pitch_plane.lines(case_data["pitch-plane"]),
         *(line for campaign in CAMPAIGNS for line in campaign.lines(case_data[campaign.id])),
@@ -81,8 +83,8 @@ def _lines(case_data: Saved) -> list[tuple[str, ...]]:
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Table of all faults, then tables for each system with errors and descriptions of the checks."""
-    lines = _lines(case_data)
+    """Tables of all faults, and for each system of the errors and descriptions of the checks."""
+    lines = _fault_lines(case_data)
     systems = len({line[0] for line in lines})
     note = (
         f"{len(lines)} faults in {systems} systems, one at a time. Each check in the last column, had it been the "

@@ -1,4 +1,5 @@
-"""The point mass of the paper's Section 2: covariances to the last digit, and by Monte Carlo."""
+"""The point mass of the paper's Section 2: position and velocity covariances compared with 60-digit arithmetic and with
+Monte Carlo."""
 
 from collections.abc import Sequence
 from decimal import Decimal, localcontext
@@ -13,14 +14,14 @@ from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, Syst
 TITLE = "A point mass driven by a noisy force"
 SYSTEM: System = "drift"
 SEED = 20
-DIGITS = 60
+DECIMAL_DIGITS = 60
 DEVIATION, STEP, MASS = 32.0, 1e-3, 780.0
-"""N, s, kg: the paper's noise on the paper's vehicle."""
-DAMPED = (0.0, 1e-8, 1e-4, 1e-2, 1.0, 100.0)
-"""Damping times time."""
-LENGTHS = (10, 1_000_000)
-TIME = 10.0
-RELATIVE_BOUND = 1e-10
+"""Standard deviation of the force noise (N), step (s) and mass (kg) of the paper's vehicle."""
+DAMPING_PRODUCTS = (0.0, 1e-8, 1e-4, 1e-2, 1.0, 100.0)
+"""Products of the damping rate and the time, dimensionless."""
+STEP_COUNTS = (10, 1_000_000)
+END_TIME = 10.0
+RELATIVE_TOLERANCE = 1e-10
 
 Matrix = list[list[Decimal]]
 BOUND_REASON = (
@@ -30,10 +31,11 @@ BOUND_REASON = (
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows for both covariances against many digits, for their difference, and for Monte Carlo; quick: 2000 paths."""
+    """Rows for both covariances compared with 60-digit arithmetic, for their difference, and for Monte Carlo; a quick
+    run has 2000 paths."""
     exact = {
-        "continuous": [_continuous_error(x) for x in DAMPED],
-        **{f"{n} steps": [_discrete_error(x, n) for x in DAMPED] for n in LENGTHS},
+        "continuous": [_continuous_error(x) for x in DAMPING_PRODUCTS],
+        **{f"{n} steps": [_discrete_error(x, n) for x in DAMPING_PRODUCTS] for n in STEP_COUNTS},
     }
     rows = [
         Observed(
@@ -42,11 +44,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             f"largest relative error of the covariance, {name}, product of damping and time {x:g}",
             error,
             "",
-        ).at_most(RELATIVE_BOUND, BOUND_REASON, "closed form")
+        ).at_most(RELATIVE_TOLERANCE, BOUND_REASON, "closed form")
         for name, errors in exact.items()
-        for x, error in zip(DAMPED, errors, strict=True)
+        for x, error in zip(DAMPING_PRODUCTS, errors, strict=True)
     ]
-    differences = [[n, *(_difference(x, n) for x in (0.0, 1.0, 10.0))] for n in (10, 100, 1000, 10_000, 100_000)]
+    differences = [
+        [n, *(_discretisation_difference(x, n) for x in (0.0, 1.0, 10.0))] for n in (10, 100, 1000, 10_000, 100_000)
+    ]
     rows.append(
         Observed(
             "point_mass.order",
@@ -57,44 +61,44 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         ).within(7.4888 / 7.5, 1e-5, "1 - 3/(2n): 7.4888 against 7.5", "closed form")
     )
     for x in (0.0, 3.0):
-        rows += _monte_carlo(x, 2000 if quick else 10_000)
+        rows += _monte_carlo_rows(x, 2000 if quick else 10_000)
     return rows, {"errors": exact, "differences": differences}
 
 
-def _power(matrix: Matrix, n: int) -> Matrix:
-    """An integer power of a matrix, by squaring."""
+def _matrix_power(matrix: Matrix, exponent: int) -> Matrix:
+    """Integer power of a matrix, by squaring."""
     size = range(len(matrix))
     product = [[Decimal(int(i == j)) for j in size] for i in size]
-    while n:
-        if n % 2:
-            product = _times(product, matrix)
-        matrix, n = _times(matrix, matrix), n // 2
+    while exponent:
+        if exponent % 2:
+            product = _matrix_product(product, matrix)
+        matrix, exponent = _matrix_product(matrix, matrix), exponent // 2
     return product
 
 
-def _times(a: Matrix, b: Matrix) -> Matrix:
+def _matrix_product(a: Matrix, b: Matrix) -> Matrix:
     return [
         [sum((x * y for x, y in zip(row, column, strict=True)), Decimal(0)) for column in zip(*b, strict=True)]
         for row in a
     ]
 
 
-def _exponential(matrix: Matrix) -> Matrix:
+def _matrix_exponential(matrix: Matrix) -> Matrix:
     """Matrix exponential by a Taylor series of the matrix divided by 2^20, squared 20 times."""
     small = [[value / 2**20 for value in row] for row in matrix]
-    term = total = _power(small, 0)
+    term = total = _matrix_power(small, 0)
     for k in range(1, 25):
-        term = [[value / k for value in row] for row in _times(term, small)]
+        term = [[value / k for value in row] for row in _matrix_product(term, small)]
         total = [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(total, term, strict=True)]
-    return _power(total, 2**20)
+    return _matrix_power(total, 2**20)
 
 
-def _continuous_error(damping_rate: float) -> float:
-    """Relative error of the continuous covariance, which obeys d/dt (Pxx, Pxv, Pvv) = (2 Pxv, Pvv - eta Pxv, s^2 - 2
-    eta Pvv)."""
-    eta = damping_rate / TIME
-    with localcontext(prec=DIGITS):
-        e, t = Decimal(eta), Decimal(TIME)
+def _continuous_error(damping_product: float) -> float:
+    """Largest relative error of the continuous covariance P of position x and velocity v. Exact: d/dt (Pxx, Pxv, Pvv) =
+    (2 Pxv, Pvv - eta Pxv, s^2 - 2 eta Pvv), with damping eta and noise intensity s^2."""
+    eta = damping_product / END_TIME
+    with localcontext(prec=DECIMAL_DIGITS):
+        e, t = Decimal(eta), Decimal(END_TIME)
         gain = Decimal(DEVIATION) ** 2 * Decimal(STEP) / Decimal(MASS) ** 2
         rates: Matrix = [
             [Decimal(0), 2 * t, Decimal(0), Decimal(0)],
@@ -102,16 +106,16 @@ def _continuous_error(damping_rate: float) -> float:
             [Decimal(0), Decimal(0), -2 * e * t, gain * t],
             [Decimal(0)] * 4,
         ]
-        truth = [row[3] for row in _exponential(rates)]
-        return _largest_relative_error(continuous_covariance(TIME, DEVIATION, STEP, MASS, eta), truth)
+        truth = [row[3] for row in _matrix_exponential(rates)]
+        return _largest_relative_error(continuous_covariance(END_TIME, DEVIATION, STEP, MASS, eta), truth)
 
 
-def _discrete_error(damping_rate: float, steps: int) -> float:
-    """Relative error of the discrete covariance, compared with the matrix recursion of an Euler step in many digits.
-    ``steps`` of these steps make TIME."""
-    step = TIME / steps
-    eta = min(damping_rate / TIME, 1.9 / step)
-    with localcontext(prec=DIGITS):
+def _discrete_error(damping_product: float, step_count: int) -> float:
+    """Largest relative error of the discrete covariance, compared with the matrix recursion of an Euler step in
+    60-digit arithmetic. ``step_count`` steps make END_TIME."""
+    step = END_TIME / step_count
+    eta = min(damping_product / END_TIME, 1.9 / step)
+    with localcontext(prec=DECIMAL_DIGITS):
         d = Decimal(step)
         r, kick = 1 - Decimal(eta) * d, (Decimal(DEVIATION) * d / Decimal(MASS)) ** 2
         recursion: Matrix = [
@@ -120,8 +124,8 @@ def _discrete_error(damping_rate: float, steps: int) -> float:
             [Decimal(0), Decimal(0), r * r, kick],
             [Decimal(0)] * 3 + [Decimal(1)],
         ]
-        truth = [row[3] for row in _power(recursion, steps)]
-        return _largest_relative_error(euler_covariance(steps, DEVIATION, step, MASS, eta), truth)
+        truth = [row[3] for row in _matrix_power(recursion, step_count)]
+        return _largest_relative_error(euler_covariance(step_count, DEVIATION, step, MASS, eta), truth)
 
 
 def _largest_relative_error(computed_values: np.ndarray, truth: Sequence[Decimal]) -> float:
@@ -131,27 +135,27 @@ def _largest_relative_error(computed_values: np.ndarray, truth: Sequence[Decimal
     )
 
 
-def _difference(damping_rate: float, steps: int) -> float:
-    """1 - ratio of the discrete to the continuous variance of the position."""
-    step = TIME / steps
-    arguments = (DEVIATION, step, MASS, damping_rate / TIME)
-    return 1 - float(euler_covariance(steps, *arguments)[0, 0] / continuous_covariance(TIME, *arguments)[0, 0])
+def _discretisation_difference(damping_product: float, step_count: int) -> float:
+    """1 minus the ratio of the discrete to the continuous variance of the position."""
+    step = END_TIME / step_count
+    arguments = (DEVIATION, step, MASS, damping_product / END_TIME)
+    return 1 - float(euler_covariance(step_count, *arguments)[0, 0] / continuous_covariance(END_TIME, *arguments)[0, 0])
 
 
-def _monte_carlo(damping_rate: float, path_count: int) -> list[Row]:
+def _monte_carlo_rows(damping_product: float, path_count: int) -> list[Row]:
     """Rows: Monte Carlo variance of the position, and mean square of position and velocity together, weighted by the
     inverse covariance of the law."""
     steps = 1000
-    arguments = (DEVIATION, STEP, MASS, damping_rate / (steps * STEP))
+    arguments = (DEVIATION, STEP, MASS, damping_product / (steps * STEP))
     law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(path_count, steps, *arguments, seed=SEED)
     distance = float(np.mean(np.sum(drawn * np.linalg.solve(law, drawn.T).T, axis=1))) / 2
     why = f"{path_count:,} paths of {steps} explicit Euler steps, seed {SEED}"
     return [
         mean_square(
             Observed(
-                f"point_mass.position.{damping_rate:g}",
+                f"point_mass.position.{damping_product:g}",
                 SYSTEM,
-                f"variance of the position by Monte Carlo, product of damping and time {damping_rate:g}",
+                f"variance of the position by Monte Carlo, product of damping and time {damping_product:g}",
                 float(np.mean(drawn[:, 0] ** 2)),
                 "m^2",
             ),
@@ -161,10 +165,10 @@ def _monte_carlo(damping_rate: float, path_count: int) -> list[Row]:
         ),
         mean_square(
             Observed(
-                f"point_mass.joint.{damping_rate:g}",
+                f"point_mass.joint.{damping_product:g}",
                 SYSTEM,
                 "half the mean squared distance, which tests the whole covariance by Monte Carlo, "
-                f"product of damping and time {damping_rate:g}",
+                f"product of damping and time {damping_product:g}",
                 distance,
                 "",
             ),
@@ -179,14 +183,15 @@ def tables(case_data: Saved) -> list[Table]:
     """Table of the relative errors of both covariances."""
     rows = tuple((name, *(f"{error:.1e}" for error in errors)) for name, errors in case_data["errors"].items())
     note = (
-        f"Worst entry of the covariance against {DIGITS} digits, over damping times time. Ten steps cannot be "
+        f"Worst entry of the covariance against {DECIMAL_DIGITS} digits, over damping times time. Ten steps cannot be "
         "stable at 100: there the damping is that of 1.9 per step."
     )
-    return [Table("Relative error of the covariances", note, ("", *(f"{x:g}" for x in DAMPED)), rows)]
+    return [Table("Relative error of the covariances", note, ("", *(f"{x:g}" for x in DAMPING_PRODUCTS)), rows)]
 
 
 def draw(case_data: Saved) -> Drawn:
-    """Standard deviations over time, and how the Euler scheme nears them."""
+    """Plot the position's standard deviation over time, and the difference of the Euler scheme from its limit over the
+    number of steps."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

@@ -1,7 +1,7 @@
-"""What accuracy costs: work and precision of every integrator, cheapest settings, and what defaults lose.
+"""What accuracy costs: error over computing work of every integrator, cheapest settings, and loss by default settings.
 
-Another system that marches joins by a problem in ``validation/price/problems`` and its name in ``PROBLEMS``; ride,
-which does not, has routes of its own beside them.
+Another system that is integrated in time joins by a problem in ``validation/price/problems`` and its name in
+``PROBLEMS``. Ride is not integrated in time and has separate methods.
 """
 
 import os
@@ -34,15 +34,15 @@ from validation.price.tables import tables as cost_tables
 
 TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
-Make = Callable[[bool], Problem]
-PROBLEMS: tuple[Make, ...] = (
+MakeProblem = Callable[[bool], Problem]
+PROBLEMS: tuple[MakeProblem, ...] = (
     road_excited.problem,
     force_excited.problem,
     partial(wheelset.problem, speed=20.0),
     braking_stop.problem,
     inertial_unit.problem,
 )
-FULL_ONLY: tuple[Make, ...] = (
+FULL_RUN_PROBLEMS: tuple[MakeProblem, ...] = (
     force_excited.noisy,
     force_excited.guided,
     free_vehicle.problem,
@@ -50,78 +50,82 @@ FULL_ONLY: tuple[Make, ...] = (
     partial(wheelset.problem, speed=1.0),
     contact_alone.problem,
 )
-"""Problems that a quick run leaves out; it has those of PROBLEMS."""
+"""Problems of a full run in addition to those of PROBLEMS."""
 TIMING_ROUNDS = {True: 1, False: 15}
-"""Interleaved rounds of timing, by ``quick``, of settings whose seconds decide something."""
-SHORTEST_TURN = {True: 0.004, False: 0.005}
-"""A short run is repeated until its turn lasts this long (s), by ``quick``."""
-CALLBACKS = {
+"""Number of interleaved timing rounds, for a quick run (True) and a full run (False), of settings whose computing time
+decides something."""
+SHORTEST_TIMED_RUN = {True: 0.004, False: 0.005}
+"""A short run is repeated until its timing takes so many seconds, for a quick run (True) and a full run (False)."""
+CALLBACK_RATIOS = {
     "all compiled to no forces": "ratio of every force in a compiled callback to the same model without forces",
     "to no callback": "ratio of native springs with a compiled callback for the road to the same without callback",
     "to no forces": "ratio of native springs and a compiled callback for the road to the bodies without any force",
 }
-"""Ratios of seconds and what they compare."""
+"""Ratios of computing times, with the two models that each compares."""
 COUNTED_DURATION = 0.2
-"""Length (s) of the runs whose force calls are counted from outside."""
+"""Length (s) of the runs in which force calls are also counted from outside the engine."""
 COINCIDING_CURVES = {
     "rk4": ("exudyn RK44 = mujoco RK4 = reference RK4", "the same tableau at the same step"),
     "implicit": ("mujoco implicit = mujoco implicitfast", "they differ in Coriolis terms, which are absent here"),
 }
-"""Curves that must coincide on the road, and why."""
-ON_SECONDS = "a target about seconds, which are reported and never gated"
+"""Work-precision curves that must coincide on the road, and the reason."""
+SECONDS_REASON = "a target about seconds, which are reported and never gated"
 
 
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows of all problems, of the force calls, and of two claims about speed; quick: five of the eleven problems, a
-    named share of their settings, and beside another case, where in full no more processes run than there are cores.
-    """
+    """Rows of all problems, of the force calls, and of two claims about speed; a quick run has five of the eleven
+    problems, and a part of their settings."""
     rounds = TIMING_ROUNDS[quick]
     if quick:
-        priced, (beside, data) = [_priced(True, rounds, make) for make in PROBLEMS], _beside(True, rounds)
+        priced, (beside, data) = [_problem_rows(True, rounds, make) for make in PROBLEMS], _further_cases(True, rounds)
     else:
-        priced, (beside, data) = _in_processes(rounds)
+        priced, (beside, data) = _cases_in_processes(rounds)
     rows = [row for problem_rows, _ in priced for row in problem_rows]
     return rows + _road_rows(priced[0][1]) + beside, {"problems": [saved for _, saved in priced], **data}
 
 
-def _beside(quick: bool, round_count: int) -> CaseAnswer:
-    """Rows and data of price cases that are not problems for the common runner: ride, shares of a step, force calls,
-    claims about speed."""
+def _further_cases(quick: bool, round_count: int) -> CaseAnswer:
+    """Rows and data of costs that the common runner does not measure: ride, parts of a step, force calls, claims about
+    speed."""
     road = assembly_of_scene(road_excited.scene())
-    rows, prices = ride.measure(quick, round_count, SHORTEST_TURN[True])
-    twice, least, duration = 2 * round_count, 2 * SHORTEST_TURN[quick], road_excited.DURATION
+    rows, prices = ride.measure(quick, round_count, SHORTEST_TIMED_RUN[True])
+    twice, least, duration = 2 * round_count, 2 * SHORTEST_TIMED_RUN[quick], road_excited.DURATION
     data: Saved = {
         "ride": prices,
-        "split": [] if quick else split.measure(round_count, SHORTEST_TURN[quick]),
+        "split": [] if quick else split.measure(round_count, SHORTEST_TIMED_RUN[quick]),
         "callback": {name: speed.callback_cost(road, duration, name, twice, least) for name in ("RK4", "Euler")},
         "real time": speed.real_time(road, duration, twice, least),
     }
     settings = dict.fromkeys(
-        _at_1_ms(problem_rows) for problem_rows in road_excited.settings(quick) if problem_rows.method != "DVERK6"
+        _setting_at_1_ms(problem_rows)
+        for problem_rows in road_excited.settings(quick)
+        if problem_rows.method != "DVERK6"
     )
-    return rows + split.rows(data["split"]) + _counts([*settings], road) + _speed_rows(data), data
+    return rows + split.rows(data["split"]) + _force_call_rows([*settings], road) + _speed_rows(data), data
 
 
-def _priced(quick: bool, round_count: int, make_problem: Make) -> CaseAnswer:
-    """The rows and the saved data of a problem."""
+def _problem_rows(quick: bool, round_count: int, make_problem: MakeProblem) -> CaseAnswer:
+    """Rows and saved data of one cost problem, which is a model with a range of integrators and settings."""
     problem = make_problem(quick)
-    measured = runner.measure(problem, quick, round_count, SHORTEST_TURN[quick])
+    measured = runner.measure(problem, quick, round_count, SHORTEST_TIMED_RUN[quick])
     return rows_of(problem, measured, quick), asdict(measured)
 
 
-def _in_processes(round_count: int) -> tuple[list[CaseAnswer], CaseAnswer]:
-    """All problems and the further cases, computed by at most two processes. The first problem is computed last; only
-    the road, which takes long, is started before."""
+def _cases_in_processes(round_count: int) -> tuple[list[CaseAnswer], CaseAnswer]:
+    """Rows and data of all cost problems and of the further costs, computed by at most two processes."""
     with process_pool(min(2, os.cpu_count() or 1)) as pool:
-        first, *other_problems = PROBLEMS + FULL_ONLY
-        road, beside = pool.submit(_priced, False, round_count, first), pool.submit(_beside, False, round_count)
-        priced = [*pool.map(partial(_priced, False, round_count), other_problems[::-1])][::-1]
+        first, *other_problems = PROBLEMS + FULL_RUN_PROBLEMS
+        road, beside = (
+            pool.submit(_problem_rows, False, round_count, first),
+            pool.submit(_further_cases, False, round_count),
+        )
+        priced = [*pool.map(partial(_problem_rows, False, round_count), other_problems[::-1])][::-1]
         return [road.result(), *priced], beside.result()
 
 
 def _road_rows(saved_rows: Saved) -> list[Row]:
-    """Rows: curves that must coincide on the road, and methods that Exudyn names without having them."""
+    """Rows: work-precision curves that must coincide on the road, and methods that Exudyn names but does not have."""
     road = runner.of_saved(saved_rows)
     groups = [" = ".join(sorted(group)) for group in road.coinciding_curves()]
     rows = [
@@ -150,13 +154,13 @@ def _road_rows(saved_rows: Saved) -> list[Row]:
     ]
 
 
-def _at_1_ms(setting: Setting) -> Setting:
-    """For every fixed-step method the setting with a step of 1 ms; adaptive methods keep their own settings."""
+def _setting_at_1_ms(setting: Setting) -> Setting:
+    """The setting of a fixed-step method with a step of 1 ms; settings of adaptive methods are unchanged."""
     return setting if setting.adaptive else road_excited.setting(setting.engine, setting.method, 1e-3)
 
 
-def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
-    """Row: force calls that each engine reports, compared with calls counted from outside."""
+def _force_call_rows(settings: list[Setting], assembly: Assembly) -> list[Row]:
+    """Rows: number of force calls that each engine reports, compared with calls counted from outside."""
     rows = []
     for engine, how in (("exudyn", "calls of one load"), ("mujoco", "MuJoCo's own timers")):
         pairs = [
@@ -196,26 +200,27 @@ def _speed_rows(case_data: Saved) -> list[Row]:
         ).at_most(1e-12, "the same forces at the same stages, written twice", "native")
     ]
     for integrator, figures in case_data["callback"].items():
-        for key, words in CALLBACKS.items():
+        for key, words in CALLBACK_RATIOS.items():
             ratio, low, high = figures[key]
             name = f"price.callback.{integrator}.{key.replace(' ', '-')}"
             what = f"MuJoCo {integrator}, {words}, paired seconds, 95 % interval {low:.3f} to {high:.3f}"
-            rows.append(Observed(name, SYSTEM, what, ratio, "times").aim(1.2, ON_SECONDS))
-    return rows + [_real_time(key, case_data["real time"][key]) for key in ("with table", "without table")]
+            rows.append(Observed(name, SYSTEM, what, ratio, "times").aim(1.2, SECONDS_REASON))
+    return rows + [_real_time_row(key, case_data["real time"][key]) for key in ("with table", "without table")]
 
 
-def _real_time(key: str, factors: tuple[float, float, float] | None) -> Row:
+def _real_time_row(key: str, factors: tuple[float, float, float] | None) -> Row:
     name = f"price.real-time.{key.replace(' ', '-')}"
     what = f"reference RK4 at 1 ms, {key.replace('table', 'making its road table')}"
     if factors is None:
         return not_run(name, SYSTEM, what, "other work of the machine hid the difference")
     factor, low, high = factors
     quantity = f"{what}, 95 % interval {low:,.0f} to {high:,.0f}"
-    return Observed(name, SYSTEM, quantity, factor, "times real time").aim(1000.0, ON_SECONDS, "at least")
+    return Observed(name, SYSTEM, quantity, factor, "times real time").aim(1000.0, SECONDS_REASON, "at least")
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Cheapest settings, losses, curves, failures and the parts of a step of every problem; the routes of ride."""
+    """Tables of cheapest settings, losses, curves, failures and parts of a step for every problem, and of the methods
+    of ride."""
     tables = [
         table
         for saved in case_data["problems"]
@@ -225,7 +230,7 @@ def tables(case_data: Saved) -> list[Table]:
 
 
 def draw(case_data: Saved) -> Drawn:
-    """A work-precision figure per problem, and one of the routes of ride."""
+    """Plot error over work for every problem, and for the methods of ride."""
     problems = map(runner.of_saved, case_data["problems"])
     return [*((_caption(measured), draw_figure(measured)) for measured in problems), ride.draw(case_data["ride"])]
 

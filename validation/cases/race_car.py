@@ -1,4 +1,5 @@
-"""A measured race car: one stretch identified, another predicted; and a known car, found again with its errors."""
+"""A measured race car whose vehicle model is identified on one stretch and predicts another; and a known car,
+identified from noisy data."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,15 +23,20 @@ from validation.common.scenes import data_folder
 
 TITLE = "A measured race car, and a known car found again"
 SYSTEM: System = "rolling-vehicle"
-FILE = "race_car/race_car.csv.gz"
-AIMS = {"yaw rate": 0.12, "lateral acceleration": 0.12, "side slip": 0.25}
-"""Rms error by the rms of the measurement, all low-passed at 5 Hz: the bounds asked for."""
+RACE_CAR_FILE = "race_car/race_car.csv.gz"
+ERROR_AIMS = {"yaw rate": 0.12, "lateral acceleration": 0.12, "side slip": 0.25}
+"""Aims for the rms prediction error divided by the rms of the measurement, both low-passed at 5 Hz."""
 IDENTIFIED_SHARE = 0.65
-"""Of the measurement that is identified on."""
-WIDEST = 2.5
-"""Mean half-width of the bands by the rms error: the bound asked for."""
-NOISE = {"yaw rate": ("rad/s", 0.004), "lateral acceleration": ("m/s^2", 0.2), "side slip": ("rad", 0.0008)}
-TRUTH = {"vehicle.yaw_inertia": 1700.0, "front.stiffness": 16.0, "rear.stiffness": 19.0, "front.friction": 0.95}
+"""Share of the measurement on which the vehicle is identified."""
+WIDEST_BAND = 2.5
+"""Largest mean half-width of the prediction bands, divided by the rms error, that is asked for."""
+NOISE_LEVELS = {"yaw rate": ("rad/s", 0.004), "lateral acceleration": ("m/s^2", 0.2), "side slip": ("rad", 0.0008)}
+TRUE_PARAMETERS = {
+    "vehicle.yaw_inertia": 1700.0,
+    "front.stiffness": 16.0,
+    "rear.stiffness": 19.0,
+    "front.friction": 0.95,
+}
 START_PARAMETERS = {
     "vehicle.yaw_inertia": 1450.0,
     "front.stiffness": 14.0,
@@ -38,25 +44,27 @@ START_PARAMETERS = {
     "front.friction": 1.05,
 }
 DRIVE_TIMES = np.arange(0.0, 12.0, 0.02)
-REPEATS = 5
-OUTER = 52.0
-"""Of chi-square with 4 x 5 freedoms 99.99 % lie below: standard errors that are 1.6 times too small break it."""
+NOISE_REPEATS = 5
+CHI_SQUARE_LIMIT = 52.0
+"""99.99 % quantile of the chi-square distribution with 4 x 5 degrees of freedom; standard errors that are 1.6 times too
+small exceed it."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows on a known car over repeated noise; in full also on the measured race car."""
-    rows = _known_rows(folder)
+    """Rows on a known car with repeated noise; a full run also has the measured race car."""
+    rows = _known_car_rows(folder)
     if quick:
         return rows, {}
     data = data_folder()
-    if data is None or not (data / FILE).is_file():
-        return [*rows, *_not_run(f"needs {FILE} in the folder that TWINRIG_DATA names")], {}
-    chosen = _race(data / FILE, folder)
-    return [*rows, *_race_rows(chosen), _sensors_row(folder / "race.csv")], _saved(chosen)
+    if data is None or not (data / RACE_CAR_FILE).is_file():
+        return [*rows, *_rows_not_run(f"needs {RACE_CAR_FILE} in the folder that TWINRIG_DATA names")], {}
+    chosen = _identified_race_car(data / RACE_CAR_FILE, folder)
+    return [*rows, *_race_car_rows(chosen), _sensors_row(folder / "race.csv")], _saved_data(chosen)
 
 
-def _car(folder: Path, values: dict[str, float]) -> SingleTrackScene:
-    """Scene of a car with a drive that steers, brakes and accelerates, at several sampling rates."""
+def _car_scene(folder: Path, values: dict[str, float]) -> SingleTrackScene:
+    """Scene of a car with a drive that steers, brakes and accelerates; ``values`` replaces parameters by their scene
+    keys."""
     table: dict[str, Any] = {
         "title": "a known car",
         "system": "single-track",
@@ -71,7 +79,7 @@ def _car(folder: Path, values: dict[str, float]) -> SingleTrackScene:
     return build(table, "known car", folder)
 
 
-def _drive(folder: Path) -> None:
+def _write_drive(folder: Path) -> None:
     steer = 0.045 * np.sin(1.1 * DRIVE_TIMES) * np.cos(0.35 * DRIVE_TIMES) + 0.015 * np.sin(3.7 * DRIVE_TIMES)
     columns = {
         "time": ("s", DRIVE_TIMES),
@@ -81,22 +89,23 @@ def _drive(folder: Path) -> None:
     write_table(folder / "known.csv", columns)
 
 
-def _noisy(scene: SingleTrackScene, seed: int) -> Problem:
+def _noisy_problem(scene: SingleTrackScene, seed: int) -> Problem:
     """Identification problem: the car's parameters are to be found from its noisy channels, starting from other
     values."""
     driven, random = run(scene), np.random.default_rng(seed)
     columns = {
-        n: (unit, driven[n] + size * random.standard_normal(len(DRIVE_TIMES))) for n, (unit, size) in NOISE.items()
+        n: (unit, driven[n] + size * random.standard_normal(len(DRIVE_TIMES)))
+        for n, (unit, size) in NOISE_LEVELS.items()
     }
     path = Path(scene.folder) / f"known measured {seed}.csv"
     write_table(path, {"time": ("s", DRIVE_TIMES), **columns})
-    return problem_of(_car(Path(scene.folder), START_PARAMETERS), path, list(TRUTH), low_pass=5.0)
+    return problem_of(_car_scene(Path(scene.folder), START_PARAMETERS), path, list(TRUE_PARAMETERS), low_pass=5.0)
 
 
-def _known_rows(folder: Path) -> list[Row]:
-    _drive(folder)
-    scene, truth = _car(folder, TRUTH), np.array(list(TRUTH.values()))
-    solved = [uncertainty(fit(_noisy(scene, seed))) for seed in range(REPEATS)]
+def _known_car_rows(folder: Path) -> list[Row]:
+    _write_drive(folder)
+    scene, truth = _car_scene(folder, TRUE_PARAMETERS), np.array(list(TRUE_PARAMETERS.values()))
+    solved = [uncertainty(fit(_noisy_problem(scene, seed))) for seed in range(NOISE_REPEATS)]
     distance, worst = 0.0, 0.0
     for known in solved:
         off = (known.fit.values - truth) / known.fit.problem.scale
@@ -107,10 +116,13 @@ def _known_rows(folder: Path) -> list[Row]:
         Observed(
             "race_car.known.distance",
             SYSTEM,
-            f"squared distance of {REPEATS} estimates of {len(TRUTH)} numbers from the truth, by their covariance",
+            f"squared distance of {NOISE_REPEATS} estimates of {len(TRUE_PARAMETERS)} numbers from the truth, "
+            "by their covariance",
             distance,
             "",
-        ).at_most(OUTER, "chi-square: larger where standard errors are too small, or estimates off", "closed form"),
+        ).at_most(
+            CHI_SQUARE_LIMIT, "chi-square: larger where standard errors are too small, or estimates off", "closed form"
+        ),
         Observed(
             "race_car.known.coverage", SYSTEM, "least share of another noise inside the bands of 95 %", inside, ""
         ).within(0.95, 0.05, "bands that are neither too narrow nor empty", "closed form"),
@@ -120,13 +132,13 @@ def _known_rows(folder: Path) -> list[Row]:
             "largest distance of an estimate from the truth, in standard errors",
             worst,
             "",
-        ).beside(2.0, f"the largest of {REPEATS * len(TRUTH)} numbers is about 2", "closed form"),
+        ).beside(2.0, f"the largest of {NOISE_REPEATS * len(TRUE_PARAMETERS)} numbers is about 2", "closed form"),
     ]
 
 
 def _coverage(fits: list[Uncertainty]) -> float:
-    """Least share of measured samples inside the prediction bands, over all fits and channels. Each fit's bands are
-    compared with the measurement of the next noise sample."""
+    """Least share of measured samples inside the prediction bands, over all channels, as a mean over the fits. Each
+    fit's bands are compared with the measurement of the next noise sample."""
     shares = []
     for known, other_fit in zip(fits, [*fits[1:], fits[0]], strict=True):
         problem = known.fit.problem
@@ -138,7 +150,7 @@ def _coverage(fits: list[Uncertainty]) -> float:
     return float(np.mean(shares, axis=0).min())
 
 
-def _race(file: Path, folder: Path) -> Identified:
+def _identified_race_car(file: Path, folder: Path) -> Identified:
     path = write_plain_table(file, folder / "race.csv")
     table = {"title": "race car", "system": "single-track", **RACE_CAR, "drive": {"file": path.name, "low_pass": 10.0}}
     times = read_drive(path).times
@@ -146,12 +158,12 @@ def _race(file: Path, folder: Path) -> Identified:
     scenes = []
     for ends in ([float(times[0]), middle], [middle, float(times[-1])]):
         scenes.append(build({**table, "drive": {**table["drive"], "stretch": ends}}, "race car", path.parent))  # type: ignore[dict-item]
-    return identified_vehicle(scenes[0], scenes[1], Search(IDENTIFIED_PARAMETERS, list(AIMS), 5.0))
+    return identified_vehicle(scenes[0], scenes[1], Search(IDENTIFIED_PARAMETERS, list(ERROR_AIMS), 5.0))
 
 
-def _race_rows(identified: Identified) -> list[Row]:
+def _race_car_rows(identified: Identified) -> list[Row]:
     answer, rows = identified.bands, []
-    figures = zip(AIMS.items(), answer.relative_error(), answer.share_inside(), answer.width(), strict=True)
+    figures = zip(ERROR_AIMS.items(), answer.relative_error(), answer.share_inside(), answer.width(), strict=True)
     for (name, aim), error, inside, width in figures:
         id = f"race_car.{name.replace(' ', '_')}"
         rows += [
@@ -163,17 +175,17 @@ def _race_rows(identified: Identified) -> list[Row]:
             ).within(0.945, 0.045, "90 to 99 %, as asked for", "measured"),
             Observed(
                 f"{id}.width", SYSTEM, f"{name}: mean half-width of the bands by the rms error", width, ""
-            ).at_most(WIDEST, "asked for: bands that are not merely wide", "measured"),
+            ).at_most(WIDEST_BAND, "asked for: bands that are not merely wide", "measured"),
         ]
     return rows
 
 
 def _sensors_row(path: Path) -> Row:
-    """Row: measured lateral acceleration compared with that from measured speed, yaw rate and side slip, which needs no
-    model.
+    """Row: measured lateral acceleration compared with that from measured speed, yaw rate and side slip, without a
+    vehicle model.
 
-    A sensor that rolls with the body reads g sin(roll) beside, a share of the lateral acceleration; one that lies
-    elsewhere or is late differs as the motion changes.
+    A sensor that rolls with the body also reads g sin(roll), a share of the lateral acceleration. A sensor at another
+    place or with a delay differs as the motion changes.
     """
     times, _, speed, turning, sensed, slip = np.genfromtxt(path, delimiter=",", skip_header=1).T[:6]
     times, speed, turning, sensed, slip = (
@@ -192,16 +204,18 @@ def _sensors_row(path: Path) -> Row:
     return Observed("race_car.sensors", SYSTEM, quantity, error, "").beside(0.0, why, "measured")
 
 
-def _not_run(reason: str) -> list[Row]:
-    return [not_run(f"race_car.{name.replace(' ', '_')}.error", SYSTEM, f"{name} predicted", reason) for name in AIMS]
+def _rows_not_run(reason: str) -> list[Row]:
+    return [
+        not_run(f"race_car.{name.replace(' ', '_')}.error", SYSTEM, f"{name} predicted", reason) for name in ERROR_AIMS
+    ]
 
 
-def _saved(identified: Identified) -> dict[str, Any]:
+def _saved_data(identified: Identified) -> dict[str, Any]:
     known = identified.uncertainty
     return {
         "estimates": dict(zip([p.name for p in known.fit.problem.parameters], known.fit.values.tolist(), strict=True)),
         "standard errors": [
             None if np.isnan(standard_error) else float(standard_error) for standard_error in known.deviations
         ],
-        "errors": dict(zip(AIMS, identified.bands.relative_error().tolist(), strict=True)),
+        "errors": dict(zip(ERROR_AIMS, identified.bands.relative_error().tolist(), strict=True)),
     }

@@ -1,4 +1,5 @@
-"""Whether the price of accuracy keeps what it promises: settings recommended for scenes that it has never seen."""
+"""Recommended settings on scenes that the recommendation has not used before: do the settings keep the tolerance at the
+promised cost?"""
 
 import os
 from concurrent.futures import ProcessPoolExecutor
@@ -14,55 +15,63 @@ from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, Syst
 from validation.price import unseen_systems
 from validation.price.unseen import ENGINES, Verdict, drawn, judge
 
-Judged = tuple[list[Verdict], list[str]]
+SceneVerdicts = tuple[list[Verdict], list[str]]
 
 TITLE = "What to recommend"
 SYSTEM: System = "cost"
 QUICK_SCENE_NUMBER = 8
-"""Number of the one scene that a quick run draws."""
-SCENES = {"pitch-plane": 88, "braking": 6, "wheelset": 4, "handling": 2}
-"""How many scenes of each system a full run judges."""
+"""Number of the only scene of a quick run."""
+SCENE_COUNTS = {"pitch-plane": 88, "braking": 6, "wheelset": 4, "handling": 2}
+"""Number of scenes of each system in a full run."""
 REDRAWS = 3
-"""A refused scene is drawn anew, up to so many times in a row; then it counts as one whose tolerance is not held."""
-ENGINE = "mujoco"
-"""The one that a quick run asks about; a full one asks about all."""
-STRIDE = 1000
-"""Between the number of a scene and of the one that is drawn in its place."""
-LEAST_MET_SHARE, SECONDS_FACTOR = 0.95, 3.0
-"""Least share of scenes whose every recommended setting holds its tolerance; bound of predicted divided by true
-error."""
+"""A refused scene is replaced by another random one at most so many times; then it counts as one whose tolerance is
+missed."""
+QUICK_ENGINE = "mujoco"
+"""Engine of a quick run; a full run has all engines."""
+REDRAW_STRIDE = 1000
+"""Difference between the number of a scene and of the scene that replaces it."""
+LEAST_MET_SHARE, ERROR_FACTOR = 0.95, 3.0
+"""Least share of scenes whose every recommended setting keeps its tolerance; and bound of the factor between predicted
+and true error."""
 
 
 @allowing_breaches(
     "random scenes: whether settings hold their tolerance is judged, beside a truth that breaks the same"
 )
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Verdicts on all recommendations for all scenes; quick: those of one engine for one scene."""
-    both = [judged("pitch-plane", QUICK_SCENE_NUMBER, folder, (ENGINE,))] if quick else _shared(folder)
+    """Rows on all recommendations for all scenes; a quick run has those of one engine for one scene."""
+    both = (
+        [scene_verdicts("pitch-plane", QUICK_SCENE_NUMBER, folder, (QUICK_ENGINE,))]
+        if quick
+        else _verdicts_in_processes(folder)
+    )
     verdicts, refused = [of_scene for of_scene, _ in both], [why for _, of_scene in both for why in of_scene]
-    return _rows(verdicts, refused), {
+    return _promise_rows(verdicts, refused), {
         "verdicts": [[asdict(verdict) for verdict in of_scene] for of_scene in verdicts],
         "refused": refused,
     }
 
 
-def _shared(folder: Path) -> list[Judged]:
-    """Verdicts on recommendations, computed by at most two processes, with the long computations first."""
+def _verdicts_in_processes(folder: Path) -> list[SceneVerdicts]:
+    """Verdicts on the recommendations for all scenes, computed by at most two processes, the long computations
+    first."""
     context = get_context("spawn")  # an engine's threads do not survive a fork
     with ProcessPoolExecutor(min(2, os.cpu_count() or 1), mp_context=context) as pool:
         return [
             job.result()
             for job in [
-                pool.submit(judged, system, n, folder) for system in reversed(SCENES) for n in range(SCENES[system])
+                pool.submit(scene_verdicts, system, n, folder)
+                for system in reversed(SCENE_COUNTS)
+                for n in range(SCENE_COUNTS[system])
             ]
         ]
 
 
-def judged(system: str, scene_number: int, folder: Path, engines: tuple[str, ...] = ENGINES) -> Judged:
+def scene_verdicts(system: str, scene_number: int, folder: Path, engines: tuple[str, ...] = ENGINES) -> SceneVerdicts:
     """Verdicts on the recommendations for a random scene of a system, and the reasons of refusals. There are no
     verdicts if the scene was refused more than REDRAWS times."""
     refused: list[str] = []
-    for n in range(scene_number, scene_number + (REDRAWS + 1) * STRIDE, STRIDE):
+    for n in range(scene_number, scene_number + (REDRAWS + 1) * REDRAW_STRIDE, REDRAW_STRIDE):
         try:
             reasons = (
                 judge(drawn(n, folder), engines)
@@ -76,9 +85,9 @@ def judged(system: str, scene_number: int, folder: Path, engines: tuple[str, ...
     return [], refused
 
 
-def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
-    """Rows on the three promises of a recommendation; a scene counts as kept if every recommended setting keeps its
-    promise."""
+def _promise_rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
+    """Rows on the promises of a recommendation: tolerance, predicted error, and cost. A scene counts as met if every
+    recommended setting keeps the scene's tolerance."""
     every = [verdict for of_scene in verdicts for verdict in of_scene]
     kept_scenes = sum(bool(of_scene) and all(verdict.meets for verdict in of_scene) for of_scene in verdicts)
     factors = [verdict.factor for verdict in every]
@@ -97,7 +106,7 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
             "largest factor between the predicted and the true error",
             max(factors, default=float("inf")),
             "times",
-        ).at_most(SECONDS_FACTOR, f"{why}; errors below what is known of the truth count as that", "closed form"),
+        ).at_most(ERROR_FACTOR, f"{why}; errors below what is known of the truth count as that", "closed form"),
         Observed(
             "recommendation.refused",
             SYSTEM,
@@ -120,14 +129,14 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
             "recommendation.slower",
             SYSTEM,
             "settings recommended by force calls that take more calls than the engine's default at the same tolerance",
-            _slower(every, "calls"),
+            _slower_count(every, "calls"),
             "settings",
         ).at_most(0.0, "exact", "none"),
         Observed(
             "recommendation.slower.seconds",
             SYSTEM,
             "settings recommended by seconds that take longer than the engine's default at the same tolerance",
-            _slower(every, "seconds"),
+            _slower_count(every, "seconds"),
             "settings",
         ).aim(
             0.0,
@@ -137,12 +146,12 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
     ]
 
 
-def _slower(every: list[Verdict], cost_kind: str) -> int:
-    return sum(verdict.slower for verdict in every if verdict.kind == cost_kind)
+def _slower_count(verdicts: list[Verdict], cost_kind: str) -> int:
+    return sum(verdict.slower for verdict in verdicts if verdict.kind == cost_kind)
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Every scene with what was recommended over all engines."""
+    """Table of every scene with the setting that was recommended over all engines."""
     rows = []
     for of_scene in case_data["verdicts"]:
         if not of_scene:
@@ -167,7 +176,7 @@ def tables(case_data: Saved) -> list[Table]:
 
 
 def draw(case_data: Saved) -> Drawn:
-    """Predicted over true error by tolerance."""
+    """Plot predicted over true error, both divided by the tolerance."""
     from models.drawing.figures import COLOURS, DARK, LABELS, REJECTED_COLOUR, add_heading, subplots
 
     figure, ax = subplots(figsize=(6.0, 4.6))
@@ -187,12 +196,12 @@ def draw(case_data: Saved) -> Drawn:
     ax.plot(span, span, color=DARK, linewidth=0.8)
     ax.fill_between(
         span,
-        span / SECONDS_FACTOR,
-        span * SECONDS_FACTOR,
+        span / ERROR_FACTOR,
+        span * ERROR_FACTOR,
         color="#bbbbbb",
         alpha=0.4,
         linewidth=0,
-        label=f"within a factor {SECONDS_FACTOR:g}",
+        label=f"within a factor {ERROR_FACTOR:g}",
     )
     ax.axvline(1.0, color=REJECTED_COLOUR, linewidth=1.0, label="tolerance")
     ax.set(

@@ -1,4 +1,5 @@
-"""Stationary covariance against closed forms and quadrature; outputs without a variance; the fast route over speeds."""
+"""Stationary covariance of ride compared with closed forms and quadrature; outputs without a variance; the fast method
+for many speeds."""
 
 import time
 from collections.abc import Iterator
@@ -39,63 +40,66 @@ from validation.ride.rides import (
 TITLE = "Ride: stationary covariance with exact delays"
 SYSTEM: System = "ride"
 SEED = 5
-"""Of the asymmetric twins, and of the roads and speeds they run at."""
-SHIPPED = ("r19_ride", "r19_free", "seven_freedoms", "three_axle_truck")
-TWINS = ("r19_ride", "r19_free", "three_axle_truck")
-FILTERS = {"left occupant": "Wk", "right occupant": "Wk", "body centre": "Wk"}
+"""Seed of the asymmetric vehicle variants, and of their roads and speeds."""
+SHIPPED_VEHICLES = ("r19_ride", "r19_free", "seven_freedoms", "three_axle_truck")
+VARIED_VEHICLES = ("r19_ride", "r19_free", "three_axle_truck")
+WEIGHTED_OUTPUTS = {"left occupant": "Wk", "right occupant": "Wk", "body centre": "Wk"}
 SPEEDS = np.linspace(5.0, 50.0, 60)
 SYMMETRY_ZERO = 1e-20
-"""Variances below this share of the largest of their kind are zero by symmetry."""
+"""Variances below this share of the largest variance count as zero by symmetry."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """All but the engines' own linearisations in quick; there, of the vehicles, two at one speed."""
-    routes = [_by_quadrature(*job) for job in _jobs(quick)]
-    rows = [*_closed_rows(), *_route_rows(routes), *_limit_rows(), *weighting_rows(SEED), *without_variance()]
+    """Rows: covariance compared with quadrature, closed forms and limits, and the fast method for many speeds. A quick
+    run leaves out the engines' own linearisations, and compares two vehicles at one speed each."""
+    routes = [_quadrature_comparison(*job) for job in _comparisons(quick)]
+    rows = [*_closed_form_rows(), *_quadrature_rows(routes), *_limit_rows(), *weighting_rows(SEED), *without_variance()]
     engines = () if quick else ("exudyn", "mujoco")
     rows += [_engine_row(engine) for engine in engines]
     speeds = SPEEDS[::20] if quick else SPEEDS
-    fast_rows, figure = _fast(speeds, "reference" if quick else "exudyn")
+    fast_rows, figure = _speed_sweep_rows(speeds, "reference" if quick else "exudyn")
     return rows + fast_rows, {"routes": routes, "figure": figure}
 
 
 @cache
-def _vehicle(name: str, seed: int = 0) -> SpatialVehicle:
-    vehicle = load_vehicle(name)
+def _ride_vehicle(vehicle_name: str, seed: int = 0) -> SpatialVehicle:
+    vehicle = load_vehicle(vehicle_name)
     return changed_vehicle(vehicle, seed) if seed else vehicle
 
 
-def _jobs(quick: bool) -> Iterator[tuple[str, int, TwoTrackRoad | None, float]]:
-    """The vehicles and roads to compare: vehicle, seed of its random variant or 0, seed of a random road or None for
-    the paper's, speed."""
+def _comparisons(quick: bool) -> Iterator[tuple[str, int, TwoTrackRoad | None, float]]:
+    """Vehicles and roads to compare: vehicle name, seed of its random variant or 0, random road or None for the
+    paper's, speed (m/s)."""
     if quick:
         yield from (("r19_ride", 0, None, 20.0), ("three_axle_truck", SEED, _random_road(SEED), 13.0))
         return
     rng = np.random.default_rng(SEED)
-    for name in SHIPPED:
+    for name in SHIPPED_VEHICLES:
         yield from ((name, 0, None, speed) for speed in (2.0, 20.0, 50.0))
-    for name in TWINS:
+    for name in VARIED_VEHICLES:
         for seed in (SEED, SEED + 1):
             yield from ((name, seed, _random_road(int(rng.integers(1000))), rng.uniform(1.0, 60.0)) for _ in range(2))
 
 
 def _random_road(seed: int) -> TwoTrackRoad:
-    """Random road whose corner wavenumbers vary over a decade, and intensities over two decades."""
+    """Random two-track road whose corner wavenumbers vary over two decades, and whose intensities vary over two
+    decades."""
     rng = np.random.default_rng(seed)
     mean, roll = (ShapeFilter(10 ** rng.uniform(-1.5, 0.5), 1e-5 * 10 ** rng.uniform(-1, 1)) for _ in range(2))
     return TwoTrackRoad(mean, roll)
 
 
-def _by_quadrature(name: str, seed: int, road: TwoTrackRoad | None, speed: float) -> dict[str, Any]:
+def _quadrature_comparison(vehicle_name: str, seed: int, road: TwoTrackRoad | None, speed: float) -> dict[str, Any]:
     """Largest relative difference between standard deviations by covariance and by quadrature, over all outputs and
-    five cases of correlation, with the error that each route states."""
-    vehicle = linearise(_vehicle(name, seed), speed)
+    five cases of correlation, with the error that each method states."""
+    vehicle = linearise(_ride_vehicle(vehicle_name, seed), speed)
     compared = [
-        _compared(vehicle, vehicle, excitation, speed) for excitation in five_cases(vehicle.wheels, road).values()
+        _covariance_difference(vehicle, vehicle, excitation, speed)
+        for excitation in five_cases(vehicle.wheels, road).values()
     ]
     worst, by_covariance, by_quadrature, counts = zip(*compared, strict=True)
     return {
-        "vehicle": name + (f", twin {seed}" if seed else ""),
+        "vehicle": vehicle_name + (f", twin {seed}" if seed else ""),
         "speed": speed,
         "values": sum(counts),
         "worst": max(worst),
@@ -103,11 +107,11 @@ def _by_quadrature(name: str, seed: int, road: TwoTrackRoad | None, speed: float
     }
 
 
-def _compared(
+def _covariance_difference(
     vehicle: LinearVehicle, analytic: LinearVehicle, road: Excitation, speed: float
 ) -> tuple[float, float, float, int]:
-    """Largest relative difference between a vehicle's covariance and quadrature on the analytic vehicle, the error that
-    each route states, and the number of outputs that do not vanish by symmetry."""
+    """Largest relative difference between a vehicle's standard deviations by covariance and those by quadrature on the
+    analytic vehicle, the error that each method states, and the number of outputs that do not vanish by symmetry."""
     covariance, integrals = (
         stationary_covariance(vehicle_with_road(vehicle, road, speed)),
         variances_by_quadrature(analytic, road, speed),
@@ -117,8 +121,8 @@ def _compared(
     return worst, covariance.error[is_finite].max(), integrals.error[is_finite].max(), int(is_finite.sum())
 
 
-def _closed_rows() -> list[Row]:
-    """Rows: quarter car and half car compared with closed formulas."""
+def _closed_form_rows() -> list[Row]:
+    """Rows: variances of quarter car and half car compared with closed formulas."""
     worst = {"acceleration": 0.0, "travel": 0.0, "deflection": 0.0}
     for corner in (0.0, 1e-6, 1e-3, 0.3, 3.0):
         variance = stationary_covariance(
@@ -155,8 +159,8 @@ def _closed_rows() -> list[Row]:
     ]
 
 
-def _route_rows(routes: list[dict[str, Any]]) -> list[Row]:
-    by_vehicle = {name: [*group] for name, group in groupby(routes, key=itemgetter("vehicle"))}
+def _quadrature_rows(comparisons: list[dict[str, Any]]) -> list[Row]:
+    by_vehicle = {name: [*group] for name, group in groupby(comparisons, key=itemgetter("vehicle"))}
     return [
         Observed(
             f"ride_covariance.quadrature.{name.replace(', ', '-').replace(' ', '-')}",
@@ -171,8 +175,8 @@ def _route_rows(routes: list[dict[str, Any]]) -> list[Row]:
 
 
 def _limit_rows() -> list[Row]:
-    """Rows: limits of zero and infinite delay between the axles, and covariances of the road itself."""
-    vehicle = linearise(_vehicle("three_axle_truck", SEED))
+    """Rows: limits of zero and of infinite delay between the axles, and covariances of the road under the wheels."""
+    vehicle = linearise(_ride_vehicle("three_axle_truck", SEED))
     road = paper_road(vehicle.wheels)
     lagged = vehicle_with_road(vehicle, road, 20.0)
     at_once = stationary_covariance(replace(lagged, delays=(0.0,) * 3)).deviation
@@ -199,8 +203,8 @@ def _limit_rows() -> list[Row]:
 
 
 def _inputs_row() -> Row:
-    """Row: covariance of the road heights under the wheels, as the system's outputs state it."""
-    vehicle = linearise(_vehicle("three_axle_truck", SEED))
+    """Row: covariance of the road heights under the wheels in the stationary solution, compared with its law."""
+    vehicle = linearise(_ride_vehicle("three_axle_truck", SEED))
     road, worst = road_of_level(1.0), 0.0
     for met, case in zip(five_cases(vehicle.wheels, road).values(), CORRELATION_CASES.values(), strict=True):
         H = np.hstack([np.zeros((len(vehicle.wheels), 2 * len(vehicle.mass))), *met.heights])
@@ -222,10 +226,10 @@ def _engine_row(engine: str) -> Row:
 
     worst = 0.0
     for name, speed in (("r19_ride", 20.0), ("r19_free", 33.0), ("three_axle_truck", 9.0)):
-        vehicle = _vehicle(name, SEED)
+        vehicle = _ride_vehicle(name, SEED)
         linear, analytic = build(engine, vehicle, speed=speed).linearise(), linearise(vehicle, speed)
         roads = five_cases(analytic.wheels).values()
-        worst = max(worst, *(_compared(linear, analytic, road, speed)[0] for road in roads))
+        worst = max(worst, *(_covariance_difference(linear, analytic, road, speed)[0] for road in roads))
     return Observed(
         f"ride_covariance.engine.{engine}",
         SYSTEM,
@@ -236,18 +240,20 @@ def _engine_row(engine: str) -> Row:
     ).at_most(1e-6, "asked", "native")
 
 
-def _fast(speeds: np.ndarray, vehicle_name: str) -> tuple[list[Row], dict[str, Any]]:
-    """Rows and data on the fast route: five cases of correlation over many speeds with weighting, by the fast and the
-    direct route, with processor times."""
-    vehicle = _vehicle("r19_ride")
-    linear = linear_vehicle(vehicle, vehicle_name)
+def _speed_sweep_rows(speeds: np.ndarray, engine: str) -> tuple[list[Row], dict[str, Any]]:
+    """Rows and data on the fast method: five cases of correlation over many speeds with weighting, by the fast and by
+    the direct method, with processor times."""
+    vehicle = _ride_vehicle("r19_ride")
+    linear = linear_vehicle(vehicle, engine)
     roads = five_cases(linear(20.0).wheels)
-    variance_sweep(linear, roads, speeds[:1], FILTERS)  # what is loaded and linearised once is no part of the sweep
+    variance_sweep(
+        linear, roads, speeds[:1], WEIGHTED_OUTPUTS
+    )  # what is loaded and linearised once is no part of the sweep
     start = time.process_time()
-    quick = variance_sweep(linear, roads, speeds, FILTERS)
+    quick = variance_sweep(linear, roads, speeds, WEIGHTED_OUTPUTS)
     seconds = time.process_time() - start
     some = slice(None, None, max(1, len(speeds) // 6))
-    slow = variance_sweep(linear, roads, speeds[some], FILTERS, fast=False)
+    slow = variance_sweep(linear, roads, speeds[some], WEIGHTED_OUTPUTS, fast=False)
     is_finite = slow.variance > SYMMETRY_ZERO * slow.variance.max()
     rows = [
         Observed(
@@ -270,7 +276,7 @@ def _fast(speeds: np.ndarray, vehicle_name: str) -> tuple[list[Row], dict[str, A
             "ride_covariance.fast.time",
             SYSTEM,
             f"time of five cases at {len(speeds)} speeds with ISO weighting, from the linear vehicle "
-            f"of {vehicle_name}, single core, measured once",
+            f"of {engine}, single core, measured once",
             seconds,
             "s",
         ).aim(2.0, "asked for 60 speeds; it counts this process's seconds and not other load"),
@@ -289,7 +295,7 @@ BODY_POINTS = ("body front", "body centre", "body rear")
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Table of the agreement between two routes, with the error that each states."""
+    """Table of the agreement between covariance and quadrature, with the error that each states."""
     rows = tuple(
         (
             route["vehicle"],
@@ -309,7 +315,8 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Standard deviation of the vertical acceleration along the body over speed, one line per case."""
+    """Plot the standard deviation of the vertical acceleration at three points of the body over speed, one line for
+    each case of correlation."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     shown = case_data["figure"]
@@ -331,3 +338,4 @@ FIGURE_TEXT = (
     "the speed: there front and rear add up or cancel with the delay, which axles that are equal or independent both "
     "miss. Front and rear of the body hardly feel it: there only the correlation of left and right matters."
 )
+"""Caption of the figure."""

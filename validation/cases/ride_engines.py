@@ -1,4 +1,5 @@
-"""Vehicles in space in both engines: linearised by each, compared at states and along paths, at rest under gravity."""
+"""Vehicles in space in Exudyn and MuJoCo: linearised matrices, accelerations at random states, simulations, and rest
+under gravity."""
 
 import time
 from dataclasses import replace
@@ -24,62 +25,64 @@ SYSTEM: System = "ride"
 ENGINES = ("exudyn", "mujoco")
 SPEED, GRAVITY = 20.0, 9.81
 SEED = 20261121
-STATES, STEP = 100, 1e-3
-SHARES = (
+STATE_COUNT, STEP = 100, 1e-3
+VEHICLE_NAMES = (
     ("quarter_car", "r19_ride"),
     ("quarter_car", "seven_freedoms", "r19_ride", "r19_free", "three_axle_truck", "spatial twin"),
 )
-"""Vehicles of the full report behind those of the quick one."""
-BOUNDS = {"exudyn": 1e-12, "mujoco": 1e-9}
-DIGRESSIVE = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-1500.0, -400.0, 0.0, 700.0, 2500.0))
+"""Vehicles of a quick run, and of a full run."""
+MATRIX_TOLERANCES = {"exudyn": 1e-12, "mujoco": 1e-9}
+DIGRESSIVE_DAMPER = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-1500.0, -400.0, 0.0, 700.0, 2500.0))
 BUMP_STOPS = Curve((-0.2, -0.05, 0.05, 0.2), (-8000.0, 0.0, 0.0, 8000.0))
-FRICTION = 40.0
-BY_DIFFERENCES = "central differences of order six leave 1e-13 of smooth laws, 1e-11 of curves with corners"
-SAME_LAWS = "the same laws, added up in another order: 1e-16 of the largest force per operation"
+DRY_FRICTION = 40.0
+DIFFERENCES_REASON = "central differences of order six leave 1e-13 of smooth laws, 1e-11 of curves with corners"
+SAME_LAWS_REASON = "the same laws, added up in another order: 1e-16 of the largest force per operation"
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Compares matrices always; states, paths, rest and price in the full share alone."""
+    """Rows of the linearised matrices; a full run also has accelerations, simulations, rest and computing times."""
     rows: list[Row] = []
-    for name in SHARES[not quick]:
-        rows += _linearised(of_name(name), name, "unloaded", BOUNDS)
-    rows += _frequencies()
+    for name in VEHICLE_NAMES[not quick]:
+        rows += _matrix_rows(vehicle_of_name(name), name, "unloaded", MATRIX_TOLERANCES)
+    rows += _frequency_rows()
     if quick:
         return rows, {"price": []}
-    for name in SHARES[1]:
-        rows += _linearised(of_name(name, GRAVITY), name, "loaded", BOUNDS) + _states(name)
-    bent = curved(of_name("r19_ride", GRAVITY))
-    rows += _linearised(bent, "r19_ride", "loaded and curved", dict.fromkeys(ENGINES, 1e-9))
-    path, price = _path()
-    return rows + path + _at_rest() + _shift() + _without_curves(), {"price": price}
+    for name in VEHICLE_NAMES[1]:
+        rows += _matrix_rows(vehicle_of_name(name, GRAVITY), name, "loaded", MATRIX_TOLERANCES) + _acceleration_rows(
+            name
+        )
+    bent = with_nonlinear_springs(vehicle_of_name("r19_ride", GRAVITY))
+    rows += _matrix_rows(bent, "r19_ride", "loaded and curved", dict.fromkeys(ENGINES, 1e-9))
+    path, price = _simulation_rows()
+    return rows + path + _rest_rows() + _shift_rows() + _curve_row(), {"price": price}
 
 
-def of_name(name: str, gravity: float = 0.0) -> SpatialVehicle:
-    """A shipped vehicle, or the asymmetric twin, with or without gravity."""
+def vehicle_of_name(name: str, gravity: float = 0.0) -> SpatialVehicle:
+    """A shipped vehicle, or the asymmetric twin, with a given gravity (m/s^2)."""
     return spatial_twin.vehicle(gravity) if name == "spatial twin" else replace(load_vehicle(name), gravity=gravity)
 
 
-def curved(vehicle: SpatialVehicle) -> SpatialVehicle:
+def with_nonlinear_springs(vehicle: SpatialVehicle) -> SpatialVehicle:
     """The vehicle with nonlinear elements in its first four springs: digressive and asymmetric dampers, bump stops and
     dry friction."""
     bent = [
-        replace(spring, damping=0.0, rate_force=DIGRESSIVE, travel_force=BUMP_STOPS, friction=FRICTION)
+        replace(spring, damping=0.0, rate_force=DIGRESSIVE_DAMPER, travel_force=BUMP_STOPS, friction=DRY_FRICTION)
         for spring in vehicle.springs[:4]
     ]
     return replace(vehicle, springs=(*bent, *vehicle.springs[4:]))
 
 
-def difference(computed_values: LinearVehicle, expected: LinearVehicle) -> float:
-    """Largest error of M, D, K, the road's columns and the outputs; each matrix is compared relative to its largest
-    entry."""
+def matrix_difference(computed_values: LinearVehicle, expected: LinearVehicle) -> float:
+    """Largest difference of M, D, K, the road's columns and the outputs of two vehicles; each matrix is compared
+    relative to its largest entry."""
     matrices = ("mass", "damping", "stiffness", "road_stiffness", "road_damping")
     sides: list[tuple[Any, Any, tuple[str, ...]]] = [(computed_values, expected, matrices)]
     sides += [(a, b, OutputRows._fields) for a, b in zip(computed_values.outputs, expected.outputs, strict=True)]
-    return max(relative(getattr(a, name), getattr(b, name)) for a, b, names in sides for name in names)
+    return max(relative_difference(getattr(a, name), getattr(b, name)) for a, b, names in sides for name in names)
 
 
-def relative(computed_values: np.ndarray, expected: np.ndarray) -> float:
-    """Largest difference, divided by the largest expected magnitude unless that is 0."""
+def relative_difference(computed_values: np.ndarray, expected: np.ndarray) -> float:
+    """Largest difference, divided by the largest expected magnitude unless this is 0."""
     size = float(np.abs(expected).max(initial=0.0))
     return float(np.abs(computed_values - expected).max(initial=0.0)) / (size or 1.0)
 
@@ -92,28 +95,30 @@ def random_state(vehicle: SpatialVehicle, path: int) -> tuple[np.ndarray, np.nda
     return 0.05 * drawn[:n], 0.5 * drawn[n : 2 * n], 0.05 * drawn[2 * n :]
 
 
-def _linearised(vehicle: SpatialVehicle, name: str, loaded: str, bounds: dict[str, float]) -> list[Row]:
+def _matrix_rows(vehicle: SpatialVehicle, vehicle_name: str, load_case: str, tolerances: dict[str, float]) -> list[Row]:
     expected = linearise(vehicle, SPEED)
     return [
         Observed(
-            f"ride_engines.matrices.{name}.{loaded}.{engine}",
+            f"ride_engines.matrices.{vehicle_name}.{load_case}.{engine}",
             SYSTEM,
-            f"difference of M, D, K, road columns and outputs of {name} in {engine} from the analytic ones, {loaded}",
-            difference(build(engine, vehicle, speed=SPEED).linearise(), expected),
+            f"difference of M, D, K, road columns and outputs of {vehicle_name} in {engine} from the analytic ones, "
+            f"{load_case}",
+            matrix_difference(build(engine, vehicle, speed=SPEED).linearise(), expected),
             "relative",
-        ).at_most(bounds[engine], BY_DIFFERENCES, "native")
+        ).at_most(tolerances[engine], DIFFERENCES_REASON, "native")
         for engine in ENGINES
     ]
 
 
-def _frequencies() -> list[Row]:
+def _frequency_rows() -> list[Row]:
     return [
         Observed(
             f"ride_engines.frequencies.{engine}",
             SYSTEM,
             f"difference of the 19 eigenfrequencies of R19-ride in {engine} from the published ones",
             largest_relative_error(
-                np.abs(poles(build(engine, of_name("r19_ride")).linearise()))[::2] / (2 * np.pi), R19_FREQUENCIES
+                np.abs(poles(build(engine, vehicle_of_name("r19_ride")).linearise()))[::2] / (2 * np.pi),
+                R19_FREQUENCIES,
             ),
             "relative",
         ).at_most(1e-5, "six decimals of the expected ones are known", "published")
@@ -121,26 +126,30 @@ def _frequencies() -> list[Row]:
     ]
 
 
-def _states(name: str) -> list[Row]:
+def _acceleration_rows(vehicle_name: str) -> list[Row]:
     """Rows: accelerations at random states with nonlinear springs, gravity and a road, compared between the engines and
     with the equations."""
-    vehicle = curved(of_name(name, GRAVITY)) if name != "quarter_car" else of_name(name, GRAVITY)
+    vehicle = (
+        with_nonlinear_springs(vehicle_of_name(vehicle_name, GRAVITY))
+        if vehicle_name != "quarter_car"
+        else vehicle_of_name(vehicle_name, GRAVITY)
+    )
     built = (build(engine, vehicle, speed=SPEED) for engine in ENGINES)
     models: list[SpatialModel | SpatialReference] = [*built, SpatialReference(vehicle, SPEED)]
     worst = np.zeros(3)
-    for path in range(STATES):
+    for path in range(STATE_COUNT):
         exudyn, mujoco, reference = (model.acceleration(0.0, *random_state(vehicle, path)) for model in models)
         pairs = ((exudyn, mujoco), (exudyn, reference), (mujoco, reference))
-        worst = np.maximum(worst, [relative(*pair) for pair in pairs])
+        worst = np.maximum(worst, [relative_difference(*pair) for pair in pairs])
     names = ("exudyn against mujoco", "exudyn against equations", "mujoco against equations")
     return [
         Observed(
-            f"ride_engines.states.{name}.{what}",
+            f"ride_engines.states.{vehicle_name}.{what}",
             SYSTEM,
-            f"difference of the accelerations of {name} at {STATES} random states, {what}",
+            f"difference of the accelerations of {vehicle_name} at {STATE_COUNT} random states, {what}",
             float(value),
             "relative",
-        ).at_most(1e-12, SAME_LAWS, "native")
+        ).at_most(1e-12, SAME_LAWS_REASON, "native")
         for what, value in zip(names, worst, strict=True)
     ]
 
@@ -149,18 +158,19 @@ def _settings(engine: str, duration: float = 1.0) -> Settings:
     return Settings(INTEGRATORS[engine], STEP, duration)
 
 
-def _path() -> tuple[list[Row], list[list[str]]]:
-    """Rows: paths of both engines from a random start over 1 s on a random road, with nonlinear springs and without."""
+def _simulation_rows() -> tuple[list[Row], list[list[str]]]:
+    """Rows and computing times: states of Exudyn and MuJoCo from a random start over 1 s on a random road, with
+    nonlinear and with linear springs."""
     rows, price = [], []
     for what in ("linear", "curved"):
-        vehicle = of_name("r19_ride", GRAVITY)
-        vehicle = curved(vehicle) if what == "curved" else vehicle
+        vehicle = vehicle_of_name("r19_ride", GRAVITY)
+        vehicle = with_nonlinear_springs(vehicle) if what == "curved" else vehicle
         road = 1e-4 * np.cumsum(normal_samples(SEED, 0, 2 * round(1.0 / STEP) + 1, 2 * len(vehicle.tyres)), axis=0)
         runs = {}
         for engine in ENGINES:
             model = build(engine, vehicle, _settings(engine), None, road)
             start = time.process_time()
-            runs[engine] = model.run(*random_state(vehicle, STATES)[:2])
+            runs[engine] = model.run(*random_state(vehicle, STATE_COUNT)[:2])
             price.append([engine, what, f"{1e3 * (time.process_time() - start):.0f}", str(model.plan()["callbacks"])])
         gap = max(
             np.abs(getattr(runs["exudyn"], state_name) - getattr(runs["mujoco"], state_name)).max()
@@ -173,15 +183,15 @@ def _path() -> tuple[list[Row], list[list[str]]]:
                 f"difference of R19-ride's states over 1 s between Exudyn and MuJoCo, {what} springs, RK4 at 1 ms",
                 float(gap),
                 "m, rad, m/s, rad/s",
-            ).at_most(1e-12, SAME_LAWS, "native")
+            ).at_most(1e-12, SAME_LAWS_REASON, "native")
         )
     return rows, price
 
 
-def _at_rest() -> list[Row]:
+def _rest_rows() -> list[Row]:
     """Rows: in the design position under gravity nothing accelerates, and nothing has moved after 1 s."""
     rows = []
-    vehicle = curved(of_name("r19_ride", GRAVITY))
+    vehicle = with_nonlinear_springs(vehicle_of_name("r19_ride", GRAVITY))
     zero = np.zeros(len(vehicle.coordinates()))
     for engine in ENGINES:
         model = build(engine, vehicle, _settings(engine))
@@ -207,15 +217,15 @@ def _at_rest() -> list[Row]:
     return rows
 
 
-def _shift() -> list[Row]:
-    """Rows: shift of the eigenvalues by gravity and preload, from both engines; the zero eigenvalues of a free vehicle
-    move by rounding."""
+def _shift_rows() -> list[Row]:
+    """Rows: shift of the eigenvalues by gravity and preload, from the matrices of Exudyn and MuJoCo and from the
+    analytic matrices."""
     rows = []
-    for name in SHARES[1]:
-        analytic = shift(*(linearise(of_name(name, gravity), SPEED) for gravity in (0.0, GRAVITY)))
+    for name in VEHICLE_NAMES[1]:
+        analytic = shift(*(linearise(vehicle_of_name(name, gravity), SPEED) for gravity in (0.0, GRAVITY)))
         for engine in ENGINES:
             shifted = shift(
-                *(build(engine, of_name(name, gravity), speed=SPEED).linearise() for gravity in (0.0, GRAVITY))
+                *(build(engine, vehicle_of_name(name, gravity), speed=SPEED).linearise() for gravity in (0.0, GRAVITY))
             )
             rows.append(
                 Observed(
@@ -229,10 +239,13 @@ def _shift() -> list[Row]:
     return rows
 
 
-def _without_curves() -> list[Row]:
-    """Row: a vehicle with linear springs has no curve functions, and one with nonlinear springs has one for each of
-    them."""
-    plain, bent = (build("exudyn", vehicle).plan() for vehicle in (of_name("r19_ride"), curved(of_name("r19_ride"))))
+def _curve_row() -> list[Row]:
+    """Row: a vehicle with linear springs has no curve functions, and a vehicle with nonlinear springs has one for each
+    of these springs."""
+    plain, bent = (
+        build("exudyn", vehicle).plan()
+        for vehicle in (vehicle_of_name("r19_ride"), with_nonlinear_springs(vehicle_of_name("r19_ride")))
+    )
     counts = f"{plain['curves']} curves, {bent['callbacks'] - plain['callbacks']} functions more with curves"
     return [
         behaviour_row(

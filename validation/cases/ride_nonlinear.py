@@ -1,4 +1,5 @@
-"""Bent springs on a random road: statistical linearisation against Monte Carlo, both engines in time."""
+"""Nonlinear springs on a random road: statistical linearisation compared with Monte Carlo, and Exudyn and MuJoCo in
+time."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -29,46 +30,47 @@ from validation.ride.rides import largest_relative_error
 __all__ = ["draw", "measure", "tables"]
 TITLE = "Nonlinear ride: statistical linearisation, Monte Carlo beside it, both engines in time"
 SYSTEM: System = "ride"
-LEVELS = (1.0, 4.0, 16.0)
-"""Times the level of the paper: class C or so, E, and G, where the stops are met all the time."""
-COPIES, LASTING = (60, 400), (1.5, 10.0)
-"""Monte Carlo in the quick and in the full share; its length in s."""
+ROAD_LEVELS = (1.0, 4.0, 16.0)
+"""Road levels as factors on the paper's: about class C, E, and G, where the stops are hit all the time."""
+COPY_COUNTS, COPY_SECONDS = (60, 400), (1.5, 10.0)
+"""Number of Monte Carlo copies in a quick and in a full run; and their length (s)."""
 MILD_DAMPING = 1500.0
-"""Damping (N s/m) beside a law that is looked at alone."""
+"""Damping (N s/m) of the spring whose friction or stops are tested alone."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Gains, fixed point, one level of road and a short path; in full three levels, and 19 freedoms in time."""
-    rows = [*_gains(), *_fixed_point()]
+    """Rows of gains, fixed point, one road level and a short run in time; a full run has three levels and a vehicle of
+    19 degrees of freedom in time."""
+    rows = [*_gain_rows(), *_fixed_point_rows()]
     table = []
-    for level in LEVELS[: 1 if quick else None]:
-        level_rows, line = _level(level, quick)
+    for level in ROAD_LEVELS[: 1 if quick else None]:
+        level_rows, line = _level_rows(level, quick)
         rows += level_rows
         table.append(line)
     rows += bent_in_engines(quick)
     if quick:
         return rows, {"levels": table, "spectra": {}}
-    rows += [_linear_copies(), *_alone()]
+    rows += [_linear_springs_row(), *_single_law_rows()]
     level_rows, shown = linear_in_engines()
     return rows + level_rows, {"levels": table, "spectra": shown}
 
 
-def _gains() -> list[Row]:
-    """Rows: gains by closed forms compared with their defining integrals, for spring laws from a single corner to
-    nearly straight ones."""
+def _gain_rows() -> list[Row]:
+    """Rows: equivalent gains by closed forms compared with their defining integrals, for damper, bump stops and dry
+    friction."""
     spring = vehicle_and_road(NONLINEAR_VEHICLE)[0].springs[0]
     worst, dry = 0.0, 0.0
     for curve, mean, size in ((spring.rate_force, 0.0, 0.3), (spring.travel_force, 0.01, 0.02)):
         assert curve is not None
         for deviation in size * np.array([0.1, 1.0, 10.0]):
             cut = [(x - mean) / deviation for x in curve.arguments[1:-1]]
-            force = expected(lambda x: curve(mean + deviation * x), cut)  # noqa: B023
-            gain = expected(lambda x: curve(mean + deviation * x) * x, cut) / deviation  # noqa: B023
+            force = normal_expectation(lambda x: curve(mean + deviation * x), cut)  # noqa: B023
+            gain = normal_expectation(lambda x: curve(mean + deviation * x) * x, cut) / deviation  # noqa: B023
             gains = of_curve(curve, mean, deviation)
             scale = max(abs(force), abs(gain) * deviation, 1e-3)
             worst = max(worst, abs(gains[0] - force) / scale, abs(gains[1] - gain) * deviation / scale)
     for ratio in (0.1, 1.0, 10.0, 100.0):
-        gain = expected(lambda x: np.tanh(ratio * x) * x, (-1.0 / ratio, 0.0, 1.0 / ratio)) / ratio  # noqa: B023
+        gain = normal_expectation(lambda x: np.tanh(ratio * x) * x, (-1.0 / ratio, 0.0, 1.0 / ratio)) / ratio  # noqa: B023
         dry = max(dry, abs(of_friction(1.0, 1.0, ratio) / gain - 1.0))
     coulomb = of_friction(1.0, 1e-6, 1.0) / np.sqrt(2.0 / np.pi) - 1.0
     return [
@@ -99,8 +101,9 @@ def _gains() -> list[Row]:
     ]
 
 
-def expected(law: Any, cuts: Any) -> float:
-    """Expected value of law(x) for a standard normal x, integrated piece by piece between the law's corners."""
+def normal_expectation(law: Any, cuts: Any) -> float:
+    """Expected value of law(x) for a standard normal x, integrated piece by piece between the law's corners
+    ``cuts``."""
     edges = np.unique(np.clip([-12.0, *cuts, 12.0], -12.0, 12.0))
     integrals = [
         quad(lambda x: law(x) * np.exp(-x * x / 2), a, b, epsabs=0.0, epsrel=1e-12, limit=200)[0]
@@ -109,7 +112,7 @@ def expected(law: Any, cuts: Any) -> float:
     return float(sum(integrals)) / np.sqrt(2 * np.pi)
 
 
-def _fixed_point() -> list[Row]:
+def _fixed_point_rows() -> list[Row]:
     """Rows: statistical linearisation converges, to the same gains from another start; gravity has no effect on a
     vehicle that only moves vertically."""
     vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, 4.0)
@@ -145,12 +148,12 @@ def _fixed_point() -> list[Row]:
     ]
 
 
-def _level(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
-    """Rows at one road level: deviations and mean travel by statistical linearisation, compared with Monte Carlo. The
-    tolerance of each is the accuracy that the result's sentences state."""
+def _level_rows(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
+    """Rows at one road level: standard deviations and mean travel by statistical linearisation, compared with Monte
+    Carlo. The tolerance of each is the accuracy that the result states."""
     vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, road_level)
     linear = statistically_linear(vehicle, road, SPEED)
-    copies = copies_in_time(vehicle, road, SPEED, LASTING[not quick], copies=COPIES[not quick], seed=SEED)
+    copies = copies_in_time(vehicle, road, SPEED, COPY_SECONDS[not quick], copies=COPY_COUNTS[not quick], seed=SEED)
     rows, cells = [], [f"{road_level:g}"]
     for i, name in enumerate(copies.names):
         error = float(linear.covariance.deviation[i] / copies.deviation[i] - 1.0)
@@ -193,21 +196,21 @@ def _level(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
     return rows, cells
 
 
-def _linear_copies() -> Row:
-    """Row: without nonlinear springs, the variances of the Monte Carlo copies agree with the covariance."""
+def _linear_springs_row() -> Row:
+    """Row: with linear springs, the variances of the Monte Carlo copies agree with the covariance."""
     vehicle, road = vehicle_and_road("quarter_car")
     exact = stationary_covariance(vehicle_with_road(linearise(vehicle), road, SPEED))
-    copies = copies_in_time(vehicle, road, SPEED, LASTING[1], copies=COPIES[1], seed=SEED)
+    copies = copies_in_time(vehicle, road, SPEED, COPY_SECONDS[1], copies=COPY_COUNTS[1], seed=SEED)
     return Observed(
         "ride_nonlinear.linear",
         SYSTEM,
-        f"largest |z| of 3 variances of quarter_car in {COPIES[1]} copies in time against the covariance",
+        f"largest |z| of 3 variances of quarter_car in {COPY_COUNTS[1]} copies in time against the covariance",
         float(np.abs(copies.z(exact.deviation)).max()),
         "",
     ).at_most(4.0, "of 3 normal values one beyond 4 in 5000 times", "none")
 
 
-def _alone() -> list[Row]:
+def _single_law_rows() -> list[Row]:
     """Rows: each nonlinear law alone, at the road level at which statistical linearisation is least accurate."""
     vehicle, _ = vehicle_and_road(NONLINEAR_VEHICLE)
     spring = vehicle.springs[0]
@@ -224,7 +227,7 @@ def _alone() -> list[Row]:
         alone = replace(vehicle, springs=(replace(spring, **laws),))
         road = vehicle_and_road(NONLINEAR_VEHICLE, level)[1]
         linear = statistically_linear(alone, road, SPEED)
-        copies = copies_in_time(alone, road, SPEED, LASTING[1], copies=COPIES[1] // 2, seed=SEED)
+        copies = copies_in_time(alone, road, SPEED, COPY_SECONDS[1], copies=COPY_COUNTS[1] // 2, seed=SEED)
         error = np.abs(linear.covariance.deviation / copies.deviation - 1.0)
         curve_kept = [promised_error(share) for share in linear.left_out] + 4.0 * copies.error / copies.variance / 2.0
         worst = int((error / curve_kept).argmax())

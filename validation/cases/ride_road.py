@@ -1,4 +1,5 @@
-"""The road under a vehicle's tracks: spectra, coherency, correlation cases, isotropic and measured roads, weighting."""
+"""The road under a vehicle's tracks: spectra, coherency, correlation cases, isotropic and measured roads, frequency
+weighting."""
 
 import math
 from pathlib import Path
@@ -38,16 +39,17 @@ WHEELS = (
     WheelPosition("rear left", -2.7, 0.9, 2),
     WheelPosition("rear right", -2.7, -0.9, 2),
 )
-"""Three axles, none like another and none symmetric."""
+"""Wheels of three axles, all different and without symmetry."""
 SPEED = 20.0
-BAND = (1e-4, 500.0)
-"""rad/m, of the frequency route."""
-MISPRINT = 10.0
-"""Hz at which the table's Wd, 212, is not that of its own parameters, 202."""
+WAVENUMBER_BAND = (1e-4, 500.0)
+"""Wavenumbers (rad/m) between which spectra are integrated."""
+MISPRINTED_FREQUENCY = 10.0
+"""Frequency (Hz) at which the standard's table prints Wd = 212 although its own parameters give 202."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Closed forms by other routes, the weightings, and fits to a made road; in full also to measured roads."""
+    """Rows of closed forms by second methods, frequency weightings, and fits to an artificial road; a full run also has
+    fits to measured roads."""
     rows = [*_paper_rows(), *_input_rows(), *_isotropic_rows(), *_weighting_rows()]
     of_made, road = fitted_made_road(1_000.0 if quick else 20_000.0)
     of_measured, roads = ([], []) if quick else measured_road_rows()
@@ -55,7 +57,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _paper_rows() -> list[Row]:
-    """Rows: values read from the paper's figure, and its road class label."""
+    """Rows on the paper's two-track road: level of the track spectrum, variance of a track, and coherency, compared
+    with closed forms."""
     road = road_of_level(HALF_TRACK)
     spectrum = road.spectrum(np.array([1e4]), HALF_TRACK)[0] * 1e8
     variance = 2.0 * quad(lambda k: float(road.spectrum(np.array(k), HALF_TRACK)), 0.0, math.inf, epsabs=1e-18)[0]
@@ -113,7 +116,7 @@ def _input_rows() -> list[Row]:
 
 
 def heights_covariance(road: Excitation, speed: float = SPEED) -> np.ndarray:
-    """Covariance (w, w) in m^2 of the road heights under the wheels, from the Lyapunov equation of the filters of all
+    """Covariance (w, w) in m^2 of the road heights under the w wheels, from the Lyapunov equation of the filters of all
     axles."""
     axles, C = np.eye(len(road.heights)), np.hstack(road.heights)
     B = tuple(np.kron(axles[:, [i]], speed**0.5 * road.G) for i in range(len(axles)))
@@ -125,7 +128,8 @@ def heights_covariance(road: Excitation, speed: float = SPEED) -> np.ndarray:
 
 
 def _limit_row() -> Row:
-    """Row: the heights of axles at the same place are equal, and those of axles far apart are uncorrelated."""
+    """Row: height covariance of axles at the same place compared with equal axles, and of axles far apart compared with
+    uncorrelated axles."""
     road = road_of_level(HALF_TRACK)
     pairs = []
     for length, front_rear in ((0.0, "equal"), (200.0, "uncorrelated")):
@@ -146,13 +150,13 @@ def _limit_row() -> Row:
 
 
 def _isotropic_rows() -> list[Row]:
-    """Rows: closed forms of an isotropic road by Bessel functions, compared with the integrals that define them; effect
-    of isotropy."""
+    """Rows: closed forms of an isotropic road by Bessel functions, compared with the integrals that define them; and
+    effect of isotropy on accelerations."""
     road, apart, k = road_of_level(HALF_TRACK), 2.0 * HALF_TRACK, np.array([0.05, 0.3, 1.0, 3.0])
     closed = isotropic_like(road, HALF_TRACK).cross_spectrum(k, apart)
     along = cross_spectrum_of(lambda r: float(road.covariance(np.array(r), HALF_TRACK, HALF_TRACK)), list(k), apart)
     density_part = DensityPart(1e-5, 0.3, 2.6)
-    across = np.array([_by_surface_density(density_part, float(wavenumber), apart) for wavenumber in k])
+    across = np.array([_cross_density_of_surface(density_part, float(wavenumber), apart) for wavenumber in k])
     hankel = density_part.density(k, apart)
     return [
         Observed(
@@ -171,12 +175,13 @@ def _isotropic_rows() -> list[Row]:
             largest_relative_error(across, hankel),
             "",
         ).at_most(1e-9, "quadrature to 1e-12 of the density on the track", "closed form"),
-        *_route_rows(road),
+        *_acceleration_rows(road),
     ]
 
 
-def _by_surface_density(spectrum_part: DensityPart, k: float, track_distance: float) -> float:
-    """S(k, d) = int Phi(sqrt(k^2 + l^2)) cos(l d) dl, Phi the Hankel transform of the track's autocovariance."""
+def _cross_density_of_surface(spectrum_part: DensityPart, k: float, track_distance: float) -> float:
+    """Cross spectral density S(k, d) of two tracks at the distance d, by the integral of Phi(sqrt(k^2 + l^2)) cos(l d)
+    over l. Phi is the surface density, the Hankel transform of the track's autocovariance."""
     w = spectrum_part.waviness
     height = spectrum_part.level * math.gamma((w + 1.0) / 2.0) / (math.sqrt(math.pi) * math.gamma(w / 2.0))
     track = float(spectrum_part.density(np.array(k), 0.0))
@@ -195,16 +200,16 @@ def _by_surface_density(spectrum_part: DensityPart, k: float, track_distance: fl
     )
 
 
-def _route_rows(road: TwoTrackRoad) -> list[Row]:
-    """Rows: frequency responses compared with the covariance on the built-in vehicle, and an isotropic road by the same
-    route."""
+def _acceleration_rows(road: TwoTrackRoad) -> list[Row]:
+    """Rows: accelerations of the built-in vehicle by frequency responses compared with the covariance, and those on an
+    isotropic road."""
     vehicle = linearise(load_vehicle("r19_ride"))
-    exact = _accelerations(
+    exact = _acceleration_values(
         stationary_covariance(vehicle_with_road(vehicle, road_excitation(road, vehicle.wheels), SPEED)).deviation,
         vehicle,
     )
     by_frequency, isotropic = (
-        _by_frequency(vehicle, road_model) for road_model in (road, isotropic_like(road, HALF_TRACK))
+        _accelerations_by_frequency(vehicle, road_model) for road_model in (road, isotropic_like(road, HALF_TRACK))
     )
     rows = [
         Observed(
@@ -228,33 +233,33 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
             float(isotropic[i] / exact[i]),
             "",
         ).beside("", why)
-        for i, name in enumerate(_names(vehicle))
+        for i, name in enumerate(_acceleration_names(vehicle))
         if name in ("body centre", "roll acceleration")
     ]
 
 
-def _accelerations(values: np.ndarray, vehicle: LinearVehicle) -> np.ndarray:
+def _acceleration_values(values: np.ndarray, vehicle: LinearVehicle) -> np.ndarray:
     return values[["acceleration" in output.kind for output in vehicle.outputs]]
 
 
-def _names(vehicle: LinearVehicle) -> list[str]:
+def _acceleration_names(vehicle: LinearVehicle) -> list[str]:
     return [output.name for output in vehicle.outputs if "acceleration" in output.kind]
 
 
-def _by_frequency(vehicle: LinearVehicle, road: TwoTrackRoad | IsotropicRoad) -> np.ndarray:
-    spectral = variances(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, *BAND)
-    return np.sqrt(_accelerations(spectral, vehicle))
+def _accelerations_by_frequency(vehicle: LinearVehicle, road: TwoTrackRoad | IsotropicRoad) -> np.ndarray:
+    spectral = variances(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, *WAVENUMBER_BAND)
+    return np.sqrt(_acceleration_values(spectral, vehicle))
 
 
 def _weighting_rows() -> list[Row]:
-    """Rows: the standard's table of weightings, filters compared with their formulas, and weighted accelerations by two
-    routes."""
+    """Rows: frequency weightings compared with the standard's table, as filters compared with their formulas, and
+    weighted accelerations by two methods."""
     frequency, wk, wd = np.array(STANDARD_WEIGHTINGS).T
     rows = []
     for name, table in (("Wk", wk), ("Wd", wd)):
         W = WEIGHTINGS[name]
         digit = 10.0 ** (np.floor(np.log10(np.minimum(table, 999.0))) - 2.0)
-        sound = (frequency != MISPRINT) | (name != "Wd")
+        sound = (frequency != MISPRINTED_FREQUENCY) | (name != "Wd")
         digits = (1e3 * np.abs(W.response(frequency)) - table) / digit
         A, B, C = W.matrices()
         by_states = np.array([C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) for f in frequency])
@@ -287,13 +292,13 @@ def _weighting_rows() -> list[Row]:
 
 
 def _weighted_rows() -> list[Row]:
-    """Rows: weighted acceleration a_w of a vehicle by the Lyapunov equation and by quadrature."""
+    """Rows: weighted acceleration a_w of a vehicle by the Lyapunov equation, compared with quadrature."""
     vehicle = linearise(load_vehicle("r19_ride"))
     road = road_of_level(HALF_TRACK)
     filters = {"left occupant": "Wk", "body centre": "Wd"}
     system = system_with_weightings(vehicle_with_road(vehicle, road_excitation(road, vehicle.wheels), SPEED), filters)
     deviations = stationary_covariance(system).deviation[-len(filters) :]
-    k, weight = both_sides(vehicle, *BAND)
+    k, weight = both_sides(vehicle, *WAVENUMBER_BAND)
     density = output_densities(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, k)
     rows = []
     for value, (output, name) in zip(deviations, filters.items(), strict=True):
@@ -313,7 +318,7 @@ def _weighted_rows() -> list[Row]:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """The five input covariances, the weightings beside the standard's table, and the fits."""
+    """Tables of the five input covariances, of the weightings beside the standard's table, and of the fits."""
     return [_inputs_table(), _weighting_table(), fits_table([case_data["made"], *case_data["measured"]])]
 
 
@@ -340,5 +345,5 @@ def _weighting_table() -> Table:
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Spectra and coherency of model, made and measured roads."""
+    """Plot spectra and coherency of the model, of artificial and of measured roads."""
     return [coherency_figure(HALF_TRACK, [case_data["made"], *case_data["measured"]])]

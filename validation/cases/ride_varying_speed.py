@@ -1,4 +1,5 @@
-"""Ride at varying speed: the covariance against its stationary limit, an adjoint, and Monte Carlo; cost of both."""
+"""Ride at varying speed: the covariance compared with its stationary limit, with an adjoint solution, and with Monte
+Carlo; cost of both."""
 
 import time
 from collections.abc import Callable
@@ -26,57 +27,62 @@ from validation.ride.rides import largest_relative_error, paper_road
 TITLE = "Ride at varying speed, through standstill, and by Monte Carlo"
 SYSTEM: System = "ride"
 SEED = 21
-COPIES = 4000
+COPY_COUNT = 4000
 BODY_POINTS = ("body front", "body centre", "body rear")
 DRIVES = {
     "accelerating": SpeedProfile((0.0, 25.0 / 3.0), (5.0, 30.0)),
     "braking": SpeedProfile((0.0, 3.0), (30.0, 6.0)),
 }
-"""At 3 and at -8 m/s^2."""
-STOPS = SpeedProfile((0.0, 1.0, 11.0, 12.0, 15.75, 18.0), (0.0, 0.0, 30.0, 30.0, 0.0, 0.0))
-"""Standing, to 30 m/s at 3 m/s^2, to standstill at -8 m/s^2, standing."""
-SHORT_STOPS = SpeedProfile((0.0, 0.2, 2.2, 2.4, 3.4, 4.0), (0.0, 0.0, 30.0, 30.0, 0.0, 0.0))
+"""Speed profiles with 3 and with -8 m/s^2."""
+STOP_PROFILE = SpeedProfile((0.0, 1.0, 11.0, 12.0, 15.75, 18.0), (0.0, 0.0, 30.0, 30.0, 0.0, 0.0))
+"""Speed profile: standing, to 30 m/s at 3 m/s^2, to standstill at -8 m/s^2, standing."""
+SHORT_STOP_PROFILE = SpeedProfile((0.0, 0.2, 2.2, 2.4, 3.4, 4.0), (0.0, 0.0, 30.0, 30.0, 0.0, 0.0))
 SETTLED_RATE_TIMES_TIME = 13.0
-"""Slowest rate times the time after a change of speed: e^-26 of it is left in a variance."""
+"""Slowest decay rate times the time after a change of speed; e^-26 of the change is left in a variance."""
 CONSTANT_SPEED = SpeedProfile((0.0, 0.5), (20.0, 20.0))
 STOP_AND_GO = SpeedProfile((0.0, 0.5, 1.0, 1.3, 2.0), (12.0, 12.0, 0.0, 0.0, 5.0))
-"""The last axle meets what the first one met before the stop."""
+"""Speed profile with a stop within the wheelbase: the last axle passes the same road after the stop as the first axle
+before the stop."""
 STEADY_SPEED = 20.0
 """Speed (m/s) of the Monte Carlo at constant speed."""
-LASTING, STEADY_COPIES = 10.0, 1000
-"""Its length, s, and its copies, each of which tells as much as dozens at an instant."""
-REPEATS = 20
-"""Of the covariance, which is too short to time once."""
+STEADY_SECONDS, STEADY_COPY_COUNT = 10.0, 1000
+"""Length (s) and number of the Monte Carlo copies at constant speed; each copy tells as much as dozens do at a single
+instant."""
+TIMED_REPEATS = 20
+"""Number of repetitions in the timing of the covariance, which is too short to time once."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Limits and the adjoint with a half car; in full also with larger vehicles, Monte Carlo, and the cost."""
-    rows = [*_limits("half_car", SHORT_STOPS), _adjoint(), _damped()]
+    """Rows of limits and of the adjoint with a half car; a full run also has larger vehicles, Monte Carlo, and the
+    cost."""
+    rows = [*_limit_rows("half_car", SHORT_STOP_PROFILE), _adjoint_row(), _damped_tyre_row()]
     if quick:
         return rows, {}
-    rows += [*_limits("r19_ride", STOPS), *_limits("three_axle_truck", SHORT_STOPS)]
-    data = {name: _drive(profile) for name, profile in DRIVES.items()}
+    rows += [*_limit_rows("r19_ride", STOP_PROFILE), *_limit_rows("three_axle_truck", SHORT_STOP_PROFILE)]
+    data = {name: _drive_comparison(profile) for name, profile in DRIVES.items()}
     for name, drive in data.items():
-        rows += _copies(name, drive)
-    return rows + _constant(), data
+        rows += _monte_carlo_rows(name, drive)
+    return rows + _constant_speed_rows(), data
 
 
 @cache
-def ride(name: str, tyre_damping: float = 0.0, cutoff: float | None = None) -> tuple[LinearVehicle, Excitation]:
+def vehicle_and_road(
+    vehicle_name: str, tyre_damping: float = 0.0, cutoff: float | None = None
+) -> tuple[LinearVehicle, Excitation]:
     """A shipped vehicle and the paper's road, which reaches the rear wheels with a delay. A vehicle without a track
     width has one track.
 
     ``cutoff`` (rad/m): a second corner of the road.
     """
-    spatial = load_vehicle(name)
+    spatial = load_vehicle(vehicle_name)
     vehicle = linearise(replace(spatial, tyres=tuple(replace(t, damping=tyre_damping) for t in spatial.tyres)))
     return vehicle, paper_road(vehicle.wheels, cutoff=cutoff)
 
 
-def _limits(name: str, stops: SpeedProfile) -> list[Row]:
+def _limit_rows(vehicle_name: str, stops: SpeedProfile) -> list[Row]:
     """Rows on limits: stationary covariance long after a change of speed and at constant speed, the road's own
-    covariance, and half the step."""
-    vehicle, road = ride(name)
+    covariance, and effect of half the step."""
+    vehicle, road = vehicle_and_road(vehicle_name)
     system = at_speed(vehicle, road, STEADY_SPEED)
     exact, settling = (
         stationary_covariance(system).deviation,
@@ -92,40 +98,43 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
     step = np.abs(stopped.at(often) ** 2 - fine.at(often) ** 2) / stopped.deviation.max(axis=0) ** 2
     return [
         Observed(
-            f"ride_varying_speed.settled.{name}",
+            f"ride_varying_speed.settled.{vehicle_name}",
             SYSTEM,
-            f"{name}, long after a change from 10 to 20 m/s: difference of all outputs from the Lyapunov equation",
+            f"{vehicle_name}, long after a change from 10 to 20 m/s: difference of all outputs from the Lyapunov "
+            "equation",
             largest_relative_error(settled[-1], exact),
             "",
         ).at_most(1e-10, "the stationary limit, relative", "closed form"),
         Observed(
-            f"ride_varying_speed.even.{name}",
+            f"ride_varying_speed.even.{vehicle_name}",
             SYSTEM,
-            f"{name}, at 20 m/s all the time: difference of all outputs from the Lyapunov equation, worst instant",
+            f"{vehicle_name}, at 20 m/s all the time: difference of all outputs from the Lyapunov equation, worst "
+            "instant",
             largest_relative_error(even, exact),
             "",
         ).at_most(1e-10, "nothing may drift", "closed form"),
         Observed(
-            f"ride_varying_speed.road.{name}",
+            f"ride_varying_speed.road.{vehicle_name}",
             SYSTEM,
-            f"{name}, through 0, 30 and 0 m/s with standing: error of the variance of the road under "
+            f"{vehicle_name}, through 0, 30 and 0 m/s with standing: error of the variance of the road under "
             "each wheel, worst instant",
             largest_relative_error((stopped.height / stopped.height[0]) ** 2, 1.0),
             "",
         ).at_most(1e-10, "the road does not know how fast it is driven over; relative", "closed form"),
         Observed(
-            f"ride_varying_speed.step.{name}",
+            f"ride_varying_speed.step.{vehicle_name}",
             SYSTEM,
-            f"{name}, through 0, 30 and 0 m/s: change of all variances at half the step, over their largest value",
+            f"{vehicle_name}, through 0, 30 and 0 m/s: change of all variances at half the step, over their largest "
+            "value",
             float(step.max()),
             "",
         ).at_most(1e-9, "ten times what was seen", "none"),
     ]
 
 
-def _adjoint() -> Row:
-    """Row: covariance at the end of a drive with a stop, compared with the same value by the adjoint equation."""
-    vehicle, road = ride("half_car")
+def _adjoint_row() -> Row:
+    """Row: standard deviation at the end of a drive with a stop, compared with the value by the adjoint equation."""
+    vehicle, road = vehicle_and_road("half_car")
     varied = varying_speed(vehicle, road, STOP_AND_GO)
     exact = by_adjoint(vehicle, road, STOP_AND_GO, "body rear")
     return Observed(
@@ -138,10 +147,10 @@ def _adjoint() -> Row:
     ).at_most(1e-8, "the adjoint's solver is good to 1e-10", "closed form")
 
 
-def _damped() -> Row:
+def _damped_tyre_row() -> Row:
     """Row: with a damped tyre, white noise makes the variance of the tyre force infinite as long as the vehicle
     moves."""
-    varied = varying_speed(*ride("half_car", 100.0), SHORT_STOPS)
+    varied = varying_speed(*vehicle_and_road("half_car", 100.0), SHORT_STOP_PROFILE)
     force, moving = varied.of("tyre force front left"), varied.speed > 0.0
     outcome = "infinite" if np.isinf(force[moving]).all() else "finite"
     outcome += ", finite" if np.isfinite(force[~moving]).all() else ", infinite"
@@ -155,13 +164,13 @@ def _damped() -> Row:
     )
 
 
-def _drive(profile: SpeedProfile) -> dict[str, Any]:
-    """Rows and data of a vehicle with 19 freedoms on a drive: covariance, quasi-stationary solution, Monte Carlo
+def _drive_comparison(profile: SpeedProfile) -> dict[str, Any]:
+    """Data of a vehicle with 19 degrees of freedom on a drive: covariance, quasi-stationary solution, Monte Carlo
     copies, and computing times."""
-    vehicle, road = ride("r19_ride")
+    vehicle, road = vehicle_and_road("r19_ride")
     instants = profile.times[-1] * np.array([0.25, 0.6, 0.95])
-    copies, slow = _timed(variances_along_drive, vehicle, road, profile, instants, copies=COPIES, seed=SEED)
-    varied, fast = _timed(varying_speed, vehicle, road, profile, instants=copies.time)
+    copies, slow = _timed_call(variances_along_drive, vehicle, road, profile, instants, copies=COPY_COUNT, seed=SEED)
+    varied, fast = _timed_call(varying_speed, vehicle, road, profile, instants=copies.time)
     often = np.linspace(profile.times[0], profile.times[-1], 101)
     columns = [varied.names.index(point) for point in BODY_POINTS]
     near = np.abs(varied.time[:, None] - often).argmin(axis=0)
@@ -179,48 +188,54 @@ def _drive(profile: SpeedProfile) -> dict[str, Any]:
     }
 
 
-def _copies(name: str, drive: dict[str, Any]) -> list[Row]:
+def _monte_carlo_rows(drive_name: str, drive: dict[str, Any]) -> list[Row]:
     """Rows: Monte Carlo copies at three instants, judged at three points of the body; all outputs and the error of the
     quasi-stationary solution are reported."""
     error = largest_relative_error(np.array(drive["quasi"]), np.array(drive["deviation"]))
     return [
         Observed(
-            f"ride_varying_speed.copies.{name}",
+            f"ride_varying_speed.copies.{drive_name}",
             SYSTEM,
-            f"r19_ride {name}: largest |z| of {COPIES} Monte Carlo copies at 3 instants in 3 points of the body",
+            f"r19_ride {drive_name}: largest |z| of {COPY_COUNT} Monte Carlo copies at 3 instants in 3 points of the "
+            "body",
             float(np.abs(drive["z"]).max()),
             "",
         ).at_most(4.0, "of 9 normal values one beyond 4 in 1800 times", "none"),
         Observed(
-            f"ride_varying_speed.outputs.{name}",
+            f"ride_varying_speed.outputs.{drive_name}",
             SYSTEM,
-            f"r19_ride {name}: largest |z| of {COPIES} Monte Carlo copies at 3 instants for all 16 outputs",
+            f"r19_ride {drive_name}: largest |z| of {COPY_COUNT} Monte Carlo copies at 3 instants for all 16 outputs",
             drive["all"],
             "",
         ).beside("below 4", "wheel loads and travels follow the same law", "none"),
         Observed(
-            f"ride_varying_speed.quasi.{name}",
+            f"ride_varying_speed.quasi.{drive_name}",
             SYSTEM,
-            f"r19_ride {name}: largest error of the quasi-stationary standard deviation in 3 points",
+            f"r19_ride {drive_name}: largest error of the quasi-stationary standard deviation in 3 points",
             error,
             "",
         ).beside(
-            {"accelerating": 0.017, "braking": 0.15}[name],
+            {"accelerating": 0.017, "braking": 0.15}[drive_name],
             "beside what a prototype sampled; the largest over all instants",
             "none",
         ),
     ]
 
 
-def _constant() -> list[Row]:
-    """Rows: Monte Carlo copies at constant speed, and what one more digit costs by them and by the covariance."""
-    vehicle, road = ride("r19_ride")
+def _constant_speed_rows() -> list[Row]:
+    """Rows: Monte Carlo copies at constant speed, and cost of an accurate standard deviation by Monte Carlo divided by
+    that of the covariance."""
+    vehicle, road = vehicle_and_road("r19_ride")
     exact = stationary_covariance(at_speed(vehicle, road, STEADY_SPEED))
     fast = (
-        _timed(lambda: [stationary_covariance(at_speed(vehicle, road, STEADY_SPEED)) for _ in range(REPEATS)])[1]
-        / REPEATS
+        _timed_call(
+            lambda: [stationary_covariance(at_speed(vehicle, road, STEADY_SPEED)) for _ in range(TIMED_REPEATS)]
+        )[1]
+        / TIMED_REPEATS
     )
-    copies, slow = _timed(at_constant_speed, vehicle, road, STEADY_SPEED, LASTING, copies=STEADY_COPIES, seed=SEED)
+    copies, slow = _timed_call(
+        at_constant_speed, vehicle, road, STEADY_SPEED, STEADY_SECONDS, copies=STEADY_COPY_COUNT, seed=SEED
+    )
     columns = [copies.names.index(point) for point in BODY_POINTS]
     z = copies.z(exact.deviation[None])[0]
     error = float((copies.error[0] / 2.0 / copies.variance[0])[columns].max())
@@ -228,7 +243,7 @@ def _constant() -> list[Row]:
         Observed(
             "ride_varying_speed.constant",
             SYSTEM,
-            f"r19_ride at 20 m/s: largest |z| of {STEADY_COPIES} Monte Carlo copies of {LASTING:g} s "
+            f"r19_ride at 20 m/s: largest |z| of {STEADY_COPY_COUNT} Monte Carlo copies of {STEADY_SECONDS:g} s "
             "in 3 points of the body",
             float(np.abs(z[columns]).max()),
             "",
@@ -236,8 +251,8 @@ def _constant() -> list[Row]:
         Observed(
             "ride_varying_speed.constant.outputs",
             SYSTEM,
-            f"r19_ride at 20 m/s: largest |z| of {STEADY_COPIES} Monte Carlo copies "
-            f"of {LASTING:g} s for all 16 outputs",
+            f"r19_ride at 20 m/s: largest |z| of {STEADY_COPY_COUNT} Monte Carlo copies "
+            f"of {STEADY_SECONDS:g} s for all 16 outputs",
             float(np.abs(z).max()),
             "",
         ).beside("below 4", "as above", "none"),
@@ -259,10 +274,10 @@ def _constant() -> list[Row]:
     ]
 
 
-def _timed(run: Callable[..., Any], *arguments: Any, **keywords: Any) -> tuple[Any, float]:
-    """Result of a call, and its processor time (s)."""
+def _timed_call(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> tuple[Any, float]:
+    """Result of a function call, and its processor time (s)."""
     start = time.process_time()
-    return run(*arguments, **keywords), time.process_time() - start
+    return function(*arguments, **keywords), time.process_time() - start
 
 
 def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, output: str) -> float:
@@ -300,9 +315,11 @@ def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, 
     return float(np.sqrt(weights @ (response**2).sum(axis=1)))
 
 
-def _path_points(profile: SpeedProfile, cuts: list[float], lengths: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+def _path_points(
+    profile: SpeedProfile, times: list[float], lengths: tuple[float, ...]
+) -> tuple[np.ndarray, np.ndarray]:
     """Quadrature points (m) along the road and their weights, dense enough for the fast response of every axle."""
-    fine = [np.linspace(start, stop, int(np.ceil((stop - start) / 0.02)) + 1) for start, stop in pairwise(cuts)]
+    fine = [np.linspace(start, stop, int(np.ceil((stop - start) / 0.02)) + 1) for start, stop in pairwise(times)]
     passed = profile.path(np.unique(np.concatenate(fine)))
     cells = np.unique(np.concatenate([passed - length for length in lengths]))
     points, weights = np.polynomial.legendre.leggauss(6)
@@ -311,7 +328,7 @@ def _path_points(profile: SpeedProfile, cuts: list[float], lengths: tuple[float,
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Table of the deviations of the Monte Carlo copies in standard errors (z), at each instant."""
+    """Table of the distances of the Monte Carlo variances from the covariance in standard errors, at each instant."""
     rows = [
         (name, f"{t:.2f} s", *(f"{value:.2f}" for value in z))
         for name, drive in case_data.items()
@@ -319,7 +336,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     ]
     if not rows:
         return []
-    note = f"How many standard errors the variance over {COPIES} copies lies above the covariance along the drive."
+    note = f"How many standard errors the variance over {COPY_COUNT} copies lies above the covariance along the drive."
     return [Table("Monte Carlo at varying speed", note, ("drive", "time", *BODY_POINTS), tuple(rows))]
 
 
@@ -349,7 +366,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
         axis.set(title=f"{name}, {drive['speed'][0]:.0f} to {drive['speed'][-1]:.0f} m/s", xlabel="time [s]")
     axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s²]")
     axes[0].plot([], [], "k--", linewidth=1.0, label="quasi-stationary")
-    axes[0].plot([], [], "ko", markersize=3, label=f"{COPIES} copies, 2 standard errors")
+    axes[0].plot([], [], "ko", markersize=3, label=f"{COPY_COUNT} copies, 2 standard errors")
     axes[0].legend(fontsize=7.5)
     add_heading(figure, "A drive of varying speed is no row of constant speeds")
     caption = (

@@ -1,4 +1,5 @@
-"""Roads: what goes into a file comes out of it, and measured roads are what their owners say."""
+"""Roads: heights written to files are read back unchanged, and measured roads have the properties that their owners
+state."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,18 +20,19 @@ TITLE = "Roads: formula, class, OpenCRG and CSV"
 SYSTEM: System = "pitch-plane"
 ROAD_LENGTH, INCREMENT = 60.0, 0.05
 SEED = 3
-"""Of the class C road's phases."""
+"""Seed of the class C road's random phases."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Round trips, the sampling recurrence, a class's variance, and the measured course; the same in quick."""
+    """Rows of round trips through files, sampling by recurrence, variance of a road class, and the measured course; a
+    quick run is the same."""
     with TemporaryDirectory() as name:
-        rows = _round_trips(Path(name))
-    return [*rows, _recurrence(), _class_variance(), *_measured()], {}
+        rows = _round_trip_rows(Path(name))
+    return [*rows, _recurrence_row(), _class_variance_row(), *_measured_course_rows()], {}
 
 
 @on_paper_road()
-def _round_trips(folder: Path) -> list[Row]:
+def _round_trip_rows(folder: Path) -> list[Row]:
     road = study_road()
     write_opencrg(road, folder / "study.crg", ROAD_LENGTH, INCREMENT)
     _write_csv(road, folder / "study.csv")
@@ -84,7 +86,7 @@ def _write_csv(road: RoadProfile, path: Path) -> None:
     )
 
 
-def _recurrence() -> Row:
+def _recurrence_row() -> Row:
     road = study_road()
     station = 300.0 + 0.01 * np.arange(4000)
     error = np.abs(road.sample_uniform(300.0, 0.01, 4000)[0] - road.height_and_slope(station)[0]).max()
@@ -97,7 +99,7 @@ def _recurrence() -> Row:
     ).at_most(1e-13, "64 rotations of a unit vector lose 64 roundings before they start anew", "closed form")
 
 
-def _class_variance() -> Row:
+def _class_variance_row() -> Row:
     """Row: variance of a class C road, compared with the integral of its spectral density over the band."""
     low, high = 0.05, 2.0
     road = iso8608_road("C", seed=SEED, n_min=low, n_max=high, waves=80, window_length=0.0)
@@ -114,7 +116,7 @@ def _class_variance() -> Row:
     )
 
 
-def _measured() -> list[Row]:
+def _measured_course_rows() -> list[Row]:
     data = data_folder()
     if data is None:
         return [not_run("roads.measured", SYSTEM, "measured roads", "TWINRIG_DATA names no folder")]

@@ -1,4 +1,5 @@
-"""The score of a stabilised run: what it sees, what vertical forces cannot see, and its verdicts in every engine."""
+"""Score of a stabilised run: the errors that it detects, the errors that vertical forces cannot show, and its verdicts
+in every engine."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,26 +20,26 @@ from validation.hard_cases.case import IMPLEMENTATIONS
 
 TITLE = "The score of a stabilised run"
 SYSTEM: System = "drift"
-SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "stabilisers.toml"
+STUDY_SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "stabilisers.toml"
 QUICK_OPTIONS = ("run.duration=5.0", "options.stiffnesses=[300.0]", "options.cut_offs=[0.1]")
-"""The study's scene in the quick report: two runs on a grade."""
+"""Changes of the study's scene in a quick run: two stabilisers on a grade."""
 FULL_OPTIONS = (
     "run.duration=60.0",
     "options.sampling_rate=1000.0",
     "options.stiffnesses=[50.0, 100.0, 300.0, 1e4, 1e5]",
 )
-"""What the prototype measured."""
-SINKING = 0.5
+"""Changes of the study's scene that reproduce the prototype's runs."""
+SINKING_SPEED = 0.5
 """Speed (m/s) at which the whole vehicle sinks in the run with a heave drift."""
 SEED = 11
-"""Of the random walk and the white noise on which conventions of damage are compared."""
-SAMPLES = 20_000
+"""Seed of the random walk and of the white noise on which damage conventions are compared."""
+SAMPLE_COUNT = 20_000
 
-GOOD = ("exact pitch prescribed", "exact heave and pitch", "Kalman filter", "Kalman smoother")
-BAD = ("free", "spring 300 N m/rad", "spring 10000 N m/rad", "10000 beyond 0.05 rad", "high-pass 0.1 Hz")
-"""Known to be right, and known to be wrong, on both roads."""
+GOOD_METHODS = ("exact pitch prescribed", "exact heave and pitch", "Kalman filter", "Kalman smoother")
+BAD_METHODS = ("free", "spring 300 N m/rad", "spring 10000 N m/rad", "10000 beyond 0.05 rad", "high-pass 0.1 Hz")
+"""Stabilisers that are known to give wrong results on both roads; those of GOOD_METHODS give right ones."""
 
-PROTOTYPE = {
+PROTOTYPE_RESULTS = {
     "free": (5.9, 0.755, 5e5),
     "exact pitch prescribed": (0.0, 1.004, 1.007),
     "measured pitch to 15 Hz": (0.002, 1.035, 1.024),
@@ -49,39 +50,43 @@ PROTOTYPE = {
     "spring 100000 N m/rad": (0.122, 1.073, 0.05),
     "Kalman filter": (0.0018, 0.994, 0.985),
 }
-"""Largest pitch error (rad), damage ratio of f3z and of f3x that an earlier prototype measured, with other noise."""
+"""Largest pitch error (rad), damage ratio of f3z and damage ratio of f3x that an earlier prototype measured with other
+noise, by stabiliser."""
 
 
 @on_paper_road()
 @allowing_breaches("what holds a run too softly, or too hard, is scored like all else")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Heave, blindness, conventions and verdicts; in full the whole study in all engines and the prototype's table."""
-    rows = [*_conventions(), *_heave(("reference",) if quick else IMPLEMENTATIONS, 5.0 if quick else 20.0)]
+    """Rows on heave drift, vertical forces, damage conventions and verdicts; a full run has the whole study in all
+    engines, and the prototype's runs."""
+    rows = [*_convention_rows(), *_heave_rows(("reference",) if quick else IMPLEMENTATIONS, 5.0 if quick else 20.0)]
     with TemporaryDirectory() as name:
         if quick:
-            return rows + _graded(Path(name), ("reference",)), {"study": [], "prototype": []}
-        rows += _graded(Path(name), IMPLEMENTATIONS)
-        studied = _study(Path(name))
-        long = _long(Path(name))
-    rows += [*_verdicts(studied), *_blind(studied), *_beside(long)]
+            return rows + _grade_rows(Path(name), ("reference",)), {"study": [], "prototype": []}
+        rows += _grade_rows(Path(name), IMPLEMENTATIONS)
+        studied = _study_results(Path(name))
+        long = _long_results(Path(name))
+    rows += [*_verdict_rows(studied), *_vertical_damage_rows(studied), *_prototype_rows(long)]
     return rows, {"study": studied, "prototype": long}
 
 
-def _conventions() -> list[Row]:
-    """Rows: counting cycles from turning points alone gives the library's result, and how other conventions would
-    change it."""
+def _convention_rows() -> list[Row]:
+    """Rows: cycle counting from turning points alone gives the library's result; and change of the damage by another
+    convention."""
     from rainflow import extract_cycles
 
-    walk = normal_samples(SEED, 0, SAMPLES, 1)[:, 0].cumsum()
-    white = normal_samples(SEED, 1, SAMPLES, 1)[:, 0]
+    walk = normal_samples(SEED, 0, SAMPLE_COUNT, 1)[:, 0].cumsum()
+    white = normal_samples(SEED, 1, SAMPLE_COUNT, 1)[:, 0]
     library_damage = sum(count * span**WOEHLER_SLOPE for span, _, count, _, _ in extract_cycles(walk.tolist()))
-    repeated = {name: _closed(load) / pseudo_damage(load) - 1 for name, load in (("walk", walk), ("white", white))}
+    repeated = {
+        name: _repeated_damage(load) / pseudo_damage(load) - 1 for name, load in (("walk", walk), ("white", white))
+    }
     why = "the residue closed by repeating the load, instead of counted as half cycles: the convention must be stated"
     return [
         Observed(
             "score.damage.turning-points",
             SYSTEM,
-            f"relative difference of the damage of a random walk of {SAMPLES:,} samples by its "
+            f"relative difference of the damage of a random walk of {SAMPLE_COUNT:,} samples by its "
             "turning points alone from all samples",
             abs(pseudo_damage(walk) / library_damage - 1),
             "",
@@ -98,32 +103,32 @@ def _conventions() -> list[Row]:
     ]
 
 
-def _closed(load: np.ndarray) -> float:
+def _repeated_damage(load: np.ndarray) -> float:
     """Pseudo-damage of one period of a load that is repeated for ever: the amount that a second period adds to the
     first."""
     return pseudo_damage(np.concatenate((load, load))) - pseudo_damage(load)
 
 
-def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
+def _heave_rows(engines: tuple[str, ...], duration: float) -> list[Row]:
     """Rows: in a run that sinks steadily, the heave error grows, but the section forces are right."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         virtual_drive(folder, duration)
-        sunk = {engine: _sinking(engine, folder, duration) for engine in engines}
+        sunk = {engine: _sinking_errors(engine, folder, duration) for engine in engines}
     rows = []
     for engine, (drift, worst) in sunk.items():
         rows += [
             Observed(
                 f"score.heave.drift.{engine}",
                 SYSTEM,
-                f"{engine}: heave error of a run that sinks at {SINKING} m/s",
+                f"{engine}: heave error of a run that sinks at {SINKING_SPEED} m/s",
                 drift,
                 "m",
-            ).within(SINKING * duration, 1e-6, "a large drift, on purpose", "closed form"),
+            ).within(SINKING_SPEED * duration, 1e-6, "a large drift, on purpose", "closed form"),
             Observed(
                 f"score.heave.damage.{engine}",
                 SYSTEM,
-                f"{engine}: largest |damage ratio - 1| of a run that sinks at {SINKING} m/s",
+                f"{engine}: largest |damage ratio - 1| of a run that sinks at {SINKING_SPEED} m/s",
                 worst,
                 "",
             ).at_most(
@@ -136,26 +141,26 @@ def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
     return rows
 
 
-def _sinking(engine: str, folder: Path, duration: float) -> tuple[float, float]:
-    """Heave error (m) of the sinking run, and its largest damage error."""
+def _sinking_errors(engine: str, folder: Path, duration: float) -> tuple[float, float]:
+    """Heave error (m) of the sinking run, and largest deviation of its damage ratios from 1."""
     scene = force_scene(folder, duration=duration)
-    sinking = scene.model_copy(update={"start": dict.fromkeys(("z1_rate", "z2_rate", "z3_rate"), SINKING)})
+    sinking = scene.model_copy(update={"start": dict.fromkeys(("z1_rate", "z2_rate", "z3_rate"), SINKING_SPEED)})
     still, moved = (simulate(simulated_scene, engine) for simulated_scene in (scene, sinking))
     wrong = errors_of_run(moved, still)
     return wrong.heave_max, max(abs(ratio - 1) for ratio in wrong.damage.values())
 
 
-def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
+def _grade_rows(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     """Rows: on a grade of 0.1 rad a holding spring gives wrong results, and a prescribed pitch right ones, in each
     implementation."""
-    scene = load(SCENE, QUICK_OPTIONS)
+    scene = load(STUDY_SCENE, QUICK_OPTIONS)
     options = read(Options, scene.options, "", "options")
     (folder / "short").mkdir()
     bench = Bench(roads(scene, options)["grade"], "grade", options, folder / "short")
     rows = []
     for engine in engines:
         for name, word in (("exact pitch prescribed", "accepted"), ("spring 300 N m/rad", "rejected")):
-            row = _scored(bench, name, engine)
+            row = _score_of_method(bench, name, engine)
             rows.append(
                 behaviour_row(
                     f"score.grade.{name.split()[0]}.{engine}",
@@ -172,50 +177,53 @@ def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     return rows
 
 
-def _study(folder: Path) -> list[Saved]:
-    """All rows of the study with its defaults, in all engines."""
+def _study_results(folder: Path) -> list[Saved]:
+    """Results of all stabilisers of the study with its default options, in all engines."""
     (folder / "study").mkdir()
-    _, rows, failed = compare(load(SCENE), IMPLEMENTATIONS, folder / "study", lambda text, progress_share: None)
+    _, rows, failed = compare(load(STUDY_SCENE), IMPLEMENTATIONS, folder / "study", lambda text, progress_share: None)
     assert not failed, failed
     return rows
 
 
-def _verdicts(studied: list[Saved]) -> list[Row]:
-    """Rows: runs known to be good or bad get the right verdict. Without the true run, the verdict is judged for bad
-    runs only."""
+def _verdict_rows(studied: list[Saved]) -> list[Row]:
+    """Rows: runs known to be good or bad get the right verdict. The verdict without the true run is judged for bad runs
+    only."""
     rows = []
     for row in studied:
         name, word, alone = row["method"], row["verdict"], row["without truth"]
         run_text = f"{row['engine']}, {row['road']}: {name}"
-        if name in GOOD or name in BAD:
-            id, wanted = f"score.verdict.{_id(row)}", "accepted" if name in GOOD else "rejected"
+        if name in GOOD_METHODS or name in BAD_METHODS:
+            id, wanted = f"score.verdict.{_row_id(row)}", "accepted" if name in GOOD_METHODS else "rejected"
             rows.append(behaviour_row(id, SYSTEM, f"{run_text}, by damage", word, wanted, row["reason"], "closed form"))
-        if name in BAD:
+        if name in BAD_METHODS:
             id, what, why = (
-                f"score.without-truth.{_id(row)}",
+                f"score.without-truth.{_row_id(row)}",
                 f"{run_text}, without the truth",
                 row["reason without truth"],
             )
             verdict_text = "accepted" if alone == "accepted" else "not accepted"
             rows.append(behaviour_row(id, SYSTEM, what, verdict_text, "not accepted", why, "none"))
         elif word != "accepted" and alone == "accepted":
-            id, what = f"score.unseen.{_id(row)}", f"{run_text}, damage ratio of f3x where the run itself shows nothing"
+            id, what = (
+                f"score.unseen.{_row_id(row)}",
+                f"{run_text}, damage ratio of f3x where the run itself shows nothing",
+            )
             why = "what an engineer without the truth cannot know"
             rows.append(Observed(id, SYSTEM, what, row["damage f3x"], "").beside(word, why, "none"))
     return rows
 
 
-def _slug(name: str) -> str:
+def _name_in_id(name: str) -> str:
     return name.replace(" ", "-").replace("/", "-")
 
 
-def _id(row: Saved) -> str:
-    return ".".join((_slug(row["method"]), row["road"], row["engine"]))
+def _row_id(row: Saved) -> str:
+    return ".".join((_name_in_id(row["method"]), row["road"], row["engine"]))
 
 
-def _blind(studied: list[Saved]) -> list[Row]:
-    """Rows: the damage of the vertical section force is nearly right even in a run that has tumbled, so it must not be
-    used as a score."""
+def _vertical_damage_rows(studied: list[Saved]) -> list[Row]:
+    """Rows: the damage of the vertical section force is nearly right even in a run that has tumbled, so this damage
+    must not be used as a score."""
     return [
         Observed(
             f"score.vertical.{row['road']}.{row['engine']}",
@@ -236,26 +244,26 @@ def _blind(studied: list[Saved]) -> list[Row]:
     ]
 
 
-def _long(folder: Path) -> list[Saved]:
-    """The prototype's stabilisers over 60 s at 1 kHz on the road, in the reference."""
-    scene = load(SCENE, FULL_OPTIONS)
+def _long_results(folder: Path) -> list[Saved]:
+    """Results of the prototype's stabilisers over 60 s at 1 kHz on the road, in the hand-written reference."""
+    scene = load(STUDY_SCENE, FULL_OPTIONS)
     (folder / "long").mkdir()
     bench = Bench(scene, "road", read(Options, scene.options, "", "options"), folder / "long")
-    return [_scored(bench, name) for name in PROTOTYPE]
+    return [_score_of_method(bench, name) for name in PROTOTYPE_RESULTS]
 
 
-def _scored(bench: Bench, name: str, engine: str = "reference") -> Saved:
-    effects = bench.methods[name]
-    return bench.row(name, effects, bench.simulate(engine, effects))
+def _score_of_method(bench: Bench, method: str, engine: str = "reference") -> Saved:
+    effects = bench.methods[method]
+    return bench.row(method, effects, bench.simulate(engine, effects))
 
 
-def _beside(long_runs: list[Saved]) -> list[Row]:
+def _prototype_rows(long_runs: list[Saved]) -> list[Row]:
     """Rows: pitch errors and damage ratios over 60 s, reported next to the prototype's; a tumbled run has no damage
     ratio."""
     rows = []
     for row in long_runs:
-        pitch, upright, along = PROTOTYPE[row["method"]]
-        name = _slug(row["method"])
+        pitch, upright, along = PROTOTYPE_RESULTS[row["method"]]
+        name = _name_in_id(row["method"])
         why = "the same road, model and levels of noise; other noise samples, and here the filter estimates the inertia"
         shown = (
             ("pitch", "pitch error max [rad]", "largest pitch error", "rad", pitch),
@@ -283,11 +291,11 @@ def tables(case_data: Saved) -> list[Table]:
                 "f3 is shown because it is blind. The last two columns: the verdict by damage, and that of an "
                 "engineer who has no true run."
             )
-            tables.append(Table(title, note, HEADINGS, tuple(_cells(row) for row in rows)))
+            tables.append(Table(title, note, TABLE_HEADINGS, tuple(_table_cells(row) for row in rows)))
     return tables
 
 
-HEADINGS = (
+TABLE_HEADINGS = (
     "engine",
     "road",
     "method",
@@ -301,7 +309,7 @@ HEADINGS = (
 )
 
 
-def _cells(row: Saved) -> tuple[str, ...]:
+def _table_cells(row: Saved) -> tuple[str, ...]:
     ratios = (row[f"damage {channel}"] for channel in SECTION_FORCE_CHANNELS)
     return (
         row.get("engine", "reference"),
@@ -318,12 +326,12 @@ def _cells(row: Saved) -> tuple[str, ...]:
 
 
 def draw(case_data: Saved) -> Drawn:
-    """Plot the study's score of the stabilisers."""
+    """Plot the damage ratios of all stabilisers of the study."""
     if not case_data["study"]:
         return []
     from models.drawing.drift import decision_figure
 
-    scene = load(SCENE)
+    scene = load(STUDY_SCENE)
     options = read(Options, scene.options, "", "options")
     rows = [row for row in case_data["study"] if row["engine"] == "reference"]
     return [("What each stabiliser leaves in the section forces", decision_figure(rows, options.limits, options.grade))]

@@ -1,4 +1,4 @@
-"""Stabilisers of a force-excited run: the loads that a prescribed motion reveals, and effects that must be exact."""
+"""Stabilisers of a force-excited run: forces and moments that reveal wrong masses, and effects that must be exact."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,108 +26,115 @@ TITLE = "Stabilisers"
 SYSTEM: System = "drift"
 STEP = 1e-3
 MISSING_MASS_SHARE, CENTRE_SHIFT = 0.05, 0.02
-"""Part of the chassis that the model lacks; how far (m) ahead of the truth its centre of mass lies."""
-MEAN_BOUND = 1e-3
-"""Of the predicted mean: forces linear between samples of 1 ms leave 1e-4."""
-SEED, SENSOR = 37, np.deg2rad(0.1)
+"""Share of the chassis mass that the model lacks; distance (m) by which its centre of mass lies ahead of the true
+one."""
+MEAN_TOLERANCE = 1e-3
+"""Tolerance of a mean force or moment, divided by the predicted mean: forces that are linear between samples of 1 ms
+leave 1e-4."""
+SEED, PITCH_NOISE = 37, np.deg2rad(0.1)
 """Seed of the noise on a measured pitch, and its standard deviation per sample (rad)."""
-BANDWIDTHS = {5.0: 3097.0, 15.0: 1333.0}
-"""Hz, with the rms moment (N m) that another zero-phase filter left on a like drive."""
-CUT_OFF = 0.25
-"""Of the high-pass, Hz."""
-RAILS = {"prescribed_heave_and_pitch": {"file": "motion.csv"}}
-CONSTRAINED = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
-EXPLICIT = {"exudyn": "RK44", "mujoco": "RK4"}
-BAND = {"pitch_spring": {"stiffness": 3e3, "damping": 200.0, "dead_band": 0.01}}
+PUBLISHED_MOMENTS = {5.0: 3097.0, 15.0: 1333.0}
+"""Published rms moment (N m) by bandwidth (Hz), left by another zero-phase filter on a similar drive."""
+HIGH_PASS_CUT_OFF = 0.25
+"""Cut-off frequency (Hz) of the high-pass."""
+PRESCRIBED_MOTION = {"prescribed_heave_and_pitch": {"file": "motion.csv"}}
+CONSTRAINED_INTEGRATORS = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
+EXPLICIT_INTEGRATORS = {"exudyn": "RK44", "mujoco": "RK4"}
+DEAD_BAND_SPRING = {"pitch_spring": {"stiffness": 3e3, "damping": 200.0, "dead_band": 0.01}}
 
 
 @allowing_breaches("masses are wrong on purpose: what they leave to be held is what is measured")
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Missing mass and misplaced centre on both vehicles; the rest on the asymmetric one; quick: half a second."""
+    """Rows: forces and moments that reveal a missing mass and a misplaced centre of mass on both vehicles, and the
+    other stabilisers on the asymmetric vehicle; a quick run has half a second."""
     duration = 0.5 if quick else 10.0
     rows: list[Row] = []
     with TemporaryDirectory() as name:
-        for parameters in VEHICLE_SETS:
-            scene = road_scene(parameters, STEP, duration)
-            measured, work = measure_road(scene), Path(name) / parameters
+        for parameter_set_name in VEHICLE_SETS:
+            scene = road_scene(parameter_set_name, STEP, duration)
+            measured, work = measure_road(scene), Path(name) / parameter_set_name
             work.mkdir()
             write_measurement(measured, work, STEP)
             follow, p = follower_builder(scene, work), scene.vehicle_parameters()
-            rows += _missing_mass(parameters, p, measured, follow, work)
-            rows += _shifted_centre(parameters, p, measured, follow, work)
+            rows += _missing_mass_rows(parameter_set_name, p, measured, follow, work)
+            rows += _shifted_centre_rows(parameter_set_name, p, measured, follow, work)
         rows += [
-            *_dead_band_and_moment(follow, min(duration, 4.0)),
-            _high_pass(follow),
-            *_bandwidth(measured, follow, work),
+            *_dead_band_and_moment_rows(follow, min(duration, 4.0)),
+            _high_pass_row(follow),
+            *_bandwidth_rows(measured, follow, work),
         ]
     return rows, {}
 
 
 def write_motion(measured_run: Result, folder: Path, ahead: float = 0.0) -> None:
-    """Write the pitch, and the heave of a point ``ahead`` (m) of the true centre of mass, to the file that guided
-    scenes read."""
+    """Write the pitch, and the heave of a point ``ahead`` (m) of the true centre of mass, to the file that scenes with
+    prescribed motion read."""
     pitch = measured_run["pitch"]
     columns = {"z3": ("m", measured_run["z3"] - ahead * np.sin(pitch)), "pitch": ("rad", pitch)}
     write_time_series(folder / "motion.csv", columns, STEP)
 
 
-def guided(scene: Scene, engine: str) -> Result:
-    """A run with prescribed motion, by the engine's integrator that can solve constraints."""
-    return simulate(scene, engine, Settings(CONSTRAINED[engine], STEP, scene.run.duration, spectral_radius=0.6))
+def prescribed_run(scene: Scene, engine: str) -> Result:
+    """Run with prescribed motion, by the engine's integrator that can solve constraints."""
+    return simulate(
+        scene, engine, Settings(CONSTRAINED_INTEGRATORS[engine], STEP, scene.run.duration, spectral_radius=0.6)
+    )
 
 
-def _missing_mass(
-    parameters: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
+def _missing_mass_rows(
+    parameter_set_name: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
 ) -> list[Row]:
-    """Rows: if the model's chassis is 5 % too light, prescribing the heave takes a mean force of dm (g - z3'')."""
+    """Rows: if the model's chassis is 5 % too light by the mass dm, prescribing the heave takes a mean force of dm (g -
+    z3'')."""
     write_motion(measured_run, folder)
-    scene = build_follower({"m3": (1 - MISSING_MASS_SHARE) * p.m3}, RAILS)
+    scene = build_follower({"m3": (1 - MISSING_MASS_SHARE) * p.m3}, PRESCRIBED_MOTION)
     rate = measured_run["z3_rate"]
     mean = (rate[-1] - rate[0]) / scene.run.duration
     wanted = MISSING_MASS_SHARE * p.m3 * (p.g - mean)
     return [
         Observed(
-            f"stabilisers.mass.{engine}.{parameters}",
+            f"stabilisers.mass.{engine}.{parameter_set_name}",
             SYSTEM,
-            f"{engine}, {parameters}: mean force that prescribes the heave, {MISSING_MASS_SHARE:.0%} of the "
+            f"{engine}, {parameter_set_name}: mean force that prescribes the heave, {MISSING_MASS_SHARE:.0%} of the "
             f"chassis missing (0.05 m3 g = {MISSING_MASS_SHARE * p.m3 * p.g:.1f} N)",
-            float(guided(scene, engine)["enforced_force"].mean()),
+            float(prescribed_run(scene, engine)["enforced_force"].mean()),
             "N",
         ).within(
             wanted,
-            MEAN_BOUND * wanted,
+            MEAN_TOLERANCE * wanted,
             f"0.05 m3 (g - z3''), down; z3'' is {mean:.3f} m/s^2 on average here",
             "closed form",
         )
-        for engine in CONSTRAINED
+        for engine in CONSTRAINED_INTEGRATORS
     ]
 
 
-def _shifted_centre(
-    parameters: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
+def _shifted_centre_rows(
+    parameter_set_name: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
 ) -> list[Row]:
     """Rows: if the model's centre of mass lies ahead of the true one, prescribing the motion takes a moment, nose
     up."""
     write_motion(measured_run, folder, CENTRE_SHIFT)
-    scene = build_follower({"a": p.a + CENTRE_SHIFT, "b": p.b - CENTRE_SHIFT}, RAILS)
+    scene = build_follower({"a": p.a + CENTRE_SHIFT, "b": p.b - CENTRE_SHIFT}, PRESCRIBED_MOTION)
     wanted = CENTRE_SHIFT * float(np.mean((measured_run["f3"] + measured_run["f4"]) * np.cos(measured_run["pitch"])))
     return [
         Observed(
-            f"stabilisers.centre.{engine}.{parameters}",
+            f"stabilisers.centre.{engine}.{parameter_set_name}",
             SYSTEM,
-            f"{engine}, {parameters}: mean moment that prescribes the pitch, centre of mass {CENTRE_SHIFT:g} "
+            f"{engine}, {parameter_set_name}: mean moment that prescribes the pitch, centre of mass {CENTRE_SHIFT:g} "
             f"m too far ahead (m3 g x = {CENTRE_SHIFT * p.m3 * p.g:.1f} N m)",
-            float(guided(scene, engine)["enforced_moment"].mean()),
+            float(prescribed_run(scene, engine)["enforced_moment"].mean()),
             "N m",
-        ).within(wanted, MEAN_BOUND * wanted, "x (f3 + f4) cos(pitch) of the true drive, nose up", "closed form")
-        for engine in CONSTRAINED
+        ).within(wanted, MEAN_TOLERANCE * wanted, "x (f3 + f4) cos(pitch) of the true drive, nose up", "closed form")
+        for engine in CONSTRAINED_INTEGRATORS
     ]
 
 
-def _dead_band_and_moment(build_follower: BuildFollower, duration: float) -> list[Row]:
-    """Rows: a spring with a dead band, and an added moment, in both engines compared with the reference."""
-    assembly = assembly_of_scene(build_follower({}, BAND))
+def _dead_band_and_moment_rows(build_follower: BuildFollower, duration: float) -> list[Row]:
+    """Rows: states with a dead-band spring, and with an added moment, in Exudyn and MuJoCo compared with the reference
+    equations."""
+    assembly = assembly_of_scene(build_follower({}, DEAD_BAND_SPRING))
     times = STEP * np.arange(round(duration / STEP) + 1)
     moment = Sampled(500.0 * np.sin(30.0 * times)[:, None], STEP, held=False)
     free = assembly_of_scene(build_follower({}, {}))
@@ -144,21 +151,24 @@ def _dead_band_and_moment(build_follower: BuildFollower, duration: float) -> lis
             "SI",
         ).at_most(1e-12, "the same stages see the same side of the band and the same moment", "native")
         for name, (law, words) in laws.items()
-        for engine, integrator in EXPLICIT.items()
+        for engine, integrator in EXPLICIT_INTEGRATORS.items()
     ]
 
 
-def _high_pass(build_follower: BuildFollower) -> Row:
-    """Rows on the high-pass: the slow pole of the linearised vehicle with the filter is the filter's own."""
-    corner, ratio = 2 * np.pi * CUT_OFF, 0.7
-    vehicle = assembly_of_scene(build_follower({}, {"high_pass": {"cut_off": CUT_OFF, "damping_ratio": ratio}})).vehicle
+def _high_pass_row(build_follower: BuildFollower) -> Row:
+    """Row: distance between the slow pole of the linearised vehicle with the high-pass and the pole of the high-pass
+    alone."""
+    corner, ratio = 2 * np.pi * HIGH_PASS_CUT_OFF, 0.7
+    vehicle = assembly_of_scene(
+        build_follower({}, {"high_pass": {"cut_off": HIGH_PASS_CUT_OFF, "damping_ratio": ratio}})
+    ).vehicle
     poles = np.linalg.eigvals(first_order(linearised(vehicle)))
     wanted = corner * complex(-ratio, np.sqrt(1 - ratio**2))
     off = float(np.abs(poles - wanted).min()) / corner
     return Observed(
         "stabilisers.high_pass",
         SYSTEM,
-        f"high-pass at {CUT_OFF:g} Hz: distance of the vehicle's slow pole from that of s^2 + 2 zeta "
+        f"high-pass at {HIGH_PASS_CUT_OFF:g} Hz: distance of the vehicle's slow pole from that of s^2 + 2 zeta "
         "wc s + wc^2, over wc",
         off,
         "",
@@ -170,17 +180,17 @@ def _high_pass(build_follower: BuildFollower) -> Row:
     )
 
 
-def _bandwidth(measured_run: Result, build_follower: BuildFollower, folder: Path) -> list[Row]:
-    """Rows: stabilising moment by a pitch with the white noise of an inertial unit, raw and smoothed."""
-    noise = SENSOR * normal_samples(SEED, 0, len(measured_run.times), 1)[:, 0]
+def _bandwidth_rows(measured_run: Result, build_follower: BuildFollower, folder: Path) -> list[Row]:
+    """Rows: stabilising moment if the prescribed pitch has the white noise of an inertial unit, raw and smoothed."""
+    noise = PITCH_NOISE * normal_samples(SEED, 0, len(measured_run.times), 1)[:, 0]
     write_time_series(folder / "measured.csv", {"pitch": ("rad", measured_run["pitch"] + noise)}, STEP)
     file = {"file": "measured.csv"}
     runs = {
-        bandwidth: guided(
+        bandwidth: prescribed_run(
             build_follower({}, {"prescribed_pitch": file | ({"bandwidth": bandwidth} if bandwidth else {})}),
             "reference",
         )
-        for bandwidth in (None, *BANDWIDTHS)
+        for bandwidth in (None, *PUBLISHED_MOMENTS)
     }
     rms = {bandwidth: float(np.sqrt(np.mean(run["enforced_moment"] ** 2))) for bandwidth, run in runs.items()}
     rows = [
@@ -192,7 +202,7 @@ def _bandwidth(measured_run: Result, build_follower: BuildFollower, folder: Path
             "N m",
         ).beside(1e6, "I s sqrt(6) / T^2 and more: differentiated twice", "published")
     ]
-    for bandwidth, published in BANDWIDTHS.items():
+    for bandwidth, published in PUBLISHED_MOMENTS.items():
         off = float(np.abs(runs[bandwidth]["pitch"] - measured_run["pitch"]).max())
         rows.append(
             Observed(

@@ -1,6 +1,7 @@
-"""Errors that results state, of random scenes of every system in random engines, against truths 100 times finer.
+"""Errors that results state, for random scenes of every system in random engines, compared with true errors from 100
+times finer solutions.
 
-The true error is that of the channel which the screen names: the one whose stated error is the largest share.
+The true error is that of the printed channel: the channel whose stated error is the largest share.
 """
 
 import math
@@ -21,48 +22,52 @@ from validation.stated_errors.sample import Sample
 TITLE = "Stated errors against truths a hundred times finer"
 SYSTEM: System = "cost"
 SEED = 21
-SYSTEMS = modules_of("validation.stated_errors.systems")
-"""Modules that draw samples, by system."""
-SAMPLES_OF_ALL = 60
-"""Samples of all systems together, at least; as many of each."""
-QUICK_SAMPLES = {"pitch-plane": 3}
-"""Those of the quick share."""
-NEAR, FAR, TENTH = 3.0, 10.0, 0.1
-"""Ratios of true to stated error: up to which it is right, from which it misleads, and below which it is useless."""
-LEAST_RIGHT_SHARE, LARGEST_USELESS_SHARE, LARGEST_COST = 0.95, 0.1, 0.6
-"""Least share that is right, largest one that is useless, and largest cost of an estimate, by the run's."""
+SAMPLE_MODULES = modules_of("validation.stated_errors.systems")
+"""Modules that draw random samples, by system."""
+LEAST_SAMPLE_COUNT = 60
+"""Least number of samples of all systems together; each system has the same number."""
+QUICK_SAMPLE_COUNTS = {"pitch-plane": 3}
+"""Number of samples by system in a quick run."""
+RIGHT_RATIO, MISLEADING_RATIO, USELESS_RATIO = 3.0, 10.0, 0.1
+"""Ratios of true to stated error: up to which the stated error is right, above which it misleads, and below which it is
+useless."""
+LEAST_RIGHT_SHARE, LARGEST_USELESS_SHARE, LARGEST_COST_RATIO = 0.95, 0.1, 0.6
+"""Least share of stated errors that must be right, largest share that may be useless, and largest cost of an error
+estimate divided by the cost of the run."""
 ROUNDING_SHARE = 1e-12
-"""True errors below this share of their channel are rounding."""
+"""True errors below this share of their channel's deviation count as rounding."""
 
 
 @allowing_breaches("what is judged is how well equations are solved, whatever a random vehicle does")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """All systems that have samples; the quick share has a few of the pitch plane, and judges no shares."""
-    names = list(SYSTEMS)
-    counts = QUICK_SAMPLES if quick else dict.fromkeys(names, -(-SAMPLES_OF_ALL // len(names)))
+    """Rows on the stated errors of all systems that draw random samples; a quick run has a few samples of the pitch
+    plane, and gives no verdict on shares."""
+    names = list(SAMPLE_MODULES)
+    counts = QUICK_SAMPLE_COUNTS if quick else dict.fromkeys(names, -(-LEAST_SAMPLE_COUNT // len(names)))
     samples = [sample for of_system in _make_samples(counts) for sample in of_system]
-    return [*_rows(samples, quick), *(row for name in counts for row in _of_system(name, samples))], {
+    return [*_common_rows(samples, quick), *(row for name in counts for row in _system_rows(name, samples))], {
         "samples": samples
     }
 
 
 def _make_samples(sample_counts: dict[str, int]) -> list[list[Saved]]:
-    """Samples of each system, computed by at most two processes; by this process if there is only one system."""
+    """Random samples of stated and true errors for each system, computed by at most two processes; by this process if
+    there is only one system."""
     if len(sample_counts) == 1:
-        return [samples(name, count) for name, count in sample_counts.items()]
+        return [samples_of_system(name, count) for name, count in sample_counts.items()]
     with process_pool(min(2, os.cpu_count() or 1)) as pool:
-        return list(pool.map(samples, sample_counts, sample_counts.values()))
+        return list(pool.map(samples_of_system, sample_counts, sample_counts.values()))
 
 
-def samples(name: str, sample_count: int) -> list[Saved]:
-    """Samples of a system in the form for JSON."""
-    drawn: Iterator[Sample] = import_module(SYSTEMS[name]).samples(sample_count, SEED)
-    return [_sample_as_table(name, sample) for sample in drawn]
+def samples_of_system(system: str, sample_count: int) -> list[Saved]:
+    """Random samples of stated and true errors for one system, as tables for JSON."""
+    drawn: Iterator[Sample] = import_module(SAMPLE_MODULES[system]).samples(sample_count, SEED)
+    return [_sample_as_table(system, sample) for sample in drawn]
 
 
 def _sample_as_table(system: str, sample: Sample) -> Saved:
-    """A sample in the form for JSON; ``ratio``: ratio of the true to the stated error, None where no number is
-    stated."""
+    """A sample of stated and true error as a table for JSON; its ``ratio`` is the ratio of the true to the stated
+    error, None where no number is stated."""
     sample_table = {
         "system": system,
         "name": sample.name,
@@ -80,25 +85,29 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
         "unit": stated.unit,
         "share": stated.share,
         "warned": stated.warned,
-        "ratio": ratio(true, stated.error),
+        "ratio": error_ratio(true, stated.error),
         "rounding": true <= ROUNDING_SHARE * stated.error / stated.share if stated.share > 0.0 else true == 0.0,
     }
 
 
-def ratio(true_error: float, stated: float) -> float:
-    """Ratio of the true to the stated error."""
-    return true_error / stated if stated > 0.0 else (0.0 if true_error == 0.0 else math.inf)
+def error_ratio(true_error: float, stated_error: float) -> float:
+    """Ratio of the true to the stated error; infinite if only the stated error is 0."""
+    return true_error / stated_error if stated_error > 0.0 else (0.0 if true_error == 0.0 else math.inf)
 
 
-def _rows(samples: list[Saved], quick: bool) -> list[Row]:
+def _common_rows(samples: list[Saved], quick: bool) -> list[Row]:
     """Rows on the stated errors of all systems together. A quick run has few samples, so its shares are reported
     without a verdict."""
     known = [sample for sample in samples if sample["ratio"] is not None]
-    right = _share_of_true(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
-    useless = _share_of_true(sample["ratio"] < TENTH and not sample["rounding"] for sample in known)
-    silent = [sample for sample in known if sample["ratio"] > FAR and not (sample["warned"] or sample["rounding"])]
-    costs = [_cost(name, samples) for name in dict.fromkeys(sample["system"] for sample in samples)]
-    near = f"share of {len(known)} samples whose true error is at most {NEAR:g} times the stated error"
+    right = _share_of_true(sample["ratio"] <= RIGHT_RATIO or sample["rounding"] for sample in known)
+    useless = _share_of_true(sample["ratio"] < USELESS_RATIO and not sample["rounding"] for sample in known)
+    silent = [
+        sample
+        for sample in known
+        if sample["ratio"] > MISLEADING_RATIO and not (sample["warned"] or sample["rounding"])
+    ]
+    costs = [_median_cost(name, samples) for name in dict.fromkeys(sample["system"] for sample in samples)]
+    near = f"share of {len(known)} samples whose true error is at most {RIGHT_RATIO:g} times the stated error"
     below = f"share of {len(known)} samples whose true error is below a tenth of the stated error"
     asked, tenth = (
         f"asked: {100 * LEAST_RIGHT_SHARE:g} of 100",
@@ -120,7 +129,7 @@ def _rows(samples: list[Saved], quick: bool) -> list[Row]:
         Observed(
             "stated_errors.silent",
             SYSTEM,
-            f"samples whose true error is above {FAR:g} times the stated error, without a warning",
+            f"samples whose true error is above {MISLEADING_RATIO:g} times the stated error, without a warning",
             float(len(silent)),
             "",
         ).at_most(
@@ -132,7 +141,7 @@ def _rows(samples: list[Saved], quick: bool) -> list[Row]:
             "ratio of the force evaluations of the error estimate to those of the run, median of systems",
             float(np.median(costs)),
             "",
-        ).at_most(LARGEST_COST, "asked: about half the run again", "none"),
+        ).at_most(LARGEST_COST_RATIO, "asked: about half the run again", "none"),
         Observed(
             "stated_errors.without",
             SYSTEM,
@@ -149,9 +158,9 @@ def _share_of_true(hits: Iterator[bool]) -> float:
     return float(np.mean(counted)) if counted else 1.0
 
 
-def _cost(name: str, samples: list[Saved]) -> float:
-    """Median cost of a system's error estimates; estimates without a number count only if all are of this kind."""
-    of_system = [sample for sample in samples if sample["system"] == name]
+def _median_cost(system: str, samples: list[Saved]) -> float:
+    """Median cost of a system's error estimates; estimates without a number count only if no estimate has a number."""
+    of_system = [sample for sample in samples if sample["system"] == system]
     return float(
         np.median(
             [sample["cost"] for sample in of_system if sample["ratio"] is not None]
@@ -160,21 +169,26 @@ def _cost(name: str, samples: list[Saved]) -> float:
     )
 
 
-def _of_system(name: str, samples: list[Saved]) -> list[Row]:
-    """Rows on the stated errors of one system, reported."""
-    of_system = [sample for sample in samples if sample["system"] == name]
+def _system_rows(system: str, samples: list[Saved]) -> list[Row]:
+    """Rows on the stated errors of one system, reported without a verdict."""
+    of_system = [sample for sample in samples if sample["system"] == system]
     known = [sample for sample in of_system if sample["ratio"] is not None]
-    sample_text = f"{name}, {len(known)} of {len(of_system)} samples"
-    near = _share_of_true(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
+    sample_text = f"{system}, {len(known)} of {len(of_system)} samples"
+    near = _share_of_true(sample["ratio"] <= RIGHT_RATIO or sample["rounding"] for sample in known)
     middle = float(np.median([sample["ratio"] for sample in known])) if known else math.nan
     why = "all systems are judged together"
     shown = (
-        ("near", f"share within {NEAR:g} times the stated error", near, 1.0),
+        ("near", f"share within {RIGHT_RATIO:g} times the stated error", near, 1.0),
         ("ratio", "median ratio of true to stated error", middle, 1.0),
-        ("cost", "median ratio of the cost of the estimate to that of the run", _cost(name, samples), LARGEST_COST),
+        (
+            "cost",
+            "median ratio of the cost of the estimate to that of the run",
+            _median_cost(system, samples),
+            LARGEST_COST_RATIO,
+        ),
     )
     return [
-        Observed(f"stated_errors.{name}.{id}", SYSTEM, f"{sample_text}: {what}", value, "").beside(
+        Observed(f"stated_errors.{system}.{id}", SYSTEM, f"{sample_text}: {what}", value, "").beside(
             expected, why, "none"
         )
         for id, what, value, expected in shown
@@ -218,7 +232,7 @@ def draw(case_data: Saved) -> Drawn:
         ratios = np.array([sample["ratio"] for sample in known if sample["system"] == name])
         axis.plot(stated, np.maximum(stated * ratios, 1e-17), "o", color=colour, ms=5, label=name)
     ends = np.array([1e-16, 1.0])
-    for factor, style in ((1.0, "-"), (NEAR, "--"), (FAR, ":"), (TENTH, ":")):
+    for factor, style in ((1.0, "-"), (RIGHT_RATIO, "--"), (MISLEADING_RATIO, ":"), (USELESS_RATIO, ":")):
         axis.plot(ends, factor * ends, style, color=GREY, lw=0.9)
     axis.axvspan(WARNED_SHARE, 10.0, color=ORANGE, alpha=0.15, lw=0)
     axis.set(

@@ -1,4 +1,4 @@
-"""Every engine at its recommended setting against an independent solution at tight tolerance, 20 s."""
+"""Every engine at its recommended setting compared with an independent solution at a tight tolerance, over 20 s."""
 
 from pathlib import Path
 
@@ -12,17 +12,19 @@ SYSTEM: System = "pitch-plane"
 DURATION = 20.0
 QUICK_DURATION = 0.5
 STEP = 2.5e-4
-TOLERANCE = 1e-9
-"""Of the solution that judges: the two families then differ by 5e-9, a twentieth of what they may; the row says so."""
+SOLVER_TOLERANCE = 1e-9
+"""Tolerance of the solutions that judge. Two solver families then differ by 5e-9, a twentieth of their bound; a row
+shows this difference."""
 
 
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """A row for the reference's own uncertainty and one per implementation; quick: half a second."""
+    """A row for the uncertainty of the tight solution, and a row for each implementation; a quick run takes half a
+    second."""
     duration = QUICK_DURATION if quick else DURATION
     scene = road_scene(step=STEP, duration=duration)
-    tight = simulate(scene, "reference", Settings("DOP853", STEP, duration, TOLERANCE))
-    by_lsoda = simulate(scene, "reference", Settings("LSODA", STEP, duration, TOLERANCE))
+    tight = simulate(scene, "reference", Settings("DOP853", STEP, duration, SOLVER_TOLERANCE))
+    by_lsoda = simulate(scene, "reference", Settings("LSODA", STEP, duration, SOLVER_TOLERANCE))
     rows = [
         Observed(
             "tight.uncertainty",

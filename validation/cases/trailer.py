@@ -1,4 +1,5 @@
-"""A car that tows on its suspension: loads by levers, steady turns, circles, energy, engines, and a planted fault."""
+"""A car on its suspension that tows a trailer: static loads, steady turns, circles, energy, agreement of engines, and a
+planted fault."""
 
 from pathlib import Path
 
@@ -18,24 +19,25 @@ TITLE = "A car with a trailer on its suspension"
 SYSTEM: System = "rolling-vehicle"
 TRAINS = {"caravan": caravan, "train": train}
 STEADY_TRAINS = {"caravan": caravan, "train": train_without_tie}
-SPEED, TURNING = 22.0, 15.0
-TURN_BOUND = 1e-3
+SPEED, TURN_SPEED = 22.0, 15.0
+"""Speeds (m/s) on the rough road, and in the steady turn."""
+TURN_TOLERANCE = 1e-3
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Loads and engines; in the full run also turns, a circle, energy, and a fault."""
-    rows = [_levers_row(), *(_engines_row(name, 0.05 if quick else 1.0) for name in TRAINS)]
+    """Rows on static loads and engines; a full run also has turns, a circle, energy, and a planted fault."""
+    rows = [_static_loads_row(), *(_engines_row(name, 0.05 if quick else 1.0) for name in TRAINS)]
     if not quick:
         rows += [*(row for name in TRAINS for row in _turn_rows(name)), _circle_row(), _energy_row(), _fault_row()]
     return rows, {}
 
 
-def _driven(engine: str, vehicle: SpatialVehicle, duration: float) -> Drive:
+def _rough_turn(engine: str, vehicle: SpatialVehicle, duration: float) -> Drive:
     """A turn on a rough road, steered, braked and driven."""
     return drive_run(engine, Handling(vehicle, Tyres(), TURN_CONTROLS, plane_waves(4e-6, seed=3)), SPEED, duration)
 
 
-def _levers_row() -> Row:
+def _static_loads_row() -> Row:
     return Observed(
         "trailer.loads",
         SYSTEM,
@@ -45,36 +47,37 @@ def _levers_row() -> Row:
     ).at_most(1e-9, "statics of two bodies on a ball and three axles; rounding of a linear system", "closed form")
 
 
-def _engines_row(name: str, duration: float) -> Row:
-    first, second = (_driven(engine, TRAINS[name](), duration).run for engine in ("mujoco", "exudyn"))
+def _engines_row(train_name: str, duration: float) -> Row:
+    first, second = (_rough_turn(engine, TRAINS[train_name](), duration).run for engine in ("mujoco", "exudyn"))
     gap = max(np.abs(first.positions - second.positions).max(), np.abs(first.rates - second.rates).max())
     return Observed(
-        f"trailer.engines.{name}",
+        f"trailer.engines.{train_name}",
         SYSTEM,
-        f"{duration:g} s of a turn of the {name} on a rough road: positions and rates of the two engines",
+        f"{duration:g} s of a turn of the {train_name} on a rough road: positions and rates of the two engines",
         float(gap),
         "m, rad, m/s, rad/s",
     ).at_most(1e-10, "the same tableau, step and forces around two engines' own trees: rounding alone", "shared kernel")
 
 
-def _turn_rows(name: str) -> list[Row]:
-    errors = towed_turn(STEADY_TRAINS[name](), TURNING)
+def _turn_rows(train_name: str) -> list[Row]:
+    errors = towed_turn(STEADY_TRAINS[train_name](), TURN_SPEED)
     why = "linear tyres, with trail and turning slip; a body that is towed balances about its hitch"
     return [
         Observed(
-            f"trailer.turn.{name}",
+            f"trailer.turn.{train_name}",
             SYSTEM,
-            f"yaw gain of a steady turn of small slip of the {name} at {TURNING:g} m/s, over the closed form's, less 1",
+            f"yaw gain of a steady turn of small slip of the {train_name} at {TURN_SPEED:g} m/s, "
+            "over the closed form's, less 1",
             errors.yaw,
             "",
-        ).at_most(TURN_BOUND, why, "closed form"),
+        ).at_most(TURN_TOLERANCE, why, "closed form"),
         Observed(
-            f"trailer.heading.{name}",
+            f"trailer.heading.{train_name}",
             SYSTEM,
-            f"headings of what is towed in it beside the car, less the closed form's, per rad of steer ({name})",
+            f"headings of what is towed in it beside the car, less the closed form's, per rad of steer ({train_name})",
             float(np.abs(errors.headings).max()),
             "rad/rad",
-        ).at_most(TURN_BOUND, why, "closed form"),
+        ).at_most(TURN_TOLERANCE, why, "closed form"),
     ]
 
 
@@ -89,7 +92,7 @@ def _circle_row() -> Row:
 
 
 def _energy_row() -> Row:
-    drive = _driven("mujoco", caravan(), 0.4)
+    drive = _rough_turn("mujoco", caravan(), 0.4)
     return Observed(
         "trailer.ledger",
         SYSTEM,
@@ -100,8 +103,8 @@ def _energy_row() -> Row:
 
 
 def _fault_row() -> Row:
-    errors = towed_turn(caravan(), TURNING, keep_to_the_car)
-    seen = abs(errors.yaw) > TURN_BOUND or np.abs(errors.headings).max() > TURN_BOUND
+    errors = towed_turn(caravan(), TURN_SPEED, keep_to_the_car)
+    seen = abs(errors.yaw) > TURN_TOLERANCE or np.abs(errors.headings).max() > TURN_TOLERANCE
     return behaviour_row(
         "trailer.fault",
         SYSTEM,

@@ -1,4 +1,5 @@
-"""Models in MJCF and URDF: every build beside the file as MuJoCo parsed it, and planted differences of two files."""
+"""Models in MJCF and URDF: the models of all engines compared with the file as MuJoCo parsed it, and planted
+differences of two files."""
 
 from importlib import import_module
 from pathlib import Path
@@ -36,78 +37,80 @@ from validation.own_model.soft_couplings import softly_coupled
 
 TITLE = "A user's own model: MJCF and URDF in every build"
 SYSTEM: System = "rolling-vehicle"
-STATES, QUICK_STATES = 100, 5
-SOLVED = 1e-8
+STATE_COUNT, QUICK_STATE_COUNT = 100, 5
+SOLVER_TOLERANCE = 1e-8
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
-EXPORTED = ("ride", "ride_nonlinear", "handling", "hub_forces", "wheelset", "study_road", "ride_drive", "motion")
+EXPORTED_SCENES = ("ride", "ride_nonlinear", "handling", "hub_forces", "wheelset", "study_road", "ride_drive", "motion")
 """Scenes whose vehicle is written as MJCF by ``twinrig export`` and read again."""
-OUTSIDE = tuple(kind for kind in CONTENT_KINDS if kind not in ("flex", "turning_law"))
-"""Content that is left out of exported vehicles: springs along axes of bodies are actuators at sites there."""
+IGNORED_CONTENT = tuple(kind for kind in CONTENT_KINDS if kind not in ("flex", "turning_law"))
+"""Content that is ignored in exported vehicles: there, springs along axes of bodies are actuators at sites."""
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Quick: seven models, five states, six planted differences; in full 24 models, eight of them exported, all 30."""
+    """Rows of 24 models, eight of them exported, and of 30 planted differences; a quick run has seven models, five
+    states and six planted differences."""
     texts = {"jointed": JOINTED, "cart": CART, "arm": ARM_URDF, "tied": TIED, "geared": GEARED}
     texts |= {"linked": LINKED, "held": HELD}
     if not quick:
         texts |= {f"chain_{count}": chain(count) for count in (8, 30)}
         texts |= {f"tree_{seed}": tree(4 + 2 * seed, seed) for seed in range(1, 8)}
-    rows = [_agreement(name, _read(folder, name, text), quick) for name, text in texts.items()]
-    rows += [] if quick else [_agreement(name, _exported(folder, name), quick) for name in EXPORTED]
+    rows = [_agreement_row(name, _file_of_text(folder, name, text), quick) for name, text in texts.items()]
+    rows += [] if quick else [_agreement_row(name, _exported_file(folder, name), quick) for name in EXPORTED_SCENES]
     return [
         *rows,
-        _soft(folder, "geared", GEARED),
-        _soft(folder, "linked", LINKED),
-        *_path(folder),
-        _planted(folder, quick),
+        _soft_constraint_row(folder, "geared", GEARED),
+        _soft_constraint_row(folder, "linked", LINKED),
+        *_cart_rows(folder),
+        _planted_differences_row(folder, quick),
     ], {}
 
 
-def _read(folder: Path, name: str, text: str, without: tuple[str, ...] = ()) -> ModelFile:
+def _file_of_text(folder: Path, name: str, text: str, ignored_content: tuple[str, ...] = ()) -> ModelFile:
     path = folder / f"{name}{'.urdf' if '<robot' in text else '.xml'}"
     path.write_text(text, encoding="utf-8")
-    return read(path, without)
+    return read(path, ignored_content)
 
 
-def _exported(folder: Path, name: str) -> ModelFile:
-    scene = load(SCENES / f"{name}.toml")
+def _exported_file(folder: Path, scene_name: str) -> ModelFile:
+    scene = load(SCENES / f"{scene_name}.toml")
     answer = import_module(f"{SYSTEMS[scene.system].package}.export").exported(scene, "mujoco")
-    return _read(folder, f"exported_{name}", answer.text, OUTSIDE)
+    return _file_of_text(folder, f"exported_{scene_name}", answer.text, IGNORED_CONTENT)
 
 
-def _agreement(name: str, file: ModelFile, quick: bool) -> Row:
-    """Row: largest difference of accelerations from the model file, over all builds."""
-    agreements = certificate(file.twin, QUICK_STATES if quick else STATES)
+def _agreement_row(model_name: str, file: ModelFile, quick: bool) -> Row:
+    """Row: largest difference of accelerations from the model file, over the models of all engines."""
+    agreements = certificate(file.twin, QUICK_STATE_COUNT if quick else STATE_COUNT)
     worst: Agreement = max(agreements, key=lambda agreement: agreement.acceleration)
     return Observed(
-        f"twin_files.{name}",
+        f"twin_files.{model_name}",
         SYSTEM,
         f"largest difference of accelerations in Exudyn, MuJoCo and plain equations from the file as MuJoCo parsed it, "
-        f"{file.twin.size} coordinates, {name}",
+        f"{file.twin.size} coordinates, {model_name}",
         worst.acceleration,
         "of its size",
     ).at_most(SAME, "what counts as alike; an acceleration near 0 is counted by what rounding may make of it", "native")
 
 
-def _soft(folder: Path, name: str, text: str) -> Row:
-    """Row: accelerations with MuJoCo's soft constraints, compared with the law in MuJoCo's documentation applied to the
-    plain equations."""
-    twin = _read(folder, name, text).twin
-    states = states_of(twin, QUICK_STATES)
+def _soft_constraint_row(folder: Path, model_name: str, text: str) -> Row:
+    """Row: accelerations with MuJoCo's soft constraints, compared with the law of MuJoCo's documentation in
+    independently written equations."""
+    twin = _file_of_text(folder, model_name, text).twin
+    states = states_of(twin, QUICK_STATE_COUNT)
     apart = agreement_of_build("", reference_of_file(twin, states, SOFT_BUILD), moved_at(softly_coupled(twin), states))
     return Observed(
-        f"twin_files.soft_{name}",
+        f"twin_files.soft_{model_name}",
         SYSTEM,
         "largest difference of accelerations with soft constraints in MuJoCo from the law of its documentation about "
-        f"the plain equations, at states that satisfy them, {name}",
+        f"the plain equations, at states that satisfy them, {model_name}",
         apart.acceleration,
         "of the largest",
-    ).at_most(SOLVED, "what MuJoCo's constraint solver leaves, whose tolerance is 1e-8", "closed form")
+    ).at_most(SOLVER_TOLERANCE, "what MuJoCo's constraint solver leaves, whose tolerance is 1e-8", "closed form")
 
 
-def _path(folder: Path) -> list[Row]:
-    """Rows: paths of the cart over 1 s, and its balance of energy and work."""
-    report = compare_paths(_read(folder, "cart", CART).twin)
+def _cart_rows(folder: Path) -> list[Row]:
+    """Rows: largest difference between the states of all engines' models over 1 s, and balance of energy and work, of
+    the cart model."""
+    report = compare_paths(_file_of_text(folder, "cart", CART).twin)
     return [
         Observed(
             "twin_files.path",
@@ -126,12 +129,12 @@ def _path(folder: Path) -> list[Row]:
     ]
 
 
-def _planted(folder: Path, quick: bool) -> Row:
+def _planted_differences_row(folder: Path, quick: bool) -> Row:
     """Row: number of planted differences that the comparison names first, with their right size."""
-    first, named = _read(folder, "original", JOINTED).twin, 0
+    first, named = _file_of_text(folder, "original", JOINTED).twin, 0
     chosen = PLANTED[::5] if quick else PLANTED
     for name, old, new, kind, owner, size in chosen:
-        second = _read(folder, "planted", changed(JOINTED, name, old, new)).twin
+        second = _file_of_text(folder, "planted", changed(JOINTED, name, old, new)).twin
         influential = compare(first, second, 3).influential
         sentence = influential[0].sentence(("original", "planted")) if influential else ""
         named += sentence.startswith(f"{kind} of {owner}: ") and size.replace("b.xml", "planted") in sentence

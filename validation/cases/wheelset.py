@@ -1,4 +1,5 @@
-"""A wheelset on straight track in three implementations: wave, critical speed, paths, limit cycles, power, faults."""
+"""A wheelset on straight track in three implementations: wavelength, critical speed, simulations, limit cycles,
+friction power, planted faults."""
 
 from collections.abc import Iterable
 from functools import partial
@@ -30,27 +31,29 @@ from validation.faults import wheelset as faults
 TITLE = "A wheelset on straight track"
 SYSTEM: System = "rolling-vehicle"
 EDGE_RADIUS = 2e-3
-"""Radius (m) of rails that are edges: Klingel's own wheelset."""
+"""Head radius (m) of rails that are nearly edges, as in Klingel's formula."""
 STEP, DURATION = 5e-4, 1.0
-LIVELY = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
-"""Spread of random states about rest: flanges touch, wheels lift off, creep forces saturate."""
-ABOVE = 1.1
-"""Speed of paths and cycles by the critical one."""
+STATE_SPREAD = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
+"""Standard deviations of random states about rest, so large that flanges touch, wheels lift off, and creep forces
+saturate."""
+SPEED_RATIO = 1.1
+"""Speed of simulations and limit cycles divided by the critical speed."""
 ENGINES = tuple(name for name in IMPLEMENTATION_MODULES if name != "reference")
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """All rows; quick: the chosen wheelset alone, without the faults."""
+    """Rows: wavelength, critical speed, accelerations, simulations, limit cycles, energy and planted faults. A quick
+    run has the chosen wheelset alone, without planted faults."""
     wheelsets = {"chosen": CHOSEN_WHEELSET} | ({} if quick else drawn_wheelsets())
     speeds = {name: critical_speeds(wheelset, quick or name != "chosen") for name, wheelset in wheelsets.items()}
     rows = [*_wave_rows(wheelsets), *_critical_rows(speeds), *_acceleration_rows(wheelsets)]
     rows += _path_rows(wheelsets, speeds, 11 if quick else 21)
-    cycles = _cycles(wheelsets, speeds, ("reference", "mujoco") if quick else tuple(IMPLEMENTATION_MODULES))
+    cycles = _limit_cycles(wheelsets, speeds, ("reference", "mujoco") if quick else tuple(IMPLEMENTATION_MODULES))
     rows += [*_cycle_rows(cycles), _order_row(), *_energy_rows()]
     if not quick:
         rows += [
-            _none_row("heavy", HEAVY_WHEELSET, "unstable"),
-            _none_row("stiff", STIFF_WHEELSET, "stable"),
+            _no_critical_speed_row("heavy", HEAVY_WHEELSET, "unstable"),
+            _no_critical_speed_row("stiff", STIFF_WHEELSET, "stable"),
             *_fault_rows(),
         ]
     orbit_fields = ("speed", "amplitude", "frequency", "error", "frequency_error")
@@ -65,19 +68,20 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     }
 
 
-def _spread(values: Iterable[float]) -> float:
-    """Largest relative difference between any two values."""
+def _relative_spread(values: Iterable[float]) -> float:
+    """Largest difference between any two values, divided by the largest magnitude."""
     every = np.array(list(values))
     return float(np.ptp(every) / np.abs(every).max())
 
 
 def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
-    """Rows: wavelength of each free wheelset by closed form, with knife-edge rails, and in all implementations."""
+    """Rows: wavelength of each free wheelset in all implementations, compared with the closed form and, on knife-edge
+    rails, with Klingel's formula."""
     closed, edges, among = [], [], []
     for wheelset in wheelsets.values():
         waves = {engine: wavelength(implementation(engine), wheelset) for engine in IMPLEMENTATION_MODULES}
         closed.append(max(abs(wave / klingel_wavelength(wheelset) - 1.0) for wave in waves.values()))
-        among.append(_spread(waves.values()))
+        among.append(_relative_spread(waves.values()))
         edge = wheelset.changed(head_radius=EDGE_RADIUS)
         plain = 2.0 * np.pi * np.sqrt(edge.radius * edge.half_gauge / edge.conicity)
         edges.append(abs(wavelength(Equations, edge) / plain - 1.0))
@@ -122,7 +126,7 @@ def _critical_rows(speeds: Speeds) -> list[Row]:
             "wheelset.critical.engines",
             SYSTEM,
             f"critical speed of {len(having)} wheelsets: relative difference between three implementations",
-            max(map(_spread, having)),
+            max(map(_relative_spread, having)),
             "",
         ).at_most(1e-6, why, "shared kernel"),
         behaviour_row(
@@ -137,8 +141,8 @@ def _critical_rows(speeds: Speeds) -> list[Row]:
     ]
 
 
-def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
-    """Row: all implementations find no critical speed for a wheelset that has none."""
+def _no_critical_speed_row(wheelset_name: str, wheelset: Wheelset, expected_outcome: str) -> Row:
+    """Row: all implementations report that a wheelset has no critical speed, and why."""
     outcomes = set()
     for engine in IMPLEMENTATION_MODULES:
         try:
@@ -146,23 +150,23 @@ def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
         except NoCriticalSpeed as error:
             outcomes.add("unstable" if error.unstable else "stable")
     return behaviour_row(
-        f"wheelset.critical.{name}",
+        f"wheelset.critical.{wheelset_name}",
         SYSTEM,
-        f"outcome of three implementations for a {name} wheelset at all speeds",
+        f"outcome of three implementations for a {wheelset_name} wheelset at all speeds",
         " or ".join(sorted(outcomes)),
-        expected,
+        expected_outcome,
         "nothing holds it, or more than creep forces can drive",
     )
 
 
 def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
-    """Rows: accelerations of each engine at random moving states, compared with the reference equations."""
+    """Rows: state derivatives of each engine at random states, compared with the reference equations."""
     draw, rows = np.random.default_rng(SEED), []
     for engine in ENGINES:
         worst = 0.0
         for wheelset in wheelsets.values():
             written, built = (implementation(name)(wheelset, 60.0, cells=11) for name in ("reference", engine))
-            states = written.rest + LIVELY * draw.normal(size=(20, eq.STATE_COUNT))
+            states = written.rest + STATE_SPREAD * draw.normal(size=(20, eq.STATE_COUNT))
             worst = max(
                 worst, *(largest_relative_difference(built.rates(state), written.rates(state)) for state in states)
             )
@@ -179,21 +183,21 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     return rows
 
 
-def _speed_of_path(speeds: Speeds, name: str) -> float:
-    """Speed (m/s) of a wheelset's path: above its critical speed, or 60 m/s if it has none."""
-    critical = speeds[name]["reference"]
-    return min(ABOVE * critical, 180.0) if critical is not None else 60.0
+def _simulation_speed(speeds: Speeds, wheelset_name: str) -> float:
+    """Speed (m/s) of a wheelset's simulation: above its critical speed, or 60 m/s if it has none."""
+    critical = speeds[wheelset_name]["reference"]
+    return min(SPEED_RATIO * critical, 180.0) if critical is not None else 60.0
 
 
 def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> list[Row]:
-    """Rows on paths of one second by RK4 with FASTSIM: differences between the implementations, and the sign of the
-    creep forces' power."""
+    """Rows on simulations of one second by RK4 with FASTSIM: differences between the implementations, and the sign of
+    the creep forces' power."""
     pairs = {("reference", engine): 0.0 for engine in ENGINES} | {ENGINES: 0.0}
     positive = steps = 0
     for name, wheelset in wheelsets.items():
         paths: dict[str, Any] = {}
-        setup: tuple[Any, ...] = (wheelset, _speed_of_path(speeds, name), "fastsim", cells)
-        step = _step(Equations(*setup))
+        setup: tuple[Any, ...] = (wheelset, _simulation_speed(speeds, name), "fastsim", cells)
+        step = _time_step(Equations(*setup))
         for engine in IMPLEMENTATION_MODULES:
             equations = implementation(engine)(*setup)
             paths[engine] = equations.run(equations.displaced_state(4e-3), DURATION, step)
@@ -228,24 +232,26 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> li
     ]
 
 
-def _step(equations: Equations) -> float:
-    """Time step (s) for the wheelset's fastest motion: STEP, or a smaller one that divides DURATION."""
+def _time_step(equations: Equations) -> float:
+    """Time step (s) for the wheelset's fastest motion: STEP, or a smaller step that divides DURATION."""
     fastest = float(np.abs(np.linalg.eigvals(equations.state_matrix)).max())
     return DURATION / np.ceil(DURATION / min(STEP, 1.0 / fastest))
 
 
-def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, ...]) -> dict[str, dict[str, Orbit]]:
-    """Limit cycle of the chosen wheelset, and, at half the step, of those whose critical speed is low enough for a
-    speed above it.
+def _limit_cycles(
+    wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, ...]
+) -> dict[str, dict[str, Orbit]]:
+    """Limit cycles by wheelset and implementation: of the chosen wheelset, and of those whose critical speed is low
+    enough for a simulation above this speed.
 
-    Each implementation finds it from 1 % beside.
+    Each implementation starts from a guess that is 1 % off, and closes the orbit again at half the step.
     """
     cycles = {}
     for name, wheelset in wheelsets.items():
         if name != "chosen" and not 20.0 < (speeds[name]["reference"] or 0.0) < 160.0:
             continue
-        setup: tuple[Any, ...] = (wheelset, _speed_of_path(speeds, name), "fastsim", 11)
-        first = attained_cycle(Equations(*setup), step=_step(Equations(*setup)))
+        setup: tuple[Any, ...] = (wheelset, _simulation_speed(speeds, name), "fastsim", 11)
+        first = attained_cycle(Equations(*setup), step=_time_step(Equations(*setup)))
         if first is not None:
             guesses = {engine: guess_from_orbit(first, implementation(engine)(*setup)) for engine in engines}
             cycles[name] = {
@@ -256,8 +262,8 @@ def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, 
 
 
 def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
-    """Rows on amplitude and frequency of the limit cycles: relative change by halving the step, and ratio of the
-    difference between the engines to it."""
+    """Rows on amplitude and frequency of the limit cycles: relative change by halving the step, and difference between
+    the implementations divided by this change."""
     rows, count = list[Row](), len(cycles["chosen"])
     for value, error in (("amplitude", "error"), ("frequency", "frequency_error")):
         every = [[(getattr(o, value), getattr(o, error)) for o in of_engine.values()] for of_engine in cycles.values()]
@@ -280,7 +286,7 @@ def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
 
 
 def _order_row() -> Row:
-    """Observed order of RK4 with linear creep, from three steps."""
+    """Row: observed order of RK4 with linear creep, from three steps."""
     equations = Equations(CHOSEN_WHEELSET, 60.0, "linear")
     start = equations.displaced_state(5e-3)
     ends = [equations.run(start, 0.1, step).states[-1] for step in (1.25e-4, 6.25e-5, 3.125e-5)]
@@ -295,8 +301,8 @@ def _order_row() -> Row:
 
 
 def _energy_rows() -> list[Row]:
-    """Rows: error of the energy balance of a path without flange contact, and how it decreases with the step, for both
-    creep laws."""
+    """Rows: error of the energy balance of a simulation without flange contact, and observed order of this error in the
+    step, for both creep laws."""
     rows = list[Row]()
     for law, named in (("linear", "linear creep"), ("fastsim", "FASTSIM (11 cells)")):
         equations = Equations(CHOSEN_WHEELSET, 60.0, law, 11)  # type: ignore[arg-type]
@@ -324,7 +330,7 @@ def _energy_rows() -> list[Row]:
 
 
 def _fault_rows() -> list[Row]:
-    """Rows: how much a small fault in one implementation changes the quantities of the other rows."""
+    """Rows: a small fault planted in one implementation must exceed the tolerances of the other rows."""
     equations, engine = Equations(CHOSEN_WHEELSET, 60.0), implementation("mujoco")(CHOSEN_WHEELSET, 60.0)
     state = equations.displaced_state(3e-3)
     right = largest_relative_difference(engine.rates(state), equations.rates(state))
@@ -349,7 +355,7 @@ def _fault_rows() -> list[Row]:
 
 
 def tables(case_data: dict[str, Any]) -> list[Table]:
-    """Critical speeds and limit cycles."""
+    """Tables of critical speeds and of limit cycles."""
     speeds = tuple(
         (name, *("none" if v is None else f"{v:.9g}" for v in of_engine.values()))
         for name, of_engine in case_data["critical"].items()

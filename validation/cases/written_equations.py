@@ -1,4 +1,5 @@
-"""Cars by their plain equations beside both engines: accelerations at random, whole paths, and every law in them."""
+"""Cars by independently written equations compared with Exudyn and MuJoCo: accelerations at random states, whole
+simulations, and every force law."""
 
 from pathlib import Path
 
@@ -22,35 +23,39 @@ from validation.spatial.written_equations import (
 TITLE = "Cars by plain equations that share no force with the engines"
 SYSTEM: System = "rolling-vehicle"
 ENGINES = ("mujoco", "exudyn")
-STATES, QUICK_STATES = 100, 12
-INSTANT_BOUND, PATH_BOUND, LAW_BOUND = 1e-12, 1e-10, 1e-12
+STATE_COUNT, QUICK_STATE_COUNT = 100, 12
+ACCELERATION_TOLERANCE, PATH_TOLERANCE, LAW_TOLERANCE = 1e-12, 1e-10, 1e-12
 INDEPENDENCE_NOTE = (
     "the description alone is shared: mass matrix, kinematics, preloads and every force are written twice"
 )
 DURATION, QUICK_DURATION = 1.0, 0.02
-"""s, in full and in quick: the plain equations of a car on tyres take about 20 s for each."""
+"""Length (s) of a simulation in a full and in a quick run. The independent equations of a car on tyres take about 20 s
+for each simulated second."""
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows of both systems; quick: fewer states, paths of some steps."""
-    states, duration = (QUICK_STATES, QUICK_DURATION) if quick else (STATES, DURATION)
-    return [*_laws(states), *_hubs(states, duration), *_rolling(states, duration)], {}
+    """Rows of cars on hub forces and of cars on rolling tyres; a quick run has fewer states and simulates a few
+    steps."""
+    states, duration = (QUICK_STATE_COUNT, QUICK_DURATION) if quick else (STATE_COUNT, DURATION)
+    return [*_law_rows(states), *_hub_rows(states, duration), *_rolling_rows(states, duration)], {}
 
 
-def _row(id: str, quantity: str, largest_error: float, unit: str, bound: float) -> Row:
-    """Row that compares the plain equations with another implementation of the same laws."""
-    return Observed(f"written.{id}", SYSTEM, quantity, largest_error, unit).at_most(bound, INDEPENDENCE_NOTE, "native")
+def _plain_equations_row(row_name: str, quantity: str, largest_error: float, unit: str, bound: float) -> Row:
+    """Row that compares the independently written equations with another implementation of the same laws."""
+    return Observed(f"written.{row_name}", SYSTEM, quantity, largest_error, unit).at_most(
+        bound, INDEPENDENCE_NOTE, "native"
+    )
 
 
-def _laws(states: int) -> list[Row]:
-    """Rows on the tyre's law, and on the preloads in the design position."""
+def _law_rows(state_count: int) -> list[Row]:
+    """Rows on the creep forces of the tyre, and on the preloads in the design position."""
     rows = [
-        _row(
+        _plain_equations_row(
             "bristles",
-            f"largest difference of the creep forces of {states} random patches, over the load",
-            bristles_gap(states),
+            f"largest difference of the creep forces of {state_count} random patches, over the load",
+            bristles_gap(state_count),
             "1",
-            LAW_BOUND,
+            LAW_TOLERANCE,
         )
     ]
     for name, car in rolling_cars().items():
@@ -61,54 +66,74 @@ def _laws(states: int) -> list[Row]:
             for known, other in zip(preloads_of, plain, strict=True)
         )
         rows.append(
-            _row(
+            _plain_equations_row(
                 f"preloads.{name}",
                 f"largest difference of the preloads and static loads of {name}, over the largest",
                 gap,
                 "1",
-                LAW_BOUND,
+                LAW_TOLERANCE,
             )
         )
     return rows
 
 
-def _hubs(states: int, duration: float) -> list[Row]:
+def _hub_rows(state_count: int, duration: float) -> list[Row]:
     """Rows on vehicles that are cut at their wheels and driven by hub forces."""
     rows = []
     for name, car in cut_cars().items():
         for engine in ("reference", *ENGINES):
             what = (
                 f"largest difference of {name}'s accelerations on hub forces and on a road "
-                f"in {engine}, {states} random states"
+                f"in {engine}, {state_count} random states"
             )
             rows.append(
-                _row(f"hubs.{engine}.{name}", what, hub_gap(car, engine, states), "of the largest", INSTANT_BOUND)
+                _plain_equations_row(
+                    f"hubs.{engine}.{name}",
+                    what,
+                    hub_gap(car, engine, state_count),
+                    "of the largest",
+                    ACCELERATION_TOLERANCE,
+                )
             )
         what = f"largest difference of {name}'s section forces, wrenches and holding moments at random states"
-        rows.append(_row(f"hubs.inside.{name}", what, inside_gap(car, 4), "of the largest", INSTANT_BOUND))
+        rows.append(
+            _plain_equations_row(
+                f"hubs.inside.{name}", what, inside_gap(car, 4), "of the largest", ACCELERATION_TOLERANCE
+            )
+        )
         for kind, rough in (("road", True), ("noise", False)):
             what = f"largest difference of {name}'s coordinates and rates in MuJoCo, {duration:g} s of {kind}"
             rows.append(
-                _row(
-                    f"hubs.{kind}.{name}", what, hub_path_gap(car, "mujoco", duration, rough), "m, rad, 1/s", PATH_BOUND
+                _plain_equations_row(
+                    f"hubs.{kind}.{name}",
+                    what,
+                    hub_path_gap(car, "mujoco", duration, rough),
+                    "m, rad, 1/s",
+                    PATH_TOLERANCE,
                 )
             )
     return rows
 
 
-def _rolling(states: int, duration: float) -> list[Row]:
-    """Rows: cars on rolling tyres."""
+def _rolling_rows(state_count: int, duration: float) -> list[Row]:
+    """Rows on cars on rolling tyres: accelerations, tyre reports, and simulations."""
     rows = []
     for name, car in rolling_cars().items():
         for engine in ENGINES:
-            what = f"largest difference of {name}'s accelerations on tyres in {engine}, {states} random states"
-            gap = rolling_gap(car, engine, states)
-            rows.append(_row(f"tyres.{engine}.{name}", what, gap, "of the largest", INSTANT_BOUND))
+            what = f"largest difference of {name}'s accelerations on tyres in {engine}, {state_count} random states"
+            gap = rolling_gap(car, engine, state_count)
+            rows.append(
+                _plain_equations_row(f"tyres.{engine}.{name}", what, gap, "of the largest", ACCELERATION_TOLERANCE)
+            )
         what = (
             f"largest difference of the tyre reports and ledgers of {name} at random states, over the largest of each"
         )
-        rows.append(_row(f"tyres.reports.{name}", what, report_gap(car, states), "1", INSTANT_BOUND))
+        rows.append(
+            _plain_equations_row(
+                f"tyres.reports.{name}", what, report_gap(car, state_count), "1", ACCELERATION_TOLERANCE
+            )
+        )
         what = f"largest difference of {name}'s positions and rates in MuJoCo, {duration:g} s of a turn on a rough road"
         gap = rolling_path_gap(car, "mujoco", duration)
-        rows.append(_row(f"tyres.path.{name}", what, gap, "m, rad, 1/s", PATH_BOUND))
+        rows.append(_plain_equations_row(f"tyres.path.{name}", what, gap, "m, rad, 1/s", PATH_TOLERANCE))
     return rows
