@@ -53,7 +53,7 @@ def parts_of(state, regularising_speed):
     return 1 if speed == 0.0 else int(min(math.ceil(regularising_speed / speed), MOST_PARTS))
 
 
-@lean
+@inlined
 def in_parts(part_count, motion, torques, step, steer, vehicle, surfaces):
     """Apply ``step_on`` to ``part_count`` equal parts of a step. The report holds means over the parts, but the sum of
     the times locked.

@@ -20,7 +20,7 @@ from models.brake.brake import Brakes
 from models.brake.plane_records import REPORT_SIZE, PlaneMotion
 from models.brake.plane_step import moved_to
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves
-from models.machine.compiled import lean, named_closure, njit
+from models.machine.compiled import inlined, named_closure, njit
 
 
 class Row(NamedTuple):
@@ -131,7 +131,7 @@ go: Callable[..., Any] = advance
 """Stands here for what ``moved`` puts in its place."""
 
 
-def some_samples(commands, record, sample, braking, motion, simulated_time, *vehicle_parts):
+def some_samples(commands, record, sample, braking, motion, simulated_time, vehicle_parts):
     """Advance a vehicle from a time (s) on by ``commands.samples`` samples, or until it stops or the run ends. ``go``
     makes each step: ``advance`` or a function in its place. Returns how the last sample ended, and the time (s)."""
     air, chambers, brakes, torques = braking
@@ -174,7 +174,7 @@ def samples(subject):
             subject.braking,
             subject.motion,
             simulated_time,
-            *subject.others,
+            subject.others,
         )
 
 
@@ -211,7 +211,7 @@ class CompiledSamples:
 
 def compiled(step_function: Callable[..., Any], name: str) -> CompiledSamples:
     """Compiled version of ``moved``, for a compiled step function."""
-    compiled_some = lean(named_closure(_with_globals(some_samples, go=step_function), name))
+    compiled_some = inlined(named_closure(_with_globals(some_samples, go=step_function), name))
     return CompiledSamples(
         njit(cache=True, error_model="numpy")(named_closure(_with_globals(samples, some=compiled_some), name))
     )
