@@ -259,39 +259,30 @@ def _fill_one_direction(sign, contacts, slip, speed, rails, wheel_forces):
             force.fx, force.fy, force.mz = _linear_forces(c.a, c.b, (c.xi_x, c.xi_y, c.spin), shear, poisson)
 
 
-@lean
-def _both_ways(forwards, contacts, slip, speed, rails, workspace):
-    """Fill fx, fy, mz in ``workspace`` as a mixture of forward and backward rolling; ``forwards`` is the weight of
-    forward rolling.
-    """
-    for k in range(len(contacts)):
-        workspace.forces[k].fx = workspace.forces[k].fy = workspace.forces[k].mz = 0.0
-    directed = workspace.directed[: len(contacts)]
-    for sign in (1.0, -1.0):
-        share = forwards if sign > 0.0 else 1.0 - forwards
-        if share > 0.0:
-            _fill_one_direction(sign, contacts, slip, speed, rails, directed)
-            for k in range(len(contacts)):
-                workspace.forces[k].fx += share * sign * directed[k].fx
-                workspace.forces[k].fy += share * directed[k].fy
-                workspace.forces[k].mz += share * sign * directed[k].mz
-
-
 @inlined
 def fill_creep_forces(contacts, slip, speed, rails, workspace):
     """Fill the forces fx, fy, mz in ``workspace`` for contacts (CONTACT) from their sliding motion (MOTION).
 
-    The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image.
+    Near standstill they are a mixture of forward and backward rolling. The creepages are written into the contacts; for
+    a wheel that rolls backwards those of its mirror image.
     """
-    if rails.law == FASTSIM:
-        shear, poisson = rails.wheels[0].shear, rails.wheels[0].nu
+    answers, directed = workspace.forces, workspace.directed[: len(contacts)]
+    for k in range(len(contacts)):
+        contact, answer = contacts[k], answers[k]
+        answer.fx = answer.fy = answer.mz = 0.0
+        if rails.law == FASTSIM:
+            contact.l1, contact.l2, contact.l3 = flexibilities_at(
+                contact.a, contact.b, rails.wheels[0].shear, rails.wheels[0].nu
+            )
+    forwards = min(1.0, max(0.0, 0.5 + 0.5 * speed / REGULAR))
+    first, last = 0 if forwards > 0.0 else 1, 1 if forwards < 1.0 else 0
+    for way in range(first, last + 1):  # one call for both ways, or callers are compiled with two copies of the law
+        sign, share = (1.0, forwards) if way == 0 else (-1.0, 1.0 - forwards)
+        _fill_one_direction(sign, contacts, slip, speed, rails, directed)
         for k in range(len(contacts)):
-            c = contacts[k]
-            c.l1, c.l2, c.l3 = flexibilities_at(c.a, c.b, shear, poisson)
-    if speed >= REGULAR:
-        _fill_one_direction(1.0, contacts, slip, speed, rails, workspace.forces[: len(contacts)])
-    else:
-        _both_ways(max(0.0, 0.5 + 0.5 * speed / REGULAR), contacts, slip, speed, rails, workspace)
+            answers[k].fx += share * sign * directed[k].fx
+            answers[k].fy += share * directed[k].fy
+            answers[k].mz += share * sign * directed[k].mz
 
 
 @inlined
