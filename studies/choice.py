@@ -178,10 +178,14 @@ def choice_of_scene(
     with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *places_of(scene)) as pool:
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
         choice, full_work = chooser.choose(), chooser.work(frozenset())
-    results = chooser.whole.variants.stated(frozenset(choice.left_out), choice.times) if scene.error else []
+    results = (
+        chooser.whole.variants.results_with_errors(frozenset(choice.left_out), choice.times) if scene.error else []
+    )
     single_effects = [
         SingleEffect(
-            effect, chooser.teller.predicted_change(frozenset([effect])), full_work / chooser.work(frozenset([effect]))
+            effect,
+            chooser.reporting_screen.predicted_change(frozenset([effect])),
+            full_work / chooser.work(frozenset([effect])),
         )
         for effect in chooser.effects
     ]

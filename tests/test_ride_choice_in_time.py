@@ -104,9 +104,10 @@ def test_a_choice_is_kept_and_says_what_chance_may_add():
 def test_few_copies_find_what_all_of_them_tell():
     scene = quarter_car(options={"copies": 48, "lasting": 2.0})
     own = Chooser(scene, "reference", scene.quantities, scene.tolerance)
-    copies = [one.variants.scene.samples.copies for one in (own.screen, own.teller, own.whole)]
+    copies = [one.variants.scene.samples.copies for one in (own.screen, own.reporting_screen, own.whole)]
     assert (
-        copies == [12, 48, 48] and own.screen.variants.scene.times == own.teller.variants.scene.times == own.step_factor
+        copies == [12, 48, 48]
+        and own.screen.variants.scene.times == own.reporting_screen.variants.scene.times == own.step_factor
     )
 
 
@@ -131,7 +132,7 @@ def test_a_quantity_that_one_sample_makes_up_is_refused():
     answer = variants.of()
     name = "body front"
     lone = replace(answer.quantities[name], cases=(np.array([1.0, *[0.01] * 15]),))
-    variants._kept[frozenset(), 1] = replace(answer, quantities={**answer.quantities, name: lone})
+    variants._quantities_of_variant[frozenset(), 1] = replace(answer, quantities={**answer.quantities, name: lone})
     with pytest.raises(InputError, match="made up to 87 % by one sample of 16"):
         Screen(variants, [name])
 

@@ -1,4 +1,5 @@
-"""Changes by leaving effects out, predicted from runs without each and without each two of them.
+"""Changes of quantities by leaving effects out, predicted from runs without each effect and without each pair of
+effects.
 
 With y(S) the quantities' paths without the effects S, to the second order
 
@@ -27,14 +28,14 @@ from models.advice.choice.variants import EffectSet, Variants
 from models.core.errors import InputError
 
 LARGEST_SAMPLE_SHARE = 1 / 3
-"""Share of a sampled quantity's mean square that one sample may have."""
+"""Largest share that one sample may have of a sampled quantity's mean square."""
 Changes = dict[str, Cases]
-"""Differences of two runs, quantity by quantity."""
+"""Differences of two runs, by the name of the quantity."""
 
 
 class Screen:
-    """Predictions of how quantities change if effects are left out, from runs of ``variants``. InputError for a
-    quantity that does not move.
+    """Predictions of how quantities change if effects are left out, from runs of ``variants`` of a scene. InputError
+    for a quantity that does not move.
     """
 
     def __init__(self, variants: Variants, quantities: list[str]) -> None:
@@ -59,25 +60,23 @@ class Screen:
     def _refuse(self, name: str, reason: str) -> NoReturn:
         raise InputError(self.variants.scene.file, f"quantities.{name}", None, reason)
 
-    def between(self, run: RunQuantities | None, other_answer: RunQuantities | None) -> Changes | None:
-        """Differences of two runs in each quantity; None where one of the runs is missing."""
-        if run is None or other_answer is None:
+    def differences_of_runs(self, run: RunQuantities | None, other_run: RunQuantities | None) -> Changes | None:
+        """Differences of two runs, by quantity; None where one of the runs or one of its quantities is missing."""
+        if run is None or other_run is None:
             return None
         try:
-            return {
-                name: difference_of_runs(run.of(name).cases, other_answer.of(name).cases) for name in self.quantities
-            }
+            return {name: difference_of_runs(run.of(name).cases, other_run.of(name).cases) for name in self.quantities}
         except InputError as error:
             if "rms" in error.allowed and "ends" not in error.allowed:
                 return None  # what is left has no such quantity
             raise
 
     def relative_changes(self, differences: Changes | None) -> np.ndarray:
-        """Relative changes (quantities,); infinite where ``predicted_difference`` is None."""
+        """Relative changes (quantities,) from differences of runs; infinite where ``differences`` is None."""
         return self._changes_with_errors(differences)[0]
 
     def statistical_errors(self, differences: Changes | None) -> np.ndarray:
-        """Statistical errors (quantities,) of predicted changes; zero for a quantity that is no mean of samples."""
+        """Statistical errors (quantities,) of relative changes; zero for a quantity that is no mean of samples."""
         return self._changes_with_errors(differences)[1]
 
     def _changes_with_errors(self, differences: Changes | None) -> np.ndarray:
@@ -93,12 +92,14 @@ class Screen:
         return np.array(pairs).T
 
     def first_order_change(self, effect: str) -> Changes | None:
-        """First-order difference d: the change if this effect alone is left out."""
+        """First-order difference d_i of the quantities: their change if this effect alone is left out."""
         return self.predicted_difference(frozenset([effect]))
 
-    def second(self, first: str, second_effect: str) -> Changes | None:
-        """Second-order difference e of a pair: the change without both, less the changes without each alone."""
-        sets = map(frozenset, ((first, second_effect), (first,), (second_effect,)))
+    def second(self, first: str, other_effect: str) -> Changes | None:
+        """Second-order difference e_ij of a pair of effects: the change without both, less the changes without each
+        alone.
+        """
+        sets = map(frozenset, ((first, other_effect), (first,), (other_effect,)))
         change_without_both, *singles = (self.predicted_difference(effects) for effects in sets)
         known = [change_of_single for change_of_single in singles if change_of_single is not None]
         if change_without_both is None or len(known) < 2:
@@ -111,11 +112,11 @@ class Screen:
         }
 
     def ahead(self, sets: Iterable[EffectSet]) -> None:
-        """Compute in advance the runs that ``predicted_difference`` needs for these sets."""
+        """Compute in advance the runs from which the changes without these sets of effects are predicted."""
         self.variants.ahead((subset, 1) for chosen in sets for subset in _sets_needed(chosen))
 
     def predicted_difference(self, omitted_effects: EffectSet) -> Changes | None:
-        """Predicted differences if a set of effects is left out; None where they cannot be predicted."""
+        """Predicted differences of the quantities if a set of effects is left out; None where they cannot be predicted."""
         parts: list[Changes | None] = [None]
         if len(omitted_effects) > 2:
             parts = [
@@ -123,7 +124,7 @@ class Screen:
                 *(self.second(*pair) for pair in combinations(sorted(omitted_effects), 2)),
             ]
         if None in parts:
-            return self.between(self.variants.of(omitted_effects), self.variants.of())
+            return self.differences_of_runs(self.variants.of(omitted_effects), self.variants.of())
         return {
             name: sum_of_differences(*(difference[name] for difference in parts if difference))
             for name in self.quantities
@@ -154,17 +155,17 @@ class Screen:
             return no_change  # the set was run itself
         return second * np.minimum(1.0, second / np.maximum(first, 1e-300))
 
-    def of_step(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
+    def change_by_longer_steps(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
         """Relative changes (quantities,) that longer steps alone cause in a run without these effects."""
         if step_factor == 1:
             return np.zeros(len(self.quantities))
         return self.relative_changes(
-            self.between(self.variants.of(omitted_effects, step_factor), self.variants.of(omitted_effects))
+            self.differences_of_runs(self.variants.of(omitted_effects, step_factor), self.variants.of(omitted_effects))
         )
 
 
 def _sets_needed(omitted_effects: EffectSet) -> list[EffectSet]:
-    """Sets of effects whose runs are needed to predict the changes for a set."""
+    """Sets of effects whose runs are needed to predict the changes without ``omitted_effects``."""
     if len(omitted_effects) <= 2:
         return [omitted_effects]
     return [frozenset(subset) for count in (1, 2) for subset in combinations(sorted(omitted_effects), count)]
