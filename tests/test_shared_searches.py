@@ -153,8 +153,8 @@ class Planted:
     """y = t^2 sin 5t with an error of 40 h^2, more of it in the second half; the reference errs as its steps say."""
 
     title, quantity, unit, kink_period, note, counted = "planted", "y", "N", 0.0, "", "force calls"
-    whole: float = 2.0
-    first: float = 1.0
+    full_duration: float = 2.0
+    searched_duration: float = 1.0
 
     def ladders(self):
         return [SettingLadder("exudyn", "second", STEPS, 2), SettingLadder("exudyn", "first", STEPS, 1, default=0.05)]
@@ -162,7 +162,7 @@ class Planted:
     def reference(self):
         return SettingLadder("reference", "fine", tuple(2e-2 / 2**k for k in range(9)), 4)
 
-    def second(self, last):
+    def second_setting(self, last):
         return None
 
     def solve(self, setting, duration):
@@ -170,7 +170,7 @@ class Planted:
             raise RunFailed("exudyn", "unstable", 0.5)
         return setting, duration
 
-    def answer(self, solution):
+    def priced_run(self, solution):
         setting, duration = solution
         times = np.linspace(0.0, duration, round(duration / setting.value) + 1)
         size = {"second": 40.0, "first": 1.0, "fine": 1e4}[setting.method]
@@ -183,7 +183,7 @@ class Planted:
 
 def same(alone: ReferenceTruth, shared: ReferenceTruth):
     keys = ("uncertainty", "origin", "rung", "broken_assumptions")
-    equal = np.array_equal(alone.answer.values, shared.answer.values)
+    equal = np.array_equal(alone.run.values, shared.run.values)
     return equal and all(getattr(alone, key) == getattr(shared, key) for key in keys)
 
 

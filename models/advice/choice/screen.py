@@ -116,7 +116,9 @@ class Screen:
         self.variants.ahead((subset, 1) for chosen in sets for subset in _sets_needed(chosen))
 
     def predicted_difference(self, omitted_effects: EffectSet) -> Changes | None:
-        """Predicted differences of the quantities if a set of effects is left out; None where they cannot be predicted."""
+        """Predicted differences of the quantities if a set of effects is left out; None where they cannot be
+        predicted.
+        """
         parts: list[Changes | None] = [None]
         if len(omitted_effects) > 2:
             parts = [
