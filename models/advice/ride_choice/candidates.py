@@ -1,5 +1,6 @@
-"""What any set of effects changes and costs that a scene's quantities may do without: predicted, confirmed, looked at
-nearby, and run."""
+"""Changes and costs of leaving out any set of effects of a linear ride scene: predicted, confirmed, and tested with
+parameters off.
+"""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -20,18 +21,22 @@ from models.systems.ride.reduced_scene import Effect, ReducedScene, reduced_with
 from models.systems.ride.scene import RideScene
 
 SCREENED_SPEEDS = 3
-"""Speeds at which effects are screened, from the slowest to the fastest; the choice is confirmed at all."""
+"""Number of speeds at which effects are screened, from the slowest to the fastest; the choice is confirmed at all
+speeds.
+"""
 IDENTITY_ERROR = 1e-12
-"""Relative error of the identity that certifies a choice; beyond it, rounding has eaten the certificate."""
+"""Largest relative error of the identity of covariance and adjoint that certifies a choice; a larger one is due to
+rounding.
+"""
 VARIANCE_DIFFERENCE = 1e-9
-"""By how much a variance by motions may differ from the one in extended precision."""
+"""Largest relative difference between a variance from eigenmodes and the one in extended precision."""
 
 EffectSet = frozenset[Effect]
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
 def cached_in_object(method: Method) -> Method:
-    """Decorator of a method whose answers are kept in its object, by their arguments."""
+    """Decorator of a method that stores its results in the object, by the arguments of the call."""
 
     @wraps(method)
     def answer(candidates: "Candidates", *asked: Any) -> Any:
@@ -44,7 +49,7 @@ def cached_in_object(method: Method) -> Method:
 
 
 class Candidates:
-    """Effects of a scene that may be left out, judged at its speeds (m/s) for quantities (names of outputs, also
+    """Effects of a ride scene that may be left out, judged at its speeds (m/s) for quantities (names of outputs, also
     weighted ones).
     """
 
@@ -73,12 +78,12 @@ class Candidates:
 
     @classmethod
     def of(cls, ride: RideScene) -> Self:
-        """The candidates of a scene that asks for a choice."""
+        """The candidates of a ride scene, for its speeds, quantities and tolerance."""
         assert ride.speeds is not None and ride.tolerance is not None
         return cls(ReducedScene.complete(ride), ride.speeds.all(), ride.quantities, ride.tolerance)
 
     def _row_and_weighting(self, quantity: str) -> tuple[int, str]:
-        """For a quantity, the row of the vehicle's output and the name of its weighting, "" if it has none."""
+        """For a quantity, the row of the vehicle's output and the name of its weighting filter, "" if it has none."""
         weighted = {
             f"{name} {weighting_name}": (name, weighting_name)
             for name, weighting_name in self.scene.ride.weighting.items()
@@ -88,24 +93,28 @@ class Candidates:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Counts of the work: eigenvalue problems, one for each vehicle that was made, and Lyapunov equations."""
+        """Numbers of eigenvalue problems, one for each vehicle that was built, and of Lyapunov equations that were
+        solved.
+        """
         return {"eigenvalue problems": len(self.vehicles) + self.near.off, "Lyapunov equations": self.solved_equations}
 
     @cached_in_object
     def rest(self, omitted_effects: EffectSet) -> ReducedScene:
-        """The scene without these effects."""
+        """The ride scene without these effects."""
         return reduced_without(self.scene, sorted(omitted_effects, key=lambda effect: effect.name))
 
     @cached_in_object
     def system(self, full_scene: FullScene, omitted_effects: EffectSet) -> Reduced | None:
-        """The system of the scene without these effects at a speed; None where no meaningful system remains."""
+        """The linear system of the scene without these effects at a speed; None where no meaningful system remains."""
         try:
             return full_scene.reduced(self.rest(omitted_effects))
         except InputError:
             return None
 
     def screen(self, full_scene: FullScene, omitted_effects: EffectSet) -> Screen | None:
-        """Covariance and adjoints of the scene without those of these effects that are singular."""
+        """Covariance and adjoints of the scene without its singular effects among these; None where they cannot be
+        computed.
+        """
         base = frozenset(effect for effect in omitted_effects if effect.is_singular)
         needs = {name for effect in base for name in effect.needs}
         return self._screen(full_scene, base | {effect for effect in omitted_effects if effect.name in needs})
@@ -121,7 +130,9 @@ class Candidates:
 
     @cached_in_object
     def predicted_changes(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Predicted changes (quantities,), each the largest over the screened speeds; inf where no system remains."""
+        """Predicted relative changes (quantities,) of standard deviations, each the largest over the screened speeds;
+        inf where no system remains.
+        """
         return largest_changes(
             np.array([self._predicted_at(full_scene, omitted_effects) for full_scene in self.screened])
         )
@@ -145,7 +156,9 @@ class Candidates:
 
     @cached_in_object
     def confirmed_changes(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Changes (quantities,) by the exact solution, each the largest over all listed speeds."""
+        """Relative changes (quantities,) of standard deviations by the exact solution, each the largest over all listed
+        speeds.
+        """
         return largest_changes(
             np.array(
                 [self._changes_at_speed(full_scene, omitted_effects, self._confirm) for full_scene in self.full_scenes]
@@ -154,8 +167,8 @@ class Candidates:
 
     @cached_in_object
     def changes_by_modes(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Changes as ``confirmed_changes`` gives them, but computed from eigenmodes of the reduced system wherever
-        these are reliable.
+        """Relative changes (quantities,) of standard deviations, each the largest over all listed speeds, from
+        eigenmodes of the reduced system wherever these are reliable.
         """
         return largest_changes(
             np.array(
@@ -200,8 +213,8 @@ class Candidates:
         omitted_effects: EffectSet,
         variances: Callable[[FullScene, EffectSet, Reduced], np.ndarray],
     ) -> np.ndarray:
-        """Changes (quantities,) at a speed by the function ``variances``; inf where no system remains, or an unstable
-        one.
+        """Relative changes (quantities,) of standard deviations at a speed, with the variances of the reduced system by
+        the function ``variances``; inf where no system remains, or an unstable one.
         """
         reduced, full = self.system(full_scene, omitted_effects), self.full[self.full_scenes.index(full_scene)]
         left = np.full(len(full), inf)
@@ -211,7 +224,9 @@ class Candidates:
 
     @cached_in_object
     def between(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Changes (quantities,), each the largest over all speeds of the range; inf where no system remains."""
+        """Relative changes (quantities,) of standard deviations, each the largest over all speeds of the range; inf
+        where no system remains.
+        """
         reduced = self.system(self.full_scenes[0], omitted_effects)
         if reduced is None or not all((d[self.rows] == 0).all() for d in reduced.system.D):
             return np.full(len(self.rows), inf)
@@ -219,8 +234,8 @@ class Candidates:
 
     @cached_in_object
     def off(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Changes (quantities,) over all speeds of the range if parameters are off, in the combination that is worst
-        for each quantity.
+        """Relative changes (quantities,) of standard deviations over all speeds of the range with parameters off, in
+        the combination that is worst for each quantity.
         """
         reduced_scene = self.rest(omitted_effects)
         return largest_changes(
@@ -228,18 +243,18 @@ class Candidates:
         )
 
     def holds(self, changes: np.ndarray) -> bool:
-        """Whether all changes are within the tolerance."""
+        """Whether all relative changes (quantities,) are within the tolerance."""
         return bool((abs(changes) <= self.tolerance).all())
 
     def told(self, changes: np.ndarray) -> str:
-        """Text on the largest of changes (quantities,)."""
+        """Text on the largest of the relative changes (quantities,), with the quantity's name."""
         worst = int(abs(changes).argmax())
         return f"{self.quantities[worst]} by {100 * changes[worst]:+.3g} %"
 
     @cached_in_object
     def cost(self, omitted_effects: EffectSet) -> Cost:
-        """Cost without these effects in the largest stable step, at the screened speed where it is highest; infinite
-        where no meaningful system remains.
+        """Cost of a run without these effects with the largest stable step, at the screened speed where it is highest;
+        infinite where no meaningful system remains.
         """
         reduced_scene = self.rest(omitted_effects)
         independent_of_speed = of_speed(reduced_scene.vehicle, 0.0) is None
@@ -257,19 +272,19 @@ class Candidates:
 
     @cached_in_object
     def cost_at_equal_accuracy(self, omitted_effects: EffectSet) -> Cost:
-        """Cost without these effects in the longest step with which reduction and steps together keep the tolerance at
-        all screened speeds.
+        """Cost of a run without these effects with the longest step with which reduction and time steps together keep
+        the tolerance at all screened speeds.
         """
         return self.at_step(
             omitted_effects, longest_step(self.marches(omitted_effects), self.exact_deviations(), self.tolerance)
         )
 
     def exact_deviations(self) -> list[np.ndarray]:
-        """Standard deviations (quantities,) of the full scene, for each of the screened speeds."""
+        """Standard deviations (quantities,) of the full scene, one array for each of the screened speeds."""
         return [np.sqrt(self.full[self.full_scenes.index(full_scene)]) for full_scene in self.screened]
 
     def marches(self, omitted_effects: EffectSet) -> list[March]:
-        """Marches of the scene without these effects, one for each of the screened speeds."""
+        """Time integrations of the scene without these effects, one for each of the screened speeds."""
         weightings = tuple(
             (row, weighting_name)
             for row, (_, weighting_name) in zip(self.rows, self.near.quantities, strict=True)
@@ -282,10 +297,10 @@ class Candidates:
         ]
 
     def at_step(self, omitted_effects: EffectSet, step: float) -> Cost:
-        """Cost without these effects in steps of ``step`` (s)."""
+        """Cost of a run without these effects with steps of ``step`` (s)."""
         return Cost(self.cost(omitted_effects).states, step, RK4_STAGES / step if step else inf)
 
 
 def largest_changes(changes: np.ndarray) -> np.ndarray:
-    """The largest change of each quantity, with its sign, of changes (n, quantities)."""
+    """The largest change (quantities,) of each quantity, with its sign, among changes (n, quantities)."""
     return changes[abs(changes).argmax(axis=0), np.arange(changes.shape[1])]

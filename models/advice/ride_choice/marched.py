@@ -1,4 +1,4 @@
-"""A run of a linear scene in time, by the classical Runge-Kutta method: what it makes of deviations at a step.
+"""Time simulation of a linear ride scene by the classical Runge-Kutta method: how the step changes standard deviations.
 
 Copies of the vehicle meet random roads of their own; the same roads are run in steps a quarter as long, so that chance
 is in both and hardly in their ratio.
@@ -15,26 +15,26 @@ from models.ride.covariance import noise_of
 from models.ride.road_path import RoadPath
 
 STEP_REFINEMENT = 4
-"""Steps of the run beside it are so many times as short."""
+"""Factor by which the steps of the run for comparison are shorter."""
 NUMBER_OF_COPIES, LONGEST_RUN_SECONDS, LONGEST_RUN_STEPS = 48, 20.0, 1500
-"""Copies; each runs for so many seconds (s), or for so many steps if that is shorter."""
+"""Number of copies of the vehicle, their longest duration (s), and their largest number of steps if that is shorter."""
 STEPS_PER_BLOCK = 250
-"""Steps whose states are kept before they are summed."""
+"""Number of steps whose states are stored before they are summed."""
 SETTLING_SHARE = 0.2
-"""Share of a run in which it forgets its beginning, and nothing counts."""
+"""Share of a run in which it settles, and which is left out of the mean squares."""
 SEED = 1
 ALLOWED_SHARE = 0.1
-"""Share of what steps change by which run and closed form may differ: a few per cent of a step."""
+"""Share of the change by the step by which run and closed form may differ."""
 CLOSED_FORM_ERROR = 1e-4
-"""What the closed form leaves out of a ratio."""
+"""Relative error of a deviation ratio by the closed form."""
 ALLOWED_STANDARD_ERRORS = 4.0
-"""Standard errors by which a run may differ from the closed form; more does not happen by chance."""
+"""Number of standard errors by which a run may differ from the closed form; more does not happen by chance."""
 
 
 @dataclass(frozen=True)
 class Marched:
-    """Comparison of a run with one in shorter steps. deviation_ratio (q,) : of standard deviations; error (q,) :
-    standard error of the ratio; calls : per second of motion.
+    """Comparison of a run with another one in shorter steps. deviation_ratio (q,) : ratio of standard deviations; error
+    (q,) : standard error of the ratio; calls : right-hand side calls per second of motion.
     """
 
     deviation_ratio: np.ndarray
@@ -43,7 +43,7 @@ class Marched:
 
 
 def comparison_of_steps(march_in_modes: March, step: float, copies: int = NUMBER_OF_COPIES) -> Marched:
-    """Run a scene in steps of ``step`` (s) and in shorter ones."""
+    """Ratio of standard deviations of a run with steps of ``step`` (s) to those of a run with shorter steps."""
     steps = max(int(min(LONGEST_RUN_SECONDS / step, LONGEST_RUN_STEPS)), 10)
     road = _filter_states(march_in_modes, step / STEP_REFINEMENT, steps * STEP_REFINEMENT, copies)
     coarse, calls = _mean_squares(march_in_modes, road[::STEP_REFINEMENT], step)
@@ -55,8 +55,8 @@ def comparison_of_steps(march_in_modes: March, step: float, copies: int = NUMBER
 
 
 def confirms_step(march_in_modes: March, step: float) -> bool:
-    """Whether a run in steps of ``step`` (s) changes standard deviations, before weightings, as much as the closed form
-    predicts.
+    """Whether a run with steps of ``step`` (s) changes standard deviations, before weightings, as much as the closed
+    form predicts.
     """
     plain = replace(march_in_modes, weightings=())
     run = comparison_of_steps(plain, step)
@@ -70,7 +70,7 @@ def confirms_step(march_in_modes: March, step: float) -> bool:
 
 
 def _filter_states(march_in_modes: March, step: float, steps: int, copies: int) -> np.ndarray:
-    """States (2 steps + 1, a m, copies) of the road filters of all axles at half steps."""
+    """States (2 steps + 1, a m, copies) of the road filters of all axles at half steps of ``step`` (s)."""
     road = march_in_modes.reduced.excitation
     axles, m = len(road.heights), len(road.F)
     axle_selectors = tuple(np.kron(np.eye(axles)[:, [i]], np.eye(m)) for i in range(axles))
@@ -79,8 +79,8 @@ def _filter_states(march_in_modes: March, step: float, steps: int, copies: int) 
 
 
 def _mean_squares(march_in_modes: March, road: np.ndarray, step: float) -> tuple[np.ndarray, int]:
-    """Mean squares (copies, q) of quantities in a run over a road that is given at half steps, and the number of calls
-    of the right-hand side.
+    """Mean squares (copies, q) of quantities in a run over a road that is given at half steps, and the number of
+    right-hand side calls.
 
     A step of a linear system is a matrix; it is found by a step from the unit matrix.
     """
@@ -110,8 +110,8 @@ def _mean_squares(march_in_modes: March, road: np.ndarray, step: float) -> tuple
 
 
 def _step_matrices(A: np.ndarray, step: float) -> list[np.ndarray]:
-    """Matrices (n, n) of one step (s): how the new state depends on the old one, and on forces at the step's begin,
-    middle and end.
+    """Transition matrices (n, n) of one Runge-Kutta step (s): from the old state, and from forces at the step's begin,
+    middle and end, to the new state.
     """
     n = len(A)
     columns = np.eye(n, 4 * n)
@@ -121,7 +121,7 @@ def _step_matrices(A: np.ndarray, step: float) -> list[np.ndarray]:
 
 def _initial_states(march_in_modes: March, road: np.ndarray) -> np.ndarray:
     """Initial states (n, copies) of the vehicle, drawn from its stationary ride for given states (m, copies) of the
-    road.
+    road filters.
 
     A short run would not reach it from rest.
     """
@@ -134,7 +134,9 @@ def _initial_states(march_in_modes: March, road: np.ndarray) -> np.ndarray:
 
 
 def _mean_noise_force(march_in_modes: March, road: np.ndarray, step: float) -> np.ndarray:
-    """Mean force (steps, n, copies) that white noise exerts over each step, 0 where no noise reaches the vehicle."""
+    """Mean rate of the states (steps, n, copies) due to white noise over each step, 0 where no noise reaches the
+    vehicle.
+    """
     roads, n = march_in_modes.reduced.excitation, march_in_modes.vehicle
     into = np.hstack([b[:n] for b in march_in_modes.reduced.system.B])
     if not into.any():

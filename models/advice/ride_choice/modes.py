@@ -1,4 +1,5 @@
-"""A linear system in its motions, A = V diag(rates) W: stationary covariances, adjoints and e^(A t) without a solve.
+"""A linear system in its eigenmodes, A = V diag(rates) W: stationary covariances, adjoints and e^(A t) without an
+equation solver.
 
 What drives and what it drives have motions of their own; those of both follow from them by a division, so that the
 eigenvalue problem of a vehicle is solved once for all its roads and speeds.
@@ -14,19 +15,20 @@ from scipy.linalg.lapack import dgebal
 from models.ride.weighting import WEIGHTINGS
 
 LARGEST_MODE_CONDITION = 1e6
-"""Product of the sizes of a column of V and a row of W, by which rounding grows, beyond which motions are too much
-alike to tell."""
+"""Largest product of the norms of a column of V and a row of W, by which rounding grows; beyond it, eigenvectors are
+too nearly parallel.
+"""
 INVERSE_TOLERANCE = 1e-9
-"""By how much W V may differ from the unit matrix."""
+"""Largest difference of W V from the unit matrix."""
 
 STEP_TIMES_EIGENVALUE = np.linspace(0.0, 3.0, 601)[1:]
-"""Sizes of step times eigenvalue at which its stability is looked at; on the real axis it ends at 2.785."""
+"""Magnitudes of step times eigenvalue at which stability is tested; on the real axis the stable range ends at 2.785."""
 
 
 @dataclass(frozen=True)
 class Modes:
-    """Eigenmodes of a system. rates (n,) : eigenvalues in 1/s; V (n, n) : eigenvectors as columns; W (n, n) : inverse
-    of V.
+    """Eigenmodes of a linear system. rates (n,) : eigenvalues in 1/s; V (n, n) : eigenvectors as columns; W (n, n) :
+    inverse of V.
     """
 
     rates: np.ndarray
@@ -34,7 +36,7 @@ class Modes:
     W: np.ndarray
 
     def of(self, A: np.ndarray) -> "Modes | None":
-        """These modes, if they are the modes of A and no two eigenvectors are too nearly parallel to be of use; else
+        """These modes, if they are accurate modes of the matrix A and no two eigenvectors are nearly parallel; else
         None.
 
         The states are scaled as they balance A, so that units have no part in it.
@@ -46,11 +48,11 @@ class Modes:
         return self if deviation_of_inverse <= INVERSE_TOLERANCE and grows <= LARGEST_MODE_CONDITION else None
 
     def propagated(self, time: float, B: np.ndarray) -> np.ndarray:
-        """The product e^(A t) B (n, k) after a time t (s)."""
+        """The matrix product e^(A t) B (n, k) after a time t (s)."""
         return np.asarray(((self.V * np.exp(self.rates * time)) @ (self.W @ B)).real)
 
     def covariance(self, Q: np.ndarray) -> np.ndarray:
-        """Solution P (n, n) of the Lyapunov equation A P + P A' + Q = 0."""
+        """Stationary covariance P (n, n), the solution of the Lyapunov equation A P + P A' + Q = 0."""
         inner = -(self.W @ Q @ self.W.conj().T) / (self.rates[:, None] + self.rates.conj())
         return np.asarray((self.V @ inner @ self.V.conj().T).real)
 
@@ -62,7 +64,7 @@ class Modes:
         return np.asarray(-(y.conj()[:, :, None] * y[:, None, :]) / (self.rates.conj()[:, None] + self.rates))
 
     def adjoints(self, C: np.ndarray) -> np.ndarray:
-        """Adjoint L (p, n, n) in state coordinates for every output."""
+        """Adjoints L (p, n, n) in state coordinates for the outputs C (p, n); they solve A' L + L A + c' c = 0."""
         return np.asarray((self.W.conj().T @ self.adjoint_of_motions(C) @ self.W).real)
 
 
@@ -102,7 +104,9 @@ def _block_triangular(upper: np.ndarray, corner: np.ndarray, lower: np.ndarray) 
 
 
 def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
-    """Modes of a vehicle together with its axles' road filters F (m, m), for the state (x, f) and its matrix A."""
+    """Modes of a vehicle together with the road filters F (m, m) of its axles, for the state (x, f) and its matrix A;
+    None where they are unreliable.
+    """
     n, road = len(A) - axles * len(F), _modes_of_filters(F.tobytes(), len(F), axles)
     if road is None or vehicle is None:
         return None
@@ -114,7 +118,9 @@ def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int)
 
 
 def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
-    """Modes of a system together with the weighting filters of its outputs, for the state (x, w) and its matrix A."""
+    """Modes of a system together with the weighting filters of its outputs, for the state (x, w) and its matrix A; None
+    where they are unreliable.
+    """
     filters = _modes_of_weightings(names)
     if system is None or filters is None:
         return None
@@ -125,6 +131,7 @@ def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...
 
 @lru_cache(maxsize=256)
 def _modes_of_filters(F: bytes, filter_size: int, axles: int) -> Modes | None:
+    """Modes of the road filters of all axles; None where they are unreliable."""
     modes_of_filter = modes_of(np.frombuffer(F).reshape(filter_size, filter_size))
     if modes_of_filter is None:
         return None
@@ -137,6 +144,7 @@ def _modes_of_filters(F: bytes, filter_size: int, axles: int) -> Modes | None:
 
 @lru_cache(maxsize=64)
 def _modes_of_weightings(names: tuple[str, ...]) -> Modes | None:
+    """Modes of the weighting filters of these names; None where they are unreliable."""
     parts = [modes_of(WEIGHTINGS[name].matrices()[0]) for name in names]
     filters = [filter_modes for filter_modes in parts if filter_modes]
     if len(filters) < len(parts):

@@ -1,4 +1,4 @@
-"""What leaving effects out changes near a scene: between its speeds, and with parameters a few per cent off.
+"""Changes by leaving effects out near a ride scene: between its speeds, and with vehicle parameters a few per cent off.
 
 A change e of a deviation is told by sums over frequencies, J = sum of |H(w) u(w)|^2, H the outputs by the heights u of
 the road, for the whole scene and for what is left. One solution tells the slopes of e by all parameters and at all
@@ -23,13 +23,15 @@ from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
 LOBE_FREQUENCY, LEAST_SPEEDS = 12.0, 10
-"""Speeds so close that waves of this frequency (Hz) turn by an eighth between axles, and at least so many."""
+"""Frequency (Hz) of waves that turn by at most an eighth between axles from one speed to the next, and the least number
+of speeds.
+"""
 SLOPE_SPEEDS = 9
-"""Speeds at which slopes are told."""
+"""Number of speeds at which sensitivities to parameters are computed."""
 FREQUENCY_ENDS = 1e-3, 1e5
-"""First and last frequency, by the slowest and the fastest motion."""
+"""Lowest and highest frequency of integration, as ratios to the slowest and the fastest eigenvalue."""
 ROUNDING_SHARE = 1e-9
-"""Share of the largest slope up to which one is nothing but rounding."""
+"""Share of the largest sensitivity up to which a sensitivity is only rounding."""
 
 
 def speeds_between(scene: ReducedScene, listed_speeds: np.ndarray) -> np.ndarray:
@@ -47,8 +49,8 @@ def speeds_between(scene: ReducedScene, listed_speeds: np.ndarray) -> np.ndarray
 
 @dataclass(frozen=True)
 class Spectra:
-    """variances (speeds, quantities) of a scene; slopes (v, q, p) : first-order changes of these if each parameter is
-    off by itself.
+    """Variances (speeds, quantities) of a scene, and their slopes (v, q, p): first-order changes of the variances if
+    each parameter is off by itself.
     """
 
     variances: np.ndarray
@@ -56,8 +58,8 @@ class Spectra:
 
 
 class Neighbourhood:
-    """Quantities of a scene at all speeds (m/s) of its range, and with parameters off. Quantities are outputs with the
-    names of their weightings, "" for none.
+    """Quantities of a ride scene at all speeds (m/s) of its range, and with parameters off. Quantities are outputs with
+    the names of their weightings, "" for none.
 
     off : vehicles with parameters off that were made.
     """
@@ -80,7 +82,7 @@ class Neighbourhood:
 
     def changes(self, reduced_scene: ReducedScene, factors: Mapping[Parameter, float] | None = None) -> np.ndarray:
         """Relative changes (v, q) of standard deviations from the full to the reduced scene; ``factors`` : of
-        parameters that are off in both.
+        parameters that are off in both scenes.
         """
         if not factors:
             return np.asarray(np.sqrt(self._variances(reduced_scene, self.vehicles) / self.whole) - 1.0)
@@ -94,8 +96,8 @@ class Neighbourhood:
         return np.asarray(changes)
 
     def corners(self, reduced_scene: ReducedScene) -> list[dict[Parameter, float]]:
-        """For each quantity, factors of all parameters with which its change is the largest, to first order, at any of
-        a few speeds.
+        """For each quantity, the factors of all parameters with which its change is the largest, to first order, at any
+        of a few speeds.
         """
         left, full = self._slopes(reduced_scene), self.at_few
         ratio = np.sqrt(left.variances / full.variances)
@@ -106,7 +108,7 @@ class Neighbourhood:
         return [dict(zip(self.parameters, 1.0 + PARAMETER_ERROR * sign, strict=True)) for sign in signs]
 
     def _variances(self, scene: ReducedScene, vehicles: Vehicles) -> np.ndarray:
-        """Variances (v, q) of a scene at all speeds."""
+        """Variances (v, q) of a scene's quantities at all speeds."""
         groups = _speeds_with_same_matrices(scene.vehicle, self.speeds)
         return np.concatenate([self._frequency_sum(scene, vehicles, speeds).variances for speeds in groups])
 
@@ -114,7 +116,9 @@ class Neighbourhood:
         return FrequencySum(vehicles.roads.of(scene), vehicles.of(scene, float(speeds[0])), self.quantities, speeds)
 
     def _slopes(self, scene: ReducedScene) -> Spectra:
-        """Variances of a scene at a few speeds, with their first-order changes by each parameter that is off."""
+        """Variances of a scene's quantities at a few speeds, with their first-order changes by each parameter that is
+        off.
+        """
         variances, slopes = [], []
         for speeds in _speeds_with_same_matrices(scene.vehicle, self.few):
             total, vehicle = (
@@ -128,7 +132,7 @@ class Neighbourhood:
         return Spectra(np.concatenate(variances), np.concatenate(slopes))
 
     def _shifts_of(self, vehicle: SpatialVehicle, speed: float) -> Shifts:
-        """Changes of a vehicle's matrices with all parameters. Those of the full vehicle are used where only bars and
+        """Changes of a vehicle's matrices with all parameters. The full vehicle's changes are used where only bars and
         the damping of tyres are removed and gravity is absent.
         """
         full_vehicle = self.scene.vehicle
@@ -143,6 +147,7 @@ class Neighbourhood:
         return self._parameter_shifts(vehicle, speed)
 
     def _parameter_shifts(self, vehicle: SpatialVehicle, speed: float) -> Shifts:
+        """Changes of a vehicle's matrices with all parameters, computed once for each vehicle and speed."""
         key = vehicle, of_speed(vehicle, speed)
         if key not in self._shifts:
             linear, factor = self.vehicles.linear, 1.0 + PARAMETER_ERROR
@@ -154,7 +159,7 @@ class Neighbourhood:
 
 
 class FrequencySum:
-    """Sums over frequencies (w,) for a reduced scene at speeds (m/s)."""
+    """Variances as sums over frequencies (w,) for a reduced scene at speeds (m/s)."""
 
     def __init__(
         self, excitation: Excitation, vehicle: ReducedVehicle, quantities: Sequence[tuple[int, str]], speeds: np.ndarray
@@ -169,21 +174,23 @@ class FrequencySum:
 
     @property
     def variances(self) -> np.ndarray:
-        """Variances (v, q) of the quantities."""
+        """Variances (v, q) of the quantities at each speed."""
         H = np.sqrt(self.weights)[..., None] * self.response.H
         rows = H.reshape(-1, H.shape[2])
         gains = [(rows @ heights).reshape(*H.shape[:2], -1) for heights in self.excitation.heights]
         return variances(gains, self.excitation, self.speeds, self.omega, self.apart)
 
     def heights(self) -> np.ndarray:
-        """Transfer functions (v, w, wheels, k) from unit noises to heights under the wheels."""
+        """Transfer functions (v, w, wheels, k) from unit noises to road heights under the wheels."""
         states_of_axle = filter_states(self.excitation, self.speeds, self.omega)
         road = at_axles(states_of_axle, self.excitation, self.speeds, self.omega, self.apart)
         return np.asarray(np.hstack(self.excitation.heights) @ road)
 
 
 def _signs_of_slopes(slopes: np.ndarray) -> np.ndarray:
-    """Signs of slopes (p,): 1 or -1; 1 also for slopes that vanish, whose sign would come from rounding."""
+    """Signs of sensitivities (p,): 1 or -1; 1 also where a sensitivity vanishes, since its sign would come from
+    rounding.
+    """
     return np.where(slopes < -ROUNDING_SHARE * abs(slopes).max(initial=0.0), -1.0, 1.0)
 
 
@@ -193,7 +200,7 @@ def _speeds_with_same_matrices(vehicle: SpatialVehicle, speeds: np.ndarray) -> l
 
 
 def _vehicle_eigenvalues(vehicle: LinearVehicle) -> np.ndarray:
-    """Eigenvalues (1/s) of a vehicle; with massless bodies there are fewer."""
+    """Finite eigenvalues (1/s) of a linear vehicle; massless bodies reduce their number."""
     n = len(vehicle.mass)
     left = np.block([[np.eye(n), np.zeros((n, n))], [np.zeros((n, n)), vehicle.mass]])
     right = np.block([[np.zeros((n, n)), np.eye(n)], [-vehicle.stiffness, -vehicle.damping]])
