@@ -77,9 +77,9 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         single_effects = [_effect_alone(chooser, effect) for effect in chooser.effects]
         watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
-        write(chooser.rest(frozenset(choice.left_out)), folder)
+        write(chooser.reduced_scene_without(frozenset(choice.left_out)), folder)
     progress("what is left", 0.9)
-    results = _deviation_results(scene, chooser.rest(frozenset(choice.left_out)))
+    results = _deviation_results(scene, chooser.reduced_scene_without(frozenset(choice.left_out)))
     _save_effect_table(scene, single_effects, choice, watts, (results, chooser.counts), folder)
     choice_figure(scene, single_effects, choice, watts, results, folder / "choice.png")
     return {

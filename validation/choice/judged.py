@@ -59,7 +59,7 @@ def _by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -
 def worst_nearby(chooser: Chooser, omitted_effects: EffectSet, draws: int, seed: int) -> float:
     """Ratio of the largest change to the tolerance, over random speeds in the range with random errors of all
     parameters."""
-    random, reduced_scene, worst = np.random.default_rng(seed), chooser.rest(omitted_effects), 0.0
+    random, reduced_scene, worst = np.random.default_rng(seed), chooser.reduced_scene_without(omitted_effects), 0.0
     low, high = chooser.full_scenes[0].speed, chooser.full_scenes[-1].speed
     names = uncertain_parameters(chooser.scene.vehicle)
     for _ in range(draws):

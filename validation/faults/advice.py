@@ -212,14 +212,14 @@ def _dearest_choice(timed_choices: list[SettingChoice], engine: str, cost_kind: 
     return max(timed_choices, key=lambda choice: choice.calls, default=None)
 
 
-def _mean_error(self: ReferenceTruth, other_answer: PricedRun) -> float:
-    exact = values_at(self.answer, other_answer.times, self.kink_period)
-    return float(np.abs(other_answer.values - exact).mean()) if np.isfinite(other_answer.values).all() else np.inf
+def _mean_error(self: ReferenceTruth, other_run: PricedRun) -> float:
+    exact = values_at(self.run, other_run.times, self.kink_period)
+    return float(np.abs(other_run.values - exact).mean()) if np.isfinite(other_run.values).all() else np.inf
 
 
-def _numbers_alone(self: ReferenceTruth, other_answer: PricedRun) -> float:
-    exact = values_at(self.answer, other_answer.times, self.kink_period)
-    return float(np.nanmax(np.abs(other_answer.values - exact)))
+def _numbers_alone(self: ReferenceTruth, other_run: PricedRun) -> float:
+    exact = values_at(self.run, other_run.times, self.kink_period)
+    return float(np.nanmax(np.abs(other_run.values - exact)))
 
 
 def _first_rung(

@@ -178,7 +178,8 @@ FAULTS = (
         "parameters that are off taken as they stand",
         "choice of linear scenes",
         attribute_patch(
-            f"{LINEAR_MODULES}.choose:Chooser.off", lambda real: lambda chooser, chosen: chooser.between(chosen)
+            f"{LINEAR_MODULES}.choose:Chooser.off",
+            lambda real: lambda chooser, chosen: chooser.changes_between_speeds(chosen),
         ),
     ),
     CampaignFault(

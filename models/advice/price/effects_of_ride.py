@@ -93,7 +93,7 @@ def _counts_of_scene(system: Reduced) -> dict[str, int]:
     """Counts of a linear ride system: states, and right-hand side calls per second of motion with the longest stable
     step.
     """
-    of_run = cost(system.of_vehicle, system.excitation)
+    of_run = cost(system.reduced_vehicle, system.excitation)
     return {"states": of_run.states, "calls per second": round(of_run.calls) if np.isfinite(of_run.calls) else 0}
 
 

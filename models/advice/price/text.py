@@ -21,8 +21,8 @@ def recommendation_lines(recommendation: Recommendation) -> list[str]:
     """
     scene = recommendation.scene
     first = (
-        f"  over the first {scene.searched_duration:g} s, where all methods are tried: {recommendation.search_truth.origin} "
-        f"{recommendation.search_truth.uncertainty:.1e} {scene.unit}"
+        f"  over the first {scene.searched_duration:g} s, where all methods are tried: "
+        f"{recommendation.search_truth.origin} {recommendation.search_truth.uncertainty:.1e} {scene.unit}"
     )
     doubt = (
         f"  DOUBT: {scene.quantity} is at most {recommendation.truth.size:.3g} {scene.unit} itself: "

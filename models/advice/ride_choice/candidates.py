@@ -12,8 +12,8 @@ import numpy as np
 
 from models.advice.ride_choice.march import Cost, March, cost, longest_step
 from models.advice.ride_choice.neighbourhood import Neighbourhood
-from models.advice.ride_choice.reduced import FullScene, Reduced, Vehicles, of_speed
-from models.advice.ride_choice.screen import Screen, exact_variances, solved_in_motions, whole_variances
+from models.advice.ride_choice.reduced import FullScene, Reduced, Vehicles, speed_if_needed
+from models.advice.ride_choice.screen import Screen, exact_variances, variances_from_modes, variances_and_rounding
 from models.core.errors import InputError
 from models.core.runge_kutta import RK4_STAGES
 from models.systems.ride.omissions import effects_of
@@ -41,9 +41,9 @@ def cached_in_object(method: Method) -> Method:
     @wraps(method)
     def answer(candidates: "Candidates", *asked: Any) -> Any:
         key = method.__name__, *asked
-        if key not in candidates.answers:
-            candidates.answers[key] = method(candidates, *asked)
-        return candidates.answers[key]
+        if key not in candidates.cached_results:
+            candidates.cached_results[key] = method(candidates, *asked)
+        return candidates.cached_results[key]
 
     return cast(Method, answer)
 
@@ -57,16 +57,18 @@ class Candidates:
         self, scene: ReducedScene, speeds: Sequence[float] | np.ndarray, quantities: Sequence[str], tolerance: float
     ) -> None:
         self.scene, self.tolerance, self.effects = scene, tolerance, effects_of(scene)
-        self.answers: dict[tuple[Any, ...], Any] = {}
+        self.cached_results: dict[tuple[Any, ...], Any] = {}
         self.vehicles, self.solved_equations = Vehicles(scene.vehicle, float(speeds[0])), 0
         self.full_scenes = [FullScene(scene, float(speed), self.vehicles) for speed in speeds]
         names = self.full_scenes[0].full.system.names
         self.quantities, self.rows = tuple(quantities), [names.index(name) for name in quantities]
         speed_count = min(SCREENED_SPEEDS, len(speeds))
-        self.screened = [self.full_scenes[i] for i in np.linspace(0, len(speeds) - 1, speed_count).round().astype(int)]
-        self._suspects, self.full = list(self.screened), list[np.ndarray]()
+        self.screened_scenes = [
+            self.full_scenes[i] for i in np.linspace(0, len(speeds) - 1, speed_count).round().astype(int)
+        ]
+        self._suspects, self.full = list(self.screened_scenes), list[np.ndarray]()
         for full_scene in self.full_scenes:
-            variances, silent = whole_variances(full_scene.full, self.rows)
+            variances, silent = variances_and_rounding(full_scene.full, self.rows)
             self.full.append(variances)
             for name, variance, smallest_variance in zip(quantities, variances, silent, strict=True):
                 if not smallest_variance < variance < inf:
@@ -74,7 +76,7 @@ class Candidates:
                     raise InputError("", f"quantities.{name}", None, allowed)
         Screen(self.full_scenes[0].full, self.rows)  # refuses a vehicle that cannot be screened
         plain = [self._row_and_weighting(name) for name in quantities]
-        self.near = Neighbourhood(scene, np.asarray(speeds, float), plain, self.vehicles)
+        self.neighbourhood = Neighbourhood(scene, np.asarray(speeds, float), plain, self.vehicles)
 
     @classmethod
     def of(cls, ride: RideScene) -> Self:
@@ -96,10 +98,13 @@ class Candidates:
         """Numbers of eigenvalue problems, one for each vehicle that was built, and of Lyapunov equations that were
         solved.
         """
-        return {"eigenvalue problems": len(self.vehicles) + self.near.off, "Lyapunov equations": self.solved_equations}
+        return {
+            "eigenvalue problems": len(self.vehicles) + self.neighbourhood.perturbed_vehicle_count,
+            "Lyapunov equations": self.solved_equations,
+        }
 
     @cached_in_object
-    def rest(self, omitted_effects: EffectSet) -> ReducedScene:
+    def reduced_scene_without(self, omitted_effects: EffectSet) -> ReducedScene:
         """The ride scene without these effects."""
         return reduced_without(self.scene, sorted(omitted_effects, key=lambda effect: effect.name))
 
@@ -107,7 +112,7 @@ class Candidates:
     def system(self, full_scene: FullScene, omitted_effects: EffectSet) -> Reduced | None:
         """The linear system of the scene without these effects at a speed; None where no meaningful system remains."""
         try:
-            return full_scene.reduced(self.rest(omitted_effects))
+            return full_scene.reduced(self.reduced_scene_without(omitted_effects))
         except InputError:
             return None
 
@@ -134,7 +139,7 @@ class Candidates:
         inf where no system remains.
         """
         return largest_changes(
-            np.array([self._predicted_at(full_scene, omitted_effects) for full_scene in self.screened])
+            np.array([self._predicted_at(full_scene, omitted_effects) for full_scene in self.screened_scenes])
         )
 
     @cached_in_object
@@ -180,7 +185,7 @@ class Candidates:
         """Whether at the screened speeds the identity of covariance and adjoint holds in extended precision, and agrees
         with the variances from eigenmodes.
         """
-        return all(self._exact(full_scene, omitted_effects) for full_scene in self.screened)
+        return all(self._exact(full_scene, omitted_effects) for full_scene in self.screened_scenes)
 
     def _exact(self, full_scene: FullScene, omitted_effects: EffectSet) -> bool:
         screen, reduced = self.screen(full_scene, frozenset()), self.system(full_scene, omitted_effects)
@@ -188,7 +193,7 @@ class Candidates:
             return False
         self.solved_equations += 1 + len(self.rows)
         certificate_variances, variance = screen.certificate_sides(reduced)
-        by_motions = solved_in_motions(reduced, self.rows)
+        by_motions = variances_from_modes(reduced, self.rows)
         agrees_with_motions = by_motions is None or bool(
             (abs(by_motions / variance - 1.0) <= VARIANCE_DIFFERENCE).all()
         )
@@ -204,7 +209,7 @@ class Candidates:
 
     def _solve(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
-        variances = solved_in_motions(reduced, self.rows)
+        variances = variances_from_modes(reduced, self.rows)
         return exact_variances(reduced, self.rows) if variances is None else variances
 
     def _changes_at_speed(
@@ -223,30 +228,35 @@ class Candidates:
         return np.asarray(np.sqrt(left / full) - 1.0)
 
     @cached_in_object
-    def between(self, omitted_effects: EffectSet) -> np.ndarray:
+    def changes_between_speeds(self, omitted_effects: EffectSet) -> np.ndarray:
         """Relative changes (quantities,) of standard deviations, each the largest over all speeds of the range; inf
         where no system remains.
         """
         reduced = self.system(self.full_scenes[0], omitted_effects)
         if reduced is None or not all((d[self.rows] == 0).all() for d in reduced.system.D):
             return np.full(len(self.rows), inf)
-        return largest_changes(self.near.changes(self.rest(omitted_effects)))
+        return largest_changes(self.neighbourhood.changes(self.reduced_scene_without(omitted_effects)))
 
     @cached_in_object
     def off(self, omitted_effects: EffectSet) -> np.ndarray:
         """Relative changes (quantities,) of standard deviations over all speeds of the range with parameters off, in
         the combination that is worst for each quantity.
         """
-        reduced_scene = self.rest(omitted_effects)
+        reduced_scene = self.reduced_scene_without(omitted_effects)
         return largest_changes(
-            np.concatenate([self.near.changes(reduced_scene, corner) for corner in self.near.corners(reduced_scene)])
+            np.concatenate(
+                [
+                    self.neighbourhood.changes(reduced_scene, corner)
+                    for corner in self.neighbourhood.corners(reduced_scene)
+                ]
+            )
         )
 
     def holds(self, changes: np.ndarray) -> bool:
         """Whether all relative changes (quantities,) are within the tolerance."""
         return bool((abs(changes) <= self.tolerance).all())
 
-    def told(self, changes: np.ndarray) -> str:
+    def largest_change_text(self, changes: np.ndarray) -> str:
         """Text on the largest of the relative changes (quantities,), with the quantity's name."""
         worst = int(abs(changes).argmax())
         return f"{self.quantities[worst]} by {100 * changes[worst]:+.3g} %"
@@ -256,11 +266,11 @@ class Candidates:
         """Cost of a run without these effects with the largest stable step, at the screened speed where it is highest;
         infinite where no meaningful system remains.
         """
-        reduced_scene = self.rest(omitted_effects)
-        independent_of_speed = of_speed(reduced_scene.vehicle, 0.0) is None
+        reduced_scene = self.reduced_scene_without(omitted_effects)
+        independent_of_speed = speed_if_needed(reduced_scene.vehicle, 0.0) is None
         costs = [
             self._cost(full_scene, reduced_scene)
-            for full_scene in (self.screened[:1] if independent_of_speed else self.screened)
+            for full_scene in (self.screened_scenes[:1] if independent_of_speed else self.screened_scenes)
         ]
         return max(costs, key=lambda c: c.calls)
 
@@ -275,28 +285,28 @@ class Candidates:
         """Cost of a run without these effects with the longest step with which reduction and time steps together keep
         the tolerance at all screened speeds.
         """
-        return self.at_step(
+        return self.cost_at_step(
             omitted_effects, longest_step(self.marches(omitted_effects), self.exact_deviations(), self.tolerance)
         )
 
     def exact_deviations(self) -> list[np.ndarray]:
         """Standard deviations (quantities,) of the full scene, one array for each of the screened speeds."""
-        return [np.sqrt(self.full[self.full_scenes.index(full_scene)]) for full_scene in self.screened]
+        return [np.sqrt(self.full[self.full_scenes.index(full_scene)]) for full_scene in self.screened_scenes]
 
     def marches(self, omitted_effects: EffectSet) -> list[March]:
         """Time integrations of the scene without these effects, one for each of the screened speeds."""
         weightings = tuple(
             (row, weighting_name)
-            for row, (_, weighting_name) in zip(self.rows, self.near.quantities, strict=True)
+            for row, (_, weighting_name) in zip(self.rows, self.neighbourhood.quantities, strict=True)
             if weighting_name
         )
-        reduced_scene = self.rest(omitted_effects)
+        reduced_scene = self.reduced_scene_without(omitted_effects)
         return [
             March(full_scene.reduced(reduced_scene), full_scene.speed, tuple(self.rows), weightings)
-            for full_scene in self.screened
+            for full_scene in self.screened_scenes
         ]
 
-    def at_step(self, omitted_effects: EffectSet, step: float) -> Cost:
+    def cost_at_step(self, omitted_effects: EffectSet, step: float) -> Cost:
         """Cost of a run without these effects with steps of ``step`` (s)."""
         return Cost(self.cost(omitted_effects).states, step, RK4_STAGES / step if step else inf)
 

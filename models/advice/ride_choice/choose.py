@@ -98,12 +98,15 @@ class Chooser(Candidates):
         """
         if not omitted_effects:
             return True
-        if not (self.holds(self.changes_by_modes(omitted_effects)) and self.holds(self.between(omitted_effects))):
+        if not (
+            self.holds(self.changes_by_modes(omitted_effects))
+            and self.holds(self.changes_between_speeds(omitted_effects))
+        ):
             return False
         why = self._cancellation_text(omitted_effects)
         perturbed_changes = np.zeros(len(self.rows)) if why else self.off(omitted_effects)
         if not self.holds(perturbed_changes):
-            why = f"changes {self.told(perturbed_changes)} with parameters 5 % off"
+            why = f"changes {self.largest_change_text(perturbed_changes)} with parameters 5 % off"
         if why:
             self.refusal_reasons[omitted_effects] = why
         return not why and omitted_effects not in self.uncertified_sets
@@ -119,10 +122,12 @@ class Chooser(Candidates):
         parts |= {f"all but {effect.name} change": omitted_effects - {effect} for effect in omitted_effects}
         for step_text, effect_set in parts.items():
             changes = (
-                np.zeros(len(self.rows)) if not effect_set or refusal_reason(effect_set) else self.between(effect_set)
+                np.zeros(len(self.rows))
+                if not effect_set or refusal_reason(effect_set)
+                else self.changes_between_speeds(effect_set)
             )
             if np.isfinite(changes).all() and not self.holds(changes):
-                return f"holds by errors that cancel: {step_text} {self.told(changes)}"
+                return f"holds by errors that cancel: {step_text} {self.largest_change_text(changes)}"
         return ""
 
     @cached_in_object
@@ -133,13 +138,13 @@ class Chooser(Candidates):
         step, marches = self.cost_at_equal_accuracy(omitted_effects).step, self.marches(omitted_effects)
         while step and not confirms_step(marches[len(marches) // 2], step):
             step *= STEP_FACTOR
-        return self.at_step(omitted_effects, step)
+        return self.cost_at_step(omitted_effects, step)
 
     def choose(self) -> RideChoice:
         """The choice by greedy search, confirmed, without effects whose removal saves nothing at equal accuracy."""
         chosen, rounds = self._certified_choice()
         unchanged, no_effects = np.zeros(len(self.rows)), frozenset[Effect]()
-        looks = (self.confirmed_changes, self.between, self.off)
+        looks = (self.confirmed_changes, self.changes_between_speeds, self.off)
         changes, between, perturbed_changes = (look(chosen) if chosen else unchanged for look in looks)
         return RideChoice(
             self.effects,
@@ -187,9 +192,9 @@ class Chooser(Candidates):
         """The set of effects to leave out by greedy search, and the number of sets that were tested, also those that
         failed.
         """
-        steps_taken, banned, rounds = [frozenset[Effect]()], set[EffectSet](), 0
+        steps_taken, refused_steps, rounds = [frozenset[Effect]()], set[EffectSet](), 0
         while rounds < MOST_CONFIRMATIONS:
-            path = self.path(steps_taken, banned)
+            path = self.path(steps_taken, refused_steps)
             if path == steps_taken:
                 break
             rounds += 1
@@ -201,7 +206,7 @@ class Chooser(Candidates):
                 middle = (low + high) // 2
                 rounds += 1
                 low, high = (middle, high) if self.within_tolerance(path[middle]) else (low, middle)
-            banned.add(path[high] - path[low])
+            refused_steps.add(path[high] - path[low])
             steps_taken = path[: low + 1]
         return steps_taken[-1], rounds
 
@@ -212,7 +217,9 @@ class Chooser(Candidates):
         fewer = [
             omitted_effects - {effect} for effect in omitted_effects if not refusal_reason(omitted_effects - {effect})
         ]
-        for smaller_set in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
+        for smaller_set in sorted(
+            fewer, key=lambda candidate: float(abs(self.changes_between_speeds(candidate)).max())
+        ):
             if self._costs_the_same(smaller_set, omitted_effects) and self.within_tolerance(smaller_set):
                 return self._without_worthless_effects(smaller_set)
         return omitted_effects
@@ -241,14 +248,14 @@ class Chooser(Candidates):
         }
         return {effect: change for effect, change in changes.items() if change < inf}
 
-    def path(self, first_sets: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
+    def path(self, first_sets: list[EffectSet], refused_steps: set[EffectSet]) -> list[EffectSet]:
         """Growing sets of omitted effects: ``first_sets``, continued one step at a time as far as predictions allow.
 
         A step saves calls, or where none does, work; there is none where none is within the tolerance.
         """
         path = list(first_sets)
-        while step := self._best_step(path[-1], banned, self._calls_saved) or self._best_step(
-            path[-1], banned, self._work_saved
+        while step := self._best_step(path[-1], refused_steps, self._calls_saved) or self._best_step(
+            path[-1], refused_steps, self._work_saved
         ):
             path.append(path[-1] | step)
         return path
@@ -280,7 +287,7 @@ class Chooser(Candidates):
         ]
         return self.single_effect_sets + [step | damping for step in white]
 
-    def _best_step(self, omitted_effects: EffectSet, banned: set[EffectSet], saving: SavingOfStep) -> EffectSet:
+    def _best_step(self, omitted_effects: EffectSet, refused_steps: set[EffectSet], saving: SavingOfStep) -> EffectSet:
         """The set of effects that saves the most for what it adds to the predicted error; empty if none keeps the
         tolerance.
         """
@@ -289,8 +296,8 @@ class Chooser(Candidates):
             further = omitted_effects | step
             if (
                 further == omitted_effects
-                or step - omitted_effects in banned
-                or step in banned
+                or step - omitted_effects in refused_steps
+                or step in refused_steps
                 or refusal_reason(further)
             ):
                 continue

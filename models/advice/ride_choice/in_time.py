@@ -246,7 +246,7 @@ def _linearised_spring(
     return spring
 
 
-_kept_roads: dict[tuple[object, ...], np.ndarray] = {}
+_stored_roads: dict[tuple[object, ...], np.ndarray] = {}
 
 
 def _road_heights(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
@@ -257,8 +257,8 @@ def _road_heights(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
     arrays = (array.tobytes() for array in (road.F, road.G, *road.heights))
     of_run = path.speed, path.half, steps, samples.copies, samples.seed
     key = (*arrays, road.lengths, road.independent, *of_run)
-    if key not in _kept_roads:
-        while sum(roads.nbytes for roads in _kept_roads.values()) > ROADS_BYTES:
-            del _kept_roads[next(iter(_kept_roads))]
-        _kept_roads[key] = next(path.blocks(steps, samples.copies, samples.seed))
-    return _kept_roads[key]
+    if key not in _stored_roads:
+        while sum(roads.nbytes for roads in _stored_roads.values()) > ROADS_BYTES:
+            del _stored_roads[next(iter(_stored_roads))]
+        _stored_roads[key] = next(path.blocks(steps, samples.copies, samples.seed))
+    return _stored_roads[key]

@@ -49,7 +49,7 @@ class March:
     weightings: tuple[tuple[int, str], ...]
 
     @cached_property
-    def vehicle(self) -> int:
+    def vehicle_state_count(self) -> int:
         """Number of states of the vehicle, which are the first ones of the system."""
         road = self.reduced.excitation
         return self.reduced.states - len(road.heights) * len(road.F)
@@ -59,14 +59,14 @@ class March:
         """Eigenvalues (n,) in 1/s of the vehicle, the matrix (q, n) from its modes to quantities, and the matrix (n, m
         + k) from the road's filters and noise to its modes.
         """
-        n, system, modes = self.vehicle, self.reduced.system, self.reduced.of_vehicle.modes
+        n, system, modes = self.vehicle_state_count, self.reduced.system, self.reduced.reduced_vehicle.modes
         rates, V = (modes.rates, modes.V) if modes else np.linalg.eig(system.A[:n, :n])
         back = modes.W if modes else np.linalg.inv(V)
         forced = np.hstack([system.A[:n, n : self.reduced.states], *(b[:n] for b in system.B)])
-        return rates, self.read[:, :n] @ V, back @ forced
+        return rates, self.output_matrix[:, :n] @ V, back @ forced
 
     @cached_property
-    def read(self) -> np.ndarray:
+    def output_matrix(self) -> np.ndarray:
         """Output matrix (q, n + m) from the states of vehicle and road to the quantities, before their weightings."""
         weighted, names = dict(self.weightings), self.reduced.system.names
         plain = [
@@ -77,7 +77,7 @@ class March:
     @cached_property
     def longest_stable_step(self) -> float:
         """Longest step (s) with which the Runge-Kutta integration of the vehicle is stable."""
-        return self.reduced.of_vehicle.stable_step
+        return self.reduced.reduced_vehicle.stable_step
 
     def deviations(self, step: float) -> np.ndarray:
         """Standard deviations (q,) of the quantities, as sampled by a run with steps of ``step`` (s)."""
@@ -110,7 +110,7 @@ class March:
         )
         shape = len(half), len(read_modes), axles, m
         outer = motions @ (begin[:, None] * by_road) + end[:, None] * (motions @ by_road)
-        outer += self.read[:, self.vehicle :].reshape(-1)
+        outer += self.output_matrix[:, self.vehicle_state_count :].reshape(-1)
         inner = motions @ (middle[:, None] * by_road)
         noisy = by_noise.any()
         noise = (motions @ ((begin + middle + 1)[:, None] * by_noise)).reshape(len(half), -1, k) if noisy else None

@@ -56,7 +56,7 @@ class Modes:
         inner = -(self.W @ Q @ self.W.conj().T) / (self.rates[:, None] + self.rates.conj())
         return np.asarray((self.V @ inner @ self.V.conj().T).real)
 
-    def adjoint_of_motions(self, C: np.ndarray) -> np.ndarray:
+    def modal_adjoint(self, C: np.ndarray) -> np.ndarray:
         """Adjoint Z (p, n, n) in modal coordinates for every output c (p, n). The adjoint L = W* Z W solves A' L + L A
         + c' c = 0.
         """
@@ -65,7 +65,7 @@ class Modes:
 
     def adjoints(self, C: np.ndarray) -> np.ndarray:
         """Adjoints L (p, n, n) in state coordinates for the outputs C (p, n); they solve A' L + L A + c' c = 0."""
-        return np.asarray((self.W.conj().T @ self.adjoint_of_motions(C) @ self.W).real)
+        return np.asarray((self.W.conj().T @ self.modal_adjoint(C) @ self.W).real)
 
 
 def modes_of(A: np.ndarray) -> Modes | None:
@@ -77,7 +77,7 @@ def modes_of(A: np.ndarray) -> Modes | None:
         return None
 
 
-def driven_motions(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
+def modes_of_cascade(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
     """Modes of the coupled system u' = A_u u, x' = A_x x + coupling u with state (u, x); None where an eigenvalue
     belongs to both.
     """
@@ -86,12 +86,12 @@ def driven_motions(driver: Modes | None, coupling: np.ndarray, system: Modes | N
     rate_differences = driver.rates - system.rates[:, None]
     if not rate_differences.all():
         return None
-    met = (system.W @ coupling @ driver.V) / rate_differences
+    coupling_in_modes = (system.W @ coupling @ driver.V) / rate_differences
     rates = np.concatenate([driver.rates, system.rates])
     return Modes(
         rates,
-        _block_triangular(driver.V, system.V @ met, system.V),
-        _block_triangular(driver.W, -met @ driver.W, system.W),
+        _block_triangular(driver.V, system.V @ coupling_in_modes, system.V),
+        _block_triangular(driver.W, -coupling_in_modes @ driver.W, system.W),
     )
 
 
@@ -103,21 +103,21 @@ def _block_triangular(upper: np.ndarray, corner: np.ndarray, lower: np.ndarray) 
     return full
 
 
-def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
+def modes_with_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
     """Modes of a vehicle together with the road filters F (m, m) of its axles, for the state (x, f) and its matrix A;
     None where they are unreliable.
     """
     n, road = len(A) - axles * len(F), _modes_of_filters(F.tobytes(), len(F), axles)
     if road is None or vehicle is None:
         return None
-    coupled_modes = driven_motions(road, A[:n, n:], vehicle)
+    coupled_modes = modes_of_cascade(road, A[:n, n:], vehicle)
     if coupled_modes is None:
         return None
     order = np.concatenate([np.arange(len(A) - n, len(A)), np.arange(len(A) - n)])
     return Modes(coupled_modes.rates, coupled_modes.V[order], coupled_modes.W[:, order]).of(A)
 
 
-def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
+def modes_with_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
     """Modes of a system together with the weighting filters of its outputs, for the state (x, w) and its matrix A; None
     where they are unreliable.
     """
@@ -125,7 +125,7 @@ def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...
     if system is None or filters is None:
         return None
     n = len(system.rates)
-    coupled_modes = driven_motions(system, A[n:, :n], filters)
+    coupled_modes = modes_of_cascade(system, A[n:, :n], filters)
     return None if coupled_modes is None else coupled_modes.of(A)
 
 

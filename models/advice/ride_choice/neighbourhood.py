@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eigvals
 
 from models.advice.ride_choice.parameters import PARAMETER_ERROR, Parameter, scaled_vehicle, uncertain_parameters
-from models.advice.ride_choice.reduced import ReducedVehicle, Vehicles, of_speed
+from models.advice.ride_choice.reduced import ReducedVehicle, Vehicles, speed_if_needed
 from models.advice.ride_choice.response import Response
 from models.advice.ride_choice.slopes import Sensitivity, Shifts
 from models.advice.ride_choice.waves import at_axles, filter_states, frequency_panels, variances, weighting_factors
@@ -61,7 +61,7 @@ class Neighbourhood:
     """Quantities of a ride scene at all speeds (m/s) of its range, and with parameters off. Quantities are outputs with
     the names of their weightings, "" for none.
 
-    off : vehicles with parameters off that were made.
+    perturbed_vehicle_count : number of vehicles with parameters off that were built.
     """
 
     def __init__(
@@ -74,34 +74,36 @@ class Neighbourhood:
         self.scene, self.quantities = scene, quantities
         self.speeds = speeds_between(scene, listed_speeds)
         self.vehicles = Vehicles(scene.vehicle, float(self.speeds[0])) if vehicles is None else vehicles
-        self.off = 0
+        self.perturbed_vehicle_count = 0
         self.parameters = uncertain_parameters(scene.vehicle)
-        self.few = self.speeds[np.unique(np.linspace(0, len(self.speeds) - 1, SLOPE_SPEEDS).round().astype(int))]
+        self.slope_speeds = self.speeds[
+            np.unique(np.linspace(0, len(self.speeds) - 1, SLOPE_SPEEDS).round().astype(int))
+        ]
         self._shifts: dict[Hashable, Shifts] = {}
-        self.whole, self.at_few = self._variances(scene, self.vehicles), self._slopes(scene)
+        self.full_variances, self.spectra_at_slope_speeds = self._variances(scene, self.vehicles), self._slopes(scene)
 
     def changes(self, reduced_scene: ReducedScene, factors: Mapping[Parameter, float] | None = None) -> np.ndarray:
         """Relative changes (v, q) of standard deviations from the full to the reduced scene; ``factors`` : of
         parameters that are off in both scenes.
         """
         if not factors:
-            return np.asarray(np.sqrt(self._variances(reduced_scene, self.vehicles) / self.whole) - 1.0)
+            return np.asarray(np.sqrt(self._variances(reduced_scene, self.vehicles) / self.full_variances) - 1.0)
         scene, reduced_scene = (
             replace(any_scene, vehicle=scaled_vehicle(any_scene.vehicle, factors))
             for any_scene in (self.scene, reduced_scene)
         )
         vehicles = Vehicles(scene.vehicle, float(self.speeds[0]), self.vehicles.roads)
         changes = np.sqrt(self._variances(reduced_scene, vehicles) / self._variances(scene, vehicles)) - 1.0
-        self.off += len(vehicles)
+        self.perturbed_vehicle_count += len(vehicles)
         return np.asarray(changes)
 
     def corners(self, reduced_scene: ReducedScene) -> list[dict[Parameter, float]]:
         """For each quantity, the factors of all parameters with which its change is the largest, to first order, at any
         of a few speeds.
         """
-        left, full = self._slopes(reduced_scene), self.at_few
-        ratio = np.sqrt(left.variances / full.variances)
-        logs = [spectra.slopes / spectra.variances[..., None] for spectra in (left, full)]
+        reduced, full = self._slopes(reduced_scene), self.spectra_at_slope_speeds
+        ratio = np.sqrt(reduced.variances / full.variances)
+        logs = [spectra.slopes / spectra.variances[..., None] for spectra in (reduced, full)]
         slopes = ratio[..., None] / 2 * (logs[0] - logs[1])
         worst = (abs(ratio - 1) + abs(slopes).sum(axis=2)).argmax(axis=0)
         signs = [_signs_of_slopes(slopes[i, q]) * (1.0 if ratio[i, q] >= 1 else -1.0) for q, i in enumerate(worst)]
@@ -120,7 +122,7 @@ class Neighbourhood:
         off.
         """
         variances, slopes = [], []
-        for speeds in _speeds_with_same_matrices(scene.vehicle, self.few):
+        for speeds in _speeds_with_same_matrices(scene.vehicle, self.slope_speeds):
             total, vehicle = (
                 self._frequency_sum(scene, self.vehicles, speeds),
                 self.vehicles.of(scene, float(speeds[0])),
@@ -148,7 +150,7 @@ class Neighbourhood:
 
     def _parameter_shifts(self, vehicle: SpatialVehicle, speed: float) -> Shifts:
         """Changes of a vehicle's matrices with all parameters, computed once for each vehicle and speed."""
-        key = vehicle, of_speed(vehicle, speed)
+        key = vehicle, speed_if_needed(vehicle, speed)
         if key not in self._shifts:
             linear, factor = self.vehicles.linear, 1.0 + PARAMETER_ERROR
             changed_vehicles = [
@@ -167,7 +169,9 @@ class FrequencySum:
         self.excitation, self.speeds = excitation, speeds
         rates = vehicle.modes.rates if vehicle.modes else _vehicle_eigenvalues(vehicle.linear)
         ends = FREQUENCY_ENDS[0] * abs(rates).min(), FREQUENCY_ENDS[1] * abs(rates).max()
-        self.omega, weights, self.apart = frequency_panels(rates, max(self.excitation.lengths) / float(speeds[0]), ends)
+        self.omega, weights, self.is_independent = frequency_panels(
+            rates, max(self.excitation.lengths) / float(speeds[0]), ends
+        )
         factors = weighting_factors([name for _, name in quantities], self.omega).T
         self.weights = weights[:, None] * abs(factors) ** 2 / np.pi
         self.response = Response(vehicle, [row for row, _ in quantities], self.omega)
@@ -178,12 +182,12 @@ class FrequencySum:
         H = np.sqrt(self.weights)[..., None] * self.response.H
         rows = H.reshape(-1, H.shape[2])
         gains = [(rows @ heights).reshape(*H.shape[:2], -1) for heights in self.excitation.heights]
-        return variances(gains, self.excitation, self.speeds, self.omega, self.apart)
+        return variances(gains, self.excitation, self.speeds, self.omega, self.is_independent)
 
     def heights(self) -> np.ndarray:
         """Transfer functions (v, w, wheels, k) from unit noises to road heights under the wheels."""
         states_of_axle = filter_states(self.excitation, self.speeds, self.omega)
-        road = at_axles(states_of_axle, self.excitation, self.speeds, self.omega, self.apart)
+        road = at_axles(states_of_axle, self.excitation, self.speeds, self.omega, self.is_independent)
         return np.asarray(np.hstack(self.excitation.heights) @ road)
 
 
@@ -196,7 +200,7 @@ def _signs_of_slopes(slopes: np.ndarray) -> np.ndarray:
 
 def _speeds_with_same_matrices(vehicle: SpatialVehicle, speeds: np.ndarray) -> list[np.ndarray]:
     """Groups of speeds (m/s) at which the vehicle has the same matrices."""
-    return [speeds] if of_speed(vehicle, 0.0) is None else [speeds[[i]] for i in range(len(speeds))]
+    return [speeds] if speed_if_needed(vehicle, 0.0) is None else [speeds[[i]] for i in range(len(speeds))]
 
 
 def _vehicle_eigenvalues(vehicle: LinearVehicle) -> np.ndarray:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from models.advice.ride_choice.modes import Modes, behind_road, behind_weightings, modes_of, stable_step
+from models.advice.ride_choice.modes import Modes, modes_with_road, modes_with_weightings, modes_of, stable_step
 from models.core.errors import InputError
 from models.core.scene_effects import tables_of
 from models.ride.covariance import noise_of
@@ -57,7 +57,7 @@ class Reduced:
     and road, which precede those of the ``weightings`` (their names).
     """
 
-    of_vehicle: ReducedVehicle
+    reduced_vehicle: ReducedVehicle
     excitation: Excitation
     system: DelayedSystem
     T: np.ndarray
@@ -68,14 +68,14 @@ class Reduced:
     @property
     def vehicle(self) -> LinearVehicle:
         """Matrices M, D, K of the reduced vehicle."""
-        return self.of_vehicle.linear
+        return self.reduced_vehicle.linear
 
     @cached_property
     def modes(self) -> Modes | None:
         """Eigenmodes of vehicle, road and weightings together; None where eigenvectors are nearly parallel."""
         A, axles, m = self.system.A[: self.states, : self.states], len(self.excitation.heights), len(self.excitation.F)
-        modes = behind_road(A, self.of_vehicle.modes, A[-m:, -m:], axles)
-        return behind_weightings(self.system.A, modes, self.weightings) if self.weightings else modes
+        modes = modes_with_road(A, self.reduced_vehicle.modes, A[-m:, -m:], axles)
+        return modes_with_weightings(self.system.A, modes, self.weightings) if self.weightings else modes
 
     @cached_property
     def noise(self) -> np.ndarray:
@@ -83,7 +83,7 @@ class Reduced:
         return noise_of(self.system, self.modes.propagated if self.modes else None)
 
 
-class Numbers:
+class IndexNumbers:
     """Index numbers of values, the same for equal values. An object that was seen before is recognised by its identity,
     without a long hash.
     """
@@ -120,8 +120,8 @@ class Roads:
     """Road excitations of reduced scenes, each computed once for all speeds."""
 
     def __init__(self) -> None:
-        self._numbers = Numbers()
-        self._made: dict[int, Excitation] = {}
+        self._numbers = IndexNumbers()
+        self._stored: dict[int, Excitation] = {}
 
     def number(self, scene: ReducedScene) -> int:
         """Index number that is the same for scenes with the same road: the same road effects, and the same tables that
@@ -133,9 +133,9 @@ class Roads:
     def of(self, scene: ReducedScene) -> Excitation:
         """The road excitation of a reduced scene, computed when it is first requested."""
         number = self.number(scene)
-        if number not in self._made:
-            self._made[number] = scene.excitation()
-        return self._made[number]
+        if number not in self._stored:
+            self._stored[number] = scene.excitation()
+        return self._stored[number]
 
 
 class Vehicles:
@@ -145,22 +145,22 @@ class Vehicles:
 
     def __init__(self, full_vehicle: SpatialVehicle, speed: float, roads: Roads | None = None) -> None:
         self.roads = roads or Roads()
-        self._numbers = Numbers()
-        self._made: dict[Hashable, ReducedVehicle] = {}
+        self._numbers = IndexNumbers()
+        self._stored: dict[Hashable, ReducedVehicle] = {}
         self._linear: dict[Hashable, LinearVehicle] = {}
         self._masses: dict[Hashable, np.ndarray] = {}
         self._free: dict[Hashable, np.ndarray] = {}
         self.mass = self.linear(full_vehicle, speed).mass
 
     def __len__(self) -> int:
-        return len(self._made)
+        return len(self._stored)
 
     def of(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
         """The reduced vehicle of a scene at a speed (m/s); InputError where no meaningful vehicle remains."""
-        key = self.number(scene.vehicle), scene.limits, of_speed(scene.vehicle, speed)
-        reduced_vehicle = self._made.get(key)
+        key = self.number(scene.vehicle), scene.limits, speed_if_needed(scene.vehicle, speed)
+        reduced_vehicle = self._stored.get(key)
         if reduced_vehicle is None:
-            reduced_vehicle = self._made[key] = self._make(scene, speed)
+            reduced_vehicle = self._stored[key] = self._make(scene, speed)
         return reduced_vehicle
 
     def number(self, vehicle: SpatialVehicle) -> int:
@@ -169,7 +169,7 @@ class Vehicles:
 
     def linear(self, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
         """The linearised vehicle at a speed (m/s), before parts are made massless, rigid or locked."""
-        key = self.number(vehicle), of_speed(vehicle, speed)
+        key = self.number(vehicle), speed_if_needed(vehicle, speed)
         if key not in self._linear:
             self._linear[key] = linearise(vehicle, speed)
         return self._linear[key]
@@ -204,7 +204,7 @@ class Vehicles:
         return self._free[key]
 
 
-def of_speed(vehicle: SpatialVehicle, speed: float) -> float | None:
+def speed_if_needed(vehicle: SpatialVehicle, speed: float) -> float | None:
     """The speed (m/s) if the vehicle's matrices depend on it, else None."""
     return speed if vehicle.side_forces or vehicle.drags else None
 
@@ -217,7 +217,7 @@ class FullScene:
         self.vehicles = Vehicles(scene.vehicle, speed) if vehicles is None else vehicles
         self.linear = self.vehicles.linear(scene.vehicle, speed)
         self.excitation = self.vehicles.roads.of(scene)
-        self._made: dict[Hashable, Reduced] = {}
+        self._stored: dict[Hashable, Reduced] = {}
         self._roads: dict[Hashable, tuple[Excitation, np.ndarray, np.ndarray]] = {}
         self.full = self.reduced(scene)
 
@@ -226,9 +226,9 @@ class FullScene:
         remains.
         """
         key = self.vehicles.number(scene.vehicle), self.vehicles.roads.number(scene), scene.limits
-        reduced_system = self._made.get(key)
+        reduced_system = self._stored.get(key)
         if reduced_system is None:
-            reduced_system = self._made[key] = self._weighted(self._make(scene))
+            reduced_system = self._stored[key] = self._weighted(self._make(scene))
         return reduced_system
 
     def _weighted(self, reduced: Reduced) -> Reduced:

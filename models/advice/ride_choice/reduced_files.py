@@ -84,11 +84,11 @@ def _key_text(key: str) -> str:
     return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else json.dumps(key)
 
 
-def _value_text(any_value: Any) -> str:
-    if isinstance(any_value, dict):
-        return "{ " + ", ".join(_table_lines(any_value)) + " }" if any_value else "{}"
-    if isinstance(any_value, list | tuple):
-        return "[" + ", ".join(map(_value_text, any_value)) + "]"
-    if isinstance(any_value, bool):
-        return "true" if any_value else "false"
-    return json.dumps(any_value) if isinstance(any_value, str) else repr(any_value)
+def _value_text(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(_table_lines(value)) + " }" if value else "{}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_value_text, value)) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return json.dumps(value) if isinstance(value, str) else repr(value)

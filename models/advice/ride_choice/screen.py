@@ -125,7 +125,7 @@ def has_undamped_motion(rates: np.ndarray, slowest: float = SLOWEST_DECAY) -> bo
     return bool(rates.real.max(initial=-np.inf) > -slowest * abs(rates).max(initial=0.0))
 
 
-def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
+def variances_from_modes(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
     """Variances (quantities,) from the eigenmodes of the reduced system; None where only the exact solution is
     reliable.
 
@@ -139,7 +139,7 @@ def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
     half = system.A @ P
     modal_noise = modes.W @ (half + half.T + reduced.noise) @ modes.W.conj().T
     variance = ((C @ P) * C).sum(axis=1)
-    missing = (modes.adjoint_of_motions(C) * modal_noise.T).sum(axis=(1, 2)).real
+    missing = (modes.modal_adjoint(C) * modal_noise.T).sum(axis=(1, 2)).real
     is_certain = np.isfinite(system.D).all(axis=(0, 2)) & (variance > rounding_thresholds(C, P))
     if (
         not (abs(missing[is_certain]) <= TRUSTED_VARIANCE_SHARE * variance[is_certain]).all()
@@ -161,7 +161,7 @@ def row_variances(covariance: StationaryCovariance, rows: list[int]) -> np.ndarr
     return np.array([covariance.variance[row] if covariance.status[row] == FINITE else np.inf for row in rows])
 
 
-def whole_variances(reduced: Reduced, rows: list[int]) -> tuple[np.ndarray, np.ndarray]:
+def variances_and_rounding(reduced: Reduced, rows: list[int]) -> tuple[np.ndarray, np.ndarray]:
     """Variances (quantities,) by the exact solution, and levels (quantities,) below which variances are only
     rounding.
     """
