@@ -1,4 +1,5 @@
-"""One step of a braked vehicle in the plane: wheels exact, their mean forces to the vehicle, loads solved.
+"""One time step of a braked vehicle in the plane: exact wheel rotation, mean wheel forces on the vehicle, loads found
+by iteration.
 
 A half step gives the state in the middle, and the whole step takes its slip angles, loads and friction there: order
 two. Loads follow from accelerations and these from the tyres' forces under the loads; the whole step finds the fixed
@@ -26,16 +27,19 @@ from models.machine.stack import array, doubles
 from models.tyre.tyre_table import TableCell, cell_and_share, lateral_adhesion
 
 ACCELERATION_TOLERANCE = 1e-7
-"""What is left of the accelerations' error (m/s^2, and rad/s^2 times 1 m) when the loads are taken to be found."""
+"""Remaining error of the accelerations (m/s^2, and rad/s^2 times 1 m) at which the iteration of the loads ends."""
 HALF_ROUNDS, ANDERSON_ROUNDS, ROUNDS_PER_WINDOW, MOST_WINDOWS = 1, 12, 16, 1000
-"""Rounds of a half step, to whose loads those of the step before are close enough for order two; rounds after which
-Anderson's method gives way to means; rounds between two looks at their progress; such windows without an answer."""
+"""Numbers of iterations: in a half step, which starts from the last step's loads; before Anderson's method gives way to
+means; between two checks of progress; and the number of such checks before giving up.
+"""
 JUMP_WIDTH = 1e-3
-"""Width (m/s^2, and rad/s^2 times 1 m) to which a jump is closed in where loads have an answer only as a mean: some
-newtons of the load of a truck's wheel."""
+"""Width (m/s^2, and rad/s^2 times 1 m) of the interval to which a jump of the accelerations is narrowed down where
+loads have only a mean solution: some newtons of the load of a truck's wheel.
+"""
 LOCKING_SLIP = 0.98
-"""Slip from which on the direction of the force goes over to that of a locked tyre: without a jump, which would leave
-some loads without an answer."""
+"""Slip above which the direction of the force passes continuously to that of a locked tyre; a jump would leave some
+loads without a solution.
+"""
 
 
 @inlined
@@ -49,7 +53,7 @@ def scalar_product(row, vector):
 
 @inlined
 def moved_to(row, target_row):
-    """Copy the row's numbers into ``target_row``; array assignment would allocate a temporary array."""
+    """Copy the row's values into ``target_row``; array assignment would allocate a temporary array."""
     for a in range(row.size):
         target_row[a] = row[a]
 
@@ -57,7 +61,8 @@ def moved_to(row, target_row):
 @inlined
 def settle(motion, steer, regularising_speed, starts, vehicle, frame):
     """Fill wheel quantities and equations of motion that follow from the state. With ``starts``, the state is that at
-    the start of the step, and the wheels' steer angles and speeds along them are stored."""
+    the start of the step, and the wheels' steer angles and speeds along them are stored.
+    """
     plane, angles, wheels, units = vehicle.plane, vehicle.tables.angles, frame.wheels, frame.units
     positions, rates, still = motion.state[0], motion.state[1], frame.wheels.static_load
     fill_headings(positions, units)
@@ -95,7 +100,8 @@ def settle(motion, steer, regularising_speed, starts, vehicle, frame):
 @inlined
 def slide(i, u, v, regularising_speed, lag, angles, wheels):
     """Set the slip angle of wheel i from the speeds (m/s) of its centre along it, u, and of its tyre across it, v.
-    Where ``lag`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v."""
+    Where ``lag`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v.
+    """
     forwards = u if wheels.start[i] >= 0.0 else -u
     if not math.isnan(lag[i]):
         v = lag[i] * max(forwards, regularising_speed)
@@ -107,7 +113,8 @@ def slide(i, u, v, regularising_speed, lag, angles, wheels):
 @inlined
 def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
     """Fill the report of wheel i, whose slip angle and load are known, from a ``StepInput`` with the speeds along the
-    wheel."""
+    wheel.
+    """
     v, speed_along, load, angle = wheels.aside[i], wheels.along[i], wheels.load[i], wheels.angle[i]
     first, second, share = int(surfaces.first[i]), int(surfaces.second[i]), surfaces.share[i]
     sign = 1.0 if wheels.start[i] >= 0.0 else -1.0
@@ -137,8 +144,8 @@ def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
 
 @lean
 def share_out(loads, positions):
-    """Correct loads (W,) of two-axle vehicles in place where a wheel's load is negative: the wheel gets none, and the
-    other wheels keep the static equilibrium. positions (W, 2) : positions of the wheels in their units' axes, m.
+    """Correct loads (W,) in N of two-axle vehicles in place where a wheel's load is negative: the wheel gets none, and
+    the other wheels keep the static equilibrium. positions (W, 2) : positions of the wheels in their units' axes, m.
 
     The other wheel of its axle bears the axle's load, and the other axle what this one cannot take of the roll moment.
     An axle that would lift leaves all its load to the other one. Beyond balance, both wheels of a side bear none.
@@ -169,8 +176,8 @@ def share_out(loads, positions):
 @lean
 def respond(motion, torques_before, torques_after, step, vehicle, frame):
     """Fill ``frame.out`` with the accelerations that the tyres' forces cause when the vehicle has the accelerations of
-    ``motion``. A step's solution is a fixed point of this map. torques_before, torques_after (W,) : torques at the ends
-    of the step.
+    ``motion``. A step's solution is a fixed point of this map. torques_before, torques_after (W,) : brake torques (N m)
+    at the ends of the step.
     """
     plane, tables, wheels, surfaces, report = vehicle.plane, vehicle.tables, frame.wheels, frame.surfaces, frame.report
     accelerations, response, rows_along, rows_across, right = (
@@ -201,7 +208,8 @@ def respond(motion, torques_before, torques_after, step, vehicle, frame):
 
 @inlined
 def stage(motion, torques_before, torques_after, step, most_rounds, vehicle, frame):
-    """Search the mean accelerations over a step, and write them into ``motion``; its last ones are the first guess.
+    """Find the mean accelerations over a step by iteration, from the last ones on, and write them into ``motion``;
+    returns the estimated remaining error.
 
     Anderson's method of depth one runs for at most ``most_rounds`` rounds. If they have not converged and were
     ``ANDERSON_ROUNDS`` or more, ``by_means`` takes over. Returns the estimated remaining error, from the last change
@@ -236,7 +244,7 @@ def stage(motion, torques_before, torques_after, step, most_rounds, vehicle, fra
 @lean
 def by_means(motion, torques_before, torques_after, step, vehicle, frame):
     """Accelerations as from ``stage``, for steps in which wheel loads jump between two solutions, so that only a mean
-    of both is in equilibrium.
+    of both is in equilibrium; returns the remaining error.
 
     So it is of a slow wheel at the edge of locking: a little less load, and it locks at once; a little more, and it
     rolls within a fraction of the step. Each round moves the accelerations by a share of their change, and the means of
@@ -307,7 +315,7 @@ def comes_to_rest(rates, wheel_turning, accelerations, step, plane):
 
 @lean
 def step_on(motion, torques, step, steer, regularising_speed, vehicle, surfaces):
-    """One step of a ``Motion`` whose wheels are on ``Surfaces``.
+    """Advance a ``PlaneMotion`` whose wheels are on ``Surfaces`` by one step (s).
 
     torques (2, W) : of the brakes at the step's ends; steer (W,) : angles of the wheels in their units (rad);
     regularising_speed : m/s. Returns the time (s) of the step at which the vehicle comes to rest, ``step`` if it does

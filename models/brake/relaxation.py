@@ -26,13 +26,15 @@ from models.brake.wheel_step import SLOWEST_SPEED, phi_1
 from models.machine.compiled import inlined, njit
 
 FADING_SPEED = 1.0
-"""Speed (m/s) along the wheel below which the damper fades in."""
+"""Speed (m/s) along the wheel below which a damper across it fades in."""
 DAMPING = 0.7
-"""Damping ratio at rest, of a wheel that bears its share of the mass."""
+"""Damping ratio of this damper at rest, for a wheel that bears its share of the mass."""
 
 
 class Lag(NamedTuple):
-    """Tyres that lag, each (W,): relaxation lengths (m), and tan of the slip angles, which are moved in place."""
+    """Tyres with lagging slip angles, each (W,): relaxation lengths (m), and tangents of the slip angles, which are
+    updated in place.
+    """
 
     length: np.ndarray
     angle: np.ndarray
@@ -40,15 +42,16 @@ class Lag(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def taken_up(a, u, v, time, length):
-    """tan of the slip angle after a time (s) at constant speeds u along and v across the wheel (m/s), with a relaxation
-    length (m)."""
+    """Tangent of the lagging slip angle after a time (s) at constant speeds u along and v across the wheel (m/s), with
+    a relaxation length (m).
+    """
     return a + (v - abs(u) * a) * phi_1(-abs(u) * time / length) * time / length
 
 
 @inlined
 def take_up(i, u, v, time, slope, lag, lagging):
-    """Advance the lagging angle of wheel i by a time (s) at speeds u, v (m/s). Put the tan of the slip angle with the
-    damper's part into ``lagging`` (W,); slope : see ``OnRoad``.
+    """Advance the lagging slip angle of wheel i by a time (s) at speeds u along and v across it (m/s). Its tangent with
+    the damper's part goes into ``lagging`` (W,); slope : see ``OnRoad``.
 
     An angle that is NaN starts at its steady value for these speeds.
     """
@@ -74,7 +77,7 @@ def longest_step(slope: float, lively: float, length: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def lag_on(state, time, steer, vehicle, lag, lagging):
-    """Advance the lagging angles of all wheels by a time (s), and fill ``lagging`` (W,): see ``take_up``."""
+    """Advance the lagging slip angles of all wheels by a time (s), and fill ``lagging`` (W,): see ``take_up``."""
     plane = vehicle.plane
     for i in range(lag.angle.size):
         k = plane.unit[i]
@@ -85,7 +88,7 @@ def lag_on(state, time, steer, vehicle, lag, lagging):
 
 @njit(cache=True, error_model="numpy")
 def advance_lagging(motion, torques, step, steer, vehicle, lag):
-    """``advance`` for tyres with relaxation, whose ``Lag`` is updated in place."""
+    """Advance a vehicle on tyres with relaxation by n steps, as ``advance`` does; its ``Lag`` is updated in place."""
     surfaces, time = surfaces_of(np.empty((4, motion.turning.size))), 0.0
     for n in range(torques.shape[0] - 1):
         under_wheels(motion.state, step, vehicle, surfaces)
@@ -104,4 +107,4 @@ def advance_lagging(motion, torques, step, steer, vehicle, lag):
 
 
 by_lagging_steps = compiled(advance_lagging, "by_lagging_steps")
-"""``by_steps`` with such tyres: after its arguments comes a ``Lag``."""
+"""Compiled samples of a vehicle on tyres with relaxation, as ``by_steps``: after its arguments comes a ``Lag``."""

@@ -13,7 +13,7 @@ import numpy as np
 from models.advice.ride_choice.march import Cost, March, cost, longest_step
 from models.advice.ride_choice.neighbourhood import Neighbourhood
 from models.advice.ride_choice.reduced import FullScene, Reduced, Vehicles, speed_if_needed
-from models.advice.ride_choice.screen import Screen, exact_variances, variances_from_modes, variances_and_rounding
+from models.advice.ride_choice.screen import Screen, exact_variances, variances_and_rounding, variances_from_modes
 from models.core.errors import InputError
 from models.core.runge_kutta import RK4_STAGES
 from models.systems.ride.omissions import effects_of

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from models.advice.ride_choice.modes import Modes, modes_with_road, modes_with_weightings, modes_of, stable_step
+from models.advice.ride_choice.modes import Modes, modes_of, modes_with_road, modes_with_weightings, stable_step
 from models.core.errors import InputError
 from models.core.scene_effects import tables_of
 from models.ride.covariance import noise_of

@@ -1,4 +1,5 @@
-"""Control by phases of the wheel's acceleration, with its slip as a second sign: the production algorithm of Bosch.
+"""Anti-lock control by phases of the wheel's acceleration, with its slip as a second criterion: the production
+algorithm of Bosch.
 
     apply      until the wheel falls faster than -a: then hold
     hold       until its slip is above ``slip``: then release
@@ -23,9 +24,10 @@ FIRST, WAIT, LET_GO, RECOVER, OVERSHOOT, STEP_UP = range(6)
 
 @dataclass
 class AccelerationPhases(Common):
-    """Thresholds of the wheel's acceleration (m/s^2): falls (-a), rises (+a), rises_fast (+A); of its slip: slip, and
-    deep, above which a wheel that does not rise is released; pulse : samples per step of pressure; slow : whether
-    valves that can apply slowly do so in place of these steps."""
+    """Anti-lock controller by thresholds of the wheel's acceleration (m/s^2): falls (-a), rises (+a), rises_fast (+A);
+    of its slip: slip, and deep, above which a wheel that does not rise is released; pulse : samples per step of
+    pressure; slow : whether valves that can apply slowly do so in place of these steps.
+    """
 
     falls: float = -20.0
     rises: float = 2.0
@@ -52,6 +54,8 @@ class AccelerationPhases(Common):
 
 
 class _Logic:
+    """State machine of one wheel's acceleration phases."""
+
     def __init__(self, settings: AccelerationPhases) -> None:
         self._settings, self._phase, self._rose, self._count = settings, FIRST, False, 0
 

@@ -1,4 +1,5 @@
-"""The five-phase hybrid controller: by the wheel's acceleration alone, round a limit cycle about the tyre's peak.
+"""Five-phase hybrid anti-lock controller: by the wheel's acceleration alone, on a limit cycle about the peak of the
+tyre's friction.
 
     1  pressure falls at ``falling``  until y >= e1
     2  it holds                       until y >= e2
@@ -23,7 +24,9 @@ from models.core.errors import InputError
 
 @dataclass
 class FivePhase(Common):
-    """Thresholds of the wheel's acceleration (m/s^2) and rates of its pressure (bar/s); deep : slip of phase 1."""
+    """Five-phase anti-lock controller. e1 to e5 : thresholds of the wheel's acceleration (m/s^2); falling, fast, slow :
+    rates of its pressure (bar/s); deep : slip above which phase 1 begins.
+    """
 
     e1: float = 4.0
     e2: float = 5.0
@@ -51,19 +54,22 @@ FIRST_PHASE = 0
 
 
 def end_of_phase(phase: int, settings: FivePhase) -> tuple[float, float]:
-    """Sign and level (m/s^2) of the threshold that ends a phase: +1 if the wheel's acceleration must rise to it, -1 if
-    fall."""
+    """Threshold of the wheel's acceleration that ends a phase: sign +1 if the acceleration must rise to it, -1 if it
+    must fall, and level (m/s^2).
+    """
     if phase in (1, 2):
         return 1.0, settings.e1 if phase == 1 else settings.e2
     return -1.0, {3: settings.e3, 4: settings.e4}.get(phase, -settings.e5)
 
 
 def rate_of_phase(phase: int, settings: FivePhase) -> float:
-    """Rate of the pressure (bar/s) in a phase."""
+    """Rate of the brake pressure (bar/s) in a phase."""
     return (settings.fast, -settings.falling, 0.0, settings.fast, 0.0, settings.slow)[phase]
 
 
 class _Logic:
+    """State machine of one wheel's five phases."""
+
     def __init__(self, settings: FivePhase) -> None:
         self._settings, self._phase, self._pressure = settings, FIRST_PHASE, 0.0
 
@@ -81,7 +87,8 @@ class _Logic:
 
     def _rolls_on(self, slip: float, gains: float) -> bool:
         """Whether the wheel no longer gains speed in phase 2, or has no brake pressure left and little slip in phase
-        1."""
+        1.
+        """
         if self._phase == 1:
             return self._pressure == 0.0 and slip <= self._settings.deep
         return self._phase == 2 and gains <= self._settings.e4

@@ -1,4 +1,5 @@
-"""Slip control: by two thresholds, the simplest controller and the yardstick of the others, and by two parts of a loop.
+"""Anti-lock control of wheel slip: by two thresholds, the simplest controller and yardstick of the others, and by a
+proportional-integral loop.
 
 ``SlipPI`` has a proportional and an integral part whose gains grow with speed, and commands pressures. Its controlled
 quantity mixes slip with deceleration, s - mix w' r / g: the deceleration tells first. Slip answers to torque the faster
@@ -16,7 +17,9 @@ from models.core.errors import InputError
 
 @dataclass
 class SlipBangBang(Common):
-    """Releases above one slip, applies below a lower one, and between them goes on with what it did."""
+    """Slip controller that releases the brake above one slip, applies it below a lower one, and keeps its last command
+    between them.
+    """
 
     release: float = 0.10
     apply: float = 0.05
@@ -29,6 +32,8 @@ class SlipBangBang(Common):
 
 
 class _BangBang:
+    """Two-threshold logic of one wheel."""
+
     def __init__(self, settings: SlipBangBang) -> None:
         self._settings, self._valve = settings, APPLY
 
@@ -42,8 +47,9 @@ class _BangBang:
 
 @dataclass
 class SlipPI(Common):
-    """target : slip wanted; gain : bar per unit of slip and m/s; reset : time of the integral part (s); mix : share
-    of the deceleration (slip per g)."""
+    """Proportional-integral slip controller. target : slip wanted; gain : bar per unit of slip and m/s; reset : time of
+    the integral part (s); mix : share of the deceleration (slip per g).
+    """
 
     target: float = 0.06
     gain: float = 1.0
@@ -56,6 +62,8 @@ class SlipPI(Common):
 
 
 class _Loop:
+    """Proportional-integral loop of one wheel, whose gain grows with speed."""
+
     def __init__(self, settings: SlipPI) -> None:
         self._settings, self._sum = settings, 0.0
 
