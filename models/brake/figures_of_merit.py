@@ -55,7 +55,7 @@ def crossing_time(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
     return float(times[i - 1] + share * (times[i] - times[i - 1]))
 
 
-def way_at(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray, time: float) -> float:
+def distance_at(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray, time: float) -> float:
     """Distance (m) covered at a time (s) between two samples, with constant deceleration between them."""
     i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2))
     passed, long = time - times[i], times[i + 1] - times[i]
@@ -78,7 +78,7 @@ def mean_fully_developed(times: np.ndarray, distance: np.ndarray, speeds: np.nda
     begin, end = (crossing_time(times, speeds, speed) for speed in (high, low))
     if not np.isfinite(begin + end):
         return float("nan")
-    covered = way_at(times, distance, speeds, end) - way_at(times, distance, speeds, begin)
+    covered = distance_at(times, distance, speeds, end) - distance_at(times, distance, speeds, begin)
     return float((high**2 - low**2) / (2.0 * covered))
 
 

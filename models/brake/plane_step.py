@@ -52,7 +52,7 @@ def scalar_product(row, vector):
 
 
 @inlined
-def moved_to(row, target_row):
+def copy_row(row, target_row):
     """Copy the row's values into ``target_row``; array assignment would allocate a temporary array."""
     for a in range(row.size):
         target_row[a] = row[a]
@@ -143,7 +143,7 @@ def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
 
 
 @lean
-def share_out(loads, positions):
+def redistribute_negative_loads(loads, positions):
     """Correct loads (W,) in N of two-axle vehicles in place where a wheel's load is negative: the wheel gets none, and
     the other wheels keep the static equilibrium. positions (W, 2) : positions of the wheels in their units' axes, m.
 
@@ -195,7 +195,7 @@ def respond(motion, torques_before, torques_after, step, vehicle, frame):
         load[i] = still[i] + scalar_product(frame.press[i], accelerations)
         lifts = lifts or load[i] < 0.0
     if lifts:
-        share_out(load, plane.place)
+        redistribute_negative_loads(load, plane.place)
     for i in range(load.size):
         speed1 = start[i] + step * (rate[i] + scalar_product(rows_along[i], accelerations))
         step_input = StepInput(start[i], speed1, torques_before[i], torques_after[i], step)
@@ -216,7 +216,7 @@ def stage(motion, torques_before, torques_after, step, most_rounds, vehicle, fra
     and the ratio of the last two.
     """
     accelerations, response, out0, off0 = motion.accelerations, frame.out, frame.out_before, frame.off
-    size, left, last_change = coordinates(vehicle.plane), math.inf, 0.0
+    size, remaining_error, last_change = coordinates(vehicle.plane), math.inf, 0.0
     for rounds in range(most_rounds):
         respond(motion, torques_before, torques_after, step, vehicle, frame)
         change, product, square = 0.0, 0.0, 0.0
@@ -225,8 +225,8 @@ def stage(motion, torques_before, torques_after, step, most_rounds, vehicle, fra
             change = max(change, abs(residual))
             product += residual * (residual - off0[a])
             square += (residual - off0[a]) ** 2
-        left = change * min(change / last_change, 1.0) if last_change > 0.0 else change
-        is_done, last_change = not left > ACCELERATION_TOLERANCE or rounds == most_rounds - 1, change
+        remaining_error = change * min(change / last_change, 1.0) if last_change > 0.0 else change
+        is_done, last_change = not remaining_error > ACCELERATION_TOLERANCE or rounds == most_rounds - 1, change
         mix = min(max(product / square, -2.0), 0.75) if rounds > 0 and square > 0.0 and not is_done else 0.0
         for a in range(size):
             off0[a] = response[a] - accelerations[a]
@@ -235,8 +235,8 @@ def stage(motion, torques_before, torques_after, step, most_rounds, vehicle, fra
         if is_done:
             break
     return (
-        left
-        if left <= ACCELERATION_TOLERANCE or most_rounds < ANDERSON_ROUNDS
+        remaining_error
+        if remaining_error <= ACCELERATION_TOLERANCE or most_rounds < ANDERSON_ROUNDS
         else by_means(motion, torques_before, torques_after, step, vehicle, frame)
     )
 
@@ -259,12 +259,12 @@ def by_means(motion, torques_before, torques_after, step, vehicle, frame):
     means = array(doubles(report.size), report.shape)
     start_accelerations = array(doubles(accelerations.size), accelerations.shape)
     respond(motion, torques_before, torques_after, step, vehicle, frame)
-    moved_to(response, accelerations)
+    copy_row(response, accelerations)
     for c in range(report.shape[0]):
-        moved_to(report[c], means[c])
+        copy_row(report[c], means[c])
     for _ in range(MOST_WINDOWS):
         total_change, net, largest_change, change = 0.0, 0.0, 0.0, 0.0
-        moved_to(accelerations, start_accelerations)
+        copy_row(accelerations, start_accelerations)
         for _ in range(ROUNDS_PER_WINDOW):
             respond(motion, torques_before, torques_after, step, vehicle, frame)
             change = 0.0
@@ -272,7 +272,7 @@ def by_means(motion, torques_before, torques_after, step, vehicle, frame):
                 change = max(change, abs(response[a] - accelerations[a]))
                 total_change += share * abs(response[a] - accelerations[a])
             if not change > ACCELERATION_TOLERANCE:
-                moved_to(response, accelerations)
+                copy_row(response, accelerations)
                 return change
             largest_change = max(largest_change, change)
             for a in range(size):
@@ -285,7 +285,7 @@ def by_means(motion, torques_before, torques_after, step, vehicle, frame):
         turns, thrown = net < 0.5 * total_change, change > last_change
         if (turns and share * change <= JUMP_WIDTH) or (thrown and share * largest_change <= JUMP_WIDTH):
             for c in range(report.shape[0]):
-                moved_to(means[c], report[c])
+                copy_row(means[c], report[c])
             return 0.0
         share, last_change = 0.5 * share if turns or thrown else share, change
     return math.inf

@@ -18,7 +18,7 @@ from numba.experimental import structref
 from models.brake.advance import AT_REST, FINE, advance
 from models.brake.brake import Brakes
 from models.brake.plane_records import REPORT_SIZE, PlaneMotion
-from models.brake.plane_step import moved_to
+from models.brake.plane_step import copy_row
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves
 from models.machine.compiled import lean, named_closure, njit
 
@@ -151,7 +151,7 @@ def some_samples(commands, record, sample, braking, motion, simulated_time, *veh
         if status not in (FINE, AT_REST):
             break
         record.now[0] = simulated_time
-        moved_to(record.now, record.rows[record.left[0]])
+        copy_row(record.now, record.rows[record.left[0]])
         record.left[0] += 1
         if status == AT_REST or simulated_time >= record.until:
             break

@@ -1,4 +1,5 @@
-"""Steps of a braked vehicle on its suspension: the one text of them, for engines that Python calls or compiled code.
+"""Time steps of a braked vehicle on its suspension: one source text, for engines called from Python or in compiled
+code.
 
 Each step (s) the wheels are exact under the torques that they have, with loads and slip angles in the middle of the
 step, to which half a step by the accelerations leads; the engine then marches the whole step by its own Runge-Kutta
@@ -6,7 +7,8 @@ method around the compiled forces, the tyres' mean ones held at their contacts a
 
 Springs and loads are as they are, tyres' forces as held. The table of numbers is that of ``models.multibody.forces``,
 then what the wheels hold, see ``WheelForces``. What the road has beside the moment that speeds up a wheel's turning is
-on the chassis, or on the towed body that carries the wheel: brakes hold on to it, and locked wheels do."""
+on the chassis, or on the towed body that carries the wheel: brakes hold on to it, and locked wheels do.
+"""
 
 from collections.abc import Callable
 from types import FunctionType
@@ -49,12 +51,13 @@ from models.multibody.moving_vehicle import WheelContact
 from models.multibody.tree import PER_LINK, dot, three, times, twist
 
 HELD = 4
-"""Numbers that each wheel holds."""
+"""Number of values that stay constant over a step for each wheel."""
 
 
 class WheelForces(NamedTuple):
     """Wheel quantities that are constant over a step, each (W,): steer angle (rad), mean forces on the tyre along and
-    across it (N), and the mean moment that speeds up the wheel's turning (N m)."""
+    across it (N), and the mean moment that accelerates the wheel's rotation (N m).
+    """
 
     steer: np.ndarray
     force_x: np.ndarray
@@ -64,7 +67,8 @@ class WheelForces(NamedTuple):
 
 class Contacts(NamedTuple):
     """Motion and loads of the wheels, each (W,): speeds of their centres along them and of their contacts across them
-    (m/s), loads (N)."""
+    (m/s), loads (N).
+    """
 
     along: np.ndarray
     across: np.ndarray
@@ -93,7 +97,7 @@ def wheel_forces_of(table):
 
 @lean
 def held_forces(table, q, v, force_sum, contacts):
-    """Add all forces to ``force_sum`` (n,), and fill the ``Contacts``."""
+    """Add all forces on the vehicle to ``force_sum`` (n,), with constant wheel forces, and fill the ``Contacts``."""
     wheel = WheelContact(
         array(doubles(10), (10,)),
         array(doubles(4), (4,)),
@@ -118,7 +122,7 @@ def held_forces(table, q, v, force_sum, contacts):
 
 @lean
 def forces(table, q, v, force_sum):
-    """Add all forces to ``force_sum`` (n,)."""
+    """Add all forces on the vehicle to ``force_sum`` (n,), with constant wheel forces."""
     w = int(table[TYRES])
     motion = array(doubles(3 * w), (3, w))
     held_forces(table, q, v, force_sum, Contacts(motion[0], motion[1], motion[2]))
@@ -126,8 +130,8 @@ def forces(table, q, v, force_sum):
 
 @lean
 def held(table, time, q, v, force_sum):
-    """Add the forces to ``force_sum``. For callbacks: all arguments but the time are pointers to doubles; the time is
-    not used.
+    """Add the vehicle's forces, with constant wheel forces, to ``force_sum``. For callbacks of engines: all arguments
+    but the time are pointers to doubles; the time is not used.
     """
     head = array(table, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
@@ -136,8 +140,9 @@ def held(table, time, q, v, force_sum):
 
 @lean
 def set_held(block, t, n):
-    """Set ``f`` to the forces of ``held``. All data are in one block of doubles at an address: f, q and v (n,), then
-    the table."""
+    """Set the generalised forces f of ``held``. All data are in one block of doubles at an address: f, q and v (n,),
+    then the table.
+    """
     f = at(block)
     array(f, (n,))[:] = 0.0
     held(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
@@ -155,8 +160,8 @@ def meet(contacts, regularising_speed, lag, angles, wheels):
 
 @lean
 def hold(known, torques_before, torques_after, step, motion, vehicle):
-    """Compute the tyres' mean forces over a step (s) between brake torques (W,), store them as the wheels' constant
-    forces, and fill the report.
+    """Compute the tyres' mean forces over a step (s) between brake torques (W,) in N m, store them as the wheels'
+    constant forces, and fill the report.
 
     known : ``AtWheels`` with speeds at the start and their rates, and what ``meet`` takes.
     """
@@ -170,11 +175,11 @@ def hold(known, torques_before, torques_after, step, motion, vehicle):
 
 
 OVER, GAVE_UP = 6, 7
-"""How a sample may end besides: the vehicle turns over; the engine gives up."""
+"""Further ends of a sample: the vehicle turns over; the engine gives up."""
 UPRIGHT = 0.5
-"""Roll and pitch (rad) beyond which the vehicle turns over."""
+"""Roll or pitch angle (rad) beyond which the vehicle turns over."""
 PLANE = 3
-"""The first coordinates: x, y and heading of the vehicle."""
+"""Number of the first coordinates: x, y and heading of the vehicle."""
 
 
 class Units(NamedTuple):
@@ -192,7 +197,9 @@ class Units(NamedTuple):
 
 @lean
 def to_units(coordinate_values, hinge_columns, plane):
-    """Fill values (2 + U,) of the ``Units`` from values of all coordinates (n,): positions, rates or accelerations."""
+    """Fill values (2 + U,) for the ``Units`` from values for all coordinates (n,): positions, rates or
+    accelerations.
+    """
     for a in range(PLANE):
         plane[a] = coordinate_values[a]
     for k in range(hinge_columns.size):
@@ -213,7 +220,7 @@ def ended(q, units, fold):
 
 
 class OnEngine(NamedTuple):
-    """Data that a step of a vehicle on its suspension needs in addition to those of a plane step.
+    """Data that a step of a vehicle on its suspension needs in addition to the data of a plane step.
 
     numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
     middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine :
@@ -246,14 +253,16 @@ def accelerate(engine: Any, q: np.ndarray, v: np.ndarray, accelerations: np.ndar
 
 
 def march(engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
-    """Advance positions and rates (n,) by one step of the engine; other engines replace this function."""
+    """Advance positions and rates (n,) by one step of the engine; returns whether it succeeded. Other engines replace
+    this function.
+    """
     q[:], v[:] = np.split(engine.march(q, v, 1, engine.step)[-1], 2)
     return True
 
 
 def advance(motion, torques, step, steer, vehicle, course):
-    """Advance a vehicle on its suspension, as ``models.brake.advance.advance`` does in the plane; the state (2, n)
-    holds all coordinates and their rates.
+    """Advance a vehicle on its suspension by n steps, as ``models.brake.advance.advance`` does in the plane; the state
+    (2, n) holds all coordinates and their rates.
 
     A run begins with accelerations of zero. The engine's step is ``step``. At its start the speeds along the wheels are
     taken to change as they did in the last one.
@@ -305,10 +314,10 @@ def advance(motion, torques, step, steer, vehicle, course):
 
 
 def advance_with(**replacements: Callable[..., Any]) -> Callable[..., Any]:
-    """``advance`` in which the engines' own functions replace this module's default ones; see ``samples.moved``."""
+    """Function ``advance`` in which an engine's functions replace this module's default ones; see ``samples.moved``."""
     return FunctionType(advance.__code__, globals() | replacements, "advance")
 
 
 def compiled(name: str, **replacements: Callable[..., Any]) -> Callable[..., Any]:
-    """Compiled ``advance_with`` for an engine's own compiled functions."""
+    """Compiled version of ``advance_with``, for an engine's compiled functions."""
     return njit(cache=True, error_model="numpy")(named_closure(advance_with(**replacements), name))

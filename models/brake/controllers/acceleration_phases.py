@@ -50,7 +50,7 @@ class AccelerationPhases(Common):
             if not isinstance(getattr(self, name), kind):
                 allowed = "must be a whole number" if kind is int else "must be true or false"
                 raise InputError("", f"controller.parameters.{name}", getattr(self, name), allowed)
-        self.governed_by(_Logic)
+        self.set_logic(_Logic)
 
 
 class _Logic:

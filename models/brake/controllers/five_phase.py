@@ -47,7 +47,7 @@ class FivePhase(Common):
         )
         if not self.e1 < self.e2 or not self.e4 < self.e3 < self.e2:
             raise InputError("", "controller.parameters.e2", self.e2, "must be above e1 and e3, and e3 above e4")
-        self.governed_by(_Logic, pressures=True)
+        self.set_logic(_Logic, pressures=True)
 
 
 FIRST_PHASE = 0
@@ -77,7 +77,7 @@ class _Logic:
         sign, level = end_of_phase(self._phase, self._settings)
         if sign * (gains - level) >= 0.0:
             self._phase = self._phase % 5 + 1
-        elif self._rolls_on(slip, gains):
+        elif self._gains_no_speed(slip, gains):
             self._phase = 5
         if self._phase != 1 and slip > self._settings.deep:
             self._phase = 1
@@ -85,7 +85,7 @@ class _Logic:
         self._pressure = min(max(raised, 0.0), supply)
         return self._pressure
 
-    def _rolls_on(self, slip: float, gains: float) -> bool:
+    def _gains_no_speed(self, slip: float, gains: float) -> bool:
         """Whether the wheel no longer gains speed in phase 2, or has no brake pressure left and little slip in phase
         1.
         """

@@ -110,7 +110,7 @@ def rim_acceleration(state, wheel_at_speed):
 
 
 @njit(cache=True, error_model="numpy")
-def go_on(state, rate, time, wheel_at_speed):
+def state_after(state, rate, time, wheel_at_speed):
     """Wheel state after a time (s) in which pressure changes at a constant rate (bar/s) and reaches no corner of the
     hysteresis loop.
     """
@@ -163,20 +163,22 @@ def integrate_phase(state, rate, sign, end_level, other_level, step, wheel_at_sp
     began, end = state.time, phase_end(state, sign, end_level, other_level, wheel_at_speed)
     while end < 0:
         time = min(step, time_to_corner(state, rate, wheel_at_speed.brakes))
-        next_state = go_on(state, rate, time, wheel_at_speed)
+        next_state = state_after(state, rate, time, wheel_at_speed)
         end = phase_end(next_state, sign, end_level, other_level, wheel_at_speed)
         if end >= 0:
             low, high = 0.0, time
             while high - low > 1e-15:
                 middle = 0.5 * (low + high)
                 if (
-                    phase_end(go_on(state, rate, middle, wheel_at_speed), sign, end_level, other_level, wheel_at_speed)
+                    phase_end(
+                        state_after(state, rate, middle, wheel_at_speed), sign, end_level, other_level, wheel_at_speed
+                    )
                     >= 0
                 ):
                     high = middle
                 else:
                     low = middle
-            next_state = go_on(state, rate, high, wheel_at_speed)
+            next_state = state_after(state, rate, high, wheel_at_speed)
         state = next_state
         if end < 0 and not (state.turning > 0.0 or rate < 0.0):
             return state, WHEEL_LOCKS
@@ -240,9 +242,9 @@ def _state_at_end(
     where the wheel locks or the phase does not end.
     """
     sign, level = end_of_phase(phase_number, controller)
-    back = controller.e4 if phase_number == SPEED_UP_PHASE else -math.inf
+    other_level = controller.e4 if phase_number == SPEED_UP_PHASE else -math.inf
     state, end = integrate_phase(
-        state, rate_of_phase(phase_number, controller), sign, level, back, step, wheel_at_speed.driven
+        state, rate_of_phase(phase_number, controller), sign, level, other_level, step, wheel_at_speed.driven
     )
     if end == NEVER_ENDS or (end == WHEEL_LOCKS and phase_number != 0):
         failure = (
@@ -271,7 +273,7 @@ def sampled_cycle(
         falling, number = pressure < state.pressure, number + 1
         state = state._replace(pressure=pressure, torque=torque(0, pressure, state.torque, driven.brakes))
         for _ in range(substeps):
-            state = go_on(state, 0.0, SAMPLE / substeps, driven)
+            state = state_after(state, 0.0, SAMPLE / substeps, driven)
         if number * SAMPLE > (cycles + skip) * LONGEST_PHASE:
             raise RunFailed("braking", "the sampled controller does not cycle", state.time)
     first_start, last_start = starts[skip], starts[-1]

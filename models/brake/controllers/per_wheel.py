@@ -49,7 +49,7 @@ class Common:
     cut_off: float = 1.5
     period: float = SAMPLE
 
-    def governed_by(self, logic: Callable[[Any], Logic], pressures: bool = False) -> None:
+    def set_logic(self, logic: Callable[[Any], Logic], pressures: bool = False) -> None:
         """Set up one ``logic`` per wheel or axle; ``pressures`` : whether it commands pressures instead of valve
         states.
         """
@@ -94,8 +94,8 @@ class PerWheel:
         self._groups = sorted(shared + single_wheels)
         self._logics = [logic(common) for _ in self._groups]
         self._common, self._pressures, self._wheels = common, pressures, wheels
-        self._estimate, self._before = SpeedEstimate(common.period), [np.nan] * len(self._groups)
-        self._speed, self._slowing = np.nan, 0.0
+        self._estimate, self._last_wheel_speeds = SpeedEstimate(common.period), [np.nan] * len(self._groups)
+        self._speed, self._mean_acceleration = np.nan, 0.0
 
     def command(self, sample: Sample) -> Command:
         """Command for a sample; all brakes are released while the brake switch is off, and applied below the cut-off
@@ -103,15 +103,19 @@ class PerWheel:
         """
         wheels = sample.wheels.tolist()
         speed = speed_of(sample.speed, wheels, self._estimate)
-        slowing = self._mean_slowing(speed)
+        vehicle_acceleration = self._smoothed_acceleration(speed)
         if not sample.brake:
             return self._command_all(0.0 if self._pressures else RELEASE)
         commands = [0.0] * self._wheels
         for k, (first_wheel, last_wheel) in enumerate(self._groups):
             wheel = min(wheels[first_wheel], wheels[last_wheel])
-            speed_before = self._before[k]
-            gains = (wheel - speed_before) / self._common.period - slowing if speed_before == speed_before else 0.0
-            self._before[k] = wheel
+            speed_before = self._last_wheel_speeds[k]
+            gains = (
+                (wheel - speed_before) / self._common.period - vehicle_acceleration
+                if speed_before == speed_before
+                else 0.0
+            )
+            self._last_wheel_speeds[k] = wheel
             if speed > 0.0:
                 answer = self._logics[k].decide(1.0 - wheel / speed, gains, speed, sample.supply)
                 commands[first_wheel] = commands[last_wheel] = answer
@@ -119,15 +123,15 @@ class PerWheel:
             return self._command_all(sample.supply if self._pressures else APPLY)
         return self._commands_of_logics(commands)
 
-    def _mean_slowing(self, speed: float) -> float:
+    def _smoothed_acceleration(self, speed: float) -> float:
         """Mean acceleration of the vehicle (m/s^2), negative while it brakes, smoothed over about ``SLOPE_MEMORY``
         seconds.
         """
         if self._speed == self._speed:
             latest = (speed - self._speed) / self._common.period
-            self._slowing += (latest - self._slowing) * min(self._common.period / SLOPE_MEMORY, 1.0)
+            self._mean_acceleration += (latest - self._mean_acceleration) * min(self._common.period / SLOPE_MEMORY, 1.0)
         self._speed = speed
-        return self._slowing
+        return self._mean_acceleration
 
     def _command_all(self, logic_output: float) -> Command:
         """The same command for all wheels."""

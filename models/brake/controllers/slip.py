@@ -28,7 +28,7 @@ class SlipBangBang(Common):
         self.check(release=SLIP_BOUNDS, apply=SLIP_BOUNDS)
         if not self.apply <= self.release < 1.0:
             raise InputError("", "controller.parameters.apply", self.apply, "must be at most release, and that below 1")
-        self.governed_by(_BangBang)
+        self.set_logic(_BangBang)
 
 
 class _BangBang:
@@ -58,7 +58,7 @@ class SlipPI(Common):
 
     def __post_init__(self) -> None:
         self.check(target=SLIP_BOUNDS, gain=(0.0, 1e4), reset=(0.0, 1e3), mix=(-SMALLEST_FLOAT, 10.0))
-        self.governed_by(_Loop, pressures=True)
+        self.set_logic(_Loop, pressures=True)
 
 
 class _Loop:

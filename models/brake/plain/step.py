@@ -64,15 +64,15 @@ class Steps:
         time (s) at its end.
         """
         half, (q, v) = 0.5 * self.step, moving_vehicle.state
-        under, middle = (
+        surfaces, half_step_torques = (
             self._surfaces_under(moving_vehicle.state, self.step),
             np.array([torques[0], torques.mean(axis=0)]),
         )
         contacts = self._contacts(q, v)
         starts = speeds(contacts)
         if moving_vehicle.lag is not None:
-            moving_vehicle.lag.reach(np.array([starts, [contact.side_speed_of_contact for contact in contacts]]), half)
-        wheel_forces = self._held_wheel_forces(moving_vehicle, contacts, starts, under, middle, half)
+            moving_vehicle.lag.reach(np.array([starts, [contact.speed_across for contact in contacts]]), half)
+        wheel_forces = self._constant_wheel_forces(moving_vehicle, contacts, starts, surfaces, half_step_torques, half)
         rates = self.vehicle.acceleration(q, v, wheel_forces)
         moving_vehicle.accelerations[:] = self._of_units(rates)
         rest_time = self.time_of_rest(moving_vehicle)
@@ -82,7 +82,7 @@ class Steps:
             return (AT_REST, rest_time) if rest_time < self.step else (self._end_status(moving_vehicle), self.step)
         contacts = self._contacts(q + half * v + 0.5 * half**2 * rates, v + half * rates)
         moving_vehicle.speed_changes[:] = (speeds(contacts) - starts) / half
-        wheel_forces = self._held_wheel_forces(moving_vehicle, contacts, starts, under, torques, self.step)
+        wheel_forces = self._constant_wheel_forces(moving_vehicle, contacts, starts, surfaces, torques, self.step)
         states_after = march(
             lambda _, x, u: self.vehicle.acceleration(x, u, wheel_forces), q.copy(), v.copy(), 1, self.step
         )[-1]
@@ -101,7 +101,7 @@ class Steps:
         no_torques, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
         moving = Moving(state, starts / plane.radius, np.zeros(starts.size), report, np.zeros(2 + plane.masses.size))
         under = self._surfaces_under(state, 0.0)
-        wheel_forces = self._held_wheel_forces(moving, contacts, starts, under, no_torques, self.step)
+        wheel_forces = self._constant_wheel_forces(moving, contacts, starts, under, no_torques, self.step)
         return self.vehicle.acceleration(state[0], state[1], wheel_forces), moving.turning
 
     def _end_status(self, moving_vehicle: Moving) -> int:
@@ -122,15 +122,15 @@ class Steps:
         plane, (position, rates) = self.course.on.plane, map(self._of_units, state)
         paths = np.empty((plane.wheels, 2, 2))
         for k in range(plane.masses.size):
-            mine = plane.unit == k
-            paths[mine] = ground_paths(*in_row(position, rates, plane.reach[k], k), plane.place[mine], time)
+            is_of_unit = plane.unit == k
+            paths[is_of_unit] = ground_paths(*in_row(position, rates, plane.reach[k], k), plane.place[is_of_unit], time)
         return under_wheels(self.course.on.road, paths, self.course.on.kind)
 
     def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[TyreContact]:
         """Contacts of all tyres at coordinates and rates (n,)."""
         return self.vehicle.contacts(self.vehicle.bodies.move(q, v), self.course.steer)
 
-    def _held_wheel_forces(
+    def _constant_wheel_forces(
         self,
         moving_vehicle: Moving,
         contacts: list[TyreContact],
@@ -147,8 +147,8 @@ class Steps:
             motion = WheelMotion(
                 starts[i],
                 moving_vehicle.speed_changes[i],
-                contact.side_speed,
-                contact.side_speed_of_contact,
+                contact.speed_along,
+                contact.speed_across,
                 course.least_speed,
             )
             if moving_vehicle.lag is not None:
@@ -178,4 +178,4 @@ class Steps:
 
 def speeds(contacts: list[TyreContact]) -> np.ndarray:
     """Speeds (W,) of the wheels' centres along the wheels (m/s)."""
-    return np.array([contact.side_speed for contact in contacts])
+    return np.array([contact.speed_along for contact in contacts])

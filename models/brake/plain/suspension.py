@@ -35,8 +35,8 @@ class TyreContact:
     axle: np.ndarray
     height: float
     load: float
-    side_speed: float
-    side_speed_of_contact: float
+    speed_along: float
+    speed_across: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,9 +160,7 @@ class Suspension:
         """
         still, straight = np.zeros(self.size), np.zeros(len(self.tyres))
         motions = [self.bodies.move(still, rate) for rate in np.eye(self.size)]
-        across = np.array(
-            [[sliding.side_speed_of_contact for sliding in self.contacts(motion, straight)] for motion in motions]
-        )
+        across = np.array([[sliding.speed_across for sliding in self.contacts(motion, straight)] for motion in motions])
         mass, _ = self.bodies.inertia(motions[0], self._gravity)
         damping = np.linalg.solve(mass, across @ (self.loads[:, None] * across.T))
         return float(np.linalg.eigvals(damping).real.max())

@@ -53,7 +53,7 @@ class Friction:
         mixed: np.ndarray = (1.0 - share) * values[self.surface.first] + share * values[self.surface.second]
         return mixed
 
-    def ahead(self) -> Force:
+    def force_along(self) -> Force:
         """Force (N) along the wheel as a function of slip."""
         t = self.tables
         mu = np.einsum(
@@ -64,7 +64,7 @@ class Friction:
         )
         return Force(t.slips, self.load * self.mixed_values(mu))
 
-    def aside(self, slip: float) -> float:
+    def side_force(self, slip: float) -> float:
         """Magnitude (N) of the force across the wheel at a slip."""
         t, by_angle = self.tables, interpolation_weights(self.tables.angles, self.angle)
         g = np.einsum("a,s,tas->t", by_angle, interpolation_weights(t.slips, abs(slip)), t.g)
@@ -121,8 +121,8 @@ def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, bra
     friction, sense = Friction(tables, surface, motion.angle, load), motion.direction
     speeds = sense * motion.start, sense * (motion.start + braked.step * motion.rate)
     wheel = WheelStep(speeds, braked.torques, braked.step, braked.radius, braked.inertia)
-    turning, force_along, slip, locked = wheel_step(wheel, sense * braked.turning, friction.ahead())
-    forces = _turned_to_sliding(np.array([force_along, friction.aside(slip)]), slip, motion)
+    turning, force_along, slip, locked = wheel_step(wheel, sense * braked.turning, friction.force_along())
+    forces = _turned_to_sliding(np.array([force_along, friction.side_force(slip)]), slip, motion)
     side = -math.copysign(forces[1], motion.across) if motion.across else 0.0
     angle = math.copysign(motion.angle, motion.across)
     return np.array([-sense * forces[0], side, load, slip, angle, locked, sense * turning])
