@@ -1,4 +1,4 @@
-"""Errors of a contact's forces: those of its cells, and those of the theory itself.
+"""Error estimates of contact forces: the error of the finite cells, and the error of the theory itself.
 
 Cells
     The same contact is rolled again on about half as many cells along each axis. An error of order p then changes by
@@ -31,19 +31,21 @@ from models.contact.linear_theory import coefficients
 from models.contact.theories import Fastsim, LinearTheory, Motion, OnEllipse, Rolled, RollingContact, Simplified
 
 SAFETY = 2.0
-"""Factor on what step halving tells."""
+"""Safety factor on the error that the comparison of two grids gives."""
 LIKELY = 0.7
 """Share of the difference of both grids that the finer one still has, as 600 contacts of all choices of FASTSIM had it
-against cells a hundred times finer: a third had more, a hundredth more than three times as much."""
+against cells a hundred times finer: a third had more, a hundredth more than three times as much.
+"""
 UNSEEN = 0.17
-"""What a zone of slip at the trailing edge takes off the force, by the square of the force used; it is wider than a
-cell, and seen, where the force used is beyond three by the cells."""
+"""Force that a zone of slip at the trailing edge takes away, divided by the square of the share of the friction limit
+that is used; the zone is wider than a cell, and seen, where this share is beyond three divided by the number of cells.
+"""
 SLENDER = (0.1, 10.0)
-"""a/b between which the bands were measured."""
+"""Axis ratios a/b between which the error bands were measured."""
 FILE = Path(__file__).with_name("error_bands.csv")
 (_, _, _, *_KNOTS), *_ROWS = csv.reader(FILE.read_text().splitlines())
 KNOTS = np.array(_KNOTS, float)
-"""Tangential force divided by mu N at which the bands are kept."""
+"""Ratios of the tangential force to mu N at which the error bands are tabulated."""
 BANDS, MOMENT_BANDS = (
     {
         theory: [np.array(values, float) for kind, name, _, *values in _ROWS if (kind, name) == (quantity, theory)]
@@ -51,16 +53,19 @@ BANDS, MOMENT_BANDS = (
     }
     for quantity in ("force", "moment")
 )
-"""Name of a theory -> error divided by mu N that 95 % of the contacts keep to at each knot, without spin and with it;
-that of the moment divided by mu N times the lever: abscissa is ``used_with_moment``, and all vanish at its zero."""
+"""Error bands by the name of a theory: ratio of the error to mu N that 95 % of the contacts keep to at each knot,
+without spin and with it; of the moment, ratio to mu N times the lever: the abscissa is ``used_with_moment``, and all
+vanish at its zero.
+"""
 
 
 @dataclass(frozen=True)
 class Error:
-    """Estimated errors of the tangential force (N) and of the moment (N m).
+    """Estimated errors of the tangential force (N) and of the moment (N m) of a rolling contact.
 
-    cells : what the cells leave at most. theory : what 95 % of contacts like this keep to. moment_cells and
-    moment_theory : the same of the moment. likely, moment_likely : what the cells leave, a third of the times more.
+    cells : largest error by the cells. theory : error of the theory that 95 % of contacts like this keep to.
+    moment_cells and moment_theory : the same for the moment. likely, moment_likely : likely error by the cells, which a
+    third of the contacts exceed.
     """
 
     cells: float
@@ -82,7 +87,7 @@ class Error:
 
 
 def rolled(contact: RollingContact, motion: Motion, cells: int, *, fields: bool = False) -> tuple[Rolled, Error]:
-    """Forces at the given creepages and spin, and their estimated errors."""
+    """Contact forces at the given creepages and spin, and their estimated errors."""
     fine = contact.roll(motion, cells, fields=fields)
     if isinstance(contact, LinearTheory):
         force, moment = _of_linear(contact, motion, fine)
@@ -102,12 +107,13 @@ def remaining_errors(contact: RollingContact, motion: Motion, cells: int, fine: 
 
 
 def _by_friction(contact: RollingContact, *rolled: Rolled) -> list[Array]:
-    """Ratios (3,) for each result: fx and fy to mu N, and mz to mu N times the lever."""
+    """Ratios (3,) of each result: fx and fy to mu N, and mz to mu N times the lever."""
     limit = contact.friction * contact.pressing.load
     return [np.array([creep.fx, creep.fy, creep.mz / contact.lever]) / limit for creep in rolled]
 
 
 def _largest_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
+    """Upper bounds of the discretisation errors of force (N) and moment (N m), from a fine and a coarse grid."""
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:
         return 0.0, 0.0
@@ -118,7 +124,8 @@ def _largest_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: R
 
 def _likely_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
     """Likely discretisation errors of force (N) and moment (N m): LIKELY times the difference between fine and coarse
-    grid, plus a small allowance for errors that both grids share."""
+    grid, plus a small allowance for errors that both grids share.
+    """
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:
         return 0.0, 0.0
@@ -133,12 +140,12 @@ def _likely_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: Ro
 
 
 def coarser_cells(cells: int) -> int:
-    """Number of cells of the coarser grid that is compared with one of ``cells`` cells."""
+    """Number of cells of the coarser grid that is compared with a grid of ``cells`` cells."""
     return (cells + 1) // 2
 
 
 def cells_error(fine: Array, coarse: Array, cells: int, order: float) -> Array:
-    """Relative discretisation errors (...) on ``cells`` cells: of the force to mu N, and of the moment to mu N times
+    """Relative discretisation errors (...) on ``cells`` cells, of the force to mu N, and of the moment to mu N times
     the lever.
 
     fine, coarse : (3, ...) fx and fy divided by mu N, mz divided by mu N times the lever, on ``cells`` and half of
@@ -150,22 +157,26 @@ def cells_error(fine: Array, coarse: Array, cells: int, order: float) -> Array:
 
 
 def band(name: str, used: Array, spinning: Array) -> Array:
-    """Ratio of a theory's force error to mu N, for one of BANDS, at force ratios ``used`` (force to mu N) and weights
-    ``spinning`` of spin from ``spin_share``."""
+    """Error band of a theory's force, as a ratio to mu N, at force ratios ``used`` (force to mu N) and weights
+    ``spinning`` of spin from ``spin_share``; ``name`` : key of BANDS.
+    """
     without, with_spin = (np.interp(used, KNOTS, values) for values in BANDS[name])
     without = without * np.minimum(used / KNOTS[0], 1.0)  # the linear theory is met, but not where spin meets creepage
     return without + spinning * (with_spin - without)
 
 
 def moment_band(name: str, used: Array, spinning: Array) -> Array:
-    """Ratio of a theory's moment error to mu N times the lever. ``used`` comes from ``used_with_moment``; other
-    arguments as in ``band``."""
+    """Error band of a theory's moment, as a ratio to mu N times the lever. ``used`` comes from ``used_with_moment``;
+    other arguments as in ``band``.
+    """
     without, with_spin = (np.interp(used, (0.0, *KNOTS), (0.0, *values)) for values in MOMENT_BANDS[name])
     return without + spinning * (with_spin - without)
 
 
 def slenderness(a: Array, b: Array) -> Array:
-    """Factor on the error bands for ellipses: 1 for the axis ratios at which the bands were measured, larger beyond."""
+    """Factor on the error bands of ellipses with semi-axes a, b: 1 for the axis ratios at which the bands were
+    measured, larger beyond.
+    """
     ratio = a / b
     return np.maximum(np.maximum(SLENDER[0] / ratio, ratio / SLENDER[1]), 1.0)
 
@@ -177,8 +188,9 @@ def used_with_moment(used: Array, moment: Array) -> Array:
 
 
 def spin_share(a: Array, b: Array, motion: Array, nu: float | Array) -> Array:
-    """Weight 0 to 1 of spin in a motion (3, ...). It is three times the share of spin in the sum of squares of the
-    linear theory's terms, at most 1."""
+    """Weight, 0 to 1, of spin in a motion (3, ...) of creepages and spin: three times the share of spin in the sum of
+    squares of the linear theory's terms, at most 1.
+    """
     c = coefficients(a / b, nu)
     parts = np.stack([c.c11 * motion[0], c.c22 * motion[1], np.sqrt(a * b) * c.c23 * motion[2]]) ** 2
     whole = parts.sum(axis=0)
@@ -201,12 +213,13 @@ def _of_theory(contact: RollingContact, motion: Motion, forces: Rolled) -> tuple
 
 
 def _of_linear(contact: OnEllipse, motion: Motion, forces: Rolled) -> tuple[float, float]:
-    """Errors of the linear theory in force (N) and moment (N m): its difference from FASTSIM plus FASTSIM's own
-    error."""
+    """Errors of the linear theory in force (N) and moment (N m): its difference from FASTSIM plus the error of
+    FASTSIM.
+    """
     better, error = rolled(Fastsim(contact.hertz, contact.friction, contact.pair, **BEST_CHOICES), motion, 31)
     off = float(np.linalg.norm(forces.force - better.force))
     return off + error.total, abs(forces.mz - better.mz) + error.moment
 
 
 BEST_CHOICES = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
-"""Choices of FASTSIM that are closest to the exact theory on the whole."""
+"""Options of FASTSIM that are on the whole closest to the exact theory."""

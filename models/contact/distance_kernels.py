@@ -13,8 +13,9 @@ from models.machine.compiled import njit
 
 @njit(cache=True)
 def weights(t):
-    """Weights of four neighbouring nodes at the position ``t`` (0 to 1) in a segment, and of the interpolated slope per
-    spacing."""
+    """Weights of four neighbouring nodes for the interpolated value at the position ``t`` (0 to 1) in a segment, and
+    for its slope per spacing.
+    """
     value = (
         0.5 * t * (-1.0 + t * (2.0 - t)),
         1.0 + 0.5 * t * t * (-5.0 + 3.0 * t),
@@ -32,15 +33,18 @@ def weights(t):
 
 @njit(cache=True)
 def segment(position, segments):
-    """Index of the segment that holds a position (in spacings), and the position as a share of that segment; clamped to
-    the ends."""
+    """Index of the segment that contains a position (in spacings), and the position as a share of that segment; clamped
+    to the ends.
+    """
     i = min(max(math.floor(position), 0), segments - 1)
     return i, position - i
 
 
 @njit(cache=True)
 def value_and_slopes(padded, u, v):
-    """Value at u spacings along x (columns) and v along y (rows), and its slopes per spacing along x and y."""
+    """Interpolated value at u spacings along x (columns) and v along y (rows), and its slopes per spacing along x and
+    y.
+    """
     i, t = segment(u, padded.shape[1] - 3)
     j, s = segment(v, padded.shape[0] - 3)
     wx, sx = weights(t)
@@ -59,7 +63,7 @@ def value_and_slopes(padded, u, v):
 
 @njit(cache=True)
 def values(padded, u, v):
-    """Values at the points (u[k], v[k])."""
+    """Interpolated values at the points (u[k], v[k]), in spacings."""
     heights = np.empty(u.size)
     for k in range(u.size):
         heights[k] = value_and_slopes(padded, u[k], v[k])[0]
@@ -114,8 +118,9 @@ def lowest(cube, square, linear):
 
 @njit(cache=True)
 def valley(padded, finer):
-    """Least value along x, and its position along x, on each of ``finer`` lines per spacing across y: two arrays
-    (lines,)."""
+    """Least value along x, and its position along x in spacings, on each of ``finer`` lines per spacing across y: two
+    arrays (lines,).
+    """
     lines = (padded.shape[0] - 3) * finer + 1
     least, where = np.empty(lines), np.empty(lines)
     for k in range(lines):
@@ -125,8 +130,8 @@ def valley(padded, finer):
 
 @njit(cache=True)
 def sides(lines, roots, bottom, root):
-    """Ends of the valley below the level ``root``. From the bottom, the total length of all parts below the level is
-    laid off on the low and on the high side.
+    """Ends (m) of the valley below the level whose root is ``root``: on either side of the bottom, the total length of
+    all parts below the level.
 
     lines : positions, one of them the bottom; roots : square root of the height above the bottom at these, linear
     between.

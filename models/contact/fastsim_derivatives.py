@@ -1,4 +1,4 @@
-"""Derivatives of FASTSIM's forces by creepages, spin and load: the march differentiated along with itself.
+"""Derivatives of FASTSIM's forces with respect to creepages, spin and load, by differentiating its march exactly.
 
 A sticking traction changes as the sum that it is. A slipping one keeps its size and only turns, so its derivative is
 that of its angle: with phi the angle of -w, psi from there to the traction, and z = |w| step / g,
@@ -52,7 +52,8 @@ def derivatives(
     flexibilities: Flexibilities = "blended",
     growing: bool = True,
 ) -> Derivatives:
-    """Derivatives of the forces of ``fastsim`` with the second-order march; the same parameters and errors.
+    """Creep forces of FASTSIM with the second-order march, and their derivatives; the same parameters and errors as
+    ``fastsim``.
 
     growing : whether the semi-axes grow with the load, as its cube root (Hertz, bodies of given shape), or stay
 
@@ -105,7 +106,7 @@ def _slopes(contacts, strips, cells, kind, forces, slopes):
 
 @compiled
 def _scale_slopes(contact, cells, kind, scale):
-    """Derivatives (3, 3) of the three numbers from ``rigid_slip`` with respect to xi_x, xi_y and spin."""
+    """Derivatives (3, 3) of the three results of ``rigid_slip`` with respect to xi_x, xi_y and spin."""
     a, c, flexible = contact.a, math.sqrt(contact.a * contact.b), (contact.l1, contact.l2, contact.l3)
     bound = contact.mu * cells.peak * contact.load / (a * contact.b)
     step, creep = 2.0 * a / (cells.centre.size * bound), (contact.xi_x, contact.xi_y, contact.spin * c)
@@ -130,8 +131,9 @@ def _scale_slopes(contact, cells, kind, scale):
 
 @compiled
 def _strip(contact, strips, s, cells, slip, sums, moved):
-    """Sums of q_x, q_y and t q_y over the cells of strip number s, and their derivatives (3, 3) with respect to the
-    three numbers of rigid slip."""
+    """Fill the sums of q_x, q_y and t q_y over the cells of strip s, and their derivatives (3, 3) with respect to the
+    rigid slip (x, y, spin).
+    """
     spread, off, arm = strips.spread[s], contact.b * strips.y[s], contact.a * strips.half[s]
     u, v0, v1 = spread * (slip[0] - slip[2] * off), spread * slip[1], spread * slip[2] * arm
     du, dv0, dv1 = (spread, 0.0, -spread * off), (0.0, spread, 0.0), (0.0, 0.0, spread * arm)
@@ -180,7 +182,9 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
 
 @compiled
 def _turning(px, py, u, v, before, rate):
-    """Rotation of a slipping traction in ``advance``: sin psi' / sin psi, the derivative of psi' to |w|, and |w|."""
+    """Derivatives of the rotation of a slipping traction in ``advance``: sin psi' / sin psi, the derivative of psi'
+    with respect to |w|, and |w|.
+    """
     size = math.sqrt(u * u + v * v)
     h = min(size * rate, LARGEST_EXPONENT)
     base = 1.0 + h * (1.0 + h * (0.5 + h * (1.0 / 6.0)))

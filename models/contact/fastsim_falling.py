@@ -1,4 +1,5 @@
-"""FASTSIM with friction that falls with the speed of slip: kernels of its own, so that constant friction pays nothing.
+"""FASTSIM with friction that falls with the speed of slip, in separate compiled functions, so that constant friction
+costs no more.
 
 Friction is taken at the rigid slip of the point: exact where all slides, and no loop in which slip and friction chase
 one another, which would have more than one end. A sticking cell is asked for less than it could hold.
@@ -16,7 +17,9 @@ from models.machine.compiled import compiled
 
 @compiled
 def forces_falling(contacts, strips, cells, kind, law, answers):
-    """FASTSIM's forces of many contacts by the second-order march, with falling friction; law : of ``Falling``."""
+    """Fill FASTSIM's forces of many contacts, FORCES (n,), by the second-order march with falling friction; law : of
+    ``Falling``.
+    """
     n, area, slip = cells.centre.size, 0.0, np.empty(1, SLIP)[0]
     left, tractions = np.empty((2, n)), np.empty((3, n))
     for s in range(strips.y.size):
@@ -42,8 +45,9 @@ def forces_falling(contacts, strips, cells, kind, law, answers):
 
 @compiled
 def friction_left(contact, strips, s, cells, law, left):
-    """Fill ``left`` (2, cells) for strip number s, as ``strip_tractions`` expects it, from the friction at each point's
-    rigid slip."""
+    """Fill ``left`` (2, cells) of strip s with the remaining share of friction at each point's rigid slip, as
+    ``strip_tractions`` expects it.
+    """
     along = contact.xi_x - contact.spin * contact.b * strips.y[s]
     across, turn = contact.xi_y, contact.spin * contact.a * strips.half[s]
     for i in range(cells.centre.size):
@@ -53,6 +57,6 @@ def friction_left(contact, strips, s, cells, law, left):
 
 @compiled
 def _friction_share(along, across, law):
-    """Ratio of the friction coefficient at a slip (along, across) to that without slip."""
+    """Ratio of the friction coefficient at a slip (along, across) to the coefficient without slip."""
     floor, decay = law
     return floor + (1.0 - floor) * math.exp(-decay * math.sqrt(along * along + across * across))

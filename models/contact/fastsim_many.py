@@ -1,4 +1,5 @@
-"""Many ellipses at once: from creepages to the strips' own numbers, through the march, and back to forces.
+"""FASTSIM for many ellipses at once: from creepages to the rigid slip of their strips, through the march, and back to
+forces.
 
 Strips of all ellipses are lined up and marched in full blocks, so that no lane is empty but at the very end.
 """
@@ -13,16 +14,23 @@ from models.contact.inputs import NEGLIGIBLE_BOUND
 from models.machine.compiled import compiled, lean
 
 A, B, LOAD, MU = range(4)
-"""Places of the first fields of CONTACT, for who keeps contacts in a table of doubles."""
+"""Indices of the first fields of CONTACT, for callers that keep contacts in a table of doubles."""
 ONE_FLEXIBILITY, THREE_FLEXIBILITIES, BLENDED = 0, 1, 2
 OF_X, OF_SPIN, AGAINST, REACH, GROWTH = 0.5, 0.52, 0.86, 1.9, 1.3
+"""Constants of the blend of flexibilities: weights of xi_x and spin relative to xi_y, how much of it lateral creepage
+against spin takes away, the reach at which the one flexibility has its main part and the power of its beginning; then
+powers of a/b in the second and the fourth, within ``RATIOS``. Calibrated on 910 contacts of the exact theory, 250 of
+them with lateral creepage against spin, and compared with others (validation case ``contact_price``).
+"""
 SPIN_BY_RATIO, REACH_BY_RATIO, RATIOS = 0.6, 0.45, (0.1, 10.0)
 """Of the blend: what xi_x and spin count by xi_y, how much of it lateral creepage against spin takes away, the reach at
 which the one flexibility has its main part and the power of its beginning; then powers of a/b in the second and the
 fourth, within ``RATIOS``. Calibrated on 910 contacts of the exact theory, 250 of them with lateral creepage against
 spin, and held against others (validation case ``contact_price``)."""
 SLIDING, MOST = 8.0, 100.0
-"""Square of the reach at which creepage without spin slides all over; exponents beyond which nothing changes."""
+"""Square of the ratio of traction to bound at which creepage without spin makes the whole area slide, and exponent
+beyond which nothing changes.
+"""
 
 
 @compiled
@@ -38,7 +46,7 @@ def forces(contacts, strips, cells, kind, march, answers):
 
 @lean
 def forces_within(contacts, strips, cells, kind, march, room, answers):
-    """``forces`` without allocating arrays; room : ``Workspace`` for intermediate values."""
+    """Creep forces as by ``forces``, without allocating arrays; room : ``Workspace`` for intermediate values."""
     slips, block, m = room.slips, room.blocks[0], strips.y.size
     for c in range(len(contacts)):
         slip, answer = slips[c], answers[c]
@@ -68,7 +76,7 @@ def touches(contact):
 
 @lean
 def rigid_slip(contact, cells, kind):
-    """Rigid slip of every cell from the creepages (x, y, spin), in the form that the march needs.
+    """Rigid slip (x, y, spin) of a contact's creepages, in the form that the march needs.
 
     The traction by the bound in the ellipse's middle that each creepage builds up over one cell of the middle strip,
     were there no slip; the third one is that of spin per metre.
@@ -83,7 +91,7 @@ def rigid_slip(contact, cells, kind):
 
 @lean
 def stiffness(contact, bound, kind):
-    """Inverses of the flexibilities along x, along y and in spin (N/m^3)."""
+    """Inverses (N/m^3) of the flexibilities along x, along y and in spin."""
     k1, k2, k3 = 1.0 / contact.l1, 1.0 / contact.l2, 1.0 / contact.l3
     part = blend(contact, bound, kind)[0]
     if part == 0.0:
@@ -101,10 +109,6 @@ def blend(contact, bound, kind):
     opposes spin contributes less: the pole about which the rigid slip turns then lies in the patch, and much of the
     area near it still sticks while the remaining area slides. A second term brings the weight to 1 where the whole area
     slides, so that force and slip have the same direction.
-
-    It grows with x, y and z, the reach of the linear theory's tractions by the bound. Lateral creepage against spin
-    reaches less: the pole about which the rigid slip turns lies in the patch then, and near it much still sticks when
-    the rest slides. A second term ends the blend where all slides, so that force and slip have one direction there.
     """
     if kind != BLENDED:
         return 1.0 if kind == ONE_FLEXIBILITY else 0.0, 0.0, 0.0, 0.0
@@ -131,7 +135,7 @@ def blend(contact, bound, kind):
 
 @lean
 def mean_flexibility(contact, turn, kind):
-    """Common flexibility for all creepages; ``turn`` = spin sqrt(a b) is the third of them.
+    """Common flexibility (m^3/N) for all creepages; ``turn`` = spin sqrt(a b) is the third of them.
 
     That of 1982 weights by their sizes and divides by their root mean square, which makes up to sqrt(3) times too much
     of mixed ones; the blend's is the mean weighted by their squares.
@@ -149,9 +153,9 @@ def mean_flexibility(contact, turn, kind):
 
 @lean
 def strip_slip(contact, strips, s, slip):
-    """Rigid slip (u, v0, v1) of strip number s from that of its contact. It is the traction that would build up over
-    one cell without sliding, in units of the bound in the strip's middle: u along x, and v0 + v1 t along y at position
-    t."""
+    """Rigid slip (u, v0, v1) of strip s from that of its contact: the traction that would build up over one cell
+    without sliding, in units of the bound in the strip's middle: u along x, and v0 + v1 t along y at position t.
+    """
     spread = strips.spread[s]
     return (
         spread * (slip.x - slip.spin * contact.b * strips.y[s]),
@@ -162,7 +166,9 @@ def strip_slip(contact, strips, s, slip):
 
 @lean
 def _fill(block, first, count, contacts, strips, slips):
-    """Put rigid slips of ``count`` strips, from number ``first`` on, into the lanes; further lanes get zero slip."""
+    """Put the rigid slips of ``count`` strips, from strip ``first`` on, into the lanes of a BLOCK; further lanes get
+    zero slip.
+    """
     c, s = first // strips.y.size, first % strips.y.size
     for j in range(LANES):
         if j >= count:
@@ -176,8 +182,9 @@ def _fill(block, first, count, contacts, strips, slips):
 
 @lean
 def _collect(block, first, count, contacts, strips, answers):
-    """Add the lanes' sums to the forces of their ellipses, and their slipping cells, weighted by length, to the slip
-    area."""
+    """Add the lanes' sums to the forces of their ellipses, and their numbers of slipping cells, weighted by length, to
+    the slip area.
+    """
     c, s = first // strips.y.size, first % strips.y.size
     for j in range(count):
         contact, answer = contacts[c], answers[c]
@@ -192,8 +199,7 @@ def _collect(block, first, count, contacts, strips, answers):
 
 @lean
 def add_strip(contact, strips, s, sums, answer):
-    """Add the forces of strip number s to those of its contact, from the strip's sums of q_x, q_y and t q_y over its
-    cells."""
+    """Add the forces of strip s to those of its contact, from the strip's sums of q_x, q_y and t q_y over its cells."""
     part, (x, y, turn) = contact.mu * contact.load * strips.part[s], sums
     answer.fx += part * x
     answer.fy += part * y
@@ -225,7 +231,7 @@ def strip_tractions(slip, cells, march, left, answers):
 
 @compiled
 def point(motion, unit, strips, cells, choices):
-    """Forces fx, fy and moment mz of one ellipse with the shape of ``unit``; NaN for invalid input.
+    """Creep forces fx, fy (N) and moment mz (N m) of one ellipse with the shape of ``unit``; NaN for invalid input.
 
     motion : a (m), load, mu, xi_x, xi_y, spin; unit : b, l1, l2, l3 at a = 1 m; strips, cells : a net's tables;
     choices : the net's peak, kind of flexibility, march. Python hands plain arrays and numbers over in a fraction of

@@ -1,4 +1,4 @@
-"""Fields inside a contact area, cell by cell, and FASTSIM's cells: its march with nothing summed up."""
+"""Fields of pressure, traction and slip inside a contact area, cell by cell."""
 
 from dataclasses import dataclass
 

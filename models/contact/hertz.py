@@ -1,4 +1,4 @@
-"""Hertz: two smooth convex bodies pressed together without friction touch on an ellipse.
+"""Hertz' theory: two smooth convex bodies pressed together without friction touch on an ellipse.
 
 Source: Johnson, Contact Mechanics (1985), section 4.2. With the short semi-axis s, the long one l, g = s/l and
 e^2 = 1 - g^2, the complete elliptic integrals
@@ -25,9 +25,9 @@ from models.core.errors import InputError
 from models.machine.compiled import njit
 
 FLATTEST = 0.01
-"""The larger curvature (1/m) of real bodies is not below this, a radius of 50 m: one in 1/mm usually is."""
+"""Least curvature (1/m) that is accepted for the larger one, a radius of 50 m: a smaller one is usually in 1/mm."""
 LEAST_AXIS, LARGEST_AXIS = 1e-30, 1e3
-"""m"""
+"""Smallest and largest semi-axis (m) that are accepted."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Hertz:
 
 
 def by_load(A: Any, B: Any, load: Any, material_pair: MaterialPair) -> Hertz:
-    """Hertzian contact under a given load.
+    """Hertzian contact from curvatures under a given load.
 
     A, B : curvatures (1/m), above 0; load : N, compression positive; arrays of any shapes that broadcast. A load of
     zero or less makes no contact. Raises InputError for a curvature that is not above zero, a number that is not
@@ -64,8 +64,8 @@ def by_load(A: Any, B: Any, load: Any, material_pair: MaterialPair) -> Hertz:
 
 
 def by_approach(A: Any, B: Any, approach: Any, material_pair: MaterialPair) -> Hertz:
-    """Contact of bodies that have approached each other by ``approach`` (m) since first touching; zero or less means a
-    gap.
+    """Hertzian contact of bodies that have approached each other by ``approach`` (m) since first touching; zero or less
+    means a gap.
 
     Otherwise as ``by_load``.
     """
@@ -105,7 +105,7 @@ def by_axes(
 
 
 def _curvatures(A: Any, B: Any) -> dict[str, Array]:
-    """Both curvatures as arrays; raises InputError where they do not make a Hertzian contact."""
+    """Both curvatures (1/m) as arrays; raises InputError where they do not make a Hertzian contact."""
     answer = {
         name: quantity(name, value, "a curvature in 1/m, at most 1e12", maximum=1e12)
         for name, value in (("A", A), ("B", B))
@@ -132,8 +132,9 @@ def _curvatures(A: Any, B: Any) -> dict[str, Array]:
 def _contact(
     A: Array, B: Array, load: Array, short: Array, ratio: Array, curvature_sum: Array, material_pair: MaterialPair
 ) -> Hertz:
-    """The contact computed from its short semi-axis; all results are zero where this axis is. ``curvature_sum`` is K =
-    B + D."""
+    """Hertzian contact from its short semi-axis (m); all results are zero where this axis is. ``curvature_sum`` is K =
+    B + D.
+    """
     long = short / ratio
     area = math.pi * short * long
     p0 = np.divide(1.5 * load, area, out=np.zeros_like(area), where=area > 0.0)
@@ -159,7 +160,7 @@ def _aspects(curvatures: Array) -> Array:
 
 @njit(cache=True)
 def aspect(curvatures: float) -> tuple[float, float, float]:
-    """Ratio g of the short to the long semi-axis, and the elliptic integrals B and D at this g.
+    """Ratio g of the short to the long semi-axis of a Hertzian ellipse, and the elliptic integrals B and D at this g.
 
     curvatures : the smaller by the larger, above 0 and up to 1. Newton's method for ln(g^2 D / B) as a function of
     ln g, whose slope 1 + C (1/D + g^2/B), C = (D - B)/e^2, stays between 1.5 and 2.
@@ -179,7 +180,9 @@ def aspect(curvatures: float) -> tuple[float, float, float]:
 
 @njit(cache=True)
 def integrals(g: float) -> tuple[float, float]:
-    """Elliptic integrals B and D (head of this module) at g = sqrt(1 - e^2), 0 < g <= 1, exact to rounding."""
+    """Elliptic integrals B and D (formulas in this module's docstring) at g = sqrt(1 - e^2), 0 < g <= 1, exact to
+    rounding.
+    """
     other, mean = g, 1.0
     a_b, b_b, a_d, b_d = 1.0, 0.0, 0.0, 1.0  # the integrands as (a cos^2 + b sin^2) / sqrt(...)
     while True:

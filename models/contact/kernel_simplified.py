@@ -1,4 +1,5 @@
-"""Kalker's theory of 1983 (``simplified_theory``) for compiled callers: one patch of any shape, at its approach.
+"""Kalker's theory of 1983 (``simplified_theory``) for compiled callers: one contact patch of any shape, at its
+approach.
 
 The undeformed distance and the way the theory is used are a table of doubles that ``table`` makes. The kernel finds
 the depth that has the approach, marches, fits W_1 = W_2 and marches again, by the compiled parts of the package: its
@@ -54,18 +55,20 @@ HEAD = record(
     "rows",
     "columns",
 )
-"""Head of the table: minus the cells; address of the law; net, shape and fit; least distance and depth at which a side
-is reached (m); first node, spacing and bottom along x and y (m); lengths. Then lines and roots along x and y, and
-padded heights."""
+"""Record at the head of the table: minus the cells; address of the callback; net, shape and fit; least distance and
+depth at which a side is reached (m); first node, spacing and bottom along x and y (m); lengths. Then lines and roots
+along x and y, and padded heights.
+"""
 HEADER = size_of(HEAD)
 MOST_CELLS = 200
 DEPTH_TOLERANCE = 1e-12
-"""Share of the approach, from first touch on, to which the depth settles."""
+"""Ratio of the remaining error of the depth to the approach beyond first touch at which the iteration ends."""
 TRIES = 100
 
 
 def table(distance: Distance, cells: int = 21, options: SimplifiedOptions = PLAIN) -> Array:
-    """Table for an undeformed distance with a single valley; its first number is below zero. Must not be modified.
+    """Table for an undeformed distance with a single valley, for compiled callers; its first number is below zero. Must
+    not be modified.
 
     cells : strips of the fine net, and cells in each, 3 to 200. Raises InputError, also for several valleys.
     """
@@ -99,7 +102,7 @@ def table(distance: Distance, cells: int = 21, options: SimplifiedOptions = PLAI
 
 @compiled
 def surface_at(numbers, depth):
-    """``Surface`` of the patch at a depth (m) for compiled functions, as ``Patch.surface`` gives it."""
+    """``Surface`` of the patch at a depth (m), as ``Patch.surface`` gives it, from its table."""
     head = records(numbers, 1, HEAD)[0]
     m, n = int(head.lines_x), int(head.lines_y)
     x, y = array(beyond(numbers, HEADER), (2, m)), array(beyond(numbers, HEADER + 2 * m), (2, n))
@@ -113,7 +116,7 @@ def surface_at(numbers, depth):
 
 @compiled
 def fit_at(numbers, depth, modulus):
-    """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA at a depth (m)."""
+    """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of the patch at a depth (m)."""
     head = records(numbers, 1, HEAD)[0]
     return crude_fit(surface_at(numbers, depth), int(head.net), int(head.shape), int(head.fit), modulus)
 
@@ -157,8 +160,8 @@ def settle(numbers, approach, modulus):
 
 @compiled
 def simplified(inputs, numbers, outputs):
-    """Status of the patch, FINE or NOT_PLAUSIBLE; fills ``outputs``. The caller, ``kernel``, must have checked
-    ``inputs``.
+    """Solve the patch by the simplified theory and fill ``outputs``; returns its status, FINE or NOT_PLAUSIBLE. The
+    caller, ``kernel``, must have checked ``inputs``.
 
     All pointers to doubles. Zeros where the bodies do not touch; no answer where the contact reaches the edge of the
     distance.
@@ -180,8 +183,9 @@ def simplified(inputs, numbers, outputs):
 
 @compiled
 def _roll(values, numbers, depth, stiffness, out):
-    """Fill the rolling forces in ``out``, whose load is known, of the patch at a depth: as
-    ``simplified_theory.roll``."""
+    """Fill the rolling forces of the patch at a depth (m) in ``out``, whose load is known, as
+    ``simplified_theory.roll`` does.
+    """
     surface, head = surface_at(numbers, depth), records(numbers, 1, HEAD)[0]
     box, cells, meshes = surface.box, -int(head.cells), int(head.net)
     net = strips(surface, cells, cells, int(head.shape))
