@@ -1,4 +1,4 @@
-"""Cross-sections of wheels and rails.
+"""Cross-section profiles of wheels and rails.
 
 A profile is a curve z(y) with z downwards, from the wheel into the rail, and y away from the middle of the track:
 a right wheel on a right rail. The flange and the gauge corner lie at negative y.
@@ -18,12 +18,15 @@ from models.core.errors import InputError
 SPACING = 1e-4
 """Distance (m) of the points along a profile's contour."""
 SPIKE = 2e-4
-"""Distance (m) from both neighbours from which a point that turns back counts as one that was measured wrongly."""
+"""Distance (m) from both neighbours above which a point that turns back counts as a measurement error."""
 BACK = 1e-3
-"""Step (m) against y up to which a contour that turns back is rough, and not the end of what can be touched; more of y
-than that may not be lost beyond it."""
+"""Step (m) against y up to which a contour that turns back is rough, and not the end of what can be touched; also the
+largest width of y that may be lost beyond it.
+"""
 TURNING = 0.3
-"""Largest way of a contour against its direction by the way along it: a rail with web and foot turns by 0.27."""
+"""Largest ratio of a contour's way against its direction to its way along it: a rail with web and foot turns by
+0.27.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +43,7 @@ class ContactProfile:
 
     @cached_property
     def curve(self) -> CubicSpline:
-        """Curve z(y) through the points, twice continuously differentiable."""
+        """Profile curve z(y) in m through the points, twice continuously differentiable."""
         return CubicSpline(self.y, self.z)
 
     def turned(self, angle: float) -> "ContactProfile":
@@ -55,7 +58,7 @@ class ContactProfile:
 
 
 def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> ContactProfile:
-    """A profile from measured points y, z (n,) in m, in order along the contour, smoothed and evenly spaced again.
+    """Profile from measured points y, z (n,) in m, in order along the contour, smoothed and evenly spaced again.
 
     smoothing : wavelength (m) of which half is left (see ``ContactProfile``). Raises InputError for wrong shapes,
     values that are not finite or not a profile's size in m, and a contour that does not run along y.
@@ -75,6 +78,7 @@ def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> Co
 
 
 def _check(y: Array, z: Array, smoothing: float, file: object) -> None:
+    """Refuse profile points of wrong shape or size, that are not finite, or whose contour does not run along y."""
     if y.ndim != 1 or y.shape != z.shape or y.size < 10:
         raise InputError(file, "profile", [list(y.shape), list(z.shape)], "must be two columns of ten points or more")
     if not (np.isfinite(y).all() and np.isfinite(z).all()):
@@ -99,7 +103,9 @@ def _check(y: Array, z: Array, smoothing: float, file: object) -> None:
 
 
 def _check_spikes(points: Array, file: object) -> None:
-    """Refuse outliers: points far from the line between their neighbours. A contour never turns back sharply."""
+    """Refuse measurement errors: points far from the line between their neighbours. A contour never turns back
+    sharply.
+    """
     way, straight = np.linalg.norm(np.diff(points, axis=0), axis=1), np.linalg.norm(points[2:] - points[:-2], axis=1)
     spikes = np.minimum(way[:-1], way[1:]) > np.maximum(2.0 * straight, SPIKE)
     if spikes.any():
@@ -113,8 +119,9 @@ def _check_spikes(points: Array, file: object) -> None:
 
 
 def _check_rough(y: Array, keep: slice, file: object) -> None:
-    """Refuse a contour whose y briefly decreases, as in rough or coarsely rounded data; the remaining points would be
-    lost."""
+    """Refuse a contour whose y briefly decreases, as in rough or coarsely rounded data, since the points beyond would
+    be lost.
+    """
     for beyond, last in ((y[keep.stop :], y[keep.stop - 1]), (-y[: keep.start][::-1], -y[keep.start])):
         highest = np.maximum.accumulate(np.append(last, beyond))[1:]
         rough = np.logical_and.accumulate(highest - beyond < BACK)
@@ -132,7 +139,8 @@ def _check_rough(y: Array, keep: slice, file: object) -> None:
 
 def _smoothed(length: Array, values: Array, even: Array, smoothing: float) -> Array:
     """Smoothed coordinate at evenly spaced lengths along the contour: the curve that minimises error^2 + (L / 2 pi)^4
-    curvature^2."""
+    curvature^2.
+    """
     interpolated = CubicSpline(length, values)(even)
     if smoothing == 0.0:
         return interpolated
@@ -141,7 +149,7 @@ def _smoothed(length: Array, values: Array, even: Array, smoothing: float) -> Ar
 
 
 def _ascending(y: Array) -> slice:
-    """Longest run of consecutive points with ascending y."""
+    """Longest run of consecutive profile points with ascending y."""
     breaks = np.flatnonzero(np.diff(y) <= 0.0)
     starts, ends = np.concatenate([[0], breaks + 1]), np.concatenate([breaks + 1, [y.size]])
     k = int(np.argmax(ends - starts))

@@ -1,4 +1,6 @@
-"""Compiled loops over the cells of a rolling contact: sweeps, the coupling within its strips, steps of GMRES."""
+"""Compiled loops of the exact rolling theory over the cells of a contact: sweeps, the coupling within strips, steps of
+GMRES.
+"""
 
 import numpy as np
 
@@ -7,7 +9,8 @@ from models.machine.compiled import njit
 
 @njit(cache=True, fastmath=True, nogil=True)
 def sweep(traction, rigid, kernel, bound, relaxation):
-    """One relaxed Gauss-Seidel sweep in place, strip by strip, each from its leading edge back.
+    """Relax the tractions of all cells once, in place, by Gauss-Seidel, strip by strip, each from its leading edge
+    back.
 
     traction, rigid : (2, ny, nx) traction in units of G and rigid slip; bound : (ny, nx), zero outside the contact;
     kernel : (3, 2 ny - 1, 2 nx - 1), xx, xy and yy, reversed in both axes so that its rows run beside the traction's.
@@ -56,7 +59,7 @@ def answer(slip_x, slip_y, own_x, own_y, bound):
 
 @njit(cache=True, fastmath=True, nogil=True)
 def factor(systems, spans):
-    """LU factors of each matrix in (many, n, n), in place: L with unit diagonal, and U.
+    """Replace each matrix (many, n, n) by its LU factors, in place: L with unit diagonal, and U.
 
     spans (many, 2) : first row of each that is not the unit matrix's, and one beyond its last. Without pivoting, which
     a matrix with a positive definite symmetric part does not need.
@@ -74,7 +77,7 @@ def factor(systems, spans):
 
 @njit(cache=True, fastmath=True, nogil=True)
 def substitute(factors, spans, values):
-    """Solutions (many, n) of the systems in ``factors`` for right-hand sides (many, n)."""
+    """Solutions (many, n) of the linear systems in ``factors`` for right-hand sides (many, n)."""
     solution = values.copy()
     for which in range(len(factors)):
         start, stop = spans[which]
@@ -93,8 +96,8 @@ def substitute(factors, spans, values):
 
 @njit(cache=True, nogil=True)
 def turned(column, turns, components):
-    """Apply Givens' rotations to the new image's components (count + 1,), so that the system stays triangular; returns
-    its new column (count,).
+    """Apply Givens' rotations to a new column (count + 1,) of GMRES, so that the system stays triangular; returns the
+    column (count,).
 
     turns (most, 2) : cosine and sine of the rotations, of which the last is added; components (most + 1,) : what the
     residual was turned to, its last component the residual's size.
@@ -115,8 +118,8 @@ def turned(column, turns, components):
 
 @njit(cache=True, fastmath=True, nogil=True)
 def orthogonalise(basis, count, vector):
-    """Remove from ``vector`` its components along the first ``count`` rows of ``basis``, and write the rest, scaled to
-    length 1, as the next row.
+    """Remove from ``vector`` its components along the first ``count`` rows of ``basis``, and write the remainder,
+    scaled to length 1, as the next row.
 
     Returns the components along these ``count`` rows and the new one, by modified Gram-Schmidt.
     """

@@ -12,17 +12,19 @@ from models.contact.rolling_kernels import factor, orthogonalise, substitute, tu
 from models.core.errors import RunFailed
 
 UPSTREAM = (1.5, -2.0, 0.5)
-"""Weights of u at a cell's centre and at the next two upstream in -dx du/dx: of second order, and dissipative."""
+"""Weights of the displacement u at a cell's centre and at the next two upstream in -dx du/dx: of second order, and
+dissipative.
+"""
 NO_SHIFT = (1.0,)
-"""Weights for u itself, by dx: a shift without rolling."""
+"""Weights of the displacement u itself, divided by dx: a shift without rolling."""
 INNER_TOLERANCE = 1e-6
 """Relative residual at which the linear solver of one Newton step stops."""
 MOST_PRODUCTS = 300
-"""Of one Newton step; 20 to 60 are usual."""
+"""Largest number of matrix products in one Newton step; 20 to 60 are usual."""
 
 
 class SlipOperator:
-    """Linear operator C from tractions (ny, nx, 2), in units of G, to their contribution to the slip, (ny, nx, 2):
+    """Linear operator C from tractions (ny, nx, 2), in units of G, to their contribution to the slip (ny, nx, 2):
     -du/dx in rolling, u/dx in a shift.
 
     The gradient at a cell's centre is taken from there and from the next two centres upstream, where the material
@@ -47,7 +49,7 @@ class SlipOperator:
         self._convolution = Convolution(self.kernel)
 
     def __call__(self, traction: Array) -> Array:
-        """Slip (ny, nx, 2) caused by tractions (ny, nx, 2)."""
+        """Slip (ny, nx, 2) caused by tractions (ny, nx, 2) in units of G."""
         return self._convolution(traction)
 
     @cached_property
@@ -58,12 +60,14 @@ class SlipOperator:
 
     @cached_property
     def own_slip(self) -> Array:
-        """Slip of a cell caused by its own unit traction, (2,)."""
+        """Slip (2,) of a cell caused by its own unit traction, along x and y."""
         return np.diag(self.kernel[self.rows - 1, self.columns - 1]).copy()
 
     @cached_property
     def strip(self) -> Array:
-        """Coupling matrix (nx, 2, nx, 2): slip of each cell of a strip by the traction of each cell of that strip."""
+        """Coupling matrix (nx, 2, nx, 2): slip of each cell of a strip by the traction of each cell of the same
+        strip.
+        """
         index = np.arange(self.columns)
         return self.kernel[self.rows - 1][index[:, None] - index + self.columns - 1].transpose(0, 2, 1, 3)
 
@@ -101,7 +105,7 @@ def gmres(apply: Map, precondition: Map, right_hand_side: Array, tolerance: floa
 
 
 class FreeSystem:
-    """Linear system free (C + stiff) d = free wanted for changes d of traction within the free directions.
+    """Linear system free (C + stiff) d = free wanted for changes d of traction within the free directions of each cell.
 
     GMRES, preconditioned by the exact inverse of every strip by itself, whose factors serve any number of right sides.
     """
@@ -119,7 +123,7 @@ class FreeSystem:
         factor(self.factors, self.spans)
 
     def _strips(self) -> Array:
-        """Matrix of the system within every strip, (ny, 2 nx, 2 nx).
+        """Matrices (ny, 2 nx, 2 nx) of the system within every strip.
 
         On the directions that are not free it is 1 + stiff: a one would be lost in the rounding of a large stiffness.
         """

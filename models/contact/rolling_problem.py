@@ -1,4 +1,4 @@
-"""Steady rolling of two half-spaces with Coulomb friction on a given pressure: the exact theory, on a grid.
+"""Exact theory of steady rolling, on a grid: two half-spaces with Coulomb friction under a given pressure.
 
 Kalker, Three-Dimensional Elastic Bodies in Rolling Contact, 1990, section 4.3. Material flows through the contact from
 the leading edge (largest x) back, so the slip of the wheel over the rail, by the rolling speed, is
@@ -21,7 +21,8 @@ Error of the cells, in forces divided by mu N (validation case ``contact_exact``
 ellipse 0.1 to 0.4 %, 0.7 % for spin on a long one, with 80 half as much. The order is 2 where all slips, 1 where much
 sticks: the edge of the contact and the leading edge of the zone that sticks lie somewhere within a cell. Carter's
 cylinder is met to 0.2 % with 80 cells, Cattaneo and Mindlin's shift to 0.04 % with 40. Full sliding gives mu N to
-rounding."""
+rounding.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -36,25 +37,28 @@ from models.contact.rolling_operator import NO_SHIFT, UPSTREAM, FreeSystem, Slip
 from models.core.errors import RunFailed
 
 TOLERANCE = 1e-8
-"""Largest residual of a solution."""
+"""Largest residual of a rolling solution."""
 COARSEST_CELLS = 16
-"""Cells along the shorter side of a grid that is solved from nothing; larger ones start from a grid with half of them,
-for which the exact theory of few cells is near enough."""
+"""Number of cells along the shorter side below which a grid is solved from zero traction; larger grids start from a
+grid with half of them, for which the exact theory of few cells is near enough.
+"""
 MOST_STEPS = 12
-"""Of Newton's method alone; three to six are usual."""
+"""Largest number of steps of Newton's method alone; three to six are usual."""
 RELAXATION, RELAXATION_FACTOR = 0.5, 0.7
-"""Of the first sweeps, and its factor after each round that came no nearer: needed for cells narrower than long."""
+"""Relaxation of the first sweeps, and its factor after each round that came no nearer: needed for cells narrower than
+long.
+"""
 SWEEPS = 3
-"""In each round."""
+"""Number of Gauss-Seidel sweeps in each round."""
 MOST_ROUNDS = 60
-"""Rounds of sweeps and Newton steps before the problem is given up."""
+"""Largest number of rounds of sweeps and Newton steps before the problem is given up."""
 RigidSlip = Callable[[Array, Array, float], Array]
-"""Rigid slip (ny, nx, 2) at x (nx,) and y (ny,) of cells of a length."""
+"""Function for the rigid slip (ny, nx, 2) at positions x (nx,) and y (ny,) of cells of a length (m)."""
 
 
 @dataclass(frozen=True)
 class RollingSolution:
-    """Forces and fields of steady rolling; cells as in the pressure's grid.
+    """Forces and fields of steady rolling, on the cells of the pressure's grid.
 
     fx, fy : forces on the wheel (N). mz : moment on the wheel about the origin of x and y (N m).
     traction : (ny, nx, 2) on the wheel (Pa). slip : (ny, nx, 2) by the rolling speed, zero outside the slipping cells.
@@ -77,7 +81,7 @@ class RollingSolution:
 def solve_rolling(
     normal_solution: PressureGrid, mu: float, xi_x: float, xi_y: float, spin: float, material_pair: MaterialPair
 ) -> RollingSolution:
-    """Tractions of steady rolling.
+    """Tractions, slip and forces of steady rolling under a given pressure.
 
     Parameters
     ----------
@@ -117,7 +121,7 @@ def solve_shift(
 def _rubbed(
     normal_solution: PressureGrid, mu: float, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
 ) -> RollingSolution:
-    """Stick and slip solution for the given rigid slip, on the cells in contact."""
+    """Solution of stick and slip for the given rigid slip, on the cells in contact."""
     mu = number("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     material_pair.require_likeness()
     shape = normal_solution.pressure.shape
@@ -141,13 +145,17 @@ def _rubbed(
 
 
 def rigid_slip(x: Array, y: Array, xi_x: float, xi_y: float, spin: float) -> Array:
-    """Ratio (ny, nx, 2) of the rigid bodies' slip velocity to the rolling speed, at positions x (nx,) and y (ny,)."""
+    """Ratio (ny, nx, 2) of the rigid bodies' slip velocity to the rolling speed, at positions x (nx,) and y (ny,) in
+    m.
+    """
     along, across = np.broadcast_arrays(xi_x - spin * y[:, None], xi_y + spin * x)
     return np.stack([along, across], axis=-1)
 
 
 class _State:
-    """Tractions (ny, nx, 2) in units of G, their slip, and the residual of every cell's stick or slip condition."""
+    """State of the cells: tractions (ny, nx, 2) in units of G, their slip, and the largest residual of the stick and
+    slip conditions.
+    """
 
     def __init__(self, operator: SlipOperator, rigid: Array, bound: Array, traction: Array) -> None:
         self.operator, self.rigid, self.bound, self.traction = operator, rigid, bound, traction
@@ -159,19 +167,20 @@ class _State:
         self.residual = float(np.linalg.norm(needed, axis=-1)[bound > 0].max() / bound.max())
 
     def moved(self, traction: Array) -> "_State":
-        """A new state with other tractions."""
+        """A new state of the cells with other tractions."""
         return _State(self.operator, self.rigid, self.bound, traction)
 
     @property
     def stick(self) -> Array:
-        """Which cells stick: their traction is within the friction bound."""
+        """Whether each cell sticks (ny, nx): its traction is within the friction bound."""
         return (self.size <= self.bound) & (self.bound > 0)
 
 
 @dataclass(frozen=True)
 class _Cells:
     """Grid of cells: centres x (nx,) and y (ny,) (m), sides dx and dy (m), and traction bounds in units of G (ny,
-    nx)."""
+    nx).
+    """
 
     x: Array
     y: Array
@@ -198,7 +207,8 @@ def _solve(
     cells: _Cells, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
 ) -> tuple[_State, int]:
     """State in which all stick and slip conditions hold, and the number of rounds on this grid; a coarser grid gives
-    its start."""
+    its start.
+    """
     bound, motion = cells.bound, rigid(cells.x, cells.y, cells.dx)
     operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, material_pair, weights)
     nothing = _State(operator, motion, bound, np.zeros_like(motion))
@@ -216,6 +226,7 @@ def _solve(
 
 
 def _nearest(*states: _State) -> _State:
+    """The state with the smallest residual."""
     return min(states, key=lambda state: state.residual)
 
 

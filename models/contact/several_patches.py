@@ -1,4 +1,4 @@
-"""Several patches of one contact in the theory of 1983: each has a net and a W of its own, the half-space is common.
+"""Several contact patches in the theory of 1983: each has a separate grid and stiffness, the half-space is common.
 
 What the springs are made like is the displacement of the half-space by the pressure of all patches. With p* = W_3 p of
 each, the conditions u^H + h = delta are fitted in the meshes of patch k by
@@ -36,10 +36,11 @@ from models.contact.simplified_kernels import (
 from models.core.errors import RunFailed
 
 PATCHES_TOLERANCE = 1e-11
-"""Share of approach and load to which patches settle."""
+"""Relative error of approach and load at which the iteration of several patches ends."""
 TRIES = (("hybr", 0.3, 1.0), ("lm", 0.05, 1.0), ("hybr", 0.05, 1.15), ("hybr", 0.3, 0.9))
-"""Method, first step and start by the given one, in turn: where a patch only just touches beside a large one the fit
-has kinks, in which one way or the other is caught."""
+"""Root finder, first step and ratio of the start to the given one, tried in turn: where a patch only just touches
+beside a large one the fit has kinks, at which a single search may stop.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +61,12 @@ class Net:
 
     @property
     def forces(self) -> Array:
-        """W times the load of every grid cell, as a flat array (m^3)."""
+        """Products of W and the load of every grid cell, as a flat array (m^3)."""
         return (self.pressure * (self.volume / self.pressure.sum())).ravel()
 
 
 def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
-    """Coarse grid of a patch at a depth (m)."""
+    """Coarse grid of a patch at a depth (m), with ``cells`` x ``cells`` cells."""
     x, y, low = patch.bottom
     nothing = np.zeros((1, 1))
     empty = Net(nothing + x, nothing + y + patch.contour_position, nothing + low, nothing, nothing, (0.0, 0.0), 0.0)
@@ -86,7 +87,8 @@ def solve_common_approach(
     nets: Sequence[Net], material_pair: MaterialPair, kind: int, lows: Array, depths: Array
 ) -> tuple[Array, Array]:
     """Stiffnesses 1/W (Pa/m) of patches at given depths (m), zero for patches without load, and their approaches
-    (m)."""
+    (m).
+    """
     loaded = [k for k, net in enumerate(nets) if net.volume > 0.0]
     pushed = {(k, m): _displacement_by(nets[m], net, material_pair) for k, net in enumerate(nets) for m in loaded}
     products, right = np.zeros((len(loaded), len(loaded))), np.zeros(len(loaded))
@@ -108,7 +110,8 @@ def solve_common_approach(
 
 def _displacement_by(source: Net, target: Net, material_pair: MaterialPair) -> Array:
     """Normal displacement (m) at the points of one grid caused by W times the pressure of another grid, or of
-    itself."""
+    itself.
+    """
     if source is target:
         return displacement(source.pressure, *source.step, material_pair.modulus)
     answer = push(source.x.ravel(), source.y.ravel(), source.forces, target.x.ravel(), target.y.ravel())
@@ -117,7 +120,8 @@ def _displacement_by(source: Net, target: Net, material_pair: MaterialPair) -> A
 
 def _product(net: Net, first: Array, second: Array, kind: int) -> float:
     """Scalar product of two displacement fields for the least-squares fit: of their slopes, or of their deviations from
-    the mean."""
+    the mean.
+    """
     if kind == GRADIENT:
         return float(slope_products(first, second, net.cover, *net.step, True)[0])
     return float(covariances(first, second, net.cover)[1])
@@ -161,8 +165,9 @@ def solve_depths(
 
 
 def dragged(nets: Sequence[Net], tractions: Sequence[Array], k: int, material_pair: MaterialPair) -> Array:
-    """Tangential displacement (2, cells, cells) (m) in grid k caused by the tractions (2, cells, cells) (Pa) on all
-    other grids."""
+    """Tangential displacement (2, cells, cells) in m of grid k caused by the tractions (2, cells, cells) in Pa on all
+    other grids.
+    """
     answer, target = np.zeros_like(tractions[k]), nets[k]
     for m, (source, traction) in enumerate(zip(nets, tractions, strict=True)):
         if m != k:

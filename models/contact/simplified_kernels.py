@@ -1,4 +1,4 @@
-"""Compiled parts of Kalker's theory of 1983: fit on the crude net, strips of the fine net, march along them."""
+"""Compiled parts of Kalker's theory of 1983: fit on the coarse grid, strips of the fine grid, march along them."""
 
 import math
 from typing import NamedTuple
@@ -10,20 +10,22 @@ from models.contact.inputs import Array
 from models.machine.compiled import compiled
 
 PARABOLIC, ELLIPTIC = 0, 1
-"""Pressure proportional to the depth d - h, as the theory has it, or to its root, as Hertz' pressure is."""
+"""Shape of the pressure: proportional to the depth d - h, as the theory has it, or to its root, as Hertz' pressure."""
 DISPLACEMENT, GRADIENT = 0, 1
-"""What the least squares fit."""
+"""Quantity that the least squares fit."""
 POINTS_PER_MESH = 3
-"""Points per crude mesh and axis at which the pressure is summed to the load."""
+"""Number of points per coarse cell and axis at which the pressure is summed to the load."""
 LEAST_STIFFNESS_SHARE = 0.2
 """Least stiffness 1/W as a share of depth over mean displacement; a Hertzian contact has about 1.2. A flat or ringlike
-bottom leaves the fit undefined, and this bound keeps it positive."""
+bottom leaves the fit undefined, and this bound keeps it positive.
+"""
 Pair = tuple[float, float]
 
 
 class Surface(NamedTuple):
     """A patch at a depth: padded heights, first node and spacing along x and y, rectangle x0, x1, y0, y1 about it,
-    depth and least distance (m)."""
+    depth and least distance (m).
+    """
 
     padded: Array
     origin: Pair
@@ -56,7 +58,7 @@ def overlap_pressure(surface, height, shape):
 
 @compiled
 def mesh_of(box, cells):
-    """Cell sizes dx, dy of a grid of cells x cells over a rectangle."""
+    """Cell sizes dx, dy (m) of a grid of cells x cells over a rectangle."""
     return (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
 
 
@@ -83,7 +85,7 @@ def crude_net(surface, cells, shape):
 
 @compiled
 def resultant(surface, points, shape):
-    """Integral of W p over the rectangle, by the midpoint rule with points x points points."""
+    """Integral of W p over the rectangle (m^3), by the midpoint rule with points x points points."""
     total, (padded, origin, step, box, _, _) = 0.0, surface
     dx, dy = mesh_of(box, points)
     for j in range(points):
@@ -143,7 +145,7 @@ def covariances(u, h, cover):
 
 @compiled
 def weighted_mean(values, weights):
-    """Weighted mean of values; weights of the same shape. Loops compile ten times as fast as array expressions."""
+    """Weighted mean of ``values``; weights of the same shape. Loops compile ten times as fast as array expressions."""
     total = weight = 0.0
     for k in range(values.size):
         total += weights.flat[k] * values.flat[k]
@@ -266,7 +268,7 @@ def drag(x, y, force, at_x, at_y, nu):
 
 @compiled
 def strips(surface, rows, cells, shape):
-    """``FineNet`` of a patch, with W p in place of the pressure.
+    """``FineNet`` of a patch, with the product W p in place of the pressure.
 
     Each of ``rows`` lines gives one strip per interval in which h < depth, its ends where the interpolation passes the
     depth.

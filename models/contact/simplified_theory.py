@@ -58,19 +58,19 @@ from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
 
 NET = 15
-"""Meshes of the crude net along each axis."""
+"""Number of cells of the coarse grid along each axis."""
 CELLS = 45
-"""Strips of the fine net, and cells along each strip."""
+"""Number of strips of the fine grid, and of cells along each strip."""
 LEAST_CELLS, MOST_CELLS = 3, 2000
 SHAPES = {"parabolic": PARABOLIC, "elliptic": ELLIPTIC}
 ABOUT = 0.6
-"""Depth by approach of a patch, about; where several are sought, the search starts there."""
+"""Ratio of a patch's depth to its approach, about; the search for several patches starts there."""
 FITS = {"displacement": DISPLACEMENT, "gradient": GRADIENT}
 
 
 @dataclass(frozen=True)
 class SimplifiedOptions:
-    """Options of the simplified theory: net, shape, fit, patches together or apart.
+    """Options of the simplified theory: coarse grid, shape of the pressure, kind of fit, separate patches.
 
     net : meshes of the crude net along each axis. shape : of the pressure over the depth: "parabolic", proportional to
     d - h as the paper has it, or "elliptic", proportional to its root as in Hertz's contact. The latter is nearer to
@@ -92,18 +92,18 @@ class SimplifiedOptions:
 
     @property
     def numbers(self) -> tuple[int, int, int]:
-        """Number of grid cells, shape and fit, coded as compiled functions read them."""
+        """Number of coarse cells, shape and kind of fit, coded as compiled functions read them."""
         return self.net, SHAPES[self.shape], FITS[self.fit]
 
 
 PLAIN = SimplifiedOptions()
 PAPER = SimplifiedOptions(shape="parabolic")
-"""The theory to the letter."""
+"""Options with which the theory is exactly that of the paper."""
 
 
 @dataclass(frozen=True, eq=False)
 class PatchPressure:
-    """Normal contact of one patch.
+    """Normal contact of one patch by the simplified theory.
 
     depth : d = -a_3 (m). stiffness : 1 / W_3 (Pa/m). approach : rigid approach that the fit finds, along its normal
     (m). load : N. box : x0, x1, y0, y1 of its net (m).
@@ -119,7 +119,7 @@ class PatchPressure:
 
 @dataclass(frozen=True, eq=False)
 class NormalContact:
-    """Normal contact by the simplified theory.
+    """Normal contact of all patches by the simplified theory.
 
     approach : rigid approach (m), counted from distance zero. load : N. Both are along the common direction where
     patches lean. area : m^2. peak : largest pressure (Pa). patches : the parts in contact.
@@ -203,8 +203,9 @@ def load_at_depth(
 def _by_load(
     patches: list[Patch], lowest: float, load: float, material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
-    """Normal contact that carries a load: the depth of a single patch, or depths and common approach of several, are
-    searched."""
+    """Normal contact that carries a load (N): the depth of a single patch, or the depths and common approach of
+    several.
+    """
     if len(patches) == 1:
         patch, along = patches[0], np.cos(patches[0].lean)
         depth = _depth_for_load(
@@ -224,7 +225,8 @@ def _by_load(
 
 def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
     """Depth or approach (m) above ``lowest`` at which the load is carried: doubled until the load is exceeded, then
-    refined by Brent's method."""
+    refined by Brent's method.
+    """
     if limit - lowest <= NO_DEPTH:
         raise no_bottom()
     low, high = 0.0, min(1e-6, limit - lowest)
@@ -242,6 +244,7 @@ def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: floa
 
 
 def _total(parts: Sequence[PatchPressure]) -> float:
+    """Sum of the patches' loads (N) along the common direction."""
     return float(sum(part.load * np.cos(part.patch.lean) for part in parts))
 
 
@@ -275,7 +278,7 @@ def _gathered(
 
 
 def _area(patch: PatchPressure, rows: int = 100) -> float:
-    """Area (m^2) of one patch."""
+    """Area (m^2) of one contact patch."""
     net = strips(patch.patch.surface(patch.depth), rows, 1, PARABOLIC)
     return float((net.high_x - net.low_x).sum() * (patch.box[3] - patch.box[2]) / rows) if net.y.size else 0.0
 
@@ -283,7 +286,7 @@ def _area(patch: PatchPressure, rows: int = 100) -> float:
 def roll(
     normal_contact: NormalContact, friction: float, xi_x: float, xi_y: float, spin: float, *, cells: int = CELLS
 ) -> Rolling:
-    """Forces of steady rolling: FASTSIM twice on the fine net of each patch, W_1 = W_2 refitted in between.
+    """Forces of steady rolling: FASTSIM twice on the fine grid of each patch, W_1 = W_2 refitted in between.
 
     friction : coefficient. xi_x, xi_y : creepages. spin : 1/m. cells : strips, and cells in each, 3 or more. Spin and
     moment are about x = y = 0 of the distance, where patches lean of each patch; roll these one by one if their
@@ -314,7 +317,7 @@ def roll(
 
 
 def _fine_strips(patch: PatchPressure, options: SimplifiedOptions, cells: int) -> FineNet:
-    """``FineNet`` of a patch, as ``march`` expects it."""
+    """``FineNet`` of a patch whose pressure carries its load, as ``march`` expects it."""
     net = strips(patch.patch.surface(patch.depth), cells, cells, SHAPES[options.shape])
     carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cells
     net.pressure[:] *= patch.load / carried  # full sliding gives mu N exactly
@@ -338,7 +341,7 @@ def _refitted(normal_contact: NormalContact, tractions: list[Array]) -> list[flo
 
 
 def _fields(net: FineNet, traction: Array, friction: float) -> Fields:
-    """Pressure, tractions and slip in each cell of each strip."""
+    """Pressure, tractions and slip in each cell of each strip of a patch."""
     y, low, high, width, pressure = net
     shape = pressure.shape
     length = ((high - low) / shape[1])[:, None]

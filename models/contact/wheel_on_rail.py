@@ -1,4 +1,4 @@
-"""A wheel on a rail: where the profiles touch, and the undeformed distance around each place.
+"""Geometry of a wheel on a rail: where the profiles touch, and the undeformed distance around each touching place.
 
 The wheel is a body of revolution, the rail straight along x. Axes of the track: x in the direction of rolling, y to
 the right, z down. The wheelset is shifted to the right, turned by the yaw (about z, positive from x to y) and rolled
@@ -30,11 +30,13 @@ from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError, RunFailed
 
 SURROUNDINGS_DISTANCE = 2e-4
-"""Distance (m) up to which the surroundings of a touching place are taken in; steel yields long before."""
+"""Distance (m) between the surfaces up to which the surroundings of a touching place are included; steel yields long
+before.
+"""
 NODES = 121
-"""Nodes of a distance along each axis."""
+"""Number of nodes of an undeformed distance along each axis."""
 STEEPEST_ROLL = 0.06
-"""Largest roll angle (rad) that is looked for."""
+"""Largest roll angle (rad) of the wheelset that is searched."""
 ITERATIONS = 12
 
 
@@ -112,7 +114,7 @@ class WheelAndRail:
     wheelset: Wheelset
 
     def centre(self, pose: Pose) -> Array:
-        """Position of the middle of the axle in the track's coordinates (m)."""
+        """Position (3,) of the middle of the axle in the track's coordinates (m)."""
         return np.array([0.0, pose.shift, pose.fall - self.wheelset.radius])
 
     def outline(self, pose: Pose) -> Array:
@@ -141,7 +143,7 @@ class WheelAndRail:
         return points[over], self.rail.curve(points[over, 1]) - points[over, 2]
 
     def clearance(self, pose: Pose) -> float:
-        """Least vertical gap (m), refined between the points by a parabola."""
+        """Least vertical gap (m) between wheel and rail, refined between the points by a parabola."""
         gap = self.gaps(pose)[1]
         k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
         rise, bend = _parabola(gap, k)
@@ -181,7 +183,9 @@ def wheel_on_rail(
 
 
 def rail_in_track(rail: ContactProfile, track: Track) -> ContactProfile:
-    """The rail as it lies to the right of the track: inclined, its top at z = 0, its gauge face at half the gauge."""
+    """The rail profile as it lies to the right of the track: inclined, its top at z = 0, its gauge face at half the
+    gauge.
+    """
     inclined = rail.turned(track.inclination) if track.inclination else rail
     y, z = inclined.y, inclined.z - inclined.z.min()
     inner = (y < y[np.argmin(z)]) & (z <= track.gauge_depth)
@@ -214,7 +218,8 @@ def _parabola_minimum(gap: Array, k: int) -> float:
 
 def touching_pose(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRail | None = None) -> Pose:
     """Pose of the wheelset in which both wheels just touch. ``left`` : the mirrored left side, if it differs from the
-    right one."""
+    right one.
+    """
     other = left or side
 
     def right_over_left(roll: float) -> float:
@@ -267,7 +272,8 @@ def distance_over(
     """Undeformed distance over the tangent plane at a contact point of the rail, between two ends along the rail's
     contour.
 
-    contact_point : x, y, z in the track (m); angle : of the plane (rad); ends : from the place (m).
+    contact_point : x, y, z in the track (m); angle : of the plane (rad); contour_limits : ends, from the contact point
+    (m).
     """
     half = 1.2 * np.sqrt(2.0 * SURROUNDINGS_DISTANCE * side.wheelset.radius / np.cos(angle))
     rail_s, rail_n = _rail_heights(side.rail, contact_point, angle)
