@@ -1,4 +1,4 @@
-"""Compiled parts of Kalker's theory of 1983: fit on the coarse grid, strips of the fine grid, march along them."""
+"""Compiled parts of Kalker's theory of 1983: fit on the coarse grid, strips of the fine one, march along them."""
 
 import math
 from typing import NamedTuple
@@ -10,22 +10,20 @@ from models.contact.inputs import Array
 from models.machine.compiled import compiled
 
 PARABOLIC, ELLIPTIC = 0, 1
-"""Shape of the pressure: proportional to the depth d - h, as the theory has it, or to its root, as Hertz' pressure."""
+"""Shape of the pressure over the depth d - h: proportional, as in the theory, or to its root, as by Hertz."""
 DISPLACEMENT, GRADIENT = 0, 1
 """Quantity that the least squares fit."""
 POINTS_PER_MESH = 3
 """Number of points per coarse cell and axis at which the pressure is summed to the load."""
 LEAST_STIFFNESS_SHARE = 0.2
 """Least stiffness 1/W as a share of depth over mean displacement; a Hertzian contact has about 1.2. A flat or ringlike
-bottom leaves the fit undefined, and this bound keeps it positive.
-"""
+bottom leaves the fit undefined, and this bound keeps it positive."""
 Pair = tuple[float, float]
 
 
 class Surface(NamedTuple):
     """A patch at a depth: padded heights, first node and spacing along x and y, rectangle x0, x1, y0, y1 about it,
-    depth and least distance (m).
-    """
+    depth and least distance (m)."""
 
     padded: Array
     origin: Pair
@@ -189,7 +187,7 @@ def crude_fit(surface, cells, shape, kind, modulus):
 
 @compiled
 def tangential(traction, dx, dy, nu):
-    """Displacement (2, cells, cells) times pi G at the cells' centres, by a traction (2, cells, cells) (Cerruti)."""
+    """Displacement (2, cells, cells) times pi G at the cells' centres, by a traction of this shape (Cerruti)."""
     cells = traction.shape[1]
     corners = np.empty((3, cells + 1, cells + 1))  # integrals of y^2/r^3, x^2/r^3 and xy/r^3 from the origin
     for j in range(cells + 1):
