@@ -30,7 +30,7 @@ import numpy as np
 
 from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, nets, strips_of
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
-from models.contact.fastsim_many import BLENDED, ONE_FLEXIBILITY, THREE_FLEXIBILITIES, point
+from models.contact.fastsim_many import BLENDED, ONE_FLEXIBILITY, THREE_FLEXIBILITIES, ellipse_forces
 from models.contact.fastsim_many import forces as march_all
 from models.contact.fastsim_records import CONTACT, FORCES
 from models.contact.hertz import LEAST_AXIS
@@ -38,10 +38,10 @@ from models.contact.inputs import (
     LARGEST_LOAD,
     NEGLIGIBLE_BOUND,
     Array,
+    broadcast_together,
     creepages,
     number,
     quantity,
-    together,
     whole_number,
 )
 from models.contact.linear_theory import flexibilities as linear_flexibilities
@@ -166,7 +166,7 @@ class Ellipse:
         """Creep forces fx, fy (N) and moment mz (N m); a : semi-axis along the direction of rolling (m)."""
         given = (a, load, mu, xi_x, xi_y, spin)
         try:
-            forces = point(tuple(map(float, given)), *self._fixed)
+            forces = ellipse_forces(tuple(map(float, given)), *self._fixed)
         except (TypeError, ValueError):
             forces = (math.nan,) * 3
         if not math.isfinite(forces[0] + forces[1] + forces[2]):
@@ -196,7 +196,7 @@ def contacts_of(ellipse: RollingEllipse, material_pair: MaterialPair) -> tuple[A
     semi-axes of 0.1 m.
     """
     axis = "a semi-axis in m, zero or more"
-    given = together(
+    given = broadcast_together(
         a=quantity("a", ellipse.a, axis, 0.0),
         b=quantity("b", ellipse.b, axis, 0.0),
         load=quantity("load", ellipse.load, f"a load in N, at most {LARGEST_LOAD:g}", maximum=LARGEST_LOAD),

@@ -16,7 +16,7 @@ import numpy as np
 
 from models.contact.fastsim import KINDS, Flexibilities, RollingEllipse, check_choices, contacts_of
 from models.contact.fastsim_grid import Bound, nets
-from models.contact.fastsim_kernels import LARGEST_EXPONENT, NEGLIGIBLE_SLIP, advance, cut, lateness
+from models.contact.fastsim_kernels import LARGEST_EXPONENT, NEGLIGIBLE_SLIP, advance, cut_to_bound, lateness
 from models.contact.fastsim_many import (
     ONE_FLEXIBILITY,
     add_strip,
@@ -147,7 +147,7 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
         bound = g, cells.before[i], cells.rate[i]
         v = v0 + v1 * mid
         if i == 0:
-            x, y, now = cut(-0.5 * u, -0.5 * v, g)
+            x, y, now = cut_to_bound(-0.5 * u, -0.5 * v, g)
         else:
             x, y, now = advance((px, py, slips), (u, v, v1 * change), bound)
         turns = slips * (u * u + v * v) > NEGLIGIBLE_SLIP

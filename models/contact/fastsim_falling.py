@@ -21,7 +21,7 @@ def forces_falling(contacts, strips, cells, kind, law, answers):
     ``Falling``.
     """
     n, area, slip = cells.centre.size, 0.0, np.empty(1, SLIP)[0]
-    left, tractions = np.empty((2, n)), np.empty((3, n))
+    friction_shares, tractions = np.empty((2, n)), np.empty((3, n))
     for s in range(strips.y.size):
         area += strips.half[s]
     for c in range(len(contacts)):
@@ -31,8 +31,8 @@ def forces_falling(contacts, strips, cells, kind, law, answers):
             continue
         slip.x, slip.y, slip.spin = rigid_slip(contact, cells, kind)
         for s in range(strips.y.size):
-            friction_left(contact, strips, s, cells, law, left)
-            strip_tractions(strip_slip(contact, strips, s, slip), cells, SECOND_ORDER, left, tractions)
+            fill_friction_shares(contact, strips, s, cells, law, friction_shares)
+            strip_tractions(strip_slip(contact, strips, s, slip), cells, SECOND_ORDER, friction_shares, tractions)
             x = y = turn = stuck = 0.0
             for i in range(n):
                 x += tractions[0, i]
@@ -44,15 +44,15 @@ def forces_falling(contacts, strips, cells, kind, law, answers):
 
 
 @compiled
-def friction_left(contact, strips, s, cells, law, left):
-    """Fill ``left`` (2, cells) of strip s with the remaining share of friction at each point's rigid slip, as
-    ``strip_tractions`` expects it.
+def fill_friction_shares(contact, strips, s, cells, law, friction_shares):
+    """Fill ``friction_shares`` (2, cells) of strip s with the remaining share of friction at each point's rigid slip,
+    as ``strip_tractions`` expects it.
     """
     along = contact.xi_x - contact.spin * contact.b * strips.y[s]
     across, turn = contact.xi_y, contact.spin * contact.a * strips.half[s]
     for i in range(cells.centre.size):
-        left[0, i] = _friction_share(along, across + turn * cells.centre[i], law)
-        left[1, i] = _friction_share(along, across + turn * cells.middle[i], law)
+        friction_shares[0, i] = _friction_share(along, across + turn * cells.centre[i], law)
+        friction_shares[1, i] = _friction_share(along, across + turn * cells.middle[i], law)
 
 
 @compiled

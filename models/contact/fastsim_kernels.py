@@ -72,7 +72,7 @@ def advance(traction, slip, bound):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def cut(x, y, g):
+def cut_to_bound(x, y, g):
     """Traction (x, y), shortened to the bound g if it exceeds the bound, and 1 if it was shortened, else 0."""
     size = math.sqrt(x * x + y * y)
     sticks = size <= g
@@ -85,11 +85,11 @@ def march_second_order(block, cells):
     """March the strips of a BLOCK with half a first step and the exact rotation of a slipping traction; fills its sums
     and states.
     """
-    _clear(block)
+    _clear_block(block)
     for j in range(LANES):
         u, v = block.u[j], block.v0[j] + block.v1[j] * cells.middle[0]
-        x, y, slips = cut(-0.5 * u, -0.5 * v, cells.bound[0])
-        _keep(block, j, cells.centre[0], x, y, slips)
+        x, y, slips = cut_to_bound(-0.5 * u, -0.5 * v, cells.bound[0])
+        _store_traction(block, j, cells.centre[0], x, y, slips)
     change = -2.0 / cells.centre.size
     for i in range(1, cells.centre.size):
         t, g, middle = cells.centre[i], cells.bound[i], cells.middle[i]
@@ -99,7 +99,7 @@ def march_second_order(block, cells):
             v = block.v0[j] + v1 * middle
             traction = block.qx[j], block.qy[j], block.slips[j]
             x, y, slips = advance(traction, (u, v, v1 * change), bound)
-            _keep(block, j, t, x, y, slips)
+            _store_traction(block, j, t, x, y, slips)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -107,18 +107,18 @@ def march_plain(block, cells):
     """March the strips of a BLOCK as in 1982: a whole step into each cell, then the traction is cut back to the bound;
     fills its sums and states.
     """
-    _clear(block)
+    _clear_block(block)
     for i in range(cells.centre.size):
         t, g = cells.centre[i], cells.bound[i]
         for j in range(LANES):
             x = block.qx[j] - block.u[j]
             y = block.qy[j] - (block.v0[j] + block.v1[j] * t)
-            x, y, slips = cut(x, y, g)
-            _keep(block, j, t, x, y, slips)
+            x, y, slips = cut_to_bound(x, y, g)
+            _store_traction(block, j, t, x, y, slips)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def _keep(block, j, t, x, y, slips):
+def _store_traction(block, j, t, x, y, slips):
     """Add a cell's traction to the sums of lane j, and store it as the lane's state."""
     block.qx[j] = x
     block.qy[j] = y
@@ -130,7 +130,7 @@ def _keep(block, j, t, x, y, slips):
 
 
 @compiled
-def _clear(block):
+def _clear_block(block):
     """Set sums and states of all lanes of a BLOCK to zero."""
     for j in range(LANES):
         block.sum_x[j] = block.sum_y[j] = block.sum_t[j] = block.slid[j] = 0.0

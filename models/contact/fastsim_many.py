@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER, advance, cut, march_plain, march_second_order
+from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER, advance, cut_to_bound, march_plain, march_second_order
 from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, LANES, SLIP, Workspace, cells_in, strips_in
 from models.contact.inputs import NEGLIGIBLE_BOUND
 from models.machine.compiled import compiled, lean
@@ -16,7 +16,7 @@ from models.machine.compiled import compiled, lean
 A, B, LOAD, MU = range(4)
 """Indices of the first fields of CONTACT, for callers that keep contacts in a table of doubles."""
 ONE_FLEXIBILITY, THREE_FLEXIBILITIES, BLENDED = 0, 1, 2
-OF_X, OF_SPIN, AGAINST, REACH, GROWTH = 0.5, 0.52, 0.86, 1.9, 1.3
+X_WEIGHT, SPIN_WEIGHT, OPPOSING_SPIN_SHARE, BLEND_REACH, BLEND_POWER = 0.5, 0.52, 0.86, 1.9, 1.3
 """Constants of the blend of flexibilities: weights of xi_x and spin relative to xi_y, how much of it lateral creepage
 against spin takes away, the reach at which the one flexibility has its main part and the power of its beginning; then
 powers of a/b in the second and the fourth, within ``RATIOS``. Calibrated on 910 contacts of the exact theory, 250 of
@@ -27,7 +27,7 @@ SPIN_BY_RATIO, REACH_BY_RATIO, RATIOS = 0.6, 0.45, (0.1, 10.0)
 which the one flexibility has its main part and the power of its beginning; then powers of a/b in the second and the
 fourth, within ``RATIOS``. Calibrated on 910 contacts of the exact theory, 250 of them with lateral creepage against
 spin, and held against others (validation case ``contact_price``)."""
-SLIDING, MOST = 8.0, 100.0
+SLIDING_SQUARE, LARGEST_BLEND_EXPONENT = 8.0, 100.0
 """Square of the ratio of traction to bound at which creepage without spin makes the whole area slide, and exponent
 beyond which nothing changes.
 """
@@ -40,26 +40,26 @@ def forces(contacts, strips, cells, kind, march, answers):
     contacts : CONTACT (n,); strips, cells : a net from ``fastsim_grid``; kind : of flexibility; march : PLAIN or
     SECOND_ORDER. A contact without load or friction has zeros all over.
     """
-    room = Workspace(np.empty(len(contacts), SLIP), np.empty(1, BLOCK))
-    forces_within(contacts, strips, cells, kind, march, room, answers)
+    workspace = Workspace(np.empty(len(contacts), SLIP), np.empty(1, BLOCK))
+    forces_within(contacts, strips, cells, kind, march, workspace, answers)
 
 
 @lean
-def forces_within(contacts, strips, cells, kind, march, room, answers):
-    """Creep forces as by ``forces``, without allocating arrays; room : ``Workspace`` for intermediate values."""
-    slips, block, m = room.slips, room.blocks[0], strips.y.size
+def forces_within(contacts, strips, cells, kind, march, workspace, answers):
+    """Creep forces as by ``forces``, without allocating arrays; workspace : ``Workspace`` for intermediate values."""
+    slips, block, m = workspace.slips, workspace.blocks[0], strips.y.size
     for c in range(len(contacts)):
         slip, answer = slips[c], answers[c]
         slip.x, slip.y, slip.spin = rigid_slip(contacts[c], cells, kind)
         answer.fx = answer.fy = answer.mz = answer.stick = 0.0
     for first in range(0, len(contacts) * m, LANES):
         count = min(LANES, len(contacts) * m - first)
-        _fill(block, first, count, contacts, strips, slips)
+        _fill_block(block, first, count, contacts, strips, slips)
         if march == SECOND_ORDER:
             march_second_order(block, cells)
         else:
             march_plain(block, cells)
-        _collect(block, first, count, contacts, strips, answers)
+        _collect_forces(block, first, count, contacts, strips, answers)
     area = 0.0
     for s in range(m):  # summed as the slipping cells are, so that nothing is left where all slip
         area += strips.half[s] * cells.centre.size
@@ -115,21 +115,23 @@ def blend(contact, bound, kind):
     ratio, unit = math.log(min(max(contact.a / contact.b, RATIOS[0]), RATIOS[1])), contact.a / bound
     of_x, of_y, of_z = unit / contact.l1, unit / contact.l2, unit / contact.l3
     x, y, z = of_x * contact.xi_x, of_y * contact.xi_y, of_z * contact.spin * math.sqrt(contact.a * contact.b)
-    turns = OF_SPIN * math.exp(SPIN_BY_RATIO * ratio)
-    square = (OF_X * x) ** 2 + y * y + (turns * z) ** 2 + 2.0 * AGAINST * y * turns * z
+    turns = SPIN_WEIGHT * math.exp(SPIN_BY_RATIO * ratio)
+    square = (X_WEIGHT * x) ** 2 + y * y + (turns * z) ** 2 + 2.0 * OPPOSING_SPIN_SHARE * y * turns * z
     if square == 0.0:
         return 0.0, 0.0, 0.0, 0.0
     level = 1.0 / (1.0 + z * z)
-    slides = min((x * x + y * y) * level / SLIDING, MOST)
-    grown = min((math.sqrt(square) / (REACH * math.exp(REACH_BY_RATIO * ratio))) ** GROWTH, MOST)
-    whole = grown + slides**3
-    left = math.exp(-whole)
-    steep, more = left * GROWTH * grown / square, left * 6.0 * slides**2 * level
+    slides = min((x * x + y * y) * level / SLIDING_SQUARE, LARGEST_BLEND_EXPONENT)
+    grown = min(
+        (math.sqrt(square) / (BLEND_REACH * math.exp(REACH_BY_RATIO * ratio))) ** BLEND_POWER, LARGEST_BLEND_EXPONENT
+    )
+    exponent = grown + slides**3
+    remaining = math.exp(-exponent)
+    steep, more = remaining * BLEND_POWER * grown / square, remaining * 6.0 * slides**2 * level
     return (
-        -math.expm1(-whole),
-        of_x * x * (steep * OF_X**2 + more / SLIDING),
-        of_y * (steep * (y + AGAINST * turns * z) + more * y / SLIDING),
-        of_z * (steep * turns * (turns * z + AGAINST * y) - more * slides * z),
+        -math.expm1(-exponent),
+        of_x * x * (steep * X_WEIGHT**2 + more / SLIDING_SQUARE),
+        of_y * (steep * (y + OPPOSING_SPIN_SHARE * turns * z) + more * y / SLIDING_SQUARE),
+        of_z * (steep * turns * (turns * z + OPPOSING_SPIN_SHARE * y) - more * slides * z),
     )
 
 
@@ -165,7 +167,7 @@ def strip_slip(contact, strips, s, slip):
 
 
 @lean
-def _fill(block, first, count, contacts, strips, slips):
+def _fill_block(block, first, count, contacts, strips, slips):
     """Put the rigid slips of ``count`` strips, from strip ``first`` on, into the lanes of a BLOCK; further lanes get
     zero slip.
     """
@@ -181,7 +183,7 @@ def _fill(block, first, count, contacts, strips, slips):
 
 
 @lean
-def _collect(block, first, count, contacts, strips, answers):
+def _collect_forces(block, first, count, contacts, strips, answers):
     """Add the lanes' sums to the forces of their ellipses, and their numbers of slipping cells, weighted by length, to
     the slip area.
     """
@@ -207,30 +209,30 @@ def add_strip(contact, strips, s, sums, answer):
 
 
 @compiled
-def strip_tractions(slip, cells, march, left, answers):
-    """Fill ``answers`` (3, cells) of a strip: tractions along x and y in units of the bound in its middle, and 1 where
-    it slips.
+def strip_tractions(slip, cells, march, friction_shares, tractions):
+    """Fill ``tractions`` (3, cells) of a strip: tractions along x and y in units of the bound in its middle, and 1
+    where it slips.
 
-    slip : of the strip, see ``strip_slip``; left : (2, cells), share of the friction that is left in the cells' centres
-    and in the middles of the steps there.
+    slip : of the strip, see ``strip_slip``; friction_shares : (2, cells), share of the friction that is left in the
+    cells' centres and in the middles of the steps there.
     """
-    (u, v0, v1), change, before = slip, -2.0 / cells.centre.size, 0.0
+    (u, v0, v1), change, share_before = slip, -2.0 / cells.centre.size, 0.0
     x = y = slips = 0.0
     for i in range(cells.centre.size):
-        v, g = v0 + v1 * cells.middle[i], left[0, i] * cells.bound[i]
+        v, g = v0 + v1 * cells.middle[i], friction_shares[0, i] * cells.bound[i]
         if march == PLAIN:
-            x, y, slips = cut(x - u, y - v0 - v1 * cells.centre[i], g)
+            x, y, slips = cut_to_bound(x - u, y - v0 - v1 * cells.centre[i], g)
         elif i == 0:
-            x, y, slips = cut(-0.5 * u, -0.5 * v, g)
+            x, y, slips = cut_to_bound(-0.5 * u, -0.5 * v, g)
         else:
-            bound = g, before * cells.before[i], cells.rate[i] / left[1, i]
+            bound = g, share_before * cells.before[i], cells.rate[i] / friction_shares[1, i]
             x, y, slips = advance((x, y, slips), (u, v, v1 * change), bound)
-        before = left[0, i]
-        answers[0, i], answers[1, i], answers[2, i] = x, y, slips
+        share_before = friction_shares[0, i]
+        tractions[0, i], tractions[1, i], tractions[2, i] = x, y, slips
 
 
 @compiled
-def point(motion, unit, strips, cells, choices):
+def ellipse_forces(motion, unit, strips, cells, choices):
     """Creep forces fx, fy (N) and moment mz (N m) of one ellipse with the shape of ``unit``; NaN for invalid input.
 
     motion : a (m), load, mu, xi_x, xi_y, spin; unit : b, l1, l2, l3 at a = 1 m; strips, cells : a net's tables;

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.inputs import LARGEST_APPROACH, LARGEST_LOAD, Array, quantity, together
+from models.contact.inputs import LARGEST_APPROACH, LARGEST_LOAD, Array, broadcast_together, quantity
 from models.contact.material import MaterialPair
 from models.core.errors import InputError
 from models.machine.compiled import njit
@@ -57,7 +57,7 @@ def by_load(A: Any, B: Any, load: Any, material_pair: MaterialPair) -> Hertz:
     finite, magnitudes that are none in SI, or shapes that do not fit together.
     """
     load = quantity("load", load, f"a load in N, at most {LARGEST_LOAD:g}", maximum=LARGEST_LOAD)
-    A, B, load = together(**_curvatures(A, B), load=np.maximum(load, 0.0))
+    A, B, load = broadcast_together(**_curvatures(A, B), load=np.maximum(load, 0.0))
     ratio, cosine, sine = aspects(np.minimum(A, B) / np.maximum(A, B))
     area = 1.5 * load * cosine / (math.pi * material_pair.modulus * np.maximum(A, B))  # l s^2
     return _contact(A, B, load, np.cbrt(area * ratio), ratio, cosine + sine, material_pair)
@@ -71,7 +71,7 @@ def by_approach(A: Any, B: Any, approach: Any, material_pair: MaterialPair) -> H
     """
     allowed = f"an approach in m, at most {LARGEST_APPROACH:g}"
     approach = np.maximum(quantity("approach", approach, allowed, maximum=LARGEST_APPROACH), 0.0)
-    A, B, approach = together(**_curvatures(A, B), approach=approach)
+    A, B, approach = broadcast_together(**_curvatures(A, B), approach=approach)
     ratio, cosine, sine = aspects(np.minimum(A, B) / np.maximum(A, B))
     short = np.sqrt(approach * cosine / (np.maximum(A, B) * (cosine + sine)))
     load = 2.0 / 3.0 * math.pi * material_pair.modulus * approach * short / (ratio * (cosine + sine))
@@ -100,17 +100,17 @@ def by_axes(
         load = 2.0 / 3.0 * math.pi * a * b * approach * material_pair.modulus / (short * (cosine + sine))
     load = float(quantity("load", load, "a load in N, above 0", LEAST_AXIS, LARGEST_LOAD))
     curvature = 1.5 * load / (math.pi * a * b) * cosine / (material_pair.modulus * short)
-    other = curvature * g * g * sine / cosine
-    return by_load(*((other, curvature) if a >= b else (curvature, other)), load, material_pair)
+    second_curvature = curvature * g * g * sine / cosine
+    return by_load(*((second_curvature, curvature) if a >= b else (curvature, second_curvature)), load, material_pair)
 
 
 def _curvatures(A: Any, B: Any) -> dict[str, Array]:
     """Both curvatures (1/m) as arrays; raises InputError where they do not make a Hertzian contact."""
-    answer = {
+    curvatures = {
         name: quantity(name, value, "a curvature in 1/m, at most 1e12", maximum=1e12)
         for name, value in (("A", A), ("B", B))
     }
-    for name, value in answer.items():
+    for name, value in curvatures.items():
         if (value <= 0.0).any():
             raise InputError(
                 "",
@@ -120,13 +120,13 @@ def _curvatures(A: Any, B: Any) -> dict[str, Array]:
                 "direction, conform or interpenetrate do not touch on an ellipse; compute them as "
                 "non-Hertzian contact",
             )
-    A, B = together(**answer)
+    A, B = broadcast_together(**curvatures)
     flattest = float(np.maximum(A, B).min(initial=np.inf))
     if flattest < FLATTEST:
         raise InputError(
             "", "A, B", flattest, f"the larger of both must be {FLATTEST:g} 1/m or more; radii are in m, not in mm"
         )
-    return answer
+    return curvatures
 
 
 def _contact(
@@ -146,16 +146,16 @@ def _contact(
 
 def aspects(curvatures: Array) -> tuple[Array, Array, Array]:
     """Results of ``aspect`` for an array of curvature ratios: three arrays of the same shape."""
-    answer = _aspects(np.ascontiguousarray(curvatures).ravel()).reshape(3, *curvatures.shape)
-    return answer[0], answer[1], answer[2]
+    ratio_and_integrals = _aspects(np.ascontiguousarray(curvatures).ravel()).reshape(3, *curvatures.shape)
+    return ratio_and_integrals[0], ratio_and_integrals[1], ratio_and_integrals[2]
 
 
 @njit(cache=True)
 def _aspects(curvatures: Array) -> Array:
-    answer = np.empty((3, curvatures.size))
+    results = np.empty((3, curvatures.size))
     for i in range(curvatures.size):
-        answer[0, i], answer[1, i], answer[2, i] = aspect(curvatures[i])
-    return answer
+        results[0, i], results[1, i], results[2, i] = aspect(curvatures[i])
+    return results
 
 
 @njit(cache=True)

@@ -69,7 +69,7 @@ def creepages(xi_x: Any, xi_y: Any, spin: Any, read: Callable[..., Any] = quanti
     }
 
 
-def together(**arrays: Array) -> tuple[Array, ...]:
+def broadcast_together(**arrays: Array) -> tuple[Array, ...]:
     """The given arrays, broadcast to their common shape; raises InputError with their shapes if there is none."""
     try:
         shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from numba import cfunc, types
 
-from models.contact.distance_kernels import sides
+from models.contact.distance_kernels import valley_ends
 from models.contact.inputs import Array, whole_number
 from models.contact.kernel import FINE, INPUT, NOT_PLAUSIBLE, OUTPUT, OUTPUTS
 from models.contact.patches import Patch, separate
@@ -29,7 +29,7 @@ from models.contact.simplified_kernels import (
     tangential,
     tangential_fit,
 )
-from models.contact.simplified_theory import ABOUT, FITS, LEAST_CELLS, PLAIN, SHAPES, SimplifiedOptions
+from models.contact.simplified_theory import DEPTH_BY_APPROACH, FITS, LEAST_CELLS, PLAIN, SHAPES, SimplifiedOptions
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
 from models.machine.compiled import compiled
@@ -63,7 +63,7 @@ HEADER = size_of(HEAD)
 MOST_CELLS = 200
 DEPTH_TOLERANCE = 1e-12
 """Ratio of the remaining error of the depth to the approach beyond first touch at which the iteration ends."""
-TRIES = 100
+MOST_ITERATIONS = 100
 
 
 def table(distance: Distance, cells: int = 21, options: SimplifiedOptions = PLAIN) -> Array:
@@ -80,7 +80,7 @@ def table(distance: Distance, cells: int = 21, options: SimplifiedOptions = PLAI
     (x, root_x), (y, root_y) = patch.lines
     head = [
         -cells,
-        _law().address,
+        _callback().address,
         options.net,
         SHAPES[options.shape],
         FITS[options.fit],
@@ -109,20 +109,20 @@ def surface_at(numbers, depth):
     shape = int(head.rows), int(head.columns)
     padded = array(beyond(numbers, HEADER + 2 * (m + n)), shape)
     root = math.sqrt(max(depth - head.low, 0.0))
-    x0, x1 = sides(x[0], x[1], head.bottom_x, root)
-    y0, y1 = sides(y[0], y[1], head.bottom_y, root)
+    x0, x1 = valley_ends(x[0], x[1], head.bottom_x, root)
+    y0, y1 = valley_ends(y[0], y[1], head.bottom_y, root)
     return Surface(padded, (head.x, head.y), (head.dx, head.dy), (x0, x1, y0, y1), depth, head.low)
 
 
 @compiled
-def fit_at(numbers, depth, modulus):
+def fit_at_depth(numbers, depth, modulus):
     """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of the patch at a depth (m)."""
     head = records(numbers, 1, HEAD)[0]
     return crude_fit(surface_at(numbers, depth), int(head.net), int(head.shape), int(head.fit), modulus)
 
 
 @compiled
-def settle(numbers, approach, modulus):
+def depth_at_approach(numbers, approach, modulus):
     """Depth (m) at which the approach (m) is reached, with its stiffness (Pa/m) and sum of W p dA; NaN if the contact
     would pass the table's edge.
 
@@ -132,10 +132,10 @@ def settle(numbers, approach, modulus):
     low, most = head.low, head.edge - head.low
     over = approach - low
     left, off_left, right, off_right = 0.0, -over, 0.0, -over
-    depth = min(ABOUT * over, most)
-    kept = 0
-    for _ in range(TRIES):
-        stiffness, reached, volume = fit_at(numbers, low + depth, modulus)
+    depth = min(DEPTH_BY_APPROACH * over, most)
+    last_side = 0
+    for _ in range(MOST_ITERATIONS):
+        stiffness, reached, volume = fit_at_depth(numbers, low + depth, modulus)
         off = reached - approach
         if abs(off) <= DEPTH_TOLERANCE * over:
             return low + depth, stiffness, volume
@@ -143,14 +143,14 @@ def settle(numbers, approach, modulus):
             break
         if off < 0.0:
             left, off_left = depth, off
-            off_right *= 0.5 if kept < 0 else 1.0
-            kept = -1
+            off_right *= 0.5 if last_side < 0 else 1.0
+            last_side = -1
         else:
             right, off_right = depth, off
-            off_left *= 0.5 if kept > 0 else 1.0
-            kept = 1
+            off_left *= 0.5 if last_side > 0 else 1.0
+            last_side = 1
         if right <= 0.0:  # not yet enclosed
-            depth, kept = min(1.5 * depth, most), 0
+            depth, last_side = min(1.5 * depth, most), 0
             continue
         depth = (left * off_right - right * off_left) / (off_right - off_left)
         if not left < depth < right:
@@ -171,7 +171,7 @@ def simplified(inputs, numbers, outputs):
     answers[:] = 0.0
     if values.pressing <= head.low:
         return FINE
-    depth, stiffness, volume = settle(numbers, values.pressing, values.G / (1.0 - values.nu))
+    depth, stiffness, volume = depth_at_approach(numbers, values.pressing, values.G / (1.0 - values.nu))
     if stiffness * volume > 0.0:
         out.load = stiffness * volume
         _roll(values, numbers, depth, stiffness, out)
@@ -219,7 +219,7 @@ def normalise(net, load):
 
 
 @cache
-def _law():
+def _callback():
     """Callback with C calling convention around ``simplified``; tables store its address."""
 
     @cfunc(types.int32(DOUBLES, DOUBLES, DOUBLES), error_model="numpy")

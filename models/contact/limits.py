@@ -8,11 +8,11 @@ at 1 m/s.
 
 from models.contact.material import Material
 
-HALF_SPACE = 0.3
+LARGEST_AXIS_SHARE = 0.3
 """Ratio of a semi-axis of the contact to a radius of curvature up to which a body counts as a half-space."""
-YIELDS = 2.7e9
+YIELD_PRESSURE = 2.7e9
 """Largest contact pressure (Pa) at which rail steel begins to flow."""
-STEEL_LIKE = 1e11
+LEAST_STEEL_MODULUS = 1e11
 """Young's modulus (Pa) from which a body is taken for steel, whose yield stress is known."""
 SMALL_CREEPAGE = 0.1
 """Creepage, and spin times the longer semi-axis, up to which the theories may neglect their squares."""
@@ -20,12 +20,12 @@ CONSTANT_FRICTION = 0.05
 """Creepage up to which friction is taken as constant where no speed is known: 1 m/s of slip at 20 m/s."""
 FAST_SLIP = 1.0
 """Speed of slip (m/s) up to which friction is taken as constant."""
-NO_SLIP = 0.5
+LINEAR_FORCE_SHARE = 0.5
 """Ratio of the linear theory's force to mu N up to which this theory is valid. Saturated by Shen's cubic the force
 would be a sixth less.
 """
 
 
-def yields(*bodies: Material) -> bool:
+def yield_is_known(*bodies: Material) -> bool:
     """Whether a pressure limit for yielding is known: all bodies are of steel."""
-    return all(body.E >= STEEL_LIKE for body in bodies)
+    return all(body.E >= LEAST_STEEL_MODULUS for body in bodies)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.inputs import Array, quantity, together
+from models.contact.inputs import Array, broadcast_together, quantity
 from models.contact.material import MaterialPair
 from models.machine.compiled import njit
 
@@ -74,9 +74,9 @@ def coefficients(ratio: Any, nu: Any) -> Coefficients:
     good to 10 %; beyond, their last slope goes on, which nothing was held against.
     """
     ratio = quantity("ratio", ratio, "a ratio a/b of semi-axes from 1e-9 to 1e9", 1e-9, 1e9)
-    ratio, nu = together(ratio=ratio, nu=quantity("nu", nu, "a Poisson's ratio from 0 to 0.5", 0.0, 0.5))
-    answer = _coefficients_of_each(ratio.flatten(), nu.flatten()).reshape(4, *ratio.shape)
-    return Coefficients(*(values[()] for values in answer))
+    ratio, nu = broadcast_together(ratio=ratio, nu=quantity("nu", nu, "a Poisson's ratio from 0 to 0.5", 0.0, 0.5))
+    values_of_each = _coefficients_of_each(ratio.flatten(), nu.flatten()).reshape(4, *ratio.shape)
+    return Coefficients(*(values[()] for values in values_of_each))
 
 
 def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, material_pair: MaterialPair) -> tuple[Array, Array, Array]:
@@ -89,7 +89,7 @@ def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, material_pair: Mater
     a, b = _axes(a, b)
     spin = quantity("spin", spin, "a spin in 1/m")
     xi_x, xi_y = (quantity(name, value, "a creepage") for name, value in (("xi_x", xi_x), ("xi_y", xi_y)))
-    a, b, xi_x, xi_y, spin = together(a=a, b=b, xi_x=xi_x, xi_y=xi_y, spin=spin)
+    a, b, xi_x, xi_y, spin = broadcast_together(a=a, b=b, xi_x=xi_x, xi_y=xi_y, spin=spin)
     ratio = np.divide(a, b, out=np.ones_like(a), where=(a > 0.0) & (b > 0.0))  # 1 where nothing touches
     c, area = coefficients(ratio, material_pair.nu), a * b
     fy = -material_pair.G * (area * c.c22 * xi_y + area**1.5 * c.c23 * spin)
@@ -108,14 +108,14 @@ def flexibilities(a: Any, b: Any, material_pair: MaterialPair) -> tuple[Array, A
     """
     material_pair.require_likeness()
     a, b = _axes(a, b)
-    answer = _flexible(a.flatten(), b.flatten(), material_pair.G, material_pair.nu).reshape(3, *a.shape)
+    answer = _flexibilities_of_each(a.flatten(), b.flatten(), material_pair.G, material_pair.nu).reshape(3, *a.shape)
     return answer[0][()], answer[1][()], answer[2][()]
 
 
 def _axes(a: Any, b: Any) -> tuple[Array, ...]:
     """Semi-axes (m) as arrays of one shape; raises InputError for negative or too large ones."""
     a, b = (quantity(name, value, "a semi-axis in m, zero or more", 0.0) for name, value in (("a", a), ("b", b)))
-    a, b = together(a=a, b=b)
+    a, b = broadcast_together(a=a, b=b)
     quantity("sqrt(a b)", np.sqrt(a * b), f"at most {LARGEST_PATCH:g} m; axes are in m, not in mm", 0.0, LARGEST_PATCH)
     return a, b
 
@@ -130,7 +130,7 @@ def _coefficients_of_each(ratio: Array, nu: Array) -> Array:
 
 
 @njit(cache=True)
-def _flexible(a: Array, b: Array, modulus: float, nu: float) -> Array:
+def _flexibilities_of_each(a: Array, b: Array, modulus: float, nu: float) -> Array:
     answer = np.empty((3, a.size))
     for i in range(a.size):
         answer[0, i], answer[1, i], answer[2, i] = flexibilities_at(a[i], b[i], modulus, nu)
@@ -163,13 +163,13 @@ def coefficient_at(kind: int, ratio: float, nu: float) -> float:
     checked.
     """
     inner = min(max(ratio, RATIOS[0]), RATIOS[-1])
-    answer = _tabulated(kind, inner, nu)
+    coefficient = _tabulated(kind, inner, nu)
     if inner == ratio:
-        return answer
+        return coefficient
     if ratio < 1.0:
-        excess = answer / _narrow_limit(kind, inner, nu) - 1.0
+        excess = coefficient / _narrow_limit(kind, inner, nu) - 1.0
         return _narrow_limit(kind, ratio, nu) * (1.0 + excess * (ratio / inner) ** NARROW_FADING)
-    excess = answer / _long_limit(kind, inner, nu) - 1.0
+    excess = coefficient / _long_limit(kind, inner, nu) - 1.0
     return _long_limit(kind, ratio, nu) * (1.0 + excess * (inner / ratio) ** LONG_FADING)
 
 
@@ -184,12 +184,12 @@ def _tabulated(kind: int, ratio: float, nu: float) -> float:
     width = math.log(RATIOS[i + 1] / RATIOS[i])
     t = math.log(ratio / RATIOS[i]) / width
     rise, low, high = t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2 * width, t * t * (t - 1.0) * width
-    power, answer = POWERS[kind], 0.0
+    power, power_mean = POWERS[kind], 0.0
     for k, weight in enumerate(_parabola(nu)):
         logarithm = (1.0 - rise) * LOGARITHMS[i, kind, k] + rise * LOGARITHMS[i + 1, kind, k]
         logarithm += low * SLOPES[i, kind, k] + high * SLOPES[i + 1, kind, k]
-        answer += weight * math.exp(power * logarithm)
-    return answer ** (1.0 / power)
+        power_mean += weight * math.exp(power * logarithm)
+    return power_mean ** (1.0 / power)
 
 
 @njit(cache=True)
@@ -226,7 +226,7 @@ def _long_limit(kind: int, ratio: float, nu: float) -> float:
         return 2.0 * math.pi * ratio**1.5 / (3.0 * three)
     i = min(max(int(np.searchsorted(LONG_RATIOS, ratio)) - 1, 0), LONG_RATIOS.size - 2)
     t = math.log(ratio / LONG_RATIOS[i]) / math.log(LONG_RATIOS[i + 1] / LONG_RATIOS[i])
-    power, answer = POWERS[3], 0.0  # ln C33 is linear in ln(a/b) between its nodes and on beyond
+    power, power_mean = POWERS[3], 0.0  # ln C33 is linear in ln(a/b) between its nodes and on beyond
     for k, weight in enumerate(_parabola(nu)):
-        answer += weight * (LONG_C33[i, k] ** (1.0 - t) * LONG_C33[i + 1, k] ** t) ** power
-    return answer ** (1.0 / power)
+        power_mean += weight * (LONG_C33[i, k] ** (1.0 - t) * LONG_C33[i + 1, k] ** t) ** power
+    return power_mean ** (1.0 / power)

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.contact.distance_kernels import sides
+from models.contact.distance_kernels import valley_ends
 from models.contact.inputs import Array
 from models.contact.simplified_kernels import Surface
 from models.contact.undeformed_distance import Distance
@@ -102,7 +102,7 @@ class Patch:
             )
         root = np.sqrt(max(depth - self.low, 0.0))
         (x, rx), (y, ry) = self.lines
-        return (*sides(x, rx, self.bottom[0], root), *sides(y, ry, self.bottom[1], root))
+        return (*valley_ends(x, rx, self.bottom[0], root), *valley_ends(y, ry, self.bottom[1], root))
 
 
 def no_bottom() -> InputError:

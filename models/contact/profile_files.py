@@ -25,14 +25,14 @@ MM = 1e-3
 Kind = Literal["wheel", "rail"]
 Points = tuple[Array, Array]
 SIMPACK, MINIPROF = (".prw", ".prr"), (".whl", ".ban")
-OF_KIND = {".prw": "wheel", ".prr": "rail", ".whl": "wheel", ".ban": "rail"}
+KIND_OF_ENDING = {".prw": "wheel", ".prr": "rail", ".whl": "wheel", ".ban": "rail"}
 COMMENTS = re.compile(r"[#!%].*")
 SEPARATORS = re.compile(r"[\s,;]+")
 DECIMAL_COMMA = re.compile(r"\d,\d.*(?<!,)[\s;]|(?<!,)[\s;].*\d,\d")
 """Pattern of a decimal comma: a comma between digits where something else separates the numbers."""
 SHOWN_CHARACTERS = 40
 """Largest number of characters of a file's line that an error message shows."""
-OFF_TAPING = 5e-3
+LARGEST_TAPING_OFFSET = 5e-3
 """Largest |z| (m) of a wheel profile at y = 0, where its radius is measured."""
 
 
@@ -46,8 +46,10 @@ def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror
         raise InputError("", "kind", kind, "is not known", get_args(Kind))
     path = Path(path)
     ending = path.suffix.lower()
-    if OF_KIND.get(ending, kind) != kind:
-        raise InputError(path, "", None, f"is a file of a {OF_KIND[ending]} by its ending, and a {kind} is wanted")
+    if KIND_OF_ENDING.get(ending, kind) != kind:
+        raise InputError(
+            path, "", None, f"is a file of a {KIND_OF_ENDING[ending]} by its ending, and a {kind} is wanted"
+        )
     lines = _lines(path)
     reader = _simpack if ending in SIMPACK else _miniprof if ending in MINIPROF else _columns
     y, z = reader(lines, path)
@@ -65,13 +67,13 @@ def _check_taping(wheel: ContactProfile, path: Path) -> None:
     axle.
     """
     middle = float(np.interp(0.0, wheel.y, wheel.z, left=np.nan, right=np.nan))
-    if not abs(middle) <= OFF_TAPING:
+    if not abs(middle) <= LARGEST_TAPING_OFFSET:
         raise InputError(
             path,
             "profile at y = 0, in m",
             middle,
             "y must count from the taping line and z from the "
-            f"tread there, to within {OFF_TAPING:g} m: shift the profile",
+            f"tread there, to within {LARGEST_TAPING_OFFSET:g} m: shift the profile",
         )
 
 
@@ -164,7 +166,7 @@ def _simpack(lines: list[str], path: Path) -> Points:
             keys[name.strip()] = (value.strip(), k)
     if not ended:
         raise InputError(path, "", None, "has no points between point.begin and point.end")
-    return _transformed(_points(rows), {name: _key(keys, name, path) for name in DEFAULTS})
+    return _transformed(_points(rows), {name: _header_value(keys, name, path) for name in DEFAULTS})
 
 
 DEFAULTS = {
@@ -186,7 +188,7 @@ bounds.
 """
 
 
-def _key(keys: dict[str, tuple[str, int]], name: str, path: Path) -> float:
+def _header_value(keys: dict[str, tuple[str, int]], name: str, path: Path) -> float:
     """Value of a key of a Simpack header, or its default."""
     text, line = keys.get(name, (str(DEFAULTS[name]), 0))
     value = _parse_numbers(text, line, path, 1)[0]

@@ -17,13 +17,13 @@ from models.core.errors import InputError
 
 SPACING = 1e-4
 """Distance (m) of the points along a profile's contour."""
-SPIKE = 2e-4
+SPIKE_HEIGHT = 2e-4
 """Distance (m) from both neighbours above which a point that turns back counts as a measurement error."""
-BACK = 1e-3
+LARGEST_BACKWARD_STEP = 1e-3
 """Step (m) against y up to which a contour that turns back is rough, and not the end of what can be touched; also the
 largest width of y that may be lost beyond it.
 """
-TURNING = 0.3
+LARGEST_BACKWARD_RATIO = 0.3
 """Largest ratio of a contour's way against its direction to its way along it: a rail with web and foot turns by
 0.27.
 """
@@ -64,7 +64,7 @@ def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> Co
     values that are not finite or not a profile's size in m, and a contour that does not run along y.
     """
     y, z = np.asarray(y, float), np.asarray(z, float)
-    _check(y, z, smoothing, file)
+    _check_points(y, z, smoothing, file)
     if y[0] > y[-1]:
         y, z = y[::-1], z[::-1]
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
@@ -77,7 +77,7 @@ def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> Co
     return ContactProfile(y[keep], z[keep], smoothing)
 
 
-def _check(y: Array, z: Array, smoothing: float, file: object) -> None:
+def _check_points(y: Array, z: Array, smoothing: float, file: object) -> None:
     """Refuse profile points of wrong shape or size, that are not finite, or whose contour does not run along y."""
     if y.ndim != 1 or y.shape != z.shape or y.size < 10:
         raise InputError(file, "profile", [list(y.shape), list(z.shape)], "must be two columns of ten points or more")
@@ -90,7 +90,7 @@ def _check(y: Array, z: Array, smoothing: float, file: object) -> None:
         )
     steps = np.diff(y)
     there, back = float(steps[steps > 0.0].sum()), float(-steps[steps < 0.0].sum())
-    if min(there, back) > TURNING * max(there, back):
+    if min(there, back) > LARGEST_BACKWARD_RATIO * max(there, back):
         raise InputError(
             file,
             "profile",
@@ -107,7 +107,7 @@ def _check_spikes(points: Array, file: object) -> None:
     sharply.
     """
     way, straight = np.linalg.norm(np.diff(points, axis=0), axis=1), np.linalg.norm(points[2:] - points[:-2], axis=1)
-    spikes = np.minimum(way[:-1], way[1:]) > np.maximum(2.0 * straight, SPIKE)
+    spikes = np.minimum(way[:-1], way[1:]) > np.maximum(2.0 * straight, SPIKE_HEIGHT)
     if spikes.any():
         y, z = points[1 + int(np.argmax(spikes))]
         raise InputError(
@@ -124,16 +124,16 @@ def _check_rough(y: Array, keep: slice, file: object) -> None:
     """
     for beyond, last in ((y[keep.stop :], y[keep.stop - 1]), (-y[: keep.start][::-1], -y[keep.start])):
         highest = np.maximum.accumulate(np.append(last, beyond))[1:]
-        rough = np.logical_and.accumulate(highest - beyond < BACK)
+        rough = np.logical_and.accumulate(highest - beyond < LARGEST_BACKWARD_STEP)
         lost = float(np.max(beyond[rough], initial=last) - last)
-        if lost > BACK:
+        if lost > LARGEST_BACKWARD_STEP:
             raise InputError(
                 file,
                 "profile",
                 float(abs(last)),
                 f"is |y| (m) where the contour turns back by less than "
-                f"{BACK:g} m, as noise or rounding makes it, and {lost:.2g} m beyond it would be lost: "
-                "give a smoothing, from 0.002 m on",
+                f"{LARGEST_BACKWARD_STEP:g} m, as noise or rounding makes it, and {lost:.2g} m beyond it would "
+                "be lost: give a smoothing, from 0.002 m on",
             )
 
 

@@ -63,7 +63,7 @@ CELLS = 45
 """Number of strips of the fine grid, and of cells along each strip."""
 LEAST_CELLS, MOST_CELLS = 3, 2000
 SHAPES = {"parabolic": PARABOLIC, "elliptic": ELLIPTIC}
-ABOUT = 0.6
+DEPTH_BY_APPROACH = 0.6
 """Ratio of a patch's depth to its approach, about; the search for several patches starts there."""
 FITS = {"displacement": DISPLACEMENT, "gradient": GRADIENT}
 
@@ -251,7 +251,9 @@ def _total(parts: Sequence[PatchPressure]) -> float:
 def _shallow(patches: list[Patch], approach: float) -> list[float]:
     """Rough depths (m) of patches at an approach (m): a fixed share of the approach beyond each patch's first touch."""
     over = [approach * np.cos(patch.lean) - patch.low for patch in patches]
-    return [float(patch.low + (ABOUT * o if o > 0.0 else o)) for patch, o in zip(patches, over, strict=True)]
+    return [
+        float(patch.low + (DEPTH_BY_APPROACH * o if o > 0.0 else o)) for patch, o in zip(patches, over, strict=True)
+    ]
 
 
 def _patches_at_common_approach(
