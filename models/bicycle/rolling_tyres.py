@@ -50,7 +50,7 @@ number.
 
 
 class BicycleTyre(Strict):
-    """[tyres]: both wheels; the reference rolls ideally, as tyres do in the limit of stiffness."""
+    """[tyres]: tyre parameters of both wheels; ideally rolling wheels are the limit of infinite stiffness."""
 
     cornering: float = quantity("1/rad", "side force by slip angle and load", default=20.0)
     vertical: float = quantity("N/m", "vertical stiffness", default=2e5)

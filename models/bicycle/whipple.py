@@ -30,7 +30,7 @@ HIGHEST_SPEED = 100.0
 
 
 class Wheel(Strict):
-    """A wheel, its inertia about all axes across its axle one number; zero is a wheel without inertia."""
+    """A bicycle wheel. Its inertia about all axes across the axle is one number; zero inertia is allowed."""
 
     radius: float = quantity("m", "of the wheel")
     mass: float = quantity("kg", "of the wheel", zero=True)
@@ -49,7 +49,9 @@ class Wheel(Strict):
 
 
 class Frame(Strict):
-    """Rear frame with a rigid rider, or the front frame; Iyy is Ixx + Izz, that of a flat body, where it is missing."""
+    """A bicycle's rear frame with a rigid rider, or its front frame; where Iyy is missing it is Ixx + Izz, as for a
+    flat body.
+    """
 
     x: float = quantity("m", "centre of mass, forward from the rear contact", signed=True)
     z: float = quantity("m", "centre of mass, down from the ground: above it is negative", signed=True)
@@ -75,7 +77,7 @@ class Frame(Strict):
 
 
 class Control(Strict):
-    """What turns the steering beside the bicycle itself, and how its sensors and motor err.
+    """Steering control and friction of the bicycle, with the errors of its sensors and motor.
 
     Steer torque = torque_gain gain (until - measured speed) lean rate - friction steer rate - dry_friction of the steer
     rate's sign, the first where the measured speed, speed_gain v + speed_bias, is below ``until``. The encoder tells

@@ -75,10 +75,10 @@ class Convolution:
     def __init__(self, kernel: Array) -> None:
         self.cells = ((kernel.shape[0] + 1) // 2, (kernel.shape[1] + 1) // 2)
         self._size = tuple(fft.next_fast_len(n, real=True) for n in kernel.shape[:2])
-        rolled = np.zeros((*self._size, *kernel.shape[2:]))
-        rolled[: kernel.shape[0], : kernel.shape[1]] = kernel
-        rolled = np.roll(rolled, (1 - self.cells[0], 1 - self.cells[1]), axis=(0, 1))
-        self._spectrum = fft.rfft2(np.moveaxis(rolled, (0, 1), (-2, -1)), workers=1)
+        shifted = np.zeros((*self._size, *kernel.shape[2:]))
+        shifted[: kernel.shape[0], : kernel.shape[1]] = kernel
+        shifted = np.roll(shifted, (1 - self.cells[0], 1 - self.cells[1]), axis=(0, 1))
+        self._spectrum = fft.rfft2(np.moveaxis(shifted, (0, 1), (-2, -1)), workers=1)
 
     def __call__(self, values: Array) -> Array:
         """Sums (ny, nx, out) over all cells of kernel times values (ny, nx, in)."""

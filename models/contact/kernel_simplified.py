@@ -20,9 +20,9 @@ from models.contact.patches import Patch, separate
 from models.contact.simplified_kernels import (
     PARABOLIC,
     Surface,
-    crude_fit,
-    crude_net,
-    gather,
+    coarse_fit,
+    coarse_net,
+    coarse_tractions,
     march,
     mesh_of,
     strips,
@@ -118,7 +118,7 @@ def surface_at(numbers, depth):
 def fit_at_depth(numbers, depth, modulus):
     """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of the patch at a depth (m)."""
     head = records(numbers, 1, HEAD)[0]
-    return crude_fit(surface_at(numbers, depth), int(head.net), int(head.shape), int(head.fit), modulus)
+    return coarse_fit(surface_at(numbers, depth), int(head.net), int(head.shape), int(head.fit), modulus)
 
 
 @compiled
@@ -195,8 +195,8 @@ def _roll(values, numbers, depth, stiffness, out):
     fx = fy = mz = stuck = area = 0.0
     for again in (False, True):
         if again:
-            crude, (dx, dy) = gather(net, traction, box, meshes), mesh_of(box, meshes)
-            cover = crude_net(surface, meshes, PARABOLIC)[2]
+            crude, (dx, dy) = coarse_tractions(net, traction, box, meshes), mesh_of(box, meshes)
+            cover = coarse_net(surface, meshes, PARABOLIC)[2]
             u = tangential(crude, dx, dy, values.nu) / (math.pi * values.G)
             fitted = tangential_fit(u, crude, cover, dx, dy, int(head.fit))
             flexibility = fitted if fitted > 0.0 else flexibility

@@ -23,7 +23,7 @@ TOLERANCE = 1e-9
 MOST_ITERATIONS = 2000
 LARGEST_CELL, LARGEST_APPROACH = 0.1, 0.1
 """Largest cell size and approach (m) that are accepted; larger ones are usually in mm."""
-UNEVEN = 4e-3
+LARGEST_UNEVENNESS = 4e-3
 """Largest difference between the steps of a grid, as a share of their mean."""
 
 
@@ -50,7 +50,7 @@ class PressureGrid:
         quantity("pressure", self.pressure, "a pressure in Pa, zero or more", 0.0)
         for name, nodes in (("x", self.x), ("y", self.y)):
             steps = np.diff(quantity(name, nodes, "a place in m"))
-            if not (steps.min() > 0.0 and np.ptp(steps) <= UNEVEN * steps.mean()):
+            if not (steps.min() > 0.0 and np.ptp(steps) <= LARGEST_UNEVENNESS * steps.mean()):
                 raise InputError("", name, None, "must ascend in even steps (m)")
 
     @property

@@ -119,15 +119,19 @@ def separate(distance: Distance) -> list[Patch]:
     """The valleys of an undeformed distance as patches, in order of ascending y (then x). Every ridge higher than
     ``RIDGE`` separates two of them.
     """
-    return [Patch(part, (*along_x, *along_y)) for row, along_y in _cut(distance, 1) for part, along_x in _cut(row, 0)]
+    return [
+        Patch(part, (*along_x, *along_y))
+        for row, along_y in _parts_between_ridges(distance, 1)
+        for part, along_x in _parts_between_ridges(row, 0)
+    ]
 
 
-def as_single_patch(distance: Distance) -> list[Patch]:
+def single_patch_of(distance: Distance) -> list[Patch]:
     """The undeformed distance treated as a single patch, even if it has several minima."""
     return [Patch(distance)]
 
 
-def _cut(distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool]]]:
+def _parts_between_ridges(distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool]]]:
     """Parts of the distance, split at ridges along an axis (0: x, 1: y), each with flags on whether its two ends are
     cuts.
     """

@@ -31,13 +31,13 @@ def sweep(traction, rigid, kernel, bound, relaxation):
                     slip_x += kernel[0, k, first + i] * p_x + cross * p_y
                     slip_y += cross * p_x + kernel[2, k, first + i] * p_y
             p_x, p_y = traction[0, row, column], traction[1, row, column]
-            new_x, new_y = answer(slip_x - own_x * p_x, slip_y - own_y * p_y, own_x, own_y, bound[row, column])
+            new_x, new_y = cell_traction(slip_x - own_x * p_x, slip_y - own_y * p_y, own_x, own_y, bound[row, column])
             traction[0, row, column] = p_x + relaxation * (new_x - p_x)
             traction[1, row, column] = p_y + relaxation * (new_y - p_y)
 
 
 @njit(cache=True, nogil=True)
-def answer(slip_x, slip_y, own_x, own_y, bound):
+def cell_traction(slip_x, slip_y, own_x, own_y, bound):
     """Traction of one cell whose slip is (slip_x + own_x p_x, slip_y + own_y p_y): it sticks, or slides with the
     traction opposite to the slip.
 
@@ -58,7 +58,7 @@ def answer(slip_x, slip_y, own_x, own_y, bound):
 
 
 @njit(cache=True, fastmath=True, nogil=True)
-def factor(systems, spans):
+def factorise(systems, spans):
     """Replace each matrix (many, n, n) by its LU factors, in place: L with unit diagonal, and U.
 
     spans (many, 2) : first row of each that is not the unit matrix's, and one beyond its last. Without pivoting, which
@@ -95,7 +95,7 @@ def substitute(factors, spans, values):
 
 
 @njit(cache=True, nogil=True)
-def turned(column, turns, components):
+def rotate_column(column, turns, components):
     """Apply Givens' rotations to a new column (count + 1,) of GMRES, so that the system stays triangular; returns the
     column (count,).
 
@@ -124,18 +124,18 @@ def orthogonalise(basis, count, vector):
     Returns the components along these ``count`` rows and the new one, by modified Gram-Schmidt.
     """
     components = np.zeros(count + 1)
-    left = vector.copy()
+    remainder = vector.copy()
     for row in range(count):
         part = 0.0
-        for i in range(len(left)):
-            part += basis[row, i] * left[i]
-        for i in range(len(left)):
-            left[i] -= part * basis[row, i]
+        for i in range(len(remainder)):
+            part += basis[row, i] * remainder[i]
+        for i in range(len(remainder)):
+            remainder[i] -= part * basis[row, i]
         components[row] = part
     square = 0.0
-    for i in range(len(left)):
-        square += left[i] * left[i]
+    for i in range(len(remainder)):
+        square += remainder[i] * remainder[i]
     components[count] = np.sqrt(square)
-    for i in range(len(left)):
-        basis[count, i] = left[i] / max(components[count], 1e-300)
+    for i in range(len(remainder)):
+        basis[count, i] = remainder[i] / max(components[count], 1e-300)
     return components

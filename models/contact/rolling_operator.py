@@ -8,7 +8,7 @@ import numpy as np
 from models.contact.half_space import Convolution, Y, influence, offsets
 from models.contact.inputs import Array
 from models.contact.material import MaterialPair
-from models.contact.rolling_kernels import factor, orthogonalise, substitute, turned
+from models.contact.rolling_kernels import factorise, orthogonalise, rotate_column, substitute
 from models.core.errors import RunFailed
 
 UPSTREAM = (1.5, -2.0, 0.5)
@@ -53,7 +53,7 @@ class SlipOperator:
         return self._convolution(traction)
 
     @cached_property
-    def reversed(self) -> Array:
+    def reversed_kernel(self) -> Array:
         """Kernel (3, 2 ny - 1, 2 nx - 1) in the reversed order that ``rolling_kernels.sweep`` needs."""
         kernel = self.kernel[::-1, ::-1]
         return np.ascontiguousarray(np.stack([kernel[..., 0, 0], kernel[..., 0, 1], kernel[..., 1, 1]]))
@@ -64,7 +64,7 @@ class SlipOperator:
         return np.diag(self.kernel[self.rows - 1, self.columns - 1]).copy()
 
     @cached_property
-    def strip(self) -> Array:
+    def strip_coupling(self) -> Array:
         """Coupling matrix (nx, 2, nx, 2): slip of each cell of a strip by the traction of each cell of the same
         strip.
         """
@@ -91,16 +91,17 @@ def gmres(apply: Map, precondition: Map, right_hand_side: Array, tolerance: floa
         np.zeros((maximum_iterations, maximum_iterations)),
         np.empty((maximum_iterations, 2)),
     )
-    left = np.append(size, np.zeros(maximum_iterations))
+    residual_components = np.append(size, np.zeros(maximum_iterations))
     basis[0] = right_hand_side / size
     for count in range(1, maximum_iterations + 1):
-        triangle[:count, count - 1] = turned(
-            orthogonalise(basis, count, apply(precondition(basis[count - 1]))), turns, left
+        triangle[:count, count - 1] = rotate_column(
+            orthogonalise(basis, count, apply(precondition(basis[count - 1]))), turns, residual_components
         )
-        if abs(left[count]) <= tolerance * size:
-            return precondition(np.linalg.solve(triangle[:count, :count], left[:count]) @ basis[:count])
+        if abs(residual_components[count]) <= tolerance * size:
+            return precondition(np.linalg.solve(triangle[:count, :count], residual_components[:count]) @ basis[:count])
     raise RunFailed(
-        "linear solver", f"residual {abs(left[maximum_iterations]) / size:.2g} after {maximum_iterations} products"
+        "linear solver",
+        f"residual {abs(residual_components[maximum_iterations]) / size:.2g} after {maximum_iterations} products",
     )
 
 
@@ -120,7 +121,7 @@ class FreeSystem:
         inside = np.any(free_directions, axis=(2, 3))
         first, last = inside.argmax(axis=1), inside.shape[1] - inside[:, ::-1].argmax(axis=1)
         self.spans = 2 * np.stack([first, np.where(inside.any(axis=1), last, first)], axis=1)
-        factor(self.factors, self.spans)
+        factorise(self.factors, self.spans)
 
     def _strips(self) -> Array:
         """Matrices (ny, 2 nx, 2 nx) of the system within every strip.
@@ -129,7 +130,7 @@ class FreeSystem:
         """
         free, stiff = self.free, self.stiff[..., None]
         rows, columns = free.shape[:2]
-        system = np.einsum("riab,ibjc,rjcd->riajd", free, self.operator.strip, free, optimize=True)
+        system = np.einsum("riab,ibjc,rjcd->riajd", free, self.operator.strip_coupling, free, optimize=True)
         index = np.arange(columns)
         system[:, index, :, index, :] += np.moveaxis((1.0 + stiff) * np.eye(2) - free, 1, 0)
         return np.ascontiguousarray(system.reshape(rows, 2 * columns, 2 * columns))

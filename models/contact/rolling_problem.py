@@ -97,7 +97,9 @@ def solve_rolling(
     RunFailed : the conditions of stick and slip were not met to ``TOLERANCE``
     """
     motion = creepages(xi_x, xi_y, spin, number).values()
-    return _rubbed(normal_solution, mu, lambda x, y, length: rigid_slip(x, y, *motion), material_pair, UPSTREAM)
+    return _stick_slip_solution(
+        normal_solution, mu, lambda x, y, length: rigid_slip(x, y, *motion), material_pair, UPSTREAM
+    )
 
 
 def solve_shift(
@@ -112,13 +114,13 @@ def solve_shift(
         number(name, value, "a shift in m, at most 0.1", -0.1, 0.1)
         for name, value in (("shift_x", shift_x), ("shift_y", shift_y))
     )
-    by_cell = _rubbed(
+    by_cell = _stick_slip_solution(
         normal_solution, mu, lambda x, y, length: rigid_slip(x, y, way_x, way_y, 0.0) / length, material_pair, NO_SHIFT
     )
     return replace(by_cell, slip=by_cell.slip * normal_solution.dx, power=by_cell.power * normal_solution.dx)
 
 
-def _rubbed(
+def _stick_slip_solution(
     normal_solution: PressureGrid, mu: float, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
 ) -> RollingSolution:
     """Solution of stick and slip for the given rigid slip, on the cells in contact."""
@@ -166,7 +168,7 @@ class _State:
         needed = self.trial * cut[..., None] - traction
         self.residual = float(np.linalg.norm(needed, axis=-1)[bound > 0].max() / bound.max())
 
-    def moved(self, traction: Array) -> "_State":
+    def with_tractions(self, traction: Array) -> "_State":
         """A new state of the cells with other tractions."""
         return _State(self.operator, self.rigid, self.bound, traction)
 
@@ -211,18 +213,18 @@ def _solve(
     """
     bound, motion = cells.bound, rigid(cells.x, cells.y, cells.dx)
     operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, material_pair, weights)
-    nothing = _State(operator, motion, bound, np.zeros_like(motion))
+    zero_state = _State(operator, motion, bound, np.zeros_like(motion))
     if min(bound.shape) < COARSEST_CELLS:
-        return _solve_tractions(nothing)
+        return _solve_tractions(zero_state)
     coarse = cells.coarser()
-    known = _solve(coarse, rigid, material_pair, weights)[0].traction
-    relative = _at_quarter_cells(known / np.where(coarse.bound > 0, coarse.bound, 1.0)[..., None])
-    state = nothing.moved(relative[: bound.shape[0], : bound.shape[1]] * bound[..., None])
+    coarse_tractions = _solve(coarse, rigid, material_pair, weights)[0].traction
+    relative = _at_quarter_cells(coarse_tractions / np.where(coarse.bound > 0, coarse.bound, 1.0)[..., None])
+    state = zero_state.with_tractions(relative[: bound.shape[0], : bound.shape[1]] * bound[..., None])
     for step in range(MOST_STEPS):
         if state.residual <= TOLERANCE:
             return state, step
         state = _after_newton_step(state)
-    return _solve_tractions(_nearest(state, nothing))
+    return _solve_tractions(_nearest(state, zero_state))
 
 
 def _nearest(*states: _State) -> _State:
@@ -243,27 +245,27 @@ def _at_quarter_cells(values: Array) -> Array:
 def _solve_tractions(state: _State) -> tuple[_State, int]:
     """State that satisfies all stick and slip conditions, by alternating sweeps and Newton steps, and the number of
     rounds."""
-    relaxation, done = RELAXATION, 0
+    relaxation, round_count = RELAXATION, 0
     while state.residual > TOLERANCE:
-        if done == MOST_ROUNDS:
+        if round_count == MOST_ROUNDS:
             raise RunFailed(
                 "rolling problem",
                 f"conditions of stick and slip met to {state.residual:.2g} only after {MOST_ROUNDS} rounds",
             )
         traction, motion = (np.ascontiguousarray(np.moveaxis(v, -1, 0)) for v in (state.traction, state.rigid))
         for _ in range(SWEEPS):
-            sweep(traction, motion, state.operator.reversed, state.bound, relaxation)
-        swept = state.moved(np.moveaxis(traction, 0, -1))
+            sweep(traction, motion, state.operator.reversed_kernel, state.bound, relaxation)
+        swept = state.with_tractions(np.moveaxis(traction, 0, -1))
         nearest = swept if swept.residual <= TOLERANCE else _nearest(swept, _after_newton_step(swept))
         relaxation *= 1.0 if nearest.residual < state.residual else RELAXATION_FACTOR
-        state, done = nearest, done + 1
-    return state, done
+        state, round_count = nearest, round_count + 1
+    return state, round_count
 
 
 def _after_newton_step(state: _State) -> _State:
     """The state after one Newton step, or the unchanged state if the linear solver fails for rounding."""
     try:
-        return state.moved(_newton(state))
+        return state.with_tractions(_newton(state))
     except RunFailed:
         return state
 
@@ -283,7 +285,7 @@ def _newton(state: _State) -> Array:
     free = free * (bound > 0)[..., None, None]
     against = np.maximum(-np.sum(slip * opposite, axis=-1), 0.0)
     stiff = np.where(slips, against / np.where(slips, bound, 1.0), 0.0)
-    moved = traction + FreeSystem(state.operator, free, stiff).solve(-slip)
-    size = np.linalg.norm(moved, axis=-1)
+    with_tractions = traction + FreeSystem(state.operator, free, stiff).solve(-slip)
+    size = np.linalg.norm(with_tractions, axis=-1)
     onto = np.where(slips | (size > bound), bound / np.where(size > 0, size, 1.0), 1.0)
-    return moved * onto[..., None]
+    return with_tractions * onto[..., None]

@@ -58,11 +58,11 @@ tread.
 """
 
 RADII = (300.0, 80.0, 13.0)
-CHANGES = (10.49975, 25.98806)
+RADIUS_CHANGES = (10.49975, 25.98806)
 """Distance (mm) from the rail's axis at which the head's radius changes from 300 to 80 mm, and from 80 to 13 mm."""
 SIDE_SLOPE = 20.0
 """Slope of the rail head's side: height over width."""
-LOWEST = 37.0
+LARGEST_DEPTH = 37.0
 """Depth (mm) below the rail head's top down to which the profile reaches."""
 
 
@@ -91,14 +91,14 @@ def uic60() -> ContactProfile:
 def _half_head() -> tuple[Array, Array]:
     """Right half of the rail head (mm) from the axis: arcs that continue one another's tangent, then the side."""
     y, z, angle = [np.zeros(1)], [np.zeros(1)], 0.0
-    for radius, end in zip(RADII, (*CHANGES, None), strict=True):
+    for radius, end in zip(RADII, (*RADIUS_CHANGES, None), strict=True):
         centre_y, centre_z = y[-1][-1] - radius * np.sin(angle), z[-1][-1] + radius * np.cos(angle)
         last = np.arctan(SIDE_SLOPE) if end is None else np.arcsin((end - centre_y) / radius)
         angles = np.linspace(angle, last, 2001)[1:]
         y.append(centre_y + radius * np.sin(angles))
         z.append(centre_z - radius * np.cos(angles))
         angle = last
-    depth = np.linspace(z[-1][-1], LOWEST, 1001)[1:]
+    depth = np.linspace(z[-1][-1], LARGEST_DEPTH, 1001)[1:]
     y.append(y[-1][-1] + (depth - z[-1][-1]) / SIDE_SLOPE)
     return np.concatenate(y), np.concatenate([*z, depth])
 

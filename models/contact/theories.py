@@ -158,7 +158,7 @@ class OnPatches(RollingContact):
         """Lever of the moment (m) for the patch with the largest extent."""
         return max((abs(side) for part in self.pressed.patches for side in part.box), default=0.0)
 
-    def placed(self, fields: Sequence[Fields]) -> tuple[Fields, ...]:
+    def along_contour(self, fields: Sequence[Fields]) -> tuple[Fields, ...]:
         """Fields whose y is the position (m) along the rail's contour, so that several patches can be shown in one
         picture.
         """
@@ -176,7 +176,7 @@ class Simplified(OnPatches):
         """Creep forces, with ``cells`` strips and as many cells per strip in each patch; fields are placed along the
         rail's contour."""
         forces = roll_simplified(self.pressed, self.friction, *motion, cells=cells)
-        inside = self.placed(forces.fields)
+        inside = self.along_contour(forces.fields)
         return Rolled(forces.fx, forces.fy, forces.mz, forces.stick_share, forces.power, inside)
 
 
@@ -187,7 +187,7 @@ class Exact(OnPatches):
 
     def __init__(self, normal_contact: NormalContact, friction: float, cells: int) -> None:
         parts = normal_contact.patches
-        grids = [_solved(part, cells, normal_contact.pair) for part in parts]
+        grids = [_exact_pressure(part, cells, normal_contact.pair) for part in parts]
         alone = grids[0].approach / float(np.cos(parts[0].patch.lean))
         approach = alone if len(grids) == 1 else normal_contact.approach
         peak = max(float(grid.pressure.max()) for grid in grids)
@@ -195,9 +195,9 @@ class Exact(OnPatches):
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Creep forces, computed with ``cells`` x ``cells`` cells around each patch."""
-        grids = [_solved(part, cells, self.pair) for part in self.pressed.patches]
+        grids = [_exact_pressure(part, cells, self.pair) for part in self.pressed.patches]
         forces = _exact_sum(grids, motion, self.friction, self.pair)
-        return replace(forces, fields=self.placed(forces.fields))
+        return replace(forces, fields=self.along_contour(forces.fields))
 
 
 def _exact_sum(grids: Sequence[PressureGrid], motion: Motion, friction: float, material_pair: MaterialPair) -> Rolled:
@@ -221,7 +221,7 @@ contact fits.
 """
 
 
-def _solved(patch: PatchPressure, cells: int, material_pair: MaterialPair) -> NormalSolution:
+def _exact_pressure(patch: PatchPressure, cells: int, material_pair: MaterialPair) -> NormalSolution:
     """Exact pressure of one patch at the load from the simplified theory, in the patch's own coordinates."""
     (x0, x1, y0, y1), known = patch.box, patch.patch.distance
     for margin in MARGINS:

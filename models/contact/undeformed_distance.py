@@ -17,7 +17,7 @@ from models.core.errors import InputError
 
 NODES = 97
 """Number of nodes along each axis of a computed distance: 48 spacings on each side of the centre."""
-UNEVEN_SHARE = 2e-3
+LARGEST_UNEVENNESS = 2e-3
 """Largest deviation of a node from its even position, as a share of a step, at which nodes count as even; rounding in a
 file causes as much.
 """
@@ -61,7 +61,7 @@ class Distance:
     @cached_property
     def padded(self) -> Array:
         """Heights (m) with an extra node on every side, extrapolated by the parabola through the three outermost."""
-        return _continued(_continued(self.height).T).T.copy()
+        return _extrapolated(_extrapolated(self.height).T).T.copy()
 
     def at(self, x: Array, y: Array) -> Array:
         """Distance (m) at points x, y (m), broadcast; raises InputError outside the nodes."""
@@ -134,7 +134,7 @@ def from_arrays(x: Array, y: Array, height: Array) -> Distance:
         if array.ndim != 1 or array.size < 4:
             raise InputError("", name, list(array.shape), "must have the shape (n,) with n of 4 or more")
         even = np.linspace(array[0], array[-1], array.size)
-        if not np.abs(array - even).max() < UNEVEN_SHARE * (even[1] - even[0]):
+        if not np.abs(array - even).max() < LARGEST_UNEVENNESS * (even[1] - even[0]):
             raise InputError("", name, None, "must ascend in even steps (m)")
     shape = (nodes["y"].size, nodes["x"].size)
     if height.shape != shape:
@@ -147,7 +147,7 @@ def quadratic(A: float, B: float, x: float, y: float, nodes: int = NODES) -> Dis
     return from_function(lambda u, v: A * u**2 + B * v**2, (-x, x), (-y, y), nodes)
 
 
-def _continued(rows: Array) -> Array:
+def _extrapolated(rows: Array) -> Array:
     """The rows of a table with one more at each end, extrapolated by the parabola through the three nearest rows."""
     first = 3.0 * (rows[0] - rows[1]) + rows[2]
     last = 3.0 * (rows[-1] - rows[-2]) + rows[-3]

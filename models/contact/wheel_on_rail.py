@@ -35,7 +35,7 @@ before.
 """
 NODES = 121
 """Number of nodes of an undeformed distance along each axis."""
-STEEPEST_ROLL = 0.06
+LARGEST_ROLL = 0.06
 """Largest roll angle (rad) of the wheelset that is searched."""
 ITERATIONS = 12
 
@@ -79,7 +79,7 @@ class Pose:
     fall: float
 
     @cached_property
-    def turn(self) -> Array:
+    def rotation(self) -> Array:
         """Rotation (3, 3) from the wheelset to the track: roll, then yaw."""
         (cr, sr), (cy, sy) = ((np.cos(a), np.sin(a)) for a in (self.roll, self.yaw))
         return np.array([[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]]) @ np.array(
@@ -113,7 +113,7 @@ class WheelAndRail:
     rail: ContactProfile
     wheelset: Wheelset
 
-    def centre(self, pose: Pose) -> Array:
+    def axle_centre(self, pose: Pose) -> Array:
         """Position (3,) of the middle of the axle in the track's coordinates (m)."""
         return np.array([0.0, pose.shift, pose.fall - self.wheelset.radius])
 
@@ -124,7 +124,7 @@ class WheelAndRail:
         sine = -self.wheel.curve(y, 1) * np.cos(pose.roll) * np.tan(pose.yaw) / np.hypot(1.0, lead)
         angle = np.arcsin(np.clip(sine, -1.0, 1.0)) - np.arctan(lead)
         points = np.column_stack([radius * np.sin(angle), self.wheelset.arm + y, radius * np.cos(angle)])
-        return points @ pose.turn.T + self.centre(pose)
+        return points @ pose.rotation.T + self.axle_centre(pose)
 
     def gaps(self, pose: Pose) -> tuple[Array, Array]:
         """Points of the wheel's outline (n, 3) above the rail, and the vertical gap (m) between each point and the
@@ -220,14 +220,14 @@ def touching_pose(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRa
     """Pose of the wheelset in which both wheels just touch. ``left`` : the mirrored left side, if it differs from the
     right one.
     """
-    other = left or side
+    left_side = left or side
 
     def right_over_left(roll: float) -> float:
-        return side.clearance(Pose(shift, yaw, roll, 0.0)) - other.clearance(Pose(-shift, -yaw, -roll, 0.0))
+        return side.clearance(Pose(shift, yaw, roll, 0.0)) - left_side.clearance(Pose(-shift, -yaw, -roll, 0.0))
 
-    if right_over_left(-STEEPEST_ROLL) * right_over_left(STEEPEST_ROLL) > 0.0:
+    if right_over_left(-LARGEST_ROLL) * right_over_left(LARGEST_ROLL) > 0.0:
         raise InputError("", "lateral_shift", shift, "lets only one wheel touch: profiles, gauge and shift do not fit")
-    roll = float(brentq(right_over_left, -STEEPEST_ROLL, STEEPEST_ROLL, xtol=1e-13))
+    roll = float(brentq(right_over_left, -LARGEST_ROLL, LARGEST_ROLL, xtol=1e-13))
     return Pose(shift, yaw, roll, side.clearance(Pose(shift, yaw, roll, 0.0)))
 
 
@@ -260,7 +260,7 @@ def _touching_place(
     top = float(side.rail.y[np.argmin(side.rail.z)])
     between = np.linspace(top, y, 200)
     along = float(np.trapezoid(np.hypot(1.0, side.rail.curve(between, 1)), between))
-    ahead, across, _ = pose.turn.T @ (lowest - side.centre(pose))
+    ahead, across, _ = pose.rotation.T @ (lowest - side.axle_centre(pose))
     patch = Patch(distance, cut, abs(angle), along)
     wheel_y = float(across) - side.wheelset.arm
     return TouchingPlace(patch.low / float(np.cos(angle)), angle, wheel_y, y - top, float(ahead), patch)
@@ -302,7 +302,7 @@ def _wheel_heights(side: WheelAndRail, pose: Pose, contact_point: Array, angle: 
         [[1.0, 0.0, 0.0], [0.0, np.cos(angle), np.sin(angle)], [0.0, -np.sin(angle), np.cos(angle)]]
     )
     base = contact_point + x[None, :, None] * ahead + s[:, None, None] * along
-    base, into = (base - side.centre(pose)) @ pose.turn, into @ pose.turn
+    base, into = (base - side.axle_centre(pose)) @ pose.rotation, into @ pose.rotation
     curve, slope, arm = side.wheel.curve, side.wheel.curve.derivative(), side.wheelset.arm
     height = np.zeros((s.size, x.size))
     for _ in range(ITERATIONS):

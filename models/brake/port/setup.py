@@ -34,8 +34,9 @@ MANUAL_START_SECONDS = 20.0
 
 
 class PortTable(Strict):
-    """[port]: paths are seen from the scene's folder; {procedure} in them is the name of what is driven, {engine} that
-    of what computes it."""
+    """[port]: the controller behind the port, its signals, faults and log. Paths start from the scene's folder;
+    {procedure} in them is the name of the simulated procedure, {engine} that of the engine.
+    """
 
     callable: str | None = Field(default=None, description="module:Name or file.py:Name, a class")
     parameters: dict[str, Any] = Field(
