@@ -179,7 +179,9 @@ def choice_of_scene(
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
         choice, full_work = chooser.choose(), chooser.work(frozenset())
     results = (
-        chooser.whole.variants.results_with_errors(frozenset(choice.left_out), choice.times) if scene.error else []
+        chooser.whole.variants.results_with_errors(frozenset(choice.left_out), choice.step_factor)
+        if scene.error
+        else []
     )
     single_effects = [
         SingleEffect(
@@ -244,7 +246,7 @@ def _answer_of_choice(answered: SceneChoice) -> dict[str, Any]:
         "implementation": answered.engine,
         "left out": list(choice.left_out),
         "stay": answered.staying_effects,
-        "step times": choice.times,
+        "step times": choice.step_factor,
         "errors": {
             name: {
                 "predicted": float(choice.predicted_change[i]),
@@ -324,8 +326,8 @@ def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
     else:
         faster = choice.seconds[0] / choice.seconds[2]
         rows.append(
-            f"    calls {saved}, by steps {choice.times} times as long; {calls_before / step:.3g} times by longer "
-            f"steps with all effects; CPU seconds {faster:.3g} times fewer, once"
+            f"    calls {saved}, by steps {choice.step_factor} times as long; {calls_before / step:.3g} times by "
+            f"longer steps with all effects; CPU seconds {faster:.3g} times fewer, once"
         )
     rows += [
         f"    {name} {_why_it_stays(change, scene_choice)}"

@@ -129,7 +129,7 @@ def _answer_of_choice(scene: RideScene, choice: RideChoice, change_by_effect: di
         "step": [choice.cost_before.step, choice.cost_after.step],
         "step limit": list(choice.stable_steps),
         "calls": [choice.cost_before.calls, choice.cost_after.calls],
-        "said": list(choice.said),
+        "said": list(choice.refusal_texts),
         "confirmations": choice.confirmations,
         "would matter no more above": {effect.name: change for effect, change in change_by_effect.items()},
     }
@@ -250,7 +250,7 @@ def _table(
     lines = [f"  left out: {', '.join(effect.name for effect in choice.left_out) or 'nothing'}"]
     lines += [f"    {effect.name}: {effect.says}" for effect in choice.left_out]
     stay = [effect.name for effect in choice.candidates if effect not in choice.left_out]
-    lines += [f"  stays: {', '.join(stay) or 'nothing'}", *(f"    {why}" for why in choice.said)]
+    lines += [f"  stays: {', '.join(stay) or 'nothing'}", *(f"    {why}" for why in choice.refusal_texts)]
     for i, name in enumerate(scene.quantities if choice.left_out else ()):
         change_texts = map(
             percent_text,

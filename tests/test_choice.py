@@ -77,7 +77,11 @@ class Made(Variants):
         self.system = type(
             "System",
             (),
-            {"WINDOWED": False, "parts": staticmethod(lambda scene: 4), "steps": staticmethod(lambda scene: 4)},
+            {
+                "WINDOWED": False,
+                "divisible_steps": staticmethod(lambda scene: 4),
+                "steps": staticmethod(lambda scene: 4),
+            },
         )
 
     @property

@@ -97,7 +97,7 @@ def test_a_mount_that_is_left_out_seats_its_body_on_the_other():
 def test_a_choice_is_kept_and_says_what_chance_may_add():
     scene = quarter_car()
     choice = Chooser(scene, "reference", scene.quantities, scene.tolerance).choose()
-    assert choice.within_tolerance and choice.left_out and choice.times > 1
+    assert choice.within_tolerance and choice.left_out and choice.step_factor > 1
     assert scene.tolerance - choice.confirmed_change[0] >= choice.statistical_error[0] > 0.0
 
 
@@ -107,7 +107,7 @@ def test_few_copies_find_what_all_of_them_tell():
     copies = [one.variants.scene.samples.copies for one in (own.screen, own.reporting_screen, own.whole)]
     assert (
         copies == [12, 48, 48]
-        and own.screen.variants.scene.times == own.reporting_screen.variants.scene.times == own.step_factor
+        and own.screen.variants.scene.step_factor == own.reporting_screen.variants.scene.step_factor == own.step_factor
     )
 
 

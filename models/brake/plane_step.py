@@ -59,7 +59,7 @@ def copy_row(row, target_row):
 
 
 @inlined
-def settle(motion, steer, regularising_speed, starts, vehicle, frame):
+def fill_state_quantities(motion, steer, regularising_speed, starts, vehicle, frame):
     """Fill wheel quantities and equations of motion that follow from the state. With ``starts``, the state is that at
     the start of the step, and the wheels' steer angles and speeds along them are stored.
     """
@@ -89,7 +89,7 @@ def settle(motion, steer, regularising_speed, starts, vehicle, frame):
         if starts:
             wheels.start[i] = u
         wheels.rate[i] = bias_along + v * rates[2 + k]
-        slide(i, u, v, regularising_speed, frame.surfaces.lag, angles, wheels)
+        set_slip_angle(i, u, v, regularising_speed, frame.surfaces.lag, angles, wheels)
     inertia(units, rates, plane, frame.mass, frame.right, frame.out, frame.out_before)
     for a in range(count_of_prescribed(plane), coordinates(plane)):
         for b in range(count_of_prescribed(plane)):
@@ -98,7 +98,7 @@ def settle(motion, steer, regularising_speed, starts, vehicle, frame):
 
 
 @inlined
-def slide(i, u, v, regularising_speed, lag, angles, wheels):
+def set_slip_angle(i, u, v, regularising_speed, lag, angles, wheels):
     """Set the slip angle of wheel i from the speeds (m/s) of its centre along it, u, and of its tyre across it, v.
     Where ``lag`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v.
     """
@@ -174,7 +174,7 @@ def redistribute_negative_loads(loads, positions):
 
 
 @lean
-def respond(motion, torques_before, torques_after, step, vehicle, frame):
+def fill_response(motion, torques_before, torques_after, step, vehicle, frame):
     """Fill ``frame.out`` with the accelerations that the tyres' forces cause when the vehicle has the accelerations of
     ``motion``. A step's solution is a fixed point of this map. torques_before, torques_after (W,) : brake torques (N m)
     at the ends of the step.
@@ -207,18 +207,18 @@ def respond(motion, torques_before, torques_after, step, vehicle, frame):
 
 
 @inlined
-def stage(motion, torques_before, torques_after, step, most_rounds, vehicle, frame):
+def find_accelerations(motion, torques_before, torques_after, step, most_rounds, vehicle, frame):
     """Find the mean accelerations over a step by iteration, from the last ones on, and write them into ``motion``;
     returns the estimated remaining error.
 
     Anderson's method of depth one runs for at most ``most_rounds`` rounds. If they have not converged and were
-    ``ANDERSON_ROUNDS`` or more, ``by_means`` takes over. Returns the estimated remaining error, from the last change
-    and the ratio of the last two.
+    ``ANDERSON_ROUNDS`` or more, ``find_by_means`` takes over. Returns the estimated remaining error, from the last
+    change and the ratio of the last two.
     """
     accelerations, response, out0, off0 = motion.accelerations, frame.out, frame.out_before, frame.off
     size, remaining_error, last_change = coordinates(vehicle.plane), math.inf, 0.0
     for rounds in range(most_rounds):
-        respond(motion, torques_before, torques_after, step, vehicle, frame)
+        fill_response(motion, torques_before, torques_after, step, vehicle, frame)
         change, product, square = 0.0, 0.0, 0.0
         for a in range(size):
             residual = response[a] - accelerations[a]
@@ -237,14 +237,14 @@ def stage(motion, torques_before, torques_after, step, most_rounds, vehicle, fra
     return (
         remaining_error
         if remaining_error <= ACCELERATION_TOLERANCE or most_rounds < ANDERSON_ROUNDS
-        else by_means(motion, torques_before, torques_after, step, vehicle, frame)
+        else find_by_means(motion, torques_before, torques_after, step, vehicle, frame)
     )
 
 
 @lean
-def by_means(motion, torques_before, torques_after, step, vehicle, frame):
-    """Accelerations as from ``stage``, for steps in which wheel loads jump between two solutions, so that only a mean
-    of both is in equilibrium; returns the remaining error.
+def find_by_means(motion, torques_before, torques_after, step, vehicle, frame):
+    """Accelerations as from ``find_accelerations``, for steps in which wheel loads jump between two solutions, so that
+    only a mean of both is in equilibrium; returns the remaining error.
 
     So it is of a slow wheel at the edge of locking: a little less load, and it locks at once; a little more, and it
     rolls within a fraction of the step. Each round moves the accelerations by a share of their change, and the means of
@@ -258,7 +258,7 @@ def by_means(motion, torques_before, torques_after, step, vehicle, frame):
     size, share, last_change = coordinates(vehicle.plane), 0.5, math.inf
     means = array(doubles(report.size), report.shape)
     start_accelerations = array(doubles(accelerations.size), accelerations.shape)
-    respond(motion, torques_before, torques_after, step, vehicle, frame)
+    fill_response(motion, torques_before, torques_after, step, vehicle, frame)
     copy_row(response, accelerations)
     for c in range(report.shape[0]):
         copy_row(report[c], means[c])
@@ -266,7 +266,7 @@ def by_means(motion, torques_before, torques_after, step, vehicle, frame):
         total_change, net, largest_change, change = 0.0, 0.0, 0.0, 0.0
         copy_row(accelerations, start_accelerations)
         for _ in range(ROUNDS_PER_WINDOW):
-            respond(motion, torques_before, torques_after, step, vehicle, frame)
+            fill_response(motion, torques_before, torques_after, step, vehicle, frame)
             change = 0.0
             for a in range(size):
                 change = max(change, abs(response[a] - accelerations[a]))
@@ -292,7 +292,7 @@ def by_means(motion, torques_before, torques_after, step, vehicle, frame):
 
 
 @inlined
-def comes_to_rest(rates, wheel_turning, accelerations, step, plane):
+def time_of_rest(rates, wheel_turning, accelerations, step, plane):
     """Time (s) within the step at which the vehicle comes to rest, or -1 if it does not.
 
     Friction takes speed away until there is none, and only the time grid would let it turn round: it stands where its
@@ -346,17 +346,15 @@ def step_on(motion, torques, step, steer, regularising_speed, vehicle, surfaces)
     for i in range(count):
         middle[i] = 0.5 * (torques[0, i] + torques[1, i])
     for half in (True, False):
-        settle(motion, steer, regularising_speed, half, vehicle, frame)
+        fill_state_quantities(motion, steer, regularising_speed, half, vehicle, frame)
         time, end_torques = (0.5 * step, middle) if half else (step, torques[1])
         most_rounds = HALF_ROUNDS if half else ANDERSON_ROUNDS
-        if not stage(motion, torques[0], end_torques, time, most_rounds, vehicle, frame) <= (
+        if not find_accelerations(motion, torques[0], end_torques, time, most_rounds, vehicle, frame) <= (
             math.inf if half else ACCELERATION_TOLERANCE
         ):
             return -1.0
         rest_time = (
-            comes_to_rest(rate0, turning, accelerations, step, plane)
-            if half and not plane.has_prescribed_hook
-            else -1.0
+            time_of_rest(rate0, turning, accelerations, step, plane) if half and not plane.has_prescribed_hook else -1.0
         )
         if rest_time >= 0.0:
             time = rest_time

@@ -41,7 +41,7 @@ class Lag(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def taken_up(a, u, v, time, length):
+def lagging_slip(a, u, v, time, length):
     """Tangent of the lagging slip angle after a time (s) at constant speeds u along and v across the wheel (m/s), with
     a relaxation length (m).
     """
@@ -49,7 +49,7 @@ def taken_up(a, u, v, time, length):
 
 
 @inlined
-def take_up(i, u, v, time, slope, lag, lagging):
+def advance_lagging_slip(i, u, v, time, slope, lag, lagging):
     """Advance the lagging slip angle of wheel i by a time (s) at speeds u along and v across it (m/s). Its tangent with
     the damper's part goes into ``lagging`` (W,); slope : see ``OnRoad``.
 
@@ -58,7 +58,7 @@ def take_up(i, u, v, time, slope, lag, lagging):
     length = lag.length[i]
     if math.isnan(lag.angle[i]):
         lag.angle[i] = v / max(abs(u), SLOWEST_SPEED)
-    lag.angle[i] = taken_up(lag.angle[i], u, v, time, length)
+    lag.angle[i] = lagging_slip(lag.angle[i], u, v, time, length)
     fade = max(1.0 - abs(u) / FADING_SPEED, 0.0)
     rate = math.sqrt(max(slope, SLOWEST_SPEED) * GRAVITY * length)
     lagging[i] = lag.angle[i] + fade * fade * v * 2.0 * DAMPING / rate
@@ -77,13 +77,15 @@ def longest_step(slope: float, lively: float, length: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def lag_on(state, time, steer, vehicle, lag, lagging):
-    """Advance the lagging slip angles of all wheels by a time (s), and fill ``lagging`` (W,): see ``take_up``."""
+    """Advance the lagging slip angles of all wheels by a time (s), and fill ``lagging`` (W,): see
+    ``advance_lagging_slip``.
+    """
     plane = vehicle.plane
     for i in range(lag.angle.size):
         k = plane.unit[i]
         vx, vy = velocity(ChainPoint(k, plane.place[i, 0], plane.place[i, 1]), state[0], state[1], plane.reach)
         c, s = math.cos(state[0, 2 + k] + steer[i]), math.sin(state[0, 2 + k] + steer[i])
-        take_up(i, c * vx + s * vy, c * vy - s * vx, time, vehicle.slope, lag, lagging)
+        advance_lagging_slip(i, c * vx + s * vy, c * vy - s * vx, time, vehicle.slope, lag, lagging)
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.brake.relaxation import take_up
+from models.brake.relaxation import advance_lagging_slip
 from models.machine.compiled import lean
 
 
@@ -30,5 +30,5 @@ def relax(contacts, half, slope, lag, surfaces):
     """
     time = lag.behind[0] + half
     for i in range(lag.angle.size):
-        take_up(i, contacts.along[i], contacts.across[i], time, slope, lag, surfaces.lag)
+        advance_lagging_slip(i, contacts.along[i], contacts.across[i], time, slope, lag, surfaces.lag)
     lag.behind[0] = half

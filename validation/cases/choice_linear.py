@@ -175,7 +175,7 @@ def _equal_rows(choices: list[Judged]) -> list[Row]:
     """Rows over all scenes: whether the tolerance holds near each scene as well, and the saving, both by routes that
     the choice itself does not use."""
     told_in_advance = sum(
-        bool(judged_choice.choice.said) and not judged_choice.choice.left_out for judged_choice in choices
+        bool(judged_choice.choice.refusal_texts) and not judged_choice.choice.left_out for judged_choice in choices
     )
     gaps = [abs(judged_choice.saving / judged_choice.measured - 1.0) for judged_choice in choices]
     saving = [judged_choice for judged_choice in choices if judged_choice.choice.left_out]
@@ -336,7 +336,7 @@ def _summary_of_choice(judged_choice: Judged) -> dict[str, Any]:
         "kept": choice.within_tolerance,
         "nearby": judged_choice.nearby,
         "measured": judged_choice.measured,
-        "said": list(choice.said),
+        "said": list(choice.refusal_texts),
         "left out": len(choice.left_out),
         "of": len(choice.candidates),
         "rounds": choice.confirmations,

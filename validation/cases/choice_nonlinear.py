@@ -50,7 +50,7 @@ def judged_ride(asked: BentRide) -> JudgedByRuns:
     engine = ENGINES["ride"][0]
     choice = Chooser(asked.opened(), engine, list(asked.quantities), asked.tolerance).choose()
     fresh = Variants(asked.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
-    full_scene, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
+    full_scene, rest = fresh.of(), fresh.of(choice.left_out, choice.step_factor)
     if full_scene is None or rest is None:
         return JudgedByRuns("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
     again = [_least_certain_change(full_scene.of(name).cases[0], rest.of(name).cases[0]) for name in asked.quantities]
@@ -184,7 +184,7 @@ def _summary_of_choice(judged_choice: JudgedByRuns) -> Saved:
         "tolerance": judged_choice.asked.tolerance,
         "quantities": list(judged_choice.asked.quantities),
         "left out": list(choice.left_out),
-        "times": choice.times,
+        "times": choice.step_factor,
         "predicted": choice.predicted_change.tolist(),
         "confirmed": choice.confirmed_change.tolist(),
         "kept": choice.within_tolerance,

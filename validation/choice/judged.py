@@ -105,7 +105,7 @@ def judged_of(request: ChoiceQuestion, system: str, engine: str) -> JudgedByRuns
     chooser = ChooserByRuns(request.scene(), engine, list(request.quantities), request.tolerance)
     choice, runs = chooser.choose(), chooser.whole.variants
     full_run = runs.system.computed_quantities(request.scene(), engine)
-    reduced_run = runs.system.computed_quantities(runs.changed(frozenset(choice.left_out), choice.times), engine)
+    reduced_run = runs.system.computed_quantities(runs.changed(frozenset(choice.left_out), choice.step_factor), engine)
     confirmed_changes = [
         largest_change(full_run.of(name).cases, reduced_run.of(name).cases) for name in request.quantities
     ]

@@ -53,8 +53,8 @@ RUN_BUDGET = 100
 
 @dataclass(frozen=True)
 class Choice:
-    """Result of a choice of effects: the effects ``left_out`` of all ``candidates``, the factor ``times`` by which the
-    step is longer, and relative changes (quantities,).
+    """Result of a choice of effects: the effects ``left_out`` of all ``candidates``, the factor ``step_factor`` by
+    which the step is longer, and relative changes (quantities,).
 
     predicted_change : by the screen; prediction_remainder : estimate of what the prediction omits; confirmed_change :
     over the whole run; statistical_error : of the confirmed change, where quantities are means of samples;
@@ -68,7 +68,7 @@ class Choice:
 
     candidates: tuple[str, ...]
     left_out: tuple[str, ...]
-    times: int
+    step_factor: int
     predicted_change: np.ndarray
     prediction_remainder: np.ndarray
     confirmed_change: np.ndarray
@@ -251,7 +251,7 @@ class Chooser:
 
     def _refuse_too_few_samples(self, choice: Choice) -> Choice:
         """The choice; InputError if only the statistical errors keep all effects in the scene."""
-        if not choice.sample_factor or choice.left_out or choice.times > 1:
+        if not choice.sample_factor or choice.left_out or choice.step_factor > 1:
             return choice
         raise InputError(
             self.whole.variants.scene.file,

@@ -95,7 +95,7 @@ class Screen:
         """First-order difference d_i of the quantities: their change if this effect alone is left out."""
         return self.predicted_difference(frozenset([effect]))
 
-    def second(self, first: str, other_effect: str) -> Changes | None:
+    def second_order_change(self, first: str, other_effect: str) -> Changes | None:
         """Second-order difference e_ij of a pair of effects: the change without both, less the changes without each
         alone.
         """
@@ -123,7 +123,7 @@ class Screen:
         if len(omitted_effects) > 2:
             parts = [
                 *map(self.first_order_change, omitted_effects),
-                *(self.second(*pair) for pair in combinations(sorted(omitted_effects), 2)),
+                *(self.second_order_change(*pair) for pair in combinations(sorted(omitted_effects), 2)),
             ]
         if None in parts:
             return self.differences_of_runs(self.variants.of(omitted_effects), self.variants.of())
@@ -150,12 +150,16 @@ class Screen:
         if len(omitted_effects) <= 2:
             return no_change
         first = np.sum([self.relative_changes(self.first_order_change(effect)) for effect in omitted_effects], axis=0)
-        second = np.sum(
-            [self.relative_changes(self.second(*pair)) for pair in combinations(sorted(omitted_effects), 2)], axis=0
+        second_order_change = np.sum(
+            [
+                self.relative_changes(self.second_order_change(*pair))
+                for pair in combinations(sorted(omitted_effects), 2)
+            ],
+            axis=0,
         )
-        if not (np.isfinite(first).all() and np.isfinite(second).all()):
+        if not (np.isfinite(first).all() and np.isfinite(second_order_change).all()):
             return no_change  # the set was run itself
-        return second * np.minimum(1.0, second / np.maximum(first, 1e-300))
+        return second_order_change * np.minimum(1.0, second_order_change / np.maximum(first, 1e-300))
 
     def change_by_longer_steps(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
         """Relative changes (quantities,) that longer steps alone cause in a run without these effects."""

@@ -205,7 +205,7 @@ class Variants:
 
     def step_factors(self) -> list[int]:
         """Factors by which the step may be lengthened so that a whole number of steps still fits into the run."""
-        count = self.system.parts(self.scene)
+        count = self.system.divisible_steps(self.scene)
         return [
             step_factor for step_factor in range(1, min(count, LARGEST_STEP_FACTOR) + 1) if count % step_factor == 0
         ]

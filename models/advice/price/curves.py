@@ -64,7 +64,7 @@ class ToleranceCost:
     how: Literal["interpolated", "tried", "coarsest", "extrapolated"]
 
 
-def reach(
+def cost_at_tolerance(
     values: Sequence[float],
     errors: Sequence[float],
     costs: Sequence[float],

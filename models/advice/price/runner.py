@@ -20,9 +20,9 @@ from models.advice.price.curves import (
     UNCERTAINTY_FACTOR,
     ToleranceCost,
     coinciding_curves,
+    cost_at_tolerance,
     observed_order,
     pareto,
-    reach,
 )
 from models.advice.price.problem import Problem, Setting
 from models.core.assumptions import collected_breaches
@@ -200,10 +200,10 @@ class MeasuredPoints:
     def _cost_at_tolerance(
         self, points: list[Point], target_error: float, costs: Sequence[float], extrapolate: bool = True
     ) -> ToleranceCost | None:
-        """Cost at which the points of one curve meet a target error, interpolated by ``curves.reach``."""
+        """Cost at which the points of one curve meet a target error, interpolated by ``curves.cost_at_tolerance``."""
         order = 0 if points[0].setting.adaptive else points[0].setting.order
         values = [p.setting.value for p in points]
-        return reach(values, list(map(self.error, points)), costs, target_error, order, extrapolate)
+        return cost_at_tolerance(values, list(map(self.error, points)), costs, target_error, order, extrapolate)
 
     def loss(self, target_error: float, cost_kind: str, default: str, engine: str = "") -> Loss | None:
         """Loss by the curve ``default`` compared with the cheapest curve of ``engine`` ("" for all engines), at a

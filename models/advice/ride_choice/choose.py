@@ -54,7 +54,7 @@ class RideChoice:
     all of them are.
     cost_before, cost_after : cost at equal accuracy; stable_steps : the longest stable steps (s) of both, whatever the
     accuracy.
-    confirmations : choices that were confirmed. said : reasons why promising effects were not left out.
+    confirmations : choices that were confirmed. refusal_texts : reasons why promising effects were not left out.
     """
 
     candidates: tuple[Effect, ...]
@@ -68,7 +68,7 @@ class RideChoice:
     cost_after: Cost
     stable_steps: tuple[float, float]
     confirmations: int
-    said: tuple[str, ...]
+    refusal_texts: tuple[str, ...]
 
 
 class Chooser(Candidates):

@@ -68,7 +68,7 @@ class CopySteps:
 @dataclass(frozen=True)
 class CopiesInTime:
     """The copies of a vehicle on random roads at all speeds of a ride scene, without the effects ``left_out``, with
-    steps longer by the factor ``times``.
+    steps longer by the factor ``step_factor``.
     """
 
     scene: ReducedScene
@@ -76,7 +76,7 @@ class CopiesInTime:
     steps_at_speeds: tuple[CopySteps, ...]
     effects: tuple[Effect, ...]
     left_out: frozenset[str] = frozenset()
-    times: int = 1
+    step_factor: int = 1
     system = "ride"
 
     @property
@@ -108,7 +108,7 @@ class CopiesInTime:
     @property
     def steps(self) -> int:
         """Number of time steps of all copies at all speeds."""
-        return self.samples.copies * sum(pace.steps for pace in self.steps_at_speeds) // self.times
+        return self.samples.copies * sum(pace.steps for pace in self.steps_at_speeds) // self.step_factor
 
     def without(self, names: Iterable[str]) -> "CopiesInTime":
         """The copies without these effects; InputError where they may not be left out."""
@@ -122,7 +122,7 @@ class CopiesInTime:
 
     def in_longer_steps(self, step_factor: int) -> "CopiesInTime":
         """The copies with steps longer by the factor ``step_factor``."""
-        return replace(self, times=self.times * step_factor)
+        return replace(self, step_factor=self.step_factor * step_factor)
 
     def with_fewer_copies(self, steps: int) -> "CopiesInTime":
         """Fewer copies, which take about ``steps`` time steps in all, but enough copies for a standard error."""
@@ -144,15 +144,15 @@ class CopiesInTime:
         roads = _road_heights(
             RoadPath(self._excitation, copy_steps.speed, copy_steps.half), copy_steps.steps, self.samples
         )
-        return np.ascontiguousarray(roads[:: self.times])
+        return np.ascontiguousarray(roads[:: self.step_factor])
 
     def mean_squares(self, copy_steps: CopySteps, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
         """Outputs of the vehicle, and for each copy their mean squares (copies, p) about the mean of all copies."""
-        step = 2.0 * copy_steps.half * self.times
+        step = 2.0 * copy_steps.half * self.step_factor
         march = CopiesMarch(self.vehicle(copy_steps), copy_steps.speed, step, self.samples.copies)
-        reading_interval = max(1, STEPS_PER_READING // self.times)
-        march.march_over(roads, copy_steps.settling_steps // self.times, reading_interval)
-        count = len(range(0, copy_steps.counted_steps // self.times, reading_interval))
+        reading_interval = max(1, STEPS_PER_READING // self.step_factor)
+        march.march_over(roads, copy_steps.settling_steps // self.step_factor, reading_interval)
+        count = len(range(0, copy_steps.counted_steps // self.step_factor, reading_interval))
         first, second = march.sums[0].T / count, march.sums[1].T / count
         if not (second < LARGEST_QUANTITY).all():
             raise RunFailed("reference", f"grows without end in steps of {step:.3g} s", step)

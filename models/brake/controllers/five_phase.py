@@ -73,11 +73,11 @@ class _Logic:
     def __init__(self, settings: FivePhase) -> None:
         self._settings, self._phase, self._pressure = settings, FIRST_PHASE, 0.0
 
-    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
         sign, level = end_of_phase(self._phase, self._settings)
-        if sign * (gains - level) >= 0.0:
+        if sign * (relative_acceleration - level) >= 0.0:
             self._phase = self._phase % 5 + 1
-        elif self._gains_no_speed(slip, gains):
+        elif self._gains_no_speed(slip, relative_acceleration):
             self._phase = 5
         if self._phase != 1 and slip > self._settings.deep:
             self._phase = 1
@@ -85,10 +85,10 @@ class _Logic:
         self._pressure = min(max(raised, 0.0), supply)
         return self._pressure
 
-    def _gains_no_speed(self, slip: float, gains: float) -> bool:
+    def _gains_no_speed(self, slip: float, relative_acceleration: float) -> bool:
         """Whether the wheel no longer gains speed in phase 2, or has no brake pressure left and little slip in phase
         1.
         """
         if self._phase == 1:
             return self._pressure == 0.0 and slip <= self._settings.deep
-        return self._phase == 2 and gains <= self._settings.e4
+        return self._phase == 2 and relative_acceleration <= self._settings.e4

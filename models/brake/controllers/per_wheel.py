@@ -29,7 +29,7 @@ SLIP_BOUNDS = (0.0, 1.0)
 class Logic(Protocol):
     """Protocol of the anti-lock logic for one wheel, or for one axle on the basis of its slower wheel."""
 
-    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
         """Valve state or pressure (bar), from the wheel's slip, its acceleration relative to the vehicle's (m/s^2), the
         vehicle's speed (m/s) and the supply pressure (bar)."""
         ...
@@ -102,7 +102,7 @@ class PerWheel:
         speed.
         """
         wheels = sample.wheels.tolist()
-        speed = speed_of(sample.speed, wheels, self._estimate)
+        speed = vehicle_speed(sample.speed, wheels, self._estimate)
         vehicle_acceleration = self._smoothed_acceleration(speed)
         if not sample.brake:
             return self._command_all(0.0 if self._pressures else RELEASE)
@@ -110,14 +110,14 @@ class PerWheel:
         for k, (first_wheel, last_wheel) in enumerate(self._groups):
             wheel = min(wheels[first_wheel], wheels[last_wheel])
             speed_before = self._last_wheel_speeds[k]
-            gains = (
+            relative_acceleration = (
                 (wheel - speed_before) / self._common.period - vehicle_acceleration
                 if speed_before == speed_before
                 else 0.0
             )
             self._last_wheel_speeds[k] = wheel
             if speed > 0.0:
-                answer = self._logics[k].decide(1.0 - wheel / speed, gains, speed, sample.supply)
+                answer = self._logics[k].decide(1.0 - wheel / speed, relative_acceleration, speed, sample.supply)
                 commands[first_wheel] = commands[last_wheel] = answer
         if speed < self._common.cut_off:
             return self._command_all(sample.supply if self._pressures else APPLY)
@@ -186,6 +186,6 @@ class SpeedEstimate:
         self._rising, self._fastest = fastest > self._fastest, fastest
 
 
-def speed_of(scene_speed: float, wheels: Sequence[float], estimate: SpeedEstimate) -> float:
+def vehicle_speed(scene_speed: float, wheels: Sequence[float], estimate: SpeedEstimate) -> float:
     """Vehicle speed (m/s) from the scene, or the estimate where the scene's speed is not a number."""
     return estimate.after(wheels) if scene_speed != scene_speed else scene_speed

@@ -37,7 +37,7 @@ class _BangBang:
     def __init__(self, settings: SlipBangBang) -> None:
         self._settings, self._valve = settings, APPLY
 
-    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
         if slip > self._settings.release:
             self._valve = RELEASE
         elif slip < self._settings.apply:
@@ -67,9 +67,9 @@ class _Loop:
     def __init__(self, settings: SlipPI) -> None:
         self._settings, self._sum = settings, 0.0
 
-    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
         settings = self._settings
-        error = settings.target - (slip - settings.mix * gains / 9.81)
+        error = settings.target - (slip - settings.mix * relative_acceleration / 9.81)
         gain = settings.gain * speed
         total = self._sum + gain * error * settings.period / settings.reset
         self._sum = min(max(total, 0.0), supply)

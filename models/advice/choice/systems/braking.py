@@ -51,7 +51,7 @@ def steps(scene: BrakingScene) -> int:
     return round(scene.run.duration / scene.run.sample) * scene.run.substeps
 
 
-def parts(scene: BrakingScene) -> int:
+def divisible_steps(scene: BrakingScene) -> int:
     """Number of time steps within a controller sample, which a longer step must divide: only these steps may become
     longer, the controller's samples stay.
     """

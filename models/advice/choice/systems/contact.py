@@ -27,7 +27,7 @@ def steps(scene: ContactScene) -> int:
     return len(creepages(scene))
 
 
-def parts(scene: ContactScene) -> int:
+def divisible_steps(scene: ContactScene) -> int:
     """Number of steps that a longer step must divide: 1, as a contact has no time steps."""
     return 1
 

@@ -43,7 +43,7 @@ def steps(scene: HandlingScene) -> int:
     return min(round(manoeuvre.duration / scene.run.step) for manoeuvre in scene.manoeuvres.values())
 
 
-parts = steps
+divisible_steps = steps
 
 
 def shorten(table: dict[str, Any], scene: HandlingScene, steps: int) -> None:

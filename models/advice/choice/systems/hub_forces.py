@@ -30,7 +30,7 @@ def steps(scene: HubScene) -> int:
     return scene.steps
 
 
-parts = steps
+divisible_steps = steps
 
 
 def shorten(table: dict[str, Any], scene: HubScene, steps: int) -> None:

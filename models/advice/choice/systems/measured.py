@@ -42,7 +42,7 @@ def steps(scene: MeasuredScene) -> int:
     return round(_period_and_duration(scene)[1] / _step(scene))
 
 
-parts = steps
+divisible_steps = steps
 
 
 def _step(scene: MeasuredScene) -> float:

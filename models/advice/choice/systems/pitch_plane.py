@@ -35,7 +35,7 @@ def steps(scene: Scene) -> int:
     return round(scene.run.duration / scene.run.step)
 
 
-parts = steps
+divisible_steps = steps
 
 
 def shorten(table: dict[str, Any], scene: Scene, steps: int) -> None:

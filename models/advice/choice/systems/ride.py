@@ -58,6 +58,6 @@ def steps(scene: CopiesInTime) -> int:
     return scene.steps
 
 
-def parts(scene: CopiesInTime) -> int:
+def divisible_steps(scene: CopiesInTime) -> int:
     """Number of steps that a longer step must divide, both in the lead-in and while outputs are averaged."""
-    return STEP_MULTIPLE // gcd(STEP_MULTIPLE, scene.times)
+    return STEP_MULTIPLE // gcd(STEP_MULTIPLE, scene.step_factor)

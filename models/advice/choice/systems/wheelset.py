@@ -40,7 +40,7 @@ def steps(scene: WheelsetScene) -> int:
     return round(scene.run.duration / scene.run.step)
 
 
-parts = steps
+divisible_steps = steps
 
 
 def shorten(table: dict[str, Any], scene: WheelsetScene, steps: int) -> None:
