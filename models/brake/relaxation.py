@@ -28,7 +28,7 @@ from models.machine.compiled import inlined, njit
 FADING_SPEED = 1.0
 """Speed (m/s) along the wheel below which a damper across it fades in."""
 DAMPING = 0.7
-"""Damping ratio of this damper at rest, for a wheel that bears its share of the mass."""
+"""Damping ratio of the damper across a wheel at rest that bears its share of the mass."""
 
 
 class Lag(NamedTuple):

@@ -33,12 +33,13 @@ from models.contact.theories import Fastsim, LinearTheory, Motion, OnEllipse, Ro
 SAFETY_FACTOR = 2.0
 """Safety factor on the error that the comparison of two grids gives."""
 LIKELY_SHARE = 0.7
-"""Share of the difference of both grids that the finer one still has, as 600 contacts of all choices of FASTSIM had it
-against cells a hundred times finer: a third had more, a hundredth more than three times as much.
+"""Likely error of the finer grid as a share of the difference of both grids, from 600 contacts of all choices of
+FASTSIM against cells a hundred times finer: a third had more, a hundredth more than three times as much.
 """
 TRAILING_SLIP_FACTOR = 0.17
-"""Force that a zone of slip at the trailing edge takes away, divided by the square of the share of the friction limit
-that is used; the zone is wider than a cell, and seen, where this share is beyond three divided by the number of cells.
+"""Factor of the force that a narrow zone of slip at the trailing edge takes away: share of mu N, divided by the square
+of the used share of mu N. A zone wider than a cell is resolved: where the used share exceeds 3 divided by the number of
+cells.
 """
 MEASURED_AXIS_RATIOS = (0.1, 10.0)
 """Axis ratios a/b between which the error bands were measured."""

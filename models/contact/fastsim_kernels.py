@@ -119,7 +119,7 @@ def march_plain(block, cells):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
 def _store_traction(block, j, t, x, y, slips):
-    """Add a cell's traction to the sums of lane j, and store it as the lane's state."""
+    """Store a cell's traction as the state of lane j, and add it to the lane's sums."""
     block.qx[j] = x
     block.qy[j] = y
     block.slips[j] = slips

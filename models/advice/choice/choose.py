@@ -34,7 +34,7 @@ PREDICTION_SHARE = 0.8
 SCREENED_STEP_SHARE = 0.05
 """Share of the tolerance that the longer steps of screening runs may cost."""
 SAMPLED_STEP_SHARE = 0.15
-"""The same for quantities of samples that met the same roads: the step error is in both compared runs."""
+"""Share as SCREENED_STEP_SHARE for samples that met the same roads: both compared runs have the step error."""
 STEP_CHECK_REFINEMENT = 8
 """Factor by which steps are refined to find the error of the longest ones."""
 STEP_SEARCH_SHARE = 0.25

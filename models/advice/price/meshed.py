@@ -83,9 +83,7 @@ class MeshedScene(ABC):
 
     @cached_property
     def steps(self) -> dict[str, float]:
-        """Time steps (s) by the name of the method; each is a whole fraction of the searched duration
-        ``searched_duration``.
-        """
+        """Time steps (s) by the name of the method; each is a whole fraction of ``searched_duration``."""
         steps = dict.fromkeys(self._longest_fraction(self.step * k) for k in STEP_FACTORS)
         return {f"RK4 at {1e3 * step:.3g} ms": step for step in steps}
 

@@ -34,7 +34,7 @@ from models.machine.timing import interleave, paired_ratio
 CLOSE_SECONDS_RATIO = 2.0
 """Ratio to the least seconds in one run up to which settings are timed in interleaved rounds."""
 DEFAULT_SECONDS_RATIO = 8.0
-"""The same ratio for an engine's default, which must not be given up because one run of it was disturbed."""
+"""Ratio as CLOSE_SECONDS_RATIO for an engine's default, which must not be given up for one disturbed run."""
 TIMING_ROUNDS, SHORTEST_TURN = 9, 0.002
 """Number of interleaved timing rounds, and the time (s) until which a short run is repeated in its turn."""
 FEWEST_ROUNDS, LONG_ROUNDS_SECONDS = 3, 5.0

@@ -33,8 +33,8 @@ from models.ride.marginal import split_marginal
 SLOWEST_DECAY = 1e-9
 """Ratio of a decay rate to the fastest rate below which a motion counts as undamped."""
 EXACT_SOLVE_LIMIT, TRUSTED_VARIANCE_SHARE = 1e-7, 1e-10
-"""The same ratio below which the exact solution replaces eigenmodes, and the share of a variance that eigenmodes may
-miss.
+"""Ratio of a decay rate to the fastest rate below which the exact solution replaces eigenmodes, and the share of a
+variance that eigenmodes may miss.
 """
 
 
