@@ -204,7 +204,7 @@ def _linear_ride_choice(scene: Any) -> SceneChoice:
     from models.systems.ride.of_scene import scene_errors
 
     with scene_errors(scene):
-        chooser = Linear.of(scene)
+        chooser = Linear.from_scene(scene)
         linear = chooser.choose()
         singles = {effect: frozenset([effect]) for effect in chooser.effects}
         calls = chooser.cost(frozenset()).calls

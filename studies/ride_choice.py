@@ -70,7 +70,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         return save_choices([scene], engines, folder, progress)
     progress("screening", 0.1)
     with scene_errors(scene):
-        chooser = Chooser.of(scene)
+        chooser = Chooser.from_scene(scene)
         choice = chooser.choose()
         progress("single effects", 0.7)
         further = chooser.change_if_left_out_too(frozenset(choice.left_out))

@@ -88,7 +88,7 @@ class Made(Variants):
     def effects(self):
         return self.names
 
-    def changed(self, left_out, times=1):
+    def changed_scene(self, left_out, times=1):
         return self.scene
 
     def _run(self, left_out, times):
@@ -131,7 +131,7 @@ def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
     found, shares = chooser(monkeypatch, quantity, names), []
     found.progress = shares.append
     choice = found.choose()
-    own = found.whole.variants.of().counts["calls"]
+    own = found.whole.variants.quantities_of_run().counts["calls"]
     assert choice.ended_early and choice.left_out == ("e00",) and choice.within_tolerance
     assert choose.RUN_BUDGET * own < choice.calls_of_search < (choose.RUN_BUDGET + 10) * own and max(shares) == 1.0
     assert not chooser(monkeypatch, quantity, names[:5]).choose().ended_early
@@ -142,7 +142,7 @@ def test_what_steps_change_is_told_by_shorter_ones_that_have_the_same_times(monk
     found = chooser(monkeypatch, lambda left_out, times: 100.0 + 0.01 * times, ("a",))
     monkeypatch.setattr(found.whole.variants, "step_factors", lambda: [1, 2, 5, 25])
     asked = []
-    monkeypatch.setattr(found.whole.variants, "of", lambda left_out=(), times=1: asked.append(times))
+    monkeypatch.setattr(found.whole.variants, "quantities_of_run", lambda left_out=(), times=1: asked.append(times))
     found.change_with_longer_steps(frozenset(), 25)
     assert 2 not in asked and 1 in asked
 
@@ -214,7 +214,7 @@ def test_what_only_rounds_does_not_move():
     answer = RunQuantities(
         {"a": Quantity("N", (np.array([5e4, 5e4 + 1e-7]),)), "b": Quantity("m", (np.zeros(2),))}, {}, 0.0
     )
-    assert scale_of_cases(answer.of("a").cases)[0] < rounding_floor(answer, "N") == pytest.approx(5e-6)
+    assert scale_of_cases(answer.quantity("a").cases)[0] < rounding_floor(answer, "N") == pytest.approx(5e-6)
     assert rounding_floor(answer, "m") == 1e-15
 
 

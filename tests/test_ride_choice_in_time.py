@@ -76,7 +76,7 @@ def test_what_is_left_out_is_gone_and_gains_stand_for_it():
     rest = whole.without(LAWS)
     (spring,) = nonlinear_springs(whole.vehicle(whole.steps_at_speeds[0]))
     (gains,) = rest.vehicle(rest.steps_at_speeds[0]).springs
-    assert not nonlinear_springs(rest.vehicle(rest.steps_at_speeds[0])) and rest.named == ("body z",)
+    assert not nonlinear_springs(rest.vehicle(rest.steps_at_speeds[0])) and rest.effect_names == ("body z",)
     k, c = whole.steps_at_speeds[0].springs[spring.name].equivalent_gains
     assert (gains.stiffness, gains.damping) == pytest.approx((k, c))  # those of statistical linearisation
     with pytest.raises(InputError, match="closed form"):
@@ -129,7 +129,7 @@ def test_a_choice_that_chance_alone_could_break_is_refused():
 
 def test_a_quantity_that_one_sample_makes_up_is_refused():
     variants = Variants(quarter_car(), "reference")
-    answer = variants.of()
+    answer = variants.quantities_of_run()
     name = "body front"
     lone = replace(answer.quantities[name], cases=(np.array([1.0, *[0.01] * 15]),))
     variants._quantities_of_variant[frozenset(), 1] = replace(answer, quantities={**answer.quantities, name: lone})

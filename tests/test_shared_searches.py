@@ -135,11 +135,11 @@ def test_a_choice_is_the_same_by_workers_and_runs_ahead_that_nobody_asks_for_do_
         alone, shared = (chooser.choose() for chooser in choosers)
         assert told(alone) == told(shared) and alone.left_out and alone.calls_of_search > 0
         variants = Variants(half_car(), "reference", pool)
-        variants.ahead((frozenset([name]), 1) for name in variants.effects)
+        variants.compute_in_advance((frozenset([name]), 1) for name in variants.effects)
         assert len(variants._computed_in_advance) == len(variants.effects) > 3 and variants.calls == 0
-        first = variants.of(["gyro"])
+        first = variants.quantities_of_run(["gyro"])
     assert len(variants._computed_in_advance) == len(variants.effects) - 1 and variants.calls == first.counts["calls"]
-    here = Variants(half_car(), "reference").of(["gyro"])
+    here = Variants(half_car(), "reference").quantities_of_run(["gyro"])
     assert first.counts == here.counts and first.quantities.keys() == here.quantities.keys()
     for name, quantity in here.quantities.items():
         assert all(map(np.array_equal, quantity.cases, first.quantities[name].cases)), name

@@ -144,7 +144,7 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
     moved[:] = 0.0
     for i in range(cells.centre.size):
         t, mid, g, share = cells.centre[i], cells.middle[i], cells.bound[i], 0.5 if i == 0 else 1.0
-        bound = g, cells.before[i], cells.rate[i]
+        bound = g, cells.start_bound[i], cells.rate[i]
         v = v0 + v1 * mid
         if i == 0:
             x, y, now = cut_to_bound(-0.5 * u, -0.5 * v, g)
@@ -155,7 +155,7 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
         late, steep = lateness(reach), 0.5 if reach < 0.4 else 0.2 if reach < 1.75 else 0.0
         w = v + v1 * change * late
         if turns and now > 0.0:
-            kept, pull, size = _turning(px, py, u, w, cells.before[i], cells.rate[i])
+            kept, pull, size = _turning(px, py, u, w, cells.start_bound[i], cells.rate[i])
         for k in range(3):
             dv = dv0[k] + dv1[k] * mid
             if now == 0.0:

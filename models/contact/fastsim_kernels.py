@@ -93,7 +93,7 @@ def march_second_order(block, cells):
     change = -2.0 / cells.centre.size
     for i in range(1, cells.centre.size):
         t, g, middle = cells.centre[i], cells.bound[i], cells.middle[i]
-        bound = g, cells.before[i], cells.rate[i]
+        bound = g, cells.start_bound[i], cells.rate[i]
         for j in range(LANES):
             u, v1 = block.u[j], block.v1[j]
             v = block.v0[j] + v1 * middle

@@ -225,7 +225,7 @@ def strip_tractions(slip, cells, march, friction_shares, tractions):
         elif i == 0:
             x, y, slips = cut_to_bound(-0.5 * u, -0.5 * v, g)
         else:
-            bound = g, share_before * cells.before[i], cells.rate[i] / friction_shares[1, i]
+            bound = g, share_before * cells.start_bound[i], cells.rate[i] / friction_shares[1, i]
             x, y, slips = advance((x, y, slips), (u, v, v1 * change), bound)
         share_before = friction_shares[0, i]
         tractions[0, i], tractions[1, i], tractions[2, i] = x, y, slips

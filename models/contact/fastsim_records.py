@@ -56,7 +56,7 @@ class Cells(NamedTuple):
     centre: Array
     bound: Array
     middle: Array
-    before: Array
+    start_bound: Array
     rate: Array
     peak: float
 

@@ -237,7 +237,7 @@ def _saving_row(choices: list[Judged]) -> Row:
 def _count_rows() -> list[Row]:
     """Rows: numbers of eigenvalue problems and Lyapunov equations that a choice solves for a car of 19 degrees of
     freedom."""
-    chooser = Chooser.of(whole_car())
+    chooser = Chooser.from_scene(whole_car())
     chooser.choose()
     pairs = len(chooser.effects) ** 2
     return [
@@ -257,7 +257,7 @@ def _count_rows() -> list[Row]:
 
 
 def _paper() -> Chooser:
-    return Chooser.of(load(SCENE))
+    return Chooser.from_scene(load(SCENE))
 
 
 def _pair() -> tuple[list[Row], dict[str, Any]]:

@@ -50,10 +50,13 @@ def judged_ride(asked: BentRide) -> JudgedByRuns:
     engine = ENGINES["ride"][0]
     choice = Chooser(asked.opened(), engine, list(asked.quantities), asked.tolerance).choose()
     fresh = Variants(asked.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
-    full_scene, rest = fresh.of(), fresh.of(choice.left_out, choice.step_factor)
+    full_scene, rest = fresh.quantities_of_run(), fresh.quantities_of_run(choice.left_out, choice.step_factor)
     if full_scene is None or rest is None:
         return JudgedByRuns("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
-    again = [_least_certain_change(full_scene.of(name).cases[0], rest.of(name).cases[0]) for name in asked.quantities]
+    again = [
+        _least_certain_change(full_scene.quantity(name).cases[0], rest.quantity(name).cases[0])
+        for name in asked.quantities
+    ]
     return JudgedByRuns("ride", engine, asked, choice, np.array(again))
 
 

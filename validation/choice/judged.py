@@ -105,9 +105,11 @@ def judged_of(request: ChoiceQuestion, system: str, engine: str) -> JudgedByRuns
     chooser = ChooserByRuns(request.scene(), engine, list(request.quantities), request.tolerance)
     choice, runs = chooser.choose(), chooser.whole.variants
     full_run = runs.system.computed_quantities(request.scene(), engine)
-    reduced_run = runs.system.computed_quantities(runs.changed(frozenset(choice.left_out), choice.step_factor), engine)
+    reduced_run = runs.system.computed_quantities(
+        runs.changed_scene(frozenset(choice.left_out), choice.step_factor), engine
+    )
     confirmed_changes = [
-        largest_change(full_run.of(name).cases, reduced_run.of(name).cases) for name in request.quantities
+        largest_change(full_run.quantity(name).cases, reduced_run.quantity(name).cases) for name in request.quantities
     ]
     return JudgedByRuns(system, engine, request, choice, np.array(confirmed_changes))
 

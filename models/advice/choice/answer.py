@@ -50,7 +50,7 @@ class RunQuantities:
     counts: dict[str, int]
     seconds: float = field(compare=False)
 
-    def of(self, name: str, file: str = "") -> Quantity:
+    def quantity(self, name: str, file: str = "") -> Quantity:
         """A quantity by its name, or the "rms" or "max" of one; InputError for an unknown name."""
         if name in self.quantities:
             return self.quantities[name]

@@ -128,7 +128,7 @@ class Chooser:
     def _coarse_screen(self, screen: Screen) -> Screen:
         """Screen of the same runs with steps longer by the factor ``step_factor``."""
         runs = screen.variants
-        coarse = Variants(runs.changed(frozenset(), self.step_factor), runs.engine, runs.executor)
+        coarse = Variants(runs.changed_scene(frozenset(), self.step_factor), runs.engine, runs.executor)
         return screen if self.step_factor == 1 else Screen(coarse, screen.quantities)
 
     def _longest_screen_step(self, screen: Screen) -> tuple[int, np.ndarray]:
@@ -139,7 +139,7 @@ class Chooser:
         step_factors = [k for k in all_variants.step_factors() if k in screen.variants.step_factors()]
         allowed = (SAMPLED_STEP_SHARE if self.all_sampled else SCREENED_STEP_SHARE) * self.tolerance
         longest, error = self._longest_allowed(screen, frozenset(), step_factors, allowed)
-        while all_variants.of(step_factor=longest) is None:  # its run fails after that part
+        while all_variants.quantities_of_run(step_factor=longest) is None:  # its run fails after that part
             longest = max(k for k in step_factors if k < longest)
         return longest, error
 
@@ -205,7 +205,8 @@ class Chooser:
             ]:
                 self.rounds += 1
                 change = self.whole.differences_of_runs(
-                    self.whole.variants.of(omitted_effects, step_factor), self.whole.variants.of()
+                    self.whole.variants.quantities_of_run(omitted_effects, step_factor),
+                    self.whole.variants.quantities_of_run(),
                 )
                 shares, chance = self.whole.relative_changes(change), self.whole.statistical_errors(change)
                 if self.whole.variants.newly_broken(omitted_effects, step_factor):
@@ -266,7 +267,9 @@ class Chooser:
         step_factor, shares, chance = self._confirmed[omitted_effects]
         no_effects: EffectSet = frozenset()
         shown = [(no_effects, 1), (no_effects, self._confirmed[no_effects][0]), (omitted_effects, step_factor)]
-        calls = [run.counts["calls"] for key in shown if (run := self.whole.variants.of(*key)) is not None]
+        calls = [
+            run.counts["calls"] for key in shown if (run := self.whole.variants.quantities_of_run(*key)) is not None
+        ]
         seconds_per_call = [self.screen.variants.seconds_per_call(left_out) for left_out, _ in shown]
         return Choice(
             self.effects,
@@ -298,7 +301,7 @@ class Chooser:
 
     def _budget_spent(self) -> bool:
         """Whether the search has used all the calls that it may make; if so, it is marked as ended early."""
-        whole_run = self.whole.variants.of()
+        whole_run = self.whole.variants.quantities_of_run()
         share = self._calls_so_far() / (RUN_BUDGET * whole_run.counts["calls"]) if whole_run else 1.0
         self.ended = self.ended or share >= 1.0
         self.progress(min(share, 1.0))
@@ -318,8 +321,8 @@ class Chooser:
             if step_factor % k == 0 and (STEP_CHECK_REFINEMENT * k <= step_factor or k == 1)
         ]
         step = screen.differences_of_runs(
-            runs.of(omitted_effects, step_factor),
-            next(filter(None, (runs.of(omitted_effects, k) for k in shorter)), None),
+            runs.quantities_of_run(omitted_effects, step_factor),
+            next(filter(None, (runs.quantities_of_run(omitted_effects, k) for k in shorter)), None),
         )
         if change is None or step is None or step_factor % self.step_factor:
             return screen.predicted_change(omitted_effects) + screen.relative_changes(step)
@@ -371,7 +374,7 @@ class Chooser:
             if self._budget_spent():
                 break
             if i % PAIRS_IN_ADVANCE == 0:
-                self.screen.ahead(effect_pairs[i : i + PAIRS_IN_ADVANCE])
+                self.screen.compute_in_advance(effect_pairs[i : i + PAIRS_IN_ADVANCE])
             within += [pair] if self.share(pair) <= PREDICTION_SHARE else []
         return within
 
@@ -387,7 +390,7 @@ class Chooser:
             if not (step <= omitted_effects or step - omitted_effects in refused_steps or step in refused_steps)
         ]
         if steps and not self._budget_spent():
-            self.screen.ahead(omitted_effects | step for step in steps)
+            self.screen.compute_in_advance(omitted_effects | step for step in steps)
         for step in steps:
             further = omitted_effects | step
             if self._budget_spent():

@@ -40,10 +40,10 @@ class Screen:
 
     def __init__(self, variants: Variants, quantities: list[str]) -> None:
         self.variants, self.quantities = variants, quantities
-        full = variants.of()
+        full = variants.quantities_of_run()
         if full is None:  # tells why
             full = variants.system.computed_quantities(variants.scene, variants.engine)
-        quantities_by_name = {name: full.of(name, variants.scene.file) for name in quantities}
+        quantities_by_name = {name: full.quantity(name, variants.scene.file) for name in quantities}
         self.full = {name: quantity.cases for name, quantity in quantities_by_name.items()}
         self.sizes = {name: quantity.sizes for name, quantity in quantities_by_name.items()}
         self.sampled = {name for name, quantity in quantities_by_name.items() if quantity.sampled}
@@ -65,7 +65,10 @@ class Screen:
         if run is None or other_run is None:
             return None
         try:
-            return {name: difference_of_runs(run.of(name).cases, other_run.of(name).cases) for name in self.quantities}
+            return {
+                name: difference_of_runs(run.quantity(name).cases, other_run.quantity(name).cases)
+                for name in self.quantities
+            }
         except InputError as error:
             if "rms" in error.allowed and "ends" not in error.allowed:
                 return None  # what is left has no such quantity
@@ -111,9 +114,9 @@ class Screen:
             for name in self.quantities
         }
 
-    def ahead(self, sets: Iterable[EffectSet]) -> None:
+    def compute_in_advance(self, sets: Iterable[EffectSet]) -> None:
         """Compute in advance the runs from which the changes without these sets of effects are predicted."""
-        self.variants.ahead((subset, 1) for chosen in sets for subset in _sets_needed(chosen))
+        self.variants.compute_in_advance((subset, 1) for chosen in sets for subset in _sets_needed(chosen))
 
     def predicted_difference(self, omitted_effects: EffectSet) -> Changes | None:
         """Predicted differences of the quantities if a set of effects is left out; None where they cannot be
@@ -126,7 +129,9 @@ class Screen:
                 *(self.second_order_change(*pair) for pair in combinations(sorted(omitted_effects), 2)),
             ]
         if None in parts:
-            return self.differences_of_runs(self.variants.of(omitted_effects), self.variants.of())
+            return self.differences_of_runs(
+                self.variants.quantities_of_run(omitted_effects), self.variants.quantities_of_run()
+            )
         return {
             name: sum_of_differences(*(difference[name] for difference in parts if difference))
             for name in self.quantities
@@ -166,7 +171,10 @@ class Screen:
         if step_factor == 1:
             return np.zeros(len(self.quantities))
         return self.relative_changes(
-            self.differences_of_runs(self.variants.of(omitted_effects, step_factor), self.variants.of(omitted_effects))
+            self.differences_of_runs(
+                self.variants.quantities_of_run(omitted_effects, step_factor),
+                self.variants.quantities_of_run(omitted_effects),
+            )
         )
 
 

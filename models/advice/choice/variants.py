@@ -65,8 +65,8 @@ class Variants:
     """Runs of a ``scene`` by one implementation. A variant is given by the effects that are left out and by the factor
     of its step.
 
-    None represents a variant that is impossible, or whose run fails. ``executor`` : computes runs ``ahead``.
-    ``calls`` : of all runs that were requested so far, without repetitions for their seconds. Runs ahead that are never
+    None represents a variant that is impossible, or whose run fails. ``executor`` : computes runs in advance. ``calls``
+    : of all runs that were requested so far, without repetitions for their seconds. Runs in advance that are never
     requested do not count, so that no choice depends on the executor.
     """
 
@@ -93,23 +93,23 @@ class Variants:
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that the scene has."""
-        return tuple(self.scene.named) if self._knows_effects else named_effects(self.scene)
+        return tuple(self.scene.effect_names) if self._knows_effects else named_effects(self.scene)
 
     @property
-    def absent(self) -> tuple[str, ...]:
+    def absent_names(self) -> tuple[str, ...]:
         """Names of the effects that the scene does not have."""
-        return tuple(self.scene.absent) if self._knows_effects else absent_effects(self.scene)
+        return tuple(self.scene.absent_names) if self._knows_effects else absent_effects(self.scene)
 
-    def beside(self, name: str) -> Any:
+    def scene_with_effect(self, name: str) -> Any:
         """The scene with an absent effect added at its usual values; InputError where it cannot be added."""
-        return self.scene.beside(name) if self._knows_effects else with_effects(self.scene, name)
+        return self.scene.with_effect(name) if self._knows_effects else with_effects(self.scene, name)
 
     def sentence_on_effect(self, name: str) -> str:
         """Sentence that describes an effect, or what leaving it out means."""
-        sentences = self.scene.said if self._knows_effects else {}
+        sentences = self.scene.effect_sentences if self._knows_effects else {}
         return str(sentences.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
 
-    def of(self, omitted_effects: Iterable[str] = (), step_factor: int = 1) -> RunQuantities | None:
+    def quantities_of_run(self, omitted_effects: Iterable[str] = (), step_factor: int = 1) -> RunQuantities | None:
         """Quantities of the run without these effects, with steps longer by ``step_factor``; None if the run fails."""
         key = (frozenset(omitted_effects), step_factor)
         if key not in self._quantities_of_variant:
@@ -120,7 +120,7 @@ class Variants:
             self.calls += answer.counts["calls"] if answer else 0
         return self._quantities_of_variant[key]
 
-    def ahead(self, keys: Iterable[VariantKey]) -> None:
+    def compute_in_advance(self, keys: Iterable[VariantKey]) -> None:
         """Let the executor compute runs that will probably be requested; without an executor no run is computed in
         advance.
         """
@@ -142,7 +142,7 @@ class Variants:
     def _run(self, omitted_effects: EffectSet, step_factor: int) -> RunQuantities | None:
         try:
             answer: RunQuantities = self.system.computed_quantities(
-                self.changed(omitted_effects, step_factor), self.engine
+                self.changed_scene(omitted_effects, step_factor), self.engine
             )
         except (InputError, RunFailed):
             return None
@@ -150,7 +150,7 @@ class Variants:
 
     def newly_broken(self, omitted_effects: EffectSet, step_factor: int = 1) -> list[BrokenAssumption]:
         """Assumptions that the complete scene keeps, and that the run without these effects breaks."""
-        if self.of(omitted_effects, step_factor) is None or self.of() is None:
+        if self.quantities_of_run(omitted_effects, step_factor) is None or self.quantities_of_run() is None:
             return []
         known = self._assumptions_broken[frozenset(), 1]
         return [
@@ -163,10 +163,10 @@ class Variants:
         """Results of a variant together with their error estimates; its runs are repeated for that."""
         results: list[Result] = []
         with suppress(RunFailed), watching(results.append):  # raised where an error is as large as what it is of
-            self.system.computed_quantities(self.changed(omitted_effects, step_factor), self.engine, error=True)
+            self.system.computed_quantities(self.changed_scene(omitted_effects, step_factor), self.engine, error=True)
         return results
 
-    def changed(self, omitted_effects: EffectSet, step_factor: int = 1) -> Any:
+    def changed_scene(self, omitted_effects: EffectSet, step_factor: int = 1) -> Any:
         """The scene without these effects and with a longer step; InputError where there can be no such scene."""
         if self._knows_effects:
             return self.scene.without(omitted_effects).in_longer_steps(step_factor)
@@ -181,7 +181,7 @@ class Variants:
         """Work of a run, from counts alone, so that it repeats exactly: right-hand side calls times the sum of states,
         terms and remaining effects; infinite where the run fails.
         """
-        run = self.of(omitted_effects, step_factor)
+        run = self.quantities_of_run(omitted_effects, step_factor)
         if run is None:
             return math.inf
         size_of_call = run.counts["states"] + run.counts.get("terms", 0) + len(set(self.effects) - omitted_effects)
@@ -194,7 +194,7 @@ class Variants:
         if omitted_effects not in self._seconds_per_call:
             took, run = (
                 list[float](),
-                self.of(omitted_effects) if self.executor is None else self._run(omitted_effects, 1),
+                self.quantities_of_run(omitted_effects) if self.executor is None else self._run(omitted_effects, 1),
             )
             while run is not None and (len(took) < 2 or (len(took) < TIMED_RUNS and sum(took) < LEAST_TIMED_SECONDS)):
                 took.append(run.seconds)

@@ -99,14 +99,18 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     engine = engine or system.ENGINE
     complete = Variants(scene, engine)
     variants = complete.window(MOST_PRICED_STEPS)
-    short, names = variants.scene, (*variants.effects, *variants.absent)
+    short, names = variants.scene, (*variants.effects, *variants.absent_names)
     with collected_breaches() as broken_alone:
         base: RunQuantities = system.computed_quantities(short, engine)
     runs: dict[str, Callable[[], RunQuantities]] = {"": partial(system.computed_quantities, short, engine)}
     first, whys, keeps = {"": base}, dict[str, str](), dict[str, tuple[str, ...]]()
     for name in names:
         try:
-            changed_scene = variants.changed(frozenset([name])) if name in variants.effects else variants.beside(name)
+            changed_scene = (
+                variants.changed_scene(frozenset([name]))
+                if name in variants.effects
+                else variants.scene_with_effect(name)
+            )
             with collected_breaches() as breaches:
                 first[name], runs[name] = (
                     system.computed_quantities(changed_scene, engine),

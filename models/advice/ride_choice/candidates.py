@@ -79,7 +79,7 @@ class Candidates:
         self.neighbourhood = Neighbourhood(scene, np.asarray(speeds, float), plain, self.vehicles)
 
     @classmethod
-    def of(cls, ride: RideScene) -> Self:
+    def from_scene(cls, ride: RideScene) -> Self:
         """The candidates of a ride scene, for its speeds, quantities and tolerance."""
         assert ride.speeds is not None and ride.tolerance is not None
         return cls(ReducedScene.complete(ride), ride.speeds.all(), ride.quantities, ride.tolerance)
@@ -276,7 +276,9 @@ class Candidates:
 
     def _cost(self, full_scene: FullScene, reduced_scene: ReducedScene) -> Cost:
         try:
-            return cost(full_scene.vehicles.of(reduced_scene, full_scene.speed), full_scene.road(reduced_scene))
+            return cost(
+                full_scene.vehicles.reduced_vehicle_of(reduced_scene, full_scene.speed), full_scene.road(reduced_scene)
+            )
         except InputError:
             return Cost(0, 0.0, inf)
 

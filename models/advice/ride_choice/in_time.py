@@ -85,21 +85,21 @@ class CopiesInTime:
         return self.scene.ride.file
 
     @property
-    def named(self) -> tuple[str, ...]:
+    def effect_names(self) -> tuple[str, ...]:
         """Names of the effects that have not been left out."""
         return tuple(effect.name for effect in self.effects if effect.name not in self.left_out)
 
     @property
-    def said(self) -> dict[str, str]:
+    def effect_sentences(self) -> dict[str, str]:
         """Sentences on what leaving out an effect means, by the name of the effect."""
         return {effect.name: effect.says for effect in self.effects}
 
     @property
-    def absent(self) -> tuple[str, ...]:
+    def absent_names(self) -> tuple[str, ...]:
         """Names of the effects that the scene could have but does not name."""
         return absent_effects(self.scene.ride)
 
-    def beside(self, name: str) -> "CopiesInTime":
+    def with_effect(self, name: str) -> "CopiesInTime":
         """The copies with an absent effect added at its usual values; InputError where the effect cannot be added."""
         scene = ReducedScene.complete(with_effects(self.scene.ride, name))
         _check(scene)

@@ -35,7 +35,7 @@ class Modes:
     V: np.ndarray
     W: np.ndarray
 
-    def of(self, A: np.ndarray) -> "Modes | None":
+    def reliable_for(self, A: np.ndarray) -> "Modes | None":
         """These modes, if they are accurate modes of the matrix A and no two eigenvectors are nearly parallel; else
         None.
 
@@ -72,7 +72,7 @@ def modes_of(A: np.ndarray) -> Modes | None:
     """Eigenvalues and eigenvectors of x' = A x, A (n, n); None where eigenvectors are nearly parallel."""
     rates, V = np.linalg.eig(A)
     try:
-        return Modes(rates, V, np.linalg.inv(V)).of(A)
+        return Modes(rates, V, np.linalg.inv(V)).reliable_for(A)
     except np.linalg.LinAlgError:
         return None
 
@@ -114,7 +114,7 @@ def modes_with_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: 
     if coupled_modes is None:
         return None
     order = np.concatenate([np.arange(len(A) - n, len(A)), np.arange(len(A) - n)])
-    return Modes(coupled_modes.rates, coupled_modes.V[order], coupled_modes.W[:, order]).of(A)
+    return Modes(coupled_modes.rates, coupled_modes.V[order], coupled_modes.W[:, order]).reliable_for(A)
 
 
 def modes_with_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
@@ -126,7 +126,7 @@ def modes_with_weightings(A: np.ndarray, system: Modes | None, names: tuple[str,
         return None
     n = len(system.rates)
     coupled_modes = modes_of_cascade(system, A[n:, :n], filters)
-    return None if coupled_modes is None else coupled_modes.of(A)
+    return None if coupled_modes is None else coupled_modes.reliable_for(A)
 
 
 @lru_cache(maxsize=256)

@@ -115,7 +115,12 @@ class Neighbourhood:
         return np.concatenate([self._frequency_sum(scene, vehicles, speeds).variances for speeds in groups])
 
     def _frequency_sum(self, scene: ReducedScene, vehicles: Vehicles, speeds: np.ndarray) -> "FrequencySum":
-        return FrequencySum(vehicles.roads.of(scene), vehicles.of(scene, float(speeds[0])), self.quantities, speeds)
+        return FrequencySum(
+            vehicles.roads.excitation_of(scene),
+            vehicles.reduced_vehicle_of(scene, float(speeds[0])),
+            self.quantities,
+            speeds,
+        )
 
     def _slopes(self, scene: ReducedScene) -> Spectra:
         """Variances of a scene's quantities at a few speeds, with their first-order changes by each parameter that is
@@ -125,7 +130,7 @@ class Neighbourhood:
         for speeds in _speeds_with_same_matrices(scene.vehicle, self.slope_speeds):
             total, vehicle = (
                 self._frequency_sum(scene, self.vehicles, speeds),
-                self.vehicles.of(scene, float(speeds[0])),
+                self.vehicles.reduced_vehicle_of(scene, float(speeds[0])),
             )
             sensitivity = Sensitivity(total.response, total.heights(), total.weights, vehicle.N)
             inert = [group != "bodies" or name not in scene.massless for group, name, _ in self.parameters]
@@ -156,7 +161,9 @@ class Neighbourhood:
             changed_vehicles = [
                 linear(scaled_vehicle(vehicle, {parameter: factor}), speed) for parameter in self.parameters
             ]
-            self._shifts[key] = Shifts.of(linear(vehicle, speed), changed_vehicles, [row for row, _ in self.quantities])
+            self._shifts[key] = Shifts.from_vehicles(
+                linear(vehicle, speed), changed_vehicles, [row for row, _ in self.quantities]
+            )
         return self._shifts[key]
 
 

@@ -92,7 +92,7 @@ class IndexNumbers:
         self._of_object: dict[int, tuple[object, int]] = {}
         self._of_value: dict[Hashable, int] = {}
 
-    def of(self, known_object: object, value_of: Callable[[], Hashable]) -> int:
+    def index_of(self, known_object: object, value_of: Callable[[], Hashable]) -> int:
         """Index number of an object's value. The object is stored, so that its identity remains unique."""
         known = self._of_object.get(id(known_object))
         if known is None:
@@ -102,10 +102,10 @@ class IndexNumbers:
             )
         return known[1]
 
-    def of_parts(self, known_object: Any, *names: str) -> tuple[int, ...]:
+    def indices_of_attributes(self, known_object: Any, *names: str) -> tuple[int, ...]:
         """Index numbers of an object's attributes; copies of an object share most attributes."""
         parts = [getattr(known_object, name) for name in names]
-        return tuple(self.of(attribute, partial(_hashable_key, attribute)) for attribute in parts)
+        return tuple(self.index_of(attribute, partial(_hashable_key, attribute)) for attribute in parts)
 
 
 def _hashable_key(any_value: Hashable) -> Hashable:
@@ -128,9 +128,9 @@ class Roads:
         add to the road.
         """
         ride = scene.ride
-        return self._numbers.of(ride, lambda: (ride.road, *tables_of(ride)))
+        return self._numbers.index_of(ride, lambda: (ride.road, *tables_of(ride)))
 
-    def of(self, scene: ReducedScene) -> Excitation:
+    def excitation_of(self, scene: ReducedScene) -> Excitation:
         """The road excitation of a reduced scene, computed when it is first requested."""
         number = self.number(scene)
         if number not in self._stored:
@@ -155,7 +155,7 @@ class Vehicles:
     def __len__(self) -> int:
         return len(self._stored)
 
-    def of(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
+    def reduced_vehicle_of(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
         """The reduced vehicle of a scene at a speed (m/s); InputError where no meaningful vehicle remains."""
         key = self.number(scene.vehicle), scene.limits, speed_if_needed(scene.vehicle, speed)
         reduced_vehicle = self._stored.get(key)
@@ -165,7 +165,7 @@ class Vehicles:
 
     def number(self, vehicle: SpatialVehicle) -> int:
         """Index number that is the same for vehicles with equal parts."""
-        return self._numbers.of(vehicle, lambda: self._numbers.of_parts(vehicle, *PARTS_OF_VEHICLE))
+        return self._numbers.index_of(vehicle, lambda: self._numbers.indices_of_attributes(vehicle, *PARTS_OF_VEHICLE))
 
     def linear(self, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
         """The linearised vehicle at a speed (m/s), before parts are made massless, rigid or locked."""
@@ -188,7 +188,7 @@ class Vehicles:
         does not depend.
         """
         names = scene.limits.massless
-        key = *self._numbers.of_parts(scene.vehicle, "bodies", "joint_elements"), names
+        key = *self._numbers.indices_of_attributes(scene.vehicle, "bodies", "joint_elements"), names
         if key not in self._masses:
             self._masses[key] = massless(scene.vehicle, names)
         return self._masses[key]
@@ -198,7 +198,7 @@ class Vehicles:
         masses, on which it does not depend.
         """
         limits = scene.limits
-        key = *self._numbers.of_parts(scene.vehicle, "bodies", "springs"), limits.rigid, limits.locked
+        key = *self._numbers.indices_of_attributes(scene.vehicle, "bodies", "springs"), limits.rigid, limits.locked
         if key not in self._free:
             self._free[key] = free(scene.vehicle, limits)
         return self._free[key]
@@ -216,7 +216,7 @@ class FullScene:
         self.scene, self.speed = scene, speed
         self.vehicles = Vehicles(scene.vehicle, speed) if vehicles is None else vehicles
         self.linear = self.vehicles.linear(scene.vehicle, speed)
-        self.excitation = self.vehicles.roads.of(scene)
+        self.excitation = self.vehicles.roads.excitation_of(scene)
         self._stored: dict[Hashable, Reduced] = {}
         self._roads: dict[Hashable, tuple[Excitation, np.ndarray, np.ndarray]] = {}
         self.full = self.reduced(scene)
@@ -243,7 +243,7 @@ class FullScene:
 
     def _make(self, scene: ReducedScene) -> Reduced:
         """The linear system of the reduced scene before the weighting filters of outputs are added."""
-        vehicle, (excitation, Tf, left_f) = self.vehicles.of(scene, self.speed), self._heights(scene)
+        vehicle, (excitation, Tf, left_f) = self.vehicles.reduced_vehicle_of(scene, self.speed), self._heights(scene)
         states, N = vehicle.states, vehicle.N
         system, Tq = first_order(vehicle.linear, states, excitation, self.speed)
         n, m, x = len(self.linear.mass), len(Tf), len(system.A)
@@ -262,7 +262,7 @@ class FullScene:
         """The road excitation of the reduced scene, and the matrices of ``_filter_state_maps`` for it."""
         key = self.vehicles.roads.number(scene)
         if key not in self._roads:
-            excitation = self.vehicles.roads.of(scene)
+            excitation = self.vehicles.roads.excitation_of(scene)
             self._roads[key] = (excitation, *_filter_state_maps(self.scene, self.excitation, scene, excitation))
         return self._roads[key]
 

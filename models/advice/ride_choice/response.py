@@ -27,7 +27,7 @@ class OutputFactors(NamedTuple):
     by_road: tuple[np.ndarray, np.ndarray]
 
     @classmethod
-    def of(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "OutputFactors":
+    def of_rows(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "OutputFactors":
         """Factors of the vehicle's outputs with these row indices."""
         read, row_list = vehicle.read, list(rows)
         return cls(
@@ -40,7 +40,7 @@ class Response:
     """Transfer functions H (w, q, wheels) from road heights to outputs at angular frequencies (w,) in rad/s."""
 
     def __init__(self, vehicle: ReducedVehicle, rows: Sequence[int], omega: np.ndarray) -> None:
-        self.vehicle, self.s, self.read = vehicle, 1j * omega, OutputFactors.of(vehicle.linear, rows)
+        self.vehicle, self.s, self.read = vehicle, 1j * omega, OutputFactors.of_rows(vehicle.linear, rows)
         self.by_heights = vehicle.linear.road_stiffness, vehicle.linear.road_damping
         self.motions = self._fractions()
         self.H = self._modal_product(self.read.by_motion, self.by_heights) + polynomial(self.read.by_road, self.s)

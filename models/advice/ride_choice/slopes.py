@@ -27,7 +27,9 @@ class Shifts:
     by_road: tuple[np.ndarray, ...]
 
     @classmethod
-    def of(cls, vehicle: LinearVehicle, other_vehicles: Sequence[LinearVehicle], rows: Sequence[int]) -> "Shifts":
+    def from_vehicles(
+        cls, vehicle: LinearVehicle, other_vehicles: Sequence[LinearVehicle], rows: Sequence[int]
+    ) -> "Shifts":
         """Matrices of the other vehicles less those of ``vehicle``, for the outputs with these row indices."""
         matrices, *changed_matrices = (
             [*_matrices_and_readings(linear_vehicle, rows)] for linear_vehicle in (vehicle, *other_vehicles)
@@ -48,7 +50,7 @@ class Shifts:
 
 def _matrices_and_readings(vehicle: LinearVehicle, rows: Sequence[int]) -> Iterator[np.ndarray]:
     """Matrices of a vehicle, then factors of its outputs, in the order of the fields of ``Shifts``."""
-    read = OutputFactors.of(vehicle, rows)
+    read = OutputFactors.of_rows(vehicle, rows)
     yield from (vehicle.stiffness, vehicle.damping, vehicle.mass, vehicle.road_stiffness, vehicle.road_damping)
     yield from (*read.by_motion, *read.by_road)
 

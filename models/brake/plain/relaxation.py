@@ -39,26 +39,26 @@ def _lagging_slip(angle: float, speed: float, speed_across: float, length: float
 @dataclass(eq=False)
 class LaggingTyres:
     """Tyres with relaxation: lengths (W,) in m, slope (1/rad), tangents of the lagging slip angles (W,), and the time
-    (s) by which these lie behind the motion. ``taken`` holds the tangents of the slip angles that forces use, with the
-    damper's part.
+    (s) by which these lie behind the motion. ``slips_for_forces`` holds the tangents of the slip angles that forces
+    use, with the damper's part.
     """
 
     length: np.ndarray
     slope: float
     angle: np.ndarray
     time_behind: float = 0.0
-    taken: np.ndarray | None = None
+    slips_for_forces: np.ndarray | None = None
 
     def reach(self, speeds: np.ndarray, half: float) -> None:
         """Advance the lagging slip angles to half a step (s) after the motion with speeds (2, W) along and across the
         wheels (m/s).
         """
-        self.angle, self.taken = lag_on(self.angle, speeds, self.time_behind + half, self.length, self.slope)
+        self.angle, self.slips_for_forces = lag_on(self.angle, speeds, self.time_behind + half, self.length, self.slope)
         self.time_behind = half
 
     def across(self, i: int, forwards: float) -> float:
         """Speed (m/s) across wheel i that corresponds to its lagging slip angle at the speed ``forwards`` (m/s) along
         it.
         """
-        assert self.taken is not None
-        return float(self.taken[i]) * forwards
+        assert self.slips_for_forces is not None
+        return float(self.slips_for_forces[i]) * forwards

@@ -42,7 +42,7 @@ class Fault(Strict):
         """Whether the fault is active at a time (s)."""
         return self.start <= time and (self.end is None or time < self.end)
 
-    def of(self, wheels: int) -> list[int]:
+    def affected_wheels(self, wheels: int) -> list[int]:
         """Indices of the wheels that the fault affects, of so many wheels."""
         return list(range(wheels)) if self.wheels is None else self.wheels
 
@@ -75,7 +75,7 @@ class FaultyController:
         self._past_signals.append(wheels)
         faulty_wheels = wheels.copy()
         for fault in active_faults:
-            for i in fault.of(wheels.size):
+            for i in fault.affected_wheels(wheels.size):
                 if fault.kind == "delayed":
                     faulty_wheels[i] = self._past_signals[max(len(self._past_signals) - 1 - (fault.samples or 0), 0)][i]
                 elif fault.kind == "lost" and self._last_signals is not None:
@@ -85,7 +85,7 @@ class FaultyController:
 
     def _stuck_valves(self, valves: np.ndarray, active_faults: list[Fault]) -> np.ndarray:
         for fault in active_faults:
-            for i in fault.of(valves.size) if fault.kind == "stuck" else ():
+            for i in fault.affected_wheels(valves.size) if fault.kind == "stuck" else ():
                 if fault.state is not None:
                     valves[i] = fault.state
                 elif self._last_valves is not None:

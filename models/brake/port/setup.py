@@ -185,7 +185,7 @@ def check_port(table: PortTable, run: ControllerRun) -> None:
         raise InputError(run.file, "port.log", table.log, reason)
     wheels = run.radius.size
     for i, fault in enumerate(table.faults):
-        for wheel in fault.of(wheels):
+        for wheel in fault.affected_wheels(wheels):
             if not 0 <= wheel < wheels:
                 raise InputError(run.file, f"port.faults.{i}.wheels", wheel, f"must be from 0 to {wheels - 1}")
         if fault.tooth is not None and table.teeth is not None and fault.tooth >= table.teeth.teeth:

@@ -10,7 +10,7 @@ represents all of it; and two edits of a scene's table: ``shorten(table, scene, 
 
 Where effects lie in files that scenes name, as in a vehicle's, a file has ``opened(scene)`` in place of both edits. It
 returns the object that ``computed_quantities``, ``steps`` and ``divisible_steps`` take. This object has ``file``,
-``system``, the names of its effects ``named`` and of those it could have ``absent``, and a sentence on each effect
-``said``; it makes variants of itself: ``without(names)``, ``beside(name)``, ``in_longer_steps(step_factor)`` and
-``with_fewer_copies(steps)``, of about so many steps.
+``system``, the names of its effects ``effect_names`` and of those it could have ``absent_names``, and a sentence on
+each effect ``effect_sentences``; it makes variants of itself: ``without(names)``, ``with_effect(name)``,
+``in_longer_steps(step_factor)`` and ``with_fewer_copies(steps)``, of about so many steps.
 """
