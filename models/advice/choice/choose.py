@@ -132,9 +132,7 @@ class Chooser:
         return screen if self.step_factor == 1 else Screen(coarse, screen.quantities)
 
     def _longest_screen_step(self, screen: Screen) -> tuple[int, np.ndarray]:
-        """Longest step of the screening runs, as a multiple of the scene's step, and the relative changes (quantities,)
-        that it causes.
-        """
+        """Longest step factor of screening runs, and the relative changes (quantities,) that it causes."""
         all_variants = self.whole.variants
         step_factors = [k for k in all_variants.step_factors() if k in screen.variants.step_factors()]
         allowed = (SAMPLED_STEP_SHARE if self.all_sampled else SCREENED_STEP_SHARE) * self.tolerance
@@ -308,9 +306,7 @@ class Chooser:
         return self.ended
 
     def change_with_longer_steps(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
-        """Predicted relative changes (quantities,) if effects are left out and the step is lengthened as well. The
-        change by the step comes from a comparison with a shorter step.
-        """
+        """Predicted relative changes (quantities,) if effects are left out and steps lengthened as well."""
         screen, runs = self.reporting_screen, self.whole.variants
         change = screen.predicted_difference(omitted_effects) if omitted_effects else None
         if step_factor == 1:
