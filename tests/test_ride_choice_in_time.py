@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.advice.choice.answer import by_chance
+from models.advice.choice.answer import sampled_change_and_error
 from models.advice.choice.choose import Chooser
 from models.advice.choice.screen import Screen
 from models.advice.choice.systems.ride import opened
@@ -45,7 +45,7 @@ def test_chance_is_the_error_of_a_ratio_of_means():
     draw = np.random.default_rng(5)
     full = draw.gamma(4.0, size=(2000, 40))  # 2000 experiments of 40 samples each
     rest = full * draw.normal(1.02, 0.05, full.shape)
-    found = [by_chance((b - a,), (a,)) for a, b in zip(full, rest, strict=True)]
+    found = [sampled_change_and_error((b - a,), (a,)) for a, b in zip(full, rest, strict=True)]
     roots = np.sqrt(rest.mean(axis=1) / full.mean(axis=1)) - 1.0
     assert [one for one, _ in found] == pytest.approx(abs(roots))
     off, beside = abs(roots - (np.sqrt(1.02) - 1.0)), np.array(found)[:, 1]
@@ -54,9 +54,9 @@ def test_chance_is_the_error_of_a_ratio_of_means():
 
 def test_a_change_that_is_the_same_in_all_samples_is_sure_and_nothing_left_is_all():
     own = np.array([1.0, 2.0, 5.0])
-    assert by_chance((0.21 * own,), (own,)) == pytest.approx((0.1, 0.0))
-    assert by_chance((-own,), (own,)) == (1.0, 0.0)
-    assert by_chance((-2.0 * own,), (own,)) == (np.inf, np.inf)
+    assert sampled_change_and_error((0.21 * own,), (own,)) == pytest.approx((0.1, 0.0))
+    assert sampled_change_and_error((-own,), (own,)) == (1.0, 0.0)
+    assert sampled_change_and_error((-2.0 * own,), (own,)) == (np.inf, np.inf)
 
 
 def test_longer_steps_meet_the_same_roads():
@@ -67,7 +67,7 @@ def test_longer_steps_meet_the_same_roads():
         pace, opened(quarter_car(options={"copies": 16, "lasting": 2.0, "seed": 2})).roads(pace)
     )[1]
     assert np.array_equal(whole.in_longer_steps(2).roads(pace), whole.roads(pace)[::2])
-    same, apart = (by_chance((rest[:, 0] - one[:, 0],), (one[:, 0],)) for rest in (two, other))
+    same, apart = (sampled_change_and_error((rest[:, 0] - one[:, 0],), (one[:, 0],)) for rest in (two, other))
     assert 0.0 < same[0] < 0.02 and apart[1] > 10.0 * same[1]  # other roads tell next to nothing
 
 

@@ -91,7 +91,7 @@ in 0.15 % of the cases.
 """
 
 
-def by_chance(differences: Cases, full_results: Cases) -> tuple[float, float]:
+def sampled_change_and_error(differences: Cases, full_results: Cases) -> tuple[float, float]:
     """Largest relative change among the cases of a quantity that is a root mean square of samples, and the statistical
     error of this change.
 

@@ -18,10 +18,10 @@ import numpy as np
 from models.advice.choice.answer import (
     Cases,
     RunQuantities,
-    by_chance,
     difference_of_runs,
     largest_relative_change,
     rounding_floor,
+    sampled_change_and_error,
     sum_of_differences,
 )
 from models.advice.choice.variants import EffectSet, Variants
@@ -87,7 +87,7 @@ class Screen:
         if differences is None:
             return np.outer((np.inf, 0.0), np.ones(len(self.quantities)))
         pairs = [
-            by_chance(differences[name], self.full[name])
+            sampled_change_and_error(differences[name], self.full[name])
             if name in self.sampled
             else (largest_relative_change(differences[name], self.sizes[name]), 0.0)
             for name in self.quantities

@@ -14,10 +14,10 @@ import numpy as np
 
 from models.advice.choice.answer import (
     RunQuantities,
-    by_chance,
     difference_of_runs,
     largest_relative_change,
     rounding_floor,
+    sampled_change_and_error,
 )
 from models.advice.choice.variants import Variants, system_of
 from models.core.assumptions import collected_breaches
@@ -205,7 +205,7 @@ def _quantity_changes(scene_quantities: RunQuantities, changed_quantities: RunQu
                 continue
             size = quantity.sizes
             if quantity.sampled:
-                share, chance = by_chance(change, quantity.cases)
+                share, chance = sampled_change_and_error(change, quantity.cases)
                 changed.append(QuantityChange(name, quantity.unit, share * float(size.max()), share, chance))
                 continue
             largest_difference = max(float(np.sqrt(np.mean(difference**2))) for difference in change)

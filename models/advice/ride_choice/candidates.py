@@ -144,7 +144,7 @@ class Candidates:
 
     @cached_in_object
     def _predicted_at(self, full_scene: FullScene, omitted_effects: EffectSet) -> np.ndarray:
-        return self._changes_at_speed(full_scene, omitted_effects, self._predict)
+        return self._changes_at_speed(full_scene, omitted_effects, self._predicted_variances)
 
     def share(self, omitted_effects: EffectSet) -> float:
         """Ratio of the largest predicted change to the tolerance. It is inf once any speed exceeds the tolerance; the
@@ -166,7 +166,10 @@ class Candidates:
         """
         return largest_changes(
             np.array(
-                [self._changes_at_speed(full_scene, omitted_effects, self._confirm) for full_scene in self.full_scenes]
+                [
+                    self._changes_at_speed(full_scene, omitted_effects, self._exact_variances)
+                    for full_scene in self.full_scenes
+                ]
             )
         )
 
@@ -177,7 +180,10 @@ class Candidates:
         """
         return largest_changes(
             np.array(
-                [self._changes_at_speed(full_scene, omitted_effects, self._solve) for full_scene in self.full_scenes]
+                [
+                    self._changes_at_speed(full_scene, omitted_effects, self._variances_by_modes)
+                    for full_scene in self.full_scenes
+                ]
             )
         )
 
@@ -185,9 +191,9 @@ class Candidates:
         """Whether at the screened speeds the identity of covariance and adjoint holds in extended precision, and agrees
         with the variances from eigenmodes.
         """
-        return all(self._exact(full_scene, omitted_effects) for full_scene in self.screened_scenes)
+        return all(self._is_certified_at(full_scene, omitted_effects) for full_scene in self.screened_scenes)
 
-    def _exact(self, full_scene: FullScene, omitted_effects: EffectSet) -> bool:
+    def _is_certified_at(self, full_scene: FullScene, omitted_effects: EffectSet) -> bool:
         screen, reduced = self.screen(full_scene, frozenset()), self.system(full_scene, omitted_effects)
         if screen is None or reduced is None:
             return False
@@ -199,15 +205,15 @@ class Candidates:
         )
         return agrees_with_motions and bool((abs(certificate_variances / variance - 1.0) <= IDENTITY_ERROR).all())
 
-    def _predict(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
+    def _predicted_variances(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         screen = self.screen(full_scene, omitted_effects)
         return np.full(len(self.rows), inf) if screen is None else screen.predicted_variances(reduced)
 
-    def _confirm(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
+    def _exact_variances(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
         return exact_variances(reduced, self.rows)
 
-    def _solve(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
+    def _variances_by_modes(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
         variances = variances_from_modes(reduced, self.rows)
         return exact_variances(reduced, self.rows) if variances is None else variances
