@@ -178,10 +178,16 @@ def choice_of_scene(
     with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *places_of(scene)) as pool:
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
         choice, full_work = chooser.choose(), chooser.work(frozenset())
-    results = chooser.whole.variants.stated(frozenset(choice.left_out), choice.times) if scene.error else []
+    results = (
+        chooser.whole.variants.results_with_errors(frozenset(choice.left_out), choice.step_factor)
+        if scene.error
+        else []
+    )
     single_effects = [
         SingleEffect(
-            effect, chooser.teller.predicted_change(frozenset([effect])), full_work / chooser.work(frozenset([effect]))
+            effect,
+            chooser.reporting_screen.predicted_change(frozenset([effect])),
+            full_work / chooser.work(frozenset([effect])),
         )
         for effect in chooser.effects
     ]
@@ -198,7 +204,7 @@ def _linear_ride_choice(scene: Any) -> SceneChoice:
     from models.systems.ride.of_scene import scene_errors
 
     with scene_errors(scene):
-        chooser = Linear.of(scene)
+        chooser = Linear.from_scene(scene)
         linear = chooser.choose()
         singles = {effect: frozenset([effect]) for effect in chooser.effects}
         calls = chooser.cost(frozenset()).calls
@@ -240,7 +246,7 @@ def _answer_of_choice(answered: SceneChoice) -> dict[str, Any]:
         "implementation": answered.engine,
         "left out": list(choice.left_out),
         "stay": answered.staying_effects,
-        "step times": choice.times,
+        "step times": choice.step_factor,
         "errors": {
             name: {
                 "predicted": float(choice.predicted_change[i]),
@@ -320,8 +326,8 @@ def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
     else:
         faster = choice.seconds[0] / choice.seconds[2]
         rows.append(
-            f"    calls {saved}, by steps {choice.times} times as long; {calls_before / step:.3g} times by longer "
-            f"steps with all effects; CPU seconds {faster:.3g} times fewer, once"
+            f"    calls {saved}, by steps {choice.step_factor} times as long; {calls_before / step:.3g} times by "
+            f"longer steps with all effects; CPU seconds {faster:.3g} times fewer, once"
         )
     rows += [
         f"    {name} {_why_it_stays(change, scene_choice)}"

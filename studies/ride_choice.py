@@ -70,16 +70,16 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         return save_choices([scene], engines, folder, progress)
     progress("screening", 0.1)
     with scene_errors(scene):
-        chooser = Chooser.of(scene)
+        chooser = Chooser.from_scene(scene)
         choice = chooser.choose()
         progress("single effects", 0.7)
         further = chooser.change_if_left_out_too(frozenset(choice.left_out))
         single_effects = [_effect_alone(chooser, effect) for effect in chooser.effects]
         watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
-        write(chooser.rest(frozenset(choice.left_out)), folder)
+        write(chooser.reduced_scene_without(frozenset(choice.left_out)), folder)
     progress("what is left", 0.9)
-    results = _deviation_results(scene, chooser.rest(frozenset(choice.left_out)))
+    results = _deviation_results(scene, chooser.reduced_scene_without(frozenset(choice.left_out)))
     _save_effect_table(scene, single_effects, choice, watts, (results, chooser.counts), folder)
     choice_figure(scene, single_effects, choice, watts, results, folder / "choice.png")
     return {
@@ -129,7 +129,7 @@ def _answer_of_choice(scene: RideScene, choice: RideChoice, change_by_effect: di
         "step": [choice.cost_before.step, choice.cost_after.step],
         "step limit": list(choice.stable_steps),
         "calls": [choice.cost_before.calls, choice.cost_after.calls],
-        "said": list(choice.said),
+        "said": list(choice.refusal_texts),
         "confirmations": choice.confirmations,
         "would matter no more above": {effect.name: change for effect, change in change_by_effect.items()},
     }
@@ -250,7 +250,7 @@ def _table(
     lines = [f"  left out: {', '.join(effect.name for effect in choice.left_out) or 'nothing'}"]
     lines += [f"    {effect.name}: {effect.says}" for effect in choice.left_out]
     stay = [effect.name for effect in choice.candidates if effect not in choice.left_out]
-    lines += [f"  stays: {', '.join(stay) or 'nothing'}", *(f"    {why}" for why in choice.said)]
+    lines += [f"  stays: {', '.join(stay) or 'nothing'}", *(f"    {why}" for why in choice.refusal_texts)]
     for i, name in enumerate(scene.quantities if choice.left_out else ()):
         change_texts = map(
             percent_text,

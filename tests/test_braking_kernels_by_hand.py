@@ -7,7 +7,7 @@ import pytest
 
 from models.brake.advance import AT_REST
 from models.brake.brake import Brake
-from models.brake.controllers.five_phase_cycle import WheelAtSpeed, go_on
+from models.brake.controllers.five_phase_cycle import WheelAtSpeed, state_after
 from models.brake.plane_chain import factorise_mass, fill_headings, inertia, solve
 from models.brake.plane_step import JUMP_WIDTH
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
@@ -116,7 +116,7 @@ def test_a_wheel_at_a_frozen_speed_keeps_its_momentum():
     brake = Brake(push_out=0.5, release=0.5, rising=1500.0, falling=1500.0)
     frozen = WheelAtSpeed(20.0, 4e3, 0.3, 1.2, brake, table_of_surface("dry"))
     start = frozen.rolling()._replace(pressure=0.6, torque=150.0)
-    end = go_on(start, 40.0, 2e-3, frozen.driven)
+    end = state_after(start, 40.0, 2e-3, frozen.driven)
     assert (end.time, end.pressure, end.torque) == pytest.approx((2e-3, 0.68, 1500.0 * (0.68 - 0.5)), rel=1e-12)
     braked = 0.5 * (150.0 + end.torque) * 2e-3
     assert 1.2 * (end.turning - start.turning) == pytest.approx(0.3 * end.impulse - braked, rel=1e-10)

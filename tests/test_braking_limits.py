@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.brake.controller import SLOW, Command, Sample
-from models.brake.plane_step import share_out
+from models.brake.plane_step import redistribute_negative_loads
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.brake.port.ask import STATES_WITH_SLOW_APPLY, ControllerFailed, checked_answer
 from models.brake.quarter import Quarter
@@ -27,7 +27,7 @@ def scene(**tables):
 @pytest.mark.grounds("closed form")
 def test_three_wheels_that_stay_hold_weight_and_moments(loads):
     place, shared = plane_of_truck(PAPER_TRUCK).place, np.array(loads)
-    share_out(shared, place)
+    redistribute_negative_loads(shared, place)
     assert shared.min() >= 0.0 and shared.sum() == pytest.approx(sum(loads), rel=1e-12)
     assert shared @ place == pytest.approx(np.array(loads) @ place, rel=1e-9)
 
@@ -36,7 +36,7 @@ def test_three_wheels_that_stay_hold_weight_and_moments(loads):
 @pytest.mark.grounds("closed form")
 def test_beyond_balance_two_wheels_bear_nothing(loads, side):
     shared = np.array(loads)
-    share_out(shared, plane_of_truck(PAPER_TRUCK).place)
+    redistribute_negative_loads(shared, plane_of_truck(PAPER_TRUCK).place)
     assert (shared[list(side)] == 0.0).all() and shared.sum() == pytest.approx(sum(loads))
 
 

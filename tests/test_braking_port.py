@@ -28,7 +28,7 @@ from models.brake.port.pace import WallClock
 from models.brake.port.sensors import Conversion, controller_behind_sensors
 from models.brake.port.setup import ControllerRun, PortTable, controller_of_run
 from models.brake.port.socket_port import controller_behind_socket
-from models.brake.port.teeth import Counted, Teeth
+from models.brake.port.teeth import Teeth, ToothCounter
 from models.brake.pressure import Chambers
 from models.brake.surfaces import Stretch, road
 from models.core.errors import InputError, RunFailed
@@ -578,7 +578,7 @@ def test_noise_gain_and_offset_of_signals_and_pressures():
 
 
 def test_a_counted_wheel_of_steady_speed_is_exact_to_a_tick():
-    counted, way = Counted(Teeth(teeth=100, tick=1e-6), RADIUS), 2 * np.pi * 0.5 / 100
+    counted, way = ToothCounter(Teeth(teeth=100, tick=1e-6), RADIUS), 2 * np.pi * 0.5 / 100
     speeds = (20.0, 7.0, 3.0, 0.0)
     for i in range(40):
         shown = counted(of(i, speeds))
@@ -589,11 +589,11 @@ def test_a_counted_wheel_of_steady_speed_is_exact_to_a_tick():
 
 
 def test_a_wheel_that_stops_is_seen_to_fall_and_one_that_slows_is_followed():
-    counted, way = Counted(Teeth(teeth=50), RADIUS), 2 * np.pi * 0.5 / 50
+    counted, way = ToothCounter(Teeth(teeth=50), RADIUS), 2 * np.pi * 0.5 / 50
     shown = [counted(of(i, (10.0 if i < 4 else 0.0,) * 4))[0] for i in range(40)]
     assert all(b <= a for a, b in pairwise(shown[3:]))
     assert shown[-1] <= way / (34 * SAMPLE)  # at most one tooth since
-    slowing = Counted(Teeth(teeth=100), RADIUS)
+    slowing = ToothCounter(Teeth(teeth=100), RADIUS)
     for i in range(60):
         true = 20.0 - 8.0 * SAMPLE * i
         got = slowing(of(i, (true,) * 4))[0]
@@ -604,8 +604,8 @@ def test_a_wheel_that_stops_is_seen_to_fall_and_one_that_slows_is_followed():
 def test_a_missing_tooth_makes_one_dip_per_turn():
     teeth, turn = 20, 2 * np.pi * 0.5
     speed = turn / (20 * SAMPLE)  # one tooth per sample
-    whole = Counted(Teeth(teeth=teeth), RADIUS)
-    less = Counted(Teeth(teeth=teeth), RADIUS, lambda wheel, tooth, time: wheel == 1 and tooth == 5)
+    whole = ToothCounter(Teeth(teeth=teeth), RADIUS)
+    less = ToothCounter(Teeth(teeth=teeth), RADIUS, lambda wheel, tooth, time: wheel == 1 and tooth == 5)
     rows = np.array([[*whole(of(i, (speed,) * 4))[:2], *less(of(i, (speed,) * 4))[:2]] for i in range(61)])[3:]
     assert np.allclose(rows[:, :3], speed, rtol=1e-3)
     assert (rows[:, 3] < 0.6 * speed).sum() in (3, 6)  # at the gap, and while it waits, in each of three turns

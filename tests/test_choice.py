@@ -64,27 +64,31 @@ class Made(Variants):
     """Variants whose quantity is a given function of what is left out and of the step."""
 
     def __init__(self, function, effects):
-        self.function, self.names, self.calls, self._kept, self._seconds_per_call, self._assumptions_broken = (
-            function,
-            effects,
-            0,
-            {},
-            {},
-            {},
-        )
+        (
+            self.function,
+            self.names,
+            self.calls,
+            self._quantities_of_variant,
+            self._seconds_per_call,
+            self._assumptions_broken,
+        ) = (function, effects, 0, {}, {}, {})
         self._computed_in_advance = {}
         self.scene, self.engine = type("Made", (), {"file": "t", "system": "made"}), ""
         self.system = type(
             "System",
             (),
-            {"WINDOWED": False, "parts": staticmethod(lambda scene: 4), "steps": staticmethod(lambda scene: 4)},
+            {
+                "WINDOWED": False,
+                "divisible_steps": staticmethod(lambda scene: 4),
+                "steps": staticmethod(lambda scene: 4),
+            },
         )
 
     @property
     def effects(self):
         return self.names
 
-    def changed(self, left_out, times=1):
+    def changed_scene(self, left_out, times=1):
         return self.scene
 
     def _run(self, left_out, times):
@@ -127,7 +131,7 @@ def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
     found, shares = chooser(monkeypatch, quantity, names), []
     found.progress = shares.append
     choice = found.choose()
-    own = found.whole.variants.of().counts["calls"]
+    own = found.whole.variants.quantities_of_run().counts["calls"]
     assert choice.ended_early and choice.left_out == ("e00",) and choice.within_tolerance
     assert choose.RUN_BUDGET * own < choice.calls_of_search < (choose.RUN_BUDGET + 10) * own and max(shares) == 1.0
     assert not chooser(monkeypatch, quantity, names[:5]).choose().ended_early
@@ -136,10 +140,10 @@ def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
 def test_what_steps_change_is_told_by_shorter_ones_that_have_the_same_times(monkeypatch):
     """25 times as long is told by 1, not by 2, whose rows fall between."""
     found = chooser(monkeypatch, lambda left_out, times: 100.0 + 0.01 * times, ("a",))
-    monkeypatch.setattr(found.whole.variants, "lengths", lambda: [1, 2, 5, 25])
+    monkeypatch.setattr(found.whole.variants, "step_factors", lambda: [1, 2, 5, 25])
     asked = []
-    monkeypatch.setattr(found.whole.variants, "of", lambda left_out=(), times=1: asked.append(times))
-    found.told(frozenset(), 25)
+    monkeypatch.setattr(found.whole.variants, "quantities_of_run", lambda left_out=(), times=1: asked.append(times))
+    found.change_with_longer_steps(frozenset(), 25)
     assert 2 not in asked and 1 in asked
 
 
@@ -151,8 +155,8 @@ def test_what_the_confirmation_breaks_is_taken_back(monkeypatch):
 
     own = chooser(monkeypatch, quantity, ("a", "b"))
     own.screen.variants._run = lambda left_out, times: Made._run(own.screen.variants, left_out, max(2, times))
-    own.screen.variants._kept.clear()
-    own.whole.variants._kept.clear()
+    own.screen.variants._quantities_of_variant.clear()
+    own.whole.variants._quantities_of_variant.clear()
     monkeypatch.setattr(own.whole.variants, "_run", lambda left_out, times: Made._run(own.whole.variants, left_out, 1))
     choice = own.choose()
     assert choice.left_out == ("a",) and choice.within_tolerance and choice.confirmed_change[0] == pytest.approx(0.005)
@@ -168,7 +172,7 @@ def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
     monkeypatch.setattr(choose, "Variants", lambda scene, engine, executor: own)
     found = Chooser(None, "", ["q"], 0.05)
     assert (
-        found._longest_allowed(Screen(part, ["q"]), frozenset(), part.lengths(), 0.05)[0] == 4
+        found._longest_allowed(Screen(part, ["q"]), frozenset(), part.step_factors(), 0.05)[0] == 4
         and found.step_factor == 2
     )
 
@@ -210,7 +214,7 @@ def test_what_only_rounds_does_not_move():
     answer = RunQuantities(
         {"a": Quantity("N", (np.array([5e4, 5e4 + 1e-7]),)), "b": Quantity("m", (np.zeros(2),))}, {}, 0.0
     )
-    assert scale_of_cases(answer.of("a").cases)[0] < rounding_floor(answer, "N") == pytest.approx(5e-6)
+    assert scale_of_cases(answer.quantity("a").cases)[0] < rounding_floor(answer, "N") == pytest.approx(5e-6)
     assert rounding_floor(answer, "m") == 1e-15
 
 

@@ -15,7 +15,14 @@ from models.contact.kernel_pointer import Pointer, pointer
 from models.contact.kernel_simplified import table
 from models.contact.material import MaterialPair
 from models.contact.patches import Patch
-from models.contact.simplified_kernels import FineNet, covariances, drag, gather, push, slope_products
+from models.contact.simplified_kernels import (
+    FineNet,
+    coarse_tractions,
+    covariances,
+    normal_displacement_sums,
+    slope_products,
+    tangential_displacement_sums,
+)
 from models.contact.simplified_theory import SimplifiedOptions, press, roll
 from models.contact.undeformed_distance import from_arrays
 from validation.contact import plain_simplified as plain
@@ -138,7 +145,7 @@ def test_tractions_of_the_meshes():
     net = plain.interval_midpoints(*box[2:], 7), low, high, 6e-3 / 7, np.ones((7, 6))
     tractions = draw.normal(size=(7, 6, 2))
     expected = plain.mean_tractions(plain.Strips(*net), tractions[..., 0] + 1j * tractions[..., 1], box, 5)
-    assert gather(FineNet(*net), tractions, box, 5) == pytest.approx(expected, rel=1e-10, abs=1e-14)
+    assert coarse_tractions(FineNet(*net), tractions, box, 5) == pytest.approx(expected, rel=1e-10, abs=1e-14)
 
 
 def test_loads_press_and_drag_the_surface_beside_them():
@@ -148,7 +155,7 @@ def test_loads_press_and_drag_the_surface_beside_them():
     force, both = draw.uniform(0.5, 1.0, 5), draw.normal(size=(2, 5))
     away = places[:, :, None] - loads[:, None, :]
     r = np.linalg.norm(away, axis=0)
-    assert push(*loads, force, *places) == pytest.approx((force / r).sum(axis=1), rel=1e-12)
+    assert normal_displacement_sums(*loads, force, *places) == pytest.approx((force / r).sum(axis=1), rel=1e-12)
     unit = away / r
     dragged = ((1.0 - PAIR.nu) * both[:, None] + PAIR.nu * unit * np.einsum("ipl,il->pl", unit, both)) / r
-    assert drag(*loads, both, *places, PAIR.nu) == pytest.approx(dragged.sum(axis=2), rel=1e-12)
+    assert tangential_displacement_sums(*loads, both, *places, PAIR.nu) == pytest.approx(dragged.sum(axis=2), rel=1e-12)

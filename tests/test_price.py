@@ -110,7 +110,7 @@ def test_coinciding_curves_are_named():
 def test_cheapest_setting_is_interpolated():
     """error = h^2, calls = 1 / h: 1e-5 needs h = 10^-2.5 and 10^2.5 calls, between the settings tried."""
     steps = [1e-1, 1e-2, 1e-3]
-    found = curves.reach(steps, [h**2 for h in steps], [1 / h for h in steps], 1e-5, order=2)
+    found = curves.cost_at_tolerance(steps, [h**2 for h in steps], [1 / h for h in steps], 1e-5, order=2)
     assert found.how == "interpolated"
     assert (found.cost, found.value) == pytest.approx((10**2.5, 10**-2.5), rel=1e-12)
 
@@ -118,21 +118,21 @@ def test_cheapest_setting_is_interpolated():
 def test_beyond_the_finest_setting():
     steps = [1e-1, 1e-2]
     table = steps, [h**2 for h in steps], [1 / h for h in steps]
-    assert curves.reach(*table, 1e-6, order=2) is None
-    found = curves.reach(*table, 1e-6, order=2, extrapolate=True)
+    assert curves.cost_at_tolerance(*table, 1e-6, order=2) is None
+    found = curves.cost_at_tolerance(*table, 1e-6, order=2, extrapolate=True)
     assert (found.cost, found.how) == (pytest.approx(1000, rel=1e-12), "extrapolated")
-    assert curves.reach(*table, 1.0, order=2).how == "coarsest"
+    assert curves.cost_at_tolerance(*table, 1.0, order=2).how == "coarsest"
 
 
 def test_adaptive_methods_count_only_where_tried():
-    found = curves.reach([1e-2, 1e-4], [1.0, 1e-3], [10.0, 20.0], 0.1, order=0)
+    found = curves.cost_at_tolerance([1e-2, 1e-4], [1.0, 1e-3], [10.0, 20.0], 0.1, order=0)
     assert (found.cost, found.value, found.how) == (20.0, 1e-4, "tried")
-    assert curves.reach([1e-2, 1e-4], [1.0, 1e-3], [10.0, 20.0], 1e-4, order=0, extrapolate=True) is None
+    assert curves.cost_at_tolerance([1e-2, 1e-4], [1.0, 1e-3], [10.0, 20.0], 1e-4, order=0, extrapolate=True) is None
 
 
 def test_a_lucky_coarse_setting_does_not_count():
     """The curve dips below 0.1 at 0.4 and comes back: only the last crossing promises anything."""
-    found = curves.reach([0.8, 0.4, 0.2, 0.1], [1.0, 0.05, 0.2, 0.01], [1.0, 2.0, 4.0, 8.0], 0.1, order=1)
+    found = curves.cost_at_tolerance([0.8, 0.4, 0.2, 0.1], [1.0, 0.05, 0.2, 0.01], [1.0, 2.0, 4.0, 8.0], 0.1, order=1)
     assert 4.0 < found.cost < 8.0
 
 

@@ -29,8 +29,8 @@ class Planted:
     """y = t^2 sin 5t with an error of scale h^order, and one method that lies."""
 
     title, quantity, unit, kink_period, note, counted = "planted", "y", "N", 0.0, "", "force calls"
-    whole: float = 2.0
-    first: float = 1.0
+    full_duration: float = 2.0
+    searched_duration: float = 1.0
     growing: float = 0.0
     lies: float = 0.0
 
@@ -44,7 +44,7 @@ class Planted:
     def reference(self):
         return SettingLadder("reference", "exact", tuple(5e-3 / 2**k for k in range(6)), 4)
 
-    def second(self, last):
+    def second_setting(self, last):
         return Setting("reference", "other", 1e-9, 0, adaptive=True)
 
     def solve(self, setting, duration):
@@ -52,7 +52,7 @@ class Planted:
             raise RunFailed("exudyn", "unstable", 0.5)
         return setting, duration
 
-    def answer(self, solution):
+    def priced_run(self, solution):
         setting, duration = solution
         step = 1e-2 if setting.adaptive else setting.value
         times = np.linspace(0.0, duration, round(duration / step) + 1)
@@ -200,7 +200,7 @@ def test_the_first_part_of_a_run_need_not_be_steps_of_the_scene(step):
     """Of 5 s the first third is searched, which 1 ms and 0.25 ms do not divide."""
     road = {"road": {"source": "iso8608", "road_class": "A", "speed": 15.0}}
     scene = priced_scene(build(RELEASE | {"run": {"duration": 5.0, "step": step}, "effects": road}), None, ("mujoco",))
-    assert scene.unit == "N" and scene.first == pytest.approx(5.0 / 3.0)
+    assert scene.unit == "N" and scene.searched_duration == pytest.approx(5.0 / 3.0)
 
 
 def test_a_tolerance_below_rounding_is_refused():

@@ -45,7 +45,7 @@ def test_a_stop_is_held_to_its_tolerance_with_as_few_steps_as_that_takes():
     best = found.winners["", "calls"]
     coarser = [one for one in found.tried if one.setting.value > best.tried.setting.value]
     assert coarser and all(one.error > 0.95e-5 for one in coarser)
-    exact = found.scene.answer(found.scene.solve(Setting("reference", "exact wheel", 5.5e-3 / 500, 1), 30.0))
+    exact = found.scene.priced_run(found.scene.solve(Setting("reference", "exact wheel", 5.5e-3 / 500, 1), 30.0))
     # 500 substeps, none of the search's own: what is left is the error of the truth, 1/20 of the tolerance or less
     assert found.truth.error(exact) < 1e-6 and best.error <= 1e-5
     text = "\n".join(recommendation_lines(found))
@@ -63,7 +63,7 @@ def test_more_cells_come_nearer_and_are_counted():
     scene = own({**PATHS, "contact": {"law": "fastsim"}}, "fy")
     ladder = next(one for one in scene.ladders() if one.default)
     coarse, fine, exact = (
-        scene.answer(scene.solve(ladder.setting(ladder.values.index(1.0 / n)), 0.05)) for n in (5, 11, 45)
+        scene.priced_run(scene.solve(ladder.setting(ladder.values.index(1.0 / n)), 0.05)) for n in (5, 11, 45)
     )
     gaps = [abs(one.values - exact.values).max() for one in (coarse, fine)]
     assert gaps[1] < 0.6 * gaps[0]  # of second order but for the kinks between slip and stick: 0.2 at best
@@ -74,7 +74,10 @@ def test_more_cells_come_nearer_and_are_counted():
 def test_steps_divide_what_is_searched():
     scene = own(PATHS)
     assert isinstance(scene, MeshedScene) and first_part(3.0, 0.25) == 0.25
-    assert all(abs(scene.first / step - round(scene.first / step)) < 1e-9 for step in scene.steps.values())
+    assert all(
+        abs(scene.searched_duration / step - round(scene.searched_duration / step)) < 1e-9
+        for step in scene.steps.values()
+    )
 
 
 @pytest.mark.parametrize(

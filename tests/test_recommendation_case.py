@@ -24,7 +24,7 @@ GOOD = Verdict("a scene", "mujoco RK4", "2 ms", 1.0, 0.5, 0.5, 0.01, False)
 class Whole(Swing):
     """All of it is searched."""
 
-    whole, first = 2.0, 2.0
+    full_duration, searched_duration = 2.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -116,10 +116,12 @@ def test_a_default_that_the_race_forgot_is_seen_by_the_verdict(monkeypatch):
 def test_a_run_of_minutes_is_not_made_where_the_tolerance_is_met_in_less():
     own = Whole()
     quick = TriedSetting(Setting("reference", "RK4", 0.1, 4), "ok", "", 0.0, 80, 0.1)
-    search = Search(own, reference_truth(own, LOOSE_TOLERANCE, own.whole), LOOSE_TOLERANCE, own.whole, [quick])
+    search = Search(
+        own, reference_truth(own, LOOSE_TOLERANCE, own.full_duration), LOOSE_TOLERANCE, own.full_duration, [quick]
+    )
     rough = TriedSetting(Setting("mujoco", "Euler", 0.2, 1), "ok", "", 10 * LOOSE_TOLERANCE, 10, 8.0)
     ladder = own.ladders()[2]
-    assert not search._too_long(ladder, 0, rough)  # 8 s
-    assert search._too_long(ladder, 2, rough)  # 24 s
+    assert not search._is_too_long(ladder, 0, rough)  # 8 s
+    assert search._is_too_long(ladder, 2, rough)  # 24 s
     assert search.tried[-1].reason == "not run: it would take about 24 s, and the tolerance is met in 0.1 s"
     assert np.isinf(search.tried[-1].error)

@@ -9,7 +9,7 @@ import pytest
 
 from models.brake.controller import AllApplied
 from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
-from models.brake.relaxation import DAMPING, Lag, lag_on, longest_step, taken_up
+from models.brake.relaxation import DAMPING, Lag, lag_on, lagging_slip, longest_step
 from models.brake.surfaces import UNIFORM_ROAD, OnRoad
 from models.systems.braking.procedures import vehicle_and_start
 from models.systems.braking.run import marched_by
@@ -22,12 +22,12 @@ from validation.cases import braking_relaxation as case
 
 def test_the_law_is_exact_whatever_the_step():
     a, u, v, length = 0.02, 8.0, 0.6, 0.5
-    once = taken_up(a, u, v, 0.1, length)
+    once = lagging_slip(a, u, v, 0.1, length)
     assert once == pytest.approx(v / u + (a - v / u) * np.exp(-u * 0.1 / length), rel=1e-14)
-    assert taken_up(taken_up(a, u, v, 0.03, length), u, v, 0.07, length) == pytest.approx(once, rel=1e-14)
-    assert taken_up(a, -u, v, 0.1, length) == once  # backwards it relaxes as well
-    assert taken_up(a, 0.0, v, 0.1, length) == a + v * 0.1 / length  # at rest it is a spring
-    assert taken_up(a, u, v, 9.0, length) == pytest.approx(v / u, rel=1e-14)
+    assert lagging_slip(lagging_slip(a, u, v, 0.03, length), u, v, 0.07, length) == pytest.approx(once, rel=1e-14)
+    assert lagging_slip(a, -u, v, 0.1, length) == once  # backwards it relaxes as well
+    assert lagging_slip(a, 0.0, v, 0.1, length) == a + v * 0.1 / length  # at rest it is a spring
+    assert lagging_slip(a, u, v, 9.0, length) == pytest.approx(v / u, rel=1e-14)
 
 
 def stop(length=None, steer=0.03, substeps=4, duration=20.0, engine="reference"):

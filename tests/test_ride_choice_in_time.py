@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.advice.choice.answer import by_chance
+from models.advice.choice.answer import sampled_change_and_error
 from models.advice.choice.choose import Chooser
 from models.advice.choice.screen import Screen
 from models.advice.choice.systems.ride import opened
@@ -45,7 +45,7 @@ def test_chance_is_the_error_of_a_ratio_of_means():
     draw = np.random.default_rng(5)
     full = draw.gamma(4.0, size=(2000, 40))  # 2000 experiments of 40 samples each
     rest = full * draw.normal(1.02, 0.05, full.shape)
-    found = [by_chance((b - a,), (a,)) for a, b in zip(full, rest, strict=True)]
+    found = [sampled_change_and_error((b - a,), (a,)) for a, b in zip(full, rest, strict=True)]
     roots = np.sqrt(rest.mean(axis=1) / full.mean(axis=1)) - 1.0
     assert [one for one, _ in found] == pytest.approx(abs(roots))
     off, beside = abs(roots - (np.sqrt(1.02) - 1.0)), np.array(found)[:, 1]
@@ -54,9 +54,9 @@ def test_chance_is_the_error_of_a_ratio_of_means():
 
 def test_a_change_that_is_the_same_in_all_samples_is_sure_and_nothing_left_is_all():
     own = np.array([1.0, 2.0, 5.0])
-    assert by_chance((0.21 * own,), (own,)) == pytest.approx((0.1, 0.0))
-    assert by_chance((-own,), (own,)) == (1.0, 0.0)
-    assert by_chance((-2.0 * own,), (own,)) == (np.inf, np.inf)
+    assert sampled_change_and_error((0.21 * own,), (own,)) == pytest.approx((0.1, 0.0))
+    assert sampled_change_and_error((-own,), (own,)) == (1.0, 0.0)
+    assert sampled_change_and_error((-2.0 * own,), (own,)) == (np.inf, np.inf)
 
 
 def test_longer_steps_meet_the_same_roads():
@@ -67,7 +67,7 @@ def test_longer_steps_meet_the_same_roads():
         pace, opened(quarter_car(options={"copies": 16, "lasting": 2.0, "seed": 2})).roads(pace)
     )[1]
     assert np.array_equal(whole.in_longer_steps(2).roads(pace), whole.roads(pace)[::2])
-    same, apart = (by_chance((rest[:, 0] - one[:, 0],), (one[:, 0],)) for rest in (two, other))
+    same, apart = (sampled_change_and_error((rest[:, 0] - one[:, 0],), (one[:, 0],)) for rest in (two, other))
     assert 0.0 < same[0] < 0.02 and apart[1] > 10.0 * same[1]  # other roads tell next to nothing
 
 
@@ -76,7 +76,7 @@ def test_what_is_left_out_is_gone_and_gains_stand_for_it():
     rest = whole.without(LAWS)
     (spring,) = nonlinear_springs(whole.vehicle(whole.steps_at_speeds[0]))
     (gains,) = rest.vehicle(rest.steps_at_speeds[0]).springs
-    assert not nonlinear_springs(rest.vehicle(rest.steps_at_speeds[0])) and rest.named == ("body z",)
+    assert not nonlinear_springs(rest.vehicle(rest.steps_at_speeds[0])) and rest.effect_names == ("body z",)
     k, c = whole.steps_at_speeds[0].springs[spring.name].equivalent_gains
     assert (gains.stiffness, gains.damping) == pytest.approx((k, c))  # those of statistical linearisation
     with pytest.raises(InputError, match="closed form"):
@@ -97,16 +97,17 @@ def test_a_mount_that_is_left_out_seats_its_body_on_the_other():
 def test_a_choice_is_kept_and_says_what_chance_may_add():
     scene = quarter_car()
     choice = Chooser(scene, "reference", scene.quantities, scene.tolerance).choose()
-    assert choice.within_tolerance and choice.left_out and choice.times > 1
+    assert choice.within_tolerance and choice.left_out and choice.step_factor > 1
     assert scene.tolerance - choice.confirmed_change[0] >= choice.statistical_error[0] > 0.0
 
 
 def test_few_copies_find_what_all_of_them_tell():
     scene = quarter_car(options={"copies": 48, "lasting": 2.0})
     own = Chooser(scene, "reference", scene.quantities, scene.tolerance)
-    copies = [one.variants.scene.samples.copies for one in (own.screen, own.teller, own.whole)]
+    copies = [one.variants.scene.samples.copies for one in (own.screen, own.reporting_screen, own.whole)]
     assert (
-        copies == [12, 48, 48] and own.screen.variants.scene.times == own.teller.variants.scene.times == own.step_factor
+        copies == [12, 48, 48]
+        and own.screen.variants.scene.step_factor == own.reporting_screen.variants.scene.step_factor == own.step_factor
     )
 
 
@@ -128,10 +129,10 @@ def test_a_choice_that_chance_alone_could_break_is_refused():
 
 def test_a_quantity_that_one_sample_makes_up_is_refused():
     variants = Variants(quarter_car(), "reference")
-    answer = variants.of()
+    answer = variants.quantities_of_run()
     name = "body front"
     lone = replace(answer.quantities[name], cases=(np.array([1.0, *[0.01] * 15]),))
-    variants._kept[frozenset(), 1] = replace(answer, quantities={**answer.quantities, name: lone})
+    variants._quantities_of_variant[frozenset(), 1] = replace(answer, quantities={**answer.quantities, name: lone})
     with pytest.raises(InputError, match="made up to 87 % by one sample of 16"):
         Screen(variants, [name])
 

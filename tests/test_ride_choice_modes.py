@@ -9,7 +9,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from models.advice.ride_choice.modes import modes_of
 from models.advice.ride_choice.reduced import FullScene
 from models.advice.ride_choice.response import Response
-from models.advice.ride_choice.screen import exact_variances, solved_in_motions
+from models.advice.ride_choice.screen import exact_variances, variances_from_modes
 from models.ride.covariance import noise_of
 from models.systems.ride.omissions import effects_of
 from models.systems.ride.reduced_scene import ReducedScene, reduced_without
@@ -53,7 +53,7 @@ def test_responses_by_motions_are_those_of_the_solve_with_and_without_mass():
     effects = [effect for effect in effects_of(scene.scene) if effect.name in ("mass of all wheels", "tyre damping")]
     omega = np.geomspace(0.01, 1e5, 50)
     for rest in (scene.scene, reduced_without(scene.scene, effects)):
-        vehicle = scene.reduced(rest).of_vehicle
+        vehicle = scene.reduced(rest).reduced_vehicle
         response = Response(vehicle, [0, 2], omega)
         assert response.motions is not None
         vehicle.__dict__["modes"] = None
@@ -68,11 +68,11 @@ def test_responses_by_motions_are_those_of_the_solve_with_and_without_mass():
 def test_variances_by_motions_are_those_of_the_exact_solve_and_wrong_motions_are_seen():
     reduced = whole().full
     exact = exact_variances(reduced, [0, 2])
-    assert solved_in_motions(reduced, [0, 2]) == pytest.approx(exact, rel=1e-10)
+    assert variances_from_modes(reduced, [0, 2]) == pytest.approx(exact, rel=1e-10)
     wrong = replace(reduced)
     wrong.__dict__["modes"] = replace(reduced.modes, rates=reduced.modes.rates * (1 + 1e-6))
     wrong.__dict__["noise"] = reduced.noise
-    assert solved_in_motions(wrong, [0, 2]) is None
+    assert variances_from_modes(wrong, [0, 2]) is None
 
 
 def test_show_says_beforehand_what_a_choice_takes(twinrig, capsys):

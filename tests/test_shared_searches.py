@@ -135,11 +135,11 @@ def test_a_choice_is_the_same_by_workers_and_runs_ahead_that_nobody_asks_for_do_
         alone, shared = (chooser.choose() for chooser in choosers)
         assert told(alone) == told(shared) and alone.left_out and alone.calls_of_search > 0
         variants = Variants(half_car(), "reference", pool)
-        variants.ahead((frozenset([name]), 1) for name in variants.effects)
+        variants.compute_in_advance((frozenset([name]), 1) for name in variants.effects)
         assert len(variants._computed_in_advance) == len(variants.effects) > 3 and variants.calls == 0
-        first = variants.of(["gyro"])
+        first = variants.quantities_of_run(["gyro"])
     assert len(variants._computed_in_advance) == len(variants.effects) - 1 and variants.calls == first.counts["calls"]
-    here = Variants(half_car(), "reference").of(["gyro"])
+    here = Variants(half_car(), "reference").quantities_of_run(["gyro"])
     assert first.counts == here.counts and first.quantities.keys() == here.quantities.keys()
     for name, quantity in here.quantities.items():
         assert all(map(np.array_equal, quantity.cases, first.quantities[name].cases)), name
@@ -153,8 +153,8 @@ class Planted:
     """y = t^2 sin 5t with an error of 40 h^2, more of it in the second half; the reference errs as its steps say."""
 
     title, quantity, unit, kink_period, note, counted = "planted", "y", "N", 0.0, "", "force calls"
-    whole: float = 2.0
-    first: float = 1.0
+    full_duration: float = 2.0
+    searched_duration: float = 1.0
 
     def ladders(self):
         return [SettingLadder("exudyn", "second", STEPS, 2), SettingLadder("exudyn", "first", STEPS, 1, default=0.05)]
@@ -162,7 +162,7 @@ class Planted:
     def reference(self):
         return SettingLadder("reference", "fine", tuple(2e-2 / 2**k for k in range(9)), 4)
 
-    def second(self, last):
+    def second_setting(self, last):
         return None
 
     def solve(self, setting, duration):
@@ -170,7 +170,7 @@ class Planted:
             raise RunFailed("exudyn", "unstable", 0.5)
         return setting, duration
 
-    def answer(self, solution):
+    def priced_run(self, solution):
         setting, duration = solution
         times = np.linspace(0.0, duration, round(duration / setting.value) + 1)
         size = {"second": 40.0, "first": 1.0, "fine": 1e4}[setting.method]
@@ -183,7 +183,7 @@ class Planted:
 
 def same(alone: ReferenceTruth, shared: ReferenceTruth):
     keys = ("uncertainty", "origin", "rung", "broken_assumptions")
-    equal = np.array_equal(alone.answer.values, shared.answer.values)
+    equal = np.array_equal(alone.run.values, shared.run.values)
     return equal and all(getattr(alone, key) == getattr(shared, key) for key in keys)
 
 

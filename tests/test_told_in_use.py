@@ -158,7 +158,7 @@ def test_a_choice_keeps_what_the_assumptions_need_and_states_its_error(tmp_path)
     assert errors_of(left) and broken_of(left) == []
     monkey = Chooser(scene, "reference", scene.quantities, scene.tolerance)
     monkey.breaks_assumption = lambda chosen: False  # what the screen foretells is confirmed by whole runs, too
-    assert not monkey.within_tolerance(monkey.confirm(frozenset(["lift_off"])))
+    assert not monkey.within_tolerance(monkey.confirmed_changes(frozenset(["lift_off"])))
 
 
 def test_points_of_work_precision_curves_are_marked():

@@ -7,7 +7,7 @@ import pytest
 from numba import njit
 
 from models.brake.advance import FINE, FOLDED
-from models.brake.sprung_step import OVER, Units, ended, to_units
+from models.brake.sprung_step import OVER, Units, status_at_end, to_units
 from models.machine.stack import start
 from models.multibody.forces import _turned_to
 from models.multibody.tree import PER_LINK, TURNED
@@ -22,7 +22,7 @@ def turned_to(link, axle):
 
 @njit
 def ending(q, units, fold):
-    return ended(q, units, fold)
+    return status_at_end(q, units, fold)
 
 
 @pytest.mark.parametrize("heading", [-2.5, 0.0, 0.3])

@@ -1,1 +1,3 @@
-"""Advice before a decision: which setting is the cheapest, and which effects are needed."""
+"""Advice before a simulation is set up: the cheapest solver setting for a tolerance, and the effects that a scene can
+do without.
+"""

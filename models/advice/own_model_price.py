@@ -1,4 +1,5 @@
-"""Cost of accuracy for a user's model: which engine, integrator and step keep a coordinate within a tolerance.
+"""Cost of accuracy for a user's own MuJoCo model: the engine, integrator and step that keep a coordinate within a
+tolerance.
 
 The search is that of ``models.advice.price``. Exudyn marches the description, MuJoCo the file's own model, so that what
 its integrators do with joint damping is what the user would have. Coordinates are those of hinges, slides and the
@@ -24,31 +25,32 @@ from models.own_model.reading import TwinModel
 from models.own_model.states import random_states
 
 ALL_COORDINATES = "all"
-"""The quantity of all coordinates together."""
+"""Name of the quantity that comprises all coordinates of the model."""
 STEPS_PER_SECOND = (40, 50, 80, 100, 160, 200, 250, 400, 500, 800, 1000, 1600, 2000, 4000, 8000, 16000, 32000)
 TRIED_STEPS = tuple(1.0 / n for n in STEPS_PER_SECOND)
-"""s: tried by every method."""
+"""Step sizes (s) that are tried with every integration method."""
 METHODS_OF_ENGINE = {
     "exudyn": ("RK44", "RK33", "ExplicitMidpoint", "ExplicitEuler", "GeneralizedAlpha", "TrapezoidalIndex2"),
     "mujoco": ("RK4", "Euler", "implicit", "implicitfast"),
 }
 CALLS_PER_STEP = {"RK44": 4, "RK4": 4, "RK33": 3, "ExplicitMidpoint": 2}
 REFERENCE_METHOD, REFERENCE_TOLERANCE = "DOP853", 1e-10
-"""Method of another family about the plain equations, and its relative tolerance."""
+"""Integration method of scipy that checks the reference with the plain equations of motion, and its relative tolerance.
+"""
 USUAL_STEP = 5e-3
-"""s: taken for Exudyn's default method, which has none of its own."""
+"""Step size (s) assumed for Exudyn's default method, as Exudyn itself has no default step."""
 
 
 @dataclass(frozen=True, eq=False)
 class PricedModel:
-    """The user's own model as a priced scene, see ``models.advice.price.OwnScene``: 1 s from a random state, as in the
-    paths of the certificate.
+    """The user's own model as a scene whose accuracy is priced, see ``models.advice.price.PricedScene``: 1 s of motion
+    from a random state.
     """
 
     twin: TwinModel
     quantity: str
     where = "in the engine"
-    whole = first = PATH_DURATION
+    full_duration = searched_duration = PATH_DURATION
     kink_period = 0.0
     counted = "force calls"
 
@@ -59,7 +61,7 @@ class PricedModel:
 
     @cached_property
     def columns(self) -> list[int]:
-        """Indices of the coordinates that make up the quantity."""
+        """Indices of the model's coordinates that make up the quantity."""
         index_by_name = named_coordinates(self.twin)
         return [i for name, i in index_by_name.items() if self.quantity in (ALL_COORDINATES, name)]
 
@@ -71,11 +73,11 @@ class PricedModel:
 
     @property
     def note(self) -> str:
-        """Text that describes the run."""
+        """Text on the start state of the run, and on the model that each engine integrates."""
         return "from the random state of the paths; MuJoCo marches the file's own model, Exudyn the description"
 
     def ladders(self) -> list[SettingLadder]:
-        """Ladders of settings for every method; MuJoCo's default step is that of the model's file."""
+        """Series of step sizes for every integration method; MuJoCo's default step is the one of the model's file."""
         return [
             SettingLadder(
                 engine, method, TRIED_STEPS, CATALOGUE[engine][method].order, default=self._default(engine, method)
@@ -93,16 +95,18 @@ class PricedModel:
         return min(TRIED_STEPS, key=lambda step: abs(step - wanted)) if wanted else 0.0
 
     def reference(self) -> SettingLadder:
-        """Ladder of the reference: halved steps of MuJoCo's RK4, which is the fastest method."""
+        """Series of halved steps of MuJoCo's RK4, the fastest method, with which the reference is computed."""
         return SettingLadder("mujoco", "RK4", tuple(0.01 / 2**k for k in range(14)), 4)
 
-    def second(self, reference_setting: Setting) -> Setting | None:
-        """Setting that must agree with the reference: a Runge-Kutta method of order 8 with the plain equations."""
+    def second_setting(self, reference_setting: Setting) -> Setting | None:
+        """Setting whose run must agree with the reference: a Runge-Kutta method of order 8 with the plain equations of
+        motion.
+        """
         return Setting("reference", REFERENCE_METHOD, reference_setting.value, 0)
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
-        """Times, coordinates of the quantity, and number of force calls of a run; RunFailed where a method stops or the
-        motion blows up.
+        """Times (s), coordinates of the quantity, and number of force calls of a run; RunFailed where a method stops or
+        the motion blows up.
         """
         steps, (q,), (v,) = round(duration / setting.value), *random_states(self.twin, 1)
         path = self._path(setting, (q, v), steps)
@@ -112,7 +116,7 @@ class PricedModel:
         return setting.value * np.arange(steps + 1), path, calls
 
     def _path(self, setting: Setting, start_state: tuple[np.ndarray, np.ndarray], steps: int) -> np.ndarray:
-        """Values (steps + 1, k) of the quantity along a run."""
+        """Coordinates (steps + 1, k) of the quantity along a run of the model."""
         twin, step = self.twin, setting.value
         if setting.engine == "mujoco":
             states = file_path(twin, start_state, (steps, step), setting.method)
@@ -125,6 +129,7 @@ class PricedModel:
         return self._exact(start_state, steps, step)
 
     def _exact(self, start_state: tuple[np.ndarray, np.ndarray], steps: int, step: float) -> np.ndarray:
+        """Coordinates of the quantity along a run by the reference method, with the plain equations of motion."""
         tree, n = plain_tree(self.twin), self.twin.size
 
         def rates(t: float, state: np.ndarray) -> np.ndarray:
@@ -147,21 +152,21 @@ class PricedModel:
         states: np.ndarray = solved.sol(times).T
         return states[:, self.columns]
 
-    def answer(self, solution: Any) -> PricedRun:
-        """The quantity along a run, with the number of force calls."""
+    def priced_run(self, solution: Any) -> PricedRun:
+        """Coordinates of the quantity along a run, with the number of force calls."""
         times, values, calls = solution
         return PricedRun(times, values, {"force calls": calls})
 
     def lines(self, setting: Setting) -> list[str]:
-        """The setting in the syntax of the engine."""
+        """The solver setting in the syntax of the engine."""
         if setting.engine == "mujoco":
             return [f'<option integrator="{setting.method}" timestep="{setting.value:g}"/>']
         return [f"exudyn.DynamicSolverType.{setting.method}, steps of {setting.value:g} s"]
 
 
 def recommended_settings(twin: TwinModel, tolerance: float, quantity: str | None) -> Recommendation:
-    """The cheapest settings of a model that meet a tolerance; InputError for an unknown quantity or an impossible
-    tolerance.
+    """The cheapest solver settings of a user's own model that meet a tolerance (rad or m); InputError for an unknown
+    quantity or an impossible tolerance.
     """
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in rad or m")
@@ -178,17 +183,19 @@ def recommended_settings(twin: TwinModel, tolerance: float, quantity: str | None
 
 
 def named_coordinates(twin: TwinModel) -> dict[str, int]:
-    """Indices of the coordinates that MuJoCo has as well, by the names of their joints."""
+    """Indices of the coordinates that MuJoCo has as well, by the names of their joints; angles of free and ball joints
+    are left out.
+    """
     names, angles = twin.names, {turning.first + i for turning in twin.coordinates.turnings for i in range(3)}
     return {_joint_name(name): i for i, name in enumerate(names) if i not in angles}
 
 
 def _joint_name(name: str) -> str:
-    """Name of a joint as a user types it, without its type."""
+    """Name of a joint as a user types it, without the prefix "joint" and quotes."""
     return name.removeprefix("joint ").replace("'", "")
 
 
 def unit_of(twin: TwinModel, coordinate: int) -> str:
-    """Unit of a coordinate: "rad" or "m"."""
+    """Unit of a coordinate of the model: "rad" or "m"."""
     _, freedom = twin.driven.vehicle.coordinates()[coordinate]
     return "rad" if freedom.startswith("r") else "m"

@@ -1,1 +1,3 @@
-"""Whipple's bicycle: linear equations, ideal rolling, tyres for engines, and what measurements say of it."""
+"""Whipple's bicycle: linear equations, nonlinear motion with ideal rolling, tyres for engines, and comparison with
+measured weave.
+"""

@@ -1,4 +1,4 @@
-"""The bicycle's bodies on the common description, their coordinates, and a run of them.
+"""The bicycle's bodies in the common vehicle description, their coordinates, and the result of a run.
 
 Axes of ISO 8855: x forward, y to the left, z up; lean to the right is positive, as a right-handed turn about x. The
 design position has the steering axis upright, so that it lies along a joint's z: the pitch of the rear frame is -tilt
@@ -16,13 +16,15 @@ from models.vehicles.spatial import Body, SpatialVehicle
 
 X, Y, YAW, HEIGHT, LEAN, PITCH, REAR, STEER, FRONT = range(COUNT := 9)
 FALLEN_LEAN = 1.4
-"""rad of lean at which a run ends: the bicycle lies on the ground."""
+"""Lean angle (rad) at which a run ends, as the bicycle lies on the ground."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ride:
-    """Result of a run: times (n,), positions and rates (n, 9), energy (n,) and work (n,) of tyres and control since the
-    start (J), and the number of steps; reports (n, 2, REPORTED) of the tyres, empty for ideally rolling wheels."""
+    """Result of a bicycle run: times (n,) in s, positions and rates (n, 9), energy (n,) and work (n,) of tyres and
+    control since the start (J), and the number of steps; reports (n, 2, REPORTED) of the tyres, None for ideally
+    rolling wheels.
+    """
 
     times: np.ndarray
     positions: np.ndarray
@@ -33,12 +35,12 @@ class Ride:
     tyres: np.ndarray | None = None
 
     def unaccounted(self) -> float:
-        """Largest energy change that neither tyres nor control explain, relative to the energy at the start."""
+        """Largest energy change that neither tyres nor control explain, as a ratio to the energy at the start."""
         return float(np.abs(self.energy - self.work - self.energy[0]).max() / abs(self.energy[0]))
 
 
 def four_bodies(b: Whipple) -> SpatialVehicle:
-    """The bicycle's bodies in tree order, in the design position with the steering axis upright."""
+    """The bicycle's bodies as a vehicle description, in the design position with the steering axis upright."""
     sine, cosine = math.sin(b.tilt), math.cos(b.tilt)
     rotation = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
     origin = np.array([0.0, 0.0, b.rear_wheel.radius])
@@ -67,8 +69,9 @@ def four_bodies(b: Whipple) -> SpatialVehicle:
 
 
 def straight_rolling(b: Whipple, speed: float, lean_rate: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and rates (9,) of rolling straight and upright at a speed (m/s), with a lean rate (rad/s) about the
-    line of the contacts."""
+    """Positions and rates (9,) of straight upright rolling at a speed (m/s), with a lean rate (rad/s) about the line
+    through both contact points.
+    """
     q, v = np.zeros(COUNT), np.zeros(COUNT)
     q[PITCH] = -b.tilt
     v[X], v[REAR], v[FRONT] = speed, speed / b.rear_wheel.radius, speed / b.front_wheel.radius

@@ -1,4 +1,4 @@
-"""Independent reference: the nonlinear bicycle with wheels that roll ideally, in plain equations.
+"""Independent reference: the nonlinear bicycle with ideally rolling wheels, in hand-written equations.
 
 Bodies move by products of matrices (``models.multibody.plain``); coordinates are those of ``four_bodies``. Each wheel
 touches the ground in its lowest point, whose material point has no velocity: six conditions J(q) v = 0 on nine rates.
@@ -33,7 +33,7 @@ UPWARD = np.array([0.0, 0.0, 1.0])
 
 
 class IdealBicycle:
-    """The bicycle as four bodies whose wheels roll ideally; raises the same errors as ``Whipple``."""
+    """The bicycle as four bodies with ideally rolling wheels; raises the same errors as ``Whipple``."""
 
     def __init__(self, bicycle: Whipple, control: Control = NO_CONTROL) -> None:
         vehicle = four_bodies(bicycle)
@@ -44,14 +44,15 @@ class IdealBicycle:
         self._wheels = [(self.bodies.row[name], radius) for name, radius in wheels.items()]
 
     def contacts(self, motion: PlainMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Kinematics of both contacts: their heights (2,) m, the Jacobian (6, 9) of the velocities of the material
-        points there, and the part (6,) of these points' accelerations without dv/dt."""
+        """Kinematics of both wheel contacts: their heights (2,) in m, the Jacobian (6, 9) of the velocities of the
+        material points there, and the part (6,) of these points' accelerations without dv/dt.
+        """
         contact_rows = [_wheel_contact(motion.matrices[row], radius) for row, radius in self._wheels]
         heights, jacobians, rates = zip(*contact_rows, strict=True)
         return np.array(heights), np.vstack(jacobians), np.concatenate(rates)
 
     def rolling(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Matrix N (9, 3) in v = N u, with the rates u of FREE_RATES, and v (9,)."""
+        """Matrix N (9, 3) of rolling, with v = N u and the free rates u of FREE_RATES, and all rates v (9,)."""
         contact = self.contacts(self.bodies.move(q, np.zeros(COUNT)))[1]
         N = np.zeros((COUNT, 3))
         N[FREE_RATES] = np.eye(3)
@@ -59,7 +60,7 @@ class IdealBicycle:
         return N, N @ u
 
     def rates(self, time: float, state: np.ndarray) -> np.ndarray:
-        """Time derivatives (12,) of the state, which holds positions and free rates."""
+        """Time derivatives (12,) of the bicycle's state, which holds positions (9,) and free rates (3,)."""
         q, (N, v) = state[:COUNT], self.rolling(state[:COUNT], state[COUNT:])
         motion, bias = self.bodies.move(q, v), np.zeros(COUNT)
         _, contact, without = self.contacts(motion)
@@ -69,7 +70,8 @@ class IdealBicycle:
 
     def applied(self, v: np.ndarray) -> np.ndarray:
         """Generalised forces (9,) of control and steering friction; the control depends on the speed of the rear
-        wheel."""
+        wheel.
+        """
         force, control = np.zeros(COUNT), self.control
         speed = v[REAR] * self.bicycle.rear_wheel.radius
         force[STEER] = -control.lean_rate_gain(speed) * v[LEAN] - control.friction * v[STEER]
@@ -77,7 +79,8 @@ class IdealBicycle:
         return force
 
     def upright(self, speed: float, lean_rate: float = 0.0, lean: float = 0.0, steer: float = 0.0) -> np.ndarray:
-        """State (12,): wheels on the ground, at a speed (m/s) of the rear wheel, with a lean rate (rad/s).
+        """Start state (12,) with the wheels on the ground, at a speed (m/s) of the rear wheel, with a lean rate
+        (rad/s).
 
         lean, steer in rad; height and pitch follow from the contacts.
         """
@@ -91,15 +94,18 @@ class IdealBicycle:
         return np.concatenate([q, [lean_rate, 0.0, speed / radius]])
 
     def energy(self, q: np.ndarray, v: np.ndarray) -> float:
-        """Sum of kinetic and potential energy (J); the potential energy is 0 when all centres of mass are on the
-        ground."""
+        """Sum of kinetic and potential energy (J) of the bicycle; the potential energy is 0 when all centres of mass
+        are on the ground.
+        """
         motion = self.bodies.move(q, v)
         mass, _ = self.bodies.inertia(motion, self.gravity)
         levels = motion.matrices[1:, PLACE, 2, 3]
         return float(0.5 * v @ mass @ v + self.bicycle.gravity * self._masses @ levels)
 
     def run(self, state: np.ndarray, duration: float, rows: int = 501, tolerance: float = 1e-9) -> Ride:
-        """Integrate from a state (12,) over a duration (s) by DOP853; RunFailed if the bicycle falls to the ground."""
+        """Integrate the motion from a state (12,) over a duration (s) by DOP853; RunFailed if the bicycle falls to the
+        ground.
+        """
 
         def lies(time: float, state: np.ndarray) -> float:
             return FALLEN_LEAN - abs(state[LEAN])

@@ -1,4 +1,4 @@
-"""Whipple's bicycle for an engine: bodies behind joints, and compiled forces of both tyres and of the control.
+"""Whipple's bicycle for an engine: bodies behind joints, and compiled forces of both tyres and of the steering control.
 
 Bodies and coordinates are those of ``four_bodies``; the table is laid out as ``models.multibody.forces`` reads it, with
 the control's numbers in place of a car's.
@@ -44,11 +44,13 @@ from models.vehicles.spatial import SpatialVehicle
 
 WHEEL_COUNT = 2
 (GAIN, FEEDBACK_SPEED_LIMIT, FRICTION, DRY_FRICTION, DRY_RATE, SPEED_GAIN, SPEED_BIAS, CONTROL_COUNT) = range(8)
-"""Numbers of the control, gains multiplied."""
+"""Column indices of the control's parameters in the table of numbers, with gains multiplied; CONTROL_COUNT is their
+number.
+"""
 
 
 class BicycleTyre(Strict):
-    """[tyres]: both wheels; the reference rolls ideally, as tyres do in the limit of stiffness."""
+    """[tyres]: tyre parameters of both wheels; ideally rolling wheels are the limit of infinite stiffness."""
 
     cornering: float = quantity("1/rad", "side force by slip angle and load", default=20.0)
     vertical: float = quantity("N/m", "vertical stiffness", default=2e5)
@@ -60,13 +62,14 @@ class BicycleTyre(Strict):
 
 
 UNCHANGED_TYRE = BicycleTyre()
-"""A tyre that no scene changes."""
+"""Default bicycle tyre, with the usual values of all parameters."""
 
 
 @dataclass(frozen=True, eq=False)
 class RollingBicycle:
-    """The bicycle on its tyres; ``driven`` is what engines build. InputError for features that only the linear
-    equations have."""
+    """The bicycle on its tyres; ``driven`` is the description that engines build. InputError for parameters that only
+    the linear equations can handle.
+    """
 
     bicycle: Whipple
     tyre: BicycleTyre = UNCHANGED_TYRE
@@ -96,14 +99,15 @@ class RollingBicycle:
         return Driven(self.vehicle, gravity, self.numbers, bicycle_forces, set_bicycle_forces)
 
     def report(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Reports (n, 2, REPORTED) of the tyres and ledgers (n, LEDGER), columns of ``models.multibody.forces``, at
-        positions and rates (n, 9)."""
+        """Reports (n, 2, REPORTED) of the tyres and energy ledgers (n, LEDGER), columns of ``models.multibody.forces``,
+        at positions and rates (n, 9).
+        """
         tyres, ledgers = np.empty((len(q), WHEEL_COUNT, REPORTED)), np.empty((len(q), LEDGER))
         read_bicycle(self.numbers, np.ascontiguousarray(q), np.ascontiguousarray(v), tyres, ledgers)
         return tyres, ledgers
 
     def loads(self) -> tuple[float, float]:
-        """Static loads (N) of the rear and the front wheel."""
+        """Static wheel loads (N) of the rear and the front wheel."""
         b, g = self.bicycle, self.bicycle.gravity
         mass = b.rear_wheel.mass + b.body.mass + b.front_frame.mass + b.front_wheel.mass
         moment = b.body.mass * b.body.x + b.front_frame.mass * b.front_frame.x + b.front_wheel.mass * b.wheelbase
@@ -112,7 +116,7 @@ class RollingBicycle:
 
 
 def _table(bicycle: RollingBicycle) -> np.ndarray:
-    """Table of all numbers that the compiled forces of the bicycle read."""
+    """Table of all numbers that the bicycle's compiled forces read."""
     c, patch, rows = bicycle.control, net(bicycle.tyre.cells), joints(bicycle.vehicle)
     counts = [len(body.freedoms) for body in bicycle.vehicle.bodies for _ in body.freedoms]
     rows[[REAR, FRONT], tree.KIND] = tree.LOOSE
@@ -141,7 +145,7 @@ def _table(bicycle: RollingBicycle) -> np.ndarray:
 
 
 def _tyres(bicycle: RollingBicycle) -> np.ndarray:
-    """Numbers (2, PER_TYRE) of both tyres, in the columns of a car's tyres, of which the bicycle needs only some."""
+    """Parameters (2, PER_TYRE) of both tyres, in the columns of a car's tyres, of which the bicycle needs only some."""
     t, table = bicycle.tyre, np.zeros((WHEEL_COUNT, forces.PER_TYRE))
     vertical, width = t.stiffness**2 * t.vertical, t.half_width / t.stiffness
     wheels = (
@@ -163,7 +167,9 @@ def _tyres(bicycle: RollingBicycle) -> np.ndarray:
 
 @lean
 def _tyre_load(tyre, vehicle, wheel):
-    """Load of a tyre, which acts at the wheel's lowest point; fills the ``WheelContact``."""
+    """Apply the load of a tyre at the wheel's lowest point, and fill the ``WheelContact`` for the tyre's creep
+    forces.
+    """
     patch, slip, way, report, ledger = wheel.patch, wheel.slip, wheel.way, wheel.report, vehicle.ledger
     spot = row(vehicle.tree.spots, tree.PER_SPOT, int(tyre[forces.POINT]))
     link, spin = (
@@ -200,8 +206,9 @@ def _tyre_load(tyre, vehicle, wheel):
 
 @lean
 def _add_steering_torque(table_of_numbers, vehicle):
-    """Add the steering torque (to the left) of control and friction, which depends on the speed of the rear wheel's
-    centre."""
+    """Add the steering torque (N m, to the left) of control and friction, which depends on the speed of the rear
+    wheel's centre.
+    """
     v = vehicle.rates
     missing = max(
         table_of_numbers[FEEDBACK_SPEED_LIMIT]
@@ -218,8 +225,8 @@ def _add_steering_torque(table_of_numbers, vehicle):
 
 @lean
 def all_bicycle_forces(table_of_numbers, q, v, forces_on_coordinates, report, ledger):
-    """Add all forces to ``forces_on_coordinates`` (9,); all are arrays: table, q, v (9,), report (2, REPORTED), ledger
-    (LEDGER,).
+    """Add the forces of tyres and control to ``forces_on_coordinates`` (9,); all arguments are arrays: table, q, v
+    (9,), report (2, REPORTED), ledger (LEDGER,).
     """
     vehicle, table = (
         enter(table_of_numbers, q, v, forces_on_coordinates, doubles(room(table_of_numbers)), ledger),
@@ -247,8 +254,8 @@ def all_bicycle_forces(table_of_numbers, q, v, forces_on_coordinates, report, le
 
 @lean
 def bicycle_forces(table_of_numbers, t, q, v, forces_on_coordinates):
-    """Add the bicycle's forces to ``forces_on_coordinates``. For callbacks: all arguments but the time (s) are pointers
-    to doubles.
+    """Add the bicycle's forces to ``forces_on_coordinates``. For callbacks of engines: all arguments but the time (s)
+    are pointers to doubles.
     """
     report, ledger = array(doubles(WHEEL_COUNT * REPORTED), (WHEEL_COUNT, REPORTED)), array(doubles(LEDGER), (LEDGER,))
     table = array(table_of_numbers, (int(array(table_of_numbers, (forces.HEADER,))[forces.COUNT]),))
@@ -259,8 +266,9 @@ def bicycle_forces(table_of_numbers, t, q, v, forces_on_coordinates):
 
 @lean
 def set_bicycle_forces(block, t, n):
-    """Set ``f`` to the forces of ``bicycle_forces``. All data are in one block of doubles at an address: f, q and v
-    (n,), then the table."""
+    """Set the generalised forces f of ``bicycle_forces``. All data are in one block of doubles at an address: f, q and
+    v (n,), then the table.
+    """
     f = at(block)
     array(f, (n,))[:] = 0.0
     bicycle_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
@@ -268,7 +276,7 @@ def set_bicycle_forces(block, t, n):
 
 @lean
 def read_bicycle(table_of_numbers, q, v, reports, ledgers):
-    """Fill reports (m, 2, REPORTED) of the tyres and ledgers (m, LEDGER) of energy for states (m, 9)."""
+    """Fill the reports (m, 2, REPORTED) of the tyres and the ledgers (m, LEDGER) of energy for states (m, 9)."""
     f = array(doubles(COUNT), (COUNT,))
     for i in range(len(q)):
         f[:] = 0.0

@@ -1,4 +1,5 @@
-"""Which suspects measured weave eigenvalues call for: what the choice of subsets (``identification.subsets``) judges.
+"""Which suspected parameters of a bicycle's control explain measured weave eigenvalues, by a choice of subsets
+(``identification.subsets``).
 
 The least squares are those of the means over windows. The weave's two parts err with the covariance of single windows:
 more of them do not help, for they share what the fitted shape does wrong (a trend beside the constant moves all of a
@@ -23,15 +24,17 @@ SUSPECTED_PARAMETERS = {
     "speed_gain": Candidate(1.0),
     "speed_bias": Candidate(0.0),
 }
-"""What experimenters suspect of a bicycle's control, keys of ``Control``."""
+"""Parameters of a bicycle's control that may explain a deviation from measurement, keys of ``Control``."""
 FRICTION_SETS = {"friction of either kind": ("friction", "dry_friction")}
 UNIT_OF_SUSPECT = {"friction": "N m s/rad", "dry_friction": "N m", "speed_bias": "m/s"}
 NO_WEAVE = -20.0 + 0.0j
-"""Stands for a weave (1/s) that does not swing at all."""
+"""Eigenvalue (1/s) that replaces the weave of a model whose weave does not oscillate."""
 
 
 def predicted_weave(bicycle: Whipple, control: Control, observation: Observation) -> np.ndarray:
-    """Prediction (3,) of a model at a speed: real and imaginary part of the weave (1/s), and measured speed (m/s)."""
+    """Prediction (3,) of a bicycle model at a measured speed: real and imaginary part of the weave eigenvalue (1/s),
+    and measured speed (m/s).
+    """
     weave = bicycle.weave(observation.speed, control.viscous(float(observation.inverse_steer_rate.mean())))
     weave = weave if np.isfinite(weave) else NO_WEAVE
     return np.array([weave.real, weave.imag, control.speed_gain * observation.speed + control.speed_bias])
@@ -43,8 +46,9 @@ def ranked_suspects(
     observations: Sequence[Observation],
     suspects: Sequence[str] = tuple(SUSPECTED_PARAMETERS),
 ) -> Choice:
-    """Fits of every subset of the suspected parameters, ranked; InputError for fewer than two speeds, or an unknown
-    name."""
+    """Fits of every subset of the suspected control parameters, ranked; InputError for fewer than two speeds, or an
+    unknown name.
+    """
     for name in suspects:
         if name not in SUSPECTED_PARAMETERS:
             raise InputError("", "suspects", name, "no such suspect", tuple(SUSPECTED_PARAMETERS))
@@ -65,8 +69,9 @@ def ranked_suspects(
 def averaged_weave(
     bicycle: Whipple, base_control: Control, choice: Choice, observation: Observation
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Damping and frequency (2,) of the weave, averaged over all subsets with their weights, and their standard
-    deviations (2,)."""
+    """Decay rate and angular frequency (2,) of the weave, averaged over all subsets of parameters with their weights,
+    and their standard deviations (2,).
+    """
     return choice.forecast(
         lambda values: predicted_weave(bicycle, base_control.model_copy(update=values), observation)[:2]
     )
@@ -75,15 +80,17 @@ def averaged_weave(
 def forecast_deviations(
     bicycle: Whipple, base_control: Control, choice: Choice, observation: Observation
 ) -> np.ndarray:
-    """Forecast less measured damping and frequency (2,), divided by the standard deviation of measurement and forecast
-    together."""
+    """Forecast less measured real and imaginary part of the weave (2,), divided by the standard deviation of
+    measurement and forecast together.
+    """
     mean, deviation = averaged_weave(bicycle, base_control, choice, observation)
     return np.asarray((mean - observation.mean[:2]) / np.hypot(observation.deviation[:2], deviation))
 
 
 def _sensor_error(observations: Sequence[Observation]) -> float:
     """Standard deviation (m/s) of the speed sensor's means about a fitted line; 0 for two speeds, which any line
-    fits."""
+    fits.
+    """
     if len(observations) < 3:
         return 0.0
     speeds, means = np.array([(o.speed, o.mean[2]) for o in observations]).T
@@ -92,8 +99,9 @@ def _sensor_error(observations: Sequence[Observation]) -> float:
 
 
 def _whitening_matrix(observation: Observation, sensor: float) -> np.ndarray:
-    """Matrix (3, 3) that maps deviations to independent standard normal ones; the error of the speed sensor counts as
-    independent."""
+    """Matrix (3, 3) that maps deviations from the prediction to independent standard normal ones; the error of the
+    speed sensor counts as independent.
+    """
     covariance = np.zeros((3, 3))
     covariance[:2, :2] = np.cov(observation.parts[:, :2].T)
     covariance[2, 2] = observation.deviation[2] ** 2 / len(observation.weave) + sensor**2

@@ -1,4 +1,4 @@
-"""Weave eigenvalues measured: decaying sinusoids fitted to the lean rate in windows of free decay.
+"""Measured weave eigenvalues of a bicycle: decaying sinusoids fitted to the lean rate in windows of free decay.
 
 A folder holds ``windows.csv`` (file, speed of the treadmill in m/s, first and last sample of a window) and for each
 ``file`` a recording whose name ends in ``_{file}kph.csv`` or ``.csv.gz``, sampled at 100 Hz, with columns ``lean_rate``
@@ -15,17 +15,17 @@ from scipy.optimize import least_squares
 from models.core.errors import InputError
 
 SAMPLING_RATE = 100.0
-"""Samples per second."""
+"""Samples per second of the recordings."""
 SHORTEST_WINDOW = 20
-"""Samples of a window."""
+"""Least number of samples in a window of free decay."""
 FIT_STARTS = [(decay, frequency) for decay in (-1.0, -3.0, -6.0) for frequency in (4.0, 7.0, 10.0)]
-"""Where fits begin (1/s, rad/s)."""
+"""Start values of the fits: real part (1/s) and angular frequency (rad/s)."""
 COLUMN_HEADINGS = ("lean_rate", "fork_rate", "speed")
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """Measurements in windows (n,) at one speed (m/s) of the treadmill.
+    """Measurements of the weave in windows (n,) at one speed (m/s) of the treadmill.
 
     weave : eigenvalues (1/s); measured_speed : mean of the speed sensor (m/s); inverse_steer_rate : mean of |steer
     rate| by mean of its square (s/rad), by which dry friction is worth a viscous one.
@@ -38,23 +38,28 @@ class Observation:
 
     @property
     def parts(self) -> np.ndarray:
-        """Measured values (n, 3) per window: real and imaginary part of the weave (1/s), measured speed (m/s)."""
+        """Measurements (n, 3) per window: real and imaginary part of the weave eigenvalue (1/s), measured speed
+        (m/s).
+        """
         return np.column_stack([self.weave.real, self.weave.imag, self.measured_speed])
 
     @property
     def mean(self) -> np.ndarray:
-        """Means (3,) of ``parts`` over the windows."""
+        """Means (3,) over the windows of the weave's real and imaginary part (1/s) and of the measured speed (m/s)."""
         return self.parts.mean(axis=0)
 
     @property
     def deviation(self) -> np.ndarray:
-        """Standard deviations (3,) of ``parts`` between the windows."""
+        """Standard deviations (3,) between the windows of the weave's real and imaginary part (1/s) and of the measured
+        speed (m/s).
+        """
         return self.parts.std(axis=0, ddof=1)
 
 
 def decaying_sinusoid(values: np.ndarray, rate: float = SAMPLING_RATE) -> complex:
     """Eigenvalue s + i w (1/s) of the function e^{s t} (a cos w t + b sin w t) + c fitted to samples (n,) by least
-    squares; w is above 0."""
+    squares; w is not negative.
+    """
     times = np.arange(len(values)) / rate
 
     def left(decay_and_frequency: np.ndarray) -> np.ndarray:
@@ -75,7 +80,9 @@ def decaying_sinusoid(values: np.ndarray, rate: float = SAMPLING_RATE) -> comple
 
 
 def observations(folder: str | Path) -> list[Observation]:
-    """Observations of a folder by ascending speed; InputError with file, position and value where it cannot be read."""
+    """Observations of the weave from a folder, by ascending speed; InputError with file, position and value where it
+    cannot be read.
+    """
     folder, rows = Path(folder), _rows_of_windows(Path(folder) / "windows.csv")
     recordings = {label: _columns_of_recording(folder, label) for label in {row[0] for row in rows}}
     by_speed = dict[float, list[tuple[complex, float, float]]]()
@@ -97,7 +104,7 @@ def observations(folder: str | Path) -> list[Observation]:
 
 
 def _rows_of_windows(path: Path) -> list[tuple[str, float, int, int]]:
-    """Rows of the file windows.csv."""
+    """Rows of the file windows.csv: label of the recording, speed (m/s), first and last sample."""
     if not path.is_file():
         raise InputError(path, "", None, "no such file: it lists file, speed [m/s], first and last sample")
     rows = []
@@ -117,7 +124,7 @@ def _rows_of_windows(path: Path) -> list[tuple[str, float, int, int]]:
 
 
 def _columns_of_recording(folder: Path, label: str) -> dict[str, np.ndarray]:
-    """Columns of the recording with a given label."""
+    """Columns lean rate, fork rate (rad/s) and speed (m/s) of the recording with a given label."""
     paths = sorted(path for path in folder.glob("*.csv*") if path.name.partition(".csv")[0].endswith(f"_{label}kph"))
     if len(paths) != 1:
         allowed = f"{len(paths)} recordings end in _{label}kph.csv or .csv.gz, one is needed"

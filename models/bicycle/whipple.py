@@ -22,15 +22,15 @@ from models.core.strict import Strict, quantity, read
 
 PARAMETER_SET_FOLDER = Path(__file__).parents[1] / "vehicles" / "parameters" / "bicycles"
 LARGEST_TILT = 1.5
-"""rad of the steering axis."""
+"""Largest tilt (rad) of the steering axis."""
 MEASURED_INERTIA_FACTOR = 1.05
-"""By how much a measured inertia may be beyond what a rigid body can have."""
+"""Ratio up to which a measured inertia may exceed the largest one that a rigid body can have."""
 HIGHEST_SPEED = 100.0
-"""m/s"""
+"""Highest speed (m/s) at which eigenvalues are computed, in either direction."""
 
 
 class Wheel(Strict):
-    """A wheel, its inertia about all axes across its axle one number; zero is a wheel without inertia."""
+    """A bicycle wheel. Its inertia about all axes across the axle is one number; zero inertia is allowed."""
 
     radius: float = quantity("m", "of the wheel")
     mass: float = quantity("kg", "of the wheel", zero=True)
@@ -49,7 +49,9 @@ class Wheel(Strict):
 
 
 class Frame(Strict):
-    """Rear frame with a rigid rider, or the front frame; Iyy is Ixx + Izz, that of a flat body, where it is missing."""
+    """A bicycle's rear frame with a rigid rider, or its front frame; where Iyy is missing it is Ixx + Izz, as for a
+    flat body.
+    """
 
     x: float = quantity("m", "centre of mass, forward from the rear contact", signed=True)
     z: float = quantity("m", "centre of mass, down from the ground: above it is negative", signed=True)
@@ -75,7 +77,7 @@ class Frame(Strict):
 
 
 class Control(Strict):
-    """What turns the steering beside the bicycle itself, and how its sensors and motor err.
+    """Steering control and friction of the bicycle, with the errors of its sensors and motor.
 
     Steer torque = torque_gain gain (until - measured speed) lean rate - friction steer rate - dry_friction of the steer
     rate's sign, the first where the measured speed, speed_gain v + speed_bias, is below ``until``. The encoder tells
@@ -93,12 +95,14 @@ class Control(Strict):
     speed_bias: float = quantity("m/s", "measured speed at standstill", default=0.0, signed=True)
 
     def lean_rate_gain(self, speed: float) -> float:
-        """Ratio of steer torque to lean rate (N m s/rad) at a speed (m/s)."""
+        """Ratio of the feedback's steer torque to the lean rate (N m s/rad) at a speed (m/s), without its negative
+        sign.
+        """
         missing = max(self.until - self.speed_gain * abs(speed) - self.speed_bias, 0.0)
         return self.torque_gain * self.gain * missing
 
     def viscous(self, slowness: float) -> "Control":
-        """The same control with viscous instead of dry friction, which does the same work in a given motion of the
+        """The same control with viscous in place of dry friction, which does the same work in a given motion of the
         steering.
 
         slowness : ratio (s/rad) of the mean of |steer rate| to the mean of its square.
@@ -108,11 +112,11 @@ class Control(Strict):
 
 
 NO_CONTROL = Control()
-"""No control, no friction."""
+"""Steering without control and without friction."""
 
 
 class LinearBicycle(NamedTuple):
-    """Matrices (2, 2) of the linear equations: M (kg m^2), C1 (kg m), K0 (kg m), K2 (kg)."""
+    """Matrices (2, 2) of the linear bicycle equations: M (kg m^2), C1 (kg m), K0 (kg m), K2 (kg)."""
 
     M: np.ndarray
     C1: np.ndarray
@@ -121,7 +125,7 @@ class LinearBicycle(NamedTuple):
 
 
 class Whipple(Strict):
-    """A bicycle of four rigid bodies whose wheels touch the ground in a point each."""
+    """A bicycle of four rigid bodies whose wheels touch the ground in one point each."""
 
     wheelbase: float = quantity("m", "distance of the contacts")
     trail: float = quantity("m", "how far the front contact lies behind the steering axis on the ground", signed=True)
@@ -133,13 +137,14 @@ class Whipple(Strict):
     front_wheel: Wheel
 
     def changed(self, **values: Any) -> "Whipple":
-        """The bicycle with some values changed, checked as in a file."""
+        """The bicycle with some parameters changed, checked as when it is read from a file."""
         return read(Whipple, {name: getattr(self, name) for name in type(self).model_fields} | values, "", "bicycle")
 
     @cached_property
     def linear(self) -> LinearBicycle:
-        """Matrices of the linear equations, from appendix A of the paper; InputError where the mass matrix is
-        singular."""
+        """Matrices of the bicycle's linear equations, from appendix A of the paper; InputError where the mass matrix is
+        singular.
+        """
         R, B, H, F, w = self.rear_wheel, self.body, self.front_frame, self.front_wheel, self.wheelbase
         sine, cosine = np.sin(self.tilt), np.cos(self.tilt)
         mass, front = R.mass + B.mass + H.mass + F.mass, H.mass + F.mass
@@ -182,14 +187,15 @@ class Whipple(Strict):
         return np.vstack([np.eye(2, 4, 2), lower_rows])
 
     def eigenvalues(self, speed: float, control: Control = NO_CONTROL) -> np.ndarray:
-        """Eigenvalues (4,) in 1/s at a speed (m/s), sorted by real, then imaginary part."""
+        """Eigenvalues (4,) in 1/s of the linear bicycle at a speed (m/s), sorted by real, then imaginary part."""
         if not abs(speed) <= HIGHEST_SPEED:
             raise InputError("", "speed", speed, f"must be from -{HIGHEST_SPEED:g} to {HIGHEST_SPEED:g} m/s")
         return np.sort_complex(np.linalg.eigvals(self.state_matrix(speed, control)))
 
     def weave(self, speed: float, control: Control = NO_CONTROL) -> complex:
-        """Eigenvalue (1/s) of the weave: the oscillatory one with positive imaginary part, the faster of two; NaN if
-        there is none."""
+        """Eigenvalue (1/s) of the weave: the oscillatory one with positive imaginary part, the faster one of two; NaN
+        if there is none.
+        """
         values = self.eigenvalues(speed, control)
         fastest = complex(values[np.argmax(values.imag)])
         return fastest if fastest.imag > 1e-9 * np.abs(values).max() else complex(np.nan, np.nan)
@@ -214,8 +220,9 @@ class Whipple(Strict):
 
     @property
     def weave_speed(self) -> float | None:
-        """Lowest speed (m/s) above which the uncontrolled bicycle's weave decays: the last root of Hurwitz' condition;
-        None if there is none."""
+        """Speed (m/s) above which the uncontrolled bicycle's weave decays: the last root of Hurwitz' condition; None if
+        there is none.
+        """
         E, D, C, B, A = self.characteristic
         roots = _positive_roots(B * C * D - A * D * D - B * B * E)
         oscillating = [v for v in roots if D(v) * B(v) > 0.0]  # a pair +-i w has w^2 = D / B
@@ -230,7 +237,7 @@ class Whipple(Strict):
 
 
 def _product_of_quadratics(first_entry: list[Polynomial], second_entry: list[Polynomial]) -> list[Polynomial]:
-    """Coefficients of the product of two quadratics in s."""
+    """Coefficients of the product of two quadratic polynomials in s, by power of s."""
     total = [Polynomial([0.0]) for _ in range(5)]
     for i, a in enumerate(first_entry):
         for j, b in enumerate(second_entry):
@@ -239,8 +246,9 @@ def _product_of_quadratics(first_entry: list[Polynomial], second_entry: list[Pol
 
 
 def _positive_roots(condition: Polynomial) -> list[float]:
-    """Positive roots v of a polynomial with only even or only odd powers of v, solved as one of at most second degree
-    in v^2."""
+    """Positive roots v (m/s) of a polynomial with only even or only odd powers of v, solved as one of at most second
+    degree in v^2.
+    """
     scale = np.abs(condition.coef).max()
     lowest = int(np.argmax(np.abs(condition.coef) > 1e-12 * scale))
     in_square = Polynomial(condition.coef[lowest::2])
@@ -250,8 +258,8 @@ def _positive_roots(condition: Polynomial) -> list[float]:
 
 
 def load_bicycle(name: str, folder: str | Path = ".", file: str = "", key_path: str = "bicycle") -> Whipple:
-    """The parameter set with this name, or in a TOML file with all parameters; ``file`` and ``key_path`` name the
-    asking scene in messages.
+    """The bicycle's parameter set with this name, or in a TOML file with all parameters; ``file`` and ``key_path`` name
+    the scene in error messages.
     """
     sets = {path.stem: path for path in sorted(PARAMETER_SET_FOLDER.glob("*.toml"))}
     if name not in sets and not name.endswith(".toml"):

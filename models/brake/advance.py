@@ -1,4 +1,4 @@
-"""One sample of the laboratory method: the vehicle's steps under the torques that its brakes have meanwhile."""
+"""One controller sample of the braked vehicle in the plane: its time steps under the torques of its brakes."""
 
 import math
 
@@ -13,17 +13,20 @@ from models.machine.compiled import inlined, lean
 from models.machine.stack import array, doubles
 
 FINE, AT_REST, NOT_FOUND, PITCHED_OVER, ROLLED_OVER, FOLDED = range(6)
-"""How a sample ended: still moving; standing; loads not found; an axle without load; both wheels of a side without
-load; a hinge of the train beyond its limit."""
+"""How a sample ended: still moving; standing; wheel loads not solved; an axle without load; both wheels of a side
+without load; a hinge of the train beyond its limit.
+"""
 
 MOST_PARTS = 64
-"""Into how many parts a step is cut at most, of a vehicle so slow that its side forces answer faster than the step."""
+"""Largest number of parts into which a step is cut where the vehicle is so slow that its side forces respond faster
+than the step.
+"""
 
 
 @inlined
 def end_status(motion, plane):
-    """FINE, or the way in which a step ends the run. It is read from wheel loads and hinge angles of units with two
-    axles.
+    """FINE, or the way in which a step ends the run: an axle or a side of a two-axle unit without load, or a hinge
+    beyond its limit angle.
 
     One lifted wheel does not end the run. It ends when both wheels of a side, or of an axle, lift.
     """
@@ -43,7 +46,7 @@ def end_status(motion, plane):
 
 @inlined
 def parts_of(state, regularising_speed):
-    """Number of equal parts into which to cut a step, so that the speed ``regularising_speed`` (m/s) falls below the
+    """Number of equal parts into which to cut a step, so that the part's ``regularising_speed`` (m/s) is at most the
     vehicle's speed.
 
     Slip angles are too small below ``regularising_speed``: the vehicle would slip sideways, and yaw on split friction,
@@ -55,8 +58,8 @@ def parts_of(state, regularising_speed):
 
 @inlined
 def in_parts(part_count, motion, torques, step, steer, vehicle, surfaces):
-    """Apply ``step_on`` to ``part_count`` equal parts of a step. The report holds means over the parts, but the sum of
-    the times locked.
+    """Advance the vehicle by a step in ``part_count`` equal parts; returns the time (s) that passed, or -1 where wheel
+    loads were not solved. The report holds means over the parts, but the sum of the times locked.
     """
     rows, piece, time, regular = motion.report, step / part_count, 0.0, vehicle.slope * 9.81 * step / part_count
     ends, sums = array(doubles(torques.size), torques.shape), array(doubles(rows.size), rows.shape)
@@ -85,7 +88,8 @@ def in_parts(part_count, motion, torques, step, steer, vehicle, surfaces):
 
 @lean
 def advance(motion, torques, step, steer, vehicle):
-    """Advance a ``PlaneMotion`` by n steps (s); torques (n + 1, W) at the steps' ends come from ``pressure``.
+    """Advance a ``PlaneMotion`` by n steps (s) under torques (n + 1, W) in N m at the steps' ends, which come from
+    ``pressure``.
 
     steer (W,): rad; vehicle: ``OnRoad``. Returns how it ended and the time (s) that passed.
     """
@@ -112,13 +116,13 @@ def advance(motion, torques, step, steer, vehicle):
 
 
 FATAL_ENDS = (NOT_FOUND, PITCHED_OVER, ROLLED_OVER, FOLDED)
-"""Ends of a sample after which a run cannot go on."""
+"""Ends of a sample after which a run cannot continue."""
 BODY_NAMES = ("vehicle", "trailer")
 HINGE_NAMES = ("the drawbar against the truck", "the trailer's body against the drawbar")
 
 
 def ending_sentence(status: int, plane: Plane, motion: PlaneMotion) -> str:
-    """Sentence on why a run ended, from the status and the motion of its last step."""
+    """Sentence on why a run ended, from the end status and the motion of its last step."""
     if status == FOLDED:
         return _folded_sentence(plane, motion.state[0, 2:])
     if status == NOT_FOUND:
@@ -129,6 +133,7 @@ def ending_sentence(status: int, plane: Plane, motion: PlaneMotion) -> str:
 
 
 def _folded_sentence(plane: Plane, headings: np.ndarray) -> str:
+    """Sentence on the hinge at which a train of vehicles jackknifes, with its angle."""
     angles = np.degrees(np.diff(headings))
     k = int(np.argmax(np.abs(angles)))
     hinge = HINGE_NAMES[k] if angles.size > 1 else HINGE_NAMES[1]
@@ -142,7 +147,7 @@ def _side_or_axle_lifted(loads: np.ndarray) -> bool:
 
 
 def _acceleration(plane: Plane, first: int, motion: PlaneMotion) -> tuple[float, float]:
-    """Longitudinal and lateral acceleration (m/s^2) of a two-axle unit, in its own axes."""
+    """Longitudinal and lateral acceleration (m/s^2) of the unit whose first wheel is ``first``, in the unit's axes."""
     accelerations = motion.accelerations
     k, row_along, across = plane.group[first], np.zeros(accelerations.size), np.zeros(accelerations.size)
     units = np.column_stack((np.cos(motion.state[0, 2:]), np.sin(motion.state[0, 2:])))
@@ -153,8 +158,9 @@ def _acceleration(plane: Plane, first: int, motion: PlaneMotion) -> tuple[float,
 
 
 def _tipping_sentence(status: int, plane: Plane, four: slice, rates: tuple[float, float], loads: np.ndarray) -> str:
-    """Sentence on how a vehicle tips over, from moments about the wheels that stay on the road; the statics are those
-    of a body whose wheel loads follow its accelerations."""
+    """Sentence on how a vehicle tips over, from moments about the wheels that stay on the road, for quasi-static wheel
+    loads.
+    """
     body, (deceleration, side_acceleration) = BODY_NAMES[four.start // 4], rates
     static, by_x, by_y, y = (
         wheel_values[four] for wheel_values in (plane.static, plane.by_x, plane.by_y, plane.place[:, 1])

@@ -1,4 +1,5 @@
-"""A brake: from chamber pressure to torque, with push-out pressure, hysteresis and a gradient for either way.
+"""A wheel brake: torque from chamber pressure, with push-out pressure, hysteresis, and separate gradients for rising
+and falling pressure.
 
 Torque rises along ``rising`` (p - push_out) and falls along ``falling`` (p - release), and between these two lines it
 stays: T = max(up(p), min(down(p), T)). The upper line is the one on which pressure falls, so that the loop is run
@@ -17,8 +18,9 @@ from models.machine.compiled import lean
 
 
 class Brake(Strict):
-    """The brake of one wheel. Raises InputError where the hysteresis would put torque below the line of rising
-    pressure."""
+    """Parameters of one wheel's brake. Raises InputError where the hysteresis would put torque below the line of rising
+    pressure.
+    """
 
     push_out: float = quantity("bar", "pressure above which torque rises from none", zero=True)
     release: float = quantity("bar", "pressure below which there is no torque; at most push_out", zero=True)
@@ -44,14 +46,14 @@ class Brakes(NamedTuple):
 
 
 def of_wheels(*brakes: Brake) -> Brakes:
-    """Parameters of the brakes of all wheels, in the order of the wheels."""
+    """Brake parameters (W,) of all wheels, in the order of the wheels."""
     return Brakes(*(np.array([getattr(brake, name) for brake in brakes]) for name in Brakes._fields))
 
 
 @lean
 def torque(i, pressure, last_torque, brakes):
-    """Torque (N m) of brake i at a pressure (bar), where ``last_torque`` is its last torque and the pressure has not
-    turned back since.
+    """Torque (N m) of brake i at a pressure (bar) that has changed monotonically since the torque was ``last_torque``
+    (N m).
     """
     rising_torque = brakes.rising[i] * max(0.0, pressure - brakes.push_out[i])
     falling_torque = brakes.falling[i] * max(0.0, pressure - brakes.release[i])
@@ -59,7 +61,7 @@ def torque(i, pressure, last_torque, brakes):
 
 
 def torques_of_pressures(pressures: np.ndarray, brakes: Brakes) -> np.ndarray:
-    """Torques (n,) in N m of the first brake over a sequence of pressures (n,) in bar; it starts without torque."""
+    """Torques (n,) in N m of the first brake over a sequence of pressures (n,) in bar, starting without torque."""
     last_torque, torques = 0.0, np.empty(len(pressures))
     for n, pressure in enumerate(pressures):
         last_torque = torques[n] = torque(0, pressure, last_torque, brakes)

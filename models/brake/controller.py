@@ -1,5 +1,6 @@
-"""The port between a vehicle and a brake controller, which is asked once per sample and answers with commands to
-valves."""
+"""Interface between a vehicle and a brake controller, which is called once per sample and returns commands to the
+valves.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,15 +9,15 @@ from typing import ClassVar, NamedTuple, Protocol
 import numpy as np
 
 SAMPLE = 0.0055
-"""Time between two samples (s): the paper's, 182 a second."""
+"""Time (s) between two controller samples: the paper's, 182 samples per second."""
 RELEASE, HOLD, APPLY, SLOW = -1, 0, 1, 2
-"""States of a valve; the last, apply slowly, only where the scene has such valves."""
+"""Valve commands: release, hold, apply, and apply slowly, the last one only where the scene has such valves."""
 LARGEST_PRESSURE = 300.0
-"""bar; no brake of a road vehicle holds more, by air some 10 and by fluid 200."""
+"""Largest brake pressure (bar) that is accepted: road vehicles have some 10 with air and 200 with fluid."""
 
 
 class Sample(NamedTuple):
-    """The signals that a controller receives at a sample.
+    """Signals that a brake controller receives at a sample.
 
     number : of the sample, from 0; time : ns since the start; wheels (W,) : wheel-speed signals times the wheel's
     radius (m/s), never negative, as a toothed wheel does not tell which way it turns; brake : whether the switch at the
@@ -33,7 +34,7 @@ class Sample(NamedTuple):
 
 
 class Command(NamedTuple):
-    """A controller's answer to a sample: states (W,) of the valves, or instead pressures (W,) in bar."""
+    """Command of a brake controller: states (W,) of the valves, or instead pressures (W,) in bar."""
 
     valves: np.ndarray | None = None
     pressures: np.ndarray | None = None
@@ -47,13 +48,14 @@ class Controller(Protocol):
     """
 
     def sample(self, sample: Sample) -> Command:
-        """The controller's commands for a sample."""
+        """The controller's command for a sample."""
         ...
 
 
 def is_steady(controller: Controller) -> bool:
-    """Whether the controller needs to be asked only once. A derived class with its own ``sample`` is not steady merely
-    because its base class is."""
+    """Whether the controller needs to be called only once, as its command never changes. A derived class with its own
+    ``sample`` is not steady merely because its base class is.
+    """
     declared: Mapping[str, object] = next(
         (vars(kind) for kind in type(controller).__mro__ if "sample" in vars(kind)), {}
     )
@@ -62,23 +64,23 @@ def is_steady(controller: Controller) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Pressures:
-    """Pressures (W,) in bar that stay, as on a test without anti-lock system."""
+    """Controller that commands constant pressures (W,) in bar, as in a test without anti-lock system."""
 
     pressures: np.ndarray
     steady: ClassVar[bool] = True
 
     def sample(self, sample: Sample) -> Command:
-        """The same pressures at every sample."""
+        """The same pressures (W,) in bar at every sample."""
         return Command(pressures=self.pressures)
 
 
 @dataclass(frozen=True)
 class AllApplied:
-    """No anti-lock system: every valve stays open."""
+    """Controller without anti-lock function: every valve stays open while the driver brakes."""
 
     wheels: int
     steady: ClassVar[bool] = True
 
     def sample(self, sample: Sample) -> Command:
-        """Commands that open all valves."""
+        """Commands that open all valves while the brake switch is closed, else release all brakes."""
         return Command(valves=np.full(self.wheels, APPLY if sample.brake else RELEASE))

@@ -1,4 +1,4 @@
-"""Figures that test engineers state of a stop: decelerations, distances, adhesion utilisation, split friction, turns.
+"""Figures of merit of a braking test: decelerations, distances, adhesion utilisation, split friction, turns.
 
 Formulas of UN Regulation 13, of ISO 21994, 16552 and 14794 as they are commonly quoted: not checked against the text of
 the regulation or standard. Speeds in m/s, times in s, distances in m, forces in N; z is a deceleration by g.
@@ -12,18 +12,20 @@ from models.brake.plane_vehicle import GRAVITY
 from models.core.errors import InputError
 
 METRES_PER_SECOND_OF_KMH = 1.0 / 3.6
-"""m/s of a kilometre per hour."""
+"""Speed (m/s) of one kilometre per hour."""
 NOT_CHECKED = "not checked against the text of the regulation"
+"""Remark on formulas that were not compared with the regulation."""
 ROLLING_DRIVEN, ROLLING_FREE = 0.015, 0.010
-"""Rolling resistance by load that Annex 13 takes for an axle without brake: of a driven and of an undriven one."""
+"""Rolling resistance coefficients that Annex 13 takes for an unbraked axle: driven, and not driven."""
 LEAST_UTILISATION = 0.75
-"""Least adhesion utilisation of a category 1 system."""
+"""Least adhesion utilisation of a category 1 anti-lock system."""
 
 
 @dataclass(frozen=True)
 class Axles:
     """Data of a two-axle vehicle: static loads (N) of front and rear axle, wheelbase (m), height of the centre of mass
-    (m)."""
+    (m).
+    """
 
     front: float
     rear: float
@@ -36,14 +38,15 @@ class Axles:
         return self.front + self.rear
 
     def dynamic_loads(self, z: float) -> tuple[float, float]:
-        """Loads (N) of the front and the rear axle when the vehicle decelerates at z g."""
+        """Loads (N) of the front and the rear axle when the vehicle decelerates at z times g."""
         transferred_load = self.height / self.wheelbase * z * self.weight
         return self.front + transferred_load, self.rear - transferred_load
 
 
 def crossing_time(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
-    """Time (s) at which the speed first falls below ``speed``, interpolated linearly between samples; NaN if it never
-    does."""
+    """Time (s) at which the vehicle's speed first falls below ``speed`` (m/s), interpolated linearly between samples;
+    NaN if it never does.
+    """
     rows_below = np.flatnonzero(speeds < speed)
     if rows_below.size == 0 or rows_below[0] == 0:
         return float("nan")
@@ -52,8 +55,8 @@ def crossing_time(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
     return float(times[i - 1] + share * (times[i] - times[i - 1]))
 
 
-def way_at(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray, time: float) -> float:
-    """Distance (m) covered at a time between two samples, with constant deceleration between them."""
+def distance_at(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray, time: float) -> float:
+    """Distance (m) covered at a time (s) between two samples, with constant deceleration between them."""
     i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2))
     passed, long = time - times[i], times[i + 1] - times[i]
     rate = (speeds[i + 1] - speeds[i]) / long
@@ -66,7 +69,7 @@ def way_at(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray, time: fl
 
 
 def mean_fully_developed(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray) -> float:
-    """MFDD (m/s^2): (vb^2 - ve^2) / (2 (s_e - s_b)) between vb = 0.8 v0 and ve = 0.1 v0.
+    """Mean fully developed deceleration (m/s^2): (vb^2 - ve^2) / (2 (s_e - s_b)) between vb = 0.8 v0 and ve = 0.1 v0.
 
     Source: UN R13, Annex 4, d_m = (vb^2 - ve^2) / (25.92 (s_e - s_b)) in km/h and m; not checked against the text of
     the regulation. Not a number if the vehicle does not get so slow.
@@ -75,17 +78,18 @@ def mean_fully_developed(times: np.ndarray, distance: np.ndarray, speeds: np.nda
     begin, end = (crossing_time(times, speeds, speed) for speed in (high, low))
     if not np.isfinite(begin + end):
         return float("nan")
-    covered = way_at(times, distance, speeds, end) - way_at(times, distance, speeds, begin)
+    covered = distance_at(times, distance, speeds, end) - distance_at(times, distance, speeds, begin)
     return float((high**2 - low**2) / (2.0 * covered))
 
 
 def equivalent_deceleration(speed: float, distance: float) -> float:
-    """v0^2 / (2 d) in m/s^2: the uniform deceleration that stops in the same distance."""
+    """Uniform deceleration v0^2 / (2 d) in m/s^2 that stops in the same distance d (m) from the speed v0 (m/s)."""
     return speed**2 / (2.0 * distance)
 
 
 def braking_rate(high: float, low: float, time: float) -> float:
-    """Braking rate z of a vehicle that takes ``time`` (s) to slow down from one speed to a lower one (m/s).
+    """Braking rate z, deceleration divided by g, of a vehicle that takes ``time`` (s) to slow down from one speed to a
+    lower one (m/s).
 
     From 40 to 20 km/h it is 0.566 / t, from 45 to 15 km/h 0.849 / t (UN R13, Annex 13; not checked against the text).
     """
@@ -93,7 +97,7 @@ def braking_rate(high: float, low: float, time: float) -> float:
 
 
 def mean_of_fastest(times: np.ndarray) -> float:
-    """Mean of the shortest times: at most three, and only those within 1.05 times the shortest one.
+    """Mean (s) of the shortest times: at most three, and only those within 1.05 times the shortest one.
 
     Source: UN R13, Annex 13, appendix 2; not checked against the text of the regulation.
     """
@@ -104,7 +108,8 @@ def mean_of_fastest(times: np.ndarray) -> float:
 
 
 def adhesion_front(z: float, axles: Axles) -> float:
-    """k of the front axle from the braking rate with that axle alone braked, the rear one driven: rounded to 0.001.
+    """Adhesion coefficient k of the front axle, rounded to 0.001, from the braking rate z with only that axle braked
+    and the rear axle driven.
 
     (z P g - 0.015 F2) / (F1 + (h / E) z P g). Source: UN R13, Annex 13; not checked against the text of the regulation.
     """
@@ -112,7 +117,8 @@ def adhesion_front(z: float, axles: Axles) -> float:
 
 
 def adhesion_rear(z: float, axles: Axles) -> float:
-    """k of the rear axle from the braking rate with that axle alone braked, the front one not driven.
+    """Adhesion coefficient k of the rear axle, rounded to 0.001, from the braking rate z with only that axle braked and
+    the front axle not driven.
 
     (z P g - 0.010 F1) / (F2 - (h / E) z P g). Source: UN R13, Annex 13; not checked against the text of the regulation.
     """
@@ -120,20 +126,18 @@ def adhesion_rear(z: float, axles: Axles) -> float:
 
 
 def adhesion_trailer(z: float, weight: float, load: float) -> float:
-    """Adhesion k of one trailer axle, z P g / F_dyn, from the braking rate of the train (weight in N) when only that
-    axle brakes.
+    """Adhesion coefficient k = z P g / F_dyn of one trailer axle, from the braking rate z of the train (weight in N)
+    when only that axle brakes.
 
     load: F_dyn, N. The formula is ours. Rolling resistance is not subtracted, because wheels have none here; that of a
     whole train would be a third of the force of one axle on ice.
-
-    load: F_dyn, N. Ours; nothing is taken off for wheels that roll, as none has rolling resistance here, and a whole
-    train's would be a third of what one axle does on ice.
     """
     return round(z * weight / load, 3)
 
 
 def adhesion_of_vehicle(z: float, k_front: float, k_rear: float, axles: Axles) -> float:
-    """k_M = (k_f F_fdyn + k_r F_rdyn) / (P g) with the loads at the braking rate z of the anti-lock system.
+    """Adhesion coefficient of the vehicle, k_M = (k_f F_fdyn + k_r F_rdyn) / (P g), with the axle loads at the braking
+    rate z of the anti-lock system.
 
     Source: UN R13, Annex 13; not checked against the text of the regulation.
     """
@@ -142,7 +146,7 @@ def adhesion_of_vehicle(z: float, k_front: float, k_rear: float, axles: Axles) -
 
 
 def split_rate(k_low: float, k_high: float) -> float:
-    """Least z_MALS on split friction: the larger of 0.75 (4 k_L + k_H) / 5 and k_L.
+    """Least braking rate z_MALS on split friction: the larger of 0.75 (4 k_L + k_H) / 5 and k_L.
 
     Source: UN R13, Annex 13, laden vehicles of category 1; not checked against the text of the regulation.
     """
@@ -160,8 +164,9 @@ def yaw_ratio(yaw_rate: float, speed: float, radius: float) -> float:
 
 @dataclass(frozen=True)
 class Locks:
-    """How long each wheel (W,) was locked while the vehicle was above a speed: total time (s), ratio of that to the
-    time above the speed, and longest single lock (s)."""
+    """How long each wheel (W,) was locked while the vehicle was above a speed: total time (s), its ratio to the time
+    above the speed, and longest single lock (s).
+    """
 
     time: np.ndarray
     share: np.ndarray

@@ -1,4 +1,5 @@
-"""Units in the plane, each hinged to the one before it: a truck alone, or a truck, a drawbar and a trailer's body.
+"""Kinematics of units in the plane, each hinged to the previous one: a truck alone, or a truck, a drawbar and a
+trailer's body.
 
 Coordinates (n = 2 + U): X, Y of the first unit's centre of mass, then the heading of each unit. The centre of unit k
 is at (X, Y) + sum_j reach[k, j] e(psi_j) with e(psi) = (cos psi, sin psi). If the first point is a hook whose motion is
@@ -12,7 +13,7 @@ from models.machine.compiled import inlined, lean
 
 
 class ChainPoint(NamedTuple):
-    """A point fixed to a unit: the unit's number, and the point's coordinates (m) in the unit's axes."""
+    """A point fixed to a unit of the train: the unit's index, and the point's coordinates (m) in the unit's axes."""
 
     unit: int
     x: float
@@ -31,7 +32,7 @@ ALONG_X = Direction(1.0, 0.0)
 
 @lean
 def velocity(point, positions, rates, arm_lengths):
-    """Velocity (2) of a ``ChainPoint`` in the ground's axes."""
+    """Velocity (2) in m/s of a ``ChainPoint``, in the ground's axes."""
     k, x, y = point
     vx, vy = rates[0], rates[1]
     for j in range(arm_lengths.shape[1]):
@@ -45,7 +46,7 @@ def velocity(point, positions, rates, arm_lengths):
 
 @lean
 def chain_point_place(point, positions, arm_lengths):
-    """Position (2) of a ``ChainPoint`` on the ground."""
+    """Position (2) in m of a ``ChainPoint`` on the ground."""
     k, x, y = point
     px, py = positions[0], positions[1]
     for j in range(arm_lengths.shape[1]):
@@ -65,13 +66,13 @@ def coordinates(plane):
 
 @inlined
 def count_of_prescribed(plane):
-    """Number of coordinates with a prescribed motion; they are the first ones: two at a hook, else none."""
+    """Number of coordinates with a prescribed motion, which are the first ones: two at a prescribed hook, else none."""
     return 0 if len(plane.units) == 1 else 2 * plane.has_prescribed_hook
 
 
 @inlined
 def fill_headings(positions, units):
-    """Fill the cosine and the sine of the heading of every unit (U, 2)."""
+    """Fill the cosine and the sine of the heading of every unit (U, 2), from ``positions`` (n,)."""
     for j in range(units.shape[0]):
         units[j, 0], units[j, 1] = math.cos(positions[2 + j]), math.sin(positions[2 + j])
 
@@ -100,8 +101,7 @@ def fill_velocity_rows(point, direction, units, rates, plane, row_along, row_acr
 
 @inlined
 def inertia(units, rates, plane, mass, right_side, row_along, row_across):
-    """Fill the mass matrix (n, n), and ``right_side`` (n,) with the centrifugal terms, which stand beside the forces in
-    the equations.
+    """Fill the mass matrix (n, n), and ``right_side`` (n,) with the centrifugal terms of the equations of motion.
 
     units : see ``fill_headings``; row_along, row_across (n,) : room to work in.
     """
@@ -121,7 +121,8 @@ def inertia(units, rates, plane, mass, right_side, row_along, row_across):
 @inlined
 def factorise_mass(mass, plane):
     """Replace the lower triangle of the mass matrix of the free coordinates by its Cholesky factor. A single unit's
-    matrix is diagonal and stays as it is."""
+    matrix is diagonal and stays unchanged.
+    """
     if len(plane.units) == 1:
         return
     first = count_of_prescribed(plane)
@@ -135,8 +136,9 @@ def factorise_mass(mass, plane):
 
 @inlined
 def solve(mass, plane, right_side):
-    """Turn forces (n,) in ``right_side`` into accelerations of the free coordinates, in place, with the matrix from
-    ``factorise_mass``."""
+    """Turn the forces (n,) in ``right_side`` into accelerations of the free coordinates, in place, with the matrix from
+    ``factorise_mass``.
+    """
     size, first = coordinates(plane), count_of_prescribed(plane)
     if len(plane.units) == 1:
         for a in range(size):

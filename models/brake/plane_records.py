@@ -1,4 +1,5 @@
-"""Records that a time step of a vehicle in the plane reads and writes: motion and wheels, W of them, n coordinates.
+"""Records that a time step of a vehicle in the plane reads and writes: its motion and its wheels, W of them, with n
+coordinates.
 
 Compiled functions pass few arrays on, and name their rows where they are read: two dozen arrays that are passed
 everywhere double the time of compiling.
@@ -29,9 +30,11 @@ class Report(NamedTuple):
 
 
 REPORT_SIZE = len(Report._fields)
-"""Numbers that a wheel reports."""
+"""Number of values that a wheel reports."""
 TURNING_ROW = Report._fields.index("turning")
-"""The row of the speeds of turning, for what runs in Python as well: there ``report_of`` gives no ``Report``."""
+"""Index of the report's row with rotational speeds, for code that also runs in Python, where ``report_of`` gives no
+``Report``.
+"""
 
 
 @inlined
@@ -43,8 +46,9 @@ def report_of(rows):
 class PlaneMotion(NamedTuple):
     """State of a vehicle in the plane, updated in place by every step.
 
-    state (2, n) : positions and rates; turning (W,) : rad/s; accelerations (2 + U,) : those of the last step, from
-    which the next one searches on; report (7, W) : the rows of the last step's ``Report``.
+    state (2, n) : positions and rates; turning (W,) : rotational speeds of the wheels, rad/s; accelerations (2 + U,) :
+    of the last step, the start values of the search in the next one; report (7, W) : the rows of the last step's
+    ``Report``.
     """
 
     state: np.ndarray
@@ -54,17 +58,19 @@ class PlaneMotion(NamedTuple):
 
 
 def motion_of(state: np.ndarray, wheel_turning: np.ndarray) -> PlaneMotion:
-    """A ``PlaneMotion`` with zero accelerations and an empty report, from positions and rates, and wheel rotation."""
+    """A ``PlaneMotion`` with zero accelerations and an empty report, from positions and rates (2, n), and the wheels'
+    rotational speeds (W,) in rad/s.
+    """
     return PlaneMotion(state, wheel_turning, np.zeros(state.shape[1]), np.zeros((REPORT_SIZE, wheel_turning.size)))
 
 
 class Wheels(NamedTuple):
     """State and geometry of each wheel within a time step, each (W,).
 
-    start : speed of its centre along it at the start (m/s); rate : what that one's rate has besides the accelerations
-    of the coordinates (m/s^2); along, aside : speeds of its centre along it, from 0 on, and across it where slip angles
-    are taken; angle : slip angle (rad); cell, share : where that lies in the tables; static_load : load (N) besides
-    what accelerations move, load : with that; cosine, sine : of the angle by which it is steered.
+    start : speed of its centre along the wheel at the start (m/s); rate : rate of this speed without the part due to
+    the coordinates' accelerations (m/s^2); along, aside : speeds of its centre along it, not negative, and across it,
+    for the slip angle; angle : slip angle (rad); cell, share : position of the angle in the tables; static_load : load
+    (N) without the part due to accelerations, load : with it; cosine, sine : of its steer angle.
     """
 
     start: np.ndarray
@@ -81,7 +87,7 @@ class Wheels(NamedTuple):
 
 
 KNOWN = len(Wheels._fields)
-"""Numbers that are known of a wheel."""
+"""Number of values in ``Wheels`` for each wheel."""
 
 
 @inlined
@@ -93,9 +99,9 @@ def wheels_of(rows):
 class Frame(NamedTuple):
     """Arrays shared by all iterations within a time step.
 
-    along, across, press (W, n) : see ``plane_chain.rows``, and load by accelerations; units (U, 2) : see ``headings``;
-    mass (n, n) : the factor of the mass matrix; right (n,) : forces besides the tyres' ones; out, out_before, off
-    (n,) : accelerations that a round gave, that the one before gave, and by how much that was off.
+    along, across, press (W, n) : see ``plane_chain.fill_velocity_rows``, and load by accelerations; units (U, 2) : see
+    ``fill_headings``; mass (n, n) : the factor of the mass matrix; right (n,) : forces besides the tyres' forces; out,
+    out_before, off (n,) : accelerations from the last iteration, from the one before, and the residual of the latter.
     """
 
     wheels: Wheels

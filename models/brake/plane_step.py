@@ -1,4 +1,5 @@
-"""One step of a braked vehicle in the plane: wheels exact, their mean forces to the vehicle, loads solved.
+"""One time step of a braked vehicle in the plane: exact wheel rotation, mean wheel forces on the vehicle, loads found
+by iteration.
 
 A half step gives the state in the middle, and the whole step takes its slip angles, loads and friction there: order
 two. Loads follow from accelerations and these from the tyres' forces under the loads; the whole step finds the fixed
@@ -26,16 +27,19 @@ from models.machine.stack import array, doubles
 from models.tyre.tyre_table import TableCell, cell_and_share, lateral_adhesion
 
 ACCELERATION_TOLERANCE = 1e-7
-"""What is left of the accelerations' error (m/s^2, and rad/s^2 times 1 m) when the loads are taken to be found."""
+"""Remaining error of the accelerations (m/s^2, and rad/s^2 times 1 m) at which the iteration of the loads ends."""
 HALF_ROUNDS, ANDERSON_ROUNDS, ROUNDS_PER_WINDOW, MOST_WINDOWS = 1, 12, 16, 1000
-"""Rounds of a half step, to whose loads those of the step before are close enough for order two; rounds after which
-Anderson's method gives way to means; rounds between two looks at their progress; such windows without an answer."""
+"""Numbers of iterations: in a half step, which starts from the last step's loads; before Anderson's method gives way to
+means; between two checks of progress; and the number of such checks before giving up.
+"""
 JUMP_WIDTH = 1e-3
-"""Width (m/s^2, and rad/s^2 times 1 m) to which a jump is closed in where loads have an answer only as a mean: some
-newtons of the load of a truck's wheel."""
+"""Width (m/s^2, and rad/s^2 times 1 m) of the interval to which a jump of the accelerations is narrowed down where
+loads have only a mean solution: some newtons of the load of a truck's wheel.
+"""
 LOCKING_SLIP = 0.98
-"""Slip from which on the direction of the force goes over to that of a locked tyre: without a jump, which would leave
-some loads without an answer."""
+"""Slip above which the direction of the force passes continuously to that of a locked tyre; a jump would leave some
+loads without a solution.
+"""
 
 
 @inlined
@@ -48,16 +52,17 @@ def scalar_product(row, vector):
 
 
 @inlined
-def moved_to(row, target_row):
-    """Copy the row's numbers into ``target_row``; array assignment would allocate a temporary array."""
+def copy_row(row, target_row):
+    """Copy the row's values into ``target_row``; array assignment would allocate a temporary array."""
     for a in range(row.size):
         target_row[a] = row[a]
 
 
 @inlined
-def settle(motion, steer, regularising_speed, starts, vehicle, frame):
+def fill_state_quantities(motion, steer, regularising_speed, starts, vehicle, frame):
     """Fill wheel quantities and equations of motion that follow from the state. With ``starts``, the state is that at
-    the start of the step, and the wheels' steer angles and speeds along them are stored."""
+    the start of the step, and the wheels' steer angles and speeds along them are stored.
+    """
     plane, angles, wheels, units = vehicle.plane, vehicle.tables.angles, frame.wheels, frame.units
     positions, rates, still = motion.state[0], motion.state[1], frame.wheels.static_load
     fill_headings(positions, units)
@@ -84,7 +89,7 @@ def settle(motion, steer, regularising_speed, starts, vehicle, frame):
         if starts:
             wheels.start[i] = u
         wheels.rate[i] = bias_along + v * rates[2 + k]
-        slide(i, u, v, regularising_speed, frame.surfaces.lag, angles, wheels)
+        set_slip_angle(i, u, v, regularising_speed, frame.surfaces.lag, angles, wheels)
     inertia(units, rates, plane, frame.mass, frame.right, frame.out, frame.out_before)
     for a in range(count_of_prescribed(plane), coordinates(plane)):
         for b in range(count_of_prescribed(plane)):
@@ -93,9 +98,10 @@ def settle(motion, steer, regularising_speed, starts, vehicle, frame):
 
 
 @inlined
-def slide(i, u, v, regularising_speed, lag, angles, wheels):
+def set_slip_angle(i, u, v, regularising_speed, lag, angles, wheels):
     """Set the slip angle of wheel i from the speeds (m/s) of its centre along it, u, and of its tyre across it, v.
-    Where ``lag`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v."""
+    Where ``lag`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v.
+    """
     forwards = u if wheels.start[i] >= 0.0 else -u
     if not math.isnan(lag[i]):
         v = lag[i] * max(forwards, regularising_speed)
@@ -107,7 +113,8 @@ def slide(i, u, v, regularising_speed, lag, angles, wheels):
 @inlined
 def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
     """Fill the report of wheel i, whose slip angle and load are known, from a ``StepInput`` with the speeds along the
-    wheel."""
+    wheel.
+    """
     v, speed_along, load, angle = wheels.aside[i], wheels.along[i], wheels.load[i], wheels.angle[i]
     first, second, share = int(surfaces.first[i]), int(surfaces.second[i]), surfaces.share[i]
     sign = 1.0 if wheels.start[i] >= 0.0 else -1.0
@@ -136,9 +143,9 @@ def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
 
 
 @lean
-def share_out(loads, positions):
-    """Correct loads (W,) of two-axle vehicles in place where a wheel's load is negative: the wheel gets none, and the
-    other wheels keep the static equilibrium. positions (W, 2) : positions of the wheels in their units' axes, m.
+def redistribute_negative_loads(loads, positions):
+    """Correct loads (W,) in N of two-axle vehicles in place where a wheel's load is negative: the wheel gets none, and
+    the other wheels keep the static equilibrium. positions (W, 2) : positions of the wheels in their units' axes, m.
 
     The other wheel of its axle bears the axle's load, and the other axle what this one cannot take of the roll moment.
     An axle that would lift leaves all its load to the other one. Beyond balance, both wheels of a side bear none.
@@ -167,10 +174,10 @@ def share_out(loads, positions):
 
 
 @lean
-def respond(motion, torques_before, torques_after, step, vehicle, frame):
+def fill_response(motion, torques_before, torques_after, step, vehicle, frame):
     """Fill ``frame.out`` with the accelerations that the tyres' forces cause when the vehicle has the accelerations of
-    ``motion``. A step's solution is a fixed point of this map. torques_before, torques_after (W,) : torques at the ends
-    of the step.
+    ``motion``. A step's solution is a fixed point of this map. torques_before, torques_after (W,) : brake torques (N m)
+    at the ends of the step.
     """
     plane, tables, wheels, surfaces, report = vehicle.plane, vehicle.tables, frame.wheels, frame.surfaces, frame.report
     accelerations, response, rows_along, rows_across, right = (
@@ -188,7 +195,7 @@ def respond(motion, torques_before, torques_after, step, vehicle, frame):
         load[i] = still[i] + scalar_product(frame.press[i], accelerations)
         lifts = lifts or load[i] < 0.0
     if lifts:
-        share_out(load, plane.place)
+        redistribute_negative_loads(load, plane.place)
     for i in range(load.size):
         speed1 = start[i] + step * (rate[i] + scalar_product(rows_along[i], accelerations))
         step_input = StepInput(start[i], speed1, torques_before[i], torques_after[i], step)
@@ -200,25 +207,26 @@ def respond(motion, torques_before, torques_after, step, vehicle, frame):
 
 
 @inlined
-def stage(motion, torques_before, torques_after, step, most_rounds, vehicle, frame):
-    """Search the mean accelerations over a step, and write them into ``motion``; its last ones are the first guess.
+def find_accelerations(motion, torques_before, torques_after, step, most_rounds, vehicle, frame):
+    """Find the mean accelerations over a step by iteration, from the last ones on, and write them into ``motion``;
+    returns the estimated remaining error.
 
     Anderson's method of depth one runs for at most ``most_rounds`` rounds. If they have not converged and were
-    ``ANDERSON_ROUNDS`` or more, ``by_means`` takes over. Returns the estimated remaining error, from the last change
-    and the ratio of the last two.
+    ``ANDERSON_ROUNDS`` or more, ``find_by_means`` takes over. Returns the estimated remaining error, from the last
+    change and the ratio of the last two.
     """
     accelerations, response, out0, off0 = motion.accelerations, frame.out, frame.out_before, frame.off
-    size, left, last_change = coordinates(vehicle.plane), math.inf, 0.0
+    size, remaining_error, last_change = coordinates(vehicle.plane), math.inf, 0.0
     for rounds in range(most_rounds):
-        respond(motion, torques_before, torques_after, step, vehicle, frame)
+        fill_response(motion, torques_before, torques_after, step, vehicle, frame)
         change, product, square = 0.0, 0.0, 0.0
         for a in range(size):
             residual = response[a] - accelerations[a]
             change = max(change, abs(residual))
             product += residual * (residual - off0[a])
             square += (residual - off0[a]) ** 2
-        left = change * min(change / last_change, 1.0) if last_change > 0.0 else change
-        is_done, last_change = not left > ACCELERATION_TOLERANCE or rounds == most_rounds - 1, change
+        remaining_error = change * min(change / last_change, 1.0) if last_change > 0.0 else change
+        is_done, last_change = not remaining_error > ACCELERATION_TOLERANCE or rounds == most_rounds - 1, change
         mix = min(max(product / square, -2.0), 0.75) if rounds > 0 and square > 0.0 and not is_done else 0.0
         for a in range(size):
             off0[a] = response[a] - accelerations[a]
@@ -227,16 +235,16 @@ def stage(motion, torques_before, torques_after, step, most_rounds, vehicle, fra
         if is_done:
             break
     return (
-        left
-        if left <= ACCELERATION_TOLERANCE or most_rounds < ANDERSON_ROUNDS
-        else by_means(motion, torques_before, torques_after, step, vehicle, frame)
+        remaining_error
+        if remaining_error <= ACCELERATION_TOLERANCE or most_rounds < ANDERSON_ROUNDS
+        else find_by_means(motion, torques_before, torques_after, step, vehicle, frame)
     )
 
 
 @lean
-def by_means(motion, torques_before, torques_after, step, vehicle, frame):
-    """Accelerations as from ``stage``, for steps in which wheel loads jump between two solutions, so that only a mean
-    of both is in equilibrium.
+def find_by_means(motion, torques_before, torques_after, step, vehicle, frame):
+    """Accelerations as from ``find_accelerations``, for steps in which wheel loads jump between two solutions, so that
+    only a mean of both is in equilibrium; returns the remaining error.
 
     So it is of a slow wheel at the edge of locking: a little less load, and it locks at once; a little more, and it
     rolls within a fraction of the step. Each round moves the accelerations by a share of their change, and the means of
@@ -250,21 +258,21 @@ def by_means(motion, torques_before, torques_after, step, vehicle, frame):
     size, share, last_change = coordinates(vehicle.plane), 0.5, math.inf
     means = array(doubles(report.size), report.shape)
     start_accelerations = array(doubles(accelerations.size), accelerations.shape)
-    respond(motion, torques_before, torques_after, step, vehicle, frame)
-    moved_to(response, accelerations)
+    fill_response(motion, torques_before, torques_after, step, vehicle, frame)
+    copy_row(response, accelerations)
     for c in range(report.shape[0]):
-        moved_to(report[c], means[c])
+        copy_row(report[c], means[c])
     for _ in range(MOST_WINDOWS):
         total_change, net, largest_change, change = 0.0, 0.0, 0.0, 0.0
-        moved_to(accelerations, start_accelerations)
+        copy_row(accelerations, start_accelerations)
         for _ in range(ROUNDS_PER_WINDOW):
-            respond(motion, torques_before, torques_after, step, vehicle, frame)
+            fill_response(motion, torques_before, torques_after, step, vehicle, frame)
             change = 0.0
             for a in range(size):
                 change = max(change, abs(response[a] - accelerations[a]))
                 total_change += share * abs(response[a] - accelerations[a])
             if not change > ACCELERATION_TOLERANCE:
-                moved_to(response, accelerations)
+                copy_row(response, accelerations)
                 return change
             largest_change = max(largest_change, change)
             for a in range(size):
@@ -277,14 +285,14 @@ def by_means(motion, torques_before, torques_after, step, vehicle, frame):
         turns, thrown = net < 0.5 * total_change, change > last_change
         if (turns and share * change <= JUMP_WIDTH) or (thrown and share * largest_change <= JUMP_WIDTH):
             for c in range(report.shape[0]):
-                moved_to(means[c], report[c])
+                copy_row(means[c], report[c])
             return 0.0
         share, last_change = 0.5 * share if turns or thrown else share, change
     return math.inf
 
 
 @inlined
-def comes_to_rest(rates, wheel_turning, accelerations, step, plane):
+def time_of_rest(rates, wheel_turning, accelerations, step, plane):
     """Time (s) within the step at which the vehicle comes to rest, or -1 if it does not.
 
     Friction takes speed away until there is none, and only the time grid would let it turn round: it stands where its
@@ -307,7 +315,7 @@ def comes_to_rest(rates, wheel_turning, accelerations, step, plane):
 
 @lean
 def step_on(motion, torques, step, steer, regularising_speed, vehicle, surfaces):
-    """One step of a ``Motion`` whose wheels are on ``Surfaces``.
+    """Advance a ``PlaneMotion`` whose wheels are on ``Surfaces`` by one step (s).
 
     torques (2, W) : of the brakes at the step's ends; steer (W,) : angles of the wheels in their units (rad);
     regularising_speed : m/s. Returns the time (s) of the step at which the vehicle comes to rest, ``step`` if it does
@@ -338,17 +346,15 @@ def step_on(motion, torques, step, steer, regularising_speed, vehicle, surfaces)
     for i in range(count):
         middle[i] = 0.5 * (torques[0, i] + torques[1, i])
     for half in (True, False):
-        settle(motion, steer, regularising_speed, half, vehicle, frame)
+        fill_state_quantities(motion, steer, regularising_speed, half, vehicle, frame)
         time, end_torques = (0.5 * step, middle) if half else (step, torques[1])
         most_rounds = HALF_ROUNDS if half else ANDERSON_ROUNDS
-        if not stage(motion, torques[0], end_torques, time, most_rounds, vehicle, frame) <= (
+        if not find_accelerations(motion, torques[0], end_torques, time, most_rounds, vehicle, frame) <= (
             math.inf if half else ACCELERATION_TOLERANCE
         ):
             return -1.0
         rest_time = (
-            comes_to_rest(rate0, turning, accelerations, step, plane)
-            if half and not plane.has_prescribed_hook
-            else -1.0
+            time_of_rest(rate0, turning, accelerations, step, plane) if half and not plane.has_prescribed_hook else -1.0
         )
         if rest_time >= 0.0:
             time = rest_time

@@ -1,4 +1,6 @@
-"""A vehicle in the plane as numbers for compiled functions: units, wheels, and how loads follow accelerations."""
+"""Parameters of a vehicle in the plane for compiled functions: units, wheels, and how wheel loads follow
+accelerations.
+"""
 
 import math
 from typing import NamedTuple
@@ -9,11 +11,11 @@ from models.core.errors import InputError
 from models.core.strict import Strict, quantity
 
 GRAVITY = 9.81
-"""m/s^2"""
+"""Gravitational acceleration (m/s^2)."""
 
 
 class Axle(Strict):
-    """Two wheels at one place along a unit."""
+    """An axle with two wheels, at one position along its unit."""
 
     x: float = quantity("m", "ahead of the unit's centre of mass", signed=True)
     track: float = quantity("m", "distance of the two wheels' centres")
@@ -23,7 +25,7 @@ class Axle(Strict):
 
 
 class Truck(Strict):
-    """A vehicle of two axles; its load transfer is semi-static.
+    """A two-axle vehicle whose wheel loads follow its accelerations without delay.
 
     Source of the form: the paper's four-wheel vehicle, whose load transfer has its front and rear share as input.
     """
@@ -41,7 +43,7 @@ class Truck(Strict):
 
 
 class Plane(NamedTuple):
-    """Numbers that compiled functions read of a vehicle in the plane, of U units and W wheels.
+    """Parameters of a vehicle in the plane, of U units and W wheels, for compiled functions.
 
     masses, inertias (U,); reach (U, U): see ``plane_chain``; unit, group (W,): of each wheel, the group being the unit
     whose acceleration moves its load; place (W, 2): m, in its unit's axes; radius, spin (W,): m, kg m^2;
@@ -73,7 +75,7 @@ class Plane(NamedTuple):
 
 
 def plane_of_truck(vehicle: Truck, with_load_transfer: bool = True) -> Plane:
-    """``Plane`` of a two-axle vehicle; without ``with_load_transfer`` its wheel loads stay as they are at rest."""
+    """``Plane`` of a two-axle vehicle; without ``with_load_transfer`` its wheel loads stay at their static values."""
     check_wheels(vehicle, vehicle.mass)
     zeros = np.zeros(4, dtype=np.int64)
     wheel_positions, radius, spin, static, by_x, by_y = wheels(vehicle, with_load_transfer)
@@ -94,8 +96,9 @@ def plane_of_truck(vehicle: Truck, with_load_transfer: bool = True) -> Plane:
 
 
 def check_wheels(vehicle: Truck, mass: float) -> None:
-    """Refuse a vehicle whose mass (kg) is at most its wheels' smallest possible mass: J / r^2 each, as if all in the
-    rim."""
+    """Refuse a vehicle whose mass (kg) is at most its wheels' smallest possible mass: J / r^2 each, as if all mass were
+    in the rim.
+    """
     least_mass = sum(2.0 * axle.spin_inertia / axle.radius**2 for axle in (vehicle.front, vehicle.rear))
     if mass <= least_mass:
         allowed = f"must be above {least_mass:.4g} kg: J / r^2 of its wheels, which cannot be lighter"
@@ -104,7 +107,8 @@ def check_wheels(vehicle: Truck, mass: float) -> None:
 
 def wheels(vehicle: Truck, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
     """Fields place (4, 2), radius, spin, static, by_x and by_y (4,) of ``Plane`` for the four wheels of a two-axle
-    body."""
+    body.
+    """
     if not vehicle.front.x > 0.0 > vehicle.rear.x:
         raise InputError("", "rear.x", vehicle.rear.x, "must be below 0, and front.x above")
     shares = vehicle.front.roll_share + vehicle.rear.roll_share

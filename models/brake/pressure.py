@@ -1,4 +1,5 @@
-"""Pressures in the brake chambers over one sample, and the torques that follow them in order.
+"""Pressures in the brake chambers over one controller sample, and the brake torques that follow them through the
+hysteresis.
 
 Mode V: the controller sets valves. A chamber then fills from the supply or empties to the air, each by a first-order
 law, exact over a step; a valve that can apply slowly, by a throttle or by pulses too short to be told apart, fills it
@@ -51,7 +52,9 @@ class Air(NamedTuple):
 
 
 def resting_chambers(chambers: Chambers, sample: float) -> Air:
-    """``Air`` at rest: zero pressure in all chambers, full supply pressure, all valves released; sample (s)."""
+    """``Air`` at rest: zero pressure in all chambers, full supply pressure, all valves released; sample : duration
+    (s).
+    """
     wheels = chambers.fill_time.size
     if math.isfinite(chambers.reservoir) and chambers.volumes.size != wheels:
         raise InputError("", "volumes", chambers.volumes.tolist(), f"a reservoir asks for those of {wheels} chambers")
@@ -66,7 +69,7 @@ def resting_chambers(chambers: Chambers, sample: float) -> Air:
 
 @lean
 def chamber_pressure(pressure, valve, time, fill, empty, supply):
-    """Pressure (bar) of a chamber after a time (s) in which its valve applies, holds or releases."""
+    """Pressure (bar) of a brake chamber after a time (s) in which its valve applies, holds or releases."""
     if valve >= APPLY:
         return supply + (pressure - supply) * math.exp(-time / fill) if fill > 0.0 else supply
     if valve == RELEASE:
@@ -76,8 +79,9 @@ def chamber_pressure(pressure, valve, time, fill, empty, supply):
 
 @lean
 def press(valves, time, air, chambers, brakes):
-    """Update pressures and torques over a time (s) with constant valve states (W,). Every pressure changes
-    monotonically, so the torque law holds."""
+    """Update chamber pressures and brake torques over a time (s) with constant valve states (W,). Every pressure
+    changes monotonically, as the hysteresis of the torque requires.
+    """
     air_used = 0.0
     for i in range(valves.size):
         pressure_before = air.pressure[i]
@@ -92,7 +96,7 @@ def press(valves, time, air, chambers, brakes):
 
 @lean
 def by_valves(valves, sample, air, chambers, brakes, torques):
-    """Mode V, control by valves: fill ``torques`` (n + 1, W), at the ends of the n steps of a sample (s)."""
+    """Control by valve states (W,) over a sample (s): fill ``torques`` (n + 1, W) in N m at the ends of its n steps."""
     steps, last_command = torques.shape[0] - 1, air.commands.shape[0] - 1
     for i in range(valves.size):
         for k in range(last_command):
@@ -112,8 +116,9 @@ def by_valves(valves, sample, air, chambers, brakes, torques):
 
 @lean
 def by_pressures(pressures, air, brakes, torques):
-    """Mode P, control by pressures: pressures (W,) in bar are reached at once and stay for the sample; fills
-    ``torques`` (n + 1, W)."""
+    """Control by pressures (W,) in bar, which are reached at once and kept for the sample; fill ``torques`` (n + 1, W)
+    in N m.
+    """
     for i in range(pressures.size):
         air.pressure[i], air.torque[i] = pressures[i], torque(i, pressures[i], air.torque[i], brakes)
         for n in range(torques.shape[0]):

@@ -20,12 +20,13 @@ from models.machine.compiled import njit
 from models.tyre.tyre_table import Tables
 
 LEAST_SLIP_SPEED = 0.1
-"""Speed (m/s) below which slip angles are those of this one: without a motion across there is none at all."""
+"""Speed (m/s) that replaces lower speeds in slip angles; without lateral motion they are zero."""
 
 
 class QuarterPath(NamedTuple):
-    """Motion of a quarter vehicle at the ends of its steps, each (n,): time (s), position (m), speed (m/s), turning of
-    the wheel (rad/s), and the time (s) within the step for which the wheel was locked."""
+    """Motion of a quarter vehicle at the ends of its steps, each (n,): time (s), position (m), speed (m/s), rotational
+    speed of the wheel (rad/s), and the time (s) within the step for which the wheel was locked.
+    """
 
     time: np.ndarray
     position: np.ndarray
@@ -68,13 +69,13 @@ class Quarter(Strict):
         )
 
     def steady_torque(self, slip: float, force: float) -> float:
-        """Brake torque (N m) that keeps a slip constant while the tyre gives a force (N)."""
+        """Brake torque (N m) that keeps a slip constant while the tyre gives a longitudinal force (N)."""
         return force * (self.radius + self.spin_inertia * (1.0 - slip) / (self.mass * self.radius))
 
 
 @dataclass(frozen=True, eq=False)
 class QuarterStop:
-    """Motion from the start to the end, and the index of the step in which the vehicle came to rest, or -1."""
+    """Motion of a braked quarter vehicle, and the index of the step in which it came to rest, or -1."""
 
     path: QuarterPath
     step_of_rest: int
@@ -86,7 +87,7 @@ class QuarterStop:
 
     @property
     def release_time(self) -> float:
-        """Time (s) at which the wheel first turned again after a locked period; NaN if it never did."""
+        """Time (s) at which the wheel turned again after its last lock; NaN if it never did."""
         time, locked = self.path.time, self.path.locked
         locked_rows = np.flatnonzero(locked > 0.0)
         if locked_rows.size == 0 or self.path.turning[locked_rows[-1]] == 0.0:
@@ -96,7 +97,7 @@ class QuarterStop:
 
 @njit(cache=True, error_model="numpy")
 def march(motion, torques, step, vehicle, path):
-    """Advance one wheel's ``motion`` in steps (s) under torques (n + 1, 1) at the steps' ends; see ``advance``.
+    """Advance one wheel's ``motion`` in steps (s) under torques (n + 1, 1) in N m at the steps' ends; see ``advance``.
 
     path is filled from its second place on. Returns the step in which the vehicle came to rest, -1 if in none, -2 if
     loads were not found; a vehicle that rests is left to its torques like one that moves.
@@ -124,7 +125,8 @@ def braked(
     speed: float,
     rim_turning: float | None = None,
 ) -> QuarterStop:
-    """Straight braking from a speed (m/s) under torques (n + 1,) in N m at the steps' ends (s), linear between.
+    """Straight braking of a quarter vehicle from a speed (m/s) under torques (n + 1,) in N m at the steps' ends (s),
+    linear between.
 
     rim_turning : rad/s at the start, that of rolling if not given. Raises InputError for a torque below 0 or no number.
     """

@@ -26,36 +26,39 @@ from models.brake.wheel_step import SLOWEST_SPEED, phi_1
 from models.machine.compiled import inlined, njit
 
 FADING_SPEED = 1.0
-"""Speed (m/s) along the wheel below which the damper fades in."""
+"""Speed (m/s) along the wheel below which a damper across it fades in."""
 DAMPING = 0.7
-"""Damping ratio at rest, of a wheel that bears its share of the mass."""
+"""Damping ratio of the damper across a wheel at rest that bears its share of the mass."""
 
 
 class Lag(NamedTuple):
-    """Tyres that lag, each (W,): relaxation lengths (m), and tan of the slip angles, which are moved in place."""
+    """Tyres with lagging slip angles, each (W,): relaxation lengths (m), and tangents of the slip angles, which are
+    updated in place.
+    """
 
     length: np.ndarray
     angle: np.ndarray
 
 
 @njit(cache=True, error_model="numpy")
-def taken_up(a, u, v, time, length):
-    """tan of the slip angle after a time (s) at constant speeds u along and v across the wheel (m/s), with a relaxation
-    length (m)."""
+def lagging_slip(a, u, v, time, length):
+    """Tangent of the lagging slip angle after a time (s) at constant speeds u along and v across the wheel (m/s), with
+    a relaxation length (m).
+    """
     return a + (v - abs(u) * a) * phi_1(-abs(u) * time / length) * time / length
 
 
 @inlined
-def take_up(i, u, v, time, slope, lag, lagging):
-    """Advance the lagging angle of wheel i by a time (s) at speeds u, v (m/s). Put the tan of the slip angle with the
-    damper's part into ``lagging`` (W,); slope : see ``OnRoad``.
+def advance_lagging_slip(i, u, v, time, slope, lag, lagging):
+    """Advance the lagging slip angle of wheel i by a time (s) at speeds u along and v across it (m/s). Its tangent with
+    the damper's part goes into ``lagging`` (W,); slope : see ``OnRoad``.
 
     An angle that is NaN starts at its steady value for these speeds.
     """
     length = lag.length[i]
     if math.isnan(lag.angle[i]):
         lag.angle[i] = v / max(abs(u), SLOWEST_SPEED)
-    lag.angle[i] = taken_up(lag.angle[i], u, v, time, length)
+    lag.angle[i] = lagging_slip(lag.angle[i], u, v, time, length)
     fade = max(1.0 - abs(u) / FADING_SPEED, 0.0)
     rate = math.sqrt(max(slope, SLOWEST_SPEED) * GRAVITY * length)
     lagging[i] = lag.angle[i] + fade * fade * v * 2.0 * DAMPING / rate
@@ -74,18 +77,20 @@ def longest_step(slope: float, lively: float, length: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def lag_on(state, time, steer, vehicle, lag, lagging):
-    """Advance the lagging angles of all wheels by a time (s), and fill ``lagging`` (W,): see ``take_up``."""
+    """Advance the lagging slip angles of all wheels by a time (s), and fill ``lagging`` (W,): see
+    ``advance_lagging_slip``.
+    """
     plane = vehicle.plane
     for i in range(lag.angle.size):
         k = plane.unit[i]
         vx, vy = velocity(ChainPoint(k, plane.place[i, 0], plane.place[i, 1]), state[0], state[1], plane.reach)
         c, s = math.cos(state[0, 2 + k] + steer[i]), math.sin(state[0, 2 + k] + steer[i])
-        take_up(i, c * vx + s * vy, c * vy - s * vx, time, vehicle.slope, lag, lagging)
+        advance_lagging_slip(i, c * vx + s * vy, c * vy - s * vx, time, vehicle.slope, lag, lagging)
 
 
 @njit(cache=True, error_model="numpy")
 def advance_lagging(motion, torques, step, steer, vehicle, lag):
-    """``advance`` for tyres with relaxation, whose ``Lag`` is updated in place."""
+    """Advance a vehicle on tyres with relaxation by n steps, as ``advance`` does; its ``Lag`` is updated in place."""
     surfaces, time = surfaces_of(np.empty((4, motion.turning.size))), 0.0
     for n in range(torques.shape[0] - 1):
         under_wheels(motion.state, step, vehicle, surfaces)
@@ -104,4 +109,4 @@ def advance_lagging(motion, torques, step, steer, vehicle, lag):
 
 
 by_lagging_steps = compiled(advance_lagging, "by_lagging_steps")
-"""``by_steps`` with such tyres: after its arguments comes a ``Lag``."""
+"""Compiled samples of a vehicle on tyres with relaxation, as ``by_steps``: after its arguments comes a ``Lag``."""

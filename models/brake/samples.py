@@ -1,4 +1,4 @@
-"""A braked vehicle moved on sample by sample, to whatever its valves, chambers and steering are told in between.
+"""Advance of a braked vehicle by controller samples, with the commands to its valves, chambers and steering in between.
 
 All of it is one generator, which as compiled code goes on within a microsecond: what it works on is given to it once
 and not in every sample. Compiled, it holds that by one reference: kept by their values, some fifty arrays take the
@@ -18,13 +18,13 @@ from numba.experimental import structref
 from models.brake.advance import AT_REST, FINE, advance
 from models.brake.brake import Brakes
 from models.brake.plane_records import REPORT_SIZE, PlaneMotion
-from models.brake.plane_step import moved_to
+from models.brake.plane_step import copy_row
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves
 from models.machine.compiled import inlined, named_closure, njit
 
 
 class Row(NamedTuple):
-    """A recorded row of a run and its parts, which are views of the row.
+    """A recorded row of a braking run and its fields, which are views of the row.
 
     time (1,): s; state (2, n): positions and rates; turning, pressure, torque (W,): rad/s, bar, N m; report (7, W):
     see ``PlaneMotion``.
@@ -44,7 +44,7 @@ class Row(NamedTuple):
 
 
 def row(coordinates: int, wheels: int) -> Row:
-    """A ``Row`` of zeros for so many coordinates and wheels."""
+    """A ``Row`` of zeros for these numbers of coordinates and wheels."""
     shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (REPORT_SIZE, wheels))
     ends = np.cumsum([math.prod(shape) for shape in shapes])
     block = np.zeros(ends[-1])
@@ -53,8 +53,9 @@ def row(coordinates: int, wheels: int) -> Row:
 
 
 def parts(rows: list[np.ndarray], like: Row) -> Row:
-    """``Row`` whose fields hold many rows each, from blocks of rows laid out as ``like``: every field has a first axis
-    more, over the rows."""
+    """``Row`` whose fields hold many rows each, from blocks of rows laid out as ``like``: every field has an additional
+    first axis, over the rows.
+    """
     ends = np.cumsum([field.size for field in like[1:]])
     block = np.concatenate(rows)
     columns = np.split(block, ends[:-1], axis=1)
@@ -69,7 +70,8 @@ def parts(rows: list[np.ndarray], like: Row) -> Row:
 
 class Commands(NamedTuple):
     """Commands that stay constant over the next ``samples`` (1,) samples: states of the valves (W,), pressures (W,) in
-    bar, of which the first is NaN where valve states apply instead, and steer angles (W,) in rad."""
+    bar, of which the first is NaN where valve states apply instead, and steer angles (W,) in rad.
+    """
 
     samples: np.ndarray
     valves: np.ndarray
@@ -80,7 +82,8 @@ class Commands(NamedTuple):
 class Record(NamedTuple):
     """Record of the samples: now (k,), the present state as numbers of which the first is the time (s); rows (m, k),
     states at earlier samples, of which the first ``left`` (1,) are filled and not yet collected; until (s): the run
-    ends with the first sample that ends then or later."""
+    ends with the first sample that ends then or later.
+    """
 
     now: np.ndarray
     rows: np.ndarray
@@ -98,8 +101,9 @@ class Braking(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """All data of a run that samples need; sample (s); others: further arguments of ``advance``, after the steer
-    angles."""
+    """All data of a braking run that its samples need; sample : duration (s); others: further arguments of ``advance``,
+    after the steer angles.
+    """
 
     commands: Commands
     record: Record
@@ -111,7 +115,7 @@ class Subject(NamedTuple):
 
 @structref.register
 class ReferenceType(types.StructRef):
-    """numba's type of a ``Reference``."""
+    """Type of a ``Reference`` for the compiler numba."""
 
 
 class Reference(structref.StructRefProxy):
@@ -128,12 +132,13 @@ def by_reference(commands, record, sample, braking, motion, vehicle_parts):
 
 
 go: Callable[..., Any] = advance
-"""Stands here for what ``moved`` puts in its place."""
+"""Placeholder of the function that advances the vehicle by a sample; ``moved`` replaces it."""
 
 
 def some_samples(commands, record, sample, braking, motion, simulated_time, vehicle_parts):
-    """Advance a vehicle from a time (s) on by ``commands.samples`` samples, or until it stops or the run ends. ``go``
-    makes each step: ``advance`` or a function in its place. Returns how the last sample ended, and the time (s)."""
+    """Advance a vehicle from a time (s) on by ``commands.samples`` samples, or until it stops or the run ends; ``go``
+    advances each sample. Returns the status of the last sample, and the time (s).
+    """
     air, chambers, brakes, torques = braking
     status, step = FINE, sample / (torques.shape[0] - 1)
     for _ in range(commands.samples[0]):
@@ -146,7 +151,7 @@ def some_samples(commands, record, sample, braking, motion, simulated_time, vehi
         if status not in (FINE, AT_REST):
             break
         record.now[0] = simulated_time
-        moved_to(record.now, record.rows[record.left[0]])
+        copy_row(record.now, record.rows[record.left[0]])
         record.left[0] += 1
         if status == AT_REST or simulated_time >= record.until:
             break
@@ -154,7 +159,7 @@ def some_samples(commands, record, sample, braking, motion, simulated_time, vehi
 
 
 some: Callable[..., Any] = some_samples
-"""Stands here for what ``moved`` puts in its place."""
+"""Placeholder of the function that advances the vehicle by some samples; ``moved`` replaces it."""
 
 
 def samples(subject):
@@ -185,11 +190,13 @@ def _with_globals(function: Callable[..., Any], **replacements: Any) -> Callable
 
 
 MoveSamples = Callable[..., Iterator[tuple[int, float, float, float]]]
-"""Function of commands, record, sample, braking, motion and all others of a ``Subject`` that begins its ``samples``."""
+"""Type of a function that begins the generator ``samples``, from commands, record, sample, braking, motion and all
+others of a ``Subject``.
+"""
 
 
 def moved(step_function: Callable[..., Any]) -> MoveSamples:
-    """``samples`` that advances its vehicle by the given ``step_function``."""
+    """Generator function ``samples`` that advances its vehicle by the given ``step_function``."""
     march = _with_globals(samples, some=_with_globals(some_samples, go=step_function))
 
     def begun(commands, record, sample, braking, motion, *vehicle_parts):
@@ -200,7 +207,7 @@ def moved(step_function: Callable[..., Any]) -> MoveSamples:
 
 @dataclass(frozen=True)
 class CompiledSamples:
-    """Compiled version of ``samples``; march takes a ``Reference``."""
+    """Compiled version of the generator ``samples``; march takes a ``Reference``."""
 
     march: Callable[[Reference], Iterator[tuple[int, float, float, float]]]
 
@@ -210,7 +217,7 @@ class CompiledSamples:
 
 
 def compiled(step_function: Callable[..., Any], name: str) -> CompiledSamples:
-    """Compiled version of ``moved``, for a compiled step function."""
+    """Compiled samples that advance the vehicle by a compiled step function."""
     compiled_some = inlined(named_closure(_with_globals(some_samples, go=step_function), name))
     return CompiledSamples(
         njit(cache=True, error_model="numpy")(named_closure(_with_globals(samples, some=compiled_some), name))
@@ -218,4 +225,4 @@ def compiled(step_function: Callable[..., Any], name: str) -> CompiledSamples:
 
 
 by_steps = compiled(advance, "by_steps")
-"""The vehicle moved by its own steps."""
+"""Compiled samples of the vehicle in the plane with the step function ``advance``."""

@@ -1,4 +1,4 @@
-"""A braked vehicle on its suspension: the bodies of a vehicle file on a carrier that turns through any angle.
+"""A braked vehicle on its suspension: the bodies of a vehicle file on a carrier that can turn to any heading.
 
 Its coordinates begin with those of the plane vehicle of the same file, x, y and heading of its centre of mass in the
 design position; heave, roll and pitch of the chassis follow (see ``models.vehicles.free_vehicle``). Loads are those
@@ -22,11 +22,11 @@ from models.vehicles.free_vehicle import CARRIER, SWAY, spinning
 from models.vehicles.spatial import Body, Freedom, SpatialVehicle, Tyre, Vector, hitch_of
 
 ROLL, PITCH = 4, 5
-"""Places of the chassis' roll and pitch among the coordinates."""
+"""Indices of the chassis' roll and pitch among the coordinates."""
 FOLD = math.pi / 2.0
-"""Yaw (rad) of a towed body beside what tows it, beyond which a train jackknifes."""
+"""Yaw angle (rad) of a towed body relative to what tows it, beyond which a train jackknifes."""
 MOST_WHEELS = 8
-"""Wheels of the longest train: a controller's frame has room for as many."""
+"""Largest number of wheels of a train: a controller's frame has room for as many."""
 LEADING_COORDINATES: tuple[tuple[str, Freedom], ...] = (
     (CARRIER, "x"),
     (CARRIER, "y"),
@@ -56,21 +56,23 @@ class Sprung:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the coordinates."""
+        """Names of the coordinates, each with its body and freedom."""
         return tuple(" ".join(body_freedom) for body_freedom in self.handling.vehicle.coordinates())
 
     @property
     def turns(self) -> np.ndarray:
-        """Numbers (towed,) of the yaw coordinates between each towed unit and the one that tows it."""
+        """Indices (towed,) of the yaw coordinates between each towed unit and the one that tows it."""
         return self._turning_coordinates("rz")
 
     @property
     def leans(self) -> np.ndarray:
-        """Numbers of the roll and pitch coordinates: of the chassis, then of each towed unit relative to the one before
-        it."""
+        """Indices of the roll and pitch coordinates: of the chassis, then of each towed unit relative to the previous
+        one.
+        """
         return np.concatenate(([ROLL, PITCH], self._turning_coordinates("rx"), self._turning_coordinates("ry")))
 
     def _turning_coordinates(self, freedom: Freedom) -> np.ndarray:
+        """Indices of the hitches' coordinates of one freedom, for all towed units that have it."""
         free = self.handling.vehicle
         hitch_coordinates = [(hitch_of(name), freedom) for name in free.towed]
         known = free.coordinates()
@@ -79,7 +81,8 @@ class Sprung:
         )
 
     def in_plane(self, with_load_transfer: bool = True) -> Plane:
-        """``Plane`` of the vehicle and its wheels. In a train, loads are the static ones that its springs carry.
+        """``Plane`` of the vehicle with its trailers and wheels. In a train, loads are the static ones that its springs
+        carry.
 
         Each hitch is taken to lie in the middle plane of the towing unit.
         """
@@ -111,8 +114,9 @@ class Sprung:
 
 
 def _hitch_reach(hitches: np.ndarray, centres: np.ndarray) -> np.ndarray:
-    """reach (U, U) of ``Plane``, m, from the hitches' positions (U - 1,) and the units' centres (U,), both ahead of the
-    vehicle's centre."""
+    """Distances ``reach`` (U, U) of ``Plane``, m, from the hitches' positions (U - 1,) and the units' centres (U,),
+    both ahead of the vehicle's centre.
+    """
     reach = np.zeros((centres.size, centres.size))
     for k in range(1, centres.size):
         reach[k:, k - 1] = hitches[k - 1] - (hitches[k - 2] if k > 1 else centres[0])
@@ -122,7 +126,8 @@ def _hitch_reach(hitches: np.ndarray, centres: np.ndarray) -> np.ndarray:
 
 def _unit(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, float]:
     """Mass (kg), yaw inertia (kg m^2) and position ahead (m) of a unit's centre of mass. The unit is a towed body with
-    all that it carries, or the vehicle without its trailers."""
+    all that it carries, or the vehicle without its trailers.
+    """
     bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed]
     masses, positions = np.array([body.mass for body in bodies]), np.array([body.position for body in bodies])
     x, y, _ = masses @ positions / masses.sum()
@@ -139,16 +144,12 @@ def _yaw_inertia(bodies: list[Body], x: float, y: float) -> float:
 def suspended_vehicle(
     vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5, forces: Literal["native", "compiled"] = "native"
 ) -> Sprung:
-    """A two-axle vehicle with two wheels per axle, and its trailers; spin_inertia (kg m^2): for wheels whose tyres name
-    no inertia.
+    """A two-axle vehicle with two wheels per axle, and its trailers, on its suspension; spin_inertia (kg m^2): for
+    wheels whose tyres name no inertia.
 
     front : share of the front axle in the lateral load transfer of the plane vehicle, while here the springs determine
     it; forces : who computes the trailers' springs, see ``Handling``. Raises InputError for a vehicle with other axles,
     with trailers that do not form a row, or without steering.
-
-    front : share of the front axle in the plane vehicle's load transfer by lateral acceleration, which springs know
-    here; forces : whose the springs of what is towed are, see ``Handling``. Raises InputError for a vehicle of other
-    axles, that tows other than in a row, or that cannot be steered.
     """
     tyres = _tyres_by_axle(vehicle)
     _check_row(vehicle)
@@ -162,7 +163,8 @@ def suspended_vehicle(
 
 def _tyres_by_axle(vehicle: SpatialVehicle) -> list[Tyre]:
     """Tyres axle by axle, left before right; InputError unless the vehicle has two axles, and these and all trailer
-    axles have two tyres each."""
+    axles have two tyres each.
+    """
     tyres = sorted(vehicle.tyres, key=lambda tyre: (tyre.axle, -tyre.point[1]))
     names, on_front_unit = [tyre.name for tyre in tyres], [vehicle.towed_under(tyre.body) is None for tyre in tyres]
     pairs = list(zip(tyres[::2], tyres[1::2], strict=False))
@@ -184,7 +186,8 @@ def _tyres_by_axle(vehicle: SpatialVehicle) -> list[Tyre]:
 
 def _wheel_inertias(name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
     """Inertias (kg m^2) of the wheels with these tyres, axle by axle; InputError unless both wheels of an axle are
-    equal."""
+    equal.
+    """
     inertias = [spinning(tyre, spin_inertia) for tyre in tyres]
     for number, (tyre, inertia) in enumerate(zip(tyres, inertias, strict=True)):
         if not inertia > 0.0 or inertia != inertias[number ^ 1]:
@@ -208,7 +211,7 @@ def _check_row(vehicle: SpatialVehicle) -> None:
 
 
 def without_trailer(vehicle: SpatialVehicle) -> list[Body]:
-    """The vehicle without the bodies that it tows."""
+    """Bodies of the vehicle without the bodies that it tows."""
     return [body for body in vehicle.bodies if vehicle.towed_under(body.name) is None]
 
 
@@ -220,11 +223,11 @@ def centre_of_mass(vehicle: SpatialVehicle) -> np.ndarray:
 
 
 POSITION_FIELDS = ("position", "point", "first_point", "second_point", "point_left", "point_right")
-"""What parts of a vehicle call their places."""
+"""Names of the fields that hold positions of a vehicle's parts."""
 
 
 def _displaced_vehicle(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
-    """The vehicle with all positions shifted by ``distance`` on the ground."""
+    """The vehicle with all positions shifted by ``distance`` (m) along and across, on the ground."""
 
     def moved_position(element: Any, name: str) -> Vector:
         x, y, z = np.add(getattr(element, name), (distance[0], distance[1], 0.0))
@@ -244,7 +247,8 @@ def _displaced_vehicle(vehicle: SpatialVehicle, distance: np.ndarray) -> Spatial
 
 def _plane_truck(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float) -> Truck:
     """``Truck`` in the plane of a vehicle centred at its mass centre, without trailers; spin_inertias (kg m^2): of its
-    wheels."""
+    wheels.
+    """
     bodies = without_trailer(vehicle)
     front_axle, rear_axle = (
         Axle(

@@ -1,4 +1,5 @@
-"""Tyres that lag on a vehicle on its suspension: the law of ``models.brake.relaxation`` at the contacts of its wheels.
+"""Tyres with lagging slip angles on a vehicle on its suspension: the law of ``models.brake.relaxation`` at its wheel
+contacts.
 
 Where a step begins, the speeds there move the angles over the half of the step before, which had to wait for them, and
 over the half of this one: no state has its forces taken for the lag alone.
@@ -8,12 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.brake.relaxation import take_up
+from models.brake.relaxation import advance_lagging_slip
 from models.machine.compiled import lean
 
 
 class ContactLag(NamedTuple):
-    """A ``Lag``, length and angle (W,), and behind (1,): the time (s) by which its angles are behind the motion."""
+    """Tyres with lagging slip angles, as ``Lag``: length and angle (W,), and behind (1,): the time (s) by which the
+    angles lie behind the motion.
+    """
 
     length: np.ndarray
     angle: np.ndarray
@@ -23,8 +26,9 @@ class ContactLag(NamedTuple):
 @lean
 def relax(contacts, half, slope, lag, surfaces):
     """Advance a ``ContactLag`` to half a step (s) after the motion in ``Contacts``; put its slip angles into the
-    ``Surfaces``."""
+    ``Surfaces``.
+    """
     time = lag.behind[0] + half
     for i in range(lag.angle.size):
-        take_up(i, contacts.along[i], contacts.across[i], time, slope, lag, surfaces.lag)
+        advance_lagging_slip(i, contacts.along[i], contacts.across[i], time, slope, lag, surfaces.lag)
     lag.behind[0] = half

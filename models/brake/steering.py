@@ -1,4 +1,4 @@
-"""The driver's steering by time, and how fast a vehicle answers to it."""
+"""The driver's steering over time, and how fast the vehicle's yaw rate responds to it."""
 
 from dataclasses import dataclass
 
@@ -7,15 +7,18 @@ import numpy as np
 from models.brake.figures_of_merit import crossing_time
 
 REACHED_SHARE, HALF_SHARE = 0.9, 0.5
-"""Share of the steady yaw rate by which the response is timed, and of the last angle from which."""
+"""Share of the steady yaw rate at which the response time ends, and share of the final steer angle at which it
+begins.
+"""
 STEADY_RANGE = 0.05
-"""Largest range of a yaw rate that is called steady, by its mean."""
+"""Largest ratio of a yaw rate's range to its mean at which it counts as steady."""
 
 
 @dataclass(frozen=True, eq=False)
 class Steering:
-    """Angles (n,) in rad of the wheels marked by ``steered`` (W,), at times (n,) in s: linear between the times,
-    constant outside."""
+    """Steer angles (n,) in rad of the wheels marked by ``steered`` (W,), at times (n,) in s: linear between the times,
+    constant outside.
+    """
 
     times: np.ndarray
     angles: np.ndarray
@@ -27,7 +30,7 @@ class Steering:
 
     @property
     def half(self) -> float:
-        """Time (s) at which the angle first reaches half of its final value."""
+        """Time (s) at which the steer angle first reaches half of its final value."""
         goal, final_sign = HALF_SHARE * abs(self.angles[-1]), np.sign(self.angles[-1])
         reached = final_sign * self.angles >= goal
         i = int(np.argmax(reached))
@@ -38,8 +41,10 @@ class Steering:
 
 @dataclass(frozen=True)
 class YawResponse:
-    """time : s, from half of the final steer angle to 90 % of the steady yaw rate; overshoot : ratio of peak yaw rate
-    above the steady one to the steady one; steady_rate : yaw rate, rad/s."""
+    """Response of the yaw rate to a step of steering. time : s, from half of the final steer angle to 90 % of the
+    steady yaw rate; overshoot : ratio of the peak above the steady yaw rate to the latter; steady_rate : yaw rate,
+    rad/s.
+    """
 
     time: float
     overshoot: float
@@ -47,7 +52,7 @@ class YawResponse:
 
 
 def yaw_response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> YawResponse | None:
-    """Step response from yaw rates (n,) in rad/s at times (n,) in s; None if the last second is not steady.
+    """Step response of steering from yaw rates (n,) in rad/s at times (n,) in s; None if the last second is not steady.
 
     half : time (s) at which the steering reaches half of its last angle. Source: ISO 7401 (cars), ISO 14793 (heavy
     vehicles); not checked against the text of the standard.

@@ -1,4 +1,4 @@
-"""Which tyre table holds where on the road: stretches along x, each with its own surface left and right of a line."""
+"""Friction surfaces of the road: stretches along x, each with its own tyre tables left and right of a line."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from models.tyre.tyre_table import Tables
 
 
 class Road(NamedTuple):
-    """Stretches of a road for compiled functions.
+    """Stretches of a road with their surfaces, for compiled functions.
 
     starts (n,): x in m at which each stretch begins, the first at minus infinity; left, right (n,): numbers of their
     surfaces; line: y in m from which on the left one holds. Table of a wheel: surface * kinds + kind of its tyre.
@@ -42,8 +42,9 @@ class OnRoad(NamedTuple):
 
 
 class Surfaces(NamedTuple):
-    """Surface under each wheel, arrays (W,): numbers of two tyre tables, and the share of the second; lag: tan of the
-    slip angle that lags behind the motion of the wheel, NaN for a tyre without lag."""
+    """Surface under each wheel, arrays (W,): indices of two tyre tables, and the share of the second; lag: tan of the
+    slip angle that lags behind the motion of the wheel, NaN for a tyre without lag.
+    """
 
     first: np.ndarray
     second: np.ndarray
@@ -52,7 +53,7 @@ class Surfaces(NamedTuple):
 
 
 def surfaces(wheels: int) -> Surfaces:
-    """``Surfaces`` for so many wheels, with the first table under each and without lag of the tyres."""
+    """``Surfaces`` for this number of wheels, with the first table under each and without lag of the tyres."""
     return Surfaces(np.zeros(wheels), np.zeros(wheels), np.zeros(wheels), np.full(wheels, math.nan))
 
 
@@ -65,7 +66,7 @@ def surfaces_of(rows):
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of road that begins at x (m): numbers of the surfaces left and right of the line."""
+    """A stretch of road that begins at x (m): indices of the surfaces left and right of the line."""
 
     x: float
     left: int
@@ -88,11 +89,13 @@ def road(stretches: list[Stretch], line: float = 0.0, kind_count: int = 1) -> Ro
 
 
 UNIFORM_ROAD = road([Stretch(0.0, 0, 0)])
-"""The same surface everywhere."""
+"""Road with the same surface everywhere."""
 
 
 def check_way(road: Road, distance: float) -> None:
-    """Refuse steps in which a wheel may travel a distance (m) longer than the shortest inner stretch of the road."""
+    """Refuse time steps in which a wheel may travel a distance (m) longer than the shortest inner stretch of the
+    road.
+    """
     shortest = float(np.diff(road.starts[1:]).min()) if road.starts.size > 2 else np.inf
     if distance > shortest:
         raise InputError(
@@ -111,7 +114,7 @@ def is_uniform(road):
 
 @lean
 def under_wheels(state, step, vehicle, surfaces):
-    """Fill tables and shares of the ``Surfaces`` under the wheels of an ``OnRoad``.
+    """Fill table indices and shares of the ``Surfaces`` under the wheels of an ``OnRoad`` for a step (s).
 
     state (2, 2 + U): positions and rates, by which wheels are taken to move over the step. Of two stretches that a
     wheel passes in the step, or of the two sides of the line, each has the share of the way on it, forwards or

@@ -1,4 +1,4 @@
-"""A drawbar trailer of two axles, behind a truck or with its hook on a motion that is prescribed.
+"""A drawbar trailer of two axles, behind a truck or with a prescribed motion of its hook.
 
 The drawbar turns about the hook and carries the front axle at its end, where its own centre of mass is; there the
 trailer's body turns on it, and the rear axle is fixed to the body. Loads under both axles follow from the acceleration
@@ -24,7 +24,7 @@ from models.tyre.tyre_table import Tables
 
 
 class Trailer(Truck):
-    """A trailer: body with axles ahead of and behind its centre of mass, and drawbar."""
+    """A drawbar trailer: body with axles ahead of and behind its centre of mass, and drawbar."""
 
     drawbar: float = quantity("m", "from the hook to the front axle")
     drawbar_mass: float = quantity("kg", "of the drawbar with the front axle")
@@ -54,7 +54,7 @@ def plane_of_trailer(trailer: Trailer, with_load_transfer: bool = True) -> Plane
 
 
 def plane_of_train(vehicle: Truck, trailer: Trailer, with_load_transfer: bool = True) -> Plane:
-    """``Plane`` of a truck with a trailer on its hook: eight wheels."""
+    """``Plane`` of a truck with a drawbar trailer on its hook: eight wheels."""
     truck_records, reach = plane_of_truck(vehicle, with_load_transfer), np.zeros((3, 3))
     reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
     units = (np.concatenate((a, b)) for a, b in zip(truck_records[:2], _units_of_train(trailer), strict=True))
@@ -67,12 +67,14 @@ def plane_of_train(vehicle: Truck, trailer: Trailer, with_load_transfer: bool = 
 
 
 def _units_of_train(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:
+    """Masses (kg) and yaw inertias (kg m^2) of the drawbar and the trailer's body."""
     return (np.array([trailer.drawbar_mass, trailer.mass]), np.array([trailer.drawbar_inertia, trailer.yaw_inertia]))
 
 
 def _wheels(trailer: Trailer, first: int, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
-    """Unit and group of each wheel, then the results of ``wheels``; the front wheels belong to the drawbar, which is
-    unit ``first``."""
+    """Unit and group of each wheel of a trailer, then the results of ``wheels``; the front wheels belong to the
+    drawbar, which is unit ``first``.
+    """
     check_wheels(trailer, trailer.mass + trailer.drawbar_mass)
     wheel_positions, radius, spin, static, by_x, by_y = wheels(trailer, with_load_transfer)
     wheel_positions[:2, 0] = 0.0
@@ -83,7 +85,8 @@ def _wheels(trailer: Trailer, first: int, with_load_transfer: bool) -> tuple[np.
 
 class Pull(NamedTuple):
     """Motion of a trailer behind its hook: states (n + 1, 2, 2 + U), positions and rates at the steps' ends, and the
-    mean forces (n, 2) in N on the hook from the vehicle, in the ground's axes."""
+    mean forces (n, 2) in N on the hook from the vehicle, in the ground's axes.
+    """
 
     states: np.ndarray
     forces: np.ndarray
@@ -111,6 +114,7 @@ def follow_hook(
 
 @njit(cache=True, error_model="numpy")
 def _march_trailer(motion, hook, step, torques, vehicle, pull):
+    """Integrate the trailer's motion into ``pull``; returns whether wheel loads were solved in every step."""
     plane, state, report, accelerations = vehicle.plane, motion.state, report_of(motion.report), motion.accelerations
     size, straight, states, forces = accelerations.size, np.zeros(motion.turning.size), pull.states, pull.forces
     mass, (right, row_along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))

@@ -1,4 +1,4 @@
-"""One wheel through one step: exact between the nodes of its tyre table, with an explicit locked state.
+"""Rotation of one braked wheel over one step: exact between the nodes of its tyre table, with an explicit locked state.
 
 With the speed u of its centre changing at a constant rate over the step, J w' = r F(s) - T and s = (u - r w) / u give
 
@@ -22,13 +22,14 @@ from models.machine.compiled import lean
 from models.tyre.tyre_table import TableCell, cell_and_share, longitudinal_adhesion
 
 SLOWEST_SPEED = 1e-9
-"""Speed (m/s) below which a wheel's centre is taken to have this one: slip has no meaning at rest."""
+"""Speed (m/s) that replaces lower speeds of a wheel's centre: slip has no meaning at rest."""
 MOST_PIECES = 100_000
 
 
 class Wheel(NamedTuple):
-    """A wheel that turns: radius (m), inertia about its axle (kg m^2), and at the start of a step the speed of turning
-    (rad/s), negative if against the direction of the wheel's centre."""
+    """A rotating wheel: radius (m), inertia about its axle (kg m^2), and rotational speed at the start of a step
+    (rad/s), negative if against the direction of the wheel's centre.
+    """
 
     radius: float
     inertia: float
@@ -52,8 +53,9 @@ class Grip(NamedTuple):
 
 
 class StepInput(NamedTuple):
-    """Drive of a wheel over a step (s): speed of its centre along it (m/s) and torque of its brake (N m, from 0
-    on), both at the step's two ends and linear in time between."""
+    """Input of a wheel over a step (s): speed of its centre along it (m/s) and torque of its brake (N m, not negative),
+    both at the step's two ends and linear in time between.
+    """
 
     speed0: float
     speed1: float
@@ -63,8 +65,9 @@ class StepInput(NamedTuple):
 
 
 class Rolled(NamedTuple):
-    """A wheel after a step: speed of turning at the end (rad/s), mean force (N, positive if it brakes the vehicle),
-    mean slip, for which slips below -1 count as -1, and the time (s) for which the wheel was locked."""
+    """A wheel after a step: rotational speed at the end (rad/s), mean force (N, positive if it brakes the vehicle),
+    mean slip, for which slips below -1 count as -1, and the time (s) for which the wheel was locked.
+    """
 
     turning: float
     force: float
@@ -74,14 +77,14 @@ class Rolled(NamedTuple):
 
 @lean
 def phi_1(z):
-    """(exp(z) - 1) / z."""
+    """The quotient (exp(z) - 1) / z, also for z near 0."""
     return math.expm1(z) / z if abs(z) > 1e-5 else 1.0 + z / 2.0 + z * z / 6.0
 
 
 @lean
 def distance_integral(distance, rate, decay, time):
-    """Integral over a time of the distance covered at a rate that decays as exp(-decay t), ``distance`` being its end
-    value.
+    """Integral over a time (s) of the distance covered at a rate that decays as exp(-decay t), ``distance`` being its
+    end value.
 
     With z = decay t it is t distance (1 / (1 - exp(-z)) - 1 / z). The series 1/2 + z/12 - z^3/720 for small z has an
     error of z^5/30240. Each branch loses at most 1e-13 of the value: the other one by cancellation.
@@ -92,7 +95,7 @@ def distance_integral(distance, rate, decay, time):
 
 @lean
 def slip_at_table_node(k, slips):
-    """Slip at node k; for a negative k, minus the slip at node -k."""
+    """Slip at node k of a tyre table; for a negative k, minus the slip at node -k."""
     return slips[k] if k >= 0 else -slips[-k]
 
 
@@ -150,9 +153,7 @@ def roll(slip, remaining, kappa, fade, brake_force, grip):
 
 @lean
 def _time_of_distance(decay, rate, distance):
-    """Time in which the distance ``distance`` is covered at a rate that decays as exp(-decay t); infinite if it never
-    is.
-    """
+    """Time in which ``distance`` is covered at a rate that decays as exp(-decay t); infinite if it is never reached."""
     if rate == 0.0:
         return math.inf
     share = decay * distance / rate

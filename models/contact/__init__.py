@@ -1,4 +1,4 @@
-"""Rolling contact: what two elastic bodies do to each other where they touch and roll.
+"""Rolling contact: forces, pressures and slip of two elastic bodies where they touch and roll.
 
 Axes
     x in the direction of rolling, z from the wheel (body 1) into the rail (body 2), y to the right of x.

@@ -1,12 +1,12 @@
-"""Errors of a contact's forces: those of its cells, and those of the theory itself.
+"""Error estimates of contact forces: the error of the finite cells, and the error of the theory itself.
 
 Cells
     The same contact is rolled again on about half as many cells along each axis. An error of order p then changes by
     the ratio of the cells to the power p, which tells how much of it is left. Cells begin to slip one by one, so the
     two grids agree by chance now and then: force and moment are compared as one vector, twice the difference is stated
-    (``SAFETY``) and a part of the force used that goes with the cells' area; and where little slips, both grids miss
-    a zone of slip narrower than their cells (``UNSEEN``). At least 95 % of contacts keep to it, FASTSIM's on 5 to 41
-    cells (validation case ``contact_price``).
+    (``SAFETY_FACTOR``) and a part of the force used that goes with the cells' area; and where little slips, both grids
+    miss a zone of slip narrower than their cells (``TRAILING_SLIP_FACTOR``). At least 95 % of contacts keep to it,
+    FASTSIM's on 5 to 41 cells (validation case ``contact_price``).
 Theory
     On converged cells the theories were held against the exact one, on 1570 contacts of
     ``validation.contact.contact_set``: ellipses of a/b from 0.1 to 10, Poisson's ratio 0, 0.28 and 0.5, creepage and
@@ -30,20 +30,23 @@ from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
 from models.contact.theories import Fastsim, LinearTheory, Motion, OnEllipse, Rolled, RollingContact, Simplified
 
-SAFETY = 2.0
-"""Factor on what step halving tells."""
-LIKELY = 0.7
-"""Share of the difference of both grids that the finer one still has, as 600 contacts of all choices of FASTSIM had it
-against cells a hundred times finer: a third had more, a hundredth more than three times as much."""
-UNSEEN = 0.17
-"""What a zone of slip at the trailing edge takes off the force, by the square of the force used; it is wider than a
-cell, and seen, where the force used is beyond three by the cells."""
-SLENDER = (0.1, 10.0)
-"""a/b between which the bands were measured."""
+SAFETY_FACTOR = 2.0
+"""Safety factor on the error that the comparison of two grids gives."""
+LIKELY_SHARE = 0.7
+"""Likely error of the finer grid as a share of the difference of both grids, from 600 contacts of all choices of
+FASTSIM against cells a hundred times finer: a third had more, a hundredth more than three times as much.
+"""
+TRAILING_SLIP_FACTOR = 0.17
+"""Factor of the force that a narrow zone of slip at the trailing edge takes away: share of mu N, divided by the square
+of the used share of mu N. A zone wider than a cell is resolved: where the used share exceeds 3 divided by the number of
+cells.
+"""
+MEASURED_AXIS_RATIOS = (0.1, 10.0)
+"""Axis ratios a/b between which the error bands were measured."""
 FILE = Path(__file__).with_name("error_bands.csv")
 (_, _, _, *_KNOTS), *_ROWS = csv.reader(FILE.read_text().splitlines())
 KNOTS = np.array(_KNOTS, float)
-"""Tangential force divided by mu N at which the bands are kept."""
+"""Ratios of the tangential force to mu N at which the error bands are tabulated."""
 BANDS, MOMENT_BANDS = (
     {
         theory: [np.array(values, float) for kind, name, _, *values in _ROWS if (kind, name) == (quantity, theory)]
@@ -51,16 +54,19 @@ BANDS, MOMENT_BANDS = (
     }
     for quantity in ("force", "moment")
 )
-"""Name of a theory -> error divided by mu N that 95 % of the contacts keep to at each knot, without spin and with it;
-that of the moment divided by mu N times the lever: abscissa is ``used_with_moment``, and all vanish at its zero."""
+"""Error bands by the name of a theory: ratio of the error to mu N that 95 % of the contacts keep to at each knot,
+without spin and with it; of the moment, ratio to mu N times the lever: the abscissa is ``used_with_moment``, and all
+vanish at its zero.
+"""
 
 
 @dataclass(frozen=True)
 class Error:
-    """Estimated errors of the tangential force (N) and of the moment (N m).
+    """Estimated errors of the tangential force (N) and of the moment (N m) of a rolling contact.
 
-    cells : what the cells leave at most. theory : what 95 % of contacts like this keep to. moment_cells and
-    moment_theory : the same of the moment. likely, moment_likely : what the cells leave, a third of the times more.
+    cells : largest error by the cells. theory : error of the theory that 95 % of contacts like this keep to.
+    moment_cells and moment_theory : the same for the moment. likely, moment_likely : likely error by the cells, which a
+    third of the contacts exceed.
     """
 
     cells: float
@@ -82,17 +88,17 @@ class Error:
 
 
 def rolled(contact: RollingContact, motion: Motion, cells: int, *, fields: bool = False) -> tuple[Rolled, Error]:
-    """Forces at the given creepages and spin, and their estimated errors."""
+    """Contact forces at the given creepages and spin, and their estimated errors."""
     fine = contact.roll(motion, cells, fields=fields)
     if isinstance(contact, LinearTheory):
-        force, moment = _of_linear(contact, motion, fine)
+        force, moment = _linear_theory_errors(contact, motion, fine)
         return fine, Error(0.0, force, 0.0, moment)
     coarse = contact.roll(motion, coarser_cells(cells))
     (force, moment), (likely, turning) = (
         _largest_errors(contact, cells, fine, coarse),
         _likely_errors(contact, cells, fine, coarse),
     )
-    theory, moment_theory = _of_theory(contact, motion, fine)
+    theory, moment_theory = _theory_errors(contact, motion, fine)
     return fine, Error(force, theory, moment, moment_theory, likely, turning)
 
 
@@ -101,73 +107,79 @@ def remaining_errors(contact: RollingContact, motion: Motion, cells: int, fine: 
     return _largest_errors(contact, cells, fine, contact.roll(motion, coarser_cells(cells)))
 
 
-def _by_friction(contact: RollingContact, *rolled: Rolled) -> list[Array]:
-    """Ratios (3,) for each result: fx and fy to mu N, and mz to mu N times the lever."""
+def _friction_ratios(contact: RollingContact, *rolled: Rolled) -> list[Array]:
+    """Ratios (3,) of each result: fx and fy to mu N, and mz to mu N times the lever."""
     limit = contact.friction * contact.pressing.load
     return [np.array([creep.fx, creep.fy, creep.mz / contact.lever]) / limit for creep in rolled]
 
 
 def _largest_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
+    """Upper bounds of the discretisation errors of force (N) and moment (N m), from a fine and a coarse grid."""
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:
         return 0.0, 0.0
-    here, there = _by_friction(contact, fine, coarse)
-    error = limit * float(cells_error(here, there, cells, contact.order))
+    fine_ratios, coarse_ratios = _friction_ratios(contact, fine, coarse)
+    error = limit * float(cells_error(fine_ratios, coarse_ratios, cells, contact.order))
     return error, contact.lever * error
 
 
 def _likely_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
     """Likely discretisation errors of force (N) and moment (N m): LIKELY times the difference between fine and coarse
-    grid, plus a small allowance for errors that both grids share."""
+    grid, plus a small allowance for errors that both grids share.
+    """
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:
         return 0.0, 0.0
-    here, there = _by_friction(contact, fine, coarse)
-    force, moment = (float(np.linalg.norm(part)) for part in (here[:2], here[2:]))
-    told = [
-        LIKELY * float(np.linalg.norm(gap)) + 0.2 * size / cells**2
-        for gap, size in (((here - there)[:2], force), ((here - there)[2:], moment))
+    fine_ratios, coarse_ratios = _friction_ratios(contact, fine, coarse)
+    force, moment = (float(np.linalg.norm(part)) for part in (fine_ratios[:2], fine_ratios[2:]))
+    errors = [
+        LIKELY_SHARE * float(np.linalg.norm(gap)) + 0.2 * size / cells**2
+        for gap, size in (((fine_ratios - coarse_ratios)[:2], force), ((fine_ratios - coarse_ratios)[2:], moment))
     ]
     unseen = 0.05 * force**2 * float(np.clip(2.0 - force * cells / 3.0, 0.0, 1.0))
-    return limit * (told[0] + unseen), limit * contact.lever * (told[1] + unseen * moment)
+    return limit * (errors[0] + unseen), limit * contact.lever * (errors[1] + unseen * moment)
 
 
 def coarser_cells(cells: int) -> int:
-    """Number of cells of the coarser grid that is compared with one of ``cells`` cells."""
+    """Number of cells of the coarser grid that is compared with a grid of ``cells`` cells."""
     return (cells + 1) // 2
 
 
 def cells_error(fine: Array, coarse: Array, cells: int, order: float) -> Array:
-    """Relative discretisation errors (...) on ``cells`` cells: of the force to mu N, and of the moment to mu N times
+    """Relative discretisation errors (...) on ``cells`` cells, of the force to mu N, and of the moment to mu N times
     the lever.
 
     fine, coarse : (3, ...) fx and fy divided by mu N, mz divided by mu N times the lever, on ``cells`` and half of
     them. order : of the theory in the size of a cell.
     """
-    used, gained = np.linalg.norm(fine, axis=0), (cells / coarser_cells(cells)) ** order - 1.0
-    unseen = UNSEEN * used**2 * np.clip(2.0 - used * cells / 3.0, 0.0, 1.0)
-    return SAFETY * np.linalg.norm(fine - coarse, axis=0) / gained + used / cells**2 + unseen
+    used, order_gain = np.linalg.norm(fine, axis=0), (cells / coarser_cells(cells)) ** order - 1.0
+    unseen = TRAILING_SLIP_FACTOR * used**2 * np.clip(2.0 - used * cells / 3.0, 0.0, 1.0)
+    return SAFETY_FACTOR * np.linalg.norm(fine - coarse, axis=0) / order_gain + used / cells**2 + unseen
 
 
 def band(name: str, used: Array, spinning: Array) -> Array:
-    """Ratio of a theory's force error to mu N, for one of BANDS, at force ratios ``used`` (force to mu N) and weights
-    ``spinning`` of spin from ``spin_share``."""
+    """Error band of a theory's force, as a ratio to mu N, at force ratios ``used`` (force to mu N) and weights
+    ``spinning`` of spin from ``spin_share``; ``name`` : key of BANDS.
+    """
     without, with_spin = (np.interp(used, KNOTS, values) for values in BANDS[name])
     without = without * np.minimum(used / KNOTS[0], 1.0)  # the linear theory is met, but not where spin meets creepage
     return without + spinning * (with_spin - without)
 
 
 def moment_band(name: str, used: Array, spinning: Array) -> Array:
-    """Ratio of a theory's moment error to mu N times the lever. ``used`` comes from ``used_with_moment``; other
-    arguments as in ``band``."""
+    """Error band of a theory's moment, as a ratio to mu N times the lever. ``used`` comes from ``used_with_moment``;
+    other arguments as in ``band``.
+    """
     without, with_spin = (np.interp(used, (0.0, *KNOTS), (0.0, *values)) for values in MOMENT_BANDS[name])
     return without + spinning * (with_spin - without)
 
 
 def slenderness(a: Array, b: Array) -> Array:
-    """Factor on the error bands for ellipses: 1 for the axis ratios at which the bands were measured, larger beyond."""
+    """Factor on the error bands of ellipses with semi-axes a, b: 1 for the axis ratios at which the bands were
+    measured, larger beyond.
+    """
     ratio = a / b
-    return np.maximum(np.maximum(SLENDER[0] / ratio, ratio / SLENDER[1]), 1.0)
+    return np.maximum(np.maximum(MEASURED_AXIS_RATIOS[0] / ratio, ratio / MEASURED_AXIS_RATIOS[1]), 1.0)
 
 
 def used_with_moment(used: Array, moment: Array) -> Array:
@@ -177,15 +189,16 @@ def used_with_moment(used: Array, moment: Array) -> Array:
 
 
 def spin_share(a: Array, b: Array, motion: Array, nu: float | Array) -> Array:
-    """Weight 0 to 1 of spin in a motion (3, ...). It is three times the share of spin in the sum of squares of the
-    linear theory's terms, at most 1."""
+    """Weight, 0 to 1, of spin in a motion (3, ...) of creepages and spin: three times the share of spin in the sum of
+    squares of the linear theory's terms, at most 1.
+    """
     c = coefficients(a / b, nu)
     parts = np.stack([c.c11 * motion[0], c.c22 * motion[1], np.sqrt(a * b) * c.c23 * motion[2]]) ** 2
-    whole = parts.sum(axis=0)
-    return np.minimum(1.0, 3.0 * np.divide(parts[2], whole, out=np.zeros_like(whole), where=whole > 0))
+    total = parts.sum(axis=0)
+    return np.minimum(1.0, 3.0 * np.divide(parts[2], total, out=np.zeros_like(total), where=total > 0))
 
 
-def _of_theory(contact: RollingContact, motion: Motion, forces: Rolled) -> tuple[float, float]:
+def _theory_errors(contact: RollingContact, motion: Motion, forces: Rolled) -> tuple[float, float]:
     """Error bands of force (N) and moment (N m) of the simplified theories; zero for the exact theory."""
     limit = contact.friction * contact.pressing.load
     if limit == 0.0 or not isinstance(contact, Fastsim | Simplified):
@@ -200,13 +213,14 @@ def _of_theory(contact: RollingContact, motion: Motion, forces: Rolled) -> tuple
     return wider * limit * float(band(name, used, share)), wider * most * float(moment_band(name, both, share))
 
 
-def _of_linear(contact: OnEllipse, motion: Motion, forces: Rolled) -> tuple[float, float]:
-    """Errors of the linear theory in force (N) and moment (N m): its difference from FASTSIM plus FASTSIM's own
-    error."""
+def _linear_theory_errors(contact: OnEllipse, motion: Motion, forces: Rolled) -> tuple[float, float]:
+    """Errors of the linear theory in force (N) and moment (N m): its difference from FASTSIM plus the error of
+    FASTSIM.
+    """
     better, error = rolled(Fastsim(contact.hertz, contact.friction, contact.pair, **BEST_CHOICES), motion, 31)
-    off = float(np.linalg.norm(forces.force - better.force))
-    return off + error.total, abs(forces.mz - better.mz) + error.moment
+    difference = float(np.linalg.norm(forces.force - better.force))
+    return difference + error.total, abs(forces.mz - better.mz) + error.moment
 
 
 BEST_CHOICES = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
-"""Choices of FASTSIM that are closest to the exact theory on the whole."""
+"""Options of FASTSIM that are on the whole closest to the exact theory."""

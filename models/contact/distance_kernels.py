@@ -12,9 +12,10 @@ from models.machine.compiled import njit
 
 
 @njit(cache=True)
-def weights(t):
-    """Weights of four neighbouring nodes at the position ``t`` (0 to 1) in a segment, and of the interpolated slope per
-    spacing."""
+def interpolation_weights(t):
+    """Weights of four neighbouring nodes for the interpolated value at the position ``t`` (0 to 1) in a segment, and
+    for its slope per spacing.
+    """
     value = (
         0.5 * t * (-1.0 + t * (2.0 - t)),
         1.0 + 0.5 * t * t * (-5.0 + 3.0 * t),
@@ -31,20 +32,23 @@ def weights(t):
 
 
 @njit(cache=True)
-def segment(position, segments):
-    """Index of the segment that holds a position (in spacings), and the position as a share of that segment; clamped to
-    the ends."""
+def segment_of_position(position, segments):
+    """Index of the segment that contains a position (in spacings), and the position as a share of that segment; clamped
+    to the ends.
+    """
     i = min(max(math.floor(position), 0), segments - 1)
     return i, position - i
 
 
 @njit(cache=True)
 def value_and_slopes(padded, u, v):
-    """Value at u spacings along x (columns) and v along y (rows), and its slopes per spacing along x and y."""
-    i, t = segment(u, padded.shape[1] - 3)
-    j, s = segment(v, padded.shape[0] - 3)
-    wx, sx = weights(t)
-    wy, sy = weights(s)
+    """Interpolated value at u spacings along x (columns) and v along y (rows), and its slopes per spacing along x and
+    y.
+    """
+    i, t = segment_of_position(u, padded.shape[1] - 3)
+    j, s = segment_of_position(v, padded.shape[0] - 3)
+    wx, sx = interpolation_weights(t)
+    wy, sy = interpolation_weights(s)
     value = along_x = along_y = 0.0
     for k in range(4):
         row = slope = 0.0
@@ -59,7 +63,7 @@ def value_and_slopes(padded, u, v):
 
 @njit(cache=True)
 def values(padded, u, v):
-    """Values at the points (u[k], v[k])."""
+    """Interpolated values at the points (u[k], v[k]), in spacings."""
     heights = np.empty(u.size)
     for k in range(u.size):
         heights[k] = value_and_slopes(padded, u[k], v[k])[0]
@@ -69,16 +73,16 @@ def values(padded, u, v):
 @njit(cache=True)
 def row_at(padded, v):
     """Interpolated row of padded values along x, at v spacings along y."""
-    j, s = segment(v, padded.shape[0] - 3)
-    w, _ = weights(s)
+    j, s = segment_of_position(v, padded.shape[0] - 3)
+    w, _ = interpolation_weights(s)
     return w[0] * padded[j] + w[1] * padded[j + 1] + w[2] * padded[j + 2] + w[3] * padded[j + 3]
 
 
 @njit(cache=True)
 def value_along_row(row, u):
     """Interpolated value of a padded row at u spacings along x."""
-    i, t = segment(u, row.size - 3)
-    w, _ = weights(t)
+    i, t = segment_of_position(u, row.size - 3)
+    w, _ = interpolation_weights(t)
     return w[0] * row[i] + w[1] * row[i + 1] + w[2] * row[i + 2] + w[3] * row[i + 3]
 
 
@@ -90,10 +94,12 @@ def least_of_row(row):
         a, b, c, d = row[i], row[i + 1], row[i + 2], row[i + 3]
         for t in (
             0.0,
-            lowest((-a + 3.0 * b - 3.0 * c + d) / 2.0, (2.0 * a - 5.0 * b + 4.0 * c - d) / 2.0, (c - a) / 2.0),
+            minimum_in_segment(
+                (-a + 3.0 * b - 3.0 * c + d) / 2.0, (2.0 * a - 5.0 * b + 4.0 * c - d) / 2.0, (c - a) / 2.0
+            ),
             1.0,
         ):
-            w, _ = weights(t)
+            w, _ = interpolation_weights(t)
             value = w[0] * a + w[1] * b + w[2] * c + w[3] * d
             if value < least:
                 least, where = value, i + t
@@ -101,7 +107,7 @@ def least_of_row(row):
 
 
 @njit(cache=True)
-def lowest(cube, square, linear):
+def minimum_in_segment(cube, square, linear):
     """Position (0 to 1) in a segment of the minimum of cube t^3 + square t^2 + linear t; 0 if there is no minimum
     inside."""
     root = square * square - 3.0 * cube * linear
@@ -114,8 +120,9 @@ def lowest(cube, square, linear):
 
 @njit(cache=True)
 def valley(padded, finer):
-    """Least value along x, and its position along x, on each of ``finer`` lines per spacing across y: two arrays
-    (lines,)."""
+    """Least value along x, and its position along x in spacings, on each of ``finer`` lines per spacing across y: two
+    arrays (lines,).
+    """
     lines = (padded.shape[0] - 3) * finer + 1
     least, where = np.empty(lines), np.empty(lines)
     for k in range(lines):
@@ -124,20 +131,20 @@ def valley(padded, finer):
 
 
 @njit(cache=True)
-def sides(lines, roots, bottom, root):
-    """Ends of the valley below the level ``root``. From the bottom, the total length of all parts below the level is
-    laid off on the low and on the high side.
+def valley_ends(lines, roots, bottom, root):
+    """Ends (m) of the valley below the level whose root is ``root``: on either side of the bottom, the total length of
+    all parts below the level.
 
     lines : positions, one of them the bottom; roots : square root of the height above the bottom at these, linear
     between.
     """
-    before = after = 0.0
+    low_length = high_length = 0.0
     for k in range(lines.size - 1):
         lower, upper = min(roots[k], roots[k + 1]), max(roots[k], roots[k + 1])
         if root > lower:
             length = (lines[k + 1] - lines[k]) * (min((root - lower) / (upper - lower), 1.0) if upper > lower else 1.0)
             if lines[k] >= bottom:
-                after += length
+                high_length += length
             else:
-                before += length
-    return bottom - before, bottom + after
+                low_length += length
+    return bottom - low_length, bottom + high_length

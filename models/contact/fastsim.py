@@ -30,7 +30,7 @@ import numpy as np
 
 from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, nets, strips_of
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
-from models.contact.fastsim_many import BLENDED, ONE_FLEXIBILITY, THREE_FLEXIBILITIES, point
+from models.contact.fastsim_many import BLENDED, ONE_FLEXIBILITY, THREE_FLEXIBILITIES, ellipse_forces
 from models.contact.fastsim_many import forces as march_all
 from models.contact.fastsim_records import CONTACT, FORCES
 from models.contact.hertz import LEAST_AXIS
@@ -38,10 +38,10 @@ from models.contact.inputs import (
     LARGEST_LOAD,
     NEGLIGIBLE_BOUND,
     Array,
+    broadcast_together,
     creepages,
     number,
     quantity,
-    together,
     whole_number,
 )
 from models.contact.linear_theory import flexibilities as linear_flexibilities
@@ -53,7 +53,7 @@ March = Literal["second-order", "plain"]
 KINDS = {"blended": BLENDED, "one": ONE_FLEXIBILITY, "three": THREE_FLEXIBILITIES}
 MARCHES = {"second-order": SECOND_ORDER, "plain": PLAIN}
 FLEXIBILITIES = ("l1", "l2", "l3")
-"""Fields of CONTACT."""
+"""Names of the flexibilities among the fields of CONTACT."""
 LEAST_CELLS, MOST_CELLS = 3, 2000
 
 
@@ -102,7 +102,7 @@ def fastsim(
     march: March = "second-order",
     falling: Falling | None = None,
 ) -> Creep:
-    """Creep forces on one ellipse or on many.
+    """Creep forces on one elliptic contact or on many, by FASTSIM.
 
     Parameters
     ----------
@@ -134,7 +134,8 @@ def fastsim(
 
 
 class Ellipse:
-    """FASTSIM for ellipses of one shape, as of a wheel on a rail; all that depends on the shape alone is computed once.
+    """FASTSIM for ellipses of one axis ratio, as of a wheel on a rail; all that depends on the ratio alone is computed
+    once.
 
     ``Ellipse(ratio, pair)(a, load, mu, xi_x, xi_y, spin)`` is (fx, fy, mz) in N, N, N m, from plain numbers and for
     plain numbers, in microseconds; ratio = a/b. Options are those of ``fastsim``. Raises InputError.
@@ -162,10 +163,10 @@ class Ellipse:
     def __call__(
         self, a: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float
     ) -> tuple[float, float, float]:
-        """Forces fx, fy (N) and moment mz (N m); a : semi-axis along the direction of rolling (m)."""
+        """Creep forces fx, fy (N) and moment mz (N m); a : semi-axis along the direction of rolling (m)."""
         given = (a, load, mu, xi_x, xi_y, spin)
         try:
-            forces = point(tuple(map(float, given)), *self._fixed)
+            forces = ellipse_forces(tuple(map(float, given)), *self._fixed)
         except (TypeError, ValueError):
             forces = (math.nan,) * 3
         if not math.isfinite(forces[0] + forces[1] + forces[2]):
@@ -191,10 +192,11 @@ def check_choices(cells: int, bound: str, flexibilities: str, march: str, fallin
 
 
 def contacts_of(ellipse: RollingEllipse, material_pair: MaterialPair) -> tuple[Array, tuple[int, ...]]:
-    """Inputs as records CONTACT (n,) for the kernels, and their common shape. Contacts without load get semi-axes of
-    0.1 m."""
+    """Inputs as records CONTACT (n,) for compiled functions, and their common shape. Contacts without load get
+    semi-axes of 0.1 m.
+    """
     axis = "a semi-axis in m, zero or more"
-    given = together(
+    given = broadcast_together(
         a=quantity("a", ellipse.a, axis, 0.0),
         b=quantity("b", ellipse.b, axis, 0.0),
         load=quantity("load", ellipse.load, f"a load in N, at most {LARGEST_LOAD:g}", maximum=LARGEST_LOAD),

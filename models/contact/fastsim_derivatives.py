@@ -1,4 +1,4 @@
-"""Derivatives of FASTSIM's forces by creepages, spin and load: the march differentiated along with itself.
+"""Derivatives of FASTSIM's forces with respect to creepages, spin and load, by differentiating its march exactly.
 
 A sticking traction changes as the sum that it is. A slipping one keeps its size and only turns, so its derivative is
 that of its angle: with phi the angle of -w, psi from there to the traction, and z = |w| step / g,
@@ -16,7 +16,7 @@ import numpy as np
 
 from models.contact.fastsim import KINDS, Flexibilities, RollingEllipse, check_choices, contacts_of
 from models.contact.fastsim_grid import Bound, nets
-from models.contact.fastsim_kernels import LARGEST_EXPONENT, NEGLIGIBLE_SLIP, advance, cut, lateness
+from models.contact.fastsim_kernels import LARGEST_EXPONENT, NEGLIGIBLE_SLIP, advance, cut_to_bound, lateness
 from models.contact.fastsim_many import (
     ONE_FLEXIBILITY,
     add_strip,
@@ -52,7 +52,8 @@ def derivatives(
     flexibilities: Flexibilities = "blended",
     growing: bool = True,
 ) -> Derivatives:
-    """Derivatives of the forces of ``fastsim`` with the second-order march; the same parameters and errors.
+    """Creep forces of FASTSIM with the second-order march, and their derivatives; the same parameters and errors as
+    ``fastsim``.
 
     growing : whether the semi-axes grow with the load, as its cube root (Hertz, bodies of given shape), or stay
 
@@ -105,7 +106,7 @@ def _slopes(contacts, strips, cells, kind, forces, slopes):
 
 @compiled
 def _scale_slopes(contact, cells, kind, scale):
-    """Derivatives (3, 3) of the three numbers from ``rigid_slip`` with respect to xi_x, xi_y and spin."""
+    """Derivatives (3, 3) of the three results of ``rigid_slip`` with respect to xi_x, xi_y and spin."""
     a, c, flexible = contact.a, math.sqrt(contact.a * contact.b), (contact.l1, contact.l2, contact.l3)
     bound = contact.mu * cells.peak * contact.load / (a * contact.b)
     step, creep = 2.0 * a / (cells.centre.size * bound), (contact.xi_x, contact.xi_y, contact.spin * c)
@@ -130,8 +131,9 @@ def _scale_slopes(contact, cells, kind, scale):
 
 @compiled
 def _strip(contact, strips, s, cells, slip, sums, moved):
-    """Sums of q_x, q_y and t q_y over the cells of strip number s, and their derivatives (3, 3) with respect to the
-    three numbers of rigid slip."""
+    """Fill the sums of q_x, q_y and t q_y over the cells of strip s, and their derivatives (3, 3) with respect to the
+    rigid slip (x, y, spin).
+    """
     spread, off, arm = strips.spread[s], contact.b * strips.y[s], contact.a * strips.half[s]
     u, v0, v1 = spread * (slip[0] - slip[2] * off), spread * slip[1], spread * slip[2] * arm
     du, dv0, dv1 = (spread, 0.0, -spread * off), (0.0, spread, 0.0), (0.0, 0.0, spread * arm)
@@ -142,10 +144,10 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
     moved[:] = 0.0
     for i in range(cells.centre.size):
         t, mid, g, share = cells.centre[i], cells.middle[i], cells.bound[i], 0.5 if i == 0 else 1.0
-        bound = g, cells.before[i], cells.rate[i]
+        bound = g, cells.start_bound[i], cells.rate[i]
         v = v0 + v1 * mid
         if i == 0:
-            x, y, now = cut(-0.5 * u, -0.5 * v, g)
+            x, y, now = cut_to_bound(-0.5 * u, -0.5 * v, g)
         else:
             x, y, now = advance((px, py, slips), (u, v, v1 * change), bound)
         turns = slips * (u * u + v * v) > NEGLIGIBLE_SLIP
@@ -153,7 +155,7 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
         late, steep = lateness(reach), 0.5 if reach < 0.4 else 0.2 if reach < 1.75 else 0.0
         w = v + v1 * change * late
         if turns and now > 0.0:
-            kept, pull, size = _turning(px, py, u, w, cells.before[i], cells.rate[i])
+            kept, pull, size = _turning(px, py, u, w, cells.start_bound[i], cells.rate[i])
         for k in range(3):
             dv = dv0[k] + dv1[k] * mid
             if now == 0.0:
@@ -180,7 +182,9 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
 
 @compiled
 def _turning(px, py, u, v, before, rate):
-    """Rotation of a slipping traction in ``advance``: sin psi' / sin psi, the derivative of psi' to |w|, and |w|."""
+    """Derivatives of the rotation of a slipping traction in ``advance``: sin psi' / sin psi, the derivative of psi'
+    with respect to |w|, and |w|.
+    """
     size = math.sqrt(u * u + v * v)
     h = min(size * rate, LARGEST_EXPONENT)
     base = 1.0 + h * (1.0 + h * (0.5 + h * (1.0 / 6.0)))

@@ -1,4 +1,5 @@
-"""FASTSIM with friction that falls with the speed of slip: kernels of its own, so that constant friction pays nothing.
+"""FASTSIM with friction that falls with the speed of slip, in separate compiled functions, so that constant friction
+costs no more.
 
 Friction is taken at the rigid slip of the point: exact where all slides, and no loop in which slip and friction chase
 one another, which would have more than one end. A sticking cell is asked for less than it could hold.
@@ -16,9 +17,11 @@ from models.machine.compiled import compiled
 
 @compiled
 def forces_falling(contacts, strips, cells, kind, law, answers):
-    """FASTSIM's forces of many contacts by the second-order march, with falling friction; law : of ``Falling``."""
+    """Fill FASTSIM's forces of many contacts, FORCES (n,), by the second-order march with falling friction; law : of
+    ``Falling``.
+    """
     n, area, slip = cells.centre.size, 0.0, np.empty(1, SLIP)[0]
-    left, tractions = np.empty((2, n)), np.empty((3, n))
+    friction_shares, tractions = np.empty((2, n)), np.empty((3, n))
     for s in range(strips.y.size):
         area += strips.half[s]
     for c in range(len(contacts)):
@@ -28,8 +31,8 @@ def forces_falling(contacts, strips, cells, kind, law, answers):
             continue
         slip.x, slip.y, slip.spin = rigid_slip(contact, cells, kind)
         for s in range(strips.y.size):
-            friction_left(contact, strips, s, cells, law, left)
-            strip_tractions(strip_slip(contact, strips, s, slip), cells, SECOND_ORDER, left, tractions)
+            fill_friction_shares(contact, strips, s, cells, law, friction_shares)
+            strip_tractions(strip_slip(contact, strips, s, slip), cells, SECOND_ORDER, friction_shares, tractions)
             x = y = turn = stuck = 0.0
             for i in range(n):
                 x += tractions[0, i]
@@ -41,18 +44,19 @@ def forces_falling(contacts, strips, cells, kind, law, answers):
 
 
 @compiled
-def friction_left(contact, strips, s, cells, law, left):
-    """Fill ``left`` (2, cells) for strip number s, as ``strip_tractions`` expects it, from the friction at each point's
-    rigid slip."""
+def fill_friction_shares(contact, strips, s, cells, law, friction_shares):
+    """Fill ``friction_shares`` (2, cells) of strip s with the remaining share of friction at each point's rigid slip,
+    as ``strip_tractions`` expects it.
+    """
     along = contact.xi_x - contact.spin * contact.b * strips.y[s]
     across, turn = contact.xi_y, contact.spin * contact.a * strips.half[s]
     for i in range(cells.centre.size):
-        left[0, i] = _friction_share(along, across + turn * cells.centre[i], law)
-        left[1, i] = _friction_share(along, across + turn * cells.middle[i], law)
+        friction_shares[0, i] = _friction_share(along, across + turn * cells.centre[i], law)
+        friction_shares[1, i] = _friction_share(along, across + turn * cells.middle[i], law)
 
 
 @compiled
 def _friction_share(along, across, law):
-    """Ratio of the friction coefficient at a slip (along, across) to that without slip."""
+    """Ratio of the friction coefficient at a slip (along, across) to the coefficient without slip."""
     floor, decay = law
     return floor + (1.0 - floor) * math.exp(-decay * math.sqrt(along * along + across * across))

@@ -1,4 +1,6 @@
-"""The cells of FASTSIM on an ellipse of semi-axes 1: strips with exact ends, and the bound normalised to the load."""
+"""FASTSIM's grid of cells on an ellipse of semi-axes 1: strips with exact ends, and the traction bound normalised to
+the load.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,17 +14,18 @@ from models.contact.inputs import Array
 
 Bound = Literal["intermediate", "parabolic", "elliptic"]
 POWERS: dict[Bound, float] = {"intermediate": 0.75, "parabolic": 1.0, "elliptic": 0.5}
-"""Of 1 - (x/a)^2 - (y/b)^2 in the bound of the traction; the first calibrated on 1120 contacts of the exact theory:
-its forces are as near as with 0.8 and its moments a sixth nearer."""
+"""Powers of 1 - (x/a)^2 - (y/b)^2 in the traction bound; the first is calibrated on 1120 contacts of the exact theory:
+its forces are as near as with 0.8 and its moments a sixth nearer.
+"""
 MOST_STRIPS = 3
-"""Strips per cell along them, at most."""
+"""Largest ratio of the number of strips to the number of cells along a strip."""
 ROUNDED = 1.0 + 2e-15
-"""A little more than a bound: the part of a traction along a unit vector is less than that, whatever the rounding."""
+"""Factor on a bound that covers rounding: a traction's component along a unit vector stays below the enlarged bound."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Grid of one ellipse in dimensionless form, as tables of doubles.
+    """FASTSIM's grid of one ellipse in dimensionless form, as tables of doubles.
 
     strips : (4, strips), rows as the fields of ``Strips``
     cells : (5, cells), rows as the fields of ``Cells``
@@ -53,7 +56,9 @@ def strips_of(ratio: Array, cells: int) -> Array:
 
 
 def nets(ratio: Array, cells: int, bound: Bound) -> Iterator[tuple[Array, Grid]]:
-    """Pairs of indices and grid: the contacts of ratios a/b = ``ratio`` (n,) that share a grid, and that grid."""
+    """Pairs of indices and grid: the contacts among axis ratios a/b = ``ratio`` (n,) that share a grid, and that
+    grid.
+    """
     strips = strips_of(ratio, cells)
     for count in np.unique(strips):
         yield np.flatnonzero(strips == count), grid(cells, int(count), bound)
@@ -61,7 +66,8 @@ def nets(ratio: Array, cells: int, bound: Bound) -> Iterator[tuple[Array, Grid]]
 
 @lru_cache(maxsize=256)
 def grid(cells: int, strips: int, bound: Bound) -> Grid:
-    """Grid of ``strips`` strips of equal width with ``cells`` cells each; cells of a strip have equal lengths.
+    """FASTSIM's grid of ``strips`` strips of equal width with ``cells`` cells each; cells of a strip have equal
+    lengths.
 
     Pressure is sampled at the cells' centres and scaled so that its sum over all cells is the load exactly.
     """
@@ -79,5 +85,5 @@ def grid(cells: int, strips: int, bound: Bound) -> Grid:
 
 
 def _pressure(t: Array, bound: Bound) -> Array:
-    """Ratio of the pressure at the distance ``t`` from the centre (in semi-axes) to the pressure in the centre."""
+    """Ratio of the pressure bound at the distance ``t`` from the centre (in semi-axes) to that in the centre."""
     return ((1.0 - t) * (1.0 + t)) ** POWERS[bound]

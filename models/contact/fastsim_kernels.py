@@ -1,4 +1,4 @@
-"""Compiled marches of FASTSIM, many strips side by side.
+"""Compiled marches of FASTSIM along strips of cells, many strips side by side.
 
 A strip is marched from its leading edge in its own scale: position t from 1 to -1, traction q relative to the bound in
 the middle of the strip, so that the bound g(t) is the same for all strips. What a strip has of its own is three
@@ -18,7 +18,7 @@ from models.machine.compiled import compiled, njit
 PLAIN, SECOND_ORDER = 0, 1
 
 LARGEST_EXPONENT = 50.0
-"""exp(-50) of an angle is nothing; larger exponents would overflow."""
+"""Largest exponent: exp(-50) of an angle is negligible; larger exponents would overflow."""
 NEGLIGIBLE_SLIP = 1e-60
 """Square of a rigid slip per cell that is too small to change the direction of a traction."""
 
@@ -36,7 +36,7 @@ def lateness(z):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
 def advance(traction, slip, bound):
-    """Traction in the next cell by the second-order march, and 1 if it slips there, else 0.
+    """Traction in the next cell by the second-order march, and 1 if the cell slips, else 0.
 
     traction : along x and y before, and whether it slips (1), being on the bound, or not (0); slip : rigid slip along x
     and y in the middle of the step, as traction, and the change of the second over it; bound : in the next cell, where
@@ -72,8 +72,8 @@ def advance(traction, slip, bound):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def cut(x, y, g):
-    """Traction, shortened to the bound g if it exceeds it, and 1 if it was shortened, else 0."""
+def cut_to_bound(x, y, g):
+    """Traction (x, y), shortened to the bound g if it exceeds the bound, and 1 if it was shortened, else 0."""
     size = math.sqrt(x * x + y * y)
     sticks = size <= g
     part = 1.0 if sticks else g / size
@@ -82,40 +82,44 @@ def cut(x, y, g):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def march_second_order(block, cells):
-    """March with half a first step and the exact rotation of a slipping traction; fills sums and states of a BLOCK."""
-    _clear(block)
+    """March the strips of a BLOCK with half a first step and the exact rotation of a slipping traction; fills its sums
+    and states.
+    """
+    _clear_block(block)
     for j in range(LANES):
         u, v = block.u[j], block.v0[j] + block.v1[j] * cells.middle[0]
-        x, y, slips = cut(-0.5 * u, -0.5 * v, cells.bound[0])
-        _keep(block, j, cells.centre[0], x, y, slips)
+        x, y, slips = cut_to_bound(-0.5 * u, -0.5 * v, cells.bound[0])
+        _store_traction(block, j, cells.centre[0], x, y, slips)
     change = -2.0 / cells.centre.size
     for i in range(1, cells.centre.size):
         t, g, middle = cells.centre[i], cells.bound[i], cells.middle[i]
-        bound = g, cells.before[i], cells.rate[i]
+        bound = g, cells.start_bound[i], cells.rate[i]
         for j in range(LANES):
             u, v1 = block.u[j], block.v1[j]
             v = block.v0[j] + v1 * middle
             traction = block.qx[j], block.qy[j], block.slips[j]
             x, y, slips = advance(traction, (u, v, v1 * change), bound)
-            _keep(block, j, t, x, y, slips)
+            _store_traction(block, j, t, x, y, slips)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def march_plain(block, cells):
-    """March of 1982: a whole step into each cell, then the traction is cut back to the bound; fills sums and states."""
-    _clear(block)
+    """March the strips of a BLOCK as in 1982: a whole step into each cell, then the traction is cut back to the bound;
+    fills its sums and states.
+    """
+    _clear_block(block)
     for i in range(cells.centre.size):
         t, g = cells.centre[i], cells.bound[i]
         for j in range(LANES):
             x = block.qx[j] - block.u[j]
             y = block.qy[j] - (block.v0[j] + block.v1[j] * t)
-            x, y, slips = cut(x, y, g)
-            _keep(block, j, t, x, y, slips)
+            x, y, slips = cut_to_bound(x, y, g)
+            _store_traction(block, j, t, x, y, slips)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def _keep(block, j, t, x, y, slips):
-    """Add a cell's traction to the sums, and store it as the lane's state."""
+def _store_traction(block, j, t, x, y, slips):
+    """Store a cell's traction as the state of lane j, and add it to the lane's sums."""
     block.qx[j] = x
     block.qy[j] = y
     block.slips[j] = slips
@@ -126,8 +130,8 @@ def _keep(block, j, t, x, y, slips):
 
 
 @compiled
-def _clear(block):
-    """Set sums and states of all lanes to zero."""
+def _clear_block(block):
+    """Set sums and states of all lanes of a BLOCK to zero."""
     for j in range(LANES):
         block.sum_x[j] = block.sum_y[j] = block.sum_t[j] = block.slid[j] = 0.0
         block.qx[j] = block.qy[j] = block.slips[j] = 0.0

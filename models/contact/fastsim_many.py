@@ -1,4 +1,5 @@
-"""Many ellipses at once: from creepages to the strips' own numbers, through the march, and back to forces.
+"""FASTSIM for many ellipses at once: from creepages to the rigid slip of their strips, through the march, and back to
+forces.
 
 Strips of all ellipses are lined up and marched in full blocks, so that no lane is empty but at the very end.
 """
@@ -7,22 +8,29 @@ import math
 
 import numpy as np
 
-from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER, advance, cut, march_plain, march_second_order
+from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER, advance, cut_to_bound, march_plain, march_second_order
 from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, LANES, SLIP, Workspace, cells_in, strips_in
 from models.contact.inputs import NEGLIGIBLE_BOUND
 from models.machine.compiled import compiled, lean
 
 A, B, LOAD, MU = range(4)
-"""Places of the first fields of CONTACT, for who keeps contacts in a table of doubles."""
+"""Indices of the first fields of CONTACT, for callers that keep contacts in a table of doubles."""
 ONE_FLEXIBILITY, THREE_FLEXIBILITIES, BLENDED = 0, 1, 2
-OF_X, OF_SPIN, AGAINST, REACH, GROWTH = 0.5, 0.52, 0.86, 1.9, 1.3
+X_WEIGHT, SPIN_WEIGHT, OPPOSING_SPIN_SHARE, BLEND_REACH, BLEND_POWER = 0.5, 0.52, 0.86, 1.9, 1.3
+"""Constants of the blend of flexibilities: weights of xi_x and spin relative to xi_y, how much of it lateral creepage
+against spin takes away, the reach at which the one flexibility has its main part and the power of its beginning; then
+powers of a/b in the second and the fourth, within ``RATIOS``. Calibrated on 910 contacts of the exact theory, 250 of
+them with lateral creepage against spin, and compared with others (validation case ``contact_price``).
+"""
 SPIN_BY_RATIO, REACH_BY_RATIO, RATIOS = 0.6, 0.45, (0.1, 10.0)
 """Of the blend: what xi_x and spin count by xi_y, how much of it lateral creepage against spin takes away, the reach at
 which the one flexibility has its main part and the power of its beginning; then powers of a/b in the second and the
 fourth, within ``RATIOS``. Calibrated on 910 contacts of the exact theory, 250 of them with lateral creepage against
 spin, and held against others (validation case ``contact_price``)."""
-SLIDING, MOST = 8.0, 100.0
-"""Square of the reach at which creepage without spin slides all over; exponents beyond which nothing changes."""
+SLIDING_SQUARE, LARGEST_BLEND_EXPONENT = 8.0, 100.0
+"""Square of the ratio of traction to bound at which creepage without spin makes the whole area slide, and exponent
+beyond which nothing changes.
+"""
 
 
 @compiled
@@ -32,26 +40,26 @@ def forces(contacts, strips, cells, kind, march, answers):
     contacts : CONTACT (n,); strips, cells : a net from ``fastsim_grid``; kind : of flexibility; march : PLAIN or
     SECOND_ORDER. A contact without load or friction has zeros all over.
     """
-    room = Workspace(np.empty(len(contacts), SLIP), np.empty(1, BLOCK))
-    forces_within(contacts, strips, cells, kind, march, room, answers)
+    workspace = Workspace(np.empty(len(contacts), SLIP), np.empty(1, BLOCK))
+    forces_within(contacts, strips, cells, kind, march, workspace, answers)
 
 
 @lean
-def forces_within(contacts, strips, cells, kind, march, room, answers):
-    """``forces`` without allocating arrays; room : ``Workspace`` for intermediate values."""
-    slips, block, m = room.slips, room.blocks[0], strips.y.size
+def forces_within(contacts, strips, cells, kind, march, workspace, answers):
+    """Creep forces as by ``forces``, without allocating arrays; workspace : ``Workspace`` for intermediate values."""
+    slips, block, m = workspace.slips, workspace.blocks[0], strips.y.size
     for c in range(len(contacts)):
         slip, answer = slips[c], answers[c]
         slip.x, slip.y, slip.spin = rigid_slip(contacts[c], cells, kind)
         answer.fx = answer.fy = answer.mz = answer.stick = 0.0
     for first in range(0, len(contacts) * m, LANES):
         count = min(LANES, len(contacts) * m - first)
-        _fill(block, first, count, contacts, strips, slips)
+        _fill_block(block, first, count, contacts, strips, slips)
         if march == SECOND_ORDER:
             march_second_order(block, cells)
         else:
             march_plain(block, cells)
-        _collect(block, first, count, contacts, strips, answers)
+        _collect_forces(block, first, count, contacts, strips, answers)
     area = 0.0
     for s in range(m):  # summed as the slipping cells are, so that nothing is left where all slip
         area += strips.half[s] * cells.centre.size
@@ -68,7 +76,7 @@ def touches(contact):
 
 @lean
 def rigid_slip(contact, cells, kind):
-    """Rigid slip of every cell from the creepages (x, y, spin), in the form that the march needs.
+    """Rigid slip (x, y, spin) of a contact's creepages, in the form that the march needs.
 
     The traction by the bound in the ellipse's middle that each creepage builds up over one cell of the middle strip,
     were there no slip; the third one is that of spin per metre.
@@ -83,7 +91,7 @@ def rigid_slip(contact, cells, kind):
 
 @lean
 def stiffness(contact, bound, kind):
-    """Inverses of the flexibilities along x, along y and in spin (N/m^3)."""
+    """Inverses (N/m^3) of the flexibilities along x, along y and in spin."""
     k1, k2, k3 = 1.0 / contact.l1, 1.0 / contact.l2, 1.0 / contact.l3
     part = blend(contact, bound, kind)[0]
     if part == 0.0:
@@ -101,37 +109,35 @@ def blend(contact, bound, kind):
     opposes spin contributes less: the pole about which the rigid slip turns then lies in the patch, and much of the
     area near it still sticks while the remaining area slides. A second term brings the weight to 1 where the whole area
     slides, so that force and slip have the same direction.
-
-    It grows with x, y and z, the reach of the linear theory's tractions by the bound. Lateral creepage against spin
-    reaches less: the pole about which the rigid slip turns lies in the patch then, and near it much still sticks when
-    the rest slides. A second term ends the blend where all slides, so that force and slip have one direction there.
     """
     if kind != BLENDED:
         return 1.0 if kind == ONE_FLEXIBILITY else 0.0, 0.0, 0.0, 0.0
     ratio, unit = math.log(min(max(contact.a / contact.b, RATIOS[0]), RATIOS[1])), contact.a / bound
     of_x, of_y, of_z = unit / contact.l1, unit / contact.l2, unit / contact.l3
     x, y, z = of_x * contact.xi_x, of_y * contact.xi_y, of_z * contact.spin * math.sqrt(contact.a * contact.b)
-    turns = OF_SPIN * math.exp(SPIN_BY_RATIO * ratio)
-    square = (OF_X * x) ** 2 + y * y + (turns * z) ** 2 + 2.0 * AGAINST * y * turns * z
+    turns = SPIN_WEIGHT * math.exp(SPIN_BY_RATIO * ratio)
+    square = (X_WEIGHT * x) ** 2 + y * y + (turns * z) ** 2 + 2.0 * OPPOSING_SPIN_SHARE * y * turns * z
     if square == 0.0:
         return 0.0, 0.0, 0.0, 0.0
     level = 1.0 / (1.0 + z * z)
-    slides = min((x * x + y * y) * level / SLIDING, MOST)
-    grown = min((math.sqrt(square) / (REACH * math.exp(REACH_BY_RATIO * ratio))) ** GROWTH, MOST)
-    whole = grown + slides**3
-    left = math.exp(-whole)
-    steep, more = left * GROWTH * grown / square, left * 6.0 * slides**2 * level
+    slides = min((x * x + y * y) * level / SLIDING_SQUARE, LARGEST_BLEND_EXPONENT)
+    grown = min(
+        (math.sqrt(square) / (BLEND_REACH * math.exp(REACH_BY_RATIO * ratio))) ** BLEND_POWER, LARGEST_BLEND_EXPONENT
+    )
+    exponent = grown + slides**3
+    remaining = math.exp(-exponent)
+    steep, more = remaining * BLEND_POWER * grown / square, remaining * 6.0 * slides**2 * level
     return (
-        -math.expm1(-whole),
-        of_x * x * (steep * OF_X**2 + more / SLIDING),
-        of_y * (steep * (y + AGAINST * turns * z) + more * y / SLIDING),
-        of_z * (steep * turns * (turns * z + AGAINST * y) - more * slides * z),
+        -math.expm1(-exponent),
+        of_x * x * (steep * X_WEIGHT**2 + more / SLIDING_SQUARE),
+        of_y * (steep * (y + OPPOSING_SPIN_SHARE * turns * z) + more * y / SLIDING_SQUARE),
+        of_z * (steep * turns * (turns * z + OPPOSING_SPIN_SHARE * y) - more * slides * z),
     )
 
 
 @lean
 def mean_flexibility(contact, turn, kind):
-    """Common flexibility for all creepages; ``turn`` = spin sqrt(a b) is the third of them.
+    """Common flexibility (m^3/N) for all creepages; ``turn`` = spin sqrt(a b) is the third of them.
 
     That of 1982 weights by their sizes and divides by their root mean square, which makes up to sqrt(3) times too much
     of mixed ones; the blend's is the mean weighted by their squares.
@@ -149,9 +155,9 @@ def mean_flexibility(contact, turn, kind):
 
 @lean
 def strip_slip(contact, strips, s, slip):
-    """Rigid slip (u, v0, v1) of strip number s from that of its contact. It is the traction that would build up over
-    one cell without sliding, in units of the bound in the strip's middle: u along x, and v0 + v1 t along y at position
-    t."""
+    """Rigid slip (u, v0, v1) of strip s from that of its contact: the traction that would build up over one cell
+    without sliding, in units of the bound in the strip's middle: u along x, and v0 + v1 t along y at position t.
+    """
     spread = strips.spread[s]
     return (
         spread * (slip.x - slip.spin * contact.b * strips.y[s]),
@@ -161,8 +167,10 @@ def strip_slip(contact, strips, s, slip):
 
 
 @lean
-def _fill(block, first, count, contacts, strips, slips):
-    """Put rigid slips of ``count`` strips, from number ``first`` on, into the lanes; further lanes get zero slip."""
+def _fill_block(block, first, count, contacts, strips, slips):
+    """Put the rigid slips of ``count`` strips, from strip ``first`` on, into the lanes of a BLOCK; further lanes get
+    zero slip.
+    """
     c, s = first // strips.y.size, first % strips.y.size
     for j in range(LANES):
         if j >= count:
@@ -175,9 +183,10 @@ def _fill(block, first, count, contacts, strips, slips):
 
 
 @lean
-def _collect(block, first, count, contacts, strips, answers):
-    """Add the lanes' sums to the forces of their ellipses, and their slipping cells, weighted by length, to the slip
-    area."""
+def _collect_forces(block, first, count, contacts, strips, answers):
+    """Add the lanes' sums to the forces of their ellipses, and their numbers of slipping cells, weighted by length, to
+    the slip area.
+    """
     c, s = first // strips.y.size, first % strips.y.size
     for j in range(count):
         contact, answer = contacts[c], answers[c]
@@ -192,8 +201,7 @@ def _collect(block, first, count, contacts, strips, answers):
 
 @lean
 def add_strip(contact, strips, s, sums, answer):
-    """Add the forces of strip number s to those of its contact, from the strip's sums of q_x, q_y and t q_y over its
-    cells."""
+    """Add the forces of strip s to those of its contact, from the strip's sums of q_x, q_y and t q_y over its cells."""
     part, (x, y, turn) = contact.mu * contact.load * strips.part[s], sums
     answer.fx += part * x
     answer.fy += part * y
@@ -201,31 +209,31 @@ def add_strip(contact, strips, s, sums, answer):
 
 
 @compiled
-def strip_tractions(slip, cells, march, left, answers):
-    """Fill ``answers`` (3, cells) of a strip: tractions along x and y in units of the bound in its middle, and 1 where
-    it slips.
+def strip_tractions(slip, cells, march, friction_shares, tractions):
+    """Fill ``tractions`` (3, cells) of a strip: tractions along x and y in units of the bound in its middle, and 1
+    where it slips.
 
-    slip : of the strip, see ``strip_slip``; left : (2, cells), share of the friction that is left in the cells' centres
-    and in the middles of the steps there.
+    slip : of the strip, see ``strip_slip``; friction_shares : (2, cells), share of the friction that is left in the
+    cells' centres and in the middles of the steps there.
     """
-    (u, v0, v1), change, before = slip, -2.0 / cells.centre.size, 0.0
+    (u, v0, v1), change, share_before = slip, -2.0 / cells.centre.size, 0.0
     x = y = slips = 0.0
     for i in range(cells.centre.size):
-        v, g = v0 + v1 * cells.middle[i], left[0, i] * cells.bound[i]
+        v, g = v0 + v1 * cells.middle[i], friction_shares[0, i] * cells.bound[i]
         if march == PLAIN:
-            x, y, slips = cut(x - u, y - v0 - v1 * cells.centre[i], g)
+            x, y, slips = cut_to_bound(x - u, y - v0 - v1 * cells.centre[i], g)
         elif i == 0:
-            x, y, slips = cut(-0.5 * u, -0.5 * v, g)
+            x, y, slips = cut_to_bound(-0.5 * u, -0.5 * v, g)
         else:
-            bound = g, before * cells.before[i], cells.rate[i] / left[1, i]
+            bound = g, share_before * cells.start_bound[i], cells.rate[i] / friction_shares[1, i]
             x, y, slips = advance((x, y, slips), (u, v, v1 * change), bound)
-        before = left[0, i]
-        answers[0, i], answers[1, i], answers[2, i] = x, y, slips
+        share_before = friction_shares[0, i]
+        tractions[0, i], tractions[1, i], tractions[2, i] = x, y, slips
 
 
 @compiled
-def point(motion, unit, strips, cells, choices):
-    """Forces fx, fy and moment mz of one ellipse with the shape of ``unit``; NaN for invalid input.
+def ellipse_forces(motion, unit, strips, cells, choices):
+    """Creep forces fx, fy (N) and moment mz (N m) of one ellipse with the shape of ``unit``; NaN for invalid input.
 
     motion : a (m), load, mu, xi_x, xi_y, spin; unit : b, l1, l2, l3 at a = 1 m; strips, cells : a net's tables;
     choices : the net's peak, kind of flexibility, march. Python hands plain arrays and numbers over in a fraction of

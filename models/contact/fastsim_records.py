@@ -1,4 +1,4 @@
-"""Records of FASTSIM's compiled functions: contacts and forces row by row, the net, the workspace.
+"""Records of FASTSIM's compiled functions: contacts and forces row by row, the grid of cells, the workspace.
 
 Records lie in memory as their fields follow, without gaps: a table of doubles becomes an array of records, or rows of a
 net, at no cost.
@@ -13,14 +13,15 @@ from models.machine.compiled import inlined
 from models.machine.records import record
 
 LANES = 24
-"""Strips that are marched at once; the last ones may be empty."""
+"""Number of strips that are marched at the same time; the last ones may be empty."""
 CONTACT = record("a", "b", "load", "mu", "xi_x", "xi_y", "spin", "l1", "l2", "l3")
-"""One ellipse: semi-axes (m), load (N), coefficient of friction, creepages and spin (1/m), flexibilities (m^3/N) along
-x, along y and in spin."""
+"""Record of one elliptic contact: semi-axes (m), load (N), coefficient of friction, creepages and spin (1/m),
+flexibilities (m^3/N) along x, along y and in spin.
+"""
 FORCES = record("fx", "fy", "mz", "stick")
-"""Creep forces (N) and moment (N m) on the wheel, share of the area that sticks."""
+"""Record of creep forces (N) and moment (N m) on the wheel, and share of the area that sticks."""
 SLIP = record("x", "y", "spin")
-"""Rigid slip of a contact, see ``fastsim_many.rigid_slip``."""
+"""Record of a contact's rigid slip, see ``fastsim_many.rigid_slip``."""
 BLOCK = np.dtype(
     [
         (name, np.float64, (LANES,))
@@ -28,13 +29,16 @@ BLOCK = np.dtype(
     ],
     align=True,
 )
-"""The strips that are marched at once: the three numbers of each (``fastsim_kernels``); sums over the cells of q_x,
-q_y, t q_y and of slipping cells; the state. One record, as the compiler must know that its lanes do not overlap."""
+"""Record of the strips that are marched at the same time: rigid slip of each (``fastsim_kernels``); sums over the cells
+of q_x, q_y, t q_y and of slipping cells; the state. One record, as the compiler must know that its lanes do not
+overlap.
+"""
 
 
 class Strips(NamedTuple):
     """Strips of an ellipse, (m,) each: position y/b, ratio of half length to a, ratio of this to the bound in the
-    strip's middle, and share of the load per bound."""
+    strip's middle, and share of the load per bound.
+    """
 
     y: Array
     half: Array
@@ -52,7 +56,7 @@ class Cells(NamedTuple):
     centre: Array
     bound: Array
     middle: Array
-    before: Array
+    start_bound: Array
     rate: Array
     peak: float
 

@@ -1,4 +1,4 @@
-"""Fields inside a contact area, cell by cell, and FASTSIM's cells: its march with nothing summed up."""
+"""Fields of pressure, traction and slip inside a contact area, cell by cell."""
 
 from dataclasses import dataclass
 
@@ -57,23 +57,23 @@ def fastsim_fields(
     strips, along = net.records
     slip = np.array([rigid_slip(contact, along, KINDS[flexibilities])], SLIP)[0]
     y, half, spread = (row[:, None] for row in (strips.y, strips.half, strips.spread))
-    relative, left = np.zeros((3, y.size, cells)), np.ones((2, cells))
+    relative, friction_shares = np.zeros((3, y.size, cells)), np.ones((2, cells))
     if falling is not None:
-        from models.contact.fastsim_falling import friction_left
+        from models.contact.fastsim_falling import fill_friction_shares
     for k in range(y.size):
         if falling is not None:
-            friction_left(contact, strips, k, along, falling.law, left)
-        strip_tractions(strip_slip(contact, strips, k, slip), along, MARCHES[march], left, relative[:, k])
+            fill_friction_shares(contact, strips, k, along, falling.law, friction_shares)
+        strip_tractions(strip_slip(contact, strips, k, slip), along, MARCHES[march], friction_shares, relative[:, k])
     peak = max(contact["load"], 0.0) * net.middle / (a * b) * half / spread
-    scale, whole = contact["mu"] * peak, np.ones((y.size, cells))
+    scale, ones = contact["mu"] * peak, np.ones((y.size, cells))
     return Fields(
         a * half * along.centre,
-        b * y * whole,
-        2 * a * half / cells * whole,
-        2 * b / y.size * whole,
+        b * y * ones,
+        2 * a * half / cells * ones,
+        2 * b / y.size * ones,
         peak * along.bound,
         scale * relative[0],
         scale * relative[1],
         relative[2] > 0,
-        whole * peak > 0,
+        ones * peak > 0,
     )

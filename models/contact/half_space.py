@@ -16,7 +16,7 @@ from models.contact.inputs import Array
 from models.contact.material import MaterialPair
 
 X, Y, Z = 0, 1, 2
-"""Indices of the axes in ``influence``."""
+"""Indices of the axes in the results of ``influence``."""
 
 
 def influence(x: Array, y: Array, dx: float, dy: float, material_pair: MaterialPair) -> Array:
@@ -62,7 +62,7 @@ def _primitives(x: Array, y: Array) -> Array:
 
 
 def _angle(opposite: Array, adjacent: Array) -> Array:
-    """Arc tangent of opposite / adjacent; pi/2 where adjacent is zero."""
+    """Arc tangent (rad) of opposite / adjacent; pi/2 where adjacent is zero."""
     return np.arctan2(opposite * np.sign(adjacent), np.abs(adjacent))
 
 
@@ -75,10 +75,10 @@ class Convolution:
     def __init__(self, kernel: Array) -> None:
         self.cells = ((kernel.shape[0] + 1) // 2, (kernel.shape[1] + 1) // 2)
         self._size = tuple(fft.next_fast_len(n, real=True) for n in kernel.shape[:2])
-        rolled = np.zeros((*self._size, *kernel.shape[2:]))
-        rolled[: kernel.shape[0], : kernel.shape[1]] = kernel
-        rolled = np.roll(rolled, (1 - self.cells[0], 1 - self.cells[1]), axis=(0, 1))
-        self._spectrum = fft.rfft2(np.moveaxis(rolled, (0, 1), (-2, -1)), workers=1)
+        shifted = np.zeros((*self._size, *kernel.shape[2:]))
+        shifted[: kernel.shape[0], : kernel.shape[1]] = kernel
+        shifted = np.roll(shifted, (1 - self.cells[0], 1 - self.cells[1]), axis=(0, 1))
+        self._spectrum = fft.rfft2(np.moveaxis(shifted, (0, 1), (-2, -1)), workers=1)
 
     def __call__(self, values: Array) -> Array:
         """Sums (ny, nx, out) over all cells of kernel times values (ny, nx, in)."""
@@ -88,5 +88,7 @@ class Convolution:
 
 
 def offsets(cells: int, step: float) -> Array:
-    """All differences (m) between the centres of two cells in a row of ``cells`` cells: (2 cells - 1,), ascending."""
+    """All differences (m) between the centres of two cells in a row of ``cells`` cells of length ``step`` (m): (2 cells
+    - 1,), ascending.
+    """
     return np.arange(1 - cells, cells) * step

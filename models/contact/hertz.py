@@ -1,4 +1,4 @@
-"""Hertz: two smooth convex bodies pressed together without friction touch on an ellipse.
+"""Hertz' theory: two smooth convex bodies pressed together without friction touch on an ellipse.
 
 Source: Johnson, Contact Mechanics (1985), section 4.2. With the short semi-axis s, the long one l, g = s/l and
 e^2 = 1 - g^2, the complete elliptic integrals
@@ -19,15 +19,15 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.inputs import LARGEST_APPROACH, LARGEST_LOAD, Array, quantity, together
+from models.contact.inputs import LARGEST_APPROACH, LARGEST_LOAD, Array, broadcast_together, quantity
 from models.contact.material import MaterialPair
 from models.core.errors import InputError
 from models.machine.compiled import njit
 
 FLATTEST = 0.01
-"""The larger curvature (1/m) of real bodies is not below this, a radius of 50 m: one in 1/mm usually is."""
+"""Least curvature (1/m) that is accepted for the larger one, a radius of 50 m: a smaller one is usually in 1/mm."""
 LEAST_AXIS, LARGEST_AXIS = 1e-30, 1e3
-"""m"""
+"""Smallest and largest semi-axis (m) that are accepted."""
 
 
 @dataclass(frozen=True)
@@ -50,28 +50,28 @@ class Hertz:
 
 
 def by_load(A: Any, B: Any, load: Any, material_pair: MaterialPair) -> Hertz:
-    """Hertzian contact under a given load.
+    """Hertzian contact from curvatures under a given load.
 
     A, B : curvatures (1/m), above 0; load : N, compression positive; arrays of any shapes that broadcast. A load of
     zero or less makes no contact. Raises InputError for a curvature that is not above zero, a number that is not
     finite, magnitudes that are none in SI, or shapes that do not fit together.
     """
     load = quantity("load", load, f"a load in N, at most {LARGEST_LOAD:g}", maximum=LARGEST_LOAD)
-    A, B, load = together(**_curvatures(A, B), load=np.maximum(load, 0.0))
+    A, B, load = broadcast_together(**_curvatures(A, B), load=np.maximum(load, 0.0))
     ratio, cosine, sine = aspects(np.minimum(A, B) / np.maximum(A, B))
     area = 1.5 * load * cosine / (math.pi * material_pair.modulus * np.maximum(A, B))  # l s^2
     return _contact(A, B, load, np.cbrt(area * ratio), ratio, cosine + sine, material_pair)
 
 
 def by_approach(A: Any, B: Any, approach: Any, material_pair: MaterialPair) -> Hertz:
-    """Contact of bodies that have approached each other by ``approach`` (m) since first touching; zero or less means a
-    gap.
+    """Hertzian contact of bodies that have approached each other by ``approach`` (m) since first touching; zero or less
+    means a gap.
 
     Otherwise as ``by_load``.
     """
     allowed = f"an approach in m, at most {LARGEST_APPROACH:g}"
     approach = np.maximum(quantity("approach", approach, allowed, maximum=LARGEST_APPROACH), 0.0)
-    A, B, approach = together(**_curvatures(A, B), approach=approach)
+    A, B, approach = broadcast_together(**_curvatures(A, B), approach=approach)
     ratio, cosine, sine = aspects(np.minimum(A, B) / np.maximum(A, B))
     short = np.sqrt(approach * cosine / (np.maximum(A, B) * (cosine + sine)))
     load = 2.0 / 3.0 * math.pi * material_pair.modulus * approach * short / (ratio * (cosine + sine))
@@ -100,17 +100,17 @@ def by_axes(
         load = 2.0 / 3.0 * math.pi * a * b * approach * material_pair.modulus / (short * (cosine + sine))
     load = float(quantity("load", load, "a load in N, above 0", LEAST_AXIS, LARGEST_LOAD))
     curvature = 1.5 * load / (math.pi * a * b) * cosine / (material_pair.modulus * short)
-    other = curvature * g * g * sine / cosine
-    return by_load(*((other, curvature) if a >= b else (curvature, other)), load, material_pair)
+    second_curvature = curvature * g * g * sine / cosine
+    return by_load(*((second_curvature, curvature) if a >= b else (curvature, second_curvature)), load, material_pair)
 
 
 def _curvatures(A: Any, B: Any) -> dict[str, Array]:
-    """Both curvatures as arrays; raises InputError where they do not make a Hertzian contact."""
-    answer = {
+    """Both curvatures (1/m) as arrays; raises InputError where they do not make a Hertzian contact."""
+    curvatures = {
         name: quantity(name, value, "a curvature in 1/m, at most 1e12", maximum=1e12)
         for name, value in (("A", A), ("B", B))
     }
-    for name, value in answer.items():
+    for name, value in curvatures.items():
         if (value <= 0.0).any():
             raise InputError(
                 "",
@@ -120,20 +120,21 @@ def _curvatures(A: Any, B: Any) -> dict[str, Array]:
                 "direction, conform or interpenetrate do not touch on an ellipse; compute them as "
                 "non-Hertzian contact",
             )
-    A, B = together(**answer)
+    A, B = broadcast_together(**curvatures)
     flattest = float(np.maximum(A, B).min(initial=np.inf))
     if flattest < FLATTEST:
         raise InputError(
             "", "A, B", flattest, f"the larger of both must be {FLATTEST:g} 1/m or more; radii are in m, not in mm"
         )
-    return answer
+    return curvatures
 
 
 def _contact(
     A: Array, B: Array, load: Array, short: Array, ratio: Array, curvature_sum: Array, material_pair: MaterialPair
 ) -> Hertz:
-    """The contact computed from its short semi-axis; all results are zero where this axis is. ``curvature_sum`` is K =
-    B + D."""
+    """Hertzian contact from its short semi-axis (m); all results are zero where this axis is. ``curvature_sum`` is K =
+    B + D.
+    """
     long = short / ratio
     area = math.pi * short * long
     p0 = np.divide(1.5 * load, area, out=np.zeros_like(area), where=area > 0.0)
@@ -145,21 +146,21 @@ def _contact(
 
 def aspects(curvatures: Array) -> tuple[Array, Array, Array]:
     """Results of ``aspect`` for an array of curvature ratios: three arrays of the same shape."""
-    answer = _aspects(np.ascontiguousarray(curvatures).ravel()).reshape(3, *curvatures.shape)
-    return answer[0], answer[1], answer[2]
+    ratio_and_integrals = _aspects(np.ascontiguousarray(curvatures).ravel()).reshape(3, *curvatures.shape)
+    return ratio_and_integrals[0], ratio_and_integrals[1], ratio_and_integrals[2]
 
 
 @njit(cache=True)
 def _aspects(curvatures: Array) -> Array:
-    answer = np.empty((3, curvatures.size))
+    results = np.empty((3, curvatures.size))
     for i in range(curvatures.size):
-        answer[0, i], answer[1, i], answer[2, i] = aspect(curvatures[i])
-    return answer
+        results[0, i], results[1, i], results[2, i] = aspect(curvatures[i])
+    return results
 
 
 @njit(cache=True)
 def aspect(curvatures: float) -> tuple[float, float, float]:
-    """Ratio g of the short to the long semi-axis, and the elliptic integrals B and D at this g.
+    """Ratio g of the short to the long semi-axis of a Hertzian ellipse, and the elliptic integrals B and D at this g.
 
     curvatures : the smaller by the larger, above 0 and up to 1. Newton's method for ln(g^2 D / B) as a function of
     ln g, whose slope 1 + C (1/D + g^2/B), C = (D - B)/e^2, stays between 1.5 and 2.
@@ -179,7 +180,9 @@ def aspect(curvatures: float) -> tuple[float, float, float]:
 
 @njit(cache=True)
 def integrals(g: float) -> tuple[float, float]:
-    """Elliptic integrals B and D (head of this module) at g = sqrt(1 - e^2), 0 < g <= 1, exact to rounding."""
+    """Elliptic integrals B and D (formulas in this module's docstring) at g = sqrt(1 - e^2), 0 < g <= 1, exact to
+    rounding.
+    """
     other, mean = g, 1.0
     a_b, b_b, a_d, b_d = 1.0, 0.0, 0.0, 1.0  # the integrands as (a cos^2 + b sin^2) / sqrt(...)
     while True:

@@ -1,4 +1,4 @@
-"""Arrays that a user hands to a function of this package: finite, within what is plausible in SI, of one shape."""
+"""Checks of user inputs to the contact functions: finite arrays, within plausible SI values, of one common shape."""
 
 from collections.abc import Callable
 from typing import Any
@@ -8,20 +8,22 @@ import numpy as np
 from models.core.errors import InputError
 
 Array = np.ndarray
-"""Of numbers or flags, of any shape."""
+"""Array of numbers or flags, of any shape."""
 LARGEST_LOAD = 1e10
-"""N"""
+"""Largest load (N) that is accepted."""
 LARGEST_APPROACH = 0.05
-"""m: beyond it no contact is small against its body; an approach in mm often is."""
+"""Largest approach (m) that is accepted: beyond it no contact is small against its body; an approach in mm often is."""
 LARGEST_CREEPAGE = 10.0
 LARGEST_SPIN = 1e9
-"""1/m"""
+"""Largest spin (1/m) that is accepted."""
 NEGLIGIBLE_BOUND = 1e-60
-"""N: what friction holds below this is zero; the slip by its bound, squared, would be beyond all numbers."""
+"""Friction limit (N) below which tangential forces are zero: otherwise the slip divided by it, squared, would
+overflow.
+"""
 
 
 def quantity(name: str, value: Any, allowed: str, minimum: float = -np.inf, maximum: float = np.inf) -> Array:
-    """``value`` as a floating-point array of any shape; every element must be finite and between ``minimum`` and
+    """A user's input as a floating-point array of any shape; every element must be finite and between ``minimum`` and
     ``maximum``.
 
     Raises InputError with the first value that is not, and ``allowed``: what is expected, with its unit. Texts, complex
@@ -43,7 +45,7 @@ def quantity(name: str, value: Any, allowed: str, minimum: float = -np.inf, maxi
 
 
 def number(name: str, value: Any, allowed: str, minimum: float = -np.inf, maximum: float = np.inf) -> float:
-    """As ``quantity``, for functions that accept a single number and no array."""
+    """A user's input as one number; checks are those of ``quantity``, and an array is refused."""
     numbers = quantity(name, value, allowed, minimum, maximum)
     if numbers.ndim:
         raise InputError("", name, value, f"must be one number, not an array: {allowed}")
@@ -51,7 +53,7 @@ def number(name: str, value: Any, allowed: str, minimum: float = -np.inf, maximu
 
 
 def whole_number(name: str, value: Any, minimum: int, maximum: int) -> int:
-    """``value`` if it is a whole number from ``minimum`` to ``maximum``, else InputError."""
+    """A user's input if it is a whole number from ``minimum`` to ``maximum``, else InputError."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not minimum <= value <= maximum:
         raise InputError("", name, value, f"must be a whole number from {minimum} to {maximum}")
     return int(value)
@@ -67,7 +69,7 @@ def creepages(xi_x: Any, xi_y: Any, spin: Any, read: Callable[..., Any] = quanti
     }
 
 
-def together(**arrays: Array) -> tuple[Array, ...]:
+def broadcast_together(**arrays: Array) -> tuple[Array, ...]:
     """The given arrays, broadcast to their common shape; raises InputError with their shapes if there is none."""
     try:
         shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))

@@ -1,4 +1,5 @@
-"""One contact, from curvatures and load to creep forces, for compiled callers: nothing is allocated, nothing raised.
+"""One contact, from curvatures and load to creep forces, for compiled callers: nothing is allocated, no exception is
+raised.
 
 Hertz' contact (``hertz``), Kalker's coefficients (``linear_theory``) and the second-order march of FASTSIM with the
 blended flexibilities and the intermediate bound (``fastsim``), to the last digits the numbers of these modules. What
@@ -37,27 +38,31 @@ from models.machine.records import record, records, size_of, stacked
 from models.machine.stack import array, ask, beyond, doubles
 
 INPUT = record("shape_x", "shape_y", "pressing", "mu", "xi_x", "xi_y", "spin", "G", "nu")
-"""What goes in, as in ``kernel.h``: A, B (1/m) or a, b (m); load (N) or approach (m); mu; xi_x, xi_y; spin (1/m); G
-(Pa), nu."""
+"""Record of the inputs, as in ``kernel.h``: A, B (1/m) or a, b (m); load (N) or approach (m); mu; xi_x, xi_y; spin
+(1/m); G (Pa), nu.
+"""
 OUTPUT = record("fx", "fy", "mz", "a", "b", "approach", "load", "stick")
-"""What comes out: fx, fy (N), mz (N m), a, b, approach (m), load (N), share of the area that sticks."""
+"""Record of the outputs: fx, fy (N), mz (N m), a, b, approach (m), load (N), share of the area that sticks."""
 INPUTS, OUTPUTS = size_of(INPUT), size_of(OUTPUT)
 BY_LOAD, BY_APPROACH, AXES_BY_LOAD, AXES_BY_APPROACH = range(4)
-"""What the first three inputs are: A, B, load; A, B, approach; a, b, load; a, b, approach."""
+"""Meaning of the first three inputs: A, B, load; A, B, approach; a, b, load; a, b, approach."""
 FINE, NOT_FINITE, NOT_PLAUSIBLE, NOT_KNOWN = range(4)
-"""Status: an answer; an input that is not finite; one out of its range; a word for the inputs that is none."""
+"""Status of a contact: solved; an input that is not finite; an input out of its range; an unknown kind of inputs."""
 LARGEST_CURVATURE, SLENDEREST, LARGEST_FRICTION = 1e12, 1e9, 10.0
-HEAD = record("cells", "first", "count")
-"""Head of the net: cells per strip, strips of the first net, how many nets. Then the rows of the cells, and the middle
-and the rows of the strips of one net after another."""
-HEADER = size_of(HEAD)
-OTHER = record("cells", "law")
-"""Head of a distance's table: a number below zero in the place of the cells, address of the law."""
+GRID_HEAD = record("cells", "first", "count")
+"""Record at the head of the grid's table: cells per strip, strips of the first grid, number of grids. Then the rows of
+the cells, and the middle and the rows of the strips of one grid after another.
+"""
+HEADER = size_of(GRID_HEAD)
+DISTANCE_HEAD = record("cells", "law")
+"""Record at the head of a distance's table: a number below zero in place of the cells, and the address of the
+callback.
+"""
 
 
 @lru_cache(maxsize=64)
 def net(cells: int) -> Array:
-    """Table of the grid for ``cells`` cells per strip, from 3 to 2000, or 0 for the linear theory; raises InputError.
+    """Table of the grids for ``cells`` cells per strip, from 3 to 2000, or 0 for the linear theory; raises InputError.
     Must not be modified.
 
     Narrow ellipses have more strips: there is one net for every number of strips that may be asked for.
@@ -78,12 +83,16 @@ def net(cells: int) -> Array:
 
 @compiled
 def contact(kind, inputs, table, outputs):
-    """Status of one contact, FINE or another; fills ``outputs``.
+    """Solve one contact and fill ``outputs``; returns its status, FINE or another.
 
     kind : BY_LOAD or another; inputs : pointer to an INPUT; table : pointer to a ``net`` or to the table of a
     distance; outputs : pointer to an OUTPUT. A load or an approach of zero or less has zeros all over.
     """
-    values, out, head = records(inputs, 1, INPUT)[0], records(outputs, 1, OUTPUT)[0], records(table, 1, OTHER)[0]
+    values, out, head = (
+        records(inputs, 1, INPUT)[0],
+        records(outputs, 1, OUTPUT)[0],
+        records(table, 1, DISTANCE_HEAD)[0],
+    )
     any_shape, answers = head.cells < 0.0, array(outputs, (OUTPUTS,))
     status = _status(kind, values, array(inputs, (INPUTS,)), any_shape)
     answers[:] = 0.0 if status == FINE else math.nan
@@ -132,30 +141,34 @@ def _status(kind, values, numbers, any_shape):
 
 @compiled
 def _press(kind, values, out):
-    """Fill semi-axes, approach and load by Hertz's theory. Returns whether rolling theories can handle this ellipse."""
+    """Fill semi-axes, approach and load by Hertz' theory. Returns whether rolling theories can handle this ellipse."""
     x, y, elastic = values.shape_x, values.shape_y, values.G / (1.0 - values.nu)
     small, large = min(x, y), max(x, y)
     if kind in (BY_LOAD, BY_APPROACH):
         if large > SLENDEREST**1.6 * small:  # beyond it a/b, about the power 2/3 of this, is so in any case
             return False
         ratio, cosine, sine = aspect(small / large)
-        whole = cosine + sine
+        integral_sum = cosine + sine
         if kind == BY_LOAD:
             load = values.pressing
             short = np.cbrt(1.5 * load * cosine / (math.pi * elastic * large) * ratio)
         else:
-            short = np.sqrt(values.pressing * cosine / (large * whole))
-            load = 2.0 / 3.0 * math.pi * elastic * values.pressing * short / (ratio * whole)
+            short = np.sqrt(values.pressing * cosine / (large * integral_sum))
+            load = 2.0 / 3.0 * math.pi * elastic * values.pressing * short / (ratio * integral_sum)
         long = short / ratio
         out.a, out.b = (long, short) if x <= y else (short, long)
     else:
         cosine, sine = integrals(small / large) if small * SLENDEREST >= large else (1.0, 1.0)
-        whole, short, long = cosine + sine, small, large
+        integral_sum, short, long = cosine + sine, small, large
         by_load = kind == AXES_BY_LOAD
-        load = values.pressing if by_load else 2.0 / 3.0 * math.pi * x * y * values.pressing * elastic / (small * whole)
+        load = (
+            values.pressing
+            if by_load
+            else 2.0 / 3.0 * math.pi * x * y * values.pressing * elastic / (small * integral_sum)
+        )
         out.a, out.b = x, y
     out.load = load
-    out.approach = 1.5 * load / (math.pi * short * long) * short * whole / elastic
+    out.approach = 1.5 * load / (math.pi * short * long) * short * integral_sum / elastic
     rolls = short >= LEAST_AXIS and long <= SLENDEREST * short and short * long <= LARGEST_PATCH**2
     return rolls and load <= LARGEST_LOAD
 
@@ -176,8 +189,8 @@ def _linear(values, out):
 
 @compiled
 def _creep(values, table, out):
-    """Fill the forces of FASTSIM on one ellipse, as in ``fastsim_many.forces``, with all arrays on the stack."""
-    head = records(table, 1, HEAD)[0]
+    """Fill the forces of FASTSIM on one ellipse, as by ``fastsim_many.forces``, with all arrays on the stack."""
+    head = records(table, 1, GRID_HEAD)[0]
     n, first = int(head.cells), int(head.first)
     wide = n * min(max((0.5 / (out.a / out.b)) ** 0.6, 1.0), 1.0 * MOST_STRIPS)
     m = 2 * math.ceil(wide / 2.0 - 1e-9)
@@ -190,6 +203,6 @@ def _creep(values, table, out):
     contact.a, contact.b, contact.load, contact.mu = out.a, out.b, out.load, values.mu
     contact.xi_x, contact.xi_y, contact.spin = values.xi_x, values.xi_y, values.spin
     contact.l1, contact.l2, contact.l3 = flexibilities_at(out.a, out.b, values.G, values.nu)
-    room = Workspace(stacked(1, SLIP), stacked(1, BLOCK))
-    forces_within(contacts, strips, cells, BLENDED, SECOND_ORDER, room, answers)
+    workspace = Workspace(stacked(1, SLIP), stacked(1, BLOCK))
+    forces_within(contacts, strips, cells, BLENDED, SECOND_ORDER, workspace, answers)
     out.fx, out.fy, out.mz, out.stick = answer.fx, answer.fy, answer.mz, answer.stick

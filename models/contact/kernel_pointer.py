@@ -1,4 +1,4 @@
-"""The contact kernel as a C function pointer, for engines and programs that are not written in Python.
+"""The compiled contact as a C function pointer, for engines and programs that are not written in Python.
 
 ``pointer(cells)`` has the address of the function and that of the table of cells it marches on. The signature, the
 structures and the status are in ``kernel.h`` beside this file, a program that uses them in ``kernel_example.c``:
@@ -30,7 +30,9 @@ EXAMPLE = Path(__file__).with_name("kernel_example.c")
 
 @dataclass(frozen=True, eq=False)
 class Pointer:
-    """Addresses of the compiled function and of its ``net``, and ``call``, the function in the form of ctypes."""
+    """Addresses of the compiled contact function and of its grid table ``net``, and ``call``, the function in the form
+    of ctypes.
+    """
 
     address: int
     net: Array
@@ -38,13 +40,13 @@ class Pointer:
 
     @property
     def net_address(self) -> int:
-        """Address of the table's first double."""
+        """Address of the first double of the grid table."""
         return int(self.net.ctypes.data)
 
 
 def pointer(cells: int = 21, distance: Distance | None = None) -> Pointer:
-    """Pointer to the compiled contact with the table for ``cells`` cells per strip, or 0 for the linear theory. Raises
-    InputError.
+    """Pointer to the compiled contact with the grid table for ``cells`` cells per strip, or 0 for the linear theory.
+    Raises InputError.
 
     distance : of bodies whose contact is no ellipse; then the table is theirs, for Kalker's theory of 1983.
     """
@@ -55,8 +57,9 @@ def pointer(cells: int = 21, distance: Distance | None = None) -> Pointer:
 
 @cache
 def _compiled() -> Any:
-    """A short wrapper of ``contact``, compiled anew in each process; the machine code of ``contact`` itself is cached
-    on disk."""
+    """Compiled C function around ``contact``, made anew in each process; the machine code of ``contact`` itself is
+    cached on disk.
+    """
 
     @cfunc(SIGNATURE, error_model="numpy")
     def twinrig_contact(kind, table, inputs, outputs):

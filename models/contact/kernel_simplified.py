@@ -1,4 +1,5 @@
-"""Kalker's theory of 1983 (``simplified_theory``) for compiled callers: one patch of any shape, at its approach.
+"""Kalker's theory of 1983 (``simplified_theory``) for compiled callers: one contact patch of any shape, at its
+approach.
 
 The undeformed distance and the way the theory is used are a table of doubles that ``table`` makes. The kernel finds
 the depth that has the approach, marches, fits W_1 = W_2 and marches again, by the compiled parts of the package: its
@@ -12,23 +13,23 @@ from functools import cache
 import numpy as np
 from numba import cfunc, types
 
-from models.contact.distance_kernels import sides
+from models.contact.distance_kernels import valley_ends
 from models.contact.inputs import Array, whole_number
 from models.contact.kernel import FINE, INPUT, NOT_PLAUSIBLE, OUTPUT, OUTPUTS
 from models.contact.patches import Patch, separate
 from models.contact.simplified_kernels import (
     PARABOLIC,
     Surface,
-    crude_fit,
-    crude_net,
-    gather,
+    coarse_fit,
+    coarse_net,
+    coarse_tractions,
     march,
     mesh_of,
     strips,
     tangential,
     tangential_fit,
 )
-from models.contact.simplified_theory import ABOUT, FITS, LEAST_CELLS, PLAIN, SHAPES, SimplifiedOptions
+from models.contact.simplified_theory import DEPTH_BY_APPROACH, FITS, LEAST_CELLS, PLAIN, SHAPES, SimplifiedOptions
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
 from models.machine.compiled import compiled
@@ -54,18 +55,20 @@ HEAD = record(
     "rows",
     "columns",
 )
-"""Head of the table: minus the cells; address of the law; net, shape and fit; least distance and depth at which a side
-is reached (m); first node, spacing and bottom along x and y (m); lengths. Then lines and roots along x and y, and
-padded heights."""
+"""Record at the head of the table: minus the cells; address of the callback; net, shape and fit; least distance and
+depth at which a side is reached (m); first node, spacing and bottom along x and y (m); lengths. Then lines and roots
+along x and y, and padded heights.
+"""
 HEADER = size_of(HEAD)
 MOST_CELLS = 200
 DEPTH_TOLERANCE = 1e-12
-"""Share of the approach, from first touch on, to which the depth settles."""
-TRIES = 100
+"""Ratio of the remaining error of the depth to the approach beyond first touch at which the iteration ends."""
+MOST_ITERATIONS = 100
 
 
 def table(distance: Distance, cells: int = 21, options: SimplifiedOptions = PLAIN) -> Array:
-    """Table for an undeformed distance with a single valley; its first number is below zero. Must not be modified.
+    """Table for an undeformed distance with a single valley, for compiled callers; its first number is below zero. Must
+    not be modified.
 
     cells : strips of the fine net, and cells in each, 3 to 200. Raises InputError, also for several valleys.
     """
@@ -77,7 +80,7 @@ def table(distance: Distance, cells: int = 21, options: SimplifiedOptions = PLAI
     (x, root_x), (y, root_y) = patch.lines
     head = [
         -cells,
-        _law().address,
+        _callback().address,
         options.net,
         SHAPES[options.shape],
         FITS[options.fit],
@@ -99,27 +102,27 @@ def table(distance: Distance, cells: int = 21, options: SimplifiedOptions = PLAI
 
 @compiled
 def surface_at(numbers, depth):
-    """``Surface`` of the patch at a depth (m) for compiled functions, as ``Patch.surface`` gives it."""
+    """``Surface`` of the patch at a depth (m), as ``Patch.surface`` gives it, from its table."""
     head = records(numbers, 1, HEAD)[0]
     m, n = int(head.lines_x), int(head.lines_y)
     x, y = array(beyond(numbers, HEADER), (2, m)), array(beyond(numbers, HEADER + 2 * m), (2, n))
     shape = int(head.rows), int(head.columns)
     padded = array(beyond(numbers, HEADER + 2 * (m + n)), shape)
     root = math.sqrt(max(depth - head.low, 0.0))
-    x0, x1 = sides(x[0], x[1], head.bottom_x, root)
-    y0, y1 = sides(y[0], y[1], head.bottom_y, root)
+    x0, x1 = valley_ends(x[0], x[1], head.bottom_x, root)
+    y0, y1 = valley_ends(y[0], y[1], head.bottom_y, root)
     return Surface(padded, (head.x, head.y), (head.dx, head.dy), (x0, x1, y0, y1), depth, head.low)
 
 
 @compiled
-def fit_at(numbers, depth, modulus):
-    """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA at a depth (m)."""
+def fit_at_depth(numbers, depth, modulus):
+    """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of the patch at a depth (m)."""
     head = records(numbers, 1, HEAD)[0]
-    return crude_fit(surface_at(numbers, depth), int(head.net), int(head.shape), int(head.fit), modulus)
+    return coarse_fit(surface_at(numbers, depth), int(head.net), int(head.shape), int(head.fit), modulus)
 
 
 @compiled
-def settle(numbers, approach, modulus):
+def depth_at_approach(numbers, approach, modulus):
     """Depth (m) at which the approach (m) is reached, with its stiffness (Pa/m) and sum of W p dA; NaN if the contact
     would pass the table's edge.
 
@@ -129,10 +132,10 @@ def settle(numbers, approach, modulus):
     low, most = head.low, head.edge - head.low
     over = approach - low
     left, off_left, right, off_right = 0.0, -over, 0.0, -over
-    depth = min(ABOUT * over, most)
-    kept = 0
-    for _ in range(TRIES):
-        stiffness, reached, volume = fit_at(numbers, low + depth, modulus)
+    depth = min(DEPTH_BY_APPROACH * over, most)
+    last_side = 0
+    for _ in range(MOST_ITERATIONS):
+        stiffness, reached, volume = fit_at_depth(numbers, low + depth, modulus)
         off = reached - approach
         if abs(off) <= DEPTH_TOLERANCE * over:
             return low + depth, stiffness, volume
@@ -140,14 +143,14 @@ def settle(numbers, approach, modulus):
             break
         if off < 0.0:
             left, off_left = depth, off
-            off_right *= 0.5 if kept < 0 else 1.0
-            kept = -1
+            off_right *= 0.5 if last_side < 0 else 1.0
+            last_side = -1
         else:
             right, off_right = depth, off
-            off_left *= 0.5 if kept > 0 else 1.0
-            kept = 1
+            off_left *= 0.5 if last_side > 0 else 1.0
+            last_side = 1
         if right <= 0.0:  # not yet enclosed
-            depth, kept = min(1.5 * depth, most), 0
+            depth, last_side = min(1.5 * depth, most), 0
             continue
         depth = (left * off_right - right * off_left) / (off_right - off_left)
         if not left < depth < right:
@@ -157,8 +160,8 @@ def settle(numbers, approach, modulus):
 
 @compiled
 def simplified(inputs, numbers, outputs):
-    """Status of the patch, FINE or NOT_PLAUSIBLE; fills ``outputs``. The caller, ``kernel``, must have checked
-    ``inputs``.
+    """Solve the patch by the simplified theory and fill ``outputs``; returns its status, FINE or NOT_PLAUSIBLE. The
+    caller, ``kernel``, must have checked ``inputs``.
 
     All pointers to doubles. Zeros where the bodies do not touch; no answer where the contact reaches the edge of the
     distance.
@@ -168,7 +171,7 @@ def simplified(inputs, numbers, outputs):
     answers[:] = 0.0
     if values.pressing <= head.low:
         return FINE
-    depth, stiffness, volume = settle(numbers, values.pressing, values.G / (1.0 - values.nu))
+    depth, stiffness, volume = depth_at_approach(numbers, values.pressing, values.G / (1.0 - values.nu))
     if stiffness * volume > 0.0:
         out.load = stiffness * volume
         _roll(values, numbers, depth, stiffness, out)
@@ -180,8 +183,9 @@ def simplified(inputs, numbers, outputs):
 
 @compiled
 def _roll(values, numbers, depth, stiffness, out):
-    """Fill the rolling forces in ``out``, whose load is known, of the patch at a depth: as
-    ``simplified_theory.roll``."""
+    """Fill the rolling forces of the patch at a depth (m) in ``out``, whose load is known, as
+    ``simplified_theory.roll`` does.
+    """
     surface, head = surface_at(numbers, depth), records(numbers, 1, HEAD)[0]
     box, cells, meshes = surface.box, -int(head.cells), int(head.net)
     net = strips(surface, cells, cells, int(head.shape))
@@ -191,8 +195,8 @@ def _roll(values, numbers, depth, stiffness, out):
     fx = fy = mz = stuck = area = 0.0
     for again in (False, True):
         if again:
-            crude, (dx, dy) = gather(net, traction, box, meshes), mesh_of(box, meshes)
-            cover = crude_net(surface, meshes, PARABOLIC)[2]
+            crude, (dx, dy) = coarse_tractions(net, traction, box, meshes), mesh_of(box, meshes)
+            cover = coarse_net(surface, meshes, PARABOLIC)[2]
             u = tangential(crude, dx, dy, values.nu) / (math.pi * values.G)
             fitted = tangential_fit(u, crude, cover, dx, dy, int(head.fit))
             flexibility = fitted if fitted > 0.0 else flexibility
@@ -215,7 +219,7 @@ def normalise(net, load):
 
 
 @cache
-def _law():
+def _callback():
     """Callback with C calling convention around ``simplified``; tables store its address."""
 
     @cfunc(types.int32(DOUBLES, DOUBLES, DOUBLES), error_model="numpy")

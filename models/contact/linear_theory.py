@@ -14,43 +14,48 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.inputs import Array, quantity, together
+from models.contact.inputs import Array, broadcast_together, quantity
 from models.contact.material import MaterialPair
 from models.machine.compiled import njit
 
 STEPS = np.arange(1.0, 11.0) / 10.0
 RATIOS = np.concatenate((STEPS, 1.0 / STEPS[-2::-1]))
-"""Ratios a/b of the table."""
+"""Axis ratios a/b of the table of coefficients."""
 FILE = Path(__file__).with_name("kalker_coefficients.csv")
 TABLE = np.loadtxt(FILE, delimiter=",", skiprows=1, usecols=range(1, 13)).reshape(RATIOS.size, 4, 3)
-"""[ratio, C11 C22 C23 C33, nu = 0, 1/4, 1/2]: Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), table
-E.3; C33 as recalled, and confirmed by the exact theory of ``rolling_problem`` as the others are."""
+"""Table of Kalker's coefficients [ratio, C11 C22 C23 C33, nu = 0, 1/4, 1/2]: Kalker, Three-Dimensional Elastic Bodies
+in Rolling Contact (1990), table E.3; C33 as recalled, and confirmed by the exact theory of ``rolling_problem`` as the
+others are.
+"""
 LOGARITHMS = np.log(TABLE)
 SLOPES = np.gradient(LOGARITHMS, np.log(RATIOS), axis=0, edge_order=2)
 POWERS = np.array([-1.0, -1.0, -1.0, 0.75])
-"""Powers of the coefficients that are nearly parabolas of nu; 1/C33 is none where a/b is large."""
+"""Powers of the coefficients C11, C22, C23, C33 that are nearly parabolas of nu; 1/C33 is none where a/b is large."""
 LONG_RATIOS = np.array([10.0, 20.0, 50.0, 100.0])
 LONG_C33 = np.array([[0.787, 0.527, 0.236], [0.781, 0.489, 0.170], [0.776, 0.456, 0.116], [0.775, 0.440, 0.0913]])
-"""[ratio, nu = 0, 1/4, 1/2]: C33 of long patches by ``rolling_operator`` with every cell sticking, as the validation
-case ``contact_coefficients`` computes it: 24 and 48 rows of cells ten times as long as wide, led on by second order.
-Twice as many cells change it by 2 % at most. The asymptote of the table's last row is 12 % too large at a/b = 20 and
-20 % at 100, for nu = 1/4."""
+"""Coefficient C33 [ratio, nu = 0, 1/4, 1/2] of long patches by ``rolling_operator`` with every cell sticking, as the
+validation case ``contact_coefficients`` computes it: 24 and 48 rows of cells ten times as long as wide, extrapolated by
+second order. Twice as many cells change it by 2 % at most. The asymptote of the table's last row is 12 % too large at
+a/b = 20 and 20 % at 100, for nu = 1/4.
+"""
 NARROW_FADING, LONG_FADING = 1.5, 0.75
 """Powers of the slenderness with which the difference from the asymptotes vanishes below and above the table."""
 STIFFER_SPIN = 25.0
-"""(L2/L3 - 1) (a/b)^2 at most. Spin meets a stiffer bed than lateral creepage, so that the power of small tractions,
+"""Largest value of (L2/L3 - 1) (a/b)^2. Spin meets a stiffer bed than lateral creepage, so that the power of small
+tractions,
 
     8/3 a^2 b xi_y^2 / L2 + pi/4 a^3 b (1/L3 - 1/L2) xi_y spin + 8/15 a^2 b^3 spin^2 / L3,
 
 could become negative where L2/L3 - 1 is beyond 3 b/a: with Kalker's coefficients from a/b = 15 on. With this bound,
-which they reach at a/b = 10.5, that is far off, and so it is on 21 cells up to a/b = 900."""
+which they reach at a/b = 10.5, that is far off, and so it is on 21 cells up to a/b = 900.
+"""
 LARGEST_PATCH = 0.5
-"""sqrt(ab) in m: a larger one is usually in mm."""
+"""Largest sqrt(ab) in m that is accepted: a larger one is usually in mm."""
 
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Coefficients of creepage and spin, dimensionless, of the common shape of ratio and nu; C32 is -C23."""
+    """Kalker's coefficients of creepage and spin, dimensionless, of the common shape of ratio and nu; C32 is -C23."""
 
     c11: Array
     c22: Array
@@ -59,7 +64,7 @@ class Coefficients:
 
 
 def coefficients(ratio: Any, nu: Any) -> Coefficients:
-    """Kalker's creepage and spin coefficients.
+    """Kalker's creepage and spin coefficients for axis ratios and Poisson's ratios.
 
     ratio : a/b, from 1e-9 to 1e9; nu : Poisson's ratio, 0 to 1/2; arrays of shapes that broadcast. Raises InputError.
 
@@ -69,13 +74,13 @@ def coefficients(ratio: Any, nu: Any) -> Coefficients:
     good to 10 %; beyond, their last slope goes on, which nothing was held against.
     """
     ratio = quantity("ratio", ratio, "a ratio a/b of semi-axes from 1e-9 to 1e9", 1e-9, 1e9)
-    ratio, nu = together(ratio=ratio, nu=quantity("nu", nu, "a Poisson's ratio from 0 to 0.5", 0.0, 0.5))
-    answer = _coefficients_of_each(ratio.flatten(), nu.flatten()).reshape(4, *ratio.shape)
-    return Coefficients(*(values[()] for values in answer))
+    ratio, nu = broadcast_together(ratio=ratio, nu=quantity("nu", nu, "a Poisson's ratio from 0 to 0.5", 0.0, 0.5))
+    values_of_each = _coefficients_of_each(ratio.flatten(), nu.flatten()).reshape(4, *ratio.shape)
+    return Coefficients(*(values[()] for values in values_of_each))
 
 
 def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, material_pair: MaterialPair) -> tuple[Array, Array, Array]:
-    """Fx, Fy (N) and Mz (N m) on the wheel according to linear theory, in which nothing slips.
+    """Creep forces Fx, Fy (N) and moment Mz (N m) on the wheel by the linear theory, in which nothing slips.
 
     a, b : semi-axes (m), zero where nothing touches; xi_x, xi_y : creepages (1); spin : 1/m; arrays of shapes that
     broadcast. Friction does not enter: the forces have no bound. Raises InputError, also for too unlike a pair.
@@ -84,7 +89,7 @@ def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, material_pair: Mater
     a, b = _axes(a, b)
     spin = quantity("spin", spin, "a spin in 1/m")
     xi_x, xi_y = (quantity(name, value, "a creepage") for name, value in (("xi_x", xi_x), ("xi_y", xi_y)))
-    a, b, xi_x, xi_y, spin = together(a=a, b=b, xi_x=xi_x, xi_y=xi_y, spin=spin)
+    a, b, xi_x, xi_y, spin = broadcast_together(a=a, b=b, xi_x=xi_x, xi_y=xi_y, spin=spin)
     ratio = np.divide(a, b, out=np.ones_like(a), where=(a > 0.0) & (b > 0.0))  # 1 where nothing touches
     c, area = coefficients(ratio, material_pair.nu), a * b
     fy = -material_pair.G * (area * c.c22 * xi_y + area**1.5 * c.c23 * spin)
@@ -93,7 +98,8 @@ def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, material_pair: Mater
 
 
 def flexibilities(a: Any, b: Any, material_pair: MaterialPair) -> tuple[Array, Array, Array]:
-    """Flexibilities L1, L2, L3 (m^3/N) of the simplified theory for xi_x, xi_y and spin: displacement by traction.
+    """Flexibilities L1, L2, L3 (m^3/N) of the simplified theory for xi_x, xi_y and spin: ratios of displacement to
+    traction.
 
     L1 = 8 a / (3 G C11), L2 = 8 a / (3 G C22), L3 = pi a sqrt(a/b) / (4 G C23) (Kalker 1982), and beyond a/b = 10.5
     as much more of L3 as passive tractions ask for (``STIFFER_SPIN``): 14 % at a/b = 20, 17 % from 50 on. a, b :
@@ -102,13 +108,14 @@ def flexibilities(a: Any, b: Any, material_pair: MaterialPair) -> tuple[Array, A
     """
     material_pair.require_likeness()
     a, b = _axes(a, b)
-    answer = _flexible(a.flatten(), b.flatten(), material_pair.G, material_pair.nu).reshape(3, *a.shape)
+    answer = _flexibilities_of_each(a.flatten(), b.flatten(), material_pair.G, material_pair.nu).reshape(3, *a.shape)
     return answer[0][()], answer[1][()], answer[2][()]
 
 
 def _axes(a: Any, b: Any) -> tuple[Array, ...]:
+    """Semi-axes (m) as arrays of one shape; raises InputError for negative or too large ones."""
     a, b = (quantity(name, value, "a semi-axis in m, zero or more", 0.0) for name, value in (("a", a), ("b", b)))
-    a, b = together(a=a, b=b)
+    a, b = broadcast_together(a=a, b=b)
     quantity("sqrt(a b)", np.sqrt(a * b), f"at most {LARGEST_PATCH:g} m; axes are in m, not in mm", 0.0, LARGEST_PATCH)
     return a, b
 
@@ -123,7 +130,7 @@ def _coefficients_of_each(ratio: Array, nu: Array) -> Array:
 
 
 @njit(cache=True)
-def _flexible(a: Array, b: Array, modulus: float, nu: float) -> Array:
+def _flexibilities_of_each(a: Array, b: Array, modulus: float, nu: float) -> Array:
     answer = np.empty((3, a.size))
     for i in range(a.size):
         answer[0, i], answer[1, i], answer[2, i] = flexibilities_at(a[i], b[i], modulus, nu)
@@ -132,7 +139,9 @@ def _flexible(a: Array, b: Array, modulus: float, nu: float) -> Array:
 
 @njit(cache=True)
 def flexibilities_at(a: float, b: float, modulus: float, nu: float) -> tuple[float, float, float]:
-    """L1, L2, L3 of one patch, ``modulus`` the shear modulus G (Pa); for compiled callers, nothing is checked."""
+    """Flexibilities L1, L2, L3 (m^3/N) of one patch, ``modulus`` : shear modulus G (Pa); for compiled callers, nothing
+    is checked.
+    """
     if a <= 0.0 or b <= 0.0:
         return 0.0, 0.0, 0.0
     unit = a / modulus
@@ -150,33 +159,37 @@ def flexibilities_at(a: float, b: float, modulus: float, nu: float) -> tuple[flo
 
 @njit(cache=True)
 def coefficient_at(kind: int, ratio: float, nu: float) -> float:
-    """One of C11, C22, C23, C33 (kind 0 to 3) of one patch; for compiled callers, nothing is checked."""
+    """Kalker's coefficient C11, C22, C23 or C33 (kind 0 to 3) of one patch; for compiled callers, nothing is
+    checked.
+    """
     inner = min(max(ratio, RATIOS[0]), RATIOS[-1])
-    answer = _tabulated(kind, inner, nu)
+    coefficient = _tabulated(kind, inner, nu)
     if inner == ratio:
-        return answer
+        return coefficient
     if ratio < 1.0:
-        excess = answer / _narrow_limit(kind, inner, nu) - 1.0
+        excess = coefficient / _narrow_limit(kind, inner, nu) - 1.0
         return _narrow_limit(kind, ratio, nu) * (1.0 + excess * (ratio / inner) ** NARROW_FADING)
-    excess = answer / _long_limit(kind, inner, nu) - 1.0
+    excess = coefficient / _long_limit(kind, inner, nu) - 1.0
     return _long_limit(kind, ratio, nu) * (1.0 + excess * (inner / ratio) ** LONG_FADING)
 
 
 @njit(cache=True)
 def _tabulated(kind: int, ratio: float, nu: float) -> float:
-    """Cubic Hermite interpolation of ln C in ln(a/b), then the parabola of a power of C through nu = 0, 1/4, 1/2."""
+    """Kalker's coefficient from the table: cubic Hermite interpolation of ln C in ln(a/b), then the parabola of a power
+    of C through nu = 0, 1/4, 1/2.
+    """
     i = 0
     while i < RATIOS.size - 2 and RATIOS[i + 1] <= ratio:
         i += 1
     width = math.log(RATIOS[i + 1] / RATIOS[i])
     t = math.log(ratio / RATIOS[i]) / width
     rise, low, high = t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2 * width, t * t * (t - 1.0) * width
-    power, answer = POWERS[kind], 0.0
+    power, power_mean = POWERS[kind], 0.0
     for k, weight in enumerate(_parabola(nu)):
         logarithm = (1.0 - rise) * LOGARITHMS[i, kind, k] + rise * LOGARITHMS[i + 1, kind, k]
         logarithm += low * SLOPES[i, kind, k] + high * SLOPES[i + 1, kind, k]
-        answer += weight * math.exp(power * logarithm)
-    return answer ** (1.0 / power)
+        power_mean += weight * math.exp(power * logarithm)
+    return power_mean ** (1.0 / power)
 
 
 @njit(cache=True)
@@ -188,7 +201,9 @@ def _parabola(nu: float) -> tuple[float, float, float]:
 
 @njit(cache=True)
 def _narrow_limit(kind: int, ratio: float, nu: float) -> float:
-    """Coefficient of a patch across the direction of rolling, a/b = g to 0 (Kalker 1990, table E.3, first row)."""
+    """Asymptote of a coefficient for patches much shorter than wide, a/b = g to 0 (Kalker 1990, table E.3, first
+    row).
+    """
     if kind == 0:
         return math.pi**2 / (4.0 * (1.0 - nu))
     if kind == 1:
@@ -200,7 +215,7 @@ def _narrow_limit(kind: int, ratio: float, nu: float) -> float:
 
 @njit(cache=True)
 def _long_limit(kind: int, ratio: float, nu: float) -> float:
-    """Coefficient of a patch along the direction of rolling, b/a = g to 0 (the same table, last row)."""
+    """Asymptote of a coefficient for patches much longer than wide, b/a = g to 0 (the same table, last row)."""
     wide = 2.0 * math.log(4.0 * ratio)
     divisor, two, three = wide - 2.0 * nu, (1.0 - nu) * wide + 2.0 * nu, (1.0 - nu) * wide - 2.0 + 4.0 * nu
     if kind == 0:
@@ -211,7 +226,7 @@ def _long_limit(kind: int, ratio: float, nu: float) -> float:
         return 2.0 * math.pi * ratio**1.5 / (3.0 * three)
     i = min(max(int(np.searchsorted(LONG_RATIOS, ratio)) - 1, 0), LONG_RATIOS.size - 2)
     t = math.log(ratio / LONG_RATIOS[i]) / math.log(LONG_RATIOS[i + 1] / LONG_RATIOS[i])
-    power, answer = POWERS[3], 0.0  # ln C33 is linear in ln(a/b) between its nodes and on beyond
+    power, power_mean = POWERS[3], 0.0  # ln C33 is linear in ln(a/b) between its nodes and on beyond
     for k, weight in enumerate(_parabola(nu)):
-        answer += weight * (LONG_C33[i, k] ** (1.0 - t) * LONG_C33[i + 1, k] ** t) ** power
-    return answer ** (1.0 / power)
+        power_mean += weight * (LONG_C33[i, k] ** (1.0 - t) * LONG_C33[i + 1, k] ** t) ** power
+    return power_mean ** (1.0 / power)

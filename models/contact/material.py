@@ -1,4 +1,4 @@
-"""Elastic constants of the two bodies, what a pair of them is to the theory of contact, and how their friction falls.
+"""Elastic constants of two bodies in contact, their combined constants, and friction that falls with the speed of slip.
 
 A pair is treated as two bodies of one material with combined constants (Kalker, Three-Dimensional Elastic Bodies in
 Rolling Contact, 1990, section 1.7). That is exact for frictionless pressure. With friction it is exact for
@@ -16,11 +16,11 @@ from models.core.errors import InputError
 from models.core.strict import Strict, message
 
 LARGEST_MISMATCH = 0.01
-"""Theories that leave K out refuse a pair beyond this |K|: at mu = 0.3 the forces would be off by 7 % of mu N."""
+"""Largest |K| of a pair that theories without K accept: at mu = 0.3 the forces would be off by 7 % of mu N."""
 
 
 class Material(Strict):
-    """An isotropic elastic body, ``Material(E=2.1e11, nu=0.28)``; raises InputError for constants of none."""
+    """An isotropic elastic material, ``Material(E=2.1e11, nu=0.28)``; raises InputError for impossible constants."""
 
     E: float = Field(ge=1e6, le=1e13, description="Young's modulus, not in MPa", json_schema_extra={"unit": "Pa"})
     nu: float = Field(ge=0.0, le=0.5, description="Poisson's ratio")
@@ -38,7 +38,7 @@ class Material(Strict):
 
 
 STEEL = Material(E=2.1e11, nu=0.28)
-"""Steel of wheel and rail as the Manchester contact benchmark has it, G = 82 GPa."""
+"""Steel of wheel and rail as in the Manchester contact benchmark, G = 82 GPa."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class MaterialPair:
 
     @cached_property
     def modulus(self) -> float:
-        """E* in Pa of normal contact: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, which is (1 - nu)/G."""
+        """Contact modulus E* in Pa of normal contact: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, which is (1 - nu)/G."""
         return 1.0 / ((1.0 - self.wheel.nu**2) / self.wheel.E + (1.0 - self.rail.nu**2) / self.rail.E)
 
     @cached_property
@@ -70,7 +70,8 @@ class MaterialPair:
 
     @cached_property
     def mismatch(self) -> float:
-        """Kalker's K = G/4 ((1 - 2 nu1)/G1 - (1 - 2 nu2)/G2), zero for equal bodies and for two incompressible ones.
+        """Kalker's mismatch K = G/4 ((1 - 2 nu1)/G1 - (1 - 2 nu2)/G2), zero for equal bodies and for two incompressible
+        ones.
 
         Dundurs' second constant is K / (1 - nu).
         """
@@ -78,7 +79,8 @@ class MaterialPair:
         return self.G / 4.0 * ((1.0 - 2.0 * wheel.nu) / wheel.G - (1.0 - 2.0 * rail.nu) / rail.G)
 
     def quasi_identity_error(self, friction: float) -> float:
-        """Ratio of the force error by neglecting K to mu N, at this coefficient of friction: up to 2 |K| / mu.
+        """Ratio of the force error by neglecting the mismatch K to mu N, at this coefficient of friction: up to 2 |K| /
+        mu.
 
         The mean of the strain 2 K p / G over the patch is a creepage of K N / (pi a b G) on a circle and up to twice
         that on a band, which the linear theory answers with G a b C11 times as much: 1.3 to 2 times K N.
@@ -86,8 +88,9 @@ class MaterialPair:
         return 2.0 * abs(self.mismatch) / friction
 
     def require_likeness(self) -> None:
-        """Raise InputError if the materials differ so much that K must not be neglected where there is friction (see
-        LARGEST_MISMATCH)."""
+        """Raise InputError if the materials differ so much that the mismatch K must not be neglected where there is
+        friction (see LARGEST_MISMATCH).
+        """
         if abs(self.mismatch) > LARGEST_MISMATCH:
             raise InputError(
                 "",
@@ -114,5 +117,5 @@ class Falling(Strict):
 
     @property
     def law(self) -> tuple[float, float]:
-        """Parameters of the law: floor, and decay per unit of the ratio of slip to rolling speed."""
+        """Parameters of the friction law: floor, and decay per unit of the ratio of slip speed to rolling speed."""
         return self.floor, self.decay * self.speed

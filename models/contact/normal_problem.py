@@ -19,17 +19,17 @@ from models.contact.material import MaterialPair
 from models.core.errors import InputError, RunFailed
 
 TOLERANCE = 1e-9
-"""Largest violation of a contact condition, as a part of the greatest elastic displacement."""
+"""Largest violation of a contact condition, as a share of the greatest elastic displacement."""
 MOST_ITERATIONS = 2000
 LARGEST_CELL, LARGEST_APPROACH = 0.1, 0.1
-"""In m; larger ones are usually in mm."""
-UNEVEN = 4e-3
-"""Largest difference between steps of a grid, as a part of them."""
+"""Largest cell size and approach (m) that are accepted; larger ones are usually in mm."""
+LARGEST_UNEVENNESS = 4e-3
+"""Largest difference between the steps of a grid, as a share of their mean."""
 
 
 @dataclass(frozen=True)
 class PressureGrid:
-    """A pressure on a regular grid of cells.
+    """A contact pressure on a regular grid of cells.
 
     pressure : (ny, nx) in Pa, zero outside the contact. x, y : (nx,), (ny,) centres of the cells (m), evenly spaced.
     """
@@ -50,7 +50,7 @@ class PressureGrid:
         quantity("pressure", self.pressure, "a pressure in Pa, zero or more", 0.0)
         for name, nodes in (("x", self.x), ("y", self.y)):
             steps = np.diff(quantity(name, nodes, "a place in m"))
-            if not (steps.min() > 0.0 and np.ptp(steps) <= UNEVEN * steps.mean()):
+            if not (steps.min() > 0.0 and np.ptp(steps) <= LARGEST_UNEVENNESS * steps.mean()):
                 raise InputError("", name, None, "must ascend in even steps (m)")
 
     @property
@@ -65,12 +65,12 @@ class PressureGrid:
 
     @property
     def contact(self) -> Array:
-        """Cells in contact, (ny, nx) bool."""
+        """Whether each cell is in contact, (ny, nx) bool."""
         return self.pressure > 0
 
     @property
     def load(self) -> float:
-        """Resultant of the pressure (N)."""
+        """Resultant force of the pressure (N)."""
         return float(self.pressure.sum() * self.dx * self.dy)
 
     @property
@@ -81,7 +81,7 @@ class PressureGrid:
 
 @dataclass(frozen=True)
 class NormalSolution(PressureGrid):
-    """Solution of the normal problem.
+    """Solution of the normal contact problem: pressure, approach and gap.
 
     approach : rigid approach of the bodies from first touch at distance 0 (m).
     gap : (ny, nx) distance between the deformed surfaces (m).
@@ -96,12 +96,12 @@ class NormalSolution(PressureGrid):
 
 
 def centres(cells: int, step: float) -> Array:
-    """Positions (m) of the centres of ``cells`` cells of size ``step``, symmetric about zero."""
+    """Positions (m) of the centres of ``cells`` cells of size ``step`` (m), symmetric about zero."""
     return (np.arange(cells) - (cells - 1) / 2) * step
 
 
 AVERAGING_POINTS = 8
-"""Points along each axis of a cell over which Hertz' pressure is averaged."""
+"""Number of points along each axis of a cell over which Hertz' pressure is averaged."""
 
 
 def hertzian(a: float, b: float, load: float, cells: int) -> PressureGrid:
@@ -124,7 +124,7 @@ def solve_normal(
     load: float | None = None,
     approach: float | None = None,
 ) -> NormalSolution:
-    """Pressure and contact area of two bodies pressed together.
+    """Pressure and contact area of two bodies pressed together without friction.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def _checked_distance(distance: Array, dx: float, dy: float, load: float | None,
 def _conjugate_gradients(
     distance: Array, displace: Convolution, load: float | None, approach: float | None, cell: float
 ) -> tuple[Array, int]:
-    """Pressure (ny, nx) that satisfies the contact conditions, and the number of iterations."""
+    """Pressure (ny, nx) in Pa that satisfies the contact conditions, and the number of iterations."""
     if load is not None:  # even over the grid
         pressure = np.full(distance.shape, load / (distance.size * cell))
     else:  # in proportion to the overlap
@@ -206,6 +206,6 @@ def _conjugate_gradients(
 
 
 def _violation(gap: Array, contact: Array, displacement: Array) -> float:
-    """Largest violation of the contact conditions, relative to the largest displacement."""
+    """Largest violation of the contact conditions, as a ratio to the largest displacement."""
     inside, outside = np.abs(gap[contact]).max(), -gap[~contact].min(initial=0.0)
     return float(max(inside, outside) / displacement.max())

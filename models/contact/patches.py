@@ -1,4 +1,4 @@
-"""Patches: the valleys of an undeformed distance, each of which makes an area of contact of its own.
+"""Contact patches: the valleys of an undeformed distance, each of which makes a separate area of contact.
 
 A distance with several valleys is cut between them, along straight lines through the ridges: first along y, where
 patches of wheel and rail lie side by side, then along x. The cuts follow from the distance alone. They do not move
@@ -11,16 +11,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.contact.distance_kernels import sides
+from models.contact.distance_kernels import valley_ends
 from models.contact.inputs import Array
 from models.contact.simplified_kernels import Surface
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
 
 RIDGE = 1e-6
-"""Height (m) of a ridge between two valleys that parts them; lower ones are roughness of one valley."""
+"""Height (m) of a ridge above which it separates two valleys; lower ones count as roughness of one valley."""
 NO_DEPTH = 1e-12
-"""m: a valley that is no deeper within its sides is none."""
+"""Depth (m) of a valley within its sides up to which it counts as none."""
 Table = tuple[Array, Array]
 Box = tuple[float, float, float, float]
 
@@ -41,7 +41,7 @@ class Patch:
 
     @cached_property
     def bottom(self) -> tuple[float, float, float]:
-        """Position x, y of the least distance (m), and that distance (m)."""
+        """Position x, y of the valley's least distance (m), and that distance (m)."""
         lines, least, where = self.distance.valley_y
         k = int(np.argmin(least))
         x, y = float(where[k]), float(lines[k])
@@ -52,7 +52,9 @@ class Patch:
 
     @property
     def low(self) -> float:
-        """Smallest distance (m) between the undeformed surfaces; at a smaller depth there is no contact."""
+        """Smallest distance (m) between the undeformed surfaces in the patch; at a smaller depth there is no
+        contact.
+        """
         return self.bottom[2]
 
     @cached_property
@@ -64,8 +66,9 @@ class Patch:
 
     @cached_property
     def lines(self) -> tuple[Table, Table]:
-        """Lines along x and along y, with the square root of the least height above the bottom on each, which is linear
-        for a paraboloid."""
+        """Grid lines along x and along y, with the square root of the least height above the bottom on each, which is
+        linear for a paraboloid.
+        """
         tables = []
         for (lines, least, _), bottom in zip(
             (self.distance.valley_x, self.distance.valley_y), self.bottom, strict=False
@@ -75,13 +78,13 @@ class Patch:
         return tables[0], tables[1]
 
     def surface(self, depth: float) -> Surface:
-        """``Surface`` of the patch at a depth (m) for compiled functions."""
+        """``Surface`` of the patch at a depth (m), for compiled functions."""
         known = self.distance
         origin = float(known.x[0]), float(known.y[0])
         return Surface(known.padded, origin, (known.dx, known.dy), self.box(depth), depth, self.low)
 
     def box(self, depth: float) -> Box:
-        """Rectangle x0, x1, y0, y1 (m) about {h < depth}, continuous in the depth.
+        """Rectangle x0, x1, y0, y1 (m) about the area {h < depth} of the patch, continuous in the depth.
 
         Each side lies as far from the bottom as the lengths of the valley below the depth add up to on that side: that
         is the bounding box of an area in one piece, and it cannot jump to a dip that opens beyond a low ridge.
@@ -99,7 +102,7 @@ class Patch:
             )
         root = np.sqrt(max(depth - self.low, 0.0))
         (x, rx), (y, ry) = self.lines
-        return (*sides(x, rx, self.bottom[0], root), *sides(y, ry, self.bottom[1], root))
+        return (*valley_ends(x, rx, self.bottom[0], root), *valley_ends(y, ry, self.bottom[1], root))
 
 
 def no_bottom() -> InputError:
@@ -113,19 +116,25 @@ def no_bottom() -> InputError:
 
 
 def separate(distance: Distance) -> list[Patch]:
-    """The valleys of a distance, in order of ascending y (then x). Every ridge higher than ``RIDGE`` separates two of
-    them."""
-    return [Patch(part, (*along_x, *along_y)) for row, along_y in _cut(distance, 1) for part, along_x in _cut(row, 0)]
+    """The valleys of an undeformed distance as patches, in order of ascending y (then x). Every ridge higher than
+    ``RIDGE`` separates two of them.
+    """
+    return [
+        Patch(part, (*along_x, *along_y))
+        for row, along_y in _parts_between_ridges(distance, 1)
+        for part, along_x in _parts_between_ridges(row, 0)
+    ]
 
 
-def as_single_patch(distance: Distance) -> list[Patch]:
+def single_patch_of(distance: Distance) -> list[Patch]:
     """The undeformed distance treated as a single patch, even if it has several minima."""
     return [Patch(distance)]
 
 
-def _cut(distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool]]]:
+def _parts_between_ridges(distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool]]]:
     """Parts of the distance, split at ridges along an axis (0: x, 1: y), each with flags on whether its two ends are
-    cuts."""
+    cuts.
+    """
     lines, least, _ = distance.valley_y if axis else distance.valley_x
     nodes, parts, everything = distance.y if axis else distance.x, [], slice(None)
     inner = [int(np.argmin(np.abs(nodes - lines[k]))) for k in ridges(least)]
@@ -138,7 +147,7 @@ def _cut(distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool
 
 
 def ridges(heights: Array) -> list[int]:
-    """Indices of maxima of a line that are more than ``RIDGE`` above the valleys on both sides."""
+    """Indices of maxima of a line of heights (m) that are more than ``RIDGE`` above the valleys on both sides."""
     maxima: list[int] = []
     low, top, at = heights[0], heights[0], 0
     climbed = False
@@ -157,8 +166,9 @@ def ridges(heights: Array) -> list[int]:
 
 
 def _vertex(distance: Distance, x: float, y: float, axis: int) -> float:
-    """Position of the minimum, along an axis, of the parabola through three nearby points; the given position if there
-    is none."""
+    """Position (m) of the minimum, along an axis, of the parabola through three nearby points; the given position if
+    there is none.
+    """
     nodes, here, step = (distance.y, y, distance.dy) if axis else (distance.x, x, distance.dx)
     middle = min(max(here, nodes[0] + step / 4), nodes[-1] - step / 4)
     points = middle + np.array([-0.25, 0.0, 0.25]) * step

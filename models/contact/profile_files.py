@@ -1,4 +1,4 @@
-"""Readers of profile files: two columns of text, Simpack (.prw, .prr) and MiniProf (.whl, .ban).
+"""Readers of wheel and rail profile files: two columns of text, Simpack (.prw, .prr) and MiniProf (.whl, .ban).
 
 two columns   y and z per line and nothing else, apart by blanks, commas or semicolons; from #, ! or % on a comment
 Simpack       keys "name = value" and the points between point.begin and point.end; "!" starts a comment. Shift,
@@ -25,19 +25,19 @@ MM = 1e-3
 Kind = Literal["wheel", "rail"]
 Points = tuple[Array, Array]
 SIMPACK, MINIPROF = (".prw", ".prr"), (".whl", ".ban")
-OF_KIND = {".prw": "wheel", ".prr": "rail", ".whl": "wheel", ".ban": "rail"}
+KIND_OF_ENDING = {".prw": "wheel", ".prr": "rail", ".whl": "wheel", ".ban": "rail"}
 COMMENTS = re.compile(r"[#!%].*")
 SEPARATORS = re.compile(r"[\s,;]+")
 DECIMAL_COMMA = re.compile(r"\d,\d.*(?<!,)[\s;]|(?<!,)[\s;].*\d,\d")
-"""A comma between digits where something else parts the numbers."""
+"""Pattern of a decimal comma: a comma between digits where something else separates the numbers."""
 SHOWN_CHARACTERS = 40
-"""Characters of a line that a message shows."""
-OFF_TAPING = 5e-3
-"""Largest |z| (m) of a wheel at y = 0: its radius is measured there."""
+"""Largest number of characters of a file's line that an error message shows."""
+LARGEST_TAPING_OFFSET = 5e-3
+"""Largest |z| (m) of a wheel profile at y = 0, where its radius is measured."""
 
 
 def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror: bool = False) -> ContactProfile:
-    """Profile read from a file, in the package's axes (m, z down, flange or gauge corner at negative y).
+    """Wheel or rail profile read from a file, in the package's axes (m, z down, flange or gauge corner at negative y).
 
     kind : "wheel" or "rail". smoothing : wavelength (m) of which half is left. mirror : exchange left and right.
     Raises InputError for a file that cannot be read or understood, naming the line and its text.
@@ -46,8 +46,10 @@ def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror
         raise InputError("", "kind", kind, "is not known", get_args(Kind))
     path = Path(path)
     ending = path.suffix.lower()
-    if OF_KIND.get(ending, kind) != kind:
-        raise InputError(path, "", None, f"is a file of a {OF_KIND[ending]} by its ending, and a {kind} is wanted")
+    if KIND_OF_ENDING.get(ending, kind) != kind:
+        raise InputError(
+            path, "", None, f"is a file of a {KIND_OF_ENDING[ending]} by its ending, and a {kind} is wanted"
+        )
     lines = _lines(path)
     reader = _simpack if ending in SIMPACK else _miniprof if ending in MINIPROF else _columns
     y, z = reader(lines, path)
@@ -62,19 +64,21 @@ def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror
 
 def _check_taping(wheel: ContactProfile, path: Path) -> None:
     """Refuse a wheel profile whose y or z is not measured from the taping line, but from the flange's back or the
-    axle."""
+    axle.
+    """
     middle = float(np.interp(0.0, wheel.y, wheel.z, left=np.nan, right=np.nan))
-    if not abs(middle) <= OFF_TAPING:
+    if not abs(middle) <= LARGEST_TAPING_OFFSET:
         raise InputError(
             path,
             "profile at y = 0, in m",
             middle,
             "y must count from the taping line and z from the "
-            f"tread there, to within {OFF_TAPING:g} m: shift the profile",
+            f"tread there, to within {LARGEST_TAPING_OFFSET:g} m: shift the profile",
         )
 
 
 def _lines(path: Path) -> list[str]:
+    """Lines of a text file; raises InputError where it cannot be read."""
     try:
         return path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
     except OSError as error:
@@ -83,7 +87,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _parse_numbers(text: str, number: int, path: Path, least: int = 2) -> list[float]:
-    """Numbers in one line; raises InputError with the line if it has too few numbers or other text."""
+    """Numbers in one line of a file; raises InputError with the line if it has too few numbers or other text."""
     if DECIMAL_COMMA.search(text.strip()):
         raise InputError(
             path, f"line {number}", text.strip()[:SHOWN_CHARACTERS], "has decimal commas: write decimal points"
@@ -100,11 +104,12 @@ def _parse_numbers(text: str, number: int, path: Path, least: int = 2) -> list[f
 
 
 def _points(rows: list[list[float]], first: int = 0, second: int = 1) -> Points:
+    """Two columns of a table of rows, as arrays (n,)."""
     return np.array([row[first] for row in rows]), np.array([row[second] for row in rows])
 
 
 def _columns(lines: list[str], path: Path) -> Points:
-    """Two columns of numbers from text, converted to m."""
+    """Points y, z (m) of a file with two columns of numbers in mm."""
     plain = [(k, COMMENTS.sub("", line)) for k, line in enumerate(lines, 1)]
     rows = [(k, _parse_numbers(line, k, path)) for k, line in plain if line.strip()]
     for k, row in rows:
@@ -120,7 +125,7 @@ def _columns(lines: list[str], path: Path) -> Points:
 
 
 def _miniprof(lines: list[str], path: Path) -> Points:
-    """Points of a MiniProf file: a header that ends with the first empty line, then points with y upwards."""
+    """Points y, z (m) of a MiniProf file: a header that ends with the first empty line, then points with y upwards."""
     rows, columns, heading = [], ["X", "Y"], True
     for k, line in enumerate(lines, 1):
         if heading:
@@ -144,7 +149,7 @@ def _miniprof(lines: list[str], path: Path) -> Points:
 
 
 def _simpack(lines: list[str], path: Path) -> Points:
-    """Points of a Simpack file, transformed as its header says."""
+    """Points y, z (m) of a Simpack file, transformed as its header says."""
     keys: dict[str, tuple[str, int]] = {}
     rows: list[list[float]] = []
     inside = ended = False
@@ -161,7 +166,7 @@ def _simpack(lines: list[str], path: Path) -> Points:
             keys[name.strip()] = (value.strip(), k)
     if not ended:
         raise InputError(path, "", None, "has no points between point.begin and point.end")
-    return _transformed(_points(rows), {name: _key(keys, name, path) for name in DEFAULTS})
+    return _transformed(_points(rows), {name: _header_value(keys, name, path) for name in DEFAULTS})
 
 
 DEFAULTS = {
@@ -178,10 +183,13 @@ DEFAULTS = {
     "units.len.f": 1e3,
     "units.ang.f": 1.0,
 }
-"""Keys of a Simpack file that change its points; bounds whose lower one is larger are none."""
+"""Keys of a Simpack file that change its points, with their defaults; bounds whose lower one is larger are no
+bounds.
+"""
 
 
-def _key(keys: dict[str, tuple[str, int]], name: str, path: Path) -> float:
+def _header_value(keys: dict[str, tuple[str, int]], name: str, path: Path) -> float:
+    """Value of a key of a Simpack header, or its default."""
     text, line = keys.get(name, (str(DEFAULTS[name]), 0))
     value = _parse_numbers(text, line, path, 1)[0]
     if name.startswith("units") and value <= 0.0:
@@ -190,8 +198,9 @@ def _key(keys: dict[str, tuple[str, int]], name: str, path: Path) -> float:
 
 
 def _transformed(points: Points, key: dict[str, float]) -> Points:
-    """Points after the operations of a Simpack header: shift, rotation, bounds, mirrors, order and unit, in this
-    order."""
+    """Points y, z (m) after the operations of a Simpack header: shift, rotation, bounds, mirrors, order and unit, in
+    this order.
+    """
     y, z = points[0] + key["shift.y"], points[1] + key["shift.z"]
     angle = key["rotate"] / key["units.ang.f"]
     y, z = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)
@@ -205,7 +214,7 @@ def _transformed(points: Points, key: dict[str, float]) -> Points:
 
 
 def _upright_points(y: Array, z: Array, kind: Kind) -> Points:
-    """Points turned so that the rail's top is up, or the wheel's flange is down and at negative y."""
+    """Profile points turned so that the rail's top is up, or the wheel's flange is down and at negative y."""
     if kind == "rail":
         ends = 0.5 * (z[0] + z[-1])
         return (y, z) if ends >= np.median(z) else (y, -z)

@@ -1,4 +1,4 @@
-"""Cross-sections of wheels and rails.
+"""Cross-section profiles of wheels and rails.
 
 A profile is a curve z(y) with z downwards, from the wheel into the rail, and y away from the middle of the track:
 a right wheel on a right rail. The flange and the gauge corner lie at negative y.
@@ -17,13 +17,16 @@ from models.core.errors import InputError
 
 SPACING = 1e-4
 """Distance (m) of the points along a profile's contour."""
-SPIKE = 2e-4
-"""Distance (m) from both neighbours from which a point that turns back counts as one that was measured wrongly."""
-BACK = 1e-3
-"""Step (m) against y up to which a contour that turns back is rough, and not the end of what can be touched; more of y
-than that may not be lost beyond it."""
-TURNING = 0.3
-"""Largest way of a contour against its direction by the way along it: a rail with web and foot turns by 0.27."""
+SPIKE_HEIGHT = 2e-4
+"""Distance (m) from both neighbours above which a point that turns back counts as a measurement error."""
+LARGEST_BACKWARD_STEP = 1e-3
+"""Step (m) against y up to which a contour that turns back is rough, and not the end of what can be touched; also the
+largest width of y that may be lost beyond it.
+"""
+LARGEST_BACKWARD_RATIO = 0.3
+"""Largest ratio of a contour's way against its direction to its way along it: a rail with web and foot turns by
+0.27.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +43,7 @@ class ContactProfile:
 
     @cached_property
     def curve(self) -> CubicSpline:
-        """Curve z(y) through the points, twice continuously differentiable."""
+        """Profile curve z(y) in m through the points, twice continuously differentiable."""
         return CubicSpline(self.y, self.z)
 
     def turned(self, angle: float) -> "ContactProfile":
@@ -55,13 +58,13 @@ class ContactProfile:
 
 
 def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> ContactProfile:
-    """A profile from measured points y, z (n,) in m, in order along the contour, smoothed and evenly spaced again.
+    """Profile from measured points y, z (n,) in m, in order along the contour, smoothed and evenly spaced again.
 
     smoothing : wavelength (m) of which half is left (see ``ContactProfile``). Raises InputError for wrong shapes,
     values that are not finite or not a profile's size in m, and a contour that does not run along y.
     """
     y, z = np.asarray(y, float), np.asarray(z, float)
-    _check(y, z, smoothing, file)
+    _check_points(y, z, smoothing, file)
     if y[0] > y[-1]:
         y, z = y[::-1], z[::-1]
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
@@ -74,7 +77,8 @@ def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> Co
     return ContactProfile(y[keep], z[keep], smoothing)
 
 
-def _check(y: Array, z: Array, smoothing: float, file: object) -> None:
+def _check_points(y: Array, z: Array, smoothing: float, file: object) -> None:
+    """Refuse profile points of wrong shape or size, that are not finite, or whose contour does not run along y."""
     if y.ndim != 1 or y.shape != z.shape or y.size < 10:
         raise InputError(file, "profile", [list(y.shape), list(z.shape)], "must be two columns of ten points or more")
     if not (np.isfinite(y).all() and np.isfinite(z).all()):
@@ -86,7 +90,7 @@ def _check(y: Array, z: Array, smoothing: float, file: object) -> None:
         )
     steps = np.diff(y)
     there, back = float(steps[steps > 0.0].sum()), float(-steps[steps < 0.0].sum())
-    if min(there, back) > TURNING * max(there, back):
+    if min(there, back) > LARGEST_BACKWARD_RATIO * max(there, back):
         raise InputError(
             file,
             "profile",
@@ -99,9 +103,11 @@ def _check(y: Array, z: Array, smoothing: float, file: object) -> None:
 
 
 def _check_spikes(points: Array, file: object) -> None:
-    """Refuse outliers: points far from the line between their neighbours. A contour never turns back sharply."""
+    """Refuse measurement errors: points far from the line between their neighbours. A contour never turns back
+    sharply.
+    """
     way, straight = np.linalg.norm(np.diff(points, axis=0), axis=1), np.linalg.norm(points[2:] - points[:-2], axis=1)
-    spikes = np.minimum(way[:-1], way[1:]) > np.maximum(2.0 * straight, SPIKE)
+    spikes = np.minimum(way[:-1], way[1:]) > np.maximum(2.0 * straight, SPIKE_HEIGHT)
     if spikes.any():
         y, z = points[1 + int(np.argmax(spikes))]
         raise InputError(
@@ -113,26 +119,28 @@ def _check_spikes(points: Array, file: object) -> None:
 
 
 def _check_rough(y: Array, keep: slice, file: object) -> None:
-    """Refuse a contour whose y briefly decreases, as in rough or coarsely rounded data; the remaining points would be
-    lost."""
+    """Refuse a contour whose y briefly decreases, as in rough or coarsely rounded data, since the points beyond would
+    be lost.
+    """
     for beyond, last in ((y[keep.stop :], y[keep.stop - 1]), (-y[: keep.start][::-1], -y[keep.start])):
         highest = np.maximum.accumulate(np.append(last, beyond))[1:]
-        rough = np.logical_and.accumulate(highest - beyond < BACK)
+        rough = np.logical_and.accumulate(highest - beyond < LARGEST_BACKWARD_STEP)
         lost = float(np.max(beyond[rough], initial=last) - last)
-        if lost > BACK:
+        if lost > LARGEST_BACKWARD_STEP:
             raise InputError(
                 file,
                 "profile",
                 float(abs(last)),
                 f"is |y| (m) where the contour turns back by less than "
-                f"{BACK:g} m, as noise or rounding makes it, and {lost:.2g} m beyond it would be lost: "
-                "give a smoothing, from 0.002 m on",
+                f"{LARGEST_BACKWARD_STEP:g} m, as noise or rounding makes it, and {lost:.2g} m beyond it would "
+                "be lost: give a smoothing, from 0.002 m on",
             )
 
 
 def _smoothed(length: Array, values: Array, even: Array, smoothing: float) -> Array:
     """Smoothed coordinate at evenly spaced lengths along the contour: the curve that minimises error^2 + (L / 2 pi)^4
-    curvature^2."""
+    curvature^2.
+    """
     interpolated = CubicSpline(length, values)(even)
     if smoothing == 0.0:
         return interpolated
@@ -141,7 +149,7 @@ def _smoothed(length: Array, values: Array, even: Array, smoothing: float) -> Ar
 
 
 def _ascending(y: Array) -> slice:
-    """Longest run of consecutive points with ascending y."""
+    """Longest run of consecutive profile points with ascending y."""
     breaks = np.flatnonzero(np.diff(y) <= 0.0)
     starts, ends = np.concatenate([[0], breaks + 1]), np.concatenate([breaks + 1, [y.size]])
     k = int(np.argmax(ends - starts))

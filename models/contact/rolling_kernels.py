@@ -1,4 +1,6 @@
-"""Compiled loops over the cells of a rolling contact: sweeps, the coupling within its strips, steps of GMRES."""
+"""Compiled loops of the exact rolling theory over the cells of a contact: sweeps, the coupling within strips, steps of
+GMRES.
+"""
 
 import numpy as np
 
@@ -7,7 +9,8 @@ from models.machine.compiled import njit
 
 @njit(cache=True, fastmath=True, nogil=True)
 def sweep(traction, rigid, kernel, bound, relaxation):
-    """One relaxed Gauss-Seidel sweep in place, strip by strip, each from its leading edge back.
+    """Relax the tractions of all cells once, in place, by Gauss-Seidel, strip by strip, each from its leading edge
+    back.
 
     traction, rigid : (2, ny, nx) traction in units of G and rigid slip; bound : (ny, nx), zero outside the contact;
     kernel : (3, 2 ny - 1, 2 nx - 1), xx, xy and yy, reversed in both axes so that its rows run beside the traction's.
@@ -28,13 +31,13 @@ def sweep(traction, rigid, kernel, bound, relaxation):
                     slip_x += kernel[0, k, first + i] * p_x + cross * p_y
                     slip_y += cross * p_x + kernel[2, k, first + i] * p_y
             p_x, p_y = traction[0, row, column], traction[1, row, column]
-            new_x, new_y = answer(slip_x - own_x * p_x, slip_y - own_y * p_y, own_x, own_y, bound[row, column])
+            new_x, new_y = cell_traction(slip_x - own_x * p_x, slip_y - own_y * p_y, own_x, own_y, bound[row, column])
             traction[0, row, column] = p_x + relaxation * (new_x - p_x)
             traction[1, row, column] = p_y + relaxation * (new_y - p_y)
 
 
 @njit(cache=True, nogil=True)
-def answer(slip_x, slip_y, own_x, own_y, bound):
+def cell_traction(slip_x, slip_y, own_x, own_y, bound):
     """Traction of one cell whose slip is (slip_x + own_x p_x, slip_y + own_y p_y): it sticks, or slides with the
     traction opposite to the slip.
 
@@ -55,8 +58,8 @@ def answer(slip_x, slip_y, own_x, own_y, bound):
 
 
 @njit(cache=True, fastmath=True, nogil=True)
-def factor(systems, spans):
-    """LU factors of each matrix in (many, n, n), in place: L with unit diagonal, and U.
+def factorise(systems, spans):
+    """Replace each matrix (many, n, n) by its LU factors, in place: L with unit diagonal, and U.
 
     spans (many, 2) : first row of each that is not the unit matrix's, and one beyond its last. Without pivoting, which
     a matrix with a positive definite symmetric part does not need.
@@ -74,7 +77,7 @@ def factor(systems, spans):
 
 @njit(cache=True, fastmath=True, nogil=True)
 def substitute(factors, spans, values):
-    """Solutions (many, n) of the systems in ``factors`` for right-hand sides (many, n)."""
+    """Solutions (many, n) of the linear systems in ``factors`` for right-hand sides (many, n)."""
     solution = values.copy()
     for which in range(len(factors)):
         start, stop = spans[which]
@@ -92,9 +95,9 @@ def substitute(factors, spans, values):
 
 
 @njit(cache=True, nogil=True)
-def turned(column, turns, components):
-    """Apply Givens' rotations to the new image's components (count + 1,), so that the system stays triangular; returns
-    its new column (count,).
+def rotate_column(column, turns, components):
+    """Apply Givens' rotations to a new column (count + 1,) of GMRES, so that the system stays triangular; returns the
+    column (count,).
 
     turns (most, 2) : cosine and sine of the rotations, of which the last is added; components (most + 1,) : what the
     residual was turned to, its last component the residual's size.
@@ -115,24 +118,24 @@ def turned(column, turns, components):
 
 @njit(cache=True, fastmath=True, nogil=True)
 def orthogonalise(basis, count, vector):
-    """Remove from ``vector`` its components along the first ``count`` rows of ``basis``, and write the rest, scaled to
-    length 1, as the next row.
+    """Remove from ``vector`` its components along the first ``count`` rows of ``basis``, and write the remainder,
+    scaled to length 1, as the next row.
 
     Returns the components along these ``count`` rows and the new one, by modified Gram-Schmidt.
     """
     components = np.zeros(count + 1)
-    left = vector.copy()
+    remainder = vector.copy()
     for row in range(count):
         part = 0.0
-        for i in range(len(left)):
-            part += basis[row, i] * left[i]
-        for i in range(len(left)):
-            left[i] -= part * basis[row, i]
+        for i in range(len(remainder)):
+            part += basis[row, i] * remainder[i]
+        for i in range(len(remainder)):
+            remainder[i] -= part * basis[row, i]
         components[row] = part
     square = 0.0
-    for i in range(len(left)):
-        square += left[i] * left[i]
+    for i in range(len(remainder)):
+        square += remainder[i] * remainder[i]
     components[count] = np.sqrt(square)
-    for i in range(len(left)):
-        basis[count, i] = left[i] / max(components[count], 1e-300)
+    for i in range(len(remainder)):
+        basis[count, i] = remainder[i] / max(components[count], 1e-300)
     return components

@@ -8,21 +8,23 @@ import numpy as np
 from models.contact.half_space import Convolution, Y, influence, offsets
 from models.contact.inputs import Array
 from models.contact.material import MaterialPair
-from models.contact.rolling_kernels import factor, orthogonalise, substitute, turned
+from models.contact.rolling_kernels import factorise, orthogonalise, rotate_column, substitute
 from models.core.errors import RunFailed
 
 UPSTREAM = (1.5, -2.0, 0.5)
-"""Weights of u at a cell's centre and at the next two upstream in -dx du/dx: of second order, and dissipative."""
+"""Weights of the displacement u at a cell's centre and at the next two upstream in -dx du/dx: of second order, and
+dissipative.
+"""
 NO_SHIFT = (1.0,)
-"""Weights for u itself, by dx: a shift without rolling."""
+"""Weights of the displacement u itself, divided by dx: a shift without rolling."""
 INNER_TOLERANCE = 1e-6
 """Relative residual at which the linear solver of one Newton step stops."""
 MOST_PRODUCTS = 300
-"""Of one Newton step; 20 to 60 are usual."""
+"""Largest number of matrix products in one Newton step; 20 to 60 are usual."""
 
 
 class SlipOperator:
-    """Linear operator C from tractions (ny, nx, 2), in units of G, to their contribution to the slip, (ny, nx, 2):
+    """Linear operator C from tractions (ny, nx, 2), in units of G, to their contribution to the slip (ny, nx, 2):
     -du/dx in rolling, u/dx in a shift.
 
     The gradient at a cell's centre is taken from there and from the next two centres upstream, where the material
@@ -47,23 +49,25 @@ class SlipOperator:
         self._convolution = Convolution(self.kernel)
 
     def __call__(self, traction: Array) -> Array:
-        """Slip (ny, nx, 2) caused by tractions (ny, nx, 2)."""
+        """Slip (ny, nx, 2) caused by tractions (ny, nx, 2) in units of G."""
         return self._convolution(traction)
 
     @cached_property
-    def reversed(self) -> Array:
+    def reversed_kernel(self) -> Array:
         """Kernel (3, 2 ny - 1, 2 nx - 1) in the reversed order that ``rolling_kernels.sweep`` needs."""
         kernel = self.kernel[::-1, ::-1]
         return np.ascontiguousarray(np.stack([kernel[..., 0, 0], kernel[..., 0, 1], kernel[..., 1, 1]]))
 
     @cached_property
     def own_slip(self) -> Array:
-        """Slip of a cell caused by its own unit traction, (2,)."""
+        """Slip (2,) of a cell caused by its own unit traction, along x and y."""
         return np.diag(self.kernel[self.rows - 1, self.columns - 1]).copy()
 
     @cached_property
-    def strip(self) -> Array:
-        """Coupling matrix (nx, 2, nx, 2): slip of each cell of a strip by the traction of each cell of that strip."""
+    def strip_coupling(self) -> Array:
+        """Coupling matrix (nx, 2, nx, 2): slip of each cell of a strip by the traction of each cell of the same
+        strip.
+        """
         index = np.arange(self.columns)
         return self.kernel[self.rows - 1][index[:, None] - index + self.columns - 1].transpose(0, 2, 1, 3)
 
@@ -87,21 +91,22 @@ def gmres(apply: Map, precondition: Map, right_hand_side: Array, tolerance: floa
         np.zeros((maximum_iterations, maximum_iterations)),
         np.empty((maximum_iterations, 2)),
     )
-    left = np.append(size, np.zeros(maximum_iterations))
+    residual_components = np.append(size, np.zeros(maximum_iterations))
     basis[0] = right_hand_side / size
     for count in range(1, maximum_iterations + 1):
-        triangle[:count, count - 1] = turned(
-            orthogonalise(basis, count, apply(precondition(basis[count - 1]))), turns, left
+        triangle[:count, count - 1] = rotate_column(
+            orthogonalise(basis, count, apply(precondition(basis[count - 1]))), turns, residual_components
         )
-        if abs(left[count]) <= tolerance * size:
-            return precondition(np.linalg.solve(triangle[:count, :count], left[:count]) @ basis[:count])
+        if abs(residual_components[count]) <= tolerance * size:
+            return precondition(np.linalg.solve(triangle[:count, :count], residual_components[:count]) @ basis[:count])
     raise RunFailed(
-        "linear solver", f"residual {abs(left[maximum_iterations]) / size:.2g} after {maximum_iterations} products"
+        "linear solver",
+        f"residual {abs(residual_components[maximum_iterations]) / size:.2g} after {maximum_iterations} products",
     )
 
 
 class FreeSystem:
-    """Linear system free (C + stiff) d = free wanted for changes d of traction within the free directions.
+    """Linear system free (C + stiff) d = free wanted for changes d of traction within the free directions of each cell.
 
     GMRES, preconditioned by the exact inverse of every strip by itself, whose factors serve any number of right sides.
     """
@@ -116,16 +121,16 @@ class FreeSystem:
         inside = np.any(free_directions, axis=(2, 3))
         first, last = inside.argmax(axis=1), inside.shape[1] - inside[:, ::-1].argmax(axis=1)
         self.spans = 2 * np.stack([first, np.where(inside.any(axis=1), last, first)], axis=1)
-        factor(self.factors, self.spans)
+        factorise(self.factors, self.spans)
 
     def _strips(self) -> Array:
-        """Matrix of the system within every strip, (ny, 2 nx, 2 nx).
+        """Matrices (ny, 2 nx, 2 nx) of the system within every strip.
 
         On the directions that are not free it is 1 + stiff: a one would be lost in the rounding of a large stiffness.
         """
         free, stiff = self.free, self.stiff[..., None]
         rows, columns = free.shape[:2]
-        system = np.einsum("riab,ibjc,rjcd->riajd", free, self.operator.strip, free, optimize=True)
+        system = np.einsum("riab,ibjc,rjcd->riajd", free, self.operator.strip_coupling, free, optimize=True)
         index = np.arange(columns)
         system[:, index, :, index, :] += np.moveaxis((1.0 + stiff) * np.eye(2) - free, 1, 0)
         return np.ascontiguousarray(system.reshape(rows, 2 * columns, 2 * columns))

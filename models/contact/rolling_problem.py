@@ -1,4 +1,4 @@
-"""Steady rolling of two half-spaces with Coulomb friction on a given pressure: the exact theory, on a grid.
+"""Exact theory of steady rolling, on a grid: two half-spaces with Coulomb friction under a given pressure.
 
 Kalker, Three-Dimensional Elastic Bodies in Rolling Contact, 1990, section 4.3. Material flows through the contact from
 the leading edge (largest x) back, so the slip of the wheel over the rail, by the rolling speed, is
@@ -21,7 +21,8 @@ Error of the cells, in forces divided by mu N (validation case ``contact_exact``
 ellipse 0.1 to 0.4 %, 0.7 % for spin on a long one, with 80 half as much. The order is 2 where all slips, 1 where much
 sticks: the edge of the contact and the leading edge of the zone that sticks lie somewhere within a cell. Carter's
 cylinder is met to 0.2 % with 80 cells, Cattaneo and Mindlin's shift to 0.04 % with 40. Full sliding gives mu N to
-rounding."""
+rounding.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -36,25 +37,28 @@ from models.contact.rolling_operator import NO_SHIFT, UPSTREAM, FreeSystem, Slip
 from models.core.errors import RunFailed
 
 TOLERANCE = 1e-8
-"""Largest residual of a solution."""
+"""Largest residual of a rolling solution."""
 COARSEST_CELLS = 16
-"""Cells along the shorter side of a grid that is solved from nothing; larger ones start from a grid with half of them,
-for which the exact theory of few cells is near enough."""
+"""Number of cells along the shorter side below which a grid is solved from zero traction; larger grids start from a
+grid with half of them, for which the exact theory of few cells is near enough.
+"""
 MOST_STEPS = 12
-"""Of Newton's method alone; three to six are usual."""
+"""Largest number of steps of Newton's method alone; three to six are usual."""
 RELAXATION, RELAXATION_FACTOR = 0.5, 0.7
-"""Of the first sweeps, and its factor after each round that came no nearer: needed for cells narrower than long."""
+"""Relaxation of the first sweeps, and its factor after each round that came no nearer: needed for cells narrower than
+long.
+"""
 SWEEPS = 3
-"""In each round."""
+"""Number of Gauss-Seidel sweeps in each round."""
 MOST_ROUNDS = 60
-"""Rounds of sweeps and Newton steps before the problem is given up."""
+"""Largest number of rounds of sweeps and Newton steps before the problem is given up."""
 RigidSlip = Callable[[Array, Array, float], Array]
-"""Rigid slip (ny, nx, 2) at x (nx,) and y (ny,) of cells of a length."""
+"""Function for the rigid slip (ny, nx, 2) at positions x (nx,) and y (ny,) of cells of a length (m)."""
 
 
 @dataclass(frozen=True)
 class RollingSolution:
-    """Forces and fields of steady rolling; cells as in the pressure's grid.
+    """Forces and fields of steady rolling, on the cells of the pressure's grid.
 
     fx, fy : forces on the wheel (N). mz : moment on the wheel about the origin of x and y (N m).
     traction : (ny, nx, 2) on the wheel (Pa). slip : (ny, nx, 2) by the rolling speed, zero outside the slipping cells.
@@ -77,7 +81,7 @@ class RollingSolution:
 def solve_rolling(
     normal_solution: PressureGrid, mu: float, xi_x: float, xi_y: float, spin: float, material_pair: MaterialPair
 ) -> RollingSolution:
-    """Tractions of steady rolling.
+    """Tractions, slip and forces of steady rolling under a given pressure.
 
     Parameters
     ----------
@@ -93,7 +97,9 @@ def solve_rolling(
     RunFailed : the conditions of stick and slip were not met to ``TOLERANCE``
     """
     motion = creepages(xi_x, xi_y, spin, number).values()
-    return _rubbed(normal_solution, mu, lambda x, y, length: rigid_slip(x, y, *motion), material_pair, UPSTREAM)
+    return _stick_slip_solution(
+        normal_solution, mu, lambda x, y, length: rigid_slip(x, y, *motion), material_pair, UPSTREAM
+    )
 
 
 def solve_shift(
@@ -108,16 +114,16 @@ def solve_shift(
         number(name, value, "a shift in m, at most 0.1", -0.1, 0.1)
         for name, value in (("shift_x", shift_x), ("shift_y", shift_y))
     )
-    by_cell = _rubbed(
+    by_cell = _stick_slip_solution(
         normal_solution, mu, lambda x, y, length: rigid_slip(x, y, way_x, way_y, 0.0) / length, material_pair, NO_SHIFT
     )
     return replace(by_cell, slip=by_cell.slip * normal_solution.dx, power=by_cell.power * normal_solution.dx)
 
 
-def _rubbed(
+def _stick_slip_solution(
     normal_solution: PressureGrid, mu: float, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
 ) -> RollingSolution:
-    """Stick and slip solution for the given rigid slip, on the cells in contact."""
+    """Solution of stick and slip for the given rigid slip, on the cells in contact."""
     mu = number("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     material_pair.require_likeness()
     shape = normal_solution.pressure.shape
@@ -141,13 +147,17 @@ def _rubbed(
 
 
 def rigid_slip(x: Array, y: Array, xi_x: float, xi_y: float, spin: float) -> Array:
-    """Ratio (ny, nx, 2) of the rigid bodies' slip velocity to the rolling speed, at positions x (nx,) and y (ny,)."""
+    """Ratio (ny, nx, 2) of the rigid bodies' slip velocity to the rolling speed, at positions x (nx,) and y (ny,) in
+    m.
+    """
     along, across = np.broadcast_arrays(xi_x - spin * y[:, None], xi_y + spin * x)
     return np.stack([along, across], axis=-1)
 
 
 class _State:
-    """Tractions (ny, nx, 2) in units of G, their slip, and the residual of every cell's stick or slip condition."""
+    """State of the cells: tractions (ny, nx, 2) in units of G, their slip, and the largest residual of the stick and
+    slip conditions.
+    """
 
     def __init__(self, operator: SlipOperator, rigid: Array, bound: Array, traction: Array) -> None:
         self.operator, self.rigid, self.bound, self.traction = operator, rigid, bound, traction
@@ -158,20 +168,21 @@ class _State:
         needed = self.trial * cut[..., None] - traction
         self.residual = float(np.linalg.norm(needed, axis=-1)[bound > 0].max() / bound.max())
 
-    def moved(self, traction: Array) -> "_State":
-        """A new state with other tractions."""
+    def with_tractions(self, traction: Array) -> "_State":
+        """A new state of the cells with other tractions."""
         return _State(self.operator, self.rigid, self.bound, traction)
 
     @property
     def stick(self) -> Array:
-        """Which cells stick: their traction is within the friction bound."""
+        """Whether each cell sticks (ny, nx): its traction is within the friction bound."""
         return (self.size <= self.bound) & (self.bound > 0)
 
 
 @dataclass(frozen=True)
 class _Cells:
     """Grid of cells: centres x (nx,) and y (ny,) (m), sides dx and dy (m), and traction bounds in units of G (ny,
-    nx)."""
+    nx).
+    """
 
     x: Array
     y: Array
@@ -198,24 +209,26 @@ def _solve(
     cells: _Cells, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
 ) -> tuple[_State, int]:
     """State in which all stick and slip conditions hold, and the number of rounds on this grid; a coarser grid gives
-    its start."""
+    its start.
+    """
     bound, motion = cells.bound, rigid(cells.x, cells.y, cells.dx)
     operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, material_pair, weights)
-    nothing = _State(operator, motion, bound, np.zeros_like(motion))
+    zero_state = _State(operator, motion, bound, np.zeros_like(motion))
     if min(bound.shape) < COARSEST_CELLS:
-        return _solve_tractions(nothing)
+        return _solve_tractions(zero_state)
     coarse = cells.coarser()
-    known = _solve(coarse, rigid, material_pair, weights)[0].traction
-    relative = _at_quarter_cells(known / np.where(coarse.bound > 0, coarse.bound, 1.0)[..., None])
-    state = nothing.moved(relative[: bound.shape[0], : bound.shape[1]] * bound[..., None])
+    coarse_tractions = _solve(coarse, rigid, material_pair, weights)[0].traction
+    relative = _at_quarter_cells(coarse_tractions / np.where(coarse.bound > 0, coarse.bound, 1.0)[..., None])
+    state = zero_state.with_tractions(relative[: bound.shape[0], : bound.shape[1]] * bound[..., None])
     for step in range(MOST_STEPS):
         if state.residual <= TOLERANCE:
             return state, step
         state = _after_newton_step(state)
-    return _solve_tractions(_nearest(state, nothing))
+    return _solve_tractions(_nearest(state, zero_state))
 
 
 def _nearest(*states: _State) -> _State:
+    """The state with the smallest residual."""
     return min(states, key=lambda state: state.residual)
 
 
@@ -232,27 +245,27 @@ def _at_quarter_cells(values: Array) -> Array:
 def _solve_tractions(state: _State) -> tuple[_State, int]:
     """State that satisfies all stick and slip conditions, by alternating sweeps and Newton steps, and the number of
     rounds."""
-    relaxation, done = RELAXATION, 0
+    relaxation, round_count = RELAXATION, 0
     while state.residual > TOLERANCE:
-        if done == MOST_ROUNDS:
+        if round_count == MOST_ROUNDS:
             raise RunFailed(
                 "rolling problem",
                 f"conditions of stick and slip met to {state.residual:.2g} only after {MOST_ROUNDS} rounds",
             )
         traction, motion = (np.ascontiguousarray(np.moveaxis(v, -1, 0)) for v in (state.traction, state.rigid))
         for _ in range(SWEEPS):
-            sweep(traction, motion, state.operator.reversed, state.bound, relaxation)
-        swept = state.moved(np.moveaxis(traction, 0, -1))
+            sweep(traction, motion, state.operator.reversed_kernel, state.bound, relaxation)
+        swept = state.with_tractions(np.moveaxis(traction, 0, -1))
         nearest = swept if swept.residual <= TOLERANCE else _nearest(swept, _after_newton_step(swept))
         relaxation *= 1.0 if nearest.residual < state.residual else RELAXATION_FACTOR
-        state, done = nearest, done + 1
-    return state, done
+        state, round_count = nearest, round_count + 1
+    return state, round_count
 
 
 def _after_newton_step(state: _State) -> _State:
     """The state after one Newton step, or the unchanged state if the linear solver fails for rounding."""
     try:
-        return state.moved(_newton(state))
+        return state.with_tractions(_newton(state))
     except RunFailed:
         return state
 
@@ -272,7 +285,7 @@ def _newton(state: _State) -> Array:
     free = free * (bound > 0)[..., None, None]
     against = np.maximum(-np.sum(slip * opposite, axis=-1), 0.0)
     stiff = np.where(slips, against / np.where(slips, bound, 1.0), 0.0)
-    moved = traction + FreeSystem(state.operator, free, stiff).solve(-slip)
-    size = np.linalg.norm(moved, axis=-1)
+    with_tractions = traction + FreeSystem(state.operator, free, stiff).solve(-slip)
+    size = np.linalg.norm(with_tractions, axis=-1)
     onto = np.where(slips | (size > bound), bound / np.where(size > 0, size, 1.0), 1.0)
-    return moved * onto[..., None]
+    return with_tractions * onto[..., None]

@@ -1,4 +1,4 @@
-"""Several patches of one contact in the theory of 1983: each has a net and a W of its own, the half-space is common.
+"""Several contact patches in the theory of 1983: each has a separate grid and stiffness, the half-space is common.
 
 What the springs are made like is the displacement of the half-space by the pressure of all patches. With p* = W_3 p of
 each, the conditions u^H + h = delta are fitted in the meshes of patch k by
@@ -24,26 +24,27 @@ from models.contact.simplified_kernels import (
     GRADIENT,
     LEAST_STIFFNESS_SHARE,
     POINTS_PER_MESH,
+    coarse_net,
     covariances,
-    crude_net,
     displacement,
-    drag,
     mesh_of,
-    push,
+    normal_displacement_sums,
     resultant,
     slope_products,
+    tangential_displacement_sums,
 )
 from models.core.errors import RunFailed
 
 PATCHES_TOLERANCE = 1e-11
-"""Share of approach and load to which patches settle."""
-TRIES = (("hybr", 0.3, 1.0), ("lm", 0.05, 1.0), ("hybr", 0.05, 1.15), ("hybr", 0.3, 0.9))
-"""Method, first step and start by the given one, in turn: where a patch only just touches beside a large one the fit
-has kinks, in which one way or the other is caught."""
+"""Relative error of approach and load at which the iteration of several patches ends."""
+ROOT_SEARCHES = (("hybr", 0.3, 1.0), ("lm", 0.05, 1.0), ("hybr", 0.05, 1.15), ("hybr", 0.3, 0.9))
+"""Root finder, first step and ratio of the start to the given one, tried in turn: where a patch only just touches
+beside a large one the fit has kinks, at which a single search may stop.
+"""
 
 
 @dataclass(frozen=True, eq=False)
-class Net:
+class CoarseGrid:
     """Coarse grid of one patch, rows along y; for a patch without load it has a single point, the bottom.
 
     x, y : meshes along the common contour (m). height : h (m). pressure : W p (m). cover : covered shares. step :
@@ -60,64 +61,75 @@ class Net:
 
     @property
     def forces(self) -> Array:
-        """W times the load of every grid cell, as a flat array (m^3)."""
+        """Products of W and the load of every grid cell, as a flat array (m^3)."""
         return (self.pressure * (self.volume / self.pressure.sum())).ravel()
 
 
-def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
-    """Coarse grid of a patch at a depth (m)."""
+def coarse_grid(patch: Patch, depth: float, cells: int, shape: int) -> CoarseGrid:
+    """Coarse grid of a patch at a depth (m), with ``cells`` x ``cells`` cells."""
     x, y, low = patch.bottom
     nothing = np.zeros((1, 1))
-    empty = Net(nothing + x, nothing + y + patch.contour_position, nothing + low, nothing, nothing, (0.0, 0.0), 0.0)
+    empty = CoarseGrid(
+        nothing + x, nothing + y + patch.contour_position, nothing + low, nothing, nothing, (0.0, 0.0), 0.0
+    )
     if depth <= low:
         return empty
     surface, box = patch.surface(depth), patch.box(depth)
-    height, pressure, cover = crude_net(surface, cells, shape)
+    height, pressure, cover = coarse_net(surface, cells, shape)
     volume = float(resultant(surface, POINTS_PER_MESH * cells, shape))
     if not (volume > 0.0 and pressure.sum() > 0.0):  # so shallow that rounding leaves nothing of it
         return empty
     dx, dy = mesh_of(box, cells)
     middles = np.arange(cells) + 0.5
     y, x = np.meshgrid(box[2] + middles * dy + patch.contour_position, box[0] + middles * dx, indexing="ij")
-    return Net(x, y, height, pressure, cover, (dx, dy), volume)
+    return CoarseGrid(x, y, height, pressure, cover, (dx, dy), volume)
 
 
 def solve_common_approach(
-    nets: Sequence[Net], material_pair: MaterialPair, kind: int, lows: Array, depths: Array
+    nets: Sequence[CoarseGrid], material_pair: MaterialPair, kind: int, lows: Array, depths: Array
 ) -> tuple[Array, Array]:
     """Stiffnesses 1/W (Pa/m) of patches at given depths (m), zero for patches without load, and their approaches
-    (m)."""
+    (m).
+    """
     loaded = [k for k, net in enumerate(nets) if net.volume > 0.0]
-    pushed = {(k, m): _displacement_by(nets[m], net, material_pair) for k, net in enumerate(nets) for m in loaded}
+    displacements = {
+        (k, m): _displacement_by(nets[m], net, material_pair) for k, net in enumerate(nets) for m in loaded
+    }
     products, right = np.zeros((len(loaded), len(loaded))), np.zeros(len(loaded))
     for i, k in enumerate(loaded):
-        whole = np.sum([pushed[k, m] for m in loaded], axis=0)
-        products[i] = [_product(nets[k], whole, pushed[k, m], kind) for m in loaded]
-        right[i] = -_product(nets[k], whole, nets[k].height, kind)
+        total = np.sum([displacements[k, m] for m in loaded], axis=0)
+        products[i] = [_product(nets[k], total, displacements[k, m], kind) for m in loaded]
+        right[i] = -_product(nets[k], total, nets[k].height, kind)
     stiffness = np.zeros(len(nets))
     if loaded:
-        least = LEAST_STIFFNESS_SHARE * (depths - lows)[loaded] / [np.mean(pushed[k, k]) for k in loaded]
+        least = LEAST_STIFFNESS_SHARE * (depths - lows)[loaded] / [np.mean(displacements[k, k]) for k in loaded]
         stiffness[loaded] = np.maximum(np.linalg.lstsq(products, right, rcond=None)[0], least)
-    raised = [sum((stiffness[m] * pushed[k, m] for m in loaded), nets[k].height) for k in range(len(nets))]
+    raised_heights = [
+        sum((stiffness[m] * displacements[k, m] for m in loaded), nets[k].height) for k in range(len(nets))
+    ]
     approach = [
         (net.pressure * u).sum() / net.pressure.sum() if net.volume > 0.0 else float(u[0, 0]) + depth - low
-        for net, u, depth, low in zip(nets, raised, depths, lows, strict=True)
+        for net, u, depth, low in zip(nets, raised_heights, depths, lows, strict=True)
     ]
     return stiffness, np.array(approach)
 
 
-def _displacement_by(source: Net, target: Net, material_pair: MaterialPair) -> Array:
+def _displacement_by(source: CoarseGrid, target: CoarseGrid, material_pair: MaterialPair) -> Array:
     """Normal displacement (m) at the points of one grid caused by W times the pressure of another grid, or of
-    itself."""
+    itself.
+    """
     if source is target:
         return displacement(source.pressure, *source.step, material_pair.modulus)
-    answer = push(source.x.ravel(), source.y.ravel(), source.forces, target.x.ravel(), target.y.ravel())
-    return answer.reshape(target.x.shape) / (np.pi * material_pair.modulus)
+    sums = normal_displacement_sums(
+        source.x.ravel(), source.y.ravel(), source.forces, target.x.ravel(), target.y.ravel()
+    )
+    return sums.reshape(target.x.shape) / (np.pi * material_pair.modulus)
 
 
-def _product(net: Net, first: Array, second: Array, kind: int) -> float:
+def _product(net: CoarseGrid, first: Array, second: Array, kind: int) -> float:
     """Scalar product of two displacement fields for the least-squares fit: of their slopes, or of their deviations from
-    the mean."""
+    the mean.
+    """
     if kind == GRADIENT:
         return float(slope_products(first, second, net.cover, *net.step, True)[0])
     return float(covariances(first, second, net.cover)[1])
@@ -141,13 +153,13 @@ def solve_depths(
 
     def state(over: Array) -> tuple[Array, Array, Array, Array]:
         *depths, approach = answer = zero + unit * over
-        nets = [crude(patch, float(d), cells, shape) for patch, d in zip(patches, depths, strict=True)]
+        nets = [coarse_grid(patch, float(d), cells, shape) for patch, d in zip(patches, depths, strict=True)]
         stiffness, reached = solve_common_approach(nets, material_pair, kind, lows, answer[:-1])
         loads = stiffness * [net.volume for net in nets]
         last = (approach - start[-1]) / unit if load is None else loads @ along / load - 1.0
         return np.append((reached - approach * along) / unit, last), answer, stiffness, loads
 
-    for method, factor, share in TRIES:
+    for method, factor, share in ROOT_SEARCHES:
         solved = root(
             lambda over: state(over)[0],
             share * (start - zero) / unit,
@@ -160,15 +172,18 @@ def solve_depths(
     raise RunFailed("simplified theory", f"patches at an approach near {answer[-1]:.4g} m did not settle")
 
 
-def dragged(nets: Sequence[Net], tractions: Sequence[Array], k: int, material_pair: MaterialPair) -> Array:
-    """Tangential displacement (2, cells, cells) (m) in grid k caused by the tractions (2, cells, cells) (Pa) on all
-    other grids."""
-    answer, target = np.zeros_like(tractions[k]), nets[k]
+def displacement_by_others(
+    nets: Sequence[CoarseGrid], tractions: Sequence[Array], k: int, material_pair: MaterialPair
+) -> Array:
+    """Tangential displacement (2, cells, cells) in m of grid k caused by the tractions (2, cells, cells) in Pa on all
+    other grids.
+    """
+    result, target = np.zeros_like(tractions[k]), nets[k]
     for m, (source, traction) in enumerate(zip(nets, tractions, strict=True)):
         if m != k:
             forces = traction.reshape(2, -1) * (source.step[0] * source.step[1])
-            places = source.x.ravel(), source.y.ravel(), target.x.ravel(), target.y.ravel()
-            answer += drag(*places[:2], forces, *places[2:], material_pair.nu).reshape(answer.shape) / (
-                np.pi * material_pair.G
-            )
-    return answer
+            positions = source.x.ravel(), source.y.ravel(), target.x.ravel(), target.y.ravel()
+            result += tangential_displacement_sums(*positions[:2], forces, *positions[2:], material_pair.nu).reshape(
+                result.shape
+            ) / (np.pi * material_pair.G)
+    return result

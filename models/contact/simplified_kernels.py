@@ -1,4 +1,4 @@
-"""Compiled parts of Kalker's theory of 1983: fit on the crude net, strips of the fine net, march along them."""
+"""Compiled parts of Kalker's theory of 1983: fit on the coarse grid, strips of the fine one, march along them."""
 
 import math
 from typing import NamedTuple
@@ -10,11 +10,11 @@ from models.contact.inputs import Array
 from models.machine.compiled import compiled
 
 PARABOLIC, ELLIPTIC = 0, 1
-"""Pressure proportional to the depth d - h, as the theory has it, or to its root, as Hertz' pressure is."""
+"""Shape of the pressure over the depth d - h: proportional, as in the theory, or to its root, as by Hertz."""
 DISPLACEMENT, GRADIENT = 0, 1
-"""What the least squares fit."""
+"""Quantity that the least squares fit."""
 POINTS_PER_MESH = 3
-"""Points per crude mesh and axis at which the pressure is summed to the load."""
+"""Number of points per coarse cell and axis at which the pressure is summed to the load."""
 LEAST_STIFFNESS_SHARE = 0.2
 """Least stiffness 1/W as a share of depth over mean displacement; a Hertzian contact has about 1.2. A flat or ringlike
 bottom leaves the fit undefined, and this bound keeps it positive."""
@@ -56,12 +56,12 @@ def overlap_pressure(surface, height, shape):
 
 @compiled
 def mesh_of(box, cells):
-    """Cell sizes dx, dy of a grid of cells x cells over a rectangle."""
+    """Cell sizes dx, dy (m) of a grid of cells x cells over a rectangle."""
     return (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
 
 
 @compiled
-def crude_net(surface, cells, shape):
+def coarse_net(surface, cells, shape):
     """Height, W p and covered share of every cell of the coarse grid (cells, cells), rows along y.
 
     The share of a mesh that the contact covers, for a straight edge: it makes meshes enter and leave without a jump.
@@ -83,7 +83,7 @@ def crude_net(surface, cells, shape):
 
 @compiled
 def resultant(surface, points, shape):
-    """Integral of W p over the rectangle, by the midpoint rule with points x points points."""
+    """Integral of W p over the rectangle (m^3), by the midpoint rule with points x points points."""
     total, (padded, origin, step, box, _, _) = 0.0, surface
     dx, dy = mesh_of(box, points)
     for j in range(points):
@@ -95,7 +95,7 @@ def resultant(surface, points, shape):
 
 
 @compiled
-def corner(x, y):
+def corner_integral(x, y):
     """Integral of 1/r over the rectangle from the origin to (x, y), signed (Boussinesq; Johnson, section 3.3)."""
     along = x * math.asinh(y / abs(x)) if x != 0.0 else 0.0
     across = y * math.asinh(x / abs(y)) if y != 0.0 else 0.0
@@ -110,7 +110,7 @@ def displacement(pressure, dx, dy, modulus):
     edges = np.empty((cells + 1, cells + 1))
     for j in range(cells + 1):
         for i in range(cells + 1):
-            edges[j, i] = corner((i - 0.5) * dx, (j - 0.5) * dy)
+            edges[j, i] = corner_integral((i - 0.5) * dx, (j - 0.5) * dy)
     influence = np.empty((cells, 2 * cells - 1))  # by rows apart, and columns apart from 1 - cells on
     for j in range(cells):
         for i in range(2 * cells - 1):
@@ -143,7 +143,7 @@ def covariances(u, h, cover):
 
 @compiled
 def weighted_mean(values, weights):
-    """Weighted mean of values; weights of the same shape. Loops compile ten times as fast as array expressions."""
+    """Weighted mean of ``values``; weights of the same shape. Loops compile ten times as fast as array expressions."""
     total = weight = 0.0
     for k in range(values.size):
         total += weights.flat[k] * values.flat[k]
@@ -167,12 +167,12 @@ def slope_products(u, h, cover, dx, dy, along_y):
 
 
 @compiled
-def crude_fit(surface, cells, shape, kind, modulus):
+def coarse_fit(surface, cells, shape, kind, modulus):
     """Stiffness 1/W (Pa/m), rigid approach (m) and integral of W p over the area, for one patch at a penetration depth.
 
     The approach is the mean of u + h weighted by the pressure: the work of the pressure by the load.
     """
-    height, pressure, cover = crude_net(surface, cells, shape)
+    height, pressure, cover = coarse_net(surface, cells, shape)
     dx, dy = mesh_of(surface.box, cells)
     u = displacement(pressure, dx, dy, modulus)
     mean_u, both, square = covariances(u, height, cover)
@@ -187,7 +187,7 @@ def crude_fit(surface, cells, shape, kind, modulus):
 
 @compiled
 def tangential(traction, dx, dy, nu):
-    """Displacement (2, cells, cells) times pi G at the cells' centres, by a traction (2, cells, cells) (Cerruti)."""
+    """Displacement (2, cells, cells) times pi G at the cells' centres, by a traction of this shape (Cerruti)."""
     cells = traction.shape[1]
     corners = np.empty((3, cells + 1, cells + 1))  # integrals of y^2/r^3, x^2/r^3 and xy/r^3 from the origin
     for j in range(cells + 1):
@@ -236,7 +236,7 @@ def tangential_fit(u, traction, cover, dx, dy, kind):
 
 
 @compiled
-def push(x, y, force, at_x, at_y):
+def normal_displacement_sums(x, y, force, at_x, at_y):
     """Sum of force / r at points; times 1 / (pi E*) it is the normal displacement by loads (N) of another patch.
 
     All arguments are flat: loads at x, y, points at_x, at_y (m).
@@ -250,7 +250,7 @@ def push(x, y, force, at_x, at_y):
 
 
 @compiled
-def drag(x, y, force, at_x, at_y, nu):
+def tangential_displacement_sums(x, y, force, at_x, at_y, nu):
     """Tangential displacements (2, points) times pi G at points, by tangential loads (2, n) (Cerruti; Johnson, section
     3.6)."""
     sums = np.zeros((2, at_x.size))
@@ -266,7 +266,7 @@ def drag(x, y, force, at_x, at_y, nu):
 
 @compiled
 def strips(surface, rows, cells, shape):
-    """``FineNet`` of a patch, with W p in place of the pressure.
+    """``FineNet`` of a patch, with the product W p in place of the pressure.
 
     Each of ``rows`` lines gives one strip per interval in which h < depth, its ends where the interpolation passes the
     depth.
@@ -343,7 +343,7 @@ def march(net, mu, flexibility, motion, traction):
             go, middle = (length, x + 0.5 * length) if i > 0 else (0.5 * length, x + 0.25 * length)
             u, v = go * (xi_x - spin * y[s]) / flexibility, go * (xi_y + spin * middle) / flexibility
             bound = mu * pressure[s, i]
-            px, py, slips = step_on(px, py, u, v, bound, 0.5 * (before + bound), slips)
+            px, py, slips = traction_after_step(px, py, u, v, bound, 0.5 * (before + bound), slips)
             before = bound
             traction[s, i, 0], traction[s, i, 1] = px, py
             cell = length * width
@@ -356,7 +356,7 @@ def march(net, mu, flexibility, motion, traction):
 
 
 @compiled
-def step_on(px, py, u, v, bound, middle, slips):
+def traction_after_step(px, py, u, v, bound, middle, slips):
     """Traction after a step, and whether it slips; without slip the rigid slip would subtract (u, v) from the traction.
 
     A traction that continues to slip stays on the bound and turns towards -(u, v): with psi between the two, tan(psi/2)
@@ -379,7 +379,7 @@ def step_on(px, py, u, v, bound, middle, slips):
 
 
 @compiled
-def gather(net, traction, box, cells):
+def coarse_tractions(net, traction, box, cells):
     """Mean tractions (2, cells, cells) on the coarse grid; each strip cell counts by its overlap with the coarse
     cell."""
     (y, low_x, high_x, width, _), sums = net, np.zeros((2, cells, cells))

@@ -39,16 +39,16 @@ from scipy.optimize import brentq
 from models.contact.fields import Fields
 from models.contact.inputs import Array, creepages, number, whole_number
 from models.contact.material import MaterialPair
-from models.contact.patches import NO_DEPTH, Box, Patch, as_single_patch, no_bottom, separate
-from models.contact.several_patches import crude, dragged, solve_depths
+from models.contact.patches import NO_DEPTH, Box, Patch, no_bottom, separate, single_patch_of
+from models.contact.several_patches import coarse_grid, displacement_by_others, solve_depths
 from models.contact.simplified_kernels import (
     DISPLACEMENT,
     ELLIPTIC,
     GRADIENT,
     PARABOLIC,
     FineNet,
-    crude_fit,
-    gather,
+    coarse_fit,
+    coarse_tractions,
     march,
     strips,
     tangential,
@@ -57,20 +57,20 @@ from models.contact.simplified_kernels import (
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
 
-NET = 15
-"""Meshes of the crude net along each axis."""
-CELLS = 45
-"""Strips of the fine net, and cells along each strip."""
+COARSE_CELLS = 15
+"""Number of cells of the coarse grid along each axis."""
+FINE_CELLS = 45
+"""Number of strips of the fine grid, and of cells along each strip."""
 LEAST_CELLS, MOST_CELLS = 3, 2000
 SHAPES = {"parabolic": PARABOLIC, "elliptic": ELLIPTIC}
-ABOUT = 0.6
-"""Depth by approach of a patch, about; where several are sought, the search starts there."""
+DEPTH_BY_APPROACH = 0.6
+"""Ratio of a patch's depth to its approach, about; the search for several patches starts there."""
 FITS = {"displacement": DISPLACEMENT, "gradient": GRADIENT}
 
 
 @dataclass(frozen=True)
 class SimplifiedOptions:
-    """Options of the simplified theory: net, shape, fit, patches together or apart.
+    """Options of the simplified theory: coarse grid, shape of the pressure, kind of fit, separate patches.
 
     net : meshes of the crude net along each axis. shape : of the pressure over the depth: "parabolic", proportional to
     d - h as the paper has it, or "elliptic", proportional to its root as in Hertz's contact. The latter is nearer to
@@ -79,7 +79,7 @@ class SimplifiedOptions:
     and constants for each patch, or one for all.
     """
 
-    net: int = NET
+    net: int = COARSE_CELLS
     shape: Literal["parabolic", "elliptic"] = "elliptic"
     fit: Literal["displacement", "gradient"] = "displacement"
     separate: bool = True
@@ -92,18 +92,18 @@ class SimplifiedOptions:
 
     @property
     def numbers(self) -> tuple[int, int, int]:
-        """Number of grid cells, shape and fit, coded as compiled functions read them."""
+        """Number of coarse cells, shape and kind of fit, coded as compiled functions read them."""
         return self.net, SHAPES[self.shape], FITS[self.fit]
 
 
 PLAIN = SimplifiedOptions()
 PAPER = SimplifiedOptions(shape="parabolic")
-"""The theory to the letter."""
+"""Options with which the theory is exactly that of the paper."""
 
 
 @dataclass(frozen=True, eq=False)
 class PatchPressure:
-    """Normal contact of one patch.
+    """Normal contact of one patch by the simplified theory.
 
     depth : d = -a_3 (m). stiffness : 1 / W_3 (Pa/m). approach : rigid approach that the fit finds, along its normal
     (m). load : N. box : x0, x1, y0, y1 of its net (m).
@@ -119,7 +119,7 @@ class PatchPressure:
 
 @dataclass(frozen=True, eq=False)
 class NormalContact:
-    """Normal contact by the simplified theory.
+    """Normal contact of all patches by the simplified theory.
 
     approach : rigid approach (m), counted from distance zero. load : N. Both are along the common direction where
     patches lean. area : m^2. peak : largest pressure (Pa). patches : the parts in contact.
@@ -171,7 +171,7 @@ def press(
     if (load is None) == (approach is None):
         raise InputError("", "load", load, "give either the load in N or the approach in m")
     if isinstance(bodies, Distance):
-        bodies = separate(bodies) if options.separate else as_single_patch(bodies)
+        bodies = separate(bodies) if options.separate else single_patch_of(bodies)
     patches = list(bodies)
     if not patches:
         raise InputError("", "bodies", bodies, "must be an undeformed distance, or one patch at least")
@@ -179,11 +179,11 @@ def press(
     if load is not None:
         wanted = number("load", load, "a load in N, up to 1e9", -1e9, 1e9)
         if wanted <= 0.0:
-            return _gathered(lowest, (), material_pair, options)
+            return _sum_of_patches(lowest, (), material_pair, options)
         return _by_load(patches, lowest, wanted, material_pair, options)
     reached = number("approach", approach, "an approach in m, up to 0.1", -0.1, 0.1)
     if reached <= lowest:
-        return _gathered(reached, (), material_pair, options)
+        return _sum_of_patches(reached, (), material_pair, options)
     return _patches_at_common_approach(patches, reached, None, material_pair, options)
 
 
@@ -194,7 +194,7 @@ def load_at_depth(
     if depth <= patch.low:
         return PatchPressure(patch, depth, 0.0, depth, 0.0, (0.0, 0.0, 0.0, 0.0))
     box = patch.box(depth)
-    stiffness, approach, volume = crude_fit(patch.surface(depth), *options.numbers, material_pair.modulus)
+    stiffness, approach, volume = coarse_fit(patch.surface(depth), *options.numbers, material_pair.modulus)
     if not (volume > 0.0 and np.isfinite(stiffness)):  # so shallow that rounding leaves nothing of it
         return PatchPressure(patch, depth, 0.0, depth, 0.0, box)
     return PatchPressure(patch, depth, stiffness, approach, volume * stiffness, box)
@@ -203,19 +203,20 @@ def load_at_depth(
 def _by_load(
     patches: list[Patch], lowest: float, load: float, material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
-    """Normal contact that carries a load: the depth of a single patch, or depths and common approach of several, are
-    searched."""
+    """Normal contact that carries a load (N): the depth of a single patch, or the depths and common approach of
+    several.
+    """
     if len(patches) == 1:
         patch, along = patches[0], np.cos(patches[0].lean)
         depth = _depth_for_load(
             lambda d: along * load_at_depth(patch, d, material_pair, options).load, load, patch.low, patch.edge
         )
         alone = load_at_depth(patch, depth, material_pair, options)
-        return _gathered(alone.approach / along, (alone,), material_pair, options)
+        return _sum_of_patches(alone.approach / along, (alone,), material_pair, options)
 
     def alone_at(reached: float) -> float:
-        depths = zip(patches, _shallow(patches, reached), strict=True)
-        return _total([load_at_depth(patch, depth, material_pair, options) for patch, depth in depths])
+        depths = zip(patches, _rough_depths(patches, reached), strict=True)
+        return _total_load([load_at_depth(patch, depth, material_pair, options) for patch, depth in depths])
 
     return _patches_at_common_approach(
         patches, _depth_for_load(alone_at, load, lowest, np.inf), load, material_pair, options
@@ -224,7 +225,8 @@ def _by_load(
 
 def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
     """Depth or approach (m) above ``lowest`` at which the load is carried: doubled until the load is exceeded, then
-    refined by Brent's method."""
+    refined by Brent's method.
+    """
     if limit - lowest <= NO_DEPTH:
         raise no_bottom()
     low, high = 0.0, min(1e-6, limit - lowest)
@@ -241,49 +243,52 @@ def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: floa
     return lowest + float(brentq(lambda over: load_at(lowest + over) - load, low, high, xtol=1e-20, rtol=1e-14))
 
 
-def _total(parts: Sequence[PatchPressure]) -> float:
+def _total_load(parts: Sequence[PatchPressure]) -> float:
+    """Sum of the patches' loads (N) along the common direction."""
     return float(sum(part.load * np.cos(part.patch.lean) for part in parts))
 
 
-def _shallow(patches: list[Patch], approach: float) -> list[float]:
+def _rough_depths(patches: list[Patch], approach: float) -> list[float]:
     """Rough depths (m) of patches at an approach (m): a fixed share of the approach beyond each patch's first touch."""
     over = [approach * np.cos(patch.lean) - patch.low for patch in patches]
-    return [float(patch.low + (ABOUT * o if o > 0.0 else o)) for patch, o in zip(patches, over, strict=True)]
+    return [
+        float(patch.low + (DEPTH_BY_APPROACH * o if o > 0.0 else o)) for patch, o in zip(patches, over, strict=True)
+    ]
 
 
 def _patches_at_common_approach(
     patches: list[Patch], approach: float, load: float | None, material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
     """Patches at their common approach (m); if a load (N) is given, the approach that carries it is found from here."""
-    start = np.array([*_shallow(patches, approach), approach])
+    start = np.array([*_rough_depths(patches, approach), approach])
     (*depths, reached), stiffnesses, loads = solve_depths(patches, start, load, material_pair, options.numbers)
     parts = []
     for patch, depth, stiffness, carried in zip(patches, map(float, depths), stiffnesses, loads, strict=True):
         if carried > 0.0:
             along = float(reached * np.cos(patch.lean))
             parts.append(PatchPressure(patch, depth, float(stiffness), along, float(carried), patch.box(depth)))
-    return _gathered(float(reached), tuple(parts), material_pair, options)
+    return _sum_of_patches(float(reached), tuple(parts), material_pair, options)
 
 
-def _gathered(
+def _sum_of_patches(
     approach: float, parts: tuple[PatchPressure, ...], material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
     """Normal contact summed over the patches; area and peak pressure come from strips with exact ends."""
     area = sum(_area(part) for part in parts)
     peak = max((part.stiffness * (part.depth - part.patch.low) for part in parts), default=0.0)
-    return NormalContact(approach, _total(parts), area, peak, parts, material_pair, options)
+    return NormalContact(approach, _total_load(parts), area, peak, parts, material_pair, options)
 
 
 def _area(patch: PatchPressure, rows: int = 100) -> float:
-    """Area (m^2) of one patch."""
+    """Area (m^2) of one contact patch."""
     net = strips(patch.patch.surface(patch.depth), rows, 1, PARABOLIC)
     return float((net.high_x - net.low_x).sum() * (patch.box[3] - patch.box[2]) / rows) if net.y.size else 0.0
 
 
 def roll(
-    normal_contact: NormalContact, friction: float, xi_x: float, xi_y: float, spin: float, *, cells: int = CELLS
+    normal_contact: NormalContact, friction: float, xi_x: float, xi_y: float, spin: float, *, cells: int = FINE_CELLS
 ) -> Rolling:
-    """Forces of steady rolling: FASTSIM twice on the fine net of each patch, W_1 = W_2 refitted in between.
+    """Forces of steady rolling: FASTSIM twice on the fine grid of each patch, W_1 = W_2 refitted in between.
 
     friction : coefficient. xi_x, xi_y : creepages. spin : 1/m. cells : strips, and cells in each, 3 or more. Spin and
     moment are about x = y = 0 of the distance, where patches lean of each patch; roll these one by one if their
@@ -296,13 +301,13 @@ def roll(
     cells = whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
     fine = [_fine_strips(part, normal_contact.options, cells) for part in normal_contact.patches]
     tractions = [np.zeros((*net.pressure.shape, 2)) for net in fine]
-    crude_tractions = []
+    tractions_on_coarse_cells = []
     # W_1 = W_2 = W_3 is the paper's first estimate. a_1 and a_2 drop out: rolling feels du/dx alone, and they are
     # constant over the patch.
     for part, net, traction in zip(normal_contact.patches, fine, tractions, strict=True):
         march(net, friction, 1.0 / part.stiffness, motion, traction)
-        crude_tractions.append(gather(net, traction, part.box, normal_contact.options.net))
-    flexibilities = _refitted(normal_contact, crude_tractions)
+        tractions_on_coarse_cells.append(coarse_tractions(net, traction, part.box, normal_contact.options.net))
+    flexibilities = _refitted(normal_contact, tractions_on_coarse_cells)
     rolled = [
         march(net, friction, flexibility, motion, traction)
         for net, flexibility, traction in zip(fine, flexibilities, tractions, strict=True)
@@ -314,7 +319,7 @@ def roll(
 
 
 def _fine_strips(patch: PatchPressure, options: SimplifiedOptions, cells: int) -> FineNet:
-    """``FineNet`` of a patch, as ``march`` expects it."""
+    """``FineNet`` of a patch whose pressure carries its load, as ``march`` expects it."""
     net = strips(patch.patch.surface(patch.depth), cells, cells, SHAPES[options.shape])
     carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cells
     net.pressure[:] *= patch.load / carried  # full sliding gives mu N exactly
@@ -328,17 +333,19 @@ def _refitted(normal_contact: NormalContact, tractions: list[Array]) -> list[flo
     It is W_3 if no traction can be fitted.
     """
     options, pair = normal_contact.options, normal_contact.pair
-    nets = [crude(part.patch, part.depth, options.net, PARABOLIC) for part in normal_contact.patches]
+    nets = [coarse_grid(part.patch, part.depth, options.net, PARABOLIC) for part in normal_contact.patches]
     flexibilities = []
     for k, (part, net, traction) in enumerate(zip(normal_contact.patches, nets, tractions, strict=True)):
-        u = tangential(traction, *net.step, pair.nu) / (np.pi * pair.G) + dragged(nets, tractions, k, pair)
+        u = tangential(traction, *net.step, pair.nu) / (np.pi * pair.G) + displacement_by_others(
+            nets, tractions, k, pair
+        )
         fitted = float(tangential_fit(u, traction, net.cover, *net.step, FITS[options.fit]))
         flexibilities.append(fitted if fitted > 0.0 else 1.0 / part.stiffness)
     return flexibilities
 
 
 def _fields(net: FineNet, traction: Array, friction: float) -> Fields:
-    """Pressure, tractions and slip in each cell of each strip."""
+    """Pressure, tractions and slip in each cell of each strip of a patch."""
     y, low, high, width, pressure = net
     shape = pressure.shape
     length = ((high - low) / shape[1])[:, None]

@@ -1,4 +1,4 @@
-"""Built-in profiles: the wheel S1002 and the rail UIC 60 (60E1), new.
+"""Built-in profiles: the new wheel S1002 and the new rail UIC 60 (60E1).
 
 S1002
     The sections of EN 13715 (formerly UIC 510-2 and ORE S1002) for a flange of 28 mm height and 32.5 mm thickness,
@@ -42,7 +42,7 @@ THROAT = (
     -2.252755540e-7,
 )
 WHEEL = (-70.0, -62.764705882, -49.662510381, -39.764473993, -38.426669071, -35.0, -26.0, 32.15796, 60.0)
-"""Ends of the sections H to A (mm)."""
+"""Ends (mm) of the sections H to A of the wheel profile S1002, y from the taping line."""
 SECTIONS: tuple[Callable[[Array], Array], ...] = (
     lambda y: 9.519259302 + np.sqrt(20.5**2 - (y + 49.5) ** 2),
     lambda y: 16.0 + np.sqrt(12.0**2 - (y + 55.0) ** 2),
@@ -53,15 +53,17 @@ SECTIONS: tuple[Callable[[Array], Array], ...] = (
     lambda y: np.polynomial.polynomial.polyval(y, TREAD),
     lambda y: 1.364323640 - 0.066666667 * y,
 )
-"""Height over y (mm) in each section, from the flange's back to the outer end of the tread."""
+"""Height over y (mm) in each section of the wheel profile S1002, from the flange's back to the outer end of the
+tread.
+"""
 
 RADII = (300.0, 80.0, 13.0)
-CHANGES = (10.49975, 25.98806)
-"""Distance from the rail's axis (mm) at which 300 changes to 80 and 80 to 13 mm."""
+RADIUS_CHANGES = (10.49975, 25.98806)
+"""Distance (mm) from the rail's axis at which the head's radius changes from 300 to 80 mm, and from 80 to 13 mm."""
 SIDE_SLOPE = 20.0
-"""Slope of the head's side."""
-LOWEST = 37.0
-"""Depth of the head's side below its top (mm) down to which it is kept."""
+"""Slope of the rail head's side: height over width."""
+LARGEST_DEPTH = 37.0
+"""Depth (mm) below the rail head's top down to which the profile reaches."""
 
 
 def s1002_height(y: Array) -> Array:
@@ -81,28 +83,28 @@ def s1002() -> ContactProfile:
 
 @cache
 def uic60() -> ContactProfile:
-    """The head of an upright UIC 60 rail, to 37 mm below its top."""
+    """The head of an upright UIC 60 rail as a profile, to 37 mm below its top."""
     y, z = _half_head()
     return _evenly_spaced(np.concatenate([-y[::-1], y[1:]]), np.concatenate([z[::-1], z[1:]]))
 
 
 def _half_head() -> tuple[Array, Array]:
-    """Right half of the head (mm) from the axis: arcs that continue one another's tangent, then the side."""
+    """Right half of the rail head (mm) from the axis: arcs that continue one another's tangent, then the side."""
     y, z, angle = [np.zeros(1)], [np.zeros(1)], 0.0
-    for radius, end in zip(RADII, (*CHANGES, None), strict=True):
+    for radius, end in zip(RADII, (*RADIUS_CHANGES, None), strict=True):
         centre_y, centre_z = y[-1][-1] - radius * np.sin(angle), z[-1][-1] + radius * np.cos(angle)
         last = np.arctan(SIDE_SLOPE) if end is None else np.arcsin((end - centre_y) / radius)
         angles = np.linspace(angle, last, 2001)[1:]
         y.append(centre_y + radius * np.sin(angles))
         z.append(centre_z - radius * np.cos(angles))
         angle = last
-    depth = np.linspace(z[-1][-1], LOWEST, 1001)[1:]
+    depth = np.linspace(z[-1][-1], LARGEST_DEPTH, 1001)[1:]
     y.append(y[-1][-1] + (depth - z[-1][-1]) / SIDE_SLOPE)
     return np.concatenate(y), np.concatenate([*z, depth])
 
 
 def _evenly_spaced(y: Array, z: Array) -> ContactProfile:
-    """Points (mm) at even distances along the contour, in m."""
+    """Profile in m of points (mm), at even distances along the contour."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
     even = np.linspace(0.0, length[-1], round(length[-1] * MM / SPACING) + 1)
     return ContactProfile(np.interp(even, length, y) * MM, np.interp(even, length, z) * MM)
@@ -113,7 +115,7 @@ RAILS = {"UIC60": uic60}
 
 
 def built_in(name: str) -> ContactProfile:
-    """The wheel or rail of this name; raises InputError that lists the names."""
+    """The built-in wheel or rail profile of this name; raises InputError that lists the names."""
     known = WHEELS | RAILS
     if name not in known:
         raise InputError("", "profile", name, "is not built in", tuple(known))

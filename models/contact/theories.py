@@ -1,4 +1,4 @@
-"""One contact by any of the theories, asked in one way.
+"""One rolling contact by any of the contact theories, with the same interface.
 
 A contact is pressed once: load, area, largest pressure and approach are then known. ``roll`` gives its forces at any
 creepage on any number of cells. ``models.contact.accuracy`` tells how far they are off.
@@ -23,13 +23,14 @@ from models.contact.simplified_theory import roll as roll_simplified
 from models.core.errors import InputError
 
 Motion = tuple[float, float, float]
-"""xi_x, xi_y and spin (1/m)."""
+"""Motion of a rolling contact: xi_x, xi_y and spin (1/m)."""
 
 
 @dataclass(frozen=True)
 class Rolled:
     """Result of rolling: forces on the wheel (N), moment (N m), sticking share of the area, ratio of dissipated power
-    to rolling speed (N)."""
+    to rolling speed (N).
+    """
 
     fx: float
     fy: float
@@ -57,7 +58,8 @@ class Pressing:
 
 class RollingContact(ABC):
     """Two bodies pressed together whose rolling one theory computes; ``order``: convergence order of the error in the
-    cell size."""
+    cell size.
+    """
 
     order = 1.0
 
@@ -71,12 +73,13 @@ class RollingContact(ABC):
 
     @abstractmethod
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces at the given creepages and spin; with ``fields``, also pressure, traction and slip in every cell of
-        each patch."""
+        """Contact forces at the given creepages and spin; with ``fields``, also pressure, traction and slip in every
+        cell of each patch.
+        """
 
 
 class OnEllipse(RollingContact):
-    """Hertz' contact, with semi-axes a and b (m)."""
+    """Rolling contact on the ellipse of Hertz' contact, with semi-axes a and b (m)."""
 
     def __init__(self, hertz: Hertz, friction: float, material_pair: MaterialPair) -> None:
         self.hertz, self.a, self.b = hertz, float(hertz.a), float(hertz.b)
@@ -85,12 +88,14 @@ class OnEllipse(RollingContact):
 
     @property
     def lever(self) -> float:
-        """The longer semi-axis (m)."""
+        """The longer semi-axis (m) of the ellipse."""
         return max(self.a, self.b)
 
 
 class LinearTheory(OnEllipse):
-    """Linear theory: no slip, forces proportional to the creepages and not limited by friction."""
+    """Rolling contact by the linear theory: no slip, forces proportional to the creepages and not limited by
+    friction.
+    """
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces of the linear theory, which has no cells and no fields."""
@@ -111,7 +116,7 @@ def beyond_friction(used: np.ndarray) -> str:
 
 
 class Fastsim(OnEllipse):
-    """The simplified theory of 1982; ``choices`` are those of ``fastsim``."""
+    """Rolling contact by the simplified theory of 1982, FASTSIM; ``choices`` : options of ``fastsim``."""
 
     def __init__(self, hertz: Hertz, friction: float, material_pair: MaterialPair, **choices: Any) -> None:
         super().__init__(hertz, friction, material_pair)
@@ -129,7 +134,7 @@ class Fastsim(OnEllipse):
 
 
 class ExactOnEllipse(OnEllipse):
-    """Half-space theory with Coulomb friction under Hertzian pressure."""
+    """Rolling contact by the half-space theory with Coulomb friction under Hertzian pressure."""
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Creep forces, computed with ``cells`` x ``cells`` cells around the ellipse."""
@@ -137,8 +142,9 @@ class ExactOnEllipse(OnEllipse):
 
 
 class OnPatches(RollingContact):
-    """Patches of any shape; their depths and loads come from the simplified theory of 1983. The load acts along the
-    normals."""
+    """Rolling contact on patches of any shape; their depths and loads come from the simplified theory of 1983. The load
+    acts along the normals.
+    """
 
     def __init__(
         self, normal_contact: NormalContact, friction: float, area: float, peak: float, approach: float
@@ -152,15 +158,16 @@ class OnPatches(RollingContact):
         """Lever of the moment (m) for the patch with the largest extent."""
         return max((abs(side) for part in self.pressed.patches for side in part.box), default=0.0)
 
-    def placed(self, fields: Sequence[Fields]) -> tuple[Fields, ...]:
-        """Fields whose y is the position along the rail's contour, so that several patches can be shown in one
-        picture."""
+    def along_contour(self, fields: Sequence[Fields]) -> tuple[Fields, ...]:
+        """Fields whose y is the position (m) along the rail's contour, so that several patches can be shown in one
+        picture.
+        """
         pairs = zip(fields, self.pressed.patches, strict=True)
         return tuple(replace(cells, y=cells.y + part.patch.contour_position) for cells, part in pairs)
 
 
 class Simplified(OnPatches):
-    """The simplified theory of 1983 for any undeformed distance."""
+    """Rolling contact by the simplified theory of 1983, for any undeformed distance."""
 
     def __init__(self, normal_contact: NormalContact, friction: float) -> None:
         super().__init__(normal_contact, friction, normal_contact.area, normal_contact.peak, normal_contact.approach)
@@ -169,17 +176,18 @@ class Simplified(OnPatches):
         """Creep forces, with ``cells`` strips and as many cells per strip in each patch; fields are placed along the
         rail's contour."""
         forces = roll_simplified(self.pressed, self.friction, *motion, cells=cells)
-        inside = self.placed(forces.fields)
+        inside = self.along_contour(forces.fields)
         return Rolled(forces.fx, forces.fy, forces.mz, forces.stick_share, forces.power, inside)
 
 
 class Exact(OnPatches):
-    """Half-space theory with Coulomb friction for pressure and tractions; the load of each patch comes from the theory
-    of 1983."""
+    """Rolling contact by the half-space theory with Coulomb friction for pressure and tractions; the load of each patch
+    comes from the theory of 1983.
+    """
 
     def __init__(self, normal_contact: NormalContact, friction: float, cells: int) -> None:
         parts = normal_contact.patches
-        grids = [_solved(part, cells, normal_contact.pair) for part in parts]
+        grids = [_exact_pressure(part, cells, normal_contact.pair) for part in parts]
         alone = grids[0].approach / float(np.cos(parts[0].patch.lean))
         approach = alone if len(grids) == 1 else normal_contact.approach
         peak = max(float(grid.pressure.max()) for grid in grids)
@@ -187,13 +195,13 @@ class Exact(OnPatches):
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Creep forces, computed with ``cells`` x ``cells`` cells around each patch."""
-        grids = [_solved(part, cells, self.pair) for part in self.pressed.patches]
+        grids = [_exact_pressure(part, cells, self.pair) for part in self.pressed.patches]
         forces = _exact_sum(grids, motion, self.friction, self.pair)
-        return replace(forces, fields=self.placed(forces.fields))
+        return replace(forces, fields=self.along_contour(forces.fields))
 
 
 def _exact_sum(grids: Sequence[PressureGrid], motion: Motion, friction: float, material_pair: MaterialPair) -> Rolled:
-    """Sum of forces over the patches, none of which is affected by the tractions of another one."""
+    """Sum of the exact theory's forces over the patches, none of which is affected by the tractions of another one."""
     forces, stuck, fields = np.zeros(3), 0.0, list[Fields]()
     for grid in grids:
         patch, (x, y) = solve_rolling(grid, friction, *motion, material_pair), np.meshgrid(grid.x, grid.y)
@@ -208,10 +216,12 @@ def _exact_sum(grids: Sequence[PressureGrid], motion: Motion, friction: float, m
 
 
 MARGINS = (1.2, 1.6, 2.2)
-"""Sides of the grid of the exact normal problem divided by those of the simplified theory's area, until it fits."""
+"""Ratios of the sides of the exact normal problem's grid to those of the simplified theory's area, tried until the
+contact fits.
+"""
 
 
-def _solved(patch: PatchPressure, cells: int, material_pair: MaterialPair) -> NormalSolution:
+def _exact_pressure(patch: PatchPressure, cells: int, material_pair: MaterialPair) -> NormalSolution:
     """Exact pressure of one patch at the load from the simplified theory, in the patch's own coordinates."""
     (x0, x1, y0, y1), known = patch.box, patch.patch.distance
     for margin in MARGINS:

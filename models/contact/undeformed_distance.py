@@ -1,4 +1,4 @@
-"""The undeformed distance of two bodies: how far apart opposite points are while the bodies just touch.
+"""The undeformed distance of two bodies: the distance of opposite surface points while the bodies just touch.
 
 A function h(x, y) >= 0 over a rectangle, kept as values on even nodes with a cubic interpolation that is exact for
 quadratic surfaces. It comes from a formula (``from_function``), from measured or computed values (``from_arrays``),
@@ -16,11 +16,13 @@ from models.contact.inputs import Array, quantity
 from models.core.errors import InputError
 
 NODES = 97
-"""Nodes along each axis of a distance that is made here: 48 spacings on each side of the centre."""
-UNEVEN_SHARE = 2e-3
-"""Nodes count as even if none is farther from its even place than this share of a step, as rounding in a file does."""
+"""Number of nodes along each axis of a computed distance: 48 spacings on each side of the centre."""
+LARGEST_UNEVENNESS = 2e-3
+"""Largest deviation of a node from its even position, as a share of a step, at which nodes count as even; rounding in a
+file causes as much.
+"""
 LARGEST_CONTACT = 1.0
-"""m, of places and heights: no contact is so large, and larger ones are usually in mm."""
+"""Largest position and height (m) that is accepted: no contact is so large, and larger ones are usually in mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +50,8 @@ class Distance:
     @property
     def curvatures(self) -> tuple[float, float]:
         """Second derivatives (1/m) of the distance along x and along y at x = y = 0, from differences over four node
-        spacings."""
+        spacings.
+        """
         second_differences = []
         for x, y in ((4.0 * self.dx, 0.0), (0.0, 4.0 * self.dy)):
             low, here, high = self.at(np.array([-x, 0.0, x]), np.array([-y, 0.0, y]))
@@ -57,8 +60,8 @@ class Distance:
 
     @cached_property
     def padded(self) -> Array:
-        """Heights with an extra node on every side, extrapolated by the parabola through the three outermost."""
-        return _continued(_continued(self.height).T).T.copy()
+        """Heights (m) with an extra node on every side, extrapolated by the parabola through the three outermost."""
+        return _extrapolated(_extrapolated(self.height).T).T.copy()
 
     def at(self, x: Array, y: Array) -> Array:
         """Distance (m) at points x, y (m), broadcast; raises InputError outside the nodes."""
@@ -72,29 +75,34 @@ class Distance:
     @cached_property
     def valley_y(self) -> tuple[Array, Array, Array]:
         """Lines y (m), the least height on each (m), and the x of that height (m): the course of the valley across
-        y."""
+        y.
+        """
         return self._valley(self.padded, self.y, self.x, self.dx)
 
     @cached_property
     def valley_x(self) -> tuple[Array, Array, Array]:
-        """Lines x (m), the least height on each (m), and the y of that height (m)."""
+        """Lines x (m), the least height on each (m), and the y of that height (m): the course of the valley across
+        x.
+        """
         return self._valley(np.ascontiguousarray(self.padded.T), self.x, self.y, self.dy)
 
     @staticmethod
     def _valley(padded: Array, along: Array, across: Array, step: float) -> tuple[Array, Array, Array]:
+        """Lines along one axis (m), the least height on each (m), and its position (m) on the other axis."""
         finer = 2
         least, where = valley(padded, finer)
         return np.linspace(along[0], along[-1], least.size), least, across[0] + where * step
 
     def part(self, x: slice, y: slice) -> "Distance":
-        """The distance restricted to some of its nodes."""
+        """The undeformed distance restricted to some of its nodes."""
         return Distance(self.x[x], self.y[y], self.height[y, x])
 
 
 def from_function(
     height: Callable[[Array, Array], Array], x: tuple[float, float], y: tuple[float, float], nodes: int = NODES
 ) -> Distance:
-    """Distance from a formula ``height(x, y)`` in m, of arrays in m, over the rectangle x[0]..x[1], y[0]..y[1].
+    """Undeformed distance from a formula ``height(x, y)`` in m, of arrays in m, over the rectangle x[0]..x[1],
+    y[0]..y[1].
 
     Raises InputError for an empty rectangle and for a formula without a finite answer of the right shape.
     """
@@ -111,7 +119,7 @@ def from_function(
 
 
 def from_arrays(x: Array, y: Array, height: Array) -> Distance:
-    """Distance from values: x (nx,), y (ny,) even ascending nodes (m), height (ny, nx) (m), rows along y.
+    """Undeformed distance from values: x (nx,), y (ny,) even ascending nodes (m), height (ny, nx) (m), rows along y.
 
     Raises InputError for a wrong shape, uneven nodes, fewer than four of them, or values that are not finite.
     """
@@ -126,7 +134,7 @@ def from_arrays(x: Array, y: Array, height: Array) -> Distance:
         if array.ndim != 1 or array.size < 4:
             raise InputError("", name, list(array.shape), "must have the shape (n,) with n of 4 or more")
         even = np.linspace(array[0], array[-1], array.size)
-        if not np.abs(array - even).max() < UNEVEN_SHARE * (even[1] - even[0]):
+        if not np.abs(array - even).max() < LARGEST_UNEVENNESS * (even[1] - even[0]):
             raise InputError("", name, None, "must ascend in even steps (m)")
     shape = (nodes["y"].size, nodes["x"].size)
     if height.shape != shape:
@@ -135,12 +143,12 @@ def from_arrays(x: Array, y: Array, height: Array) -> Distance:
 
 
 def quadratic(A: float, B: float, x: float, y: float, nodes: int = NODES) -> Distance:
-    """Hertz' distance A x^2 + B y^2 (A and B in 1/m) over -x..x and -y..y (m)."""
+    """Undeformed distance of Hertz' theory, A x^2 + B y^2 (A and B in 1/m), over -x..x and -y..y (m)."""
     return from_function(lambda u, v: A * u**2 + B * v**2, (-x, x), (-y, y), nodes)
 
 
-def _continued(rows: Array) -> Array:
-    """The rows with one more at each end, extrapolated by the parabola through the three nearest rows."""
+def _extrapolated(rows: Array) -> Array:
+    """The rows of a table with one more at each end, extrapolated by the parabola through the three nearest rows."""
     first = 3.0 * (rows[0] - rows[1]) + rows[2]
     last = 3.0 * (rows[-1] - rows[-2]) + rows[-3]
     return np.vstack([first, rows, last])

@@ -1,4 +1,4 @@
-"""A wheel on a rail: where the profiles touch, and the undeformed distance around each place.
+"""Geometry of a wheel on a rail: where the profiles touch, and the undeformed distance around each touching place.
 
 The wheel is a body of revolution, the rail straight along x. Axes of the track: x in the direction of rolling, y to
 the right, z down. The wheelset is shifted to the right, turned by the yaw (about z, positive from x to y) and rolled
@@ -30,11 +30,13 @@ from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError, RunFailed
 
 SURROUNDINGS_DISTANCE = 2e-4
-"""Distance (m) up to which the surroundings of a touching place are taken in; steel yields long before."""
+"""Distance (m) between the surfaces up to which the surroundings of a touching place are included; steel yields long
+before.
+"""
 NODES = 121
-"""Nodes of a distance along each axis."""
-STEEPEST_ROLL = 0.06
-"""Largest roll angle (rad) that is looked for."""
+"""Number of nodes of an undeformed distance along each axis."""
+LARGEST_ROLL = 0.06
+"""Largest roll angle (rad) of the wheelset that is searched."""
 ITERATIONS = 12
 
 
@@ -77,7 +79,7 @@ class Pose:
     fall: float
 
     @cached_property
-    def turn(self) -> Array:
+    def rotation(self) -> Array:
         """Rotation (3, 3) from the wheelset to the track: roll, then yaw."""
         (cr, sr), (cy, sy) = ((np.cos(a), np.sin(a)) for a in (self.roll, self.yaw))
         return np.array([[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]]) @ np.array(
@@ -111,8 +113,8 @@ class WheelAndRail:
     rail: ContactProfile
     wheelset: Wheelset
 
-    def centre(self, pose: Pose) -> Array:
-        """Position of the middle of the axle in the track's coordinates (m)."""
+    def axle_centre(self, pose: Pose) -> Array:
+        """Position (3,) of the middle of the axle in the track's coordinates (m)."""
         return np.array([0.0, pose.shift, pose.fall - self.wheelset.radius])
 
     def outline(self, pose: Pose) -> Array:
@@ -122,7 +124,7 @@ class WheelAndRail:
         sine = -self.wheel.curve(y, 1) * np.cos(pose.roll) * np.tan(pose.yaw) / np.hypot(1.0, lead)
         angle = np.arcsin(np.clip(sine, -1.0, 1.0)) - np.arctan(lead)
         points = np.column_stack([radius * np.sin(angle), self.wheelset.arm + y, radius * np.cos(angle)])
-        return points @ pose.turn.T + self.centre(pose)
+        return points @ pose.rotation.T + self.axle_centre(pose)
 
     def gaps(self, pose: Pose) -> tuple[Array, Array]:
         """Points of the wheel's outline (n, 3) above the rail, and the vertical gap (m) between each point and the
@@ -141,7 +143,7 @@ class WheelAndRail:
         return points[over], self.rail.curve(points[over, 1]) - points[over, 2]
 
     def clearance(self, pose: Pose) -> float:
-        """Least vertical gap (m), refined between the points by a parabola."""
+        """Least vertical gap (m) between wheel and rail, refined between the points by a parabola."""
         gap = self.gaps(pose)[1]
         k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
         rise, bend = _parabola(gap, k)
@@ -181,7 +183,9 @@ def wheel_on_rail(
 
 
 def rail_in_track(rail: ContactProfile, track: Track) -> ContactProfile:
-    """The rail as it lies to the right of the track: inclined, its top at z = 0, its gauge face at half the gauge."""
+    """The rail profile as it lies to the right of the track: inclined, its top at z = 0, its gauge face at half the
+    gauge.
+    """
     inclined = rail.turned(track.inclination) if track.inclination else rail
     y, z = inclined.y, inclined.z - inclined.z.min()
     inner = (y < y[np.argmin(z)]) & (z <= track.gauge_depth)
@@ -214,15 +218,16 @@ def _parabola_minimum(gap: Array, k: int) -> float:
 
 def touching_pose(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRail | None = None) -> Pose:
     """Pose of the wheelset in which both wheels just touch. ``left`` : the mirrored left side, if it differs from the
-    right one."""
-    other = left or side
+    right one.
+    """
+    left_side = left or side
 
     def right_over_left(roll: float) -> float:
-        return side.clearance(Pose(shift, yaw, roll, 0.0)) - other.clearance(Pose(-shift, -yaw, -roll, 0.0))
+        return side.clearance(Pose(shift, yaw, roll, 0.0)) - left_side.clearance(Pose(-shift, -yaw, -roll, 0.0))
 
-    if right_over_left(-STEEPEST_ROLL) * right_over_left(STEEPEST_ROLL) > 0.0:
+    if right_over_left(-LARGEST_ROLL) * right_over_left(LARGEST_ROLL) > 0.0:
         raise InputError("", "lateral_shift", shift, "lets only one wheel touch: profiles, gauge and shift do not fit")
-    roll = float(brentq(right_over_left, -STEEPEST_ROLL, STEEPEST_ROLL, xtol=1e-13))
+    roll = float(brentq(right_over_left, -LARGEST_ROLL, LARGEST_ROLL, xtol=1e-13))
     return Pose(shift, yaw, roll, side.clearance(Pose(shift, yaw, roll, 0.0)))
 
 
@@ -255,7 +260,7 @@ def _touching_place(
     top = float(side.rail.y[np.argmin(side.rail.z)])
     between = np.linspace(top, y, 200)
     along = float(np.trapezoid(np.hypot(1.0, side.rail.curve(between, 1)), between))
-    ahead, across, _ = pose.turn.T @ (lowest - side.centre(pose))
+    ahead, across, _ = pose.rotation.T @ (lowest - side.axle_centre(pose))
     patch = Patch(distance, cut, abs(angle), along)
     wheel_y = float(across) - side.wheelset.arm
     return TouchingPlace(patch.low / float(np.cos(angle)), angle, wheel_y, y - top, float(ahead), patch)
@@ -267,7 +272,8 @@ def distance_over(
     """Undeformed distance over the tangent plane at a contact point of the rail, between two ends along the rail's
     contour.
 
-    contact_point : x, y, z in the track (m); angle : of the plane (rad); ends : from the place (m).
+    contact_point : x, y, z in the track (m); angle : of the plane (rad); contour_limits : ends, from the contact point
+    (m).
     """
     half = 1.2 * np.sqrt(2.0 * SURROUNDINGS_DISTANCE * side.wheelset.radius / np.cos(angle))
     rail_s, rail_n = _rail_heights(side.rail, contact_point, angle)
@@ -296,7 +302,7 @@ def _wheel_heights(side: WheelAndRail, pose: Pose, contact_point: Array, angle: 
         [[1.0, 0.0, 0.0], [0.0, np.cos(angle), np.sin(angle)], [0.0, -np.sin(angle), np.cos(angle)]]
     )
     base = contact_point + x[None, :, None] * ahead + s[:, None, None] * along
-    base, into = (base - side.centre(pose)) @ pose.turn, into @ pose.turn
+    base, into = (base - side.axle_centre(pose)) @ pose.rotation, into @ pose.rotation
     curve, slope, arm = side.wheel.curve, side.wheel.curve.derivative(), side.wheelset.arm
     height = np.zeros((s.size, x.size))
     for _ in range(ITERATIONS):

@@ -15,10 +15,10 @@ from models.brake.samples import moved
 from models.brake.sprung import FOLD, Sprung
 from models.brake.sprung_step import (
     GAVE_UP,
-    HELD,
     OVER,
     PLANE,
     UPRIGHT,
+    VALUES_PER_WHEEL,
     AtWheels,
     Contacts,
     OnEngine,
@@ -26,11 +26,11 @@ from models.brake.sprung_step import (
     WheelForces,
     advance,
     advance_with,
-    held,
-    held_forces,
-    hold,
-    meet,
-    set_held,
+    forces_and_contacts,
+    forces_from_pointers,
+    set_forces_from_block,
+    set_slip_angles,
+    store_mean_forces,
     to_units,
 )
 from models.brake.surfaces import OnRoad, surfaces, under_wheels
@@ -57,10 +57,10 @@ def driven(vehicle: Sprung, engine: str) -> Driven:
     """
     handling = vehicle.handling
     division = divided(handling, engine)
-    wheels = np.zeros(HELD * len(handling.vehicle.tyres))
+    wheels = np.zeros(VALUES_PER_WHEEL * len(handling.vehicle.tyres))
     table = np.concatenate((numbers_beside(handling, division), wheels))
     native = (*joint_parts(handling.vehicle), *division.native)
-    return Driven(handling.vehicle, handling.gravity, table, held, set_held, native)
+    return Driven(handling.vehicle, handling.gravity, table, forces_from_pointers, set_forces_from_block, native)
 
 
 class OnSprings:
@@ -85,7 +85,7 @@ class OnSprings:
         handling, size = self.vehicle.handling, self.size
         contacts, across = Contacts(*np.empty((3, self.wheels))), np.empty((self.wheels, size))
         for j, rate in enumerate(np.eye(size)):
-            held_forces(self._driven.numbers, np.zeros(size), rate, np.zeros(size), contacts)
+            forces_and_contacts(self._driven.numbers, np.zeros(size), rate, np.zeros(size), contacts)
             across[:, j] = contacts.across
         loads = np.array([handling.held.tyres[tyre.name] for tyre in handling.vehicle.tyres])
         damping = np.linalg.solve(mass(handling.vehicle), across.T @ (loads[:, None] * across))
@@ -131,7 +131,9 @@ class OnSprings:
         """``AtWheels`` for the wheel quantities at the end of a table; these share the table's memory."""
         wheels = Wheels(*np.zeros((KNOWN, self.wheels)))
         return AtWheels(
-            WheelForces(*table[-HELD * self.wheels :].reshape(HELD, self.wheels)), wheels, surfaces(self.wheels)
+            WheelForces(*table[-VALUES_PER_WHEEL * self.wheels :].reshape(VALUES_PER_WHEEL, self.wheels)),
+            wheels,
+            surfaces(self.wheels),
         )
 
     def advance(
@@ -207,17 +209,17 @@ class OnSprings:
         """
         on_engine, none = self._on_engine, np.zeros(steer.size)
         known = self._at_wheels(on_engine.numbers)
-        for part in known.held:
+        for part in known.wheel_forces:
             part[:] = 0.0
-        known.held.steer[:] = steer
-        held_forces(on_engine.numbers, *state, np.zeros(self.size), on_engine.contacts)
+        known.wheel_forces.steer[:] = steer
+        forces_and_contacts(on_engine.numbers, *state, np.zeros(self.size), on_engine.contacts)
         turning = on_engine.contacts.along / vehicle.plane.radius
         for whole, of_units in zip(state, on_engine.units.motion, strict=True):
             to_units(whole, on_engine.units.turns, of_units)
         under_wheels(on_engine.units.motion, 0.0, _alike(vehicle), known.surfaces)
         known.wheels.start[:] = on_engine.contacts.along
-        meet(on_engine.contacts, 0.0, known.surfaces.lag, vehicle.tables.angles, known.wheels)
-        hold(known, none, none, BLINK, motion_of(state, turning), _alike(vehicle))
+        set_slip_angles(on_engine.contacts, 0.0, known.surfaces.lag, vehicle.tables.angles, known.wheels)
+        store_mean_forces(known, none, none, BLINK, motion_of(state, turning), _alike(vehicle))
         return self._model.acceleration(0.0, *state), turning
 
 

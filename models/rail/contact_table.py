@@ -267,7 +267,7 @@ class WheelsetContact:
             single_patch = replace(wheel.normal_contact, patches=(replace(patch_pressure, load=load),))
             creep = roll(single_patch, self.friction, *creepage, cells=round(CELLS_PER_STRIP / self.cell_factor))
             forces.append((creep.fx, creep.fy, creep.mz))
-        pairs, axle = list(zip(wheel.touches, forces, strict=True)), wheel.pose.turn[:, 1]
+        pairs, axle = list(zip(wheel.touches, forces, strict=True)), wheel.pose.rotation[:, 1]
         lifted = sum(force[1] * math.sin(touch.angle) for touch, force in pairs)
         moment = sum(float(axle @ _patch_moment(self._arm(wheel.pose, touch), touch, force)) for touch, force in pairs)
         return replace(wheel, forces=forces, creep_lift=lifted, moment=moment)
@@ -276,7 +276,7 @@ class WheelsetContact:
         """Creepages and spin (1/m) at a point of first touch."""
         if self.friction == 0.0:
             return 0.0, 0.0, 0.0
-        axle, arm = pose.turn[:, 1], self._arm(pose, touch)
+        axle, arm = pose.rotation[:, 1], self._arm(pose, touch)
         velocity = spin * np.cross(axle, arm) + np.array([self.speed, 0.0, 0.0])
         across, into = _surface_axes(touch)
         slips = velocity[0] / self.speed, velocity @ across / self.speed, spin * axle @ into / self.speed
@@ -288,7 +288,7 @@ class WheelsetContact:
     def _arm(self, pose: Pose, touch: TouchingPlace) -> Array:
         """Vector from the wheelset's centre to a point of first touch, in the track's axes (m)."""
         height_below = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
-        return pose.turn @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, height_below])
+        return pose.rotation @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, height_below])
 
     def _patch_reports(self, wheel: LoadedWheel) -> tuple[PatchReport, ...]:
         """Reports of all patches of a wheel that carry load; patches that have grown together get one common report."""

@@ -153,5 +153,5 @@ def _rolling_radii(right_side: WheelAndRail, left_side: WheelAndRail, lateral_sh
 
 def rolling_radius(wheel_and_rail: WheelAndRail, pose: Pose) -> float:
     """Radius (m) of a wheel at the point nearest to its rail."""
-    across = float((pose.turn.T @ (lowest_point(wheel_and_rail, pose) - wheel_and_rail.centre(pose)))[1])
+    across = float((pose.rotation.T @ (lowest_point(wheel_and_rail, pose) - wheel_and_rail.axle_centre(pose)))[1])
     return float(wheel_and_rail.wheelset.radius + wheel_and_rail.wheel.curve(across - wheel_and_rail.wheelset.arm))

@@ -8,7 +8,7 @@ import numpy as np
 from models.brake.brake import PAPER_FRONT, of_wheels, torque
 from models.brake.controller import AllApplied, Command, Sample
 from models.brake.plane_chain import inertia
-from models.brake.plane_step import share_out
+from models.brake.plane_step import redistribute_negative_loads
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.port.ask import checked_answer
 from models.brake.surfaces import Stretch, road
@@ -160,7 +160,7 @@ def one_wheel_lifted(implementation: str, folder: Path) -> float:
         return np.array([loads.sum(), loads @ TRUCK.place[:, 0], loads @ TRUCK.place[:, 1]])
 
     balance_before = balance()
-    share_out(loads, TRUCK.place)
+    redistribute_negative_loads(loads, TRUCK.place)
     return float(np.abs(balance() - balance_before).max()) if loads.min() >= 0.0 else np.inf
 
 

@@ -5,13 +5,13 @@ import numpy as np
 from models.brake.plain.suspension import WheelForces
 from models.brake.plain.tyre import BrakedStep, Surface, WheelMotion
 from models.brake.plane_records import KNOWN, REPORT_SIZE, Report, Wheels
-from models.brake.plane_step import slide
+from models.brake.plane_step import set_slip_angle
 from models.brake.plane_step import tyre as compiled_tyre
 from models.brake.plane_vehicle import PAPER_TRUCK, Plane, plane_of_truck
 from models.brake.relaxation import Lag
 from models.brake.relaxation import lag_on as compiled_lag_on
 from models.brake.sprung import Sprung
-from models.brake.sprung_step import HELD
+from models.brake.sprung_step import VALUES_PER_WHEEL
 from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road, surfaces
 from models.brake.surfaces import under_wheels as compiled_under_wheels
 from models.brake.wheel_step import StepInput, Wheel
@@ -41,7 +41,7 @@ def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, bra
     )
     wheels.start[0], wheels.load[0] = motion.start, load
     forward_speed = motion.forward_speed if motion.start >= 0.0 else -motion.forward_speed
-    slide(0, forward_speed, motion.across, motion.least_speed, surfaces_below.lag, tables.angles, wheels)
+    set_slip_angle(0, forward_speed, motion.across, motion.least_speed, surfaces_below.lag, tables.angles, wheels)
     step_input = StepInput(motion.start, motion.start + braked.step * motion.rate, *braked.torques, braked.step)
     compiled_tyre(
         0,
@@ -95,5 +95,5 @@ def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
 def wheel_forces_in(table: np.ndarray, wheels: int = 4) -> WheelForces:
     """Views into a table of numbers on the quantities that are constant at each wheel during a step; writing to them
     changes the table."""
-    rows = table[-wheels * HELD :].reshape(HELD, wheels)
+    rows = table[-wheels * VALUES_PER_WHEEL :].reshape(VALUES_PER_WHEEL, wheels)
     return WheelForces(rows[0], rows[1:3].T, rows[3])

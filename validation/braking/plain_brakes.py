@@ -154,6 +154,6 @@ def friction_of_random_states(state_count: int = STATE_COUNT, seed: int = SEED) 
             chosen.angles, chosen.slips, chosen.loads, chosen.mu_x[None], chosen.g[None], chosen.h[None]
         )
         friction = plain_tyre.Friction(single_tables, plain_tyre.Surface(0, 0, 0.0), angle, load)
-        friction_along = friction.ahead()
-        plain[i] = np.interp(slip, friction_along.slips, friction_along.forces) / load, friction.aside(slip) / load
+        friction_along = friction.force_along()
+        plain[i] = np.interp(slip, friction_along.slips, friction_along.forces) / load, friction.side_force(slip) / load
     return coefficients, plain

@@ -179,7 +179,7 @@ def _nearby_and_saving_rows(choices: list[JudgedChoice]) -> list[Row]:
     """Rows over all scenes: whether the tolerance also holds at other speeds and with changed parameters, and the
     saving. Both are computed by methods that the choice does not use."""
     told_in_advance = sum(
-        bool(judged_choice.choice.said) and not judged_choice.choice.left_out for judged_choice in choices
+        bool(judged_choice.choice.refusal_texts) and not judged_choice.choice.left_out for judged_choice in choices
     )
     gaps = [abs(judged_choice.saving / judged_choice.sampled_saving - 1.0) for judged_choice in choices]
     saving = [judged_choice for judged_choice in choices if judged_choice.choice.left_out]
@@ -241,7 +241,7 @@ def _saving_row(choices: list[JudgedChoice]) -> Row:
 def _solver_count_rows() -> list[Row]:
     """Rows: numbers of eigenvalue problems and of Lyapunov equations that a choice solves for a car of 19 degrees of
     freedom, divided by the square of its number of effects."""
-    chooser = Chooser.of(whole_car())
+    chooser = Chooser.from_scene(whole_car())
     chooser.choose()
     pairs = len(chooser.effects) ** 2
     return [
@@ -261,7 +261,7 @@ def _solver_count_rows() -> list[Row]:
 
 
 def _half_car_chooser() -> Chooser:
-    return Chooser.of(load(HALF_CAR_SCENE))
+    return Chooser.from_scene(load(HALF_CAR_SCENE))
 
 
 def _half_car_rows() -> tuple[list[Row], dict[str, Any]]:
@@ -340,7 +340,7 @@ def _summary_of_choice(judged_choice: JudgedChoice) -> dict[str, Any]:
         "kept": choice.within_tolerance,
         "nearby": judged_choice.nearby_ratio,
         "measured": judged_choice.sampled_saving,
-        "said": list(choice.said),
+        "said": list(choice.refusal_texts),
         "left out": len(choice.left_out),
         "of": len(choice.candidates),
         "rounds": choice.confirmations,

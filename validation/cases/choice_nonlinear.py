@@ -52,10 +52,13 @@ def judge_ride(bent_ride: BentRide) -> JudgedByRuns:
     engine = ENGINES["ride"][0]
     choice = Chooser(bent_ride.opened(), engine, list(bent_ride.quantities), bent_ride.tolerance).choose()
     fresh = Variants(bent_ride.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
-    full_scene, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
+    full_scene, rest = fresh.quantities_of_run(), fresh.quantities_of_run(choice.left_out, choice.step_factor)
     if full_scene is None or rest is None:
         return JudgedByRuns("ride", engine, bent_ride, choice, np.full(len(bent_ride.quantities), np.inf))
-    again = [_significant_change(full_scene.of(name).cases[0], rest.of(name).cases[0]) for name in bent_ride.quantities]
+    again = [
+        _significant_change(full_scene.quantity(name).cases[0], rest.quantity(name).cases[0])
+        for name in bent_ride.quantities
+    ]
     return JudgedByRuns("ride", engine, bent_ride, choice, np.array(again))
 
 
@@ -186,7 +189,7 @@ def _summary_of_choice(judged_choice: JudgedByRuns) -> Saved:
         "tolerance": judged_choice.asked.tolerance,
         "quantities": list(judged_choice.asked.quantities),
         "left out": list(choice.left_out),
-        "times": choice.times,
+        "times": choice.step_factor,
         "predicted": choice.predicted_change.tolist(),
         "confirmed": choice.confirmed_change.tolist(),
         "kept": choice.within_tolerance,

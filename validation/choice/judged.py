@@ -59,7 +59,7 @@ def _by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -
 def worst_nearby(chooser: Chooser, omitted_effects: EffectSet, draws: int, seed: int) -> float:
     """Ratio of the largest change to the tolerance, over random speeds in the range with random errors of all
     parameters."""
-    random, reduced_scene, worst = np.random.default_rng(seed), chooser.rest(omitted_effects), 0.0
+    random, reduced_scene, worst = np.random.default_rng(seed), chooser.reduced_scene_without(omitted_effects), 0.0
     low, high = chooser.full_scenes[0].speed, chooser.full_scenes[-1].speed
     names = uncertain_parameters(chooser.scene.vehicle)
     for _ in range(draws):
@@ -105,9 +105,11 @@ def judged_of(request: ChoiceQuestion, system: str, engine: str) -> JudgedByRuns
     chooser = ChooserByRuns(request.scene(), engine, list(request.quantities), request.tolerance)
     choice, runs = chooser.choose(), chooser.whole.variants
     full_run = runs.system.computed_quantities(request.scene(), engine)
-    reduced_run = runs.system.computed_quantities(runs.changed(frozenset(choice.left_out), choice.times), engine)
+    reduced_run = runs.system.computed_quantities(
+        runs.changed_scene(frozenset(choice.left_out), choice.step_factor), engine
+    )
     confirmed_changes = [
-        largest_change(full_run.of(name).cases, reduced_run.of(name).cases) for name in request.quantities
+        largest_change(full_run.quantity(name).cases, reduced_run.quantity(name).cases) for name in request.quantities
     ]
     return JudgedByRuns(system, engine, request, choice, np.array(confirmed_changes))
 

@@ -35,7 +35,7 @@ def price_of_choice() -> tuple[tuple[float, float, float], float]:
 
     def choose() -> None:
         with scene_errors(scene):
-            Chooser.of(scene).choose()
+            Chooser.from_scene(scene).choose()
 
     jobs = (choose, lambda: run(scene, "reference", error=scene.error))
     seconds = interleave(jobs, TIMING_ROUNDS, 1e-3, clock=time.process_time)

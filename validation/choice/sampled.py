@@ -85,8 +85,8 @@ class Sampled:
     def _by_road(self, axle: int) -> np.ndarray:
         """Matrix (q, m) that gives the quantities from the states of the road filters of one axle."""
         m = len(self._rate)
-        first_column = self.march.vehicle + axle * m
-        return self.march.read[:, first_column : first_column + m]
+        first_column = self.march.vehicle_state_count + axle * m
+        return self.march.output_matrix[:, first_column : first_column + m]
 
     @cached_property
     def _motion_covariance(self) -> np.ndarray:

@@ -16,7 +16,16 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 from models.contact.fastsim_grid import MOST_STRIPS, POWERS, Bound
-from models.contact.fastsim_many import AGAINST, GROWTH, OF_SPIN, OF_X, REACH, REACH_BY_RATIO, SLIDING, SPIN_BY_RATIO
+from models.contact.fastsim_many import (
+    BLEND_POWER,
+    BLEND_REACH,
+    OPPOSING_SPIN_SHARE,
+    REACH_BY_RATIO,
+    SLIDING_SQUARE,
+    SPIN_BY_RATIO,
+    SPIN_WEIGHT,
+    X_WEIGHT,
+)
 from models.contact.inputs import Array
 from models.contact.linear_theory import LONG_C33, LONG_FADING, LONG_RATIOS, NARROW_FADING, RATIOS, STIFFER_SPIN, TABLE
 from models.contact.linear_theory import POWERS as OF_NU
@@ -143,10 +152,10 @@ def _flexibility_share(ellipse: PlainEllipse, reach: Array) -> float:
     """Weight of the common flexibility relative to the three separate ones, from the scaled creepages (3,)."""
     x, y, z = reach
     shape = min(max(ellipse.a / ellipse.b, 0.1), 10.0)
-    turns = OF_SPIN * shape**SPIN_BY_RATIO * z
-    rolling = (OF_X * x) ** 2 + y**2 + turns**2 + 2.0 * AGAINST * y * turns
-    begun = (math.sqrt(rolling) / (REACH * shape**REACH_BY_RATIO)) ** GROWTH
-    slides = (x**2 + y**2) / (1.0 + z**2) / SLIDING
+    turns = SPIN_WEIGHT * shape**SPIN_BY_RATIO * z
+    rolling = (X_WEIGHT * x) ** 2 + y**2 + turns**2 + 2.0 * OPPOSING_SPIN_SHARE * y * turns
+    begun = (math.sqrt(rolling) / (BLEND_REACH * shape**REACH_BY_RATIO)) ** BLEND_POWER
+    slides = (x**2 + y**2) / (1.0 + z**2) / SLIDING_SQUARE
     return 1.0 - math.exp(-begun - slides**3)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from models.contact.fastsim import Creep, RollingEllipse, fastsim
 from models.contact.hertz import by_axes
-from models.contact.simplified_theory import CELLS, PAPER, NormalContact, Rolling, roll
+from models.contact.simplified_theory import FINE_CELLS, PAPER, NormalContact, Rolling, roll
 from models.machine.seconds import cost
 from models.machine.timing import interleave
 from models.systems.contact.run import interpenetrating
@@ -42,7 +42,7 @@ def compare(cases: list[ContactCase]) -> dict[str, Any]:
     return {"errors": errors, "normal": normal, "seconds": seconds}
 
 
-PROGRAM_OF_1982: dict[str, Any] = {"cells": CELLS, "march": "plain", "flexibilities": "one", "bound": "parabolic"}
+PROGRAM_OF_1982: dict[str, Any] = {"cells": FINE_CELLS, "march": "plain", "flexibilities": "one", "bound": "parabolic"}
 """The program of 1982, on as many cells as the fine net of the other one has."""
 
 
@@ -87,7 +87,7 @@ def table(comparison: dict[str, Any]) -> Table:
     return Table(
         "The programs of 1982 and 1983",
         "Kalker's own comparison (1983) with measured figures; both to the "
-        f"letter, {CELLS} strips and cells, times of one call from Python: median and range of rounds.",
+        f"letter, {FINE_CELLS} strips and cells, times of one call from Python: median and range of rounds.",
         ("", "1982", "1983"),
         rows,
     )

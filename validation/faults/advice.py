@@ -56,7 +56,7 @@ class Swing:
     the run that is searched."""
 
     title, quantity, unit, kink_period, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
-    whole, first = 8.0, 2.0
+    full_duration, searched_duration = 8.0, 2.0
 
     def ladders(self) -> list[SettingLadder]:
         """Settings of four methods of one engine: the default has order 2, and one method breaks down at a finer
@@ -73,7 +73,7 @@ class Swing:
         judged."""
         return SettingLadder("reference", "RK4", tuple(0.1 / 2**k for k in range(8)), 4)
 
-    def second(self, reference_setting: Setting) -> None:
+    def second_setting(self, reference_setting: Setting) -> None:
         """None, as no second method is needed: the checks know the closed form."""
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
@@ -90,7 +90,7 @@ class Swing:
         )
         return sample_times, np.array(swing), len(stage_positions) * n
 
-    def answer(self, solution: tuple[np.ndarray, np.ndarray, int]) -> PricedRun:
+    def priced_run(self, solution: tuple[np.ndarray, np.ndarray, int]) -> PricedRun:
         """The quantity y of a solution."""
         times, values, calls = solution
         return PricedRun(times, values[:, None], {"force calls": calls})
@@ -111,7 +111,7 @@ def _step(t: float, y: float, step: float, stage_positions: tuple[float, ...], w
 @cache
 def _error(setting: Setting) -> float:
     """True error over the complete run; infinite if a value is not finite."""
-    sample_times, values, _ = Swing().solve(setting, Swing.whole)
+    sample_times, values, _ = Swing().solve(setting, Swing.full_duration)
     worst = float(np.abs(values - np.exp(np.sin(sample_times))).max())
     return worst if math.isfinite(worst) else math.inf
 
@@ -121,7 +121,7 @@ def _fewest_calls(tolerance: float) -> int:
     """Fewest force calls with which any setting keeps the tolerance, found by running all settings."""
     swing = Swing()
     return min(
-        swing.solve(setting, swing.whole)[2]
+        swing.solve(setting, swing.full_duration)[2]
         for ladder in swing.ladders()
         for setting in map(ladder.setting, range(len(STEPS_TRIED)))
         if _error(setting) <= tolerance
@@ -212,20 +212,20 @@ def _dearest_choice(timed_choices: list[SettingChoice], engine: str, cost_kind: 
     return max(timed_choices, key=lambda choice: choice.calls, default=None)
 
 
-def _mean_error(self: ReferenceTruth, other_answer: PricedRun) -> float:
-    exact = values_at(self.answer, other_answer.times, self.kink_period)
-    return float(np.abs(other_answer.values - exact).mean()) if np.isfinite(other_answer.values).all() else np.inf
+def _mean_error(self: ReferenceTruth, other_run: PricedRun) -> float:
+    exact = values_at(self.run, other_run.times, self.kink_period)
+    return float(np.abs(other_run.values - exact).mean()) if np.isfinite(other_run.values).all() else np.inf
 
 
-def _numbers_alone(self: ReferenceTruth, other_answer: PricedRun) -> float:
-    exact = values_at(self.answer, other_answer.times, self.kink_period)
-    return float(np.nanmax(np.abs(other_answer.values - exact)))
+def _numbers_alone(self: ReferenceTruth, other_run: PricedRun) -> float:
+    exact = values_at(self.run, other_run.times, self.kink_period)
+    return float(np.nanmax(np.abs(other_run.values - exact)))
 
 
 def _first_rung(
     scene: Any, ladder: SettingLadder, tolerance: float, duration: float, first_rung: int, executor: object
 ) -> Any:
-    return scene.answer(scene.solve(ladder.setting(0), duration)), 0, 0.0, 0.0, {}
+    return scene.priced_run(scene.solve(ladder.setting(0), duration)), 0, 0.0, 0.0, {}
 
 
 FAULTS = (

@@ -53,7 +53,7 @@ def _by_frequency() -> tuple[RideChoice, np.ndarray, float]:
 
 def _choice_by_runs() -> JudgedByRuns:
     """The choice by runs for the half car, judged by two further runs."""
-    return _choice_with_functions(Chooser.__init__, Chooser.confirm, Screen.relative_changes)
+    return _choice_with_functions(Chooser.__init__, Chooser.confirmed_changes, Screen.relative_changes)
 
 
 @cache
@@ -137,13 +137,13 @@ def _any_tolerance(original: Any) -> Any:
 def _unconfirmed_report(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> Callable[[Any], Any]:
     """Fault: predicted changes are reported as confirmed without a run."""
 
-    def confirm(chooser: Chooser, omitted_effects: frozenset[str]) -> np.ndarray:
-        step_factor = chooser.reach(omitted_effects)
+    def confirmed_changes(chooser: Chooser, omitted_effects: frozenset[str]) -> np.ndarray:
+        step_factor = chooser.longest_step_factor(omitted_effects)
         shares = change(chooser, omitted_effects, step_factor)
         chooser._confirmed[omitted_effects] = step_factor, shares, np.zeros_like(shares)
         return shares
 
-    return lambda real: confirm
+    return lambda real: confirmed_changes
 
 
 LINEAR_MODULES, RUN_MODULES = "models.advice.ride_choice", "models.advice.choice"
@@ -178,22 +178,23 @@ FAULTS = (
         "parameters that are off taken as they stand",
         "choice of linear scenes",
         attribute_patch(
-            f"{LINEAR_MODULES}.choose:Chooser.off", lambda real: lambda chooser, chosen: chooser.between(chosen)
+            f"{LINEAR_MODULES}.choose:Chooser.off",
+            lambda real: lambda chooser, chosen: chooser.changes_between_speeds(chosen),
         ),
     ),
     CampaignFault(
         "predictions reported as confirmed",
         "choice by runs",
         attribute_patch(
-            f"{RUN_MODULES}.choose:Chooser.confirm",
-            _unconfirmed_report(lambda chooser, chosen, times: chooser.told(chosen, times)),
+            f"{RUN_MODULES}.choose:Chooser.confirmed_changes",
+            _unconfirmed_report(lambda chooser, chosen, times: chooser.change_with_longer_steps(chosen, times)),
         ),
     ),
     CampaignFault(
         "confirmed against itself",
         "choice by runs",
         attribute_patch(
-            f"{RUN_MODULES}.choose:Chooser.confirm",
+            f"{RUN_MODULES}.choose:Chooser.confirmed_changes",
             _unconfirmed_report(lambda chooser, *_: np.zeros(len(chooser.whole.quantities))),
         ),
     ),

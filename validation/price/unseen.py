@@ -236,7 +236,7 @@ def verdicts_on_scene(
 def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
     """Largest error of each setting over the complete run, against DOP853. All settings are compared at common instants
     where their steps have such."""
-    runs = {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in settings}
+    runs = {setting: scene.priced_run(scene.solve(setting, scene.full_duration)) for setting in settings}
     parts = {setting: 1 if setting.adaptive else round(scene.base / setting.value) for setting in runs}
     common = _fine_multiple(scene, math.lcm(*parts.values()))
     if scene.base / common < FINE_SPACING:
@@ -256,7 +256,7 @@ def _fine_multiple(scene: PricedPitchPlane, part_count: int) -> int:
 
 
 def _exact_answer(scene: PricedPitchPlane, spacing: float) -> PricedRun:
-    return scene.answer(scene.run("reference", Settings("DOP853", spacing, scene.whole, TRUTH_TOLERANCE)))
+    return scene.priced_run(scene.run("reference", Settings("DOP853", spacing, scene.full_duration, TRUTH_TOLERANCE)))
 
 
 def default_is_cheaper(recommendation: Recommendation, key: tuple[str, str], choice: SettingChoice) -> bool:
@@ -271,7 +271,7 @@ def default_is_cheaper(recommendation: Recommendation, key: tuple[str, str], cho
 def _coarsest_defaults(recommendation: Recommendation) -> list[TriedSetting]:
     """The coarsest setting of each default method that keeps the tolerance. If the complete run was searched, all tried
     settings count, as the recommendation may have missed one."""
-    if not recommendation.whole:
+    if not recommendation.searched_whole_run:
         return [
             tried.refined.tried
             for tried in recommendation.defaults.values()
@@ -289,7 +289,7 @@ def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, r
     if rival.setting == choice.tried.setting or rival.seconds > CONTEST_RATIO * choice.seconds:
         return False
     jobs = [
-        partial(recommendation.scene.solve, attempt.setting, recommendation.scene.first)
+        partial(recommendation.scene.solve, attempt.setting, recommendation.scene.searched_duration)
         for attempt in (choice.tried, rival)
     ]
     return all(

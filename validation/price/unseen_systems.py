@@ -119,9 +119,9 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
         exact = (
             _exact_answer(scene, setting)
             if isinstance(scene, MeshedScene)
-            else scene.answer(scene.solve(finer, scene.whole))
+            else scene.priced_run(scene.solve(finer, scene.full_duration))
         )
-        return ReferenceTruth(exact, 0.0, "", 0).error(scene.answer(scene.solve(setting, scene.whole)))
+        return ReferenceTruth(exact, 0.0, "", 0).error(scene.priced_run(scene.solve(setting, scene.full_duration)))
 
     return {setting: error(setting) for setting in settings}
 
@@ -129,4 +129,4 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
 def _exact_answer(scene: MeshedScene, setting: Setting) -> PricedRun:
     cells = min(MOST_CELLS, max(FEWEST_CELLS, TRUTH_CELLS_RATIO * round(1.0 / setting.value))) if scene.cells else 0
     step = min(scene.steps.values()) if scene.cells else setting.value
-    return scene.answer((cells, scene.exact(cells, step, scene.whole)))
+    return scene.priced_run((cells, scene.exact(cells, step, scene.full_duration)))

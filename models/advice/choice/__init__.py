@@ -1,4 +1,5 @@
-"""Which effects a scene's quantities call for, by runs: what each costs and changes, and what may be left out.
+"""Choice of effects by test runs: what each effect of a scene costs and changes, and which ones may be left out within
+a tolerance.
 
     scene -> Variants (less effects, with longer steps) -> Screen (differences, pair by pair) -> Choice (confirmed)
 

@@ -1,4 +1,4 @@
-"""Results of any scene as numbers by which two runs can be compared, and the cost of the run."""
+"""Quantities of a simulation run as numbers by which two runs can be compared, and the cost of the run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -9,18 +9,22 @@ from scipy.special import stdtrit
 from models.core.errors import InputError
 
 Cases = tuple[np.ndarray, ...]
-"""One quantity in every case of a scene (procedure, manoeuvre, speed, creepage): its path (n,), or one number (1,)."""
+"""One quantity in every case of a scene (procedure, manoeuvre, speed, creepage): its time history (n,), or a single
+number (1,).
+"""
 SMALLEST_CASE_SHARE = 1e-3
-"""Of the largest case: changes of a smaller one are relative to this share."""
+"""Smallest size of a case as a share of the largest case's: changes of smaller cases are divided by this size."""
 ROUNDING_SHARE, ABSOLUTE_ROUNDING = 1e-10, 1e-15
-"""Of the largest value in a unit, and in SI units: what moves less does not move at all, but for rounding."""
+"""Rounding limits: a share of the largest value in the same unit, and a value in SI units. Smaller changes are only
+rounding.
+"""
 SCALAR_OF_PATH = {"rms": lambda path: np.sqrt(np.mean(path**2)), "max": lambda path: np.abs(path).max()}
-"""Words that make a number of a path, as in "rms f1"."""
+"""Functions that make one number of a time history, by the word that asks for them, as in "rms f1"."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity's unit, and its values in every case (a run, or a part of it).
+    """A quantity's unit, and its values in every case of the run (procedure, manoeuvre, speed, creepage).
 
     sampled : each case holds mean squares (m,) of independent samples; the quantity is the root of their mean.
     """
@@ -31,22 +35,22 @@ class Quantity:
 
     @property
     def sizes(self) -> np.ndarray:
-        """Sizes by which changes of the quantity are divided, one for each case."""
+        """Reference sizes of the quantity, one for each case; changes are divided by them."""
         return np.sqrt([case.mean() for case in self.cases]) if self.sampled else scale_of_cases(self.cases)
 
 
 @dataclass(frozen=True)
 class RunQuantities:
-    """Quantities of a run by name, CPU seconds of the march alone, and counts that repeat exactly: "steps", "calls" of
-    the right-hand side, "states", and "terms", where a call evaluates any besides these (cells of contact patches,
-    waves of roads).
+    """Quantities of a run by name, CPU seconds of the time integration alone, and counts that repeat exactly: "steps",
+    "calls" of the right-hand side, "states", and "terms", where a call evaluates further terms (cells of contact
+    patches, waves of roads).
     """
 
     quantities: dict[str, Quantity]
     counts: dict[str, int]
     seconds: float = field(compare=False)
 
-    def of(self, name: str, file: str = "") -> Quantity:
+    def quantity(self, name: str, file: str = "") -> Quantity:
         """A quantity by its name, or the "rms" or "max" of one; InputError for an unknown name."""
         if name in self.quantities:
             return self.quantities[name]
@@ -61,8 +65,8 @@ class RunQuantities:
 
 
 def scale_of_cases(full_results: Sequence[np.ndarray]) -> np.ndarray:
-    """Sizes by which changes are divided, one for each case: the standard deviation of a path, the magnitude of a
-    number.
+    """Reference sizes by which changes are divided, one for each case: the standard deviation of a time history, the
+    magnitude of a single number.
 
     A case that hardly moves compared with the others has at least the size SMALLEST_CASE_SHARE times the largest one.
     """
@@ -82,11 +86,14 @@ def rounding_floor(run_quantities: RunQuantities, unit: str) -> float:
 
 
 CONFIDENCE_PROBABILITY = 0.9985
-"""Probability that chance adds no more to either side than is said of it."""
+"""One-sided probability of Student's t for statistical errors: on either side, chance adds more than the stated error
+in 0.15 % of the cases.
+"""
 
 
-def by_chance(differences: Cases, full_results: Cases) -> tuple[float, float]:
-    """Largest relative change of a sampled quantity, and the statistical error of this change.
+def sampled_change_and_error(differences: Cases, full_results: Cases) -> tuple[float, float]:
+    """Largest relative change among the cases of a quantity that is a root mean square of samples, and the statistical
+    error of this change.
 
     The ratio of two means over m samples that met the same roads, and its standard error by what each sample differs
     from it, times Student's t for m - 1.
@@ -108,7 +115,7 @@ def by_chance(differences: Cases, full_results: Cases) -> tuple[float, float]:
 
 
 def difference_of_runs(run: Cases, full_results: Cases) -> Cases:
-    """Differences of two runs at the times that both have, which are those of the run with longer steps.
+    """Differences of two runs, case by case, at the output times of the run with longer steps.
 
     Raises InputError where the runs have no common times, as those that end by themselves.
     """
@@ -125,19 +132,19 @@ def difference_of_runs(run: Cases, full_results: Cases) -> Cases:
 
 
 def _at_common_times(*paths: np.ndarray) -> list[np.ndarray]:
-    """The paths at those times that all of them have."""
+    """Time histories thinned to the output times that all of them have."""
     row_count = min(map(len, paths))
     return [path[:: (len(path) - 1) // max(row_count - 1, 1) or 1] for path in paths]
 
 
 def sum_of_differences(*changes: Cases) -> Cases:
-    """Sum of several differences, at those times that all of them have."""
+    """Sum of several differences of runs, case by case, at the output times that all of them have."""
     return tuple(np.sum(_at_common_times(*parts), axis=0) for parts in zip(*changes, strict=True))
 
 
 def largest_relative_change(differences: Cases, full_size: np.ndarray) -> float:
-    """Largest relative change among the cases: the rms difference of a path, or the difference of a number, divided by
-    its size.
+    """Largest relative change among the cases: the rms difference of a time history, or the difference of a single
+    number, divided by the case's reference size.
     """
     largest_differences = np.array([float(np.sqrt(np.mean(difference**2))) for difference in differences])
     with np.errstate(divide="ignore", invalid="ignore"):

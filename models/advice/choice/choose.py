@@ -1,4 +1,4 @@
-"""Which effects a scene's quantities can do without, and how long its steps may be: screened, chosen, confirmed.
+"""Choice of effects: which ones a scene's quantities can do without, and how long its time steps may be.
 
 Screened are cheap runs: with steps as much longer as costs a small share of the tolerance over the first part of the
 scene; without single effects, and without pairs. Of all that the screen keeps within the tolerance, the next to go is
@@ -30,46 +30,45 @@ from models.core.assumptions import BrokenAssumption
 from models.core.errors import InputError
 
 PREDICTION_SHARE = 0.8
-"""Share of the tolerance that predictions may use."""
+"""Share of the tolerance that the predicted change may use."""
 SCREENED_STEP_SHARE = 0.05
-"""Share of the tolerance that the steps of screened runs may cost."""
+"""Share of the tolerance that the longer steps of screening runs may cost."""
 SAMPLED_STEP_SHARE = 0.15
-"""The same where samples are compared that met the same roads: what a step costs is in both of them."""
+"""Share as SCREENED_STEP_SHARE for samples that met the same roads: both compared runs have the step error."""
 STEP_CHECK_REFINEMENT = 8
-"""Steps so many times as short tell what the longest ones cost."""
+"""Factor by which steps are refined to find the error of the longest ones."""
 STEP_SEARCH_SHARE = 0.25
-"""Share of a run by which these steps are chosen."""
+"""Share of a run over which the longest steps of screening runs are searched."""
 NEGLIGIBLE_SHARE = 1e-3
 """Share of the tolerance below which an error counts as none."""
 STEP_REDUCTION = 2
-"""Times that steps become shorter where a confirmation fails, before effects are taken back."""
+"""Number of times that steps become shorter after a failed confirmation, before effects are put back."""
 MOST_CONFIRMATIONS = 30
-"""Sets that are confirmed at most."""
+"""Largest number of sets of effects that are confirmed by runs of the whole scene."""
 PAIRS_IN_ADVANCE = 16
-"""Pairs whose runs are computed ahead at once, where there is somebody to compute them."""
+"""Number of pairs of effects whose runs the executor computes in advance at once."""
 RUN_BUDGET = 100
-"""Runs of the scene, by their calls, that the search may take."""
+"""Largest cost of the search in right-hand side calls, as a multiple of one run of the whole scene."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Result of a choice of effects: those ``left_out`` of all ``candidates``, a step that is ``times`` as long, and
-    relative changes (quantities,).
+    """Result of a choice of effects: the effects ``left_out`` of all ``candidates``, the factor ``step_factor`` by
+    which the step is longer, and relative changes (quantities,).
 
     predicted_change : by the screen; prediction_remainder : estimate of what the prediction omits; confirmed_change :
-    over the whole run;
-    statistical_error : statistical error of this, where quantities are means of samples; within_tolerance : whether
-    each sum of both is. calls and seconds (CPU) : of the scene, of the scene with longer steps alone, and of the
-    reduced scene.
-    confirmations : runs of the whole scene for confirmation; calls_of_search : calls of all runs. sample_factor :
-    factor, roughly, by which more samples would let more effects be left out, 0 where statistical errors prevent
-    nothing. ended_early : whether the search ended before all sets were tried. assumptions_barring : for effects that
-    stay, the assumptions that the scene keeps and that would be broken without them.
+    over the whole run; statistical_error : of the confirmed change, where quantities are means of samples;
+    within_tolerance : whether each sum of both is. calls and seconds (CPU) : of the scene, of the scene with longer
+    steps alone, and of the reduced scene. confirmations : runs of the whole scene for confirmation; calls_of_search :
+    calls of all runs. sample_factor : factor, roughly, by which more samples would let more effects be left out, 0
+    where statistical errors prevent nothing. ended_early : whether the search ended before all sets were tried.
+    assumptions_barring : for effects that stay, the assumptions that the scene keeps and that would be broken without
+    them.
     """
 
     candidates: tuple[str, ...]
     left_out: tuple[str, ...]
-    times: int
+    step_factor: int
     predicted_change: np.ndarray
     prediction_remainder: np.ndarray
     confirmed_change: np.ndarray
@@ -85,8 +84,8 @@ class Choice:
 
 
 class Chooser:
-    """Search for the effects of a scene that can be left out in one implementation, for quantities (see
-    ``models.advice.choice.answer``) and a tolerance.
+    """Search for the effects that a scene can do without, for given quantities (see ``models.advice.choice.answer``), a
+    tolerance and one implementation.
 
     progress(share) : called with the share that is spent of the runs that the search may make. executor : computes the
     runs without one or two effects that the screen will need; runs that confirm, and timed runs, are made by this
@@ -104,20 +103,20 @@ class Chooser:
     ) -> None:
         self.tolerance, self.progress = tolerance, progress
         self.whole = Screen(Variants(scene, engine, executor), quantities)
-        self.alike = self.whole.sampled == set(quantities)
-        partial_screen = self._part_screen()
+        self.all_sampled = self.whole.sampled == set(quantities)
+        partial_screen = self._partial_screen()
         self.step_factor, self.error = self._longest_screen_step(partial_screen)
-        self.teller = self._coarse_screen(self.whole)
-        self.screen = self._coarse_screen(partial_screen) if self.alike else self.teller
-        self.lengths = [self.step_factor * k for k in self.screen.variants.lengths()]
+        self.reporting_screen = self._coarse_screen(self.whole)
+        self.screen = self._coarse_screen(partial_screen) if self.all_sampled else self.reporting_screen
+        self.step_factors = [self.step_factor * k for k in self.screen.variants.step_factors()]
         self.effects = self.whole.variants.effects
-        self._reach: dict[EffectSet, int] = {}
+        self._longest_step_factors: dict[EffectSet, int] = {}
         self._confirmed: dict[EffectSet, tuple[int, np.ndarray, np.ndarray]] = {}
         self._pairs: list[EffectSet] | None = None
-        self.rounds, self._doubtful, self.ended = 0, list[float](), False
+        self.rounds, self._sample_factors, self.ended = 0, list[float](), False
 
-    def _part_screen(self) -> Screen:
-        """Screen of the first part of the scene, or of a few of its samples."""
+    def _partial_screen(self) -> Screen:
+        """Screen over a part of the run or over a few of its samples; over all of it if it cannot be cut."""
         all_variants = self.whole.variants
         if not all_variants.system.WINDOWED:
             return self.whole
@@ -127,39 +126,37 @@ class Chooser:
         return self.whole if partial_variants is all_variants else Screen(partial_variants, self.whole.quantities)
 
     def _coarse_screen(self, screen: Screen) -> Screen:
-        """Screen of the same runs in longer steps, by the factor ``step_factor``."""
+        """Screen of the same runs with steps longer by the factor ``step_factor``."""
         runs = screen.variants
-        coarse = Variants(runs.changed(frozenset(), self.step_factor), runs.engine, runs.executor)
+        coarse = Variants(runs.changed_scene(frozenset(), self.step_factor), runs.engine, runs.executor)
         return screen if self.step_factor == 1 else Screen(coarse, screen.quantities)
 
     def _longest_screen_step(self, screen: Screen) -> tuple[int, np.ndarray]:
-        """Longest steps that are allowed for the screen, as a multiple of the scene's own, and the relative changes
-        (quantities,) that they cause.
-        """
+        """Longest step factor of screening runs, and the relative changes (quantities,) that it causes."""
         all_variants = self.whole.variants
-        lengths = [k for k in all_variants.lengths() if k in screen.variants.lengths()]
-        allowed = (SAMPLED_STEP_SHARE if self.alike else SCREENED_STEP_SHARE) * self.tolerance
-        longest, error = self._longest_allowed(screen, frozenset(), lengths, allowed)
-        while all_variants.of(step_factor=longest) is None:  # its run fails after that part
-            longest = max(k for k in lengths if k < longest)
+        step_factors = [k for k in all_variants.step_factors() if k in screen.variants.step_factors()]
+        allowed = (SAMPLED_STEP_SHARE if self.all_sampled else SCREENED_STEP_SHARE) * self.tolerance
+        longest, error = self._longest_allowed(screen, frozenset(), step_factors, allowed)
+        while all_variants.quantities_of_run(step_factor=longest) is None:  # its run fails after that part
+            longest = max(k for k in step_factors if k < longest)
         return longest, error
 
     def _longest_allowed(
-        self, screen: Screen, omitted_effects: EffectSet, lengths: list[int], largest_change: float
+        self, screen: Screen, omitted_effects: EffectSet, step_factors: list[int], largest_change: float
     ) -> tuple[int, np.ndarray]:
-        """Longest step of ``lengths`` whose relative changes (quantities,) are allowed, and these changes. It is found
-        by bisection; the first step is always allowed.
+        """Longest step of ``step_factors`` that changes no quantity by more than ``largest_change``, by bisection, and
+        its relative changes (quantities,). The first step is always allowed.
         """
-        low, high, shares = 0, len(lengths), np.zeros(len(screen.quantities))
+        low, high, shares = 0, len(step_factors), np.zeros(len(screen.quantities))
         while high - low > 1:
             middle = (low + high) // 2
-            tried = screen.of_step(omitted_effects, lengths[middle] // lengths[0])
+            tried = screen.change_by_longer_steps(omitted_effects, step_factors[middle] // step_factors[0])
             low, high, shares = (middle, high, tried) if (tried <= largest_change).all() else (low, middle, shares)
-        return lengths[low], shares
+        return step_factors[low], shares
 
     def share(self, omitted_effects: EffectSet) -> float:
-        """Ratio of the largest predicted change, with a bound on what the prediction omits, to the tolerance; infinite
-        where leaving the effects out breaks an assumption that the scene keeps.
+        """Ratio of the largest predicted change, with an estimate of what the prediction omits, to the tolerance;
+        infinite where leaving the effects out breaks an assumption that the scene keeps.
         """
         if self.breaks_assumption(omitted_effects):
             return math.inf
@@ -171,8 +168,8 @@ class Chooser:
         return float(np.max(error)) / self.tolerance
 
     def breaks_assumption(self, omitted_effects: EffectSet) -> bool:
-        """Whether leaving out these effects breaks an assumption that the scene keeps. For more than two effects this
-        is predicted from pairs: it does if, for some effect, every pair with another one does.
+        """Whether leaving out these effects breaks an assumption that the scene keeps. For more than two, predicted
+        from pairs: some effect breaks one in every pair with another effect.
         """
         runs = self.screen.variants
         if len(omitted_effects) <= 2:
@@ -182,29 +179,32 @@ class Chooser:
             for effect in omitted_effects
         )
 
-    def reach(self, omitted_effects: EffectSet) -> int:
-        """Longest step without these effects that the predictions allow, as a multiple of the scene's own."""
-        if omitted_effects not in self._reach:
+    def longest_step_factor(self, omitted_effects: EffectSet) -> int:
+        """Longest step without these effects that the predictions allow, as a multiple of the scene's step."""
+        if omitted_effects not in self._longest_step_factors:
             left = max(0.0, PREDICTION_SHARE - self.share(omitted_effects)) * self.tolerance
-            self._reach[omitted_effects], _ = self._longest_allowed(self.screen, omitted_effects, self.lengths, left)
-        return self._reach[omitted_effects]
+            self._longest_step_factors[omitted_effects], _ = self._longest_allowed(
+                self.screen, omitted_effects, self.step_factors, left
+            )
+        return self._longest_step_factors[omitted_effects]
 
     def work(self, omitted_effects: EffectSet) -> float:
-        """Work of a run without these effects in the longest step that is allowed; infinite if the run fails."""
-        return self.screen.variants.work(omitted_effects, self.reach(omitted_effects) // self.step_factor)
+        """Predicted work of a run without these effects with the longest allowed step; infinite if the run fails."""
+        return self.screen.variants.work(omitted_effects, self.longest_step_factor(omitted_effects) // self.step_factor)
 
-    def confirm(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Relative changes (quantities,) over the whole run without these effects, plus their statistical errors, in
-        the longest step that is confirmed, or nearly so.
+    def confirmed_changes(self, omitted_effects: EffectSet) -> np.ndarray:
+        """Relative changes (quantities,) over the whole run without these effects, plus their statistical errors, with
+        the longest step that meets the tolerance, else with the shortest of the few that are tried.
         """
         if omitted_effects not in self._confirmed:
-            longest = self.reach(omitted_effects)
-            for step_factor in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][
+            longest = self.longest_step_factor(omitted_effects)
+            for step_factor in [k for k in reversed(self.whole.variants.step_factors()) if k <= longest][
                 : 1 + STEP_REDUCTION
             ]:
                 self.rounds += 1
-                change = self.whole.between(
-                    self.whole.variants.of(omitted_effects, step_factor), self.whole.variants.of()
+                change = self.whole.differences_of_runs(
+                    self.whole.variants.quantities_of_run(omitted_effects, step_factor),
+                    self.whole.variants.quantities_of_run(),
                 )
                 shares, chance = self.whole.relative_changes(change), self.whole.statistical_errors(change)
                 if self.whole.variants.newly_broken(omitted_effects, step_factor):
@@ -213,30 +213,28 @@ class Chooser:
                 if self.within_tolerance(shares + chance):
                     break
                 if (shares < self.tolerance).all():
-                    self._doubtful.append(float(np.max(chance / (self.tolerance - shares)) ** 2))
+                    self._sample_factors.append(float(np.max(chance / (self.tolerance - shares)) ** 2))
         return np.add(*self._confirmed[omitted_effects][1:])
 
     def within_tolerance(self, changes: np.ndarray) -> bool:
-        """Whether all changes are within the tolerance."""
+        """Whether all relative changes (quantities,) are within the tolerance."""
         return bool((changes <= self.tolerance).all())
 
     def is_better(self, larger_set: EffectSet, current_set: EffectSet) -> bool:
-        """Whether leaving out ``change_if_left_out_too`` is confirmed, and takes less work than leaving out
-        ``current_set``, each in its confirmed step.
-        """
-        if not self.within_tolerance(self.confirm(larger_set)):
+        """Whether leaving out ``larger_set`` is confirmed, with less work than without ``current_set``."""
+        if not self.within_tolerance(self.confirmed_changes(larger_set)):
             return False
         work = [self.whole.variants.work(effects, self._confirmed[effects][0]) for effects in (larger_set, current_set)]
         return work[0] < work[1]
 
     def choose(self) -> Choice:
-        """The greedy choice, confirmed over the whole run."""
+        """The choice of effects by greedy search, confirmed over the whole run."""
         no_effects: EffectSet = frozenset()
-        if not self.within_tolerance(self.confirm(no_effects)):
+        if not self.within_tolerance(self.confirmed_changes(no_effects)):
             self._confirmed[no_effects] = 1, *np.zeros((2, len(self.whole.quantities)))
-        steps_taken, banned = [no_effects], set[EffectSet]()
+        steps_taken, refused_steps = [no_effects], set[EffectSet]()
         while self.rounds < MOST_CONFIRMATIONS and not self.ended:
-            path = self.path(steps_taken, banned)
+            path = self.path(steps_taken, refused_steps)
             if path == steps_taken:
                 break
             if self.is_better(path[-1], steps_taken[-1]):
@@ -246,13 +244,13 @@ class Chooser:
             while high - low > 1:
                 middle = (low + high) // 2
                 low, high = (middle, high) if self.is_better(path[middle], steps_taken[-1]) else (low, middle)
-            banned.add(path[high] - path[low])
+            refused_steps.add(path[high] - path[low])
             steps_taken = path[: low + 1]
-        return self._choice_with_fresh_samples(self._choice(steps_taken[-1]))
+        return self._refuse_too_few_samples(self._choice_of_set(steps_taken[-1]))
 
-    def _choice_with_fresh_samples(self, choice: Choice) -> Choice:
-        """The choice; InputError if nothing can be left out only because the statistical errors are too large."""
-        if not choice.sample_factor or choice.left_out or choice.times > 1:
+    def _refuse_too_few_samples(self, choice: Choice) -> Choice:
+        """The choice; InputError if only the statistical errors keep all effects in the scene."""
+        if not choice.sample_factor or choice.left_out or choice.step_factor > 1:
             return choice
         raise InputError(
             self.whole.variants.scene.file,
@@ -263,18 +261,20 @@ class Chooser:
             f"{choice.sample_factor:.2g} times as many samples would tell",
         )
 
-    def _choice(self, omitted_effects: EffectSet) -> Choice:
+    def _choice_of_set(self, omitted_effects: EffectSet) -> Choice:
         step_factor, shares, chance = self._confirmed[omitted_effects]
         no_effects: EffectSet = frozenset()
         shown = [(no_effects, 1), (no_effects, self._confirmed[no_effects][0]), (omitted_effects, step_factor)]
-        calls = [run.counts["calls"] for key in shown if (run := self.whole.variants.of(*key)) is not None]
-        seconds_per_call = [self.screen.variants.per_call(left_out) for left_out, _ in shown]
+        calls = [
+            run.counts["calls"] for key in shown if (run := self.whole.variants.quantities_of_run(*key)) is not None
+        ]
+        seconds_per_call = [self.screen.variants.seconds_per_call(left_out) for left_out, _ in shown]
         return Choice(
             self.effects,
             tuple(sorted(omitted_effects)),
             step_factor,
-            self.told(omitted_effects, step_factor),
-            self.teller.higher_order_estimate(omitted_effects),
+            self.change_with_longer_steps(omitted_effects, step_factor),
+            self.reporting_screen.higher_order_estimate(omitted_effects),
             shares,
             chance,
             self.within_tolerance(shares + chance),
@@ -282,39 +282,43 @@ class Chooser:
             tuple(count * seconds for count, seconds in zip(calls, seconds_per_call, strict=True)),
             self.rounds,
             self._calls_so_far(),
-            min(self._doubtful, default=0.0),
+            min(self._sample_factors, default=0.0),
             self.ended,
-            {name: broken for name in self.effects if (broken := self.teller.variants.newly_broken(frozenset([name])))},
+            {
+                name: broken
+                for name in self.effects
+                if (broken := self.reporting_screen.variants.newly_broken(frozenset([name])))
+            },
         )
 
     def _calls_so_far(self) -> int:
-        """Number of right-hand side calls of all runs so far."""
-        return sum({id(screen): screen.variants.calls for screen in (self.whole, self.teller, self.screen)}.values())
+        """Number of right-hand side calls of all runs of the search so far."""
+        return sum(
+            {id(screen): screen.variants.calls for screen in (self.whole, self.reporting_screen, self.screen)}.values()
+        )
 
     def _budget_spent(self) -> bool:
-        """Whether the search has used all the calls that it may make; if so, it sets ``ended_early``."""
-        whole_run = self.whole.variants.of()
+        """Whether the search has used all the calls that it may make; if so, it is marked as ended early."""
+        whole_run = self.whole.variants.quantities_of_run()
         share = self._calls_so_far() / (RUN_BUDGET * whole_run.counts["calls"]) if whole_run else 1.0
         self.ended = self.ended or share >= 1.0
         self.progress(min(share, 1.0))
         return self.ended
 
-    def told(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
-        """Predicted changes (quantities,) if effects are left out and the step is lengthened as well. What the step
-        changes comes from a comparison with a shorter step.
-        """
-        screen, runs = self.teller, self.whole.variants
+    def change_with_longer_steps(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
+        """Predicted relative changes (quantities,) if effects are left out and steps lengthened as well."""
+        screen, runs = self.reporting_screen, self.whole.variants
         change = screen.predicted_difference(omitted_effects) if omitted_effects else None
         if step_factor == 1:
             return screen.predicted_change(omitted_effects)
         shorter = [
             k
-            for k in reversed(runs.lengths())
+            for k in reversed(runs.step_factors())
             if step_factor % k == 0 and (STEP_CHECK_REFINEMENT * k <= step_factor or k == 1)
         ]
-        step = screen.between(
-            runs.of(omitted_effects, step_factor),
-            next(filter(None, (runs.of(omitted_effects, k) for k in shorter)), None),
+        step = screen.differences_of_runs(
+            runs.quantities_of_run(omitted_effects, step_factor),
+            next(filter(None, (runs.quantities_of_run(omitted_effects, k) for k in shorter)), None),
         )
         if change is None or step is None or step_factor % self.step_factor:
             return screen.predicted_change(omitted_effects) + screen.relative_changes(step)
@@ -323,12 +327,11 @@ class Chooser:
         )
 
     def change_if_left_out_too(self, omitted_effects: EffectSet) -> dict[str, float]:
-        """Predicted change for each effect that stayed, if it were left out, too: with a larger tolerance than this, it
-        could be.
+        """Predicted relative change for each remaining effect, if it were left out as well.
 
-        Only those that may go, and whose going would save anything at the same step.
+        Only of effects that may be left out, and whose omission saves work at the same step.
         """
-        shares, step_factor = {}, self.reach(omitted_effects) // self.step_factor
+        shares, step_factor = {}, self.longest_step_factor(omitted_effects) // self.step_factor
         for effect in self.effects:
             further = omitted_effects | {effect}
             if effect not in omitted_effects and self.screen.variants.work(further, step_factor) < self.work(
@@ -337,18 +340,18 @@ class Chooser:
                 shares[effect] = self.share(further) * self.tolerance
         return {effect: change for effect, change in shares.items() if math.isfinite(change)}
 
-    def path(self, first_sets: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
-        """Path of sets of effects that extends ``first_sets``, one step at a time, as far as predictions allow."""
+    def path(self, first_sets: list[EffectSet], refused_steps: set[EffectSet]) -> list[EffectSet]:
+        """Growing sets of omitted effects: ``first_sets``, continued one step at a time as far as predictions allow."""
         path = list(first_sets)
         while True:
-            step = self._best_step(path[-1], banned, [frozenset([effect]) for effect in self.effects])
-            step = step or self._best_step(path[-1], banned, self._promising_pairs())
+            step = self._best_step(path[-1], refused_steps, [frozenset([effect]) for effect in self.effects])
+            step = step or self._best_step(path[-1], refused_steps, self._promising_pairs())
             if not step:
                 return path
             path.append(path[-1] | step)
 
     def _promising_pairs(self) -> list[EffectSet]:
-        """Pairs of effects of which at least one exceeds the budget alone, while both together keep to it."""
+        """Pairs of effects that keep to the error budget together, though one of them alone exceeds it."""
         if self._pairs is None:
             change_alone = {effect: self.share(frozenset([effect])) for effect in self.effects}
             pairs = [
@@ -367,23 +370,23 @@ class Chooser:
             if self._budget_spent():
                 break
             if i % PAIRS_IN_ADVANCE == 0:
-                self.screen.ahead(effect_pairs[i : i + PAIRS_IN_ADVANCE])
+                self.screen.compute_in_advance(effect_pairs[i : i + PAIRS_IN_ADVANCE])
             within += [pair] if self.share(pair) <= PREDICTION_SHARE else []
         return within
 
-    def _best_step(self, omitted_effects: EffectSet, banned: set[EffectSet], steps: list[EffectSet]) -> EffectSet:
-        """The step that saves the most work for what it adds to the predicted error; empty where no step keeps to the
-        budget.
-        """
+    def _best_step(
+        self, omitted_effects: EffectSet, refused_steps: set[EffectSet], steps: list[EffectSet]
+    ) -> EffectSet:
+        """The effect or pair that saves the most work for the predicted error that it adds; empty where none may go."""
         best, best_score = frozenset[str](), 0.0
         current_share, work = self.share(omitted_effects), self.work(omitted_effects)
         steps = [
             step
             for step in steps
-            if not (step <= omitted_effects or step - omitted_effects in banned or step in banned)
+            if not (step <= omitted_effects or step - omitted_effects in refused_steps or step in refused_steps)
         ]
         if steps and not self._budget_spent():
-            self.screen.ahead(omitted_effects | step for step in steps)
+            self.screen.compute_in_advance(omitted_effects | step for step in steps)
         for step in steps:
             further = omitted_effects | step
             if self._budget_spent():

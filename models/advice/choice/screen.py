@@ -1,4 +1,5 @@
-"""Changes by leaving effects out, predicted from runs without each and without each two of them.
+"""Changes of quantities by leaving effects out, predicted from runs without each effect and without each pair of
+effects.
 
 With y(S) the quantities' paths without the effects S, to the second order
 
@@ -17,32 +18,32 @@ import numpy as np
 from models.advice.choice.answer import (
     Cases,
     RunQuantities,
-    by_chance,
     difference_of_runs,
     largest_relative_change,
     rounding_floor,
+    sampled_change_and_error,
     sum_of_differences,
 )
 from models.advice.choice.variants import EffectSet, Variants
 from models.core.errors import InputError
 
 LARGEST_SAMPLE_SHARE = 1 / 3
-"""Share of a sampled quantity's mean square that one sample may have."""
+"""Largest share that one sample may have of a sampled quantity's mean square."""
 Changes = dict[str, Cases]
-"""Differences of two runs, quantity by quantity."""
+"""Differences of two runs, by the name of the quantity."""
 
 
 class Screen:
-    """Predictions of how quantities change if effects are left out, from runs of ``variants``. InputError for a
-    quantity that does not move.
+    """Predictions of how quantities change if effects are left out, from runs of ``variants`` of a scene. InputError
+    for a quantity that does not move.
     """
 
     def __init__(self, variants: Variants, quantities: list[str]) -> None:
         self.variants, self.quantities = variants, quantities
-        full = variants.of()
+        full = variants.quantities_of_run()
         if full is None:  # tells why
             full = variants.system.computed_quantities(variants.scene, variants.engine)
-        quantities_by_name = {name: full.of(name, variants.scene.file) for name in quantities}
+        quantities_by_name = {name: full.quantity(name, variants.scene.file) for name in quantities}
         self.full = {name: quantity.cases for name, quantity in quantities_by_name.items()}
         self.sizes = {name: quantity.sizes for name, quantity in quantities_by_name.items()}
         self.sampled = {name for name, quantity in quantities_by_name.items() if quantity.sampled}
@@ -59,13 +60,14 @@ class Screen:
     def _refuse(self, name: str, reason: str) -> NoReturn:
         raise InputError(self.variants.scene.file, f"quantities.{name}", None, reason)
 
-    def between(self, run: RunQuantities | None, other_answer: RunQuantities | None) -> Changes | None:
-        """Differences of two runs in each quantity; None where one of the runs is missing."""
-        if run is None or other_answer is None:
+    def differences_of_runs(self, run: RunQuantities | None, other_run: RunQuantities | None) -> Changes | None:
+        """Differences of two runs, by quantity; None where one of the runs or one of its quantities is missing."""
+        if run is None or other_run is None:
             return None
         try:
             return {
-                name: difference_of_runs(run.of(name).cases, other_answer.of(name).cases) for name in self.quantities
+                name: difference_of_runs(run.quantity(name).cases, other_run.quantity(name).cases)
+                for name in self.quantities
             }
         except InputError as error:
             if "rms" in error.allowed and "ends" not in error.allowed:
@@ -73,11 +75,11 @@ class Screen:
             raise
 
     def relative_changes(self, differences: Changes | None) -> np.ndarray:
-        """Relative changes (quantities,); infinite where ``predicted_difference`` is None."""
+        """Relative changes (quantities,) from differences of runs; infinite where ``differences`` is None."""
         return self._changes_with_errors(differences)[0]
 
     def statistical_errors(self, differences: Changes | None) -> np.ndarray:
-        """Statistical errors (quantities,) of predicted changes; zero for a quantity that is no mean of samples."""
+        """Statistical errors (quantities,) of relative changes; zero for a quantity that is no mean of samples."""
         return self._changes_with_errors(differences)[1]
 
     def _changes_with_errors(self, differences: Changes | None) -> np.ndarray:
@@ -85,7 +87,7 @@ class Screen:
         if differences is None:
             return np.outer((np.inf, 0.0), np.ones(len(self.quantities)))
         pairs = [
-            by_chance(differences[name], self.full[name])
+            sampled_change_and_error(differences[name], self.full[name])
             if name in self.sampled
             else (largest_relative_change(differences[name], self.sizes[name]), 0.0)
             for name in self.quantities
@@ -93,12 +95,14 @@ class Screen:
         return np.array(pairs).T
 
     def first_order_change(self, effect: str) -> Changes | None:
-        """First-order difference d: the change if this effect alone is left out."""
+        """First-order difference d_i of the quantities: their change if this effect alone is left out."""
         return self.predicted_difference(frozenset([effect]))
 
-    def second(self, first: str, second_effect: str) -> Changes | None:
-        """Second-order difference e of a pair: the change without both, less the changes without each alone."""
-        sets = map(frozenset, ((first, second_effect), (first,), (second_effect,)))
+    def second_order_change(self, first: str, other_effect: str) -> Changes | None:
+        """Second-order difference e_ij of a pair of effects: the change without both, less the changes without each
+        alone.
+        """
+        sets = map(frozenset, ((first, other_effect), (first,), (other_effect,)))
         change_without_both, *singles = (self.predicted_difference(effects) for effects in sets)
         known = [change_of_single for change_of_single in singles if change_of_single is not None]
         if change_without_both is None or len(known) < 2:
@@ -110,20 +114,24 @@ class Screen:
             for name in self.quantities
         }
 
-    def ahead(self, sets: Iterable[EffectSet]) -> None:
-        """Compute in advance the runs that ``predicted_difference`` needs for these sets."""
-        self.variants.ahead((subset, 1) for chosen in sets for subset in _sets_needed(chosen))
+    def compute_in_advance(self, sets: Iterable[EffectSet]) -> None:
+        """Compute in advance the runs from which the changes without these sets of effects are predicted."""
+        self.variants.compute_in_advance((subset, 1) for chosen in sets for subset in _sets_needed(chosen))
 
     def predicted_difference(self, omitted_effects: EffectSet) -> Changes | None:
-        """Predicted differences if a set of effects is left out; None where they cannot be predicted."""
+        """Predicted differences of the quantities if a set of effects is left out; None where they cannot be
+        predicted.
+        """
         parts: list[Changes | None] = [None]
         if len(omitted_effects) > 2:
             parts = [
                 *map(self.first_order_change, omitted_effects),
-                *(self.second(*pair) for pair in combinations(sorted(omitted_effects), 2)),
+                *(self.second_order_change(*pair) for pair in combinations(sorted(omitted_effects), 2)),
             ]
         if None in parts:
-            return self.between(self.variants.of(omitted_effects), self.variants.of())
+            return self.differences_of_runs(
+                self.variants.quantities_of_run(omitted_effects), self.variants.quantities_of_run()
+            )
         return {
             name: sum_of_differences(*(difference[name] for difference in parts if difference))
             for name in self.quantities
@@ -147,24 +155,31 @@ class Screen:
         if len(omitted_effects) <= 2:
             return no_change
         first = np.sum([self.relative_changes(self.first_order_change(effect)) for effect in omitted_effects], axis=0)
-        second = np.sum(
-            [self.relative_changes(self.second(*pair)) for pair in combinations(sorted(omitted_effects), 2)], axis=0
+        second_order_change = np.sum(
+            [
+                self.relative_changes(self.second_order_change(*pair))
+                for pair in combinations(sorted(omitted_effects), 2)
+            ],
+            axis=0,
         )
-        if not (np.isfinite(first).all() and np.isfinite(second).all()):
+        if not (np.isfinite(first).all() and np.isfinite(second_order_change).all()):
             return no_change  # the set was run itself
-        return second * np.minimum(1.0, second / np.maximum(first, 1e-300))
+        return second_order_change * np.minimum(1.0, second_order_change / np.maximum(first, 1e-300))
 
-    def of_step(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
+    def change_by_longer_steps(self, omitted_effects: EffectSet, step_factor: int) -> np.ndarray:
         """Relative changes (quantities,) that longer steps alone cause in a run without these effects."""
         if step_factor == 1:
             return np.zeros(len(self.quantities))
         return self.relative_changes(
-            self.between(self.variants.of(omitted_effects, step_factor), self.variants.of(omitted_effects))
+            self.differences_of_runs(
+                self.variants.quantities_of_run(omitted_effects, step_factor),
+                self.variants.quantities_of_run(omitted_effects),
+            )
         )
 
 
 def _sets_needed(omitted_effects: EffectSet) -> list[EffectSet]:
-    """Sets of effects whose runs are needed to predict the changes for a set."""
+    """Sets of effects whose runs are needed to predict the changes without ``omitted_effects``."""
     if len(omitted_effects) <= 2:
         return [omitted_effects]
     return [frozenset(subset) for count in (1, 2) for subset in combinations(sorted(omitted_effects), count)]

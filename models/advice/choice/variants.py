@@ -1,4 +1,6 @@
-"""A scene less some of its effects and with longer steps, each variant run once and kept."""
+"""Variants of a scene without some of its effects and with longer time steps; each is run once, and its quantities are
+stored.
+"""
 
 import math
 from collections.abc import Iterable
@@ -28,19 +30,23 @@ from models.ensemble.runner import block_results
 
 EffectSet = frozenset[str]
 VariantKey = tuple[EffectSet, int]
-"""A variant: the effects that are left out, and how many times as long its steps are."""
+"""Key of a variant: the effects that are left out, and the factor by which its steps are longer."""
 VariantOutcome = tuple[RunQuantities | None, dict[str, BrokenAssumption]]
-"""A variant's run, and the assumptions that it breaks."""
+"""Outcome of a variant: its quantities, None where the run fails, and the assumptions that it breaks."""
 LARGEST_STEP_FACTOR = 128
-"""No step is tried that is more times as long as the scene's."""
+"""Largest factor by which the scene's step is lengthened."""
 SHORTEST_PART_STEPS = 60
-"""Steps of which whole numbers make up a part of a run, so that it can be taken in longer steps, too."""
+"""Number of steps of which whole multiples make up a part of a run, so that the part can be computed with longer steps,
+too.
+"""
 TIMED_RUNS, LEAST_TIMED_SECONDS = 3, 0.02
-"""Runs of which the shortest tells the seconds; two where they took so many (s), as the first may have to load."""
+"""Most timed runs, of which the shortest counts, and the time (s) after which two are enough; the first run may have to
+load code.
+"""
 
 
 def system_of(scene: Any) -> ModuleType:
-    """The module that runs scenes of this scene's system; InputError where there is none."""
+    """The module that runs scenes of this scene's system for a price or a choice; InputError where there is none."""
     files = modules_of("models.advice.choice.systems")
     if scene.system not in files:
         raise InputError(
@@ -57,10 +63,10 @@ def system_of(scene: Any) -> ModuleType:
 @dataclass
 class Variants:
     """Runs of a ``scene`` by one implementation. A variant is given by the effects that are left out and by the factor
-    of the step.
+    of its step.
 
-    None represents a variant that is impossible, or whose run fails. ``executor`` : computes runs ``ahead``.
-    ``calls`` : of all runs that were requested so far, without repetitions for their seconds. Runs ahead that are never
+    None represents a variant that is impossible, or whose run fails. ``executor`` : computes runs in advance. ``calls``
+    : of all runs that were requested so far, without repetitions for their seconds. Runs in advance that are never
     requested do not count, so that no choice depends on the executor.
     """
 
@@ -69,7 +75,7 @@ class Variants:
     executor: Executor | None = None
     system: ModuleType = field(init=False)
     calls: int = 0
-    _kept: dict[VariantKey, RunQuantities | None] = field(default_factory=dict)
+    _quantities_of_variant: dict[VariantKey, RunQuantities | None] = field(default_factory=dict)
     _seconds_per_call: dict[EffectSet, float] = field(default_factory=dict)
     _assumptions_broken: dict[VariantKey, dict[str, BrokenAssumption]] = field(default_factory=dict)
     _computed_in_advance: dict[VariantKey, VariantOutcome] = field(default_factory=dict)
@@ -87,58 +93,64 @@ class Variants:
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that the scene has."""
-        return tuple(self.scene.named) if self._knows_effects else named_effects(self.scene)
+        return tuple(self.scene.effect_names) if self._knows_effects else named_effects(self.scene)
 
     @property
-    def absent(self) -> tuple[str, ...]:
+    def absent_names(self) -> tuple[str, ...]:
         """Names of the effects that the scene does not have."""
-        return tuple(self.scene.absent) if self._knows_effects else absent_effects(self.scene)
+        return tuple(self.scene.absent_names) if self._knows_effects else absent_effects(self.scene)
 
-    def beside(self, name: str) -> Any:
-        """The scene with one of the absent effects added, at its usual values; InputError where it cannot be added."""
-        return self.scene.beside(name) if self._knows_effects else with_effects(self.scene, name)
+    def scene_with_effect(self, name: str) -> Any:
+        """The scene with an absent effect added at its usual values; InputError where it cannot be added."""
+        return self.scene.with_effect(name) if self._knows_effects else with_effects(self.scene, name)
 
     def sentence_on_effect(self, name: str) -> str:
         """Sentence that describes an effect, or what leaving it out means."""
-        sentences = self.scene.said if self._knows_effects else {}
+        sentences = self.scene.effect_sentences if self._knows_effects else {}
         return str(sentences.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
 
-    def of(self, omitted_effects: Iterable[str] = (), step_factor: int = 1) -> RunQuantities | None:
-        """Quantities of the run without these effects, in steps ``step_factor`` as long; None if it fails."""
+    def quantities_of_run(self, omitted_effects: Iterable[str] = (), step_factor: int = 1) -> RunQuantities | None:
+        """Quantities of the run without these effects, with steps longer by ``step_factor``; None if the run fails."""
         key = (frozenset(omitted_effects), step_factor)
-        if key not in self._kept:
+        if key not in self._quantities_of_variant:
             answer, self._assumptions_broken[key] = (
                 self._computed_in_advance.pop(key) if key in self._computed_in_advance else self.run(key)
             )
-            self._kept[key] = answer
+            self._quantities_of_variant[key] = answer
             self.calls += answer.counts["calls"] if answer else 0
-        return self._kept[key]
+        return self._quantities_of_variant[key]
 
-    def ahead(self, keys: Iterable[VariantKey]) -> None:
-        """Let the executor compute runs that will probably be requested; without an executor nothing is computed in
+    def compute_in_advance(self, keys: Iterable[VariantKey]) -> None:
+        """Let the executor compute runs that will probably be requested; without an executor no run is computed in
         advance.
         """
         if self.executor is not None:
-            new = [key for key in dict.fromkeys(keys) if key not in self._kept and key not in self._computed_in_advance]
+            new = [
+                key
+                for key in dict.fromkeys(keys)
+                if key not in self._quantities_of_variant and key not in self._computed_in_advance
+            ]
             self._computed_in_advance |= zip(new, block_results(self._job, new, self.executor), strict=True)
 
     def run(self, key: VariantKey) -> VariantOutcome:
-        """Run a variant, even if it was run before."""
+        """Run a variant, even if it was run before; returns its quantities, None where the run fails, and the
+        assumptions that it breaks.
+        """
         with collected_breaches() as broken:
             return self._run(*key), broken
 
     def _run(self, omitted_effects: EffectSet, step_factor: int) -> RunQuantities | None:
         try:
             answer: RunQuantities = self.system.computed_quantities(
-                self.changed(omitted_effects, step_factor), self.engine
+                self.changed_scene(omitted_effects, step_factor), self.engine
             )
         except (InputError, RunFailed):
             return None
         return answer
 
     def newly_broken(self, omitted_effects: EffectSet, step_factor: int = 1) -> list[BrokenAssumption]:
-        """Assumptions that the scene itself keeps, and that the run without these effects breaks."""
-        if self.of(omitted_effects, step_factor) is None or self.of() is None:
+        """Assumptions that the complete scene keeps, and that the run without these effects breaks."""
+        if self.quantities_of_run(omitted_effects, step_factor) is None or self.quantities_of_run() is None:
             return []
         known = self._assumptions_broken[frozenset(), 1]
         return [
@@ -147,17 +159,15 @@ class Variants:
             if name not in known
         ]
 
-    def stated(self, omitted_effects: EffectSet, step_factor: int = 1) -> list[Result]:
-        """Results of a variant together with the errors that they state; its runs are repeated, with error
-        estimates.
-        """
+    def results_with_errors(self, omitted_effects: EffectSet, step_factor: int = 1) -> list[Result]:
+        """Results of a variant together with their error estimates; its runs are repeated for that."""
         results: list[Result] = []
         with suppress(RunFailed), watching(results.append):  # raised where an error is as large as what it is of
-            self.system.computed_quantities(self.changed(omitted_effects, step_factor), self.engine, error=True)
+            self.system.computed_quantities(self.changed_scene(omitted_effects, step_factor), self.engine, error=True)
         return results
 
-    def changed(self, omitted_effects: EffectSet, step_factor: int = 1) -> Any:
-        """The scene of a variant; InputError where there can be no such scene."""
+    def changed_scene(self, omitted_effects: EffectSet, step_factor: int = 1) -> Any:
+        """The scene without these effects and with a longer step; InputError where there can be no such scene."""
         if self._knows_effects:
             return self.scene.without(omitted_effects).in_longer_steps(step_factor)
         scene = scene_without(self.scene, *sorted(omitted_effects)) if omitted_effects else self.scene
@@ -168,21 +178,23 @@ class Variants:
         return rebuilt_scene(table, scene)
 
     def work(self, omitted_effects: EffectSet, step_factor: int = 1) -> float:
-        """Work of a run, from counts alone, so that it repeats exactly: calls times the sum of states, terms and
-        remaining effects; infinite where the run fails.
+        """Work of a run, from counts alone, so that it repeats exactly: right-hand side calls times the sum of states,
+        terms and remaining effects; infinite where the run fails.
         """
-        run = self.of(omitted_effects, step_factor)
+        run = self.quantities_of_run(omitted_effects, step_factor)
         if run is None:
             return math.inf
         size_of_call = run.counts["states"] + run.counts.get("terms", 0) + len(set(self.effects) - omitted_effects)
         return float(run.counts["calls"] * max(size_of_call, 1))
 
-    def per_call(self, omitted_effects: EffectSet) -> float:
-        """CPU seconds of one call, the least of a few runs in this process; infinite where no run succeeds."""
+    def seconds_per_call(self, omitted_effects: EffectSet) -> float:
+        """CPU seconds of one right-hand side call, the least of a few runs in this process; infinite where no run
+        succeeds.
+        """
         if omitted_effects not in self._seconds_per_call:
             took, run = (
                 list[float](),
-                self.of(omitted_effects) if self.executor is None else self._run(omitted_effects, 1),
+                self.quantities_of_run(omitted_effects) if self.executor is None else self._run(omitted_effects, 1),
             )
             while run is not None and (len(took) < 2 or (len(took) < TIMED_RUNS and sum(took) < LEAST_TIMED_SECONDS)):
                 took.append(run.seconds)
@@ -191,16 +203,16 @@ class Variants:
             self._seconds_per_call.setdefault(omitted_effects, math.inf)
         return self._seconds_per_call[omitted_effects]
 
-    def lengths(self) -> list[int]:
-        """Factors by which the step may be lengthened, so that whole numbers of steps fit into the run."""
-        count = self.system.parts(self.scene)
+    def step_factors(self) -> list[int]:
+        """Factors by which the step may be lengthened so that a whole number of steps still fits into the run."""
+        count = self.system.divisible_steps(self.scene)
         return [
             step_factor for step_factor in range(1, min(count, LARGEST_STEP_FACTOR) + 1) if count % step_factor == 0
         ]
 
     def window(self, steps: int) -> "Variants":
-        """Variants of the first part of the run, of at least ``steps`` steps; of the whole run where this is hardly
-        longer.
+        """Variants of the first part of the run, at least ``steps`` steps long; of the whole run where the part would
+        be hardly shorter.
 
         The length is one that the scene may have, for example whole samples of a measurement.
         """
@@ -216,5 +228,5 @@ class Variants:
 
 
 def _run_variant_in_worker(scene: Any, engine: str, key: VariantKey) -> VariantOutcome:
-    """Do ``Variants.run`` in a worker process."""
+    """Run a variant of a scene in a worker process; returns what ``Variants.run`` returns."""
     return Variants(scene, engine).run(key)

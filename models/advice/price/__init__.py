@@ -1,4 +1,5 @@
-"""The price of accuracy of a user's own scene: ``twinrig price SCENE --tolerance T``.
+"""The price of accuracy of a user's own scene: which engine, method and step are the cheapest (``twinrig price SCENE
+--tolerance T``).
 
 scene -> PricedScene (by a file of ``systems``) -> truth -> search -> recommendation -> text
 """
@@ -13,13 +14,13 @@ from models.advice.price.problem import Setting
 
 @dataclass(frozen=True)
 class SettingLadder:
-    """Settings of one method of an engine, ordered from coarse to fine; each is a rung.
+    """Settings of one method of an engine, ordered from coarse to fine; each setting is a rung of the ladder.
 
-    values : steps in s, relative tolerances where ``adaptive``, or a cell's share of the contact where ``cells``;
-    order : declared, 0 if it varies; default : what the engine itself, or the scene, would take, 0 where the method is
-    not its default; confirmation_divisor : a reference is known where a finer rung changes it by less than the
-    tolerance divided by this; said : text on what that rung is, before the change, where it is not half the step, or
-    cells and steps together
+    values : steps in s, relative tolerances where ``adaptive``, or a cell's share of the contact where ``cells``; order
+    : declared, 0 if it varies; default : what the engine itself, or the scene, would take, 0 where the method is not
+    its default; confirmation_divisor : a reference is known where a finer rung changes it by less than the tolerance
+    divided by this; change_text : text on what that rung is, before the change, where it is not half the step, or cells
+    and steps together
     """
 
     engine: str
@@ -30,20 +31,22 @@ class SettingLadder:
     default: float = 0.0
     cells: bool = False
     confirmation_divisor: float = 20.0
-    said: str = ""
+    change_text: str = ""
 
     def setting(self, i: int) -> Setting:
-        """The setting on rung ``i`` of the ladder."""
+        """The solver setting on rung ``i`` of the ladder, counted from the coarsest."""
         owner, kind = self.engine if self.default else "", InCells if self.cells else Setting
         return kind(self.engine, self.method, self.values[i], self.order, self.adaptive, default=owner)
 
     def work(self, old_value: float, new_value: float) -> float:
-        """Ratio of the work with one setting's value to that with another. Cells count along and across the contact."""
+        """Ratio of the work with the new value of a setting (step, or cell share) to the work with the old one. Cells
+        count along and across the contact.
+        """
         return 1.0 if self.adaptive else (old_value / new_value) ** (2 if self.cells else 1)
 
 
 class InCells(Setting):
-    """A setting whose value is the ratio of a cell's length to that of the contact."""
+    """A setting of contact cells: its value is the ratio of a cell's length to that of the contact."""
 
     def label(self) -> str:
         """Number of cells along the contact, as text."""
@@ -52,8 +55,8 @@ class InCells(Setting):
 
 @dataclass(frozen=True)
 class PricedRun:
-    """Result of a run. times (n,) : s, from 0; values (n, k) : of the quantity's channels, in its unit; counts : of the
-    work that the run took.
+    """Result of a run whose accuracy is priced. times (n,) : s, from 0; values (n, k) : of the quantity's channels, in
+    its unit; counts : of the work that the run took.
     """
 
     times: np.ndarray
@@ -62,7 +65,7 @@ class PricedRun:
 
 
 class PricedScene(Protocol):
-    """Protocol of a scene that can be priced: what the search for the cheapest settings needs."""
+    """Protocol of a scene whose accuracy can be priced: what the search for the cheapest solver settings needs."""
 
     @property
     def title(self) -> str:
@@ -80,12 +83,12 @@ class PricedScene(Protocol):
         ...
 
     @property
-    def whole(self) -> float:
+    def full_duration(self) -> float:
         """Duration (s) of the scene's run."""
         ...
 
     @property
-    def first(self) -> float:
+    def searched_duration(self) -> float:
         """Duration (s) of the first part of the run, in which settings are searched."""
         ...
 
@@ -105,27 +108,31 @@ class PricedScene(Protocol):
         ...
 
     def ladders(self) -> list[SettingLadder]:
-        """Ladders of settings, one for each method of each requested engine."""
+        """Ladders of solver settings, one for each method of each requested engine."""
         ...
 
     def reference(self) -> SettingLadder:
-        """Ladder of the settings that are refined until the truth is known; each step is half the one before."""
+        """Ladder of the reference's settings, which are refined until the true quantity is known well enough; each step
+        is half the previous one.
+        """
         ...
 
-    def second(self, reference_setting: Setting) -> Setting | None:
-        """A setting of another family of methods that must agree with the reference's finest one; None where there is
+    def second_setting(self, reference_setting: Setting) -> Setting | None:
+        """Setting of another family of methods whose run must agree with the finest reference; None where there is
         none.
         """
         ...
 
     def solve(self, setting: Setting, duration: float) -> Any:
-        """Build and run the scene with a setting; InputError or RunFailed where this is impossible."""
+        """Build and run the scene with a solver setting over ``duration`` (s); InputError or RunFailed where this is
+        impossible.
+        """
         ...
 
-    def answer(self, solution: Any) -> PricedRun:
-        """The quantity, read from what ``solve`` returned."""
+    def priced_run(self, solution: Any) -> PricedRun:
+        """The quantity along a run, read from what ``solve`` returned."""
         ...
 
     def lines(self, setting: Setting) -> list[str]:
-        """Lines of a scene file that contain the setting."""
+        """Lines of a scene file that select the solver setting."""
         ...

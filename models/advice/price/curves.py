@@ -1,4 +1,6 @@
-"""Figures of a work-precision curve: its order, which curves coincide, and the cost of an error on it."""
+"""Figures of a work-precision curve: its order of convergence, which curves coincide, and the cost at which it meets an
+error.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,29 +9,33 @@ from typing import Literal
 import numpy as np
 
 UNCERTAINTY_FACTOR = 10.0
-"""A point is hollow if its error is below this many times the uncertainty of the reference."""
+"""Ratio of an error to the uncertainty of the reference below which the point is drawn hollow."""
 FITTED_POINTS = 3
-"""How many of the finest points an observed order is fitted to: the coarse end is not asymptotic yet."""
+"""Number of the finest points to which an observed order is fitted, as the coarse ones are not yet asymptotic."""
 EQUAL_ERROR_SHARE = 0.01
-"""Errors within this part of each other count as the same."""
+"""Relative difference up to which two errors count as equal."""
 
 
 def slope(step_sizes: Sequence[float], errors: Sequence[float]) -> float:
-    """Least-squares slope of log error over log size; not a number for fewer than two points."""
+    """Least-squares slope of the logarithm of error over the logarithm of step size; not a number for fewer than two
+    points.
+    """
     if len(step_sizes) < 2:
         return float("nan")
     return float(np.polyfit(np.log(step_sizes), np.log(errors), 1)[0])
 
 
 def observed_order(step_sizes: Sequence[float], errors: Sequence[float], floor: float) -> float:
-    """Observed order: slope of log error over the finest points whose errors are above ``floor``."""
+    """Observed order of convergence: slope of log error over log step size, at the finest points whose errors are above
+    ``floor``.
+    """
     clear = sorted((h, e) for h, e in zip(step_sizes, errors, strict=True) if e >= floor)[:FITTED_POINTS]
     return slope(*zip(*clear, strict=True)) if len(clear) > 1 else float("nan")
 
 
 def coinciding_curves(curves: Mapping[str, Mapping[float, float]]) -> list[tuple[str, ...]]:
-    """Groups of curves (name -> {setting: error}) that coincide: their errors at all common settings agree to
-    EQUAL_ERROR_SHARE.
+    """Groups of work-precision curves (name -> {setting: error}) that coincide: their errors at all common settings
+    agree to EQUAL_ERROR_SHARE.
 
     At least three settings must be common: two curves that merely cross are not the same.
     """
@@ -47,7 +53,7 @@ def _coincide(a: Mapping[float, float], b: Mapping[float, float]) -> bool:
 
 @dataclass(frozen=True)
 class ToleranceCost:
-    """Cost at which a tolerance is met: the cost, the setting's value, and how both were found.
+    """Cost at which a method meets a tolerance: the cost, the setting's value, and ``how`` both were determined.
 
     "tried" : the first setting that does, nothing in between; "coarsest" : already the coarsest setting
     does; "extrapolated" : not even the finest does.
@@ -58,7 +64,7 @@ class ToleranceCost:
     how: Literal["interpolated", "tried", "coarsest", "extrapolated"]
 
 
-def reach(
+def cost_at_tolerance(
     values: Sequence[float],
     errors: Sequence[float],
     costs: Sequence[float],
@@ -66,7 +72,8 @@ def reach(
     order: int = 0,
     extrapolate: bool = False,
 ) -> ToleranceCost | None:
-    """Cost at which the error of a curve falls below ``target_error`` and stays there.
+    """Cost at which the error of a work-precision curve falls below ``target_error`` and stays there; None where it
+    does not.
 
     Points are taken from coarse to fine by ``values``. With the declared ``order`` of a fixed-step method the
     answer is interpolated log-log between two settings, and, with ``extrapolate``, carried beyond the finest

@@ -1,4 +1,4 @@
-"""The price list of a scene's effects: what each costs and what it changes, measured by short paired runs.
+"""The price list of a scene's effects: what each effect costs and what it changes, measured by short paired runs.
 
 An effect that the scene names is compared with the scene without it, one that it could have with the scene that has
 it, at its usual values. Runs take turns in a random order, and seconds are compared within a turn only.
@@ -14,10 +14,10 @@ import numpy as np
 
 from models.advice.choice.answer import (
     RunQuantities,
-    by_chance,
     difference_of_runs,
     largest_relative_change,
     rounding_floor,
+    sampled_change_and_error,
 )
 from models.advice.choice.variants import Variants, system_of
 from models.core.assumptions import collected_breaches
@@ -26,16 +26,18 @@ from models.machine.timing import describe, paired_ratio
 from models.systems.ride.of_scene import goes_in_time
 
 MOST_PRICED_STEPS = 960
-"""Of every run, so many are priced."""
+"""Number of steps of a run, at most, over which effects are priced."""
 TIMING_ROUNDS, LEAST_ROUNDS, LONG_ROUNDS_SECONDS = 7, 3, 10.0
-"""Turns in which every variant runs once; fewer where all of them would take longer than so many CPU seconds."""
+"""Number of timing turns, in each of which every variant runs once; the fewer turns, and the total CPU seconds above
+which only these are made.
+"""
 SEED = 11
 
 
 @dataclass(frozen=True)
 class QuantityChange:
-    """Largest change of a quantity among all cases: absolute, as the rms difference of a path or the difference of a
-    number, and relative to the quantity's size. chance : statistical error of the latter.
+    """Largest change of a quantity among all cases: absolute, as the rms difference of a time history or the difference
+    of a number, and relative to the quantity's size. chance : statistical error of the relative change.
     """
 
     name: str
@@ -70,8 +72,8 @@ class EffectPrice:
 
 @dataclass(frozen=True)
 class PriceList:
-    """Price list of a scene's effects in one implementation. each : largest number of steps of a run; whole : steps of
-    the complete run.
+    """Price list of a scene's effects in one implementation. each : largest number of steps of a priced run; whole :
+    steps of the complete run.
 
     micros : CPU microseconds of a step of the scene as it is, median and median absolute deviation.
     """
@@ -86,8 +88,8 @@ class PriceList:
 
 
 def price_list(scene: Any, engine: str | None = None) -> PriceList:
-    """Price list from runs of the scene, and of every scene with one effect more or one less. Raises InputError or
-    RunFailed where the scene itself cannot be run.
+    """Price list of effects from runs of the scene, and of every variant with one effect more or one less. Raises
+    InputError or RunFailed where the scene itself cannot be run.
     """
     if scene.system == "ride" and not goes_in_time(scene):
         from models.advice.price.effects_of_ride import price_list_of_ride
@@ -95,16 +97,20 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
         return price_list_of_ride(scene)
     system = system_of(scene)
     engine = engine or system.ENGINE
-    all_of_it = Variants(scene, engine)
-    variants = all_of_it.window(MOST_PRICED_STEPS)
-    short, names = variants.scene, (*variants.effects, *variants.absent)
+    complete = Variants(scene, engine)
+    variants = complete.window(MOST_PRICED_STEPS)
+    short, names = variants.scene, (*variants.effects, *variants.absent_names)
     with collected_breaches() as broken_alone:
         base: RunQuantities = system.computed_quantities(short, engine)
     runs: dict[str, Callable[[], RunQuantities]] = {"": partial(system.computed_quantities, short, engine)}
     first, whys, keeps = {"": base}, dict[str, str](), dict[str, tuple[str, ...]]()
     for name in names:
         try:
-            changed_scene = variants.changed(frozenset([name])) if name in variants.effects else variants.beside(name)
+            changed_scene = (
+                variants.changed_scene(frozenset([name]))
+                if name in variants.effects
+                else variants.scene_with_effect(name)
+            )
             with collected_breaches() as breaches:
                 first[name], runs[name] = (
                     system.computed_quantities(changed_scene, engine),
@@ -128,7 +134,7 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
         scene.title,
         engine,
         system.steps(short),
-        system.steps(all_of_it.scene),
+        system.steps(complete.scene),
         base.counts,
         median_and_deviation(micros[""]),
         tuple(prices),
@@ -149,7 +155,7 @@ def _microseconds_by_turn(runs: dict[str, Callable[[], RunQuantities]]) -> dict[
 
 
 def median_and_deviation(values: np.ndarray) -> tuple[float, float]:
-    """Median and median absolute deviation of values."""
+    """Median and median absolute deviation of ``values`` (n,), in their unit."""
     statistics = describe(values.tolist())
     return statistics["median"], statistics["mad"]
 
@@ -158,18 +164,21 @@ def _price_of_effect(
     variants: Variants,
     name: str,
     scene_quantities: RunQuantities,
-    other_answer: RunQuantities | None,
-    took: np.ndarray | None,
-    unchanged: np.ndarray,
+    changed_quantities: RunQuantities | None,
+    changed_microseconds: np.ndarray | None,
+    scene_microseconds: np.ndarray,
     reason: str,
 ) -> EffectPrice:
+    """Price of one effect from a run of the scene and a run with this effect added or left out."""
     is_present, says = name in variants.effects, variants.sentence_on_effect(name)
-    if other_answer is None or took is None:
+    if changed_quantities is None or changed_microseconds is None:
         return EffectPrice(name, is_present, says, reason)
     quantities_without, quantities_with = (
-        (other_answer, scene_quantities) if is_present else (scene_quantities, other_answer)
+        (changed_quantities, scene_quantities) if is_present else (scene_quantities, changed_quantities)
     )
-    slow, fast = (unchanged, took) if is_present else (took, unchanged)
+    slow, fast = (
+        (scene_microseconds, changed_microseconds) if is_present else (changed_microseconds, scene_microseconds)
+    )
     seconds = np.maximum(slow, 1e-9), np.maximum(fast, 1e-9)
     gone = tuple(key for key in quantities_with.quantities if key not in quantities_without.quantities)
     return EffectPrice(
@@ -180,23 +189,23 @@ def _price_of_effect(
         (quantities_without.counts, quantities_with.counts),
         median_and_deviation(slow - fast),
         paired_ratio(*seconds),
-        _quantity_changes(scene_quantities, other_answer),
+        _quantity_changes(scene_quantities, changed_quantities),
         gone,
     )
 
 
-def _quantity_changes(scene_quantities: RunQuantities, other_answer: RunQuantities) -> tuple[QuantityChange, ...]:
-    """Changes of the quantities that both runs have, relative to their size in the scene."""
+def _quantity_changes(scene_quantities: RunQuantities, changed_quantities: RunQuantities) -> tuple[QuantityChange, ...]:
+    """Changes of the quantities that both runs have, relative to their size in the complete scene."""
     changed = []
     for name, quantity in scene_quantities.quantities.items():
-        if name in other_answer.quantities:
+        if name in changed_quantities.quantities:
             try:
-                change = difference_of_runs(other_answer.quantities[name].cases, quantity.cases)
+                change = difference_of_runs(changed_quantities.quantities[name].cases, quantity.cases)
             except (InputError, ValueError):  # of other lengths, or of another number of cases
                 continue
             size = quantity.sizes
             if quantity.sampled:
-                share, chance = by_chance(change, quantity.cases)
+                share, chance = sampled_change_and_error(change, quantity.cases)
                 changed.append(QuantityChange(name, quantity.unit, share * float(size.max()), share, chance))
                 continue
             largest_difference = max(float(np.sqrt(np.mean(difference**2))) for difference in change)

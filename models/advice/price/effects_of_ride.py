@@ -1,4 +1,5 @@
-"""The price list of a linear stationary scene of ride, in closed form: states, calls at the step limit, deviations.
+"""The price list of effects of a linear stationary ride scene, in closed form: states, calls at the step limit,
+standard deviations.
 
 Only microseconds are measured, those of a step of the classical Runge-Kutta method on the vehicle's own matrix.
 """
@@ -28,27 +29,32 @@ from models.systems.ride.omissions import effects_of
 from models.systems.ride.reduced_scene import Effect, ReducedScene, reduced_without, refusal_reason
 
 TIMED_STEPS = 500
-"""Steps that are timed in every turn."""
+"""Number of Runge-Kutta steps that are timed in every turn."""
 
 
 def price_list_of_ride(scene: Any) -> PriceList:
-    """Price list of effects at the scene's middle speed, in closed form; InputError for a scene whose speed varies."""
+    """Price list of a ride scene's effects at its middle speed, in closed form; InputError for a scene whose speed
+    varies.
+    """
     if scene.speeds is None:
         raise InputError(scene.file, "drive", None, "has no effects priced in closed form: give [speeds]")
     speeds = scene.speeds.all()
     with scene_errors(scene):
         full = FullScene(ReducedScene.complete(scene), float(speeds[len(speeds) // 2]))
         effects = effects_of(full.scene)
-        rests = {effect.name: _without_effect(full, effect) for effect in effects}
-    with_added_effect = {name: _with_one_more(scene, name, full.speed) for name in absent_effects(scene)}
+        systems_without_effect = {effect.name: _without_effect(full, effect) for effect in effects}
+    with_added_effect = {name: _with_added_effect(scene, name, full.speed) for name in absent_effects(scene)}
     systems = {
         name: system
-        for name, system in ({"": full.full} | rests | with_added_effect).items()
+        for name, system in ({"": full.full} | systems_without_effect | with_added_effect).items()
         if isinstance(system, Reduced)
     }
     micros = _microseconds_by_turn(systems)
     says = effect_sentences(scene.system)
-    prices = [_price_of_effect(full, effect.name, effect.says, rests[effect.name], micros) for effect in effects]
+    prices = [
+        _price_of_effect(full, effect.name, effect.says, systems_without_effect[effect.name], micros)
+        for effect in effects
+    ]
     prices += [
         _price_of_effect(full, name, says[name], with_added_effect[name], micros, is_present=False)
         for name in with_added_effect
@@ -65,7 +71,7 @@ def price_list_of_ride(scene: Any) -> PriceList:
 
 
 def _without_effect(full_scene: FullScene, effect: Effect) -> Reduced | str:
-    """The scene without an effect, or the reason why this is impossible."""
+    """The linear ride system without an effect, or the reason why it cannot be left out."""
     why = refusal_reason([effect])
     if why:
         return why
@@ -75,8 +81,8 @@ def _without_effect(full_scene: FullScene, effect: Effect) -> Reduced | str:
         return error.allowed
 
 
-def _with_one_more(scene: Any, name: str, speed: float) -> Reduced | str:
-    """The scene with one more effect at its usual values, or the reason why this is impossible."""
+def _with_added_effect(scene: Any, name: str, speed: float) -> Reduced | str:
+    """The linear ride system with one more effect at its usual values, or the reason why it cannot be added."""
     try:
         return FullScene(ReducedScene.complete(with_effects(scene, name)), speed).full
     except InputError as error:
@@ -84,15 +90,15 @@ def _with_one_more(scene: Any, name: str, speed: float) -> Reduced | str:
 
 
 def _counts_of_scene(system: Reduced) -> dict[str, int]:
-    """Counts of a reduced scene: states, and calls of the right-hand side per second of motion in the longest stable
+    """Counts of a linear ride system: states, and right-hand side calls per second of motion with the longest stable
     step.
     """
-    of_run = cost(system.of_vehicle, system.excitation)
+    of_run = cost(system.reduced_vehicle, system.excitation)
     return {"states": of_run.states, "calls per second": round(of_run.calls) if np.isfinite(of_run.calls) else 0}
 
 
 def _microseconds_by_turn(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
-    """CPU microseconds of a step (ROUNDS,) for every system; the systems take turns in random order."""
+    """CPU microseconds of a step (TIMING_ROUNDS,) for every system; the systems take turns in random order."""
     micros, order = {name: np.empty(TIMING_ROUNDS) for name in systems}, np.random.default_rng(SEED)
     for i in range(TIMING_ROUNDS):
         for j in order.permutation(len(systems)):
@@ -102,7 +108,7 @@ def _microseconds_by_turn(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
 
 
 def _step_microseconds(A: np.ndarray) -> float:
-    """CPU microseconds of one step with the state matrix A."""
+    """CPU microseconds of one Runge-Kutta step of x' = A x with the state matrix A."""
     x, step = np.ones(len(A)), 1e-6
     start_time = time.process_time()
     for _ in range(TIMED_STEPS):
@@ -118,7 +124,9 @@ def _price_of_effect(
     micros: dict[str, np.ndarray],
     is_present: bool = True,
 ) -> EffectPrice:
-    """Price of an effect. If it ``is_present``, ``changed_system`` is the scene without it, else the scene with it."""
+    """Price of an effect. ``changed_system`` is the scene without the effect if it ``is_present``, else the scene with
+    it.
+    """
     if isinstance(changed_system, str):
         return EffectPrice(name, is_present, description, changed_system)
     without_it, with_it = ((changed_system, micros[name]), (full_scene.full, micros[""]))[:: 1 if is_present else -1]
@@ -137,20 +145,20 @@ def _price_of_effect(
 
 
 def _deviation_changes(full_scene: FullScene, reduced: Reduced) -> tuple[QuantityChange, ...]:
-    """Changes of the standard deviations, exact; infinite where white noise reaches a quantity."""
+    """Changes of the outputs' standard deviations, exact; infinite where white noise reaches an output."""
     names = full_scene.full.system.names
     units = [output.unit for output in full_scene.linear.outputs]
     units += ["m/s^2"] * (len(names) - len(units))  # weighted accelerations come last
     try:
         with np.errstate(invalid="ignore"):
-            full, left = (
+            full, without = (
                 np.sqrt(exact_variances(system, list(range(len(names))))) for system in (full_scene.full, reduced)
             )
     except InputError:
         return ()
     changes = [
         QuantityChange(name, unit, float(abs(b - a)), float(abs(b / a - 1.0)))
-        for name, unit, a, b in zip(names, units, full, left, strict=True)
+        for name, unit, a, b in zip(names, units, full, without, strict=True)
         if np.isfinite(a) and a > 0.0
     ]
     return tuple(sorted(changes, key=lambda change: -change.relative))

@@ -1,4 +1,4 @@
-"""The price list of effects as a person reads it, and as JSON."""
+"""The price list of effects as text for a reader, and as JSON."""
 
 from dataclasses import asdict
 from typing import Any
@@ -8,15 +8,17 @@ import numpy as np
 from models.advice.price.effects import EffectPrice, PriceList, QuantityChange
 
 SHOWN_QUANTITIES = 3
-"""Quantities of an effect that are printed; JSON has all."""
+"""Number of changed quantities of an effect that are printed; JSON has all."""
 NAME_COLUMN_WIDTH = 26
-"""Of the column of names."""
+"""Width of the column of effect names, in characters."""
 ROUNDING_CHANGE = 1e-12
-"""Relative change that is rounding."""
+"""Relative change of a quantity up to which it is only rounding."""
 
 
 def price_list_lines(prices: PriceList, quantities: list[str]) -> list[str]:
-    """Text of a price list: the cost of the scene, then every effect with its cost and the changes that it makes."""
+    """Text lines of a price list: the cost of the scene, then every effect with its cost and the changes that it
+    makes.
+    """
     counts = ", ".join(f"{value:,} {name}" for name, value in prices.counts.items())
     priced_steps_text = "" if prices.each >= prices.whole else f", {prices.each:,} of {prices.whole:,} steps priced"
     return [
@@ -53,7 +55,7 @@ def _number_text(value: float, digits: int) -> str:
 
 
 def _effect_lines(price: EffectPrice, quantities: list[str]) -> list[str]:
-    """Text on an effect: a line on its cost, and a line on the quantities that it changes."""
+    """Text lines on an effect: its cost, the quantities that it changes, and the assumptions that it keeps."""
     name = f"    {price.name:<{NAME_COLUMN_WIDTH}} "
     if price.why:
         return [f"{name}no price: {price.why}"]
@@ -68,7 +70,7 @@ def _effect_lines(price: EffectPrice, quantities: list[str]) -> list[str]:
 
 
 def _counts_text(price: EffectPrice) -> str:
-    """Text of the counts that an effect changes."""
+    """Text on the counts (steps, calls, states) that an effect changes."""
     counts_without, counts_with = price.counts
     count_texts = [
         f"{counts_with[name] - counts_without[name]:+,} {name}"

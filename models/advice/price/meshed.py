@@ -1,4 +1,6 @@
-"""Common part of scenes whose contacts are cut into cells: settings are steps and cells of any engine's RK4."""
+"""Base of priced scenes whose contacts are divided into cells: settings are time steps and cell numbers of any engine's
+RK4.
+"""
 
 import math
 from abc import ABC, abstractmethod
@@ -13,37 +15,40 @@ from models.advice.price.problem import Setting
 from models.core.errors import InputError
 
 CELLS_TRIED = (3, 5, 7, 9, 11, 15, 21, 31, 45, 63, 91, 127, 200)
-"""Cells along a contact that are tried, and those of the scene."""
+"""Numbers of cells along a contact that are tried, beside the scene's number."""
 STEP_FACTORS = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25)
-"""Steps that are tried, by the scene's own; without cells, halvings of the shortest too."""
+"""Tried steps as multiples of the scene's step; without cells, halvings of the shortest are tried too."""
 STEP_HALVINGS = 8
 FIRST_CELLS, REFERENCE_RUNGS, CONFIRMATION_DIVISOR = 12, 5, 6.0
-"""Cells of the reference's first rung, how many rungs there are, and the part of a tolerance that the last one may
-change: the error that is left is a third of that."""
-REFINED_TOGETHER, OTHER_METHOD = "RK4 with cells and steps refined together", "DOP853"
-"""Methods of the reference, and of another family."""
-OTHER_TOLERANCE = 1e-8
-"""Relative tolerance of the second solver, which has its own steps."""
+"""Number of cells on the reference's first rung, number of its rungs, and the divisor of the tolerance that limits the
+change by the last rung: the remaining error is a third of that change.
+"""
+REFINED_TOGETHER, SECOND_METHOD = "RK4 with cells and steps refined together", "DOP853"
+"""Names of the method of the reference, and of a second method from another family."""
+SECOND_SOLVER_TOLERANCE = 1e-8
+"""Relative tolerance of the second solver, which picks its steps itself."""
 
 
 def first_part(duration: float, longest_part: float) -> float:
-    """Duration (s) of the first part of a run: at most ``longest_part``, and a whole fraction of the run."""
+    """Duration (s) of the first part of a run: at most ``longest_part`` (s), and a whole fraction of ``duration``
+    (s).
+    """
     return duration / math.ceil(duration / longest_part * (1 - 1e-9))
 
 
 @dataclass(frozen=True)
 class MeshedScene(ABC):
     """A priced scene with contact cells, see ``models.advice.price.PricedScene``. reference_engine : engine of the
-    reference; step : the scene's (s); longest : step (s) on the reference's first rung; cells : the scene's, 0 where
-    its contacts have none.
+    reference; step : the scene's (s); longest : step (s) on the reference's first rung; cells : the scene's number
+    along a contact, 0 where its contacts have none.
     """
 
     title: str
     quantity: str
     unit: str
     note: str
-    whole: float
-    first: float
+    full_duration: float
+    searched_duration: float
     engines: tuple[str, ...]
     reference_engine: str
     step: float
@@ -53,23 +58,23 @@ class MeshedScene(ABC):
 
     @abstractmethod
     def run(self, engine: str, cells: int, step: float, duration: float) -> Any:
-        """Run the scene in an engine with this number of cells and this step (s)."""
+        """Run the scene in an engine with this number of contact cells and this step (s)."""
 
     @abstractmethod
     def exact(self, cells: int, step: float, duration: float) -> Any:
-        """Run the scene by the solver DOP853 with accelerations of ``reference_engine``; rows are ``step`` (s)
+        """Run the scene by the solver DOP853 with accelerations of ``reference_engine``; output rows are ``step`` (s)
         apart.
         """
 
     @abstractmethod
     def read(self, run: Any) -> tuple[np.ndarray, np.ndarray, int]:
-        """Times (n,) in s and values (n, k) of a run, and how often contact forces were evaluated; the run's
-        assumptions are judged.
+        """Times (n,) in s and values (n, k) of the quantity along a run, and the number of contact force calls; the
+        run's assumptions are judged.
         """
 
     @abstractmethod
     def lines(self, setting: Setting) -> list[str]:
-        """Lines of a scene file that contain the setting."""
+        """Lines of a scene file that select the solver setting."""
 
     @property
     def counted(self) -> str:
@@ -78,12 +83,12 @@ class MeshedScene(ABC):
 
     @cached_property
     def steps(self) -> dict[str, float]:
-        """Steps (s) by the name of the method; each is a whole fraction of ``first``."""
+        """Time steps (s) by the name of the method; each is a whole fraction of ``searched_duration``."""
         steps = dict.fromkeys(self._longest_fraction(self.step * k) for k in STEP_FACTORS)
         return {f"RK4 at {1e3 * step:.3g} ms": step for step in steps}
 
     def ladders(self) -> list[SettingLadder]:
-        """A ladder of cells for every engine and step or, without cells, a ladder of steps for every engine."""
+        """A ladder of cell numbers for every engine and step or, without cells, a ladder of steps for every engine."""
         if not self.cells:
             steps = (*self.steps.values(), *(min(self.steps.values()) / 2**k for k in range(1, STEP_HALVINGS)))
             return [
@@ -99,8 +104,8 @@ class MeshedScene(ABC):
         ]
 
     def reference(self) -> SettingLadder:
-        """Ladder of the reference: twice the cells on every rung and half the step on every second; without cells, half
-        the step.
+        """Ladder of the reference: twice the cells on every rung and half the step on every second rung; without cells,
+        half the step on every rung.
         """
         if not self.cells:
             return SettingLadder(
@@ -115,11 +120,11 @@ class MeshedScene(ABC):
             confirmation_divisor=CONFIRMATION_DIVISOR,
         )
 
-    def second(self, reference_setting: Setting) -> Setting | None:
-        """DOP853, to check the reference; None where there are cells, since all solvers share the error of the
-        cells.
+    def second_setting(self, reference_setting: Setting) -> Setting | None:
+        """DOP853 as the setting that checks the reference; None where there are cells, since all solvers share the
+        error of the cells.
         """
-        return None if self.cells else Setting("reference", OTHER_METHOD, reference_setting.value, 0)
+        return None if self.cells else Setting("reference", SECOND_METHOD, reference_setting.value, 0)
 
     def solve(self, setting: Setting, duration: float) -> Any:
         """Run the scene with a setting for a duration (s); returns the number of cells, 0 without cells, and the
@@ -127,14 +132,14 @@ class MeshedScene(ABC):
         """
         cells = round(1.0 / setting.value) if self.cells else 0
         rung = round(math.log2(cells / FIRST_CELLS)) if self.cells else 0
-        if setting.method == OTHER_METHOD:
+        if setting.method == SECOND_METHOD:
             return cells, self.exact(cells, self._step_tied_to_cells(rung) if self.cells else setting.value, duration)
         if setting.method == REFINED_TOGETHER:
             return cells, self.run(setting.engine, cells, self._step_tied_to_cells(rung), duration)
         return cells, self.run(setting.engine, cells, self.steps.get(setting.method, setting.value), duration)
 
-    def answer(self, solution: Any) -> PricedRun:
-        """The quantity along a run, with the number of cells that were evaluated."""
+    def priced_run(self, solution: Any) -> PricedRun:
+        """The quantity along a run, with the numbers of force calls and of evaluated contact cells."""
         cells, run = solution
         times, values, calls = self.read(run)
         return PricedRun(times, values, {"force calls": calls, "contact cells": calls * cells**2})
@@ -143,12 +148,12 @@ class MeshedScene(ABC):
         return self._longest_fraction(self.longest) / 2 ** (max(0, rung_index) // 2)
 
     def _longest_fraction(self, step: float) -> float:
-        """The longest whole fraction (s) of ``first`` that is at most ``step`` (s)."""
-        return self.first / math.ceil(self.first / step * (1 - 1e-9))
+        """The longest whole fraction (s) of ``searched_duration`` that is at most ``step`` (s)."""
+        return self.searched_duration / math.ceil(self.searched_duration / step * (1 - 1e-9))
 
 
 def checked_quantity(quantity: str, known_names: dict[str, Any]) -> str:
-    """The name of a quantity that a scene has; InputError for an unknown one."""
+    """The name of a quantity, unchanged; InputError where the scene has no quantity of this name."""
     if quantity not in known_names:
         raise InputError("--quantity", "", quantity, "is no quantity of this scene: one of them", tuple(known_names))
     return quantity

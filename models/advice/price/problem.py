@@ -1,4 +1,4 @@
-"""Protocols of a work-precision problem and of one way to solve it."""
+"""Protocols of a work-precision problem and of the solver that computes it with one setting."""
 
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 @dataclass(frozen=True)
 class Setting:
-    """One way to solve a problem: an engine, a method, and its step, tolerance or number of cells.
+    """One setting with which a problem is solved: an engine, a method, and its step, tolerance or number of cells.
 
     engine, method : together the name of a work-precision curve
     value : step in s, relative tolerance where ``adaptive``, or 1 by the number of cells where ``cells``
@@ -32,22 +32,22 @@ class Setting:
         return f"{self.engine} {self.method}"
 
     def label(self) -> str:
-        """The setting as text: a step with its unit, a tolerance, or a number of cells along a contact."""
+        """The setting as text: a step in ms, a tolerance, or a number of cells along a contact."""
         if self.cells:
             return f"{round(1.0 / self.value)} cells"
         return f"tolerance {self.value:.3g}" if self.adaptive else f"{1e3 * self.value:.3g} ms"
 
 
 class Solver(Protocol):
-    """A model that has been built and can be run."""
+    """A model of a problem that has been built and can be run."""
 
     def run(self) -> Any:
-        """Solve the problem; raises RunFailed rather than give a wrong answer."""
+        """Solve the problem and return its solution; raises RunFailed rather than give a wrong solution."""
         ...
 
 
 class Problem(Protocol):
-    """Protocol of a problem that the work-precision runner measures.
+    """Protocol of a problem whose cost and error the work-precision runner measures.
 
     key : part of the rows' names; title : what is computed; note : what a reader of its figure must know;
     duration : of the run, s; units : unit of each error, the quantity that
@@ -67,19 +67,21 @@ class Problem(Protocol):
     tolerances: tuple[float, ...]
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """All settings to try, or the few that quick runs use."""
+        """All solver settings to try, or the few that quick runs use."""
         ...
 
     def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
-        """The setting of this problem that has this engine, this method, and this step (s) or tolerance."""
+        """The solver setting of this problem that has this engine, this method, and this step (s) or tolerance."""
         ...
 
     def build(self, setting: Setting) -> Solver:
-        """A model of the problem, ready to run; raises Refused where the engine would answer wrongly."""
+        """A model of the problem, ready to run with a setting; raises Refused where the engine would give a wrong
+        solution.
+        """
         ...
 
     def errors(self, solution: Any) -> dict[str, float]:
-        """Largest error of each quantity over the run, in the units of ``units``. Where it also judges the run's
-        assumptions, work-precision curves mark points that break one.
+        """Largest error of each quantity over a run, in the units of ``units``. Problems may also judge the run's
+        assumptions; work-precision curves then mark points that break one.
         """
         ...

@@ -1,4 +1,4 @@
-"""Which setting to take: the cheapest that meets a tolerance, timed beside the engines' defaults, and confirmed.
+"""Which solver setting to take: the cheapest that meets a tolerance, timed beside the engines' defaults, and confirmed.
 
 Counts are the same in every run, so the least count wins. Seconds wander: they are those of the processor, in rounds in
 which the rivals take turns, and an engine's default method that meets the tolerance is recommended unless the 95 %
@@ -32,31 +32,30 @@ from models.ensemble.workers import Crew, places_of
 from models.machine.timing import interleave, paired_ratio
 
 CLOSE_SECONDS_RATIO = 2.0
-"""Settings that took up to so many times the least seconds in one run are timed beside one another."""
+"""Ratio to the least seconds in one run up to which settings are timed in interleaved rounds."""
 DEFAULT_SECONDS_RATIO = 8.0
-"""The same for a default: it must never be given up because one run of it was disturbed."""
+"""Ratio as CLOSE_SECONDS_RATIO for an engine's default, which must not be given up for one disturbed run."""
 TIMING_ROUNDS, SHORTEST_TURN = 9, 0.002
-"""Interleaved rounds of timing; a short run is repeated until its turn lasts this long (s)."""
+"""Number of interleaved timing rounds, and the time (s) until which a short run is repeated in its turn."""
 FEWEST_ROUNDS, LONG_ROUNDS_SECONDS = 3, 5.0
-"""Of slow runs there are fewer rounds, for they take no longer together than this (s), yet at least so many."""
+"""Least number of timing rounds, and the total time (s) that limits the number of rounds of slow runs."""
 DROPPED_SECONDS_RATIO, DEFAULT_DROPPED_RATIO = 1.5, 3.0
-"""What took so many times the seconds of its engine's best in the first rounds is out of the race; a default later."""
+"""Ratios to the engine's least seconds above which a setting, or a default, leaves after the first rounds."""
 SLOWER_RATIO = 1.05
-"""A ratio of seconds whose 95 % interval lies above this is slower beyond doubt."""
+"""Ratio of seconds above which the 95 % interval must lie for a setting to count as slower."""
 MOST_CONFIRMATIONS = 6
-"""Settings that are confirmed over the whole run, at most, for one recommendation."""
+"""Largest number of settings that are tried over the whole run in search of one that meets the tolerance."""
 RESOLUTION_FACTOR = 3.0
-"""An error is told against a truth which is known that many times better, where one can be had within
-LONG_ROUNDS_SECONDS."""
+"""Ratio of errors to the uncertainty of the truth below which a finer truth is computed, if there is time."""
 UNTIMED_RUNS_AT_ONCE = 8
-"""Runs at once that are not timed, about: two settings of a reference, or two for each engine."""
+"""Number of untimed runs at the same time, about: two settings of a reference, or two for each engine."""
 REFINEMENT_COST = 8.0
-"""A finer reference takes at most about so many times the seconds: twice the cells, half the step."""
+"""Ratio of the seconds of a finer reference to those of the last one, at most: twice the cells, half the step."""
 
 
 @dataclass(frozen=True)
 class SettingChoice:
-    """A setting with its cost. error : in the quantity's unit, at least the uncertainty of the truth; calls : of
+    """A solver setting with its cost. error : in the quantity's unit, at least the uncertainty of the truth; calls : of
     forces; seconds : median; confirmed : whether over the whole run; rounds : seconds in the rounds in which it was
     timed alternately with others.
     """
@@ -70,14 +69,14 @@ class SettingChoice:
 
 
 Winners = dict[tuple[str, str], SettingChoice]
-"""By engine, "" for all, and by what is counted, "calls" or "seconds"."""
+"""Cheapest settings by engine ("" for all engines) and by kind of cost ("calls" or "seconds")."""
 
 
 @dataclass(frozen=True)
-class Default:
-    """An engine's default method. as_it_is : outcome of its default setting, with a ``reason`` if it gave no answer;
-    refined : the setting that meets the tolerance; extrapolated : whether by the declared order, because no step that
-    was tried is fine enough.
+class EngineDefault:
+    """Error and cost of an engine's default method. as_it_is : outcome of its default setting, with a ``reason`` if it
+    gave no result; refined : the setting that meets the tolerance; extrapolated : whether by the declared order,
+    because no step that was tried is fine enough.
     """
 
     as_it_is: TriedSetting
@@ -87,7 +86,7 @@ class Default:
 
 @dataclass(frozen=True)
 class Recommendation:
-    """Result of a search for settings: winners by engine and cost ("" for all engines), defaults by engine, all
+    """Result of a search for solver settings: winners by engine and cost ("" for all engines), defaults by engine, all
     settings that were tried, and the truth over the searched part and over the whole run.
     """
 
@@ -96,18 +95,18 @@ class Recommendation:
     search_truth: ReferenceTruth
     truth: ReferenceTruth
     winners: Winners
-    defaults: dict[str, Default]
+    defaults: dict[str, EngineDefault]
     tried: tuple[TriedSetting, ...]
 
     @property
-    def whole(self) -> bool:
-        """Whether settings were searched over the full duration of the run, not its first part alone."""
-        return self.scene.whole <= self.scene.first * (1 + 1e-9)
+    def searched_whole_run(self) -> bool:
+        """Whether settings were searched over the full duration of the run, not only over its first part."""
+        return self.scene.full_duration <= self.scene.searched_duration * (1 + 1e-9)
 
 
 def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str, ...]) -> Recommendation:
-    """The cheapest settings of a scene that meet a tolerance. InputError for impossible requests, RunFailed where no
-    truth can be computed.
+    """The cheapest solver settings of a scene that meet a tolerance. InputError for impossible requests, RunFailed
+    where no truth can be computed.
 
     The scene's crew computes what is not timed.
     """
@@ -120,7 +119,7 @@ def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str
 
 
 def priced_scene(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> PricedScene:
-    """A scene in the form that the search needs, made by its system's module; InputError where there is none."""
+    """The scene in the form of the price search, made by its system's module; InputError where there is none."""
     files = modules_of("models.advice.price.systems")
     if scene.system in files:
         priceable: PricedScene = import_module(files[scene.system]).priced_scene(scene, quantity, engines)
@@ -133,16 +132,16 @@ def priced_scene(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> 
 
 
 def recommend(scene: PricedScene, tolerance: float, executor: Executor | None = None) -> Recommendation:
-    """Search settings over the first part of the run, time those near the best, and confirm them over the whole run.
+    """The cheapest settings: searched over the first part of the run, timed, and confirmed over the whole run.
 
     executor : computes what is not timed.
     """
-    searched = known = reference_truth(scene, tolerance, scene.first, executor=executor)
-    search = Search(scene, searched, tolerance, scene.first).search_all_ladders()
+    searched = known = reference_truth(scene, tolerance, scene.searched_duration, executor=executor)
+    search = Search(scene, searched, tolerance, scene.searched_duration).search_all_ladders()
     timed = _timed_settings(search)
     engines = ("", *dict.fromkeys(ladder.engine for ladder in scene.ladders()))
     winners = _cheapest_by_key(timed, [(engine, kind) for engine in engines for kind in ("seconds", "calls")])
-    if scene.whole > scene.first * (1 + 1e-9) and winners:
+    if scene.full_duration > scene.searched_duration * (1 + 1e-9) and winners:
         known, timed, winners = _confirmed_over_whole_run(search, timed, winners, executor)
     known, timed, winners = _with_finer_truth(scene, known, timed, winners, executor)
     defaults = {
@@ -154,9 +153,7 @@ def recommend(scene: PricedScene, tolerance: float, executor: Executor | None = 
 
 
 def _timed_settings(search: Search) -> list[SettingChoice]:
-    """The coarsest setting of every method that meets the tolerance; those that may be the fastest are timed in several
-    rounds.
-    """
+    """The coarsest setting of every method that meets the tolerance; the fastest ones are timed in several rounds."""
     curves: dict[str, TriedSetting] = {}
     for attempt in search.settings_that_meet():
         coarsest = curves.setdefault(attempt.setting.curve, attempt)
@@ -167,7 +164,7 @@ def _timed_settings(search: Search) -> list[SettingChoice]:
     attempts = list(curves.values())
     seconds_by_setting, longer = (
         _interleaved_seconds(search, _fastest_candidates(attempts)),
-        search.scene.whole / search.duration,
+        search.scene.full_duration / search.duration,
     )
     seconds = [
         tuple(longer * seconds_by_setting.get(attempt.setting, np.array([attempt.seconds]))) for attempt in attempts
@@ -179,7 +176,7 @@ def _timed_settings(search: Search) -> list[SettingChoice]:
 
 
 def _fastest_candidates(attempts: list[TriedSetting]) -> list[TriedSetting]:
-    """Settings that may be an engine's fastest, or the fastest of all; none where there is only one candidate."""
+    """Settings that may be the fastest of an engine or of all; none where there is only one candidate."""
     rivals = dict[TriedSetting, None]()
     for engine in ("", *dict.fromkeys(attempt.setting.engine for attempt in attempts)):
         attempts_of_engine = [attempt for attempt in attempts if attempt.setting.engine.startswith(engine)]
@@ -195,7 +192,7 @@ def _fastest_candidates(attempts: list[TriedSetting]) -> list[TriedSetting]:
 
 
 def _interleaved_seconds(search: Search, rivals: list[TriedSetting]) -> dict[Setting, np.ndarray]:
-    """Seconds of each setting in a few rounds, and in more rounds for those that are not far behind the fastest."""
+    """Seconds of each setting in a few rounds, and in more rounds for those not far behind the fastest."""
     seconds = _seconds_by_round(search, rivals, FEWEST_ROUNDS)
     middle = {attempt.setting: float(np.median(seconds[attempt.setting])) for attempt in rivals}
     least_by_engine: dict[str, float] = {}
@@ -219,6 +216,7 @@ def _interleaved_seconds(search: Search, rivals: list[TriedSetting]) -> dict[Set
 
 
 def _seconds_by_round(search: Search, rivals: list[TriedSetting], round_count: int) -> dict[Setting, np.ndarray]:
+    """Processor seconds of each setting in every one of ``round_count`` interleaved rounds."""
     jobs = [partial(search.scene.solve, attempt.setting, search.duration) for attempt in rivals]
     lasted = [attempt.seconds for attempt in rivals]
     seconds_by_setting = interleave(jobs, round_count, SHORTEST_TURN, lasted=lasted, clock=time.process_time)
@@ -226,13 +224,13 @@ def _seconds_by_round(search: Search, rivals: list[TriedSetting], round_count: i
 
 
 def _cheapest_by_key(timed_choices: list[SettingChoice], keys: Iterable[tuple[str, str]]) -> Winners:
-    """The cheapest setting for every pair of engine and cost in ``keys`` that has any."""
+    """The cheapest setting for each (engine, kind of cost) in ``keys``; a key without any setting is left out."""
     return {key: best for key in keys if (best := _cheapest(timed_choices, *key)) is not None}
 
 
 def _cheapest(timed_choices: list[SettingChoice], engine: str, cost_kind: str) -> SettingChoice | None:
-    """The setting of an engine with the least cost. By seconds, which scatter, a default method is preferred unless it
-    is clearly slower.
+    """The setting of an engine with the least cost of a kind. By seconds, which scatter, a default method is preferred
+    unless it is clearly slower.
     """
     able = [choice for choice in timed_choices if choice.tried.setting.engine.startswith(engine)]
     if not able:
@@ -260,15 +258,13 @@ TruthAndOutcomes = tuple[ReferenceTruth, list[SettingChoice], Winners]
 def _confirmed_over_whole_run(
     search: Search, timed_choices: list[SettingChoice], winners: Winners, executor: Executor | None
 ) -> TruthAndOutcomes:
-    """The winners and defaults after runs over the whole scene, refined until they meet the tolerance there; with the
-    truth.
-    """
+    """The winners and defaults that meet the tolerance over the whole run, refined if necessary; with the truth."""
     scene = search.scene
     rung = max(0, search.truth.rung - 1)
-    known = reference_truth(scene, search.tolerance, scene.whole, rung, second_method=False, executor=executor)
+    known = reference_truth(scene, search.tolerance, scene.full_duration, rung, second_method=False, executor=executor)
     ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.ladders()}
     able = {choice.tried.setting: choice for choice in _winners_and_defaults(timed_choices, winners)}
-    full_search = Search(scene, known, search.tolerance, scene.whole)
+    full_search = Search(scene, known, search.tolerance, scene.full_duration)
     blocks = [(ladders[setting.curve], choice) for setting, choice in able.items()]
     confirmed = block_results(partial(_valid_over_run, full_search), blocks, executor)
     confirmed_choices = [confirmation.choice for confirmation in confirmed if confirmation.choice is not None]
@@ -277,7 +273,7 @@ def _confirmed_over_whole_run(
 
 
 def _winners_and_defaults(timed_choices: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
-    """The winners and the settings of default methods, each once."""
+    """The winners and the settings of default methods, without repetition."""
     return list(
         dict.fromkeys([*winners.values(), *(choice for choice in timed_choices if choice.tried.setting.default)])
     )
@@ -285,8 +281,8 @@ def _winners_and_defaults(timed_choices: list[SettingChoice], winners: Winners) 
 
 @dataclass(frozen=True)
 class _ConfirmedSetting:
-    """A setting that meets the tolerance over the whole run, None where there is none, and attempts that failed for
-    other reasons than their error.
+    """A setting that meets the tolerance over the whole run, None where there is none, and the attempts that failed for
+    another reason than their error.
     """
 
     choice: SettingChoice | None
@@ -294,7 +290,7 @@ class _ConfirmedSetting:
 
 
 def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) -> _ConfirmedSetting:
-    """The setting, or the next finer one of its method, that meets the tolerance over the whole run.
+    """A setting that meets the tolerance over the whole run: that of the block, or a finer one of its method.
 
     The seconds of all attempts are scaled from the rounds in which the first one was timed.
     """
@@ -325,14 +321,15 @@ def _with_finer_truth(
     winners: Winners,
     executor: Executor | None,
 ) -> TruthAndOutcomes:
-    """A truth that is more exact than the winners and the defaults, and these with their errors from it: a setting may
-    be far better than its tolerance asks, and as good as the reference that it was compared with.
+    """A more exact truth where the errors are close to its uncertainty, and the winners and defaults with their errors
+    from it: a setting may be far better than its tolerance asks, and as good as the reference that it was compared
+    with.
     """
     shown = _winners_and_defaults(timed_choices, winners)
     errors = {choice.tried.setting: choice.error for choice in shown}
     if _is_blurred(truth, errors):
-        answers = dict(zip(errors, block_results(partial(_whole_answer, scene), errors, executor), strict=True))
-        truth, errors = _finer_truth(scene, truth, answers, executor)
+        runs = dict(zip(errors, block_results(partial(_run_over_whole_scene, scene), errors, executor), strict=True))
+        truth, errors = _finer_truth(scene, truth, runs, executor)
     choices_with_errors = {
         choice.tried.setting: replace(choice, error=max(errors[choice.tried.setting], truth.uncertainty))
         for choice in shown
@@ -344,14 +341,13 @@ def _with_finer_truth(
     )
 
 
-def _whole_answer(scene: PricedScene, setting: Setting) -> PricedRun:
-    return scene.answer(scene.solve(setting, scene.whole))
+def _run_over_whole_scene(scene: PricedScene, setting: Setting) -> PricedRun:
+    """The quantity along the whole run with a setting."""
+    return scene.priced_run(scene.solve(setting, scene.full_duration))
 
 
 def _is_blurred(truth: ReferenceTruth, errors: dict[Setting, float]) -> bool:
-    """Whether the smallest error is too close to the uncertainty of the truth, and a better truth would take seconds,
-    not minutes.
-    """
+    """Whether errors are too close to the uncertainty of the truth, while a better truth would take only seconds."""
     return (
         min(errors.values(), default=np.inf) < RESOLUTION_FACTOR * truth.uncertainty
         and REFINEMENT_COST * truth.seconds < LONG_ROUNDS_SECONDS
@@ -361,12 +357,14 @@ def _is_blurred(truth: ReferenceTruth, errors: dict[Setting, float]) -> bool:
 def _finer_truth(
     scene: PricedScene, truth: ReferenceTruth, priced_runs: dict[Setting, PricedRun], executor: Executor | None
 ) -> tuple[ReferenceTruth, dict[Setting, float]]:
-    """A truth that is exact enough for the errors of all answers, or the best that time allows, and these errors."""
+    """A truth that is exact enough for the errors of all runs, or the best that time allows, with these errors."""
     errors = {setting: truth.error(answer) for setting, answer in priced_runs.items()}
     while _is_blurred(truth, errors):
         try:
             tolerance = scene.reference().confirmation_divisor * truth.uncertainty
-            finer = reference_truth(scene, tolerance, scene.whole, truth.rung, second_method=False, executor=executor)
+            finer = reference_truth(
+                scene, tolerance, scene.full_duration, truth.rung, second_method=False, executor=executor
+            )
         except (InputError, RunFailed):
             break  # as well known as rounding and the reference's finest step let it be
         if not finer.uncertainty < truth.uncertainty:
@@ -375,8 +373,8 @@ def _finer_truth(
     return truth, errors
 
 
-def _default_cost(search: Search, ladder: SettingLadder, timed_choices: list[SettingChoice]) -> Default | None:
-    """Error and cost of an engine's default settings, and the cost at which they meet the tolerance."""
+def _default_cost(search: Search, ladder: SettingLadder, timed_choices: list[SettingChoice]) -> EngineDefault | None:
+    """Error and cost of an engine's default setting, and the cost at which its method meets the tolerance."""
     curve = f"{ladder.engine} {ladder.method}"
     tried = [attempt for attempt in search.tried if attempt.setting.curve == curve]
     if not tried:
@@ -385,13 +383,13 @@ def _default_cost(search: Search, ladder: SettingLadder, timed_choices: list[Set
     met = next((attempt for attempt in timed_choices if attempt.tried.setting.curve == curve), None)
     clear = [attempt for attempt in tried if attempt.status == "ok"]
     if met is not None or not clear:
-        return Default(as_it_is, met, False)
+        return EngineDefault(as_it_is, met, False)
     finest = min(clear, key=lambda attempt: attempt.setting.value)
     if search.meets(finest):  # over the part that was searched, and not over the whole run
-        return Default(as_it_is, None, False)
+        return EngineDefault(as_it_is, None, False)
     finer = (finest.error / search.tolerance) ** (1 / (ladder.order or 1))
     setting = replace(finest.setting, value=finest.setting.value / finer)
-    longer = ladder.work(finest.setting.value, setting.value) * search.scene.whole / search.duration
+    longer = ladder.work(finest.setting.value, setting.value) * search.scene.full_duration / search.duration
     guess = TriedSetting(setting, "ok", "", search.tolerance)
     refined = SettingChoice(guess, search.tolerance, longer * finest.calls, longer * finest.seconds, False)
-    return Default(as_it_is, refined, True)
+    return EngineDefault(as_it_is, refined, True)

@@ -1,4 +1,4 @@
-"""The one work-precision runner: every setting of a problem tried, judged, counted and timed.
+"""The work-precision runner: every setting of a problem is tried, judged, counted and timed.
 
     problem (validation/price/problems) -> points -> curves -> table of cheapest settings
 
@@ -20,9 +20,9 @@ from models.advice.price.curves import (
     UNCERTAINTY_FACTOR,
     ToleranceCost,
     coinciding_curves,
+    cost_at_tolerance,
     observed_order,
     pareto,
-    reach,
 )
 from models.advice.price.problem import Problem, Setting
 from models.core.assumptions import collected_breaches
@@ -32,27 +32,33 @@ from models.machine.timing import interleave, interval, resamples
 Status = Literal["ok", "raised", "refused", "flagged", "SILENT"]
 CostsAtTolerance = dict[str, ToleranceCost]
 WORK_COUNTS = ("contact cells", "force calls")
-"""What work may be counted in: the first that a problem's points have."""
+"""Names of the counts that can measure work; the first one that a problem's points have is used."""
 COMPARED_ENGINES = ("exudyn", "mujoco")
-"""Engines whose own cheapest setting is told, where a problem has them."""
+"""Engines whose cheapest settings are reported, where a problem has them."""
 PROCESSOR_CLOCK = time.process_time
-"""Seconds of the processor: what else the machine does is not in them, nor in which settings have rounds."""
+"""Clock of processor seconds: other work of the machine is not in them, nor does it decide which settings are timed in
+rounds.
+"""
 CLOSE_SECONDS_RATIO = 1.25
-"""A curve that takes up to so many times the least seconds in one run may be the cheapest: rounds tell."""
+"""Ratio to the least seconds in one run up to which a curve may be the cheapest, so that it is timed in rounds."""
 SLOW_RUN_SECONDS = 0.05
-"""A setting that takes longer (s) has FEWEST_ROUNDS rounds, its first run as the first of them: a long run wanders
-less."""
+"""Duration (s) of a run above which only FEWEST_ROUNDS rounds are timed, with the first run as the first of them: long
+runs scatter less.
+"""
 LONG_RUN_SECONDS = 0.25
-"""A setting that takes longer (s) has rounds for the tolerance in the middle alone, which the rows are about."""
+"""Duration (s) of a run above which rounds are timed for the middle tolerance alone, which the report's rows are
+about.
+"""
 FEWEST_ROUNDS = 5
-"""With fewer rounds no interval is told: that of one would look exact."""
+"""Least number of rounds for an interval of seconds; that of a single round would look exact."""
 BOOTSTRAP_DRAWS = 200
-"""Bootstrapped sets of rounds behind the interval of an interpolated ratio."""
+"""Number of bootstrap samples of the rounds for the interval of an interpolated ratio."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """Outcome of one setting: errors by quantity, counts, and the seconds of every round, or of the only run.
+    """Outcome of one setting of a work-precision problem: errors by quantity, counts, and the seconds of every round,
+    or of the only run.
 
     changed : whether the last of those rounds counted, or erred by, anything else; None without rounds. broken :
     assumptions that the run broke, of a problem whose solutions are judged.
@@ -74,7 +80,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Loss:
-    """Ratio of the cost of a default method to that of the cheapest setting with the same error.
+    """Loss by a default method: ratio of its cost to that of the cheapest setting with the same error.
 
     factor with its 95 % interval (equal to it for counts, NaN after too few rounds); ``how`` as in ``ToleranceCost``,
     for the default's side.
@@ -88,8 +94,8 @@ class Loss:
 
 @dataclass(frozen=True)
 class MeasuredPoints:
-    """All points of a problem, with the facts about it that tables and figures need (see ``Problem``), as they are
-    saved as JSON.
+    """All points of a work-precision problem, with the facts about it that tables and figures need (see ``Problem``),
+    in the form that is saved as JSON.
     """
 
     key: str
@@ -115,12 +121,12 @@ class MeasuredPoints:
 
     @property
     def middle(self) -> float:
-        """The tolerance that the report's rows use: the middle one, of two the looser."""
+        """The tolerance that the report's rows use: the middle one of all; of two middle ones, the looser."""
         return sorted(self.tolerances)[len(self.tolerances) // 2]
 
     @property
     def costs(self) -> tuple[str, str]:
-        """Names of the two kinds of cost: the count that measures the work, and seconds."""
+        """Names of the two kinds of cost: the count that measures the work, and "seconds"."""
         return next(kind for kind in WORK_COUNTS if any(kind in p.counts for p in self.points)), "seconds"
 
     @property
@@ -128,16 +134,16 @@ class MeasuredPoints:
         """Points at default settings, by the name of the engine whose default it is."""
         return {p.setting.default: p for p in self.points if p.setting.default}
 
-    def error(self, p: Point) -> float:
+    def error(self, point: Point) -> float:
         """Error of a point in the quantity to which the tolerances apply."""
-        return p.errors[self.quantity]
+        return point.errors[self.quantity]
 
     def judging_floor(self, quantity: str = "") -> float:
-        """Error of a quantity below which the reference is too uncertain to judge."""
+        """Error of a quantity, in its unit, below which the reference is too uncertain to judge a setting."""
         return UNCERTAINTY_FACTOR * self.uncertainty[quantity or self.quantity]
 
     def curves(self, status: Status | None = "ok") -> dict[str, list[Point]]:
-        """Points of each curve with this status, from coarse to fine; None means any status."""
+        """Points of each work-precision curve with this status, from coarse to fine; None means any status."""
         points_of = defaultdict(list)
         for p in sorted(self.points, key=lambda p: -p.setting.value):
             if status in (None, p.status):
@@ -145,14 +151,16 @@ class MeasuredPoints:
         return points_of
 
     def front(self, cost_kind: str) -> list[Point]:
-        """Points that no other point beats in both cost and error, in the order of rising cost, without errors below
-        ``judging_floor``.
+        """Pareto front: points that no other point beats in both cost and error, in the order of rising cost, without
+        errors below ``judging_floor``.
         """
         clear = [p for p in self.points if p.status == "ok" and self.error(p) >= self.judging_floor()]
         return [clear[i] for i in pareto([p.cost(cost_kind) for p in clear], list(map(self.error, clear)))]
 
     def observed_orders(self, quantity: str) -> dict[str, float]:
-        """Observed order of convergence of each curve: in the step, or in 1 / force calls for adaptive methods."""
+        """Observed order of convergence of each curve in an error: over the step, or over 1 / force calls for adaptive
+        methods.
+        """
         orders = {}
         for curve, points in self.curves().items():
             sizes = [1 / p.cost(self.costs[0]) if p.setting.adaptive else p.setting.value for p in points]
@@ -160,7 +168,7 @@ class MeasuredPoints:
         return orders
 
     def coinciding_curves(self) -> list[tuple[str, ...]]:
-        """Groups of curves that coincide, judged on the points whose errors are above ``judging_floor``."""
+        """Groups of curves that coincide in their errors above ``judging_floor``."""
         return coinciding_curves(
             {
                 curve: {p.setting.value: self.error(p) for p in points if self.error(p) >= self.judging_floor()}
@@ -180,7 +188,9 @@ class MeasuredPoints:
         return wrong
 
     def reaches(self, target: float, kind: str, extrapolate: bool = False) -> CostsAtTolerance:
-        """Cost of the kind ``kind`` at which each curve meets ``target``; curves that do not meet it are left out."""
+        """Cost of the kind ``kind`` at which each curve meets the error ``target``; curves that do not meet it are left
+        out.
+        """
         reaches = {
             curve: self._cost_at_tolerance(points, target, [p.cost(kind) for p in points], extrapolate)
             for curve, points in self.curves().items()
@@ -190,14 +200,14 @@ class MeasuredPoints:
     def _cost_at_tolerance(
         self, points: list[Point], target_error: float, costs: Sequence[float], extrapolate: bool = True
     ) -> ToleranceCost | None:
-        """Cost at which the points of one curve meet a target, by ``curves.reach``."""
+        """Cost at which the points of one curve meet a target error, interpolated by ``curves.cost_at_tolerance``."""
         order = 0 if points[0].setting.adaptive else points[0].setting.order
         values = [p.setting.value for p in points]
-        return reach(values, list(map(self.error, points)), costs, target_error, order, extrapolate)
+        return cost_at_tolerance(values, list(map(self.error, points)), costs, target_error, order, extrapolate)
 
     def loss(self, target_error: float, cost_kind: str, default: str, engine: str = "") -> Loss | None:
-        """Loss of the curve ``default`` compared with the cheapest curve of ``engine`` ("" for all engines); None if no
-        curve meets the target.
+        """Loss by the curve ``default`` compared with the cheapest curve of ``engine`` ("" for all engines), at a
+        target error; None if no curve meets it.
         """
         best = cheapest_curve(self.reaches(target_error, cost_kind), engine)
         usual = self.reaches(target_error, cost_kind, extrapolate=True).get(default)
@@ -214,8 +224,8 @@ class MeasuredPoints:
         return Loss(factor, low, high, usual.how)
 
     def _bootstrapped_seconds(self, bracketing: list[Point], target_error: float, round_count: int) -> np.ndarray:
-        """Seconds that a curve needs to meet a target, from the points that its interpolation uses, one value per
-        bootstrap sample of the rounds that both have.
+        """Seconds that a curve needs to meet a target error, interpolated between its bracketing points: one value per
+        bootstrap sample of the timing rounds.
         """
         timed_rounds = [np.array(p.seconds)[:: len(p.seconds) // round_count][:round_count] for p in bracketing]
         medians = np.array(
@@ -240,13 +250,13 @@ class MeasuredPoints:
             for engine in ("", *COMPARED_ENGINES, *(p.setting.engine for p in usual)):
                 near |= _nearly_cheapest(met, engine)
             near |= {p.setting.curve: refined[p.setting.curve] for p in usual if p.setting.curve in refined}
-            rests = (p for curve, cheapest in near.items() for p in bracketing_points(curves[curve], cheapest))
-            chosen += [p for p in rests if target == self.middle or p.cost("seconds") <= LONG_RUN_SECONDS]
+            bracketing = (p for curve, cheapest in near.items() for p in bracketing_points(curves[curve], cheapest))
+            chosen += [p for p in bracketing if target == self.middle or p.cost("seconds") <= LONG_RUN_SECONDS]
         return list({p.setting: p for p in chosen}.values())
 
 
 def measured_points(problem: Problem, points: Iterable[Point]) -> MeasuredPoints:
-    """The points of a problem, with the facts about it."""
+    """The points of a work-precision problem, together with the facts about the problem."""
     problem_facts = {
         problem_field.name: getattr(problem, problem_field.name)
         for problem_field in fields(MeasuredPoints)
@@ -256,11 +266,11 @@ def measured_points(problem: Problem, points: Iterable[Point]) -> MeasuredPoints
 
 
 TUPLE_KEYS = ("seconds", "broken")
-"""What JSON keeps as lists."""
+"""Fields of a point that are tuples, but lists in JSON."""
 
 
 def of_saved(dictionary: dict[str, Any]) -> MeasuredPoints:
-    """A ``MeasuredPoints`` from the dictionary that ``dataclasses.asdict`` made from it."""
+    """``MeasuredPoints`` restored from the dictionary that ``dataclasses.asdict`` made from them."""
     points = [
         Point(**p | {"setting": Setting(**p["setting"])} | {name: tuple(p.get(name, ())) for name in TUPLE_KEYS})
         for p in dictionary["points"]
@@ -269,8 +279,8 @@ def of_saved(dictionary: dict[str, Any]) -> MeasuredPoints:
 
 
 def attempt(problem: Problem, setting: Setting) -> Point:
-    """Try one setting. Its status is ok, raised (the run failed with a message), refused (it was not run), flagged (the
-    solution has a ``doubt``), or SILENT (the answer is not finite, or absurd, without any message).
+    """Try one setting of a problem. Its status is ok, raised (the run failed with a message), refused (it was not run),
+    flagged (the solution has a ``doubt``), or SILENT (the solution is not finite, or absurd, without any message).
     """
     start_time = PROCESSOR_CLOCK()
     try:
@@ -304,8 +314,8 @@ def attempt(problem: Problem, setting: Setting) -> Point:
 
 
 def measure(problem: Problem, quick: bool, round_count: int, minimum_seconds: float) -> MeasuredPoints:
-    """All points of a problem. Those that are decisive have the seconds of ``round_count`` interleaved rounds, the
-    others those of one run.
+    """All points of a work-precision problem. Decisive points have the seconds of ``round_count`` interleaved rounds,
+    the others those of one run.
 
     Seconds are those of building the model and running it, input tables included, for every engine alike.
     """
@@ -320,8 +330,8 @@ def measure(problem: Problem, quick: bool, round_count: int, minimum_seconds: fl
 def _timed_points(
     problem: Problem, points: list[Point], round_count: int, minimum_seconds: float
 ) -> dict[Setting, Point]:
-    """The points with the seconds of their rounds, and whether counts or errors of the last run differ from the first
-    one's.
+    """The points with the seconds of their rounds, and whether counts or errors of the last run differ from those of
+    the first run.
     """
     last_runs: dict[Setting, Any] = {}
 
@@ -347,7 +357,7 @@ def _timed_points(
 
 
 def _nearly_cheapest(reaches: CostsAtTolerance, engine: str) -> CostsAtTolerance:
-    """The cheapest curve of one engine, or of all, and the curves that are little slower."""
+    """The cheapest curve of one engine, or of all ("") engines, and the curves that cost little more."""
     best = cheapest_curve(reaches, engine)
     return {
         curve: cheapest
@@ -357,13 +367,15 @@ def _nearly_cheapest(reaches: CostsAtTolerance, engine: str) -> CostsAtTolerance
 
 
 def bracketing_points(points: list[Point], cheapest_reach: ToleranceCost) -> list[Point]:
-    """The one or two points of a curve between which the cost of meeting a tolerance is interpolated."""
+    """The one or two points of a work-precision curve between which the cost of meeting a tolerance is interpolated."""
     coarser = [p for p in points if p.setting.value >= cheapest_reach.value * (1 - 1e-12)]
     finer = [p for p in points if p.setting.value <= cheapest_reach.value * (1 + 1e-12)]
     return [*coarser[-1:], *(p for p in finer[:1] if p is not coarser[-1])] if coarser else finer[:1]
 
 
 def cheapest_curve(reaches: CostsAtTolerance, engine: str = "") -> tuple[str, ToleranceCost] | None:
-    """The curve that meets a tolerance at the least cost, among those of one engine or of all engines."""
+    """The name and cost of the curve that meets a tolerance at the least cost, among those of one engine or of all
+    engines; None if there is none.
+    """
     able = [item for item in reaches.items() if item[0].startswith(engine)]
     return min(able, key=lambda item: item[1].cost, default=None)

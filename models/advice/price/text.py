@@ -1,4 +1,4 @@
-"""A recommendation as a person reads it, and as JSON."""
+"""A recommendation of solver settings as text for a reader, and as JSON."""
 
 from collections import defaultdict
 from dataclasses import asdict
@@ -11,28 +11,28 @@ from models.drawing.figures import LABELS
 from models.machine.seconds import cost
 
 EQUAL_RATIO_MARGIN = 0.005
-"""Ratios so near to one are not worth a word."""
+"""Distance of a cost ratio from 1 up to which it is not reported."""
 TABLE_HEADING = f"  {'':<24}{'setting':<36}{'error':>11}{{counted:>16}}   time"
 
 
 def recommendation_lines(recommendation: Recommendation) -> list[str]:
-    """Text of a recommendation: the cheapest settings, the extra cost of defaults, what failed, and what to write into
-    the scene.
+    """Text lines of a recommendation: the cheapest settings, the extra cost of defaults, what failed, and what to write
+    into the scene.
     """
     scene = recommendation.scene
     first = (
-        f"  over the first {scene.first:g} s, where all methods are tried: {recommendation.search_truth.origin} "
-        f"{recommendation.search_truth.uncertainty:.1e} {scene.unit}"
+        f"  over the first {scene.searched_duration:g} s, where all methods are tried: "
+        f"{recommendation.search_truth.origin} {recommendation.search_truth.uncertainty:.1e} {scene.unit}"
     )
     doubt = (
         f"  DOUBT: {scene.quantity} is at most {recommendation.truth.size:.3g} {scene.unit} itself: "
         f"within {recommendation.tolerance:g} {scene.unit} even zero would do"
     )
-    extent = getattr(scene, "extent", f"over {scene.whole:g} s")
+    extent = getattr(scene, "extent", f"over {scene.full_duration:g} s")
     return [
         f"{scene.title}: {scene.quantity} within {recommendation.tolerance:g} {scene.unit} {extent}",
         f"  truth: {recommendation.truth.origin} {recommendation.truth.uncertainty:.1e} {scene.unit}",
-        *([] if recommendation.whole else [first]),
+        *([] if recommendation.searched_whole_run else [first]),
         *([f"  {scene.note}"] if scene.note else []),
         *([doubt] if recommendation.tolerance >= recommendation.truth.size else []),
         *(f"  with every setting: {assumption.line()}" for assumption in recommendation.truth.broken_assumptions),
@@ -40,7 +40,7 @@ def recommendation_lines(recommendation: Recommendation) -> list[str]:
         *(_table(recommendation) if recommendation.winners else _no_setting_lines(recommendation)),
         *_default_lines(recommendation),
         *_failure_lines(recommendation.tried),
-        *_into_the_scene(recommendation),
+        *_scene_file_lines(recommendation),
     ]
 
 
@@ -54,7 +54,7 @@ def _table(recommendation: Recommendation) -> list[str]:
         )
     duration_text = (
         " over the whole run"
-        if recommendation.whole or all(choice.confirmed for choice in recommendation.winners.values())
+        if recommendation.searched_whole_run or all(choice.confirmed for choice in recommendation.winners.values())
         else ""
     )
     return [
@@ -65,7 +65,7 @@ def _table(recommendation: Recommendation) -> list[str]:
 
 
 def _merged_winners(winners: Winners) -> Winners:
-    """The winners, with one row instead of two where the same setting is the cheapest by both costs."""
+    """The cheapest settings, with one row instead of two where the same setting is the cheapest by both costs."""
     rows = Winners()
     for (engine, kind), choice in winners.items():
         if (engine, "seconds") in rows and rows[engine, "seconds"] is choice:
@@ -95,9 +95,11 @@ def _default_lines(recommendation: Recommendation) -> list[str]:
     rows = [""]
     for engine, default in recommendation.defaults.items():
         tried = default.as_it_is
-        known = max(tried.error, recommendation.search_truth.uncertainty)
-        error = f"{'' if known == tried.error else 'below '}{known:.2g} {recommendation.scene.unit}"
-        duration_text = "" if recommendation.whole else f" over {recommendation.scene.first:g} s"
+        error_bound = max(tried.error, recommendation.search_truth.uncertainty)
+        error = f"{'' if error_bound == tried.error else 'below '}{error_bound:.2g} {recommendation.scene.unit}"
+        duration_text = (
+            "" if recommendation.searched_whole_run else f" over {recommendation.scene.searched_duration:g} s"
+        )
         as_it_is = f"{error}{duration_text}" if tried.status == "ok" else tried.status
         lost = _cost_of_default_text(recommendation, engine, default.refined, default.extrapolated)
         rows.append(f"  {LABELS[engine]}'s default, {_setting_text(tried.setting, False)}: {as_it_is}{lost}")
@@ -107,7 +109,7 @@ def _default_lines(recommendation: Recommendation) -> list[str]:
 def _cost_of_default_text(
     recommendation: Recommendation, engine: str, refined: SettingChoice | None, extrapolated: bool
 ) -> str:
-    """Text on the cost of the refined default method, compared with the engine's cheapest setting and with the cheapest
+    """Text on the cost of the refined default method, as a ratio to the engine's cheapest setting and to the cheapest
     of all.
     """
     if refined is None:
@@ -124,7 +126,7 @@ def _cost_of_default_text(
 
 
 def _failure_lines(tried: tuple[TriedSetting, ...]) -> list[str]:
-    """Lines on settings without an answer, by method, with the reason of the last one that was tried."""
+    """Text lines on settings without a valid result, by method, with the reason of the last one that was tried."""
     known = defaultdict[tuple[str, str], list[TriedSetting]](list)
     for attempt in tried:
         if attempt.status != "ok":
@@ -142,8 +144,8 @@ def _failure_lines(tried: tuple[TriedSetting, ...]) -> list[str]:
     ]
 
 
-def _into_the_scene(recommendation: Recommendation) -> list[str]:
-    """Lines of a scene file that give the recommended setting."""
+def _scene_file_lines(recommendation: Recommendation) -> list[str]:
+    """Text lines on how to select the recommended setting: the lines of a scene file."""
     best = recommendation.winners.get(("", "seconds"))
     if best is None:
         return []
@@ -152,14 +154,14 @@ def _into_the_scene(recommendation: Recommendation) -> list[str]:
 
 
 def as_dict(recommendation: Recommendation) -> dict[str, Any]:
-    """The recommendation as plain values for JSON."""
+    """The recommendation of settings as plain values for JSON."""
     scene = recommendation.scene
     return {
         "scene": scene.title,
         "quantity": scene.quantity,
         "unit": scene.unit,
         "tolerance": recommendation.tolerance,
-        "duration": scene.whole,
+        "duration": scene.full_duration,
         "truth": recommendation.truth.origin,
         "uncertainty": recommendation.truth.uncertainty,
         "broken assumptions": [asdict(entry) for entry in recommendation.truth.broken_assumptions],

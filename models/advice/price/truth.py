@@ -1,4 +1,6 @@
-"""The true value of a scene's quantity: a reference refined until it no longer matters, and how well it is known."""
+"""The true value of a scene's quantity: a reference that is refined until the change is small beside the tolerance,
+with its uncertainty.
+"""
 
 import time
 from collections.abc import Mapping
@@ -16,23 +18,24 @@ from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
 
 AGREEMENT_FACTOR = 4.0
-"""A solver of another family differs by less than this part of the tolerance."""
+"""Divisor of the tolerance that gives the largest difference allowed between the reference and a solver of another
+family.
+"""
 ROW_TIME_ROUNDING = 1e-3
-"""Of a row's spacing: times so near to a row are its own, to the rounding of times."""
+"""Distance from an output time, as a share of the output step, up to which a time counts as this output time."""
 MOST_ROWS = 4_000_000
-"""Rows of a reference: beyond, it takes gigabytes."""
+"""Largest number of output rows of a reference run; more would take gigabytes."""
 
 
 @dataclass(frozen=True)
 class ReferenceTruth:
-    """Answer of the reference, taken as the truth. uncertainty : in the unit of the quantity; origin : text on its
-    origin;
-    rung : of the reference's ladder; kink_period : s between kinks of the quantity, 0 where there are none; seconds :
-    of the processor that it took, a guide to how long to wait and no price; broken_assumptions : assumptions that the
-    reference breaks, as every correct setting does.
+    """The quantity along the reference run, taken as the truth. uncertainty : in the unit of the quantity; origin :
+    text on its origin; rung : of the reference's ladder; kink_period : s between kinks of the quantity, 0 where there
+    are none; seconds : of the processor that it took, a guide to how long to wait and no price; broken_assumptions :
+    assumptions that the reference breaks, as every correct setting does.
     """
 
-    answer: PricedRun
+    run: PricedRun
     uncertainty: float
     origin: str
     rung: int
@@ -40,28 +43,26 @@ class ReferenceTruth:
     seconds: float = 0.0
     broken_assumptions: tuple[BrokenAssumption, ...] = ()
 
-    def beside(self, broken: Mapping[str, BrokenAssumption]) -> list[BrokenAssumption]:
-        """Those of the broken assumptions that the reference keeps."""
+    def newly_broken(self, broken: Mapping[str, BrokenAssumption]) -> list[BrokenAssumption]:
+        """Assumptions among ``broken`` that the reference keeps."""
         known = {assumption.name for assumption in self.broken_assumptions}
         return [assumption for name, assumption in broken.items() if name not in known]
 
-    def error(self, other_answer: PricedRun) -> float:
-        """Largest difference of another answer from the truth, at the other answer's times; infinite if that answer is
-        not finite.
-        """
-        if not np.isfinite(other_answer.values).all():
+    def error(self, other_run: PricedRun) -> float:
+        """Largest difference of a run from the truth, at the run's output times; infinite if the run is not finite."""
+        if not np.isfinite(other_run.values).all():
             return float("inf")
-        return float(np.abs(other_answer.values - values_at(self.answer, other_answer.times, self.kink_period)).max())
+        return float(np.abs(other_run.values - values_at(self.run, other_run.times, self.kink_period)).max())
 
     @property
     def size(self) -> float:
-        """Largest magnitude of the quantity over the run."""
-        return float(np.abs(self.answer.values).max())
+        """Largest magnitude of the quantity over the reference run."""
+        return float(np.abs(self.run.values).max())
 
 
 def values_at(priced_run: PricedRun, times: np.ndarray, kink_period: float = 0.0) -> np.ndarray:
-    """Values (m, k) of an answer at ``times`` (m,) in s: its rows where they coincide, else cubic interpolation in four
-    rows within one kink period.
+    """Values (m, k) of a run at ``times`` (m,) in s: its output rows where the times coincide, else cubic interpolation
+    in four rows within one kink period.
     """
     last_row = len(priced_run.times) - 1
     step = float(priced_run.times[-1]) / last_row
@@ -90,7 +91,7 @@ def reference_truth(
     second_method: bool = True,
     executor: Executor | None = None,
 ) -> ReferenceTruth:
-    """The truth of a scene's quantity over ``duration`` (s), to within a twentieth of ``tolerance``;
+    """The truth of a scene's quantity over ``duration`` (s), as exact as the ladder's divisor of ``tolerance`` asks;
     ``second_method`` : whether another family of methods must confirm it.
 
     executor : computes the first two settings of the reference at the same time, since fewer are never enough.
@@ -103,15 +104,15 @@ def reference_truth(
         scene, ladder, tolerance, duration, first_rung, executor
     )
     change_text = _setting_text(ladder.setting(first_rung))
-    second_setting = scene.second(ladder.setting(first_rung)) if second_method else None
+    second_setting = scene.second_setting(ladder.setting(first_rung)) if second_method else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
-    finer = ladder.said or finer
+    finer = ladder.change_text or finer
     truth_of_halving = ReferenceTruth(
         settled, change, f"{change_text}; {finer}", first_rung, scene.kink_period, seconds, tuple(broken.values())
     )
     if second_setting is None:
         return truth_of_halving
-    differs = truth_of_halving.error(scene.answer(scene.solve(second_setting, duration)))
+    differs = truth_of_halving.error(scene.priced_run(scene.solve(second_setting, duration)))
     both_settings = f"{change_text} and {_setting_text(second_setting)}"
     if differs > tolerance / AGREEMENT_FACTOR:
         raise RunFailed(
@@ -121,8 +122,8 @@ def reference_truth(
 
 
 def _change_by_halving(scene: PricedScene, coarse_run: PricedRun, fine_run: PricedRun) -> float:
-    """Largest difference between an answer and that with half the step, at the rows of both; the coarser answer is
-    interpolated between its rows.
+    """Largest difference between two runs, the second with half the step, at the output rows of both; the coarser run
+    is interpolated between its rows.
     """
     run_pairs = ((fine_run, coarse_run), (coarse_run, fine_run))
     return max(ReferenceTruth(run, 0.0, "", 0, scene.kink_period).error(other_run) for run, other_run in run_pairs)
@@ -132,25 +133,26 @@ def _setting_text(setting: Setting) -> str:
     return f"{setting.engine} {setting.method} at {setting.label()}"
 
 
-class _Rung(NamedTuple):
-    """Outcome of the reference on one rung: its answer, None where it failed; the reason for that; processor seconds;
-    assumptions that it broke.
+class _RungOutcome(NamedTuple):
+    """Outcome of the reference on one rung of its ladder: the run, None where it failed; the reason for that; processor
+    seconds; assumptions that it broke.
     """
 
-    answer: PricedRun | None
+    run: PricedRun | None
     failure: str
     seconds: float
     broken_assumptions: dict[str, BrokenAssumption]
 
 
-def _reference_on_rung(scene: PricedScene, duration: float, setting: Setting) -> _Rung:
+def _reference_on_rung(scene: PricedScene, duration: float, setting: Setting) -> _RungOutcome:
+    """Run the reference with one setting over ``duration`` (s); a failure is part of the outcome."""
     start_time = time.process_time()
     with collected_breaches() as broken:
         try:
-            answer = scene.answer(scene.solve(setting, duration))
+            run = scene.priced_run(scene.solve(setting, duration))
         except (InputError, RunFailed) as error:
-            return _Rung(None, str(error), 0.0, broken)
-    return _Rung(answer, "", time.process_time() - start_time, broken)
+            return _RungOutcome(None, str(error), 0.0, broken)
+    return _RungOutcome(run, "", time.process_time() - start_time, broken)
 
 
 def _settled_answer(
@@ -161,8 +163,8 @@ def _settled_answer(
     first_rung: int,
     executor: Executor | None,
 ) -> tuple[PricedRun, int, float, float, dict[str, BrokenAssumption]]:
-    """The first answer of the reference that the next finer rung changed by no more than a fraction of the tolerance;
-    with its rung, the change, the processor seconds and the assumptions that it broke.
+    """The first reference run that changes from the previous rung by no more than a fraction of the tolerance; with its
+    rung, the change, the processor seconds and the assumptions that it broke.
     """
     coarser_run: PricedRun | None = None
     change, failure = float("inf"), ""

@@ -1,1 +1,3 @@
-"""The effects that a ride scene's quantities call for: screened by adjoint, chosen by what they save, confirmed."""
+"""Choice of effects of linear ride scenes in closed form: which ones the scene's quantities need; screened by adjoints,
+chosen by what they save, confirmed.
+"""

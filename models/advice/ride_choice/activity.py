@@ -1,4 +1,4 @@
-"""Energy activity of every element of a vehicle: the mean of abs(power), in closed form for a Gaussian ride.
+"""Energy activity of every element of a vehicle: the mean absolute power, in closed form for a Gaussian ride.
 
 L. S. Louca, J. L. Stein and others rank elements by A = mean abs(effort flow) and drop those with the smallest share.
 Deflection and rate, and rate and acceleration, of a stationary motion are uncorrelated, so that for Gaussian ones
@@ -18,8 +18,8 @@ from models.vehicles.spatial_linear import slopes_at_rest
 
 
 def activity_by_element(full_scene: FullScene) -> dict[str, float]:
-    """Activity in watts by element: of springs, dampers, bars and tyres, and of every body's inertia along and about
-    each axis.
+    """Mean absolute power (W) by element: of springs, dampers, bars and tyres, and of every body's inertia along and
+    about each axis.
 
     A wheel that meets white noise through a damped tyre has an acceleration without variance: its inertia is inf.
     """
@@ -71,4 +71,5 @@ def activity_by_element(full_scene: FullScene) -> dict[str, float]:
 
 
 def _standard_deviation(row: np.ndarray, P: np.ndarray) -> float:
+    """Standard deviation of a linear combination ``row`` of the states with covariance P."""
     return float(np.sqrt(max(row @ P @ row, 0.0)))

@@ -1,5 +1,6 @@
-"""What any set of effects changes and costs that a scene's quantities may do without: predicted, confirmed, looked at
-nearby, and run."""
+"""Changes and costs of leaving out any set of effects of a linear ride scene: predicted, confirmed, and tested with
+parameters off.
+"""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -11,8 +12,8 @@ import numpy as np
 
 from models.advice.ride_choice.march import Cost, March, cost, longest_step
 from models.advice.ride_choice.neighbourhood import Neighbourhood
-from models.advice.ride_choice.reduced import FullScene, Reduced, Vehicles, of_speed
-from models.advice.ride_choice.screen import Screen, exact_variances, solved_in_motions, whole_variances
+from models.advice.ride_choice.reduced import FullScene, Reduced, Vehicles, speed_if_needed
+from models.advice.ride_choice.screen import Screen, exact_variances, variances_and_rounding, variances_from_modes
 from models.core.errors import InputError
 from models.core.runge_kutta import RK4_STAGES
 from models.systems.ride.omissions import effects_of
@@ -20,31 +21,35 @@ from models.systems.ride.reduced_scene import Effect, ReducedScene, reduced_with
 from models.systems.ride.scene import RideScene
 
 SCREENED_SPEEDS = 3
-"""Speeds at which effects are screened, from the slowest to the fastest; the choice is confirmed at all."""
+"""Number of speeds at which effects are screened, from the slowest to the fastest; the choice is confirmed at all
+speeds.
+"""
 IDENTITY_ERROR = 1e-12
-"""Relative error of the identity that certifies a choice; beyond it, rounding has eaten the certificate."""
+"""Largest relative error of the identity of covariance and adjoint that certifies a choice; a larger one is due to
+rounding.
+"""
 VARIANCE_DIFFERENCE = 1e-9
-"""By how much a variance by motions may differ from the one in extended precision."""
+"""Largest relative difference between a variance from eigenmodes and the one in extended precision."""
 
 EffectSet = frozenset[Effect]
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
 def cached_in_object(method: Method) -> Method:
-    """Decorator of a method whose answers are kept in its object, by their arguments."""
+    """Decorator of a method that stores its results in the object, by the arguments of the call."""
 
     @wraps(method)
     def answer(candidates: "Candidates", *asked: Any) -> Any:
         key = method.__name__, *asked
-        if key not in candidates.answers:
-            candidates.answers[key] = method(candidates, *asked)
-        return candidates.answers[key]
+        if key not in candidates.cached_results:
+            candidates.cached_results[key] = method(candidates, *asked)
+        return candidates.cached_results[key]
 
     return cast(Method, answer)
 
 
 class Candidates:
-    """Effects of a scene that may be left out, judged at its speeds (m/s) for quantities (names of outputs, also
+    """Effects of a ride scene that may be left out, judged at its speeds (m/s) for quantities (names of outputs, also
     weighted ones).
     """
 
@@ -52,16 +57,18 @@ class Candidates:
         self, scene: ReducedScene, speeds: Sequence[float] | np.ndarray, quantities: Sequence[str], tolerance: float
     ) -> None:
         self.scene, self.tolerance, self.effects = scene, tolerance, effects_of(scene)
-        self.answers: dict[tuple[Any, ...], Any] = {}
+        self.cached_results: dict[tuple[Any, ...], Any] = {}
         self.vehicles, self.solved_equations = Vehicles(scene.vehicle, float(speeds[0])), 0
         self.full_scenes = [FullScene(scene, float(speed), self.vehicles) for speed in speeds]
         names = self.full_scenes[0].full.system.names
         self.quantities, self.rows = tuple(quantities), [names.index(name) for name in quantities]
         speed_count = min(SCREENED_SPEEDS, len(speeds))
-        self.screened = [self.full_scenes[i] for i in np.linspace(0, len(speeds) - 1, speed_count).round().astype(int)]
-        self._suspects, self.full = list(self.screened), list[np.ndarray]()
+        self.screened_scenes = [
+            self.full_scenes[i] for i in np.linspace(0, len(speeds) - 1, speed_count).round().astype(int)
+        ]
+        self._suspects, self.full = list(self.screened_scenes), list[np.ndarray]()
         for full_scene in self.full_scenes:
-            variances, silent = whole_variances(full_scene.full, self.rows)
+            variances, silent = variances_and_rounding(full_scene.full, self.rows)
             self.full.append(variances)
             for name, variance, smallest_variance in zip(quantities, variances, silent, strict=True):
                 if not smallest_variance < variance < inf:
@@ -69,16 +76,16 @@ class Candidates:
                     raise InputError("", f"quantities.{name}", None, allowed)
         Screen(self.full_scenes[0].full, self.rows)  # refuses a vehicle that cannot be screened
         plain = [self._row_and_weighting(name) for name in quantities]
-        self.near = Neighbourhood(scene, np.asarray(speeds, float), plain, self.vehicles)
+        self.neighbourhood = Neighbourhood(scene, np.asarray(speeds, float), plain, self.vehicles)
 
     @classmethod
-    def of(cls, ride: RideScene) -> Self:
-        """The candidates of a scene that asks for a choice."""
+    def from_scene(cls, ride: RideScene) -> Self:
+        """The candidates of a ride scene, for its speeds, quantities and tolerance."""
         assert ride.speeds is not None and ride.tolerance is not None
         return cls(ReducedScene.complete(ride), ride.speeds.all(), ride.quantities, ride.tolerance)
 
     def _row_and_weighting(self, quantity: str) -> tuple[int, str]:
-        """For a quantity, the row of the vehicle's output and the name of its weighting, "" if it has none."""
+        """For a quantity, the row of the vehicle's output and the name of its weighting filter, "" if it has none."""
         weighted = {
             f"{name} {weighting_name}": (name, weighting_name)
             for name, weighting_name in self.scene.ride.weighting.items()
@@ -88,24 +95,31 @@ class Candidates:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Counts of the work: eigenvalue problems, one for each vehicle that was made, and Lyapunov equations."""
-        return {"eigenvalue problems": len(self.vehicles) + self.near.off, "Lyapunov equations": self.solved_equations}
+        """Numbers of eigenvalue problems, one for each vehicle that was built, and of Lyapunov equations that were
+        solved.
+        """
+        return {
+            "eigenvalue problems": len(self.vehicles) + self.neighbourhood.perturbed_vehicle_count,
+            "Lyapunov equations": self.solved_equations,
+        }
 
     @cached_in_object
-    def rest(self, omitted_effects: EffectSet) -> ReducedScene:
-        """The scene without these effects."""
+    def reduced_scene_without(self, omitted_effects: EffectSet) -> ReducedScene:
+        """The ride scene without these effects."""
         return reduced_without(self.scene, sorted(omitted_effects, key=lambda effect: effect.name))
 
     @cached_in_object
     def system(self, full_scene: FullScene, omitted_effects: EffectSet) -> Reduced | None:
-        """The system of the scene without these effects at a speed; None where no meaningful system remains."""
+        """The linear system of the scene without these effects at a speed; None where no meaningful system remains."""
         try:
-            return full_scene.reduced(self.rest(omitted_effects))
+            return full_scene.reduced(self.reduced_scene_without(omitted_effects))
         except InputError:
             return None
 
     def screen(self, full_scene: FullScene, omitted_effects: EffectSet) -> Screen | None:
-        """Covariance and adjoints of the scene without those of these effects that are singular."""
+        """Covariance and adjoints of the scene without its singular effects among these; None where they cannot be
+        computed.
+        """
         base = frozenset(effect for effect in omitted_effects if effect.is_singular)
         needs = {name for effect in base for name in effect.needs}
         return self._screen(full_scene, base | {effect for effect in omitted_effects if effect.name in needs})
@@ -121,14 +135,16 @@ class Candidates:
 
     @cached_in_object
     def predicted_changes(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Predicted changes (quantities,), each the largest over the screened speeds; inf where no system remains."""
+        """Predicted relative changes (quantities,) of standard deviations, each the largest over the screened speeds;
+        inf where no system remains.
+        """
         return largest_changes(
-            np.array([self._predicted_at(full_scene, omitted_effects) for full_scene in self.screened])
+            np.array([self._predicted_at(full_scene, omitted_effects) for full_scene in self.screened_scenes])
         )
 
     @cached_in_object
     def _predicted_at(self, full_scene: FullScene, omitted_effects: EffectSet) -> np.ndarray:
-        return self._changes_at_speed(full_scene, omitted_effects, self._predict)
+        return self._changes_at_speed(full_scene, omitted_effects, self._predicted_variances)
 
     def share(self, omitted_effects: EffectSet) -> float:
         """Ratio of the largest predicted change to the tolerance. It is inf once any speed exceeds the tolerance; the
@@ -145,21 +161,29 @@ class Candidates:
 
     @cached_in_object
     def confirmed_changes(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Changes (quantities,) by the exact solution, each the largest over all listed speeds."""
+        """Relative changes (quantities,) of standard deviations by the exact solution, each the largest over all listed
+        speeds.
+        """
         return largest_changes(
             np.array(
-                [self._changes_at_speed(full_scene, omitted_effects, self._confirm) for full_scene in self.full_scenes]
+                [
+                    self._changes_at_speed(full_scene, omitted_effects, self._exact_variances)
+                    for full_scene in self.full_scenes
+                ]
             )
         )
 
     @cached_in_object
     def changes_by_modes(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Changes as ``confirmed_changes`` gives them, but computed from eigenmodes of the reduced system wherever
-        these are reliable.
+        """Relative changes (quantities,) of standard deviations, each the largest over all listed speeds, from
+        eigenmodes of the reduced system wherever these are reliable.
         """
         return largest_changes(
             np.array(
-                [self._changes_at_speed(full_scene, omitted_effects, self._solve) for full_scene in self.full_scenes]
+                [
+                    self._changes_at_speed(full_scene, omitted_effects, self._variances_by_modes)
+                    for full_scene in self.full_scenes
+                ]
             )
         )
 
@@ -167,31 +191,31 @@ class Candidates:
         """Whether at the screened speeds the identity of covariance and adjoint holds in extended precision, and agrees
         with the variances from eigenmodes.
         """
-        return all(self._exact(full_scene, omitted_effects) for full_scene in self.screened)
+        return all(self._is_certified_at(full_scene, omitted_effects) for full_scene in self.screened_scenes)
 
-    def _exact(self, full_scene: FullScene, omitted_effects: EffectSet) -> bool:
+    def _is_certified_at(self, full_scene: FullScene, omitted_effects: EffectSet) -> bool:
         screen, reduced = self.screen(full_scene, frozenset()), self.system(full_scene, omitted_effects)
         if screen is None or reduced is None:
             return False
         self.solved_equations += 1 + len(self.rows)
         certificate_variances, variance = screen.certificate_sides(reduced)
-        by_motions = solved_in_motions(reduced, self.rows)
+        by_motions = variances_from_modes(reduced, self.rows)
         agrees_with_motions = by_motions is None or bool(
             (abs(by_motions / variance - 1.0) <= VARIANCE_DIFFERENCE).all()
         )
         return agrees_with_motions and bool((abs(certificate_variances / variance - 1.0) <= IDENTITY_ERROR).all())
 
-    def _predict(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
+    def _predicted_variances(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         screen = self.screen(full_scene, omitted_effects)
         return np.full(len(self.rows), inf) if screen is None else screen.predicted_variances(reduced)
 
-    def _confirm(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
+    def _exact_variances(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
         return exact_variances(reduced, self.rows)
 
-    def _solve(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
+    def _variances_by_modes(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
-        variances = solved_in_motions(reduced, self.rows)
+        variances = variances_from_modes(reduced, self.rows)
         return exact_variances(reduced, self.rows) if variances is None else variances
 
     def _changes_at_speed(
@@ -200,8 +224,8 @@ class Candidates:
         omitted_effects: EffectSet,
         variances: Callable[[FullScene, EffectSet, Reduced], np.ndarray],
     ) -> np.ndarray:
-        """Changes (quantities,) at a speed by the function ``variances``; inf where no system remains, or an unstable
-        one.
+        """Relative changes (quantities,) of standard deviations at a speed, with the variances of the reduced system by
+        the function ``variances``; inf where no system remains, or an unstable one.
         """
         reduced, full = self.system(full_scene, omitted_effects), self.full[self.full_scenes.index(full_scene)]
         left = np.full(len(full), inf)
@@ -210,82 +234,91 @@ class Candidates:
         return np.asarray(np.sqrt(left / full) - 1.0)
 
     @cached_in_object
-    def between(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Changes (quantities,), each the largest over all speeds of the range; inf where no system remains."""
+    def changes_between_speeds(self, omitted_effects: EffectSet) -> np.ndarray:
+        """Relative changes (quantities,) of standard deviations, each the largest over all speeds of the range; inf
+        where no system remains.
+        """
         reduced = self.system(self.full_scenes[0], omitted_effects)
         if reduced is None or not all((d[self.rows] == 0).all() for d in reduced.system.D):
             return np.full(len(self.rows), inf)
-        return largest_changes(self.near.changes(self.rest(omitted_effects)))
+        return largest_changes(self.neighbourhood.changes(self.reduced_scene_without(omitted_effects)))
 
     @cached_in_object
     def off(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Changes (quantities,) over all speeds of the range if parameters are off, in the combination that is worst
-        for each quantity.
+        """Relative changes (quantities,) of standard deviations over all speeds of the range with parameters off, in
+        the combination that is worst for each quantity.
         """
-        reduced_scene = self.rest(omitted_effects)
+        reduced_scene = self.reduced_scene_without(omitted_effects)
         return largest_changes(
-            np.concatenate([self.near.changes(reduced_scene, corner) for corner in self.near.corners(reduced_scene)])
+            np.concatenate(
+                [
+                    self.neighbourhood.changes(reduced_scene, corner)
+                    for corner in self.neighbourhood.corners(reduced_scene)
+                ]
+            )
         )
 
     def holds(self, changes: np.ndarray) -> bool:
-        """Whether all changes are within the tolerance."""
+        """Whether all relative changes (quantities,) are within the tolerance."""
         return bool((abs(changes) <= self.tolerance).all())
 
-    def told(self, changes: np.ndarray) -> str:
-        """Text on the largest of changes (quantities,)."""
+    def largest_change_text(self, changes: np.ndarray) -> str:
+        """Text on the largest of the relative changes (quantities,), with the quantity's name."""
         worst = int(abs(changes).argmax())
         return f"{self.quantities[worst]} by {100 * changes[worst]:+.3g} %"
 
     @cached_in_object
     def cost(self, omitted_effects: EffectSet) -> Cost:
-        """Cost without these effects in the largest stable step, at the screened speed where it is highest; infinite
-        where no meaningful system remains.
+        """Cost of a run without these effects with the largest stable step, at the screened speed where it is highest;
+        infinite where no meaningful system remains.
         """
-        reduced_scene = self.rest(omitted_effects)
-        independent_of_speed = of_speed(reduced_scene.vehicle, 0.0) is None
+        reduced_scene = self.reduced_scene_without(omitted_effects)
+        independent_of_speed = speed_if_needed(reduced_scene.vehicle, 0.0) is None
         costs = [
             self._cost(full_scene, reduced_scene)
-            for full_scene in (self.screened[:1] if independent_of_speed else self.screened)
+            for full_scene in (self.screened_scenes[:1] if independent_of_speed else self.screened_scenes)
         ]
         return max(costs, key=lambda c: c.calls)
 
     def _cost(self, full_scene: FullScene, reduced_scene: ReducedScene) -> Cost:
         try:
-            return cost(full_scene.vehicles.of(reduced_scene, full_scene.speed), full_scene.road(reduced_scene))
+            return cost(
+                full_scene.vehicles.reduced_vehicle_of(reduced_scene, full_scene.speed), full_scene.road(reduced_scene)
+            )
         except InputError:
             return Cost(0, 0.0, inf)
 
     @cached_in_object
     def cost_at_equal_accuracy(self, omitted_effects: EffectSet) -> Cost:
-        """Cost without these effects in the longest step with which reduction and steps together keep the tolerance at
-        all screened speeds.
+        """Cost of a run without these effects with the longest step with which reduction and time steps together keep
+        the tolerance at all screened speeds.
         """
-        return self.at_step(
+        return self.cost_at_step(
             omitted_effects, longest_step(self.marches(omitted_effects), self.exact_deviations(), self.tolerance)
         )
 
     def exact_deviations(self) -> list[np.ndarray]:
-        """Standard deviations (quantities,) of the full scene, for each of the screened speeds."""
-        return [np.sqrt(self.full[self.full_scenes.index(full_scene)]) for full_scene in self.screened]
+        """Standard deviations (quantities,) of the full scene, one array for each of the screened speeds."""
+        return [np.sqrt(self.full[self.full_scenes.index(full_scene)]) for full_scene in self.screened_scenes]
 
     def marches(self, omitted_effects: EffectSet) -> list[March]:
-        """Marches of the scene without these effects, one for each of the screened speeds."""
+        """Time integrations of the scene without these effects, one for each of the screened speeds."""
         weightings = tuple(
             (row, weighting_name)
-            for row, (_, weighting_name) in zip(self.rows, self.near.quantities, strict=True)
+            for row, (_, weighting_name) in zip(self.rows, self.neighbourhood.quantities, strict=True)
             if weighting_name
         )
-        reduced_scene = self.rest(omitted_effects)
+        reduced_scene = self.reduced_scene_without(omitted_effects)
         return [
             March(full_scene.reduced(reduced_scene), full_scene.speed, tuple(self.rows), weightings)
-            for full_scene in self.screened
+            for full_scene in self.screened_scenes
         ]
 
-    def at_step(self, omitted_effects: EffectSet, step: float) -> Cost:
-        """Cost without these effects in steps of ``step`` (s)."""
+    def cost_at_step(self, omitted_effects: EffectSet, step: float) -> Cost:
+        """Cost of a run without these effects with steps of ``step`` (s)."""
         return Cost(self.cost(omitted_effects).states, step, RK4_STAGES / step if step else inf)
 
 
 def largest_changes(changes: np.ndarray) -> np.ndarray:
-    """The largest change of each quantity, with its sign, of changes (n, quantities)."""
+    """The largest change (quantities,) of each quantity, with its sign, among changes (n, quantities)."""
     return changes[abs(changes).argmax(axis=0), np.arange(changes.shape[1])]

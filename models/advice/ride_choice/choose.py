@@ -1,4 +1,5 @@
-"""Which effects a scene's quantities can do without: screened one by one, chosen by what they save, confirmed.
+"""Choice of effects of a linear ride scene: which ones its quantities can do without; screened, chosen by savings,
+confirmed.
 
 A greedy choice: the next effect to be left out is the one that saves most calls at the stable step (their logarithm)
 for the error that the screen predicts for the whole set; where none saves any, calls times states, if calls do not
@@ -28,23 +29,24 @@ from models.systems.ride.omissions import TYRE_DAMPING
 from models.systems.ride.reduced_scene import Effect, refusal_reason
 
 MOST_CONFIRMATIONS = 30
-"""Choices that are confirmed at most."""
+"""Largest number of sets of effects that are confirmed."""
 EQUAL_COST_LOG, LARGEST_CALL_RISE = 0.05, 1e-3
-"""Logarithm of calls up to which two sets cost the same; by how much, relative, a step that saves states may raise
-them."""
+"""Difference of the logarithm of calls up to which two sets cost the same, and the relative rise of calls that is
+allowed where a step saves states.
+"""
 STEP_FACTOR = 0.9
-"""A step that no run confirms becomes so many times as long."""
+"""Factor by which a time step is shortened if no run confirms it."""
 NEGLIGIBLE_SHARE = 1e-3
 """Share of the tolerance below which an error counts as none."""
 
 SavingOfStep = Callable[[EffectSet, EffectSet], float]
-"""What a step saves, from a set to a larger one."""
+"""Function for the saving by a step of the search, from a set of omitted effects to a larger one."""
 
 
 @dataclass(frozen=True)
 class RideChoice:
-    """Result of a choice: effects ``left_out`` of all ``candidates``, and the relative changes (quantities,) of
-    standard deviations that result.
+    """Result of a choice of effects: the effects ``left_out`` of all ``candidates``, and the relative changes
+    (quantities,) of standard deviations that result.
 
     predicted_change and confirmed_change : the worst over the listed speeds, with sign; change_between_speeds : over
     all speeds of their range;
@@ -52,7 +54,7 @@ class RideChoice:
     all of them are.
     cost_before, cost_after : cost at equal accuracy; stable_steps : the longest stable steps (s) of both, whatever the
     accuracy.
-    confirmations : choices that were confirmed. said : reasons why promising effects were not left out.
+    confirmations : choices that were confirmed. refusal_texts : reasons why promising effects were not left out.
     """
 
     candidates: tuple[Effect, ...]
@@ -66,25 +68,25 @@ class RideChoice:
     cost_after: Cost
     stable_steps: tuple[float, float]
     confirmations: int
-    said: tuple[str, ...]
+    refusal_texts: tuple[str, ...]
 
 
 class Chooser(Candidates):
-    """Search for candidates that can be left out of a scene."""
+    """Search for the effects that a linear ride scene can do without."""
 
     @cached_property
     def refusal_reasons(self) -> dict[EffectSet, str]:
-        """Sets that kept the tolerance but were refused, with the reasons."""
+        """Sets of omitted effects that kept the tolerance at all speeds but were refused, with the reasons."""
         return {}
 
     @cached_property
     def uncertified_sets(self) -> set[EffectSet]:
-        """Sets that kept the tolerance but whose certificate was not exact."""
+        """Sets of omitted effects that kept the tolerance but whose certificate was not exact."""
         return set()
 
     @cached_property
     def single_effect_sets(self) -> list[EffectSet]:
-        """For each effect, the set of this effect and of all effects that must be left out with it."""
+        """For each effect, the set of this effect and all effects that must be left out with it."""
         named = {effect.name: effect for effect in self.effects}
         return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
 
@@ -96,19 +98,22 @@ class Chooser(Candidates):
         """
         if not omitted_effects:
             return True
-        if not (self.holds(self.changes_by_modes(omitted_effects)) and self.holds(self.between(omitted_effects))):
+        if not (
+            self.holds(self.changes_by_modes(omitted_effects))
+            and self.holds(self.changes_between_speeds(omitted_effects))
+        ):
             return False
         why = self._cancellation_text(omitted_effects)
         perturbed_changes = np.zeros(len(self.rows)) if why else self.off(omitted_effects)
         if not self.holds(perturbed_changes):
-            why = f"changes {self.told(perturbed_changes)} with parameters 5 % off"
+            why = f"changes {self.largest_change_text(perturbed_changes)} with parameters 5 % off"
         if why:
             self.refusal_reasons[omitted_effects] = why
         return not why and omitted_effects not in self.uncertified_sets
 
     def _cancellation_text(self, omitted_effects: EffectSet) -> str:
-        """Text on an effect whose removal alone, or return alone, breaks the tolerance that the whole choice keeps,
-        since errors cancel; "" if there is none.
+        """Text on an effect whose removal alone, or return alone, breaks the tolerance that the whole set keeps, since
+        errors cancel; "" if there is none.
 
         Changes without end do not count: white noise that passes is nothing that another change could make up for.
         """
@@ -117,27 +122,29 @@ class Chooser(Candidates):
         parts |= {f"all but {effect.name} change": omitted_effects - {effect} for effect in omitted_effects}
         for step_text, effect_set in parts.items():
             changes = (
-                np.zeros(len(self.rows)) if not effect_set or refusal_reason(effect_set) else self.between(effect_set)
+                np.zeros(len(self.rows))
+                if not effect_set or refusal_reason(effect_set)
+                else self.changes_between_speeds(effect_set)
             )
             if np.isfinite(changes).all() and not self.holds(changes):
-                return f"holds by errors that cancel: {step_text} {self.told(changes)}"
+                return f"holds by errors that cancel: {step_text} {self.largest_change_text(changes)}"
         return ""
 
     @cached_in_object
     def _cost_by_run(self, omitted_effects: EffectSet) -> Cost:
-        """Cost as from ``cost_at_equal_accuracy``, in a step that a run at the middle one of the screened speeds
-        confirms.
+        """Cost of a run at equal accuracy without these effects, with a step that a time simulation at the middle
+        screened speed confirms.
         """
         step, marches = self.cost_at_equal_accuracy(omitted_effects).step, self.marches(omitted_effects)
         while step and not confirms_step(marches[len(marches) // 2], step):
             step *= STEP_FACTOR
-        return self.at_step(omitted_effects, step)
+        return self.cost_at_step(omitted_effects, step)
 
     def choose(self) -> RideChoice:
-        """The greedy choice, confirmed, without effects whose removal saves nothing at equal accuracy."""
+        """The choice by greedy search, confirmed, without effects whose removal saves nothing at equal accuracy."""
         chosen, rounds = self._certified_choice()
         unchanged, no_effects = np.zeros(len(self.rows)), frozenset[Effect]()
-        looks = (self.confirmed_changes, self.between, self.off)
+        looks = (self.confirmed_changes, self.changes_between_speeds, self.off)
         changes, between, perturbed_changes = (look(chosen) if chosen else unchanged for look in looks)
         return RideChoice(
             self.effects,
@@ -155,7 +162,7 @@ class Chooser(Candidates):
         )
 
     def _certified_choice(self) -> tuple[EffectSet, int]:
-        """The choice that saves calls and is certified, and the number of sets that were tested for it."""
+        """The certified set of omitted effects that saves calls, and the number of sets that were tested for it."""
         rounds = 0
         while rounds < MOST_CONFIRMATIONS:
             chosen, tested = self._greedy_set()
@@ -172,7 +179,7 @@ class Chooser(Candidates):
         return frozenset(), rounds
 
     def _refusal_texts(self, omitted_effects: EffectSet) -> tuple[str, ...]:
-        """Reasons why larger sets that kept the tolerance were refused."""
+        """Texts on why larger sets that kept the tolerance were refused."""
         larger = {
             refused - omitted_effects: why for refused, why in self.refusal_reasons.items() if refused - omitted_effects
         }
@@ -182,10 +189,12 @@ class Chooser(Candidates):
         )
 
     def _greedy_set(self) -> tuple[EffectSet, int]:
-        """The set of effects to leave out, and the number of sets that were tested for it, also unsuccessfully."""
-        steps_taken, banned, rounds = [frozenset[Effect]()], set[EffectSet](), 0
+        """The set of effects to leave out by greedy search, and the number of sets that were tested, also those that
+        failed.
+        """
+        steps_taken, refused_steps, rounds = [frozenset[Effect]()], set[EffectSet](), 0
         while rounds < MOST_CONFIRMATIONS:
-            path = self.path(steps_taken, banned)
+            path = self.path(steps_taken, refused_steps)
             if path == steps_taken:
                 break
             rounds += 1
@@ -197,25 +206,27 @@ class Chooser(Candidates):
                 middle = (low + high) // 2
                 rounds += 1
                 low, high = (middle, high) if self.within_tolerance(path[middle]) else (low, middle)
-            banned.add(path[high] - path[low])
+            refused_steps.add(path[high] - path[low])
             steps_taken = path[: low + 1]
         return steps_taken[-1], rounds
 
     def _without_worthless_effects(self, omitted_effects: EffectSet) -> EffectSet:
-        """The choice without effects whose return costs hardly any more calls at equal accuracy, or no shorter stable
+        """The set without effects whose return costs hardly any more calls at equal accuracy, or no shorter stable
         step. Fewer calls without a longer stable step only mean that errors of reduction and of steps cancel.
         """
         fewer = [
             omitted_effects - {effect} for effect in omitted_effects if not refusal_reason(omitted_effects - {effect})
         ]
-        for smaller_set in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
+        for smaller_set in sorted(
+            fewer, key=lambda candidate: float(abs(self.changes_between_speeds(candidate)).max())
+        ):
             if self._costs_the_same(smaller_set, omitted_effects) and self.within_tolerance(smaller_set):
                 return self._without_worthless_effects(smaller_set)
         return omitted_effects
 
     def _costs_the_same(self, smaller_set: EffectSet, omitted_effects: EffectSet) -> bool:
-        """Whether the smaller set ``smaller_set`` has no shorter stable step than the larger one, or about as few calls
-        at equal accuracy.
+        """Whether a run without ``smaller_set`` has no shorter stable step than one without the larger set, or about as
+        few calls at equal accuracy.
         """
         stable = self.cost(smaller_set).step
         if stable >= self.cost(omitted_effects).step * (1 - EQUAL_COST_LOG):
@@ -227,7 +238,7 @@ class Chooser(Candidates):
         )
 
     def change_if_left_out_too(self, omitted_effects: EffectSet) -> dict[Effect, float]:
-        """Largest confirmed change for each effect that stayed, if it were left out as well, with what it needs: with a
+        """Largest relative change for each effect that stayed, if it were left out as well with what it needs: with a
         larger tolerance than this, it could be. Only legal sets and finite changes.
         """
         changes = {
@@ -237,14 +248,14 @@ class Chooser(Candidates):
         }
         return {effect: change for effect, change in changes.items() if change < inf}
 
-    def path(self, first_sets: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
-        """Path of sets of effects that extends ``first_sets``, one step at a time, as far as predictions allow.
+    def path(self, first_sets: list[EffectSet], refused_steps: set[EffectSet]) -> list[EffectSet]:
+        """Growing sets of omitted effects: ``first_sets``, continued one step at a time as far as predictions allow.
 
         A step saves calls, or where none does, work; there is none where none is within the tolerance.
         """
         path = list(first_sets)
-        while step := self._best_step(path[-1], banned, self._calls_saved) or self._best_step(
-            path[-1], banned, self._work_saved
+        while step := self._best_step(path[-1], refused_steps, self._calls_saved) or self._best_step(
+            path[-1], refused_steps, self._work_saved
         ):
             path.append(path[-1] | step)
         return path
@@ -258,6 +269,7 @@ class Chooser(Candidates):
         return saved if saved > EQUAL_COST_LOG else 0.0
 
     def _work_saved(self, omitted_effects: EffectSet, added_effects: EffectSet) -> float:
+        """Logarithm of the ratio by which leaving out more effects reduces calls times states; 0 where calls rise."""
         cost_now, cost_after = self.cost(omitted_effects), self.cost(added_effects)
         return (
             log(cost_now.work / cost_after.work)
@@ -266,8 +278,8 @@ class Chooser(Candidates):
         )
 
     def _smallest_sets(self) -> list[EffectSet]:
-        """The smallest sets that can be left out. A set that lets white noise pass is also tried together with the
-        tyres' damping, through which this noise enters.
+        """The smallest sets that can be left out. A set that lets white noise reach a quantity is also tried together
+        with the tyres' damping, through which this noise enters.
         """
         damping = frozenset(effect for effect in self.effects if effect.name == TYRE_DAMPING)
         white = [
@@ -275,8 +287,8 @@ class Chooser(Candidates):
         ]
         return self.single_effect_sets + [step | damping for step in white]
 
-    def _best_step(self, omitted_effects: EffectSet, banned: set[EffectSet], saving: SavingOfStep) -> EffectSet:
-        """The step that saves the most for what it adds to the predicted error; empty if no step keeps the
+    def _best_step(self, omitted_effects: EffectSet, refused_steps: set[EffectSet], saving: SavingOfStep) -> EffectSet:
+        """The set of effects that saves the most for what it adds to the predicted error; empty if none keeps the
         tolerance.
         """
         best, best_score, current_share = frozenset[Effect](), 0.0, self.share(omitted_effects)
@@ -284,8 +296,8 @@ class Chooser(Candidates):
             further = omitted_effects | step
             if (
                 further == omitted_effects
-                or step - omitted_effects in banned
-                or step in banned
+                or step - omitted_effects in refused_steps
+                or step in refused_steps
                 or refusal_reason(further)
             ):
                 continue

@@ -1,4 +1,6 @@
-"""What a choice of effects will take, before it is made: by counts, and by what an eigenvalue problem takes here."""
+"""Estimate of the processor time of a choice of effects, made beforehand: from counts, and the time of an eigenvalue
+problem on this machine.
+"""
 
 import time
 from dataclasses import dataclass
@@ -13,19 +15,19 @@ from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import RideScene
 
 EIGENVALUE_PROBLEMS = 4.0
-"""Eigenvalue problems as long as a choice by each effect, each state and each of ``SCREENED_SPEEDS`` speeds: in
-proportion fitted to 14 scenes of 7 to 26 effects and 10 to 42 states, all within a factor of two, and in size to the
-largest.
+"""Cost of a choice per effect, per state and for SCREENED_SPEEDS speeds, in eigenvalue problems: the proportion is
+fitted to 14 scenes of 7 to 26 effects and 10 to 42 states, all within a factor of two, and the size to the largest
+scene.
 """
 FURTHER_SPEED_SHARE = 0.05
-"""What a further speed takes by one at which effects are screened: it is confirmed there, and nothing else."""
+"""Ratio of the cost of a speed at which effects are only confirmed to that of a speed at which they are screened."""
 TIMED_PROBLEM_SIZE, TIMED_REPETITIONS = 40, 9
-"""Size of the eigenvalue problem that is timed, and how many times."""
+"""Number of states of the eigenvalue problem that is timed, and number of repetitions."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Size of a choice in counts, and an estimate of its processor time (s), good to a factor of two."""
+    """Size of a choice of effects in counts, and an estimate of its processor time (s), within a factor of two."""
 
     effects: int
     speeds: int
@@ -34,7 +36,7 @@ class Estimate:
 
 
 def estimate(ride: RideScene) -> Estimate:
-    """Estimate for a linear scene at constant speeds that asks for a choice."""
+    """Estimate of a choice of effects for a linear ride scene at constant speeds."""
     assert ride.speeds is not None
     with scene_errors(ride):
         scene = ReducedScene.complete(ride)
@@ -54,7 +56,7 @@ def _count_of_states(scene: ReducedScene, road: Excitation) -> int:
 
 
 def _eigenvalue_problem() -> float:
-    """Processor time (s) of an eigenvalue problem of ``TIMED_PROBLEM_SIZE`` states on this machine, now."""
+    """Processor time (s) of an eigenvalue problem of ``TIMED_PROBLEM_SIZE`` states on this machine, measured now."""
     A, seconds = np.random.default_rng(TIMED_PROBLEM_SIZE).standard_normal((TIMED_PROBLEM_SIZE, TIMED_PROBLEM_SIZE)), []
     for _ in range(TIMED_REPETITIONS):
         start_time = time.process_time()

@@ -1,4 +1,5 @@
-"""A ride scene with bent springs as it is run in time, less what is left out: copies of its vehicle on random roads.
+"""A ride scene with nonlinear springs in the time domain, with some effects left out: copies of its vehicle on random
+roads.
 
 The copies know nothing of each other, and two runs meet the same roads, so that what leaving something out changes is
 known with its standard error. A longer step reads every so many rows of the same roads.
@@ -27,15 +28,17 @@ from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
 
 FEWEST_COPIES = 12
-"""Copies of which a standard error can be told, its own error about a fifth."""
+"""Smallest number of copies for a standard error, which is itself uncertain by about a fifth then."""
 STEP_MULTIPLE = 48
-"""Steps are whole numbers of so many, before and while outputs count: a step may be any divisor of it times as long."""
+"""The numbers of steps, both before and while outputs count, are multiples of this; a step may be longer by any of its
+divisors.
+"""
 ROADS_BYTES = 3e8
-"""Bytes of roads that are kept, which many variants share, before one more."""
+"""Memory (bytes) of stored road samples, which many variants share, above which the oldest ones are deleted."""
 
 
 class Samples(Strict):
-    """Number and duration of the copies, from a scene's [options]."""
+    """Number and duration of the copies of a vehicle, from a scene's [options]."""
 
     copies: int = Field(
         default=48, ge=FEWEST_COPIES, le=100_000, description="of the vehicle, each on a road of its own"
@@ -46,8 +49,8 @@ class Samples(Strict):
 
 @dataclass(frozen=True)
 class CopySteps:
-    """Time steps of the copies at a speed (m/s): the road's ``half`` step (s), the numbers of steps before and while
-    outputs count, and the motion of the whole vehicle's nonlinear springs.
+    """Time steps of the copies at a speed (m/s): half of the step (s), the numbers of steps before and while outputs
+    count, and the motion of the nonlinear springs of the full vehicle.
     """
 
     speed: float
@@ -58,55 +61,57 @@ class CopySteps:
 
     @property
     def steps(self) -> int:
-        """Number of steps of a copy."""
+        """Number of time steps of a copy."""
         return self.settling_steps + self.counted_steps
 
 
 @dataclass(frozen=True)
 class CopiesInTime:
-    """The copies of a scene at all its speeds, without the effects ``left_out``, in steps ``times`` as long."""
+    """The copies of a vehicle on random roads at all speeds of a ride scene, without the effects ``left_out``, with
+    steps longer by the factor ``step_factor``.
+    """
 
     scene: ReducedScene
     samples: Samples
     steps_at_speeds: tuple[CopySteps, ...]
     effects: tuple[Effect, ...]
     left_out: frozenset[str] = frozenset()
-    times: int = 1
+    step_factor: int = 1
     system = "ride"
 
     @property
     def file(self) -> str:
-        """Name of the scene's file."""
+        """Name of the scene file."""
         return self.scene.ride.file
 
     @property
-    def named(self) -> tuple[str, ...]:
+    def effect_names(self) -> tuple[str, ...]:
         """Names of the effects that have not been left out."""
         return tuple(effect.name for effect in self.effects if effect.name not in self.left_out)
 
     @property
-    def said(self) -> dict[str, str]:
-        """Sentences on what leaving out each effect means."""
+    def effect_sentences(self) -> dict[str, str]:
+        """Sentences on what leaving out an effect means, by the name of the effect."""
         return {effect.name: effect.says for effect in self.effects}
 
     @property
-    def absent(self) -> tuple[str, ...]:
-        """Effects that the scene does not name."""
+    def absent_names(self) -> tuple[str, ...]:
+        """Names of the effects that the scene could have but does not name."""
         return absent_effects(self.scene.ride)
 
-    def beside(self, name: str) -> "CopiesInTime":
-        """The scene with an absent effect at its usual values; InputError where the effect cannot be added."""
+    def with_effect(self, name: str) -> "CopiesInTime":
+        """The copies with an absent effect added at its usual values; InputError where the effect cannot be added."""
         scene = ReducedScene.complete(with_effects(self.scene.ride, name))
         _check(scene)
         return replace(self, scene=scene)
 
     @property
     def steps(self) -> int:
-        """Number of steps of all copies at all speeds."""
-        return self.samples.copies * sum(pace.steps for pace in self.steps_at_speeds) // self.times
+        """Number of time steps of all copies at all speeds."""
+        return self.samples.copies * sum(pace.steps for pace in self.steps_at_speeds) // self.step_factor
 
     def without(self, names: Iterable[str]) -> "CopiesInTime":
-        """The scene without these effects; InputError where they may not be left out."""
+        """The copies without these effects; InputError where they may not be left out."""
         left_out = self.left_out | set(names)
         chosen = [effect for effect in self.effects if effect.name in left_out]
         why = refusal_reason(chosen)
@@ -116,13 +121,11 @@ class CopiesInTime:
         return replace(self, scene=without_effects(self.scene, fresh), left_out=left_out)
 
     def in_longer_steps(self, step_factor: int) -> "CopiesInTime":
-        """The scene in steps ``step_factor`` as long as now."""
-        return replace(self, times=self.times * step_factor)
+        """The copies with steps longer by the factor ``step_factor``."""
+        return replace(self, step_factor=self.step_factor * step_factor)
 
     def with_fewer_copies(self, steps: int) -> "CopiesInTime":
-        """The scene with so few copies that these take about ``steps`` steps in all, but enough copies for a standard
-        error.
-        """
+        """Fewer copies, which take about ``steps`` time steps in all, but enough copies for a standard error."""
         copies = max(FEWEST_COPIES, -(-self.samples.copies * steps // self.steps))
         return replace(self, samples=self.samples.model_copy(update={"copies": min(copies, self.samples.copies)}))
 
@@ -131,25 +134,25 @@ class CopiesInTime:
         return self.scene.excitation()
 
     def vehicle(self, copy_steps: CopySteps) -> SpatialVehicle:
-        """The vehicle at a speed, without the effects that are left out; InputError where a run in time needs one of
-        them.
+        """The vehicle for a run at a speed, without the effects that are left out; InputError where a run in time needs
+        one of them.
         """
         return reduced_vehicle(self.scene, copy_steps.springs)
 
     def roads(self, copy_steps: CopySteps) -> np.ndarray:
-        """Heights and rates (2 steps + 1, 2 w, copies) of the road at half steps."""
+        """Heights and their rates (2 steps + 1, 2 w, copies) of the road under each wheel, at half steps."""
         roads = _road_heights(
             RoadPath(self._excitation, copy_steps.speed, copy_steps.half), copy_steps.steps, self.samples
         )
-        return np.ascontiguousarray(roads[:: self.times])
+        return np.ascontiguousarray(roads[:: self.step_factor])
 
     def mean_squares(self, copy_steps: CopySteps, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
-        """Outputs of the vehicle, and for each copy the mean squares (copies, p) about the mean of all copies."""
-        step = 2.0 * copy_steps.half * self.times
+        """Outputs of the vehicle, and for each copy their mean squares (copies, p) about the mean of all copies."""
+        step = 2.0 * copy_steps.half * self.step_factor
         march = CopiesMarch(self.vehicle(copy_steps), copy_steps.speed, step, self.samples.copies)
-        reading_interval = max(1, STEPS_PER_READING // self.times)
-        march.march_over(roads, copy_steps.settling_steps // self.times, reading_interval)
-        count = len(range(0, copy_steps.counted_steps // self.times, reading_interval))
+        reading_interval = max(1, STEPS_PER_READING // self.step_factor)
+        march.march_over(roads, copy_steps.settling_steps // self.step_factor, reading_interval)
+        count = len(range(0, copy_steps.counted_steps // self.step_factor, reading_interval))
         first, second = march.sums[0].T / count, march.sums[1].T / count
         if not (second < LARGEST_QUANTITY).all():
             raise RunFailed("reference", f"grows without end in steps of {step:.3g} s", step)
@@ -158,8 +161,8 @@ class CopiesInTime:
 
 
 def in_time(scene: ReducedScene) -> CopiesInTime:
-    """The copies of a full scene, run in time; InputError for a scene with a closed form, or one that copies cannot
-    answer.
+    """The copies of a complete ride scene, to be integrated in time; InputError for a scene with a closed form, or one
+    whose effects or weightings copies cannot represent.
     """
     _check(scene)
     speeds, options = scene.ride.speeds, scene.ride.options
@@ -183,6 +186,7 @@ def _check(scene: ReducedScene) -> None:
 
 
 def _copy_steps(scene: ReducedScene, speed: float, lasting: float) -> CopySteps:
+    """Time steps of the copies at a speed (m/s), each ``lasting`` (s) after settling."""
     excitation = scene.excitation()
     linear = statistically_linear(scene.vehicle.with_tyres(pushes_only=False), excitation, speed)
     half = road_path(excitation, speed, usual_step(scene.vehicle, speed, linear.vehicle)).half
@@ -192,7 +196,7 @@ def _copy_steps(scene: ReducedScene, speed: float, lasting: float) -> CopySteps:
 
 
 def _can_be_left_out(scene: ReducedScene, effect: Effect) -> bool:
-    """Whether a run in time can do without an effect and the parts that leave with it."""
+    """Whether a run in time can do without an effect and the parts that must leave with it."""
     reduced_scene = effect.without(scene)
     rigid = (spring for spring in scene.vehicle.springs if spring.name in reduced_scene.rigid)
     return not reduced_scene.massless and not any(
@@ -201,8 +205,8 @@ def _can_be_left_out(scene: ReducedScene, effect: Effect) -> bool:
 
 
 def reduced_vehicle(scene: ReducedScene, motion_of_spring: dict[str, BentSpring]) -> SpatialVehicle:
-    """The vehicle of a reduced scene; ``motion_of_spring`` : motion of the nonlinear springs, for the gains that
-    replace their laws.
+    """The vehicle of a reduced scene; ``motion_of_spring`` : motion of the nonlinear springs, for the gains of
+    statistical linearisation.
     """
     springs = scene.vehicle.springs
     seats = {s.first_body: s.second_body for s in springs if s.name in scene.rigid and s.second_body is not None}
@@ -226,7 +230,7 @@ def reduced_vehicle(scene: ReducedScene, motion_of_spring: dict[str, BentSpring]
 def _linearised_spring(
     spring: SpringDamper, laws: frozenset[str], motion_of_spring: dict[str, BentSpring]
 ) -> SpringDamper:
-    """The spring with gains of statistical linearisation in place of these laws."""
+    """The spring with gains of statistical linearisation in place of the nonlinear ``laws``."""
     motion = motion_of_spring.get(spring.name)
     if motion is None:
         return spring
@@ -242,17 +246,19 @@ def _linearised_spring(
     return spring
 
 
-_kept_roads: dict[tuple[object, ...], np.ndarray] = {}
+_stored_roads: dict[tuple[object, ...], np.ndarray] = {}
 
 
 def _road_heights(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
-    """Heights and rates (2 steps + 1, 2 w, copies) of the road; those that were requested last are kept."""
+    """Heights and rates (2 steps + 1, 2 w, copies) of the road at half steps; those that were requested last are
+    stored.
+    """
     road = path.excitation
     arrays = (array.tobytes() for array in (road.F, road.G, *road.heights))
     of_run = path.speed, path.half, steps, samples.copies, samples.seed
     key = (*arrays, road.lengths, road.independent, *of_run)
-    if key not in _kept_roads:
-        while sum(roads.nbytes for roads in _kept_roads.values()) > ROADS_BYTES:
-            del _kept_roads[next(iter(_kept_roads))]
-        _kept_roads[key] = next(path.blocks(steps, samples.copies, samples.seed))
-    return _kept_roads[key]
+    if key not in _stored_roads:
+        while sum(roads.nbytes for roads in _stored_roads.values()) > ROADS_BYTES:
+            del _stored_roads[next(iter(_stored_roads))]
+        _stored_roads[key] = next(path.blocks(steps, samples.copies, samples.seed))
+    return _stored_roads[key]

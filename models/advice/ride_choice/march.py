@@ -1,5 +1,5 @@
-"""Standard deviations that a run in time has, by the classical Runge-Kutta method at a step in closed form, and its
-cost.
+"""Standard deviations that a run by the classical Runge-Kutta method has at a given step, in closed form, and the cost
+of the run.
 
 A run reads the road's filters at the begin, the middle and the end of a step (f0, fm, f1). In a motion of rate s, with
 z = h s, a step is x1 = R x0 + h (c0 g0 + cm gm + c1 g1), g the force of the road on it and
@@ -24,20 +24,23 @@ from models.core.runge_kutta import RK4_STAGES
 from models.road.excitation import Excitation
 
 LEAST_ALIASES, ALIAS_RANGE_FACTOR = 6, 6.0
-"""Waves to either side that look alike at the steps, at least, and so many times the road's last corner; the last two
-stand for all beyond, which fall with their square."""
+"""Least number of aliased waves to either side, and the ratio of their range to the road's highest corner frequency;
+the last two stand for all beyond, which fall with their square.
+"""
 LOWEST_FREQUENCY_SHARE = 1e-4
-"""Where panels of frequencies begin, by the highest frequency that steps can tell."""
+"""Ratio of the lowest frequency of integration to the highest one, which has two steps per period."""
 SHORTEST_STEP_SHARE, STEPS_TRIED, PARTS_BETWEEN_STEPS = 1 / 32, 8, 64
-"""Shortest step that is tried, by the longest stable one; steps from there on, and parts of what lies between two."""
+"""Ratio of the shortest step that is tried to the longest stable one; the number of steps from there on, and the number
+of parts between two of them.
+"""
 NEGLIGIBLE_SHARE = 1e-12
-"""An error, by the tolerance, that is none."""
+"""Ratio of an error to the tolerance below which it counts as zero."""
 
 
 @dataclass(frozen=True)
 class March:
-    """A reduced system in its eigenmodes, with its road at a speed (m/s). rows (q,) : of the quantities; weightings :
-    the names of their weightings, by row.
+    """Time integration of a reduced linear system by its eigenmodes, with its road at a speed (m/s). rows (q,) : of the
+    quantities; weightings : the names of their weighting filters, by row.
     """
 
     reduced: Reduced
@@ -46,7 +49,7 @@ class March:
     weightings: tuple[tuple[int, str], ...]
 
     @cached_property
-    def vehicle(self) -> int:
+    def vehicle_state_count(self) -> int:
         """Number of states of the vehicle, which are the first ones of the system."""
         road = self.reduced.excitation
         return self.reduced.states - len(road.heights) * len(road.F)
@@ -56,15 +59,15 @@ class March:
         """Eigenvalues (n,) in 1/s of the vehicle, the matrix (q, n) from its modes to quantities, and the matrix (n, m
         + k) from the road's filters and noise to its modes.
         """
-        n, system, modes = self.vehicle, self.reduced.system, self.reduced.of_vehicle.modes
+        n, system, modes = self.vehicle_state_count, self.reduced.system, self.reduced.reduced_vehicle.modes
         rates, V = (modes.rates, modes.V) if modes else np.linalg.eig(system.A[:n, :n])
         back = modes.W if modes else np.linalg.inv(V)
         forced = np.hstack([system.A[:n, n : self.reduced.states], *(b[:n] for b in system.B)])
-        return rates, self.read[:, :n] @ V, back @ forced
+        return rates, self.output_matrix[:, :n] @ V, back @ forced
 
     @cached_property
-    def read(self) -> np.ndarray:
-        """Matrix (q, n + m) from the states to the quantities, before their weightings."""
+    def output_matrix(self) -> np.ndarray:
+        """Output matrix (q, n + m) from the states of vehicle and road to the quantities, before their weightings."""
         weighted, names = dict(self.weightings), self.reduced.system.names
         plain = [
             names.index(names[row].removesuffix(f" {weighted[row]}")) if row in weighted else row for row in self.rows
@@ -73,11 +76,11 @@ class March:
 
     @cached_property
     def longest_stable_step(self) -> float:
-        """Longest step (s) at which the vehicle's march is stable."""
-        return self.reduced.of_vehicle.stable_step
+        """Longest step (s) with which the Runge-Kutta integration of the vehicle is stable."""
+        return self.reduced.reduced_vehicle.stable_step
 
     def deviations(self, step: float) -> np.ndarray:
-        """Standard deviations (q,) of the quantities that a run in steps of ``step`` (s) samples."""
+        """Standard deviations (q,) of the quantities, as sampled by a run with steps of ``step`` (s)."""
         omega, weights, is_independent = self._frequencies(step)
         alias_limit, half = self._count_of_aliases(step), np.exp(0.5j * step * omega)
         aliases = np.arange(-alias_limit, alias_limit + 1)[:, None]
@@ -90,7 +93,7 @@ class March:
         return np.sqrt(weights @ (total * abs(self._weighting_factors(omega).T) ** 2) / np.pi)
 
     def _gains(self, half: np.ndarray, step: float) -> Iterator[list[np.ndarray]]:
-        """Gains (w, q, m) from the states of each axle's filter to the quantities, for waves whose phase turns by
+        """Gains (w, q, m) from the states of each axle's road filter to the quantities, for waves whose phase turns by
         ``half`` in half a step, and for waves that turn by the opposite and look the same at the steps.
 
         White noise enters as its mean over a step, computed from the filters' states at the step's begin, middle and
@@ -107,7 +110,7 @@ class March:
         )
         shape = len(half), len(read_modes), axles, m
         outer = motions @ (begin[:, None] * by_road) + end[:, None] * (motions @ by_road)
-        outer += self.read[:, self.vehicle :].reshape(-1)
+        outer += self.output_matrix[:, self.vehicle_state_count :].reshape(-1)
         inner = motions @ (middle[:, None] * by_road)
         noisy = by_noise.any()
         noise = (motions @ ((begin + middle + 1)[:, None] * by_noise)).reshape(len(half), -1, k) if noisy else None
@@ -128,8 +131,8 @@ class March:
     def _spectral_densities(
         self, gains: list[np.ndarray], waves: np.ndarray, alias_weights: np.ndarray, is_independent: np.ndarray
     ) -> np.ndarray:
-        """Spectral densities (w, q) of the quantities, summed over all ``waves`` (a, w) that look alike, each weighted
-        with its ``alias_weights`` (a, 1).
+        """Spectral densities (w, q) of the quantities, summed over all ``waves`` (a, w) that are aliased to the same
+        frequency, each weighted with its ``alias_weights`` (a, 1).
         """
         road, speeds, total = self.reduced.excitation, np.array([self.speed]), 0.0
         late, by_noises = {}, self.filters.by_noises(gains)
@@ -146,42 +149,42 @@ class March:
 
     @cached_property
     def filters(self) -> Filters:
-        """Filters of an axle of the road."""
+        """Road filters of one axle, in terms of their poles."""
         return Filters(self.reduced.excitation)
 
     def _count_of_aliases(self, step: float) -> int:
-        """Number of aliased waves to either side within which contributions need not fall with the square of the
+        """Number of aliased waves to either side that are summed; beyond it, contributions fall with the square of the
         distance.
         """
         corner = self.speed * abs(np.linalg.eigvals(self.reduced.excitation.F)).max()
         return max(LEAST_ALIASES, int(np.ceil(ALIAS_RANGE_FACTOR * corner * step / (2 * np.pi))))
 
     def _frequencies(self, step: float) -> tuple[np.ndarray, ...]:
-        """Frequencies up to the one with two steps per period, with their weights."""
+        """Angular frequencies (rad/s) of integration up to two steps per period, with their weights."""
         highest = np.pi / step
         delay = max(self.reduced.excitation.lengths) / self.speed
         return frequency_panels(self.motions[0], delay, (LOWEST_FREQUENCY_SHARE * highest, highest))
 
     def _weighting_factors(self, omega: np.ndarray) -> np.ndarray:
-        """Factors (q, w) of the weightings at angular frequencies ``omega``."""
+        """Complex gains (q, w) of the weighting filters at angular frequencies ``omega`` (rad/s)."""
         names = dict(self.weightings)
         return weighting_factors([names.get(row, "") for row in self.rows], omega)
 
 
 class RunInSteps(Protocol):
-    """Runs in time of a scene at one speed, in steps (s) of any length."""
+    """Protocol of time simulations of a scene at one speed, with steps (s) of any length."""
 
     @property
     def longest_stable_step(self) -> float:
-        """Longest step (s) at which the run is stable."""
+        """Longest step (s) with which the simulation is stable."""
 
     def deviations(self, step: float) -> np.ndarray:
-        """Standard deviations (q,) of the quantities that a run in steps of ``step`` (s) samples."""
+        """Standard deviations (q,) of the quantities, as sampled by a run with steps of ``step`` (s)."""
 
 
 def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], tolerance: float) -> float:
-    """Longest step (s) with which runs at every speed keep all quantities within a tolerance of their ``exact``
-    deviations.
+    """Longest step (s) with which runs at every speed keep all quantities within a relative tolerance of their
+    ``exact`` standard deviations.
 
     exact : standard deviations of the full scene, (q,) for each march. The result is 0 where the shortest step that is
     tried breaks the tolerance.
@@ -214,8 +217,7 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
 def _longest_step_below(
     steps: tuple[float, float], shares: tuple[float, float], share: Callable[[float], float]
 ) -> float:
-    """Longest of ``PARTS_BETWEEN_STEPS`` logarithmically spaced steps (s) below the first one that breaks the
-    tolerance.
+    """Longest of ``PARTS_BETWEEN_STEPS`` logarithmically spaced steps (s) between two that keeps the tolerance.
 
     An error grows as a power of the step, so that linear interpolation of logarithms predicts where to look next.
     """
@@ -237,8 +239,8 @@ def _longest_step_below(
 @dataclass(frozen=True)
 class Cost:
     """Cost of a run. states : of vehicle and road filters, without weightings; step (s) : the largest at which the
-    classical Runge-Kutta method is stable for the vehicle; calls : of its right-hand side per second of motion in this
-    step.
+    classical Runge-Kutta method is stable for the vehicle; calls : of its right-hand side per second of motion with
+    this step.
 
     The road's own poles do not bound the step: a time run reads heights from a table made beforehand. How fine a step
     must be to resolve the road or a quantity is another question, the same with and without an effect.
@@ -250,11 +252,13 @@ class Cost:
 
     @property
     def work(self) -> float:
-        """Work per second of motion: calls times states."""
+        """Work per second of motion: right-hand side calls times states."""
         return self.calls * self.states
 
 
 def cost(vehicle: ReducedVehicle, excitation: Excitation) -> Cost:
-    """Cost of a run of a stable vehicle on its road; infinite for an unstable vehicle, which has no stable step."""
+    """Cost of a run of a stable vehicle on its road with the largest stable step; infinite for an unstable vehicle,
+    which has none.
+    """
     states, step = len(vehicle.states.A) + len(excitation.heights) * len(excitation.F), vehicle.stable_step
     return Cost(states, step, RK4_STAGES / step if step else np.inf)

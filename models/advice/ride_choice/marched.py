@@ -1,4 +1,4 @@
-"""A run of a linear scene in time, by the classical Runge-Kutta method: what it makes of deviations at a step.
+"""Time simulation of a linear ride scene by the classical Runge-Kutta method: how the step changes standard deviations.
 
 Copies of the vehicle meet random roads of their own; the same roads are run in steps a quarter as long, so that chance
 is in both and hardly in their ratio.
@@ -15,26 +15,26 @@ from models.ride.covariance import noise_of
 from models.ride.road_path import RoadPath
 
 STEP_REFINEMENT = 4
-"""Steps of the run beside it are so many times as short."""
+"""Factor by which the steps of the run for comparison are shorter."""
 NUMBER_OF_COPIES, LONGEST_RUN_SECONDS, LONGEST_RUN_STEPS = 48, 20.0, 1500
-"""Copies; each runs for so many seconds (s), or for so many steps if that is shorter."""
+"""Number of copies of the vehicle, their longest duration (s), and their largest number of steps if that is shorter."""
 STEPS_PER_BLOCK = 250
-"""Steps whose states are kept before they are summed."""
+"""Number of steps whose states are stored before they are summed."""
 SETTLING_SHARE = 0.2
-"""Share of a run in which it forgets its beginning, and nothing counts."""
+"""Share of a run in which it settles, and which is left out of the mean squares."""
 SEED = 1
 ALLOWED_SHARE = 0.1
-"""Share of what steps change by which run and closed form may differ: a few per cent of a step."""
+"""Share of the change by the step by which run and closed form may differ."""
 CLOSED_FORM_ERROR = 1e-4
-"""What the closed form leaves out of a ratio."""
+"""Relative error of a deviation ratio by the closed form."""
 ALLOWED_STANDARD_ERRORS = 4.0
-"""Standard errors by which a run may differ from the closed form; more does not happen by chance."""
+"""Number of standard errors by which a run may differ from the closed form; more does not happen by chance."""
 
 
 @dataclass(frozen=True)
-class Marched:
-    """Comparison of a run with one in shorter steps. deviation_ratio (q,) : of standard deviations; error (q,) :
-    standard error of the ratio; calls : per second of motion.
+class StepComparison:
+    """Comparison of a run with another one in shorter steps. deviation_ratio (q,) : ratio of standard deviations; error
+    (q,) : standard error of the ratio; calls : right-hand side calls per second of motion.
     """
 
     deviation_ratio: np.ndarray
@@ -42,23 +42,23 @@ class Marched:
     calls: float
 
 
-def comparison_of_steps(march_in_modes: March, step: float, copies: int = NUMBER_OF_COPIES) -> Marched:
-    """Run a scene in steps of ``step`` (s) and in shorter ones."""
+def comparison_of_steps(march: March, step: float, copies: int = NUMBER_OF_COPIES) -> StepComparison:
+    """Ratio of standard deviations of a run with steps of ``step`` (s) to those of a run with shorter steps."""
     steps = max(int(min(LONGEST_RUN_SECONDS / step, LONGEST_RUN_STEPS)), 10)
-    road = _filter_states(march_in_modes, step / STEP_REFINEMENT, steps * STEP_REFINEMENT, copies)
-    coarse, calls = _mean_squares(march_in_modes, road[::STEP_REFINEMENT], step)
-    fine, _ = _mean_squares(march_in_modes, road, step / STEP_REFINEMENT)
+    road = _filter_states(march, step / STEP_REFINEMENT, steps * STEP_REFINEMENT, copies)
+    coarse, calls = _mean_squares(march, road[::STEP_REFINEMENT], step)
+    fine, _ = _mean_squares(march, road, step / STEP_REFINEMENT)
     mean = fine.mean(axis=0)
     squared = coarse.mean(axis=0) / mean
     error = (coarse - squared * fine).std(axis=0, ddof=1) / (np.sqrt(copies) * mean * 2 * np.sqrt(squared))
-    return Marched(np.sqrt(squared), error, calls / (steps * step))
+    return StepComparison(np.sqrt(squared), error, calls / (steps * step))
 
 
-def confirms_step(march_in_modes: March, step: float) -> bool:
-    """Whether a run in steps of ``step`` (s) changes standard deviations, before weightings, as much as the closed form
-    predicts.
+def confirms_step(march: March, step: float) -> bool:
+    """Whether a run with steps of ``step`` (s) changes standard deviations, before weightings, as much as the closed
+    form predicts.
     """
-    plain = replace(march_in_modes, weightings=())
+    plain = replace(march, weightings=())
     run = comparison_of_steps(plain, step)
     stated_ratio = plain.deviations(step) / plain.deviations(step / STEP_REFINEMENT)
     return bool(
@@ -69,49 +69,49 @@ def confirms_step(march_in_modes: March, step: float) -> bool:
     )
 
 
-def _filter_states(march_in_modes: March, step: float, steps: int, copies: int) -> np.ndarray:
-    """States (2 steps + 1, a m, copies) of the road filters of all axles at half steps."""
-    road = march_in_modes.reduced.excitation
+def _filter_states(march: March, step: float, steps: int, copies: int) -> np.ndarray:
+    """States (2 steps + 1, a m, copies) of the road filters of all axles at half steps of ``step`` (s)."""
+    road = march.reduced.excitation
     axles, m = len(road.heights), len(road.F)
     axle_selectors = tuple(np.kron(np.eye(axles)[:, [i]], np.eye(m)) for i in range(axles))
-    path = RoadPath(replace(road, heights=axle_selectors), march_in_modes.speed, step / 2)
+    path = RoadPath(replace(road, heights=axle_selectors), march.speed, step / 2)
     return next(path.blocks(steps, copies, SEED))[:, : axles * m]
 
 
-def _mean_squares(march_in_modes: March, road: np.ndarray, step: float) -> tuple[np.ndarray, int]:
-    """Mean squares (copies, q) of quantities in a run over a road that is given at half steps, and the number of calls
-    of the right-hand side.
+def _mean_squares(march: March, road: np.ndarray, step: float) -> tuple[np.ndarray, int]:
+    """Mean squares (copies, q) of quantities in a run over a road that is given at half steps, and the number of
+    right-hand side calls.
 
     A step of a linear system is a matrix; it is found by a step from the unit matrix.
     """
-    n, steps, (_, m, copies) = march_in_modes.vehicle, len(road) // 2, road.shape
-    move, *weights = _step_matrices(march_in_modes.reduced.system.A[:n, :n], step)
-    by_road = [weight @ march_in_modes.reduced.system.A[:n, n : n + m] for weight in weights]
+    n, steps, (_, m, copies) = march.vehicle_state_count, len(road) // 2, road.shape
+    move, *weights = _step_matrices(march.reduced.system.A[:n, :n], step)
+    by_road = [weight @ march.reduced.system.A[:n, n : n + m] for weight in weights]
     x, first, sums = (
-        _initial_states(march_in_modes, road[0]),
+        _initial_states(march, road[0]),
         int(np.ceil(SETTLING_SHARE * steps)),
-        np.zeros((len(march_in_modes.rows), copies)),
+        np.zeros((len(march.rows), copies)),
     )
     for begin in range(0, steps, STEPS_PER_BLOCK):
         road_of_block = road[2 * begin : 2 * min(begin + STEPS_PER_BLOCK, steps) + 1]
         forcing = (
             by_road[0] @ road_of_block[:-2:2] + by_road[1] @ road_of_block[1::2] + by_road[2] @ road_of_block[2::2]
         )
-        forcing += sum(weights) @ _mean_noise_force(march_in_modes, road_of_block, step)
+        forcing += sum(weights) @ _mean_noise_force(march, road_of_block, step)
         for i in range(len(forcing)):
             forcing[i] += move @ x
             x = forcing[i]
         counted = slice(max(first - begin, 0), None)
-        heard = (
-            march_in_modes.read[:, :n] @ forcing[counted] + march_in_modes.read[:, n:] @ road_of_block[2::2][counted]
+        quantities = (
+            march.output_matrix[:, :n] @ forcing[counted] + march.output_matrix[:, n:] @ road_of_block[2::2][counted]
         )
-        sums += (heard**2).sum(axis=0)
+        sums += (quantities**2).sum(axis=0)
     return (sums / (steps - first)).T, RK4_STAGES * steps
 
 
 def _step_matrices(A: np.ndarray, step: float) -> list[np.ndarray]:
-    """Matrices (n, n) of one step (s): how the new state depends on the old one, and on forces at the step's begin,
-    middle and end.
+    """Transition matrices (n, n) of one Runge-Kutta step (s): from the old state, and from forces at the step's begin,
+    middle and end, to the new state.
     """
     n = len(A)
     columns = np.eye(n, 4 * n)
@@ -119,13 +119,13 @@ def _step_matrices(A: np.ndarray, step: float) -> list[np.ndarray]:
     return np.split(step_on(lambda time, x: A @ x + acting[time], 0.0, columns, step), 4, axis=1)
 
 
-def _initial_states(march_in_modes: March, road: np.ndarray) -> np.ndarray:
+def _initial_states(march: March, road: np.ndarray) -> np.ndarray:
     """Initial states (n, copies) of the vehicle, drawn from its stationary ride for given states (m, copies) of the
-    road.
+    road filters.
 
     A short run would not reach it from rest.
     """
-    n, states, system = march_in_modes.vehicle, march_in_modes.reduced.states, march_in_modes.reduced.system
+    n, states, system = march.vehicle_state_count, march.reduced.states, march.reduced.system
     P = solve_continuous_lyapunov(system.A, -noise_of(system))[:states, :states]
     regression = P[:n, n:] @ np.linalg.pinv(P[n:, n:], hermitian=True)
     values, vectors = np.linalg.eigh(P[:n, :n] - regression @ P[n:, :n])
@@ -133,15 +133,17 @@ def _initial_states(march_in_modes: March, road: np.ndarray) -> np.ndarray:
     return regression @ road + vectors * np.sqrt(values.clip(0.0)) @ chance
 
 
-def _mean_noise_force(march_in_modes: March, road: np.ndarray, step: float) -> np.ndarray:
-    """Mean force (steps, n, copies) that white noise exerts over each step, 0 where no noise reaches the vehicle."""
-    roads, n = march_in_modes.reduced.excitation, march_in_modes.vehicle
-    into = np.hstack([b[:n] for b in march_in_modes.reduced.system.B])
+def _mean_noise_force(march: March, road: np.ndarray, step: float) -> np.ndarray:
+    """Mean rate of the states (steps, n, copies) due to white noise over each step, 0 where no noise reaches the
+    vehicle.
+    """
+    roads, n = march.reduced.excitation, march.vehicle_state_count
+    into = np.hstack([b[:n] for b in march.reduced.system.B])
     if not into.any():
         return np.zeros((len(road) // 2, n, 1))
     begin, middle, end = road[:-2:2], road[1::2], road[2::2]
     path, back = (
         np.kron(np.eye(len(roads.heights)), filter_matrix)
-        for filter_matrix in (march_in_modes.speed * roads.F, np.linalg.pinv(march_in_modes.speed**0.5 * roads.G))
+        for filter_matrix in (march.speed * roads.F, np.linalg.pinv(march.speed**0.5 * roads.G))
     )
     return into @ (back @ ((end - begin) / step - path @ (begin + 4 * middle + end) / 6))

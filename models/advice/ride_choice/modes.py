@@ -1,4 +1,5 @@
-"""A linear system in its motions, A = V diag(rates) W: stationary covariances, adjoints and e^(A t) without a solve.
+"""A linear system in its eigenmodes, A = V diag(rates) W: stationary covariances, adjoints and e^(A t) without an
+equation solver.
 
 What drives and what it drives have motions of their own; those of both follow from them by a division, so that the
 eigenvalue problem of a vehicle is solved once for all its roads and speeds.
@@ -14,27 +15,28 @@ from scipy.linalg.lapack import dgebal
 from models.ride.weighting import WEIGHTINGS
 
 LARGEST_MODE_CONDITION = 1e6
-"""Product of the sizes of a column of V and a row of W, by which rounding grows, beyond which motions are too much
-alike to tell."""
+"""Largest product of the norms of a column of V and a row of W, by which rounding grows; beyond it, eigenvectors are
+too nearly parallel.
+"""
 INVERSE_TOLERANCE = 1e-9
-"""By how much W V may differ from the unit matrix."""
+"""Largest difference of W V from the unit matrix."""
 
 STEP_TIMES_EIGENVALUE = np.linspace(0.0, 3.0, 601)[1:]
-"""Sizes of step times eigenvalue at which its stability is looked at; on the real axis it ends at 2.785."""
+"""Magnitudes of step times eigenvalue at which stability is tested; on the real axis the stable range ends at 2.785."""
 
 
 @dataclass(frozen=True)
 class Modes:
-    """Eigenmodes of a system. rates (n,) : eigenvalues in 1/s; V (n, n) : eigenvectors as columns; W (n, n) : inverse
-    of V.
+    """Eigenmodes of a linear system. rates (n,) : eigenvalues in 1/s; V (n, n) : eigenvectors as columns; W (n, n) :
+    inverse of V.
     """
 
     rates: np.ndarray
     V: np.ndarray
     W: np.ndarray
 
-    def of(self, A: np.ndarray) -> "Modes | None":
-        """These modes, if they are the modes of A and no two eigenvectors are too nearly parallel to be of use; else
+    def reliable_for(self, A: np.ndarray) -> "Modes | None":
+        """These modes, if they are accurate modes of the matrix A and no two eigenvectors are nearly parallel; else
         None.
 
         The states are scaled as they balance A, so that units have no part in it.
@@ -46,15 +48,15 @@ class Modes:
         return self if deviation_of_inverse <= INVERSE_TOLERANCE and grows <= LARGEST_MODE_CONDITION else None
 
     def propagated(self, time: float, B: np.ndarray) -> np.ndarray:
-        """The product e^(A t) B (n, k) after a time t (s)."""
+        """The matrix product e^(A t) B (n, k) after a time t (s)."""
         return np.asarray(((self.V * np.exp(self.rates * time)) @ (self.W @ B)).real)
 
     def covariance(self, Q: np.ndarray) -> np.ndarray:
-        """Solution P (n, n) of the Lyapunov equation A P + P A' + Q = 0."""
+        """Stationary covariance P (n, n), the solution of the Lyapunov equation A P + P A' + Q = 0."""
         inner = -(self.W @ Q @ self.W.conj().T) / (self.rates[:, None] + self.rates.conj())
         return np.asarray((self.V @ inner @ self.V.conj().T).real)
 
-    def adjoint_of_motions(self, C: np.ndarray) -> np.ndarray:
+    def modal_adjoint(self, C: np.ndarray) -> np.ndarray:
         """Adjoint Z (p, n, n) in modal coordinates for every output c (p, n). The adjoint L = W* Z W solves A' L + L A
         + c' c = 0.
         """
@@ -62,20 +64,20 @@ class Modes:
         return np.asarray(-(y.conj()[:, :, None] * y[:, None, :]) / (self.rates.conj()[:, None] + self.rates))
 
     def adjoints(self, C: np.ndarray) -> np.ndarray:
-        """Adjoint L (p, n, n) in state coordinates for every output."""
-        return np.asarray((self.W.conj().T @ self.adjoint_of_motions(C) @ self.W).real)
+        """Adjoints L (p, n, n) in state coordinates for the outputs C (p, n); they solve A' L + L A + c' c = 0."""
+        return np.asarray((self.W.conj().T @ self.modal_adjoint(C) @ self.W).real)
 
 
 def modes_of(A: np.ndarray) -> Modes | None:
     """Eigenvalues and eigenvectors of x' = A x, A (n, n); None where eigenvectors are nearly parallel."""
     rates, V = np.linalg.eig(A)
     try:
-        return Modes(rates, V, np.linalg.inv(V)).of(A)
+        return Modes(rates, V, np.linalg.inv(V)).reliable_for(A)
     except np.linalg.LinAlgError:
         return None
 
 
-def driven_motions(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
+def modes_of_cascade(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
     """Modes of the coupled system u' = A_u u, x' = A_x x + coupling u with state (u, x); None where an eigenvalue
     belongs to both.
     """
@@ -84,12 +86,12 @@ def driven_motions(driver: Modes | None, coupling: np.ndarray, system: Modes | N
     rate_differences = driver.rates - system.rates[:, None]
     if not rate_differences.all():
         return None
-    met = (system.W @ coupling @ driver.V) / rate_differences
+    coupling_in_modes = (system.W @ coupling @ driver.V) / rate_differences
     rates = np.concatenate([driver.rates, system.rates])
     return Modes(
         rates,
-        _block_triangular(driver.V, system.V @ met, system.V),
-        _block_triangular(driver.W, -met @ driver.W, system.W),
+        _block_triangular(driver.V, system.V @ coupling_in_modes, system.V),
+        _block_triangular(driver.W, -coupling_in_modes @ driver.W, system.W),
     )
 
 
@@ -101,30 +103,35 @@ def _block_triangular(upper: np.ndarray, corner: np.ndarray, lower: np.ndarray) 
     return full
 
 
-def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
-    """Modes of a vehicle together with its axles' road filters F (m, m), for the state (x, f) and its matrix A."""
+def modes_with_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
+    """Modes of a vehicle together with the road filters F (m, m) of its axles, for the state (x, f) and its matrix A;
+    None where they are unreliable.
+    """
     n, road = len(A) - axles * len(F), _modes_of_filters(F.tobytes(), len(F), axles)
     if road is None or vehicle is None:
         return None
-    coupled_modes = driven_motions(road, A[:n, n:], vehicle)
+    coupled_modes = modes_of_cascade(road, A[:n, n:], vehicle)
     if coupled_modes is None:
         return None
     order = np.concatenate([np.arange(len(A) - n, len(A)), np.arange(len(A) - n)])
-    return Modes(coupled_modes.rates, coupled_modes.V[order], coupled_modes.W[:, order]).of(A)
+    return Modes(coupled_modes.rates, coupled_modes.V[order], coupled_modes.W[:, order]).reliable_for(A)
 
 
-def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
-    """Modes of a system together with the weighting filters of its outputs, for the state (x, w) and its matrix A."""
+def modes_with_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
+    """Modes of a system together with the weighting filters of its outputs, for the state (x, w) and its matrix A; None
+    where they are unreliable.
+    """
     filters = _modes_of_weightings(names)
     if system is None or filters is None:
         return None
     n = len(system.rates)
-    coupled_modes = driven_motions(system, A[n:, :n], filters)
-    return None if coupled_modes is None else coupled_modes.of(A)
+    coupled_modes = modes_of_cascade(system, A[n:, :n], filters)
+    return None if coupled_modes is None else coupled_modes.reliable_for(A)
 
 
 @lru_cache(maxsize=256)
 def _modes_of_filters(F: bytes, filter_size: int, axles: int) -> Modes | None:
+    """Modes of the road filters of all axles; None where they are unreliable."""
     modes_of_filter = modes_of(np.frombuffer(F).reshape(filter_size, filter_size))
     if modes_of_filter is None:
         return None
@@ -137,6 +144,7 @@ def _modes_of_filters(F: bytes, filter_size: int, axles: int) -> Modes | None:
 
 @lru_cache(maxsize=64)
 def _modes_of_weightings(names: tuple[str, ...]) -> Modes | None:
+    """Modes of the weighting filters of these names; None where they are unreliable."""
     parts = [modes_of(WEIGHTINGS[name].matrices()[0]) for name in names]
     filters = [filter_modes for filter_modes in parts if filter_modes]
     if len(filters) < len(parts):

@@ -1,4 +1,4 @@
-"""Parameters of a vehicle that may be off: every mass, inertia, stiffness and damping, each for itself."""
+"""Uncertain parameters of a vehicle: every mass, inertia, stiffness and damping, each of which may be off by itself."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -9,21 +9,21 @@ import numpy as np
 from models.vehicles.spatial import SpatialVehicle
 
 PARAMETER_ERROR = 0.05
-"""Share by which every mass, inertia, stiffness and damping may be off, each for itself."""
+"""Relative error that every mass, inertia, stiffness and damping may have independently."""
 PARAMETERS_OF_PARTS = {
     "bodies": ("mass", "inertia"),
     "springs": ("stiffness", "damping"),
     "tyres": ("stiffness", "damping"),
     "bars": ("stiffness", "damping"),
 }
-"""Parameters of a vehicle's parts."""
+"""Names of the uncertain parameters, by the group of vehicle parts that have them."""
 
 Parameter = tuple[str, str, str]
-"""Group, name and key of a value, as in ("springs", "front left", "damping")."""
+"""Name of a parameter: group, part and key, as in ("springs", "front left", "damping")."""
 
 
 def uncertain_parameters(vehicle: SpatialVehicle) -> list[Parameter]:
-    """All parameters of a vehicle that may be off: those with a value other than 0."""
+    """All uncertain parameters of a vehicle: its masses, inertias, stiffnesses and dampings other than 0."""
     return [
         (group, element.name, key)
         for group, keys in PARAMETERS_OF_PARTS.items()
@@ -34,7 +34,9 @@ def uncertain_parameters(vehicle: SpatialVehicle) -> list[Parameter]:
 
 
 def scaled_vehicle(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> SpatialVehicle:
-    """The vehicle with its values multiplied by these factors; factors of values that it does not have are ignored."""
+    """The vehicle with its parameters multiplied by these factors; factors of parameters that it does not have are
+    ignored.
+    """
 
     def scaled_part(group_name: str, original_part: Any) -> Any:
         known = [key for key in PARAMETERS_OF_PARTS[group_name] if (group_name, original_part.name, key) in factors]

@@ -1,4 +1,5 @@
-"""A scene less some effects as a system x' = A x + B w, with the way from its state to that of the whole scene.
+"""A ride scene without some effects as a linear system x' = A x + B w, with the maps between its state and that of the
+full scene.
 
 What rigid springs, locked freedoms and bodies without mass leave of the vehicle is said in
 ``models.vehicles.spatial.Limits`` and ``models.ride.excited``. The vehicle that is left is made once for all speeds and
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from models.advice.ride_choice.modes import Modes, behind_road, behind_weightings, modes_of, stable_step
+from models.advice.ride_choice.modes import Modes, modes_of, modes_with_road, modes_with_weightings, stable_step
 from models.core.errors import InputError
 from models.core.scene_effects import tables_of
 from models.ride.covariance import noise_of
@@ -29,8 +30,8 @@ from models.vehicles.spatial_linear import free, limited, linearise, massless
 @dataclass(frozen=True)
 class ReducedVehicle:
     """A vehicle without some of its effects. linear : M, D, K in the remaining coordinates (M may be singular); N (n,
-    r) : from these to the full vehicle's; states : of first order; residual_flexibility (r, n) : from the full
-    coordinates back, keeping momentum.
+    r) : from these to the full vehicle's coordinates; states : of first order; residual_flexibility (r, n) : from the
+    full coordinates back, keeping momentum.
     """
 
     linear: LinearVehicle
@@ -40,23 +41,23 @@ class ReducedVehicle:
 
     @cached_property
     def modes(self) -> Modes | None:
-        """Eigenmodes of the states; None where eigenvectors are nearly parallel."""
+        """Eigenmodes of the vehicle's state matrix; None where eigenvectors are nearly parallel."""
         return modes_of(self.states.A)
 
     @cached_property
     def stable_step(self) -> float:
-        """Longest step (s) at which the classical Runge-Kutta method is stable; 0 for a mode that grows."""
+        """Longest step (s) with which the classical Runge-Kutta method is stable; 0 where a mode grows."""
         return stable_step(self.modes.rates if self.modes else np.linalg.eigvals(self.states.A))
 
 
 @dataclass(frozen=True)
 class Reduced:
-    """A reduced vehicle, its road ``excitation``, and their ``system``. T (n, x) : from the reduced state to the full
-    (q, q', f, weightings); left (x, n) : back, keeping momentum; states : number of those of vehicle and road, which
-    precede those of the ``weightings`` (their names).
+    """A reduced vehicle, its road ``excitation``, and the linear ``system`` of both. T (n, x) : from the reduced state
+    to the full state (q, q', f, weightings); left (x, n) : back, keeping momentum; states : number of states of vehicle
+    and road, which precede those of the ``weightings`` (their names).
     """
 
-    of_vehicle: ReducedVehicle
+    reduced_vehicle: ReducedVehicle
     excitation: Excitation
     system: DelayedSystem
     T: np.ndarray
@@ -67,22 +68,22 @@ class Reduced:
     @property
     def vehicle(self) -> LinearVehicle:
         """Matrices M, D, K of the reduced vehicle."""
-        return self.of_vehicle.linear
+        return self.reduced_vehicle.linear
 
     @cached_property
     def modes(self) -> Modes | None:
-        """Eigenmodes of the system; None where eigenvectors are nearly parallel."""
+        """Eigenmodes of vehicle, road and weightings together; None where eigenvectors are nearly parallel."""
         A, axles, m = self.system.A[: self.states, : self.states], len(self.excitation.heights), len(self.excitation.F)
-        modes = behind_road(A, self.of_vehicle.modes, A[-m:, -m:], axles)
-        return behind_weightings(self.system.A, modes, self.weightings) if self.weightings else modes
+        modes = modes_with_road(A, self.reduced_vehicle.modes, A[-m:, -m:], axles)
+        return modes_with_weightings(self.system.A, modes, self.weightings) if self.weightings else modes
 
     @cached_property
     def noise(self) -> np.ndarray:
-        """Covariance (x, x) per second that the noise of all axles adds."""
+        """Rate (x, x) per second at which the noise of all axles adds to the covariance of the states."""
         return noise_of(self.system, self.modes.propagated if self.modes else None)
 
 
-class Numbers:
+class IndexNumbers:
     """Index numbers of values, the same for equal values. An object that was seen before is recognised by its identity,
     without a long hash.
     """
@@ -91,8 +92,8 @@ class Numbers:
         self._of_object: dict[int, tuple[object, int]] = {}
         self._of_value: dict[Hashable, int] = {}
 
-    def of(self, known_object: object, value_of: Callable[[], Hashable]) -> int:
-        """Number of an object's value. The object is kept, so that its identity remains unique."""
+    def index_of(self, known_object: object, value_of: Callable[[], Hashable]) -> int:
+        """Index number of an object's value. The object is stored, so that its identity remains unique."""
         known = self._of_object.get(id(known_object))
         if known is None:
             known = self._of_object[id(known_object)] = (
@@ -101,10 +102,10 @@ class Numbers:
             )
         return known[1]
 
-    def of_parts(self, known_object: Any, *names: str) -> tuple[int, ...]:
-        """Numbers of an object's attributes; copies of an object share most attributes."""
+    def indices_of_attributes(self, known_object: Any, *names: str) -> tuple[int, ...]:
+        """Index numbers of an object's attributes; copies of an object share most attributes."""
         parts = [getattr(known_object, name) for name in names]
-        return tuple(self.of(attribute, partial(_hashable_key, attribute)) for attribute in parts)
+        return tuple(self.index_of(attribute, partial(_hashable_key, attribute)) for attribute in parts)
 
 
 def _hashable_key(any_value: Hashable) -> Hashable:
@@ -112,66 +113,69 @@ def _hashable_key(any_value: Hashable) -> Hashable:
 
 
 PARTS_OF_VEHICLE = tuple(field.name for field in fields(SpatialVehicle))
-"""Attributes of a vehicle."""
+"""Names of a vehicle's attributes."""
 
 
 class Roads:
-    """Roads of reduced scenes, each made once for all speeds."""
+    """Road excitations of reduced scenes, each computed once for all speeds."""
 
     def __init__(self) -> None:
-        self._numbers = Numbers()
-        self._made: dict[int, Excitation] = {}
+        self._numbers = IndexNumbers()
+        self._stored: dict[int, Excitation] = {}
 
     def number(self, scene: ReducedScene) -> int:
-        """Number that is the same for scenes with the same road: the same effects of the road, and the same tables that
-        add to it.
+        """Index number that is the same for scenes with the same road: the same road effects, and the same tables that
+        add to the road.
         """
         ride = scene.ride
-        return self._numbers.of(ride, lambda: (ride.road, *tables_of(ride)))
+        return self._numbers.index_of(ride, lambda: (ride.road, *tables_of(ride)))
 
-    def of(self, scene: ReducedScene) -> Excitation:
-        """The road of a reduced scene, made when it is first requested."""
+    def excitation_of(self, scene: ReducedScene) -> Excitation:
+        """The road excitation of a reduced scene, computed when it is first requested."""
         number = self.number(scene)
-        if number not in self._made:
-            self._made[number] = scene.excitation()
-        return self._made[number]
+        if number not in self._stored:
+            self._stored[number] = scene.excitation()
+        return self._stored[number]
 
 
 class Vehicles:
-    """Reduced vehicles, each made once and kept for all choices that request it; ``roads`` : their roads."""
+    """Reduced vehicles, each computed once and stored for all choices that request it; ``roads`` : their road
+    excitations.
+    """
 
     def __init__(self, full_vehicle: SpatialVehicle, speed: float, roads: Roads | None = None) -> None:
         self.roads = roads or Roads()
-        self._numbers = Numbers()
-        self._made: dict[Hashable, ReducedVehicle] = {}
+        self._numbers = IndexNumbers()
+        self._stored: dict[Hashable, ReducedVehicle] = {}
         self._linear: dict[Hashable, LinearVehicle] = {}
         self._masses: dict[Hashable, np.ndarray] = {}
         self._free: dict[Hashable, np.ndarray] = {}
         self.mass = self.linear(full_vehicle, speed).mass
 
     def __len__(self) -> int:
-        return len(self._made)
+        return len(self._stored)
 
-    def of(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
+    def reduced_vehicle_of(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
         """The reduced vehicle of a scene at a speed (m/s); InputError where no meaningful vehicle remains."""
-        key = self.number(scene.vehicle), scene.limits, of_speed(scene.vehicle, speed)
-        reduced_vehicle = self._made.get(key)
+        key = self.number(scene.vehicle), scene.limits, speed_if_needed(scene.vehicle, speed)
+        reduced_vehicle = self._stored.get(key)
         if reduced_vehicle is None:
-            reduced_vehicle = self._made[key] = self._make(scene, speed)
+            reduced_vehicle = self._stored[key] = self._make(scene, speed)
         return reduced_vehicle
 
     def number(self, vehicle: SpatialVehicle) -> int:
-        """Number that is the same for vehicles with the same parts."""
-        return self._numbers.of(vehicle, lambda: self._numbers.of_parts(vehicle, *PARTS_OF_VEHICLE))
+        """Index number that is the same for vehicles with equal parts."""
+        return self._numbers.index_of(vehicle, lambda: self._numbers.indices_of_attributes(vehicle, *PARTS_OF_VEHICLE))
 
     def linear(self, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
-        """The linearised vehicle without its limits, that is without massless, rigid or locked parts."""
-        key = self.number(vehicle), of_speed(vehicle, speed)
+        """The linearised vehicle at a speed (m/s), before parts are made massless, rigid or locked."""
+        key = self.number(vehicle), speed_if_needed(vehicle, speed)
         if key not in self._linear:
             self._linear[key] = linearise(vehicle, speed)
         return self._linear[key]
 
     def _make(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
+        """The reduced vehicle of a scene at a speed (m/s), newly computed."""
         N = self._free_directions(scene)
         left = limited(self.linear(scene.vehicle, speed), self._mass_matrix(scene), N)
         states = vehicle_states(left)
@@ -180,48 +184,55 @@ class Vehicles:
         return ReducedVehicle(left, N, states, np.linalg.solve(N.T @ self.mass @ N, N.T @ self.mass))
 
     def _mass_matrix(self, scene: ReducedScene) -> np.ndarray:
-        """The mass matrix (n, n) of a scene, which springs and locks do not change; made once."""
+        """The mass matrix (n, n) of a scene, computed once for all sets of springs and locked coordinates, on which it
+        does not depend.
+        """
         names = scene.limits.massless
-        key = *self._numbers.of_parts(scene.vehicle, "bodies", "joint_elements"), names
+        key = *self._numbers.indices_of_attributes(scene.vehicle, "bodies", "joint_elements"), names
         if key not in self._masses:
             self._masses[key] = massless(scene.vehicle, names)
         return self._masses[key]
 
     def _free_directions(self, scene: ReducedScene) -> np.ndarray:
-        """The matrix N (n, r) of a scene, which bars, tyres and masses do not change; made once."""
+        """The matrix N (n, r) from the remaining to all coordinates, computed once for all sets of bars, tyres and
+        masses, on which it does not depend.
+        """
         limits = scene.limits
-        key = *self._numbers.of_parts(scene.vehicle, "bodies", "springs"), limits.rigid, limits.locked
+        key = *self._numbers.indices_of_attributes(scene.vehicle, "bodies", "springs"), limits.rigid, limits.locked
         if key not in self._free:
             self._free[key] = free(scene.vehicle, limits)
         return self._free[key]
 
 
-def of_speed(vehicle: SpatialVehicle, speed: float) -> float | None:
+def speed_if_needed(vehicle: SpatialVehicle, speed: float) -> float | None:
     """The speed (m/s) if the vehicle's matrices depend on it, else None."""
     return speed if vehicle.side_forces or vehicle.drags else None
 
 
 class FullScene:
-    """A scene with all its effects at a speed (m/s), from which reduced systems are made."""
+    """A ride scene with all its effects at a speed (m/s), from which reduced systems are derived."""
 
     def __init__(self, scene: ReducedScene, speed: float, vehicles: Vehicles | None = None) -> None:
         self.scene, self.speed = scene, speed
         self.vehicles = Vehicles(scene.vehicle, speed) if vehicles is None else vehicles
         self.linear = self.vehicles.linear(scene.vehicle, speed)
-        self.excitation = self.vehicles.roads.of(scene)
-        self._made: dict[Hashable, Reduced] = {}
+        self.excitation = self.vehicles.roads.excitation_of(scene)
+        self._stored: dict[Hashable, Reduced] = {}
         self._roads: dict[Hashable, tuple[Excitation, np.ndarray, np.ndarray]] = {}
         self.full = self.reduced(scene)
 
     def reduced(self, scene: ReducedScene) -> Reduced:
-        """The system of the reduced scene; raises InputError where it is no system."""
+        """The linear system of a reduced scene, stored for later requests; InputError where no meaningful system
+        remains.
+        """
         key = self.vehicles.number(scene.vehicle), self.vehicles.roads.number(scene), scene.limits
-        reduced_system = self._made.get(key)
+        reduced_system = self._stored.get(key)
         if reduced_system is None:
-            reduced_system = self._made[key] = self._weighted(self._make(scene))
+            reduced_system = self._stored[key] = self._weighted(self._make(scene))
         return reduced_system
 
     def _weighted(self, reduced: Reduced) -> Reduced:
+        """The system with the weighting filters of the scene's outputs added."""
         weightings = self.scene.ride.weighting
         if not weightings:
             return reduced
@@ -231,8 +242,8 @@ class FullScene:
         return replace(reduced, system=system, T=T, left=left, weightings=names)
 
     def _make(self, scene: ReducedScene) -> Reduced:
-        """The system of the reduced scene before the weightings of outputs are added."""
-        vehicle, (excitation, Tf, left_f) = self.vehicles.of(scene, self.speed), self._heights(scene)
+        """The linear system of the reduced scene before the weighting filters of outputs are added."""
+        vehicle, (excitation, Tf, left_f) = self.vehicles.reduced_vehicle_of(scene, self.speed), self._heights(scene)
         states, N = vehicle.states, vehicle.N
         system, Tq = first_order(vehicle.linear, states, excitation, self.speed)
         n, m, x = len(self.linear.mass), len(Tf), len(system.A)
@@ -244,14 +255,14 @@ class FullScene:
         return Reduced(vehicle, excitation, system, np.vstack([q, q @ system.A, f]), left, x)
 
     def road(self, scene: ReducedScene) -> Excitation:
-        """The road of the reduced scene."""
+        """The road excitation of the reduced scene."""
         return self._heights(scene)[0]
 
     def _heights(self, scene: ReducedScene) -> tuple[Excitation, np.ndarray, np.ndarray]:
-        """The road of the reduced scene, and the matrices of ``_filter_state_maps`` for it."""
+        """The road excitation of the reduced scene, and the matrices of ``_filter_state_maps`` for it."""
         key = self.vehicles.roads.number(scene)
         if key not in self._roads:
-            excitation = self.vehicles.roads.of(scene)
+            excitation = self.vehicles.roads.excitation_of(scene)
             self._roads[key] = (excitation, *_filter_state_maps(self.scene, self.excitation, scene, excitation))
         return self._roads[key]
 

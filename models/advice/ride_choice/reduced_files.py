@@ -1,4 +1,4 @@
-"""The files of what a choice has left: a scene of the study ride and a reduced vehicle, which run as they stand."""
+"""Files of the result of a choice of effects: a ride scene and a reduced vehicle, which can be run unchanged."""
 
 import json
 from pathlib import Path
@@ -12,11 +12,11 @@ from models.vehicles.vehicle_file import vehicle_path
 
 SCENE_FILE_NAME, VEHICLE_FILE_NAME = "reduced.toml", "reduced_vehicle.toml"
 QUESTION_KEYS = ("quantities", "tolerance", "options")
-"""Keys of a scene that belong to its question."""
+"""Keys of a scene that belong to the choice of effects, and are left out of the reduced scene."""
 
 
 def write(reduced_scene: ReducedScene, folder: Path) -> Path:
-    """Write the reduced scene and its vehicle into a folder; returns the path of the scene."""
+    """Write the reduced scene and its vehicle into a folder; returns the path of the scene file."""
     scene = own_table(reduced_scene.ride)
     vehicle_file = scene["vehicle"]["file"]
     vehicle = reduced_tables(parse(vehicle_path(vehicle_file, reduced_scene.ride.folder)), reduced_scene)
@@ -40,8 +40,8 @@ def write(reduced_scene: ReducedScene, folder: Path) -> Path:
 
 
 def reduced_tables(table: dict[str, Any], reduced_scene: ReducedScene) -> dict[str, Any]:
-    """The tables of the full vehicle without the bars and the damping of tyres that are left out, and with the limits
-    that reduce it.
+    """The tables of the full vehicle without the bars and the tyre damping that are left out, and with the limits
+    (massless, rigid, locked) that reduce it.
     """
     bars = {bar.name for bar in reduced_scene.vehicle.bars}
     undamped = {tyre.name for tyre in reduced_scene.vehicle.tyres if not tyre.damping}
@@ -59,7 +59,9 @@ def reduced_tables(table: dict[str, Any], reduced_scene: ReducedScene) -> dict[s
 
 
 def toml_text(table: dict[str, Any]) -> str:
-    """Nested tables as a TOML file: plain keys first, then a block for each table and each table of a list."""
+    """Nested tables as the text of a TOML file: plain keys first, then a block for each table and each table of a
+    list.
+    """
     lines, blocks = list[str](), list[str]()
     for key, value in table.items():
         if isinstance(value, dict) and not value:
@@ -82,11 +84,11 @@ def _key_text(key: str) -> str:
     return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else json.dumps(key)
 
 
-def _value_text(any_value: Any) -> str:
-    if isinstance(any_value, dict):
-        return "{ " + ", ".join(_table_lines(any_value)) + " }" if any_value else "{}"
-    if isinstance(any_value, list | tuple):
-        return "[" + ", ".join(map(_value_text, any_value)) + "]"
-    if isinstance(any_value, bool):
-        return "true" if any_value else "false"
-    return json.dumps(any_value) if isinstance(any_value, str) else repr(any_value)
+def _value_text(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(_table_lines(value)) + " }" if value else "{}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_value_text, value)) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return json.dumps(value) if isinstance(value, str) else repr(value)

@@ -1,4 +1,4 @@
-"""A vehicle's outputs by the heights under its wheels at frequencies, from its motions, and how parameters move them.
+"""Frequency responses of a vehicle's outputs to road heights under its wheels, from its eigenmodes.
 
 With Z q = B u the dynamic stiffness and y = C q + direct u, the compliance is Z^-1 = Q (s - A)^-1 B_g + compliance of
 what only springs hold. In the motions of A it is a sum of fractions 1 / (s - rate) and a polynomial in s = i w.
@@ -13,18 +13,22 @@ from models.advice.ride_choice.reduced import ReducedVehicle
 from models.vehicles.linear_vehicle import LinearVehicle
 
 RESPONSE_DIFFERENCE = 1e-7
-"""Share of the largest response by which motions and the solve may differ at the frequency that is looked at."""
+"""Share of the largest response by which eigenmodes and the direct solution may differ at the frequency that is
+checked.
+"""
 
 
 class OutputFactors(NamedTuple):
-    """Factors of the requested outputs: of the motion q, q', q'' (q, n), and of heights and their rates (q, wheels)."""
+    """Factors of a vehicle's requested outputs: of its motion q, q', q'' (q, n), and of road heights and their rates
+    (q, wheels).
+    """
 
     by_motion: tuple[np.ndarray, np.ndarray, np.ndarray]
     by_road: tuple[np.ndarray, np.ndarray]
 
     @classmethod
-    def of(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "OutputFactors":
-        """Factors of the vehicle's outputs with these rows."""
+    def of_rows(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "OutputFactors":
+        """Factors of the vehicle's outputs with these row indices."""
         read, row_list = vehicle.read, list(rows)
         return cls(
             (read.displacement_factors[row_list], read.rate_factors[row_list], read.acceleration_factors[row_list]),
@@ -33,24 +37,24 @@ class OutputFactors(NamedTuple):
 
 
 class Response:
-    """Transfer functions H (w, q, wheels) from road heights to outputs at frequencies (w,) in rad/s."""
+    """Transfer functions H (w, q, wheels) from road heights to outputs at angular frequencies (w,) in rad/s."""
 
     def __init__(self, vehicle: ReducedVehicle, rows: Sequence[int], omega: np.ndarray) -> None:
-        self.vehicle, self.s, self.read = vehicle, 1j * omega, OutputFactors.of(vehicle.linear, rows)
+        self.vehicle, self.s, self.read = vehicle, 1j * omega, OutputFactors.of_rows(vehicle.linear, rows)
         self.by_heights = vehicle.linear.road_stiffness, vehicle.linear.road_damping
         self.motions = self._fractions()
         self.H = self._modal_product(self.read.by_motion, self.by_heights) + polynomial(self.read.by_road, self.s)
 
     def coordinates(self) -> tuple[np.ndarray, np.ndarray]:
-        """Transfer functions (w, n, wheels) from heights to coordinates, and (w, q, n) from forces on coordinates to
-        outputs.
+        """Transfer functions (w, n, wheels) from road heights to coordinates, and (w, q, n) from forces on coordinates
+        to outputs.
         """
         unit = np.eye(len(self.vehicle.linear.mass))
         return self._modal_product([unit], self.by_heights), self._modal_product(self.read.by_motion, [unit])
 
     def _fractions(self) -> np.ndarray | None:
-        """Partial fractions 1 / (s - rate) (w, modes). None where the equations must be solved: without modes, or where
-        both differ at the frequency with the largest response.
+        """Partial fractions 1 / (s - rate) (w, modes). None where the equations must be solved directly: without
+        eigenmodes, or where both differ at the frequency with the largest response.
         """
         modes = self.vehicle.modes
         if modes is None:
@@ -66,7 +70,9 @@ class Response:
     def _modal_product(
         self, row_coefficients: Sequence[np.ndarray], column_coefficients: Sequence[np.ndarray]
     ) -> np.ndarray:
-        """Product (w, i, j) of a polynomial in s of rows, the compliance, and a polynomial of columns."""
+        """Product (w, i, j) of a polynomial of row vectors in s, the compliance of the vehicle, and a polynomial of
+        column vectors in s.
+        """
         if self.motions is None:
             return self._product_by_solving(row_coefficients, column_coefficients, self.s)
         return self._sum_over_modes(self.motions, row_coefficients, column_coefficients, self.s)
@@ -78,6 +84,7 @@ class Response:
         column_coefficients: Sequence[np.ndarray],
         s: np.ndarray,
     ) -> np.ndarray:
+        """Product as from ``_modal_product``, as a sum of partial fractions and a polynomial in s."""
         states, modes = self.vehicle.states, self.vehicle.modes
         assert modes is not None
         to_motions, of_motions = modes.W @ states.B, states.Q @ modes.V
@@ -117,14 +124,14 @@ class Response:
     def _product_by_solving(
         self, row_coefficients: Sequence[np.ndarray], column_coefficients: Sequence[np.ndarray], s: np.ndarray
     ) -> np.ndarray:
-        """The product of ``_modal_product``, by solving the equations at every frequency."""
+        """Product as from ``_modal_product``, by solving the equations of motion at every frequency."""
         linear = self.vehicle.linear
         Z = polynomial((linear.stiffness, linear.damping, linear.mass), s)
         return np.asarray(polynomial(row_coefficients, s) @ np.linalg.solve(Z, polynomial(column_coefficients, s)))
 
 
 def polynomial(coefficients: Sequence[np.ndarray], s: np.ndarray) -> np.ndarray:
-    """Values (w, i, j) of a polynomial with coefficients (i, j), by power of s, at s (w,)."""
+    """Values (w, i, j) of a matrix polynomial in s at s (w,), from its ``coefficients`` (i, j) by power of s."""
     total = np.zeros((len(s), *coefficients[0].shape), complex)
     for power, coefficient in enumerate(coefficients):
         if coefficient.any():

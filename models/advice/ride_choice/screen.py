@@ -1,4 +1,5 @@
-"""Changes of quantities by leaving effects out, from one covariance and one adjoint solve of the whole scene each.
+"""Changes of variances by leaving effects out, predicted from one covariance and one adjoint solution of the full
+scene.
 
 The variance of a reduced system, A_r, C_r, noise Q_r, is for **any** symmetric matrix P_m exactly
 
@@ -30,15 +31,17 @@ from models.ride.excited import DelayedSystem
 from models.ride.marginal import split_marginal
 
 SLOWEST_DECAY = 1e-9
-"""Decay, by the fastest rate, below which a motion counts as one that does not die out."""
+"""Ratio of a decay rate to the fastest rate below which a motion counts as undamped."""
 EXACT_SOLVE_LIMIT, TRUSTED_VARIANCE_SHARE = 1e-7, 1e-10
-"""The same below which motions are left to the exact solve, and the share of a variance that they may miss."""
+"""Ratio of a decay rate to the fastest rate below which the exact solution replaces eigenmodes, and the share of a
+variance that eigenmodes may miss.
+"""
 
 
 @dataclass(frozen=True)
 class StationarySolution:
-    """Stationary solution in extended precision: covariance P (n, n), adjoints L (quantities, n, n) and variances
-    (quantities,).
+    """Stationary solution of a linear system in extended precision: covariance P (n, n), adjoints L (quantities, n, n)
+    and variances (quantities,).
     """
 
     P: np.ndarray
@@ -47,8 +50,8 @@ class StationarySolution:
 
 
 def solve(system: DelayedSystem, rows: list[int]) -> StationarySolution:
-    """Covariance P and adjoints L of a system in which every mode is damped; InputError for a mode without a restoring
-    force.
+    """Stationary covariance P and adjoints L of a system in which every mode is damped; InputError for a mode without a
+    restoring force.
 
     Noise and outputs stay in extended precision in the coordinates of the modes, too: where these are nearly parallel,
     a variance is a small difference of large terms.
@@ -63,8 +66,8 @@ def solve(system: DelayedSystem, rows: list[int]) -> StationarySolution:
 
 
 class Screen:
-    """Predictions for systems that are reduced further than ``base``, from the solution for ``base``. Quantities are
-    given by their rows of C.
+    """Predictions of variances for systems that are reduced further than ``base``, from the stationary solution for
+    ``base``. Quantities are given by their rows of C.
     """
 
     def __init__(self, reduced_scene: Reduced, rows: list[int]) -> None:
@@ -86,11 +89,13 @@ class Screen:
 
     @cached_property
     def extended_solution(self) -> StationarySolution:
-        """The solution for ``base`` in extended precision, for the certificate."""
+        """Stationary solution for the system ``base`` in extended precision, for the certificate."""
         return solve(self.base.system, self.rows)
 
     def predicted_variances(self, reduced: Reduced) -> np.ndarray:
-        """Predicted variances (quantities,) of the reduced system; inf where white noise passes to a quantity."""
+        """Predicted variances (quantities,) of the reduced system; inf where white noise reaches a quantity
+        directly.
+        """
         system, left, T = reduced.system, reduced.left @ self.base.T, self.base.left @ reduced.T
         P, C = left @ self.P @ left.T, system.C[self.rows]
         half = system.A @ P
@@ -100,8 +105,8 @@ class Screen:
         return np.where(white, np.inf, np.maximum(J, 0.0))
 
     def certificate_sides(self, reduced: Reduced) -> tuple[np.ndarray, np.ndarray]:
-        """Two results for the variances (quantities,) that a certificate compares: from the P of ``base`` with the
-        reduced L, and from the reduced P.
+        """Variances (quantities,) of the reduced system in two ways, which a certificate compares: from the covariance
+        of ``base`` with the adjoints of the reduced system, and from the reduced covariance.
         """
         system, left = reduced.system, (reduced.left @ self.base.T).astype(np.longdouble)
         covariance = solve(system, self.rows)
@@ -114,11 +119,13 @@ class Screen:
 
 
 def has_undamped_motion(rates: np.ndarray, slowest: float = SLOWEST_DECAY) -> bool:
-    """Whether one of the eigenvalues (1/s) has no damping, or almost none."""
+    """Whether one of the eigenvalues (1/s) has almost no damping: ``slowest`` is the least ratio of decay to the
+    fastest rate.
+    """
     return bool(rates.real.max(initial=-np.inf) > -slowest * abs(rates).max(initial=0.0))
 
 
-def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
+def variances_from_modes(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
     """Variances (quantities,) from the eigenmodes of the reduced system; None where only the exact solution is
     reliable.
 
@@ -132,7 +139,7 @@ def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
     half = system.A @ P
     modal_noise = modes.W @ (half + half.T + reduced.noise) @ modes.W.conj().T
     variance = ((C @ P) * C).sum(axis=1)
-    missing = (modes.adjoint_of_motions(C) * modal_noise.T).sum(axis=(1, 2)).real
+    missing = (modes.modal_adjoint(C) * modal_noise.T).sum(axis=(1, 2)).real
     is_certain = np.isfinite(system.D).all(axis=(0, 2)) & (variance > rounding_thresholds(C, P))
     if (
         not (abs(missing[is_certain]) <= TRUSTED_VARIANCE_SHARE * variance[is_certain]).all()
@@ -144,17 +151,19 @@ def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
 
 def exact_variances(reduced: Reduced, rows: list[int]) -> np.ndarray:
     """Variances (quantities,) by the exact solution of the reduced system, inf where a quantity has none. Raises
-    InputError.
+    InputError for an unstable system.
     """
     return row_variances(stationary_covariance(reduced.system), rows)
 
 
 def row_variances(covariance: StationaryCovariance, rows: list[int]) -> np.ndarray:
-    """Variances (quantities,) of these rows, inf where an output has none."""
+    """Variances (quantities,) of the outputs with these row indices, inf where an output has none."""
     return np.array([covariance.variance[row] if covariance.status[row] == FINITE else np.inf for row in rows])
 
 
-def whole_variances(reduced: Reduced, rows: list[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Variances as from ``exact_variances``, and levels (quantities,) below which variances are only rounding."""
+def variances_and_rounding(reduced: Reduced, rows: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Variances (quantities,) by the exact solution, and levels (quantities,) below which variances are only
+    rounding.
+    """
     covariance = stationary_covariance(reduced.system)
     return row_variances(covariance, rows), rounding_thresholds(reduced.system.C[rows], covariance.P)

@@ -1,4 +1,5 @@
-"""What each parameter of a vehicle, a few per cent off, adds to variances of its outputs, to first order.
+"""Sensitivities of a vehicle's output variances to its parameters: first-order changes where a parameter is a few per
+cent off.
 
 A parameter moves outputs by heights by dH = dC q + ddirect - (C / Z) (dZ q - dB): products of what the vehicle does
 without it and of differences of matrices, so that one sum over frequencies serves all parameters.
@@ -16,8 +17,8 @@ from models.vehicles.linear_vehicle import LinearVehicle
 @dataclass(frozen=True)
 class Shifts:
     """Changes of a vehicle's matrices with each of p parameters: of stiffness, damping and mass (p, n, n), of forces by
-    heights and their rates (p, n, wheels), of output factors of q, q', q'' (p, q, n), and of those of heights and their
-    rates.
+    road heights and their rates (p, n, wheels), of output factors of q, q', q'' (p, q, n), and of output factors of
+    heights and their rates.
     """
 
     stiffness: tuple[np.ndarray, ...]
@@ -26,8 +27,10 @@ class Shifts:
     by_road: tuple[np.ndarray, ...]
 
     @classmethod
-    def of(cls, vehicle: LinearVehicle, other_vehicles: Sequence[LinearVehicle], rows: Sequence[int]) -> "Shifts":
-        """Matrices of the other vehicles less those of ``vehicle``, for the outputs with these rows."""
+    def from_vehicles(
+        cls, vehicle: LinearVehicle, other_vehicles: Sequence[LinearVehicle], rows: Sequence[int]
+    ) -> "Shifts":
+        """Matrices of the other vehicles less those of ``vehicle``, for the outputs with these row indices."""
         matrices, *changed_matrices = (
             [*_matrices_and_readings(linear_vehicle, rows)] for linear_vehicle in (vehicle, *other_vehicles)
         )
@@ -38,7 +41,7 @@ class Shifts:
         return cls(tuple(changes[:3]), tuple(changes[3:5]), tuple(changes[5:8]), tuple(changes[8:]))
 
     def only(self, is_present: np.ndarray) -> "Shifts":
-        """The shifts, with zeros for parameters that are not ``is_present`` (p,)."""
+        """The matrix changes, with zeros for parameters that are not ``is_present`` (p,)."""
         parts = (self.stiffness, self.by_heights, self.by_motion, self.by_road)
         return Shifts(
             *(tuple(matrix_changes * is_present[:, None, None] for matrix_changes in matrices) for matrices in parts)
@@ -46,15 +49,16 @@ class Shifts:
 
 
 def _matrices_and_readings(vehicle: LinearVehicle, rows: Sequence[int]) -> Iterator[np.ndarray]:
-    read = OutputFactors.of(vehicle, rows)
+    """Matrices of a vehicle, then factors of its outputs, in the order of the fields of ``Shifts``."""
+    read = OutputFactors.of_rows(vehicle, rows)
     yield from (vehicle.stiffness, vehicle.damping, vehicle.mass, vehicle.road_stiffness, vehicle.road_damping)
     yield from (*read.by_motion, *read.by_road)
 
 
 class Sensitivity:
-    """First-order changes of variances at speeds (v,) by parameters. They follow from heights (v, w, wheels, k),
-    weights (w, q) of the sum, and N (n, r) from the response's coordinates to those of the vehicle whose parameters are
-    off.
+    """First-order changes of variances at speeds (v,) by parameters. They follow from road heights (v, w, wheels, k),
+    weights (w, q) of the sum over frequencies, and N (n, r) from the response's coordinates to those of the vehicle
+    whose parameters are off.
     """
 
     def __init__(self, response: Response, heights: np.ndarray, weights: np.ndarray, N: np.ndarray) -> None:
@@ -71,7 +75,7 @@ class Sensitivity:
         self.by_road = [each[:, :, r, r:] for each in sums[:2]]
 
     def slopes(self, shifts: Shifts, inert: np.ndarray) -> np.ndarray:
-        """Changes of variances (v, q, p) by each shift, to first order. A change of mass counts only for parameters
+        """First-order changes of variances (v, q, p) by each matrix change. A change of mass counts only for parameters
         that are ``inert`` (p,).
         """
         stiffness = (*shifts.stiffness[:2], shifts.stiffness[2] * inert[:, None, None])

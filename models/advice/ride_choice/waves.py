@@ -1,4 +1,6 @@
-"""Frequencies at which spectra of a vehicle on a road are summed, and the road's waves there at many speeds at once."""
+"""Frequencies at which a vehicle's response spectra are integrated, and the road's waves at these frequencies for many
+speeds at once.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,17 +13,18 @@ from models.road.excitation import Excitation
 
 GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 PER_DECADE = 8
-"""Panels of ``GAUSS_NODES`` Gauss points per decade."""
+"""Number of integration panels, each with the points GAUSS_NODES, per decade of frequency."""
 RESONANCE_EDGES = np.array([-30.0, -10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0, 30.0])
-"""Edges of panels about a resonance, in half-widths."""
+"""Edges of integration panels about a resonance, in half-widths of the resonance."""
 PANEL_ANGLE, NARROW_PANELS = 8.0, 30
-"""Radians by which waves turn between axles within a panel, and panels so narrow; beyond them axles count as meeting
-roads that know nothing of one another, for sums over quick turns vanish."""
+"""Angle (rad) by which waves turn between axles within a panel, and the number of panels so narrow; above them, axles
+count as meeting independent roads, since sums over quick turns vanish.
+"""
 
 
 def frequency_panels(rates: np.ndarray, delay: float, frequency_limits: tuple[float, float]) -> tuple[np.ndarray, ...]:
     """Angular frequencies (w,) in rad/s from 0 to the upper limit, weights (w,) of a sum that approximates the integral
-    over them, and whether axles are treated as independent, ``apart`` (w,).
+    over them, and whether axles are treated as independent (w,).
 
     rates : of the vehicle's motions, 1/s; delay : the longest one between axles, s; frequency_limits : of the panels
     that are equal on a logarithmic axis; the first panel extends to 0.
@@ -39,7 +42,9 @@ def frequency_panels(rates: np.ndarray, delay: float, frequency_limits: tuple[fl
 
 
 def filter_states(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    """States (v, w, m, k) of an axle's filter under unit noise, without delay, at speeds (v,) and frequencies (w,)."""
+    """States (v, w, m, k) of an axle's road filter under unit noise, without delay, at speeds (v,) in m/s and angular
+    frequencies (w,) in rad/s.
+    """
     corners, V = np.linalg.eig(excitation.F)
     driven = np.linalg.solve(V, excitation.G + 0j)
     waves = 1j * omega[:, None] - speeds[:, None, None] * corners
@@ -53,7 +58,8 @@ def at_axles(
     omega: np.ndarray,
     is_independent: np.ndarray,
 ) -> np.ndarray:
-    """Filter states (v, w, axles m, noises) of all axles: those of one axle (v, w, m, k), delayed for each axle.
+    """Road filter states (v, w, axles m, noises) of all axles: the states of one axle (v, w, m, k), delayed for each
+    axle.
 
     Axles that are ``is_independent`` (w,), or independent, have noises of their own, axles k; all others share the
     first k.
@@ -76,13 +82,13 @@ def at_axles(
 
 @dataclass(frozen=True)
 class CornerPair:
-    """Two corners (1/m) of an axle's filter, whose product contributes to the spectral density."""
+    """Two corner frequencies (1/m) of an axle's road filter, whose product contributes to the spectral density."""
 
     corners: tuple[complex, complex]
 
     def density(self, speeds: np.ndarray, omega: np.ndarray) -> np.ndarray:
-        """Spectral density (v, w) of the pair at speeds (v,) in m/s and frequencies (w,) in rad/s; real if both corners
-        are the same.
+        """Spectral density (v, w) of the pair at speeds (v,) in m/s and angular frequencies (w,) in rad/s; real if both
+        corners are the same.
         """
         first, second = (speeds[:, None] * corner for corner in self.corners)
         if self.corners[0] == self.corners[1] and not np.imag(self.corners[0]):
@@ -91,8 +97,8 @@ class CornerPair:
 
 
 class Filters:
-    """An axle's filter decomposed into its eigenmodes, one per corner, whose products are ``pairs``. noises : for each
-    corner, the states (m, k) that unit noises excite through its mode.
+    """An axle's road filter decomposed into its eigenmodes, one per corner frequency, whose products are ``pairs``.
+    noises : for each corner, the states (m, k) that unit noises excite through its mode.
     """
 
     def __init__(self, excitation: Excitation) -> None:
@@ -104,8 +110,8 @@ class Filters:
         self.noises = {complex(c): V[:, corners == c] @ driven[corners == c] for c in corners}
 
     def by_noises(self, gains: Sequence[np.ndarray]) -> dict[complex, list[np.ndarray]]:
-        """For each corner, the gains (w, q, k) from noises to the quantities at every axle; ``gains`` (w, q, m) : from
-        the filter's states.
+        """Gains (w, q, k) from noises to the quantities at every axle, for each corner; ``gains`` (w, q, m) : from the
+        filter's states.
         """
         rows = [gain.reshape(-1, gain.shape[2]) for gain in gains]
         return {
@@ -117,8 +123,9 @@ class Filters:
 def pair_factors(
     gains: Mapping[complex, Sequence[np.ndarray]], axle_pair: CornerPair, all_independent: bool
 ) -> tuple[np.ndarray, dict[tuple[int, int], np.ndarray]]:
-    """Factors of a pair's density in the density of the quantities: (w, q) summed over single axles and, unless all are
-    ``all_independent``, for every two axles, before the delay between them. ``gains`` : of ``Filters.by_noises``.
+    """Factors of a corner pair's density in the spectral density of the quantities: (w, q) summed over single axles
+    and, unless all are ``all_independent``, for every two axles, before the delay between them. ``gains`` : of
+    ``Filters.by_noises``.
     """
     first, second = (gains[corner] for corner in axle_pair.corners)
     axles = range(len(first))
@@ -140,8 +147,8 @@ def variances(
     omega: np.ndarray,
     is_independent: np.ndarray,
 ) -> np.ndarray:
-    """Variances (v, q) at speeds (v,): sums over frequencies (w,) of the response to the road at all axles with their
-    delays.
+    """Variances (v, q) of quantities at speeds (v,): sums over frequencies (w,) of the response to the road at all
+    axles with their delays.
 
     gains : (w, q, m) of every axle, of its filter's states, with the root of the weights of the sum. Axles that are
     ``is_independent`` (w,), or independent, know nothing of one another.
@@ -162,6 +169,8 @@ def variances(
 
 
 def weighting_factors(weightings: Sequence[str], omega: np.ndarray) -> np.ndarray:
-    """Factors (q, w) of frequency weightings, by their names, at angular frequencies (rad/s); 1 for the name ""."""
+    """Complex gains (q, w) of frequency weightings, by their names, at angular frequencies (rad/s); 1 for the name
+    "".
+    """
     frequency = omega / (2 * np.pi)
     return np.array([WEIGHTINGS[name].response(frequency) if name else np.ones(len(omega)) for name in weightings])

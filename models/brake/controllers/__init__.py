@@ -1,4 +1,6 @@
-"""Controllers of anti-lock brakes; all decide wheel by wheel, or axle by axle where they select low."""
+"""Controllers of anti-lock brakes; all decide wheel by wheel, or for a whole axle where its wheels share the pressure
+that the slower one needs.
+"""
 
 from models.brake.controller import AllApplied
 from models.brake.controllers.acceleration_phases import AccelerationPhases
@@ -12,4 +14,4 @@ CONTROLLERS = {
     "five_phase": FivePhase,
     "slip_pi": SlipPI,
 }
-"""By the names that scenes give them; each is made from the number of wheels and its parameters."""
+"""Controller classes by the names that scenes give them; each takes the number of wheels and its parameters."""

@@ -1,4 +1,5 @@
-"""Control by phases of the wheel's acceleration, with its slip as a second sign: the production algorithm of Bosch.
+"""Anti-lock control by phases of the wheel's acceleration, with its slip as a second criterion: the production
+algorithm of Bosch.
 
     apply      until the wheel falls faster than -a: then hold
     hold       until its slip is above ``slip``: then release
@@ -23,9 +24,10 @@ FIRST, WAIT, LET_GO, RECOVER, OVERSHOOT, STEP_UP = range(6)
 
 @dataclass
 class AccelerationPhases(Common):
-    """Thresholds of the wheel's acceleration (m/s^2): falls (-a), rises (+a), rises_fast (+A); of its slip: slip, and
-    deep, above which a wheel that does not rise is released; pulse : samples per step of pressure; slow : whether
-    valves that can apply slowly do so in place of these steps."""
+    """Anti-lock controller by thresholds of the wheel's acceleration (m/s^2): falls (-a), rises (+a), rises_fast (+A);
+    of its slip: slip, and deep, above which a wheel that does not rise is released; pulse : samples per step of
+    pressure; slow : whether valves that can apply slowly do so in place of these steps.
+    """
 
     falls: float = -20.0
     rises: float = 2.0
@@ -48,39 +50,41 @@ class AccelerationPhases(Common):
             if not isinstance(getattr(self, name), kind):
                 allowed = "must be a whole number" if kind is int else "must be true or false"
                 raise InputError("", f"controller.parameters.{name}", getattr(self, name), allowed)
-        self.governed_by(_Logic)
+        self.set_logic(_Logic)
 
 
 class _Logic:
+    """State machine of one wheel's acceleration phases."""
+
     def __init__(self, settings: AccelerationPhases) -> None:
         self._settings, self._phase, self._rose, self._count = settings, FIRST, False, 0
 
-    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
         settings, phase = self._settings, self._phase
-        falls = gains < settings.falls
+        falls = relative_acceleration < settings.falls
         if phase == FIRST and falls:
             phase = WAIT
         if phase == STEP_UP and (falls or slip > settings.deep):
             phase = LET_GO if slip > settings.slip else WAIT
         if phase in (FIRST, WAIT) and slip > settings.slip and (phase == WAIT or slip > settings.deep):
             phase = LET_GO
-        elif phase == WAIT and gains > settings.rises:
+        elif phase == WAIT and relative_acceleration > settings.rises:
             phase, self._count = STEP_UP, 0
-        if phase == LET_GO and not falls and (slip < settings.deep or gains > settings.rises):
+        if phase == LET_GO and not falls and (slip < settings.deep or relative_acceleration > settings.rises):
             phase, self._rose = RECOVER, False
         elif phase in (RECOVER, OVERSHOOT):
-            phase = self._recovering(slip, gains)
+            phase = self._recovering(slip, relative_acceleration)
         self._phase = phase
         return self._valve(phase)
 
-    def _recovering(self, slip: float, gains: float) -> int:
+    def _recovering(self, slip: float, relative_acceleration: float) -> int:
         settings = self._settings
-        self._rose = self._rose or gains > settings.rises
-        if gains > settings.rises_fast and slip < settings.slip:
+        self._rose = self._rose or relative_acceleration > settings.rises
+        if relative_acceleration > settings.rises_fast and slip < settings.slip:
             return OVERSHOOT
-        if gains <= settings.rises and slip > settings.deep:
+        if relative_acceleration <= settings.rises and slip > settings.deep:
             return LET_GO
-        if gains <= settings.rises and (self._rose or slip < settings.slip):
+        if relative_acceleration <= settings.rises and (self._rose or slip < settings.slip):
             self._count = 0
             return STEP_UP
         return RECOVER

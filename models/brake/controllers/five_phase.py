@@ -1,4 +1,5 @@
-"""The five-phase hybrid controller: by the wheel's acceleration alone, round a limit cycle about the tyre's peak.
+"""Five-phase hybrid anti-lock controller: by the wheel's acceleration alone, on a limit cycle about the peak of the
+tyre's friction.
 
     1  pressure falls at ``falling``  until y >= e1
     2  it holds                       until y >= e2
@@ -23,7 +24,9 @@ from models.core.errors import InputError
 
 @dataclass
 class FivePhase(Common):
-    """Thresholds of the wheel's acceleration (m/s^2) and rates of its pressure (bar/s); deep : slip of phase 1."""
+    """Five-phase anti-lock controller. e1 to e5 : thresholds of the wheel's acceleration (m/s^2); falling, fast, slow :
+    rates of its pressure (bar/s); deep : slip above which phase 1 begins.
+    """
 
     e1: float = 4.0
     e2: float = 5.0
@@ -44,34 +47,37 @@ class FivePhase(Common):
         )
         if not self.e1 < self.e2 or not self.e4 < self.e3 < self.e2:
             raise InputError("", "controller.parameters.e2", self.e2, "must be above e1 and e3, and e3 above e4")
-        self.governed_by(_Logic, pressures=True)
+        self.set_logic(_Logic, pressures=True)
 
 
 FIRST_PHASE = 0
 
 
 def end_of_phase(phase: int, settings: FivePhase) -> tuple[float, float]:
-    """Sign and level (m/s^2) of the threshold that ends a phase: +1 if the wheel's acceleration must rise to it, -1 if
-    fall."""
+    """Threshold of the wheel's acceleration that ends a phase: sign +1 if the acceleration must rise to it, -1 if it
+    must fall, and level (m/s^2).
+    """
     if phase in (1, 2):
         return 1.0, settings.e1 if phase == 1 else settings.e2
     return -1.0, {3: settings.e3, 4: settings.e4}.get(phase, -settings.e5)
 
 
 def rate_of_phase(phase: int, settings: FivePhase) -> float:
-    """Rate of the pressure (bar/s) in a phase."""
+    """Rate of the brake pressure (bar/s) in a phase."""
     return (settings.fast, -settings.falling, 0.0, settings.fast, 0.0, settings.slow)[phase]
 
 
 class _Logic:
+    """State machine of one wheel's five phases."""
+
     def __init__(self, settings: FivePhase) -> None:
         self._settings, self._phase, self._pressure = settings, FIRST_PHASE, 0.0
 
-    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
         sign, level = end_of_phase(self._phase, self._settings)
-        if sign * (gains - level) >= 0.0:
+        if sign * (relative_acceleration - level) >= 0.0:
             self._phase = self._phase % 5 + 1
-        elif self._rolls_on(slip, gains):
+        elif self._gains_no_speed(slip, relative_acceleration):
             self._phase = 5
         if self._phase != 1 and slip > self._settings.deep:
             self._phase = 1
@@ -79,9 +85,10 @@ class _Logic:
         self._pressure = min(max(raised, 0.0), supply)
         return self._pressure
 
-    def _rolls_on(self, slip: float, gains: float) -> bool:
+    def _gains_no_speed(self, slip: float, relative_acceleration: float) -> bool:
         """Whether the wheel no longer gains speed in phase 2, or has no brake pressure left and little slip in phase
-        1."""
+        1.
+        """
         if self._phase == 1:
             return self._pressure == 0.0 and slip <= self._settings.deep
-        return self._phase == 2 and gains <= self._settings.e4
+        return self._phase == 2 and relative_acceleration <= self._settings.e4

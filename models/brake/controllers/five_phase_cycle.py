@@ -1,4 +1,4 @@
-"""One wheel at a frozen speed under the five-phase controller: its limit cycle, with every switch located.
+"""Limit cycle of one wheel at constant vehicle speed under the five-phase controller, with every switch located.
 
 The vehicle's speed v stays, the wheel obeys J w' = r F(s) - T, and pressure rises and falls at the rates of the phases,
 so that the controller is the continuous one of its author: phases end when r w' meets its threshold, not at samples.
@@ -24,12 +24,13 @@ from models.tyre.tyre_table import TableCell, TyreTable, cell_and_share, stacked
 LONGEST_PHASE = 1.0
 """Time (s) after which a phase is taken never to end."""
 CLOSED_CYCLE_TOLERANCE = 1e-9
-"""Relative change of slip and torque from one cycle to the next one at which it is the limit cycle."""
+"""Relative change of wheel speed and torque from one cycle to the next at which the limit cycle is reached."""
 
 
 class WheelState(NamedTuple):
-    """State of a wheel in the five-phase cycle: pressure (bar) and torque (N m) of its brake, speed of turning (rad/s),
-    time (s), and the integral of the tyre's force over that time (N s)."""
+    """State of a wheel in the five-phase cycle: pressure (bar) and torque (N m) of its brake, rotational speed (rad/s),
+    time (s), and the integral of the tyre's force over that time (N s).
+    """
 
     pressure: float
     torque: float
@@ -39,8 +40,9 @@ class WheelState(NamedTuple):
 
 
 class ConstantSpeedWheel(NamedTuple):
-    """A wheel of a vehicle at a constant speed (m/s): its radius (m) and inertia (kg m^2), the brake (of one wheel) and
-    the grip of its tyre, as compiled functions take them."""
+    """A wheel of a vehicle at a constant speed (m/s), for compiled functions: its radius (m) and inertia (kg m^2), the
+    brake (of one wheel) and the grip of its tyre.
+    """
 
     vehicle_speed: float
     radius: float
@@ -50,15 +52,20 @@ class ConstantSpeedWheel(NamedTuple):
 
 
 LEVEL_MET, OTHER_LEVEL_MET, WHEEL_LOCKS, NEVER_ENDS = range(4)
-"""How a phase ends: the rim's acceleration is at its level; it has fallen to the other one, as phase 2 may; else it
-does not end."""
+"""How a phase ends: the rim's acceleration meets the phase's level; it falls to the other level, as in phase 2; the
+wheel locks; or the phase never ends.
+"""
 RELEASE_PHASE, SPEED_UP_PHASE, SLOW_PHASE = 1, 2, 5
-"""Phases in which pressure falls, in which the wheel gains speed, and that follows one in which it does so no more."""
+"""Numbers of phases: in which pressure falls, in which the wheel gains speed, and which follows if it gains no more
+speed.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class WheelAtSpeed:
-    """A wheel with its load (N), radius (m), inertia (kg m^2) and brake, on a tyre table, at a speed (m/s)."""
+    """A wheel with its load (N), radius (m), inertia (kg m^2) and brake, on a tyre table, at a constant vehicle speed
+    (m/s).
+    """
 
     speed: float
     load: float
@@ -74,7 +81,7 @@ class WheelAtSpeed:
 
     @property
     def peak(self) -> float:
-        """Largest force (N) of the tyre."""
+        """Largest longitudinal force (N) of the tyre at its load."""
         grip = self.driven.grip
         return max(node_force(k, grip) for k in range(grip.slips.size))
 
@@ -88,13 +95,13 @@ class WheelAtSpeed:
         )
 
     def rolling(self) -> WheelState:
-        """A wheel that rolls without torque, at time 0."""
+        """State of the wheel that rolls without torque, at time 0."""
         return WheelState(0.0, 0.0, self.speed / self.radius, 0.0, 0.0)
 
 
 @njit(cache=True, error_model="numpy")
 def rim_acceleration(state, wheel_at_speed):
-    """Acceleration (m/s^2) of the wheel's rim."""
+    """Acceleration (m/s^2) of the wheel's rim, radius times rotational acceleration."""
     radius, inertia = wheel_at_speed.radius, wheel_at_speed.inertia
     slip = min(max(1.0 - radius * state.turning / wheel_at_speed.vehicle_speed, 0.0), 1.0)
     k, share = cell_and_share(wheel_at_speed.grip.slips, slip)
@@ -103,9 +110,10 @@ def rim_acceleration(state, wheel_at_speed):
 
 
 @njit(cache=True, error_model="numpy")
-def go_on(state, rate, time, wheel_at_speed):
-    """State after a time (s) in which pressure changes at a constant rate (bar/s) and reaches no corner of the
-    hysteresis loop."""
+def state_after(state, rate, time, wheel_at_speed):
+    """Wheel state after a time (s) in which pressure changes at a constant rate (bar/s) and reaches no corner of the
+    hysteresis loop.
+    """
     pressure = max(state.pressure + rate * time, 0.0)
     torque_after = torque(0, pressure, state.torque, wheel_at_speed.brakes)
     drive = StepInput(wheel_at_speed.vehicle_speed, wheel_at_speed.vehicle_speed, state.torque, torque_after, time)
@@ -116,7 +124,8 @@ def go_on(state, rate, time, wheel_at_speed):
 @njit(cache=True, error_model="numpy")
 def time_to_corner(state, rate, brakes):
     """Time (s) until the pressure reaches the next corner of the brake's hysteresis loop, or zero pressure; else
-    infinite."""
+    infinite.
+    """
     first = math.inf
     if rate > 0.0:
         first = (brakes.push_out[0] + state.torque / brakes.rising[0] - state.pressure) / rate
@@ -131,8 +140,8 @@ def time_to_corner(state, rate, brakes):
 
 @njit(cache=True, error_model="numpy")
 def phase_end(state, sign, end_level, other_level, wheel_at_speed):
-    """MET if the rim's acceleration has passed ``end_level`` in the direction ``sign``, OTHER_LEVEL_MET if it is at
-    most ``other_level`` (m/s^2), else -1.
+    """LEVEL_MET if the rim's acceleration has passed ``end_level`` in the direction ``sign``, OTHER_LEVEL_MET if it is
+    at most ``other_level`` (m/s^2), else -1.
     """
     acceleration = rim_acceleration(state, wheel_at_speed)
     return (
@@ -146,28 +155,30 @@ def phase_end(state, sign, end_level, other_level, wheel_at_speed):
 
 @njit(cache=True, error_model="numpy")
 def integrate_phase(state, rate, sign, end_level, other_level, step, wheel_at_speed):
-    """Integrate one phase from ``state`` at a constant rate of pressure (bar/s) in steps (s): the last state, and how
-    the phase ended.
+    """Wheel state at the end of a phase with a constant rate of pressure (bar/s), integrated in steps (s), and how the
+    phase ended.
 
     A wheel that locks while pressure falls turns again later; another one does not.
     """
     began, end = state.time, phase_end(state, sign, end_level, other_level, wheel_at_speed)
     while end < 0:
         time = min(step, time_to_corner(state, rate, wheel_at_speed.brakes))
-        next_state = go_on(state, rate, time, wheel_at_speed)
+        next_state = state_after(state, rate, time, wheel_at_speed)
         end = phase_end(next_state, sign, end_level, other_level, wheel_at_speed)
         if end >= 0:
             low, high = 0.0, time
             while high - low > 1e-15:
                 middle = 0.5 * (low + high)
                 if (
-                    phase_end(go_on(state, rate, middle, wheel_at_speed), sign, end_level, other_level, wheel_at_speed)
+                    phase_end(
+                        state_after(state, rate, middle, wheel_at_speed), sign, end_level, other_level, wheel_at_speed
+                    )
                     >= 0
                 ):
                     high = middle
                 else:
                     low = middle
-            next_state = go_on(state, rate, high, wheel_at_speed)
+            next_state = state_after(state, rate, high, wheel_at_speed)
         state = next_state
         if end < 0 and not (state.turning > 0.0 or rate < 0.0):
             return state, WHEEL_LOCKS
@@ -178,8 +189,9 @@ def integrate_phase(state, rate, sign, end_level, other_level, step, wheel_at_sp
 
 @dataclass(frozen=True)
 class Cycle:
-    """A limit cycle: period (s), durations (5,) of phases 1 to 5 (s), ratio of the mean tyre force to the largest one,
-    and slips (6,) at the start of each phase and at the end of the cycle."""
+    """A limit cycle of a braked wheel: period (s), durations (5,) of phases 1 to 5 (s), ratio of the mean tyre force to
+    the largest one, and slips (6,) at the start of each phase and at the end of the cycle.
+    """
 
     period: float
     durations: tuple[float, ...]
@@ -190,8 +202,8 @@ class Cycle:
 def limit_cycle(
     wheel_at_speed: WheelAtSpeed, controller: FivePhase, step: float = 2e-5, most_cycles: int = 60
 ) -> Cycle:
-    """Limit cycle of the continuous controller, reached from a wheel that rolls freely, in steps of at most ``step``
-    (s).
+    """Limit cycle of a wheel under the continuous five-phase controller, from a freely rolling wheel on, in steps of at
+    most ``step`` (s).
 
     The driver applies the brake fast, so the first release differs from later ones. If the wheel stops gaining speed in
     phase 2, phase 5 follows, as in the controller; a wheel that locks by this is released.
@@ -214,7 +226,7 @@ def limit_cycle(
 
 
 def _cycle_from_switches(switch_states: list[WheelState], wheel_at_speed: WheelAtSpeed) -> Cycle:
-    """The ``Cycle`` computed from the wheel's states at the six switches between phases."""
+    """Limit cycle computed from the wheel's states at the six switches between phases."""
     last_state, slips = (
         switch_states[-1],
         [1.0 - wheel_at_speed.radius * state.turning / wheel_at_speed.speed for state in switch_states],
@@ -226,11 +238,13 @@ def _cycle_from_switches(switch_states: list[WheelState], wheel_at_speed: WheelA
 def _state_at_end(
     state: WheelState, phase_number: int, controller: FivePhase, step: float, wheel_at_speed: WheelAtSpeed
 ) -> tuple[WheelState, int]:
-    """State at the end of a phase, and whether it ended as LEVEL_MET or as OTHER_LEVEL_MET; raises RunFailed."""
+    """Wheel state at the end of a phase, and whether it ended as LEVEL_MET or as OTHER_LEVEL_MET; raises RunFailed
+    where the wheel locks or the phase does not end.
+    """
     sign, level = end_of_phase(phase_number, controller)
-    back = controller.e4 if phase_number == SPEED_UP_PHASE else -math.inf
+    other_level = controller.e4 if phase_number == SPEED_UP_PHASE else -math.inf
     state, end = integrate_phase(
-        state, rate_of_phase(phase_number, controller), sign, level, back, step, wheel_at_speed.driven
+        state, rate_of_phase(phase_number, controller), sign, level, other_level, step, wheel_at_speed.driven
     )
     if end == NEVER_ENDS or (end == WHEEL_LOCKS and phase_number != 0):
         failure = (
@@ -243,8 +257,8 @@ def _state_at_end(
 def sampled_cycle(
     wheel_at_speed: WheelAtSpeed, controller: FivePhase, cycles: int = 30, substeps: int = 4, skip: int = 5
 ) -> Cycle:
-    """Mean over ``cycles`` cycles of the sampled controller, after the first ``skip`` ones; no durations and slips are
-    given.
+    """Mean over ``cycles`` cycles of the sampled five-phase controller, after the first ``skip`` ones; durations and
+    slips are left empty.
 
     Raises RunFailed if it does not cycle.
     """
@@ -259,7 +273,7 @@ def sampled_cycle(
         falling, number = pressure < state.pressure, number + 1
         state = state._replace(pressure=pressure, torque=torque(0, pressure, state.torque, driven.brakes))
         for _ in range(substeps):
-            state = go_on(state, 0.0, SAMPLE / substeps, driven)
+            state = state_after(state, 0.0, SAMPLE / substeps, driven)
         if number * SAMPLE > (cycles + skip) * LONGEST_PHASE:
             raise RunFailed("braking", "the sampled controller does not cycle", state.time)
     first_start, last_start = starts[skip], starts[-1]

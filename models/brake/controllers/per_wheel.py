@@ -1,5 +1,6 @@
-"""The part that all controllers of wheel slip share: a logic per wheel or axle, the vehicle's speed, and an end of
-control when it is slow."""
+"""Common part of the slip controllers: one logic per wheel or axle, the estimate of the vehicle's speed, and the end of
+control at low speed.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -12,20 +13,23 @@ from models.brake.controller import APPLY, RELEASE, SAMPLE, Command, Sample
 from models.core.errors import InputError
 
 SLOPE_MEMORY = 0.1
-"""s"""
+"""Time constant (s) over which the vehicle's acceleration is smoothed."""
 SMALLEST_FLOAT = 5e-324
-"""What is above its negative is zero or more, and what is at most its negative is below zero."""
+"""Smallest positive number; its negative as an exclusive lower bound admits zero, and as an upper bound excludes
+zero.
+"""
 ACCELERATION_BOUNDS, PRESSURE_RATE = (0.0, 1e4), (0.0, 1e5)
-"""Bounds of thresholds of a wheel's acceleration (m/s^2) and of rates of pressure (bar/s): no wheel, no valve is
-faster."""
+"""Bounds of thresholds of a wheel's acceleration (m/s^2) and of rates of pressure (bar/s), beyond any wheel or
+valve.
+"""
 SLIP_BOUNDS = (0.0, 1.0)
-"""Bounds of thresholds of slip: a wheel that stands has 1."""
+"""Bounds of slip thresholds: a locked wheel has slip 1."""
 
 
 class Logic(Protocol):
-    """Decides for one wheel, or for one axle on the basis of its slower wheel."""
+    """Protocol of the anti-lock logic for one wheel, or for one axle on the basis of its slower wheel."""
 
-    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
         """Valve state or pressure (bar), from the wheel's slip, its acceleration relative to the vehicle's (m/s^2), the
         vehicle's speed (m/s) and the supply pressure (bar)."""
         ...
@@ -33,7 +37,7 @@ class Logic(Protocol):
 
 @dataclass(kw_only=True)
 class Common:
-    """Parameters of every controller.
+    """Parameters that every anti-lock controller has.
 
     wheels : how many there are; select_low : axles, from 0, whose two wheels get what the slower one needs; cut_off :
     speed of the vehicle (m/s) below which all brakes are applied, so that it comes to rest; period : s between two
@@ -45,13 +49,14 @@ class Common:
     cut_off: float = 1.5
     period: float = SAMPLE
 
-    def governed_by(self, logic: Callable[[Any], Logic], pressures: bool = False) -> None:
-        """Set up one ``logic`` per wheel or axle; ``pressures`` is whether it answers with pressures instead of valve
-        states."""
+    def set_logic(self, logic: Callable[[Any], Logic], pressures: bool = False) -> None:
+        """Set up one ``logic`` per wheel or axle; ``pressures`` : whether it commands pressures instead of valve
+        states.
+        """
         self._loop = PerWheel(self.wheels, self, logic, pressures)
 
     def sample(self, sample: Sample) -> Command:
-        """States of the valves, or pressures."""
+        """Command for a sample: states of the valves, or pressures."""
         return self._loop.command(sample)
 
     def check(self, **bounds: tuple[float, float]) -> None:
@@ -76,8 +81,9 @@ class Common:
 
 
 class PerWheel:
-    """The loop over wheels that all controllers share; ``pressures`` is whether they answer with pressures, not valve
-    states."""
+    """Loop over wheels or axles that all controllers share; ``pressures`` : whether they command pressures instead of
+    valve states.
+    """
 
     def __init__(self, wheels: int, common: Common, logic: Callable[[Any], Logic], pressures: bool) -> None:
         for axle in common.select_low:
@@ -88,41 +94,51 @@ class PerWheel:
         self._groups = sorted(shared + single_wheels)
         self._logics = [logic(common) for _ in self._groups]
         self._common, self._pressures, self._wheels = common, pressures, wheels
-        self._estimate, self._before = SpeedEstimate(common.period), [np.nan] * len(self._groups)
-        self._speed, self._slowing = np.nan, 0.0
+        self._estimate, self._last_wheel_speeds = SpeedEstimate(common.period), [np.nan] * len(self._groups)
+        self._speed, self._mean_acceleration = np.nan, 0.0
 
     def command(self, sample: Sample) -> Command:
-        """Valve commands for a sample; all brakes are released while the brake switch is off."""
+        """Command for a sample; all brakes are released while the brake switch is off, and applied below the cut-off
+        speed.
+        """
         wheels = sample.wheels.tolist()
-        speed = speed_of(sample.speed, wheels, self._estimate)
-        slowing = self._mean_slowing(speed)
+        speed = vehicle_speed(sample.speed, wheels, self._estimate)
+        vehicle_acceleration = self._smoothed_acceleration(speed)
         if not sample.brake:
             return self._command_all(0.0 if self._pressures else RELEASE)
         commands = [0.0] * self._wheels
         for k, (first_wheel, last_wheel) in enumerate(self._groups):
             wheel = min(wheels[first_wheel], wheels[last_wheel])
-            speed_before = self._before[k]
-            gains = (wheel - speed_before) / self._common.period - slowing if speed_before == speed_before else 0.0
-            self._before[k] = wheel
+            speed_before = self._last_wheel_speeds[k]
+            relative_acceleration = (
+                (wheel - speed_before) / self._common.period - vehicle_acceleration
+                if speed_before == speed_before
+                else 0.0
+            )
+            self._last_wheel_speeds[k] = wheel
             if speed > 0.0:
-                answer = self._logics[k].decide(1.0 - wheel / speed, gains, speed, sample.supply)
+                answer = self._logics[k].decide(1.0 - wheel / speed, relative_acceleration, speed, sample.supply)
                 commands[first_wheel] = commands[last_wheel] = answer
         if speed < self._common.cut_off:
             return self._command_all(sample.supply if self._pressures else APPLY)
         return self._commands_of_logics(commands)
 
-    def _mean_slowing(self, speed: float) -> float:
-        """Mean acceleration of the vehicle (m/s^2), smoothed over about ``SLOPE_MEMORY`` seconds."""
+    def _smoothed_acceleration(self, speed: float) -> float:
+        """Mean acceleration of the vehicle (m/s^2), negative while it brakes, smoothed over about ``SLOPE_MEMORY``
+        seconds.
+        """
         if self._speed == self._speed:
             latest = (speed - self._speed) / self._common.period
-            self._slowing += (latest - self._slowing) * min(self._common.period / SLOPE_MEMORY, 1.0)
+            self._mean_acceleration += (latest - self._mean_acceleration) * min(self._common.period / SLOPE_MEMORY, 1.0)
         self._speed = speed
-        return self._slowing
+        return self._mean_acceleration
 
     def _command_all(self, logic_output: float) -> Command:
+        """The same command for all wheels."""
         return self._commands_of_logics([logic_output] * self._wheels)
 
     def _commands_of_logics(self, logic_outputs: list[float]) -> Command:
+        """Command with one valve state or pressure per wheel."""
         if self._pressures:
             return Command(pressures=np.array(logic_outputs, dtype=float))
         return Command(valves=np.array(logic_outputs, dtype=np.int64))
@@ -161,7 +177,7 @@ class SpeedEstimate:
         return self._speed
 
     def _learn_slope(self, fastest: float) -> None:
-        """Determine the slope of the vehicle's speed from the last two maxima of the fastest wheel's speed."""
+        """Update the slope (m/s^2) of the vehicle's speed from the last two maxima of the fastest wheel's speed."""
         self._since += self.sample
         if self._rising and fastest < self._fastest and self._since >= self.least_interval:
             slope = self.slope_margin * (self._peak - self._fastest) / self._since
@@ -170,6 +186,6 @@ class SpeedEstimate:
         self._rising, self._fastest = fastest > self._fastest, fastest
 
 
-def speed_of(scene_speed: float, wheels: Sequence[float], estimate: SpeedEstimate) -> float:
-    """The speed (m/s) that the scene gives, or the estimate if that is not a number."""
+def vehicle_speed(scene_speed: float, wheels: Sequence[float], estimate: SpeedEstimate) -> float:
+    """Vehicle speed (m/s) from the scene, or the estimate where the scene's speed is not a number."""
     return estimate.after(wheels) if scene_speed != scene_speed else scene_speed

@@ -1,4 +1,5 @@
-"""Slip control: by two thresholds, the simplest controller and the yardstick of the others, and by two parts of a loop.
+"""Anti-lock control of wheel slip: by two thresholds, the simplest controller and yardstick of the others, and by a
+proportional-integral loop.
 
 ``SlipPI`` has a proportional and an integral part whose gains grow with speed, and commands pressures. Its controlled
 quantity mixes slip with deceleration, s - mix w' r / g: the deceleration tells first. Slip answers to torque the faster
@@ -16,7 +17,9 @@ from models.core.errors import InputError
 
 @dataclass
 class SlipBangBang(Common):
-    """Releases above one slip, applies below a lower one, and between them goes on with what it did."""
+    """Slip controller that releases the brake above one slip, applies it below a lower one, and keeps its last command
+    between them.
+    """
 
     release: float = 0.10
     apply: float = 0.05
@@ -25,14 +28,16 @@ class SlipBangBang(Common):
         self.check(release=SLIP_BOUNDS, apply=SLIP_BOUNDS)
         if not self.apply <= self.release < 1.0:
             raise InputError("", "controller.parameters.apply", self.apply, "must be at most release, and that below 1")
-        self.governed_by(_BangBang)
+        self.set_logic(_BangBang)
 
 
 class _BangBang:
+    """Two-threshold logic of one wheel."""
+
     def __init__(self, settings: SlipBangBang) -> None:
         self._settings, self._valve = settings, APPLY
 
-    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
         if slip > self._settings.release:
             self._valve = RELEASE
         elif slip < self._settings.apply:
@@ -42,8 +47,9 @@ class _BangBang:
 
 @dataclass
 class SlipPI(Common):
-    """target : slip wanted; gain : bar per unit of slip and m/s; reset : time of the integral part (s); mix : share
-    of the deceleration (slip per g)."""
+    """Proportional-integral slip controller. target : slip wanted; gain : bar per unit of slip and m/s; reset : time of
+    the integral part (s); mix : share of the deceleration (slip per g).
+    """
 
     target: float = 0.06
     gain: float = 1.0
@@ -52,16 +58,18 @@ class SlipPI(Common):
 
     def __post_init__(self) -> None:
         self.check(target=SLIP_BOUNDS, gain=(0.0, 1e4), reset=(0.0, 1e3), mix=(-SMALLEST_FLOAT, 10.0))
-        self.governed_by(_Loop, pressures=True)
+        self.set_logic(_Loop, pressures=True)
 
 
 class _Loop:
+    """Proportional-integral loop of one wheel, whose gain grows with speed."""
+
     def __init__(self, settings: SlipPI) -> None:
         self._settings, self._sum = settings, 0.0
 
-    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+    def decide(self, slip: float, relative_acceleration: float, speed: float, supply: float) -> float:
         settings = self._settings
-        error = settings.target - (slip - settings.mix * gains / 9.81)
+        error = settings.target - (slip - settings.mix * relative_acceleration / 9.81)
         gain = settings.gain * speed
         total = self._sum + gain * error * settings.period / settings.reset
         self._sum = min(max(total, 0.0), supply)

@@ -1,4 +1,4 @@
-"""Pressures and torques of the brakes along the whole of a run's commands, in plain code.
+"""Brake pressures and torques over all commands of a run, in plain code: the reference of ``models.brake.pressure``.
 
 The commands of all samples are kept with the times at which they reach the chambers. A step is cut where one does, and
 within a cut each chamber follows p' = (p_to - p) / tau, so that no pressure turns back. See ``models.brake.pressure``
@@ -15,12 +15,14 @@ from models.brake.controller import APPLY, RELEASE, SLOW
 from models.brake.pressure import Air, Chambers
 
 STEP_END_SHARE = 1e-9
-"""Share of a step at its ends in which a command counts as coming with the end."""
+"""Share of a step at its ends within which a command counts as arriving at the end."""
 
 
 @dataclass(eq=False)
 class Pressures:
-    """The brake's air system: commands so far, and its state ``air``, which is updated in place; sample (s)."""
+    """The brakes' air system: all commands so far, and its state ``air``, which is updated in place; sample : duration
+    (s).
+    """
 
     chambers: Chambers
     brakes: Brakes
@@ -29,7 +31,7 @@ class Pressures:
     commands: list[np.ndarray] = field(default_factory=list)
 
     def by_valves(self, valves: np.ndarray, torques: np.ndarray) -> None:
-        """Fill ``torques`` (n + 1, W), at the ends of the n steps of the next sample, for valve states (W,)."""
+        """Fill ``torques`` (n + 1, W) in N m, at the ends of the n steps of the next sample, for valve states (W,)."""
         self.commands.append(valves.copy())
         torques[0], steps = self.air.torque, len(torques) - 1
         step = self.sample / steps
@@ -44,7 +46,9 @@ class Pressures:
             torques[n + 1] = self.air.torque
 
     def by_pressures(self, pressures: np.ndarray, torques: np.ndarray) -> None:
-        """Set pressures (W,) in bar at once and keep them over the next sample; fill its ``torques``."""
+        """Set pressures (W,) in bar at once and keep them over the next sample; fill its ``torques`` (n + 1, W) in N
+        m.
+        """
         self.air.pressure[:] = pressures
         self._follow_hysteresis()
         torques[:] = self.air.torque
@@ -55,26 +59,28 @@ class Pressures:
         return [(k - latest) * self.sample + self.chambers.delay - time for k in range(latest + 1)]
 
     def _effective_command(self, time: float) -> np.ndarray:
-        """The command that is effective in the chambers at a time (s) in the latest sample."""
+        """The valve states (W,) that are effective in the chambers at a time (s) in the latest sample."""
         known = [arrived for arrived, late in zip(self.commands, self._arrival_times(time), strict=True) if late <= 0.0]
         return known[-1] if known else np.full(self.air.pressure.size, RELEASE)
 
     def _advance_pressures(self, valves: np.ndarray, time: float) -> None:
-        """Update pressures and torques over a time (s) with constant valve states (W,)."""
+        """Update chamber pressures and torques over a time (s) with constant valve states (W,)."""
         chambers, supply, pressures_before = self.chambers, float(self.air.supply[0]), self.air.pressure.copy()
         fills = valves >= APPLY
-        to = np.where(fills, supply, np.where(valves == RELEASE, 0.0, pressures_before))
+        target = np.where(fills, supply, np.where(valves == RELEASE, 0.0, pressures_before))
         slow = chambers.slow if chambers.slow.size else chambers.fill_time
         constants = np.where(valves == RELEASE, chambers.empty_time, np.where(valves == SLOW, slow, chambers.fill_time))
-        left = np.exp(-time / np.where(constants > 0.0, constants, 1.0)) * (constants > 0.0)
-        self.air.pressure[:] = to + (pressures_before - to) * left
+        decayed_share = np.exp(-time / np.where(constants > 0.0, constants, 1.0)) * (constants > 0.0)
+        self.air.pressure[:] = target + (pressures_before - target) * decayed_share
         self._follow_hysteresis()
         if np.isfinite(chambers.reservoir):
             air_used = float(chambers.volumes @ ((self.air.pressure - pressures_before) * fills))
             self.air.supply[0] -= max(air_used, 0.0) / chambers.reservoir
 
     def _follow_hysteresis(self) -> None:
-        """Update the torques: each stays between the lines of rising and of falling pressure in the hysteresis loop."""
+        """Update the brake torques: each stays between the lines of rising and of falling pressure of its hysteresis
+        loop.
+        """
         pressure, brakes = self.air.pressure, self.brakes
         rising = brakes.rising * np.maximum(pressure - brakes.push_out, 0.0)
         falling = brakes.falling * np.maximum(pressure - brakes.release, 0.0)

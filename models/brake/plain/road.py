@@ -1,4 +1,4 @@
-"""Which tables hold under the wheels over a step, in plain code: see ``models.brake.surfaces`` for the rule."""
+"""Friction tables under the wheels over a step, in plain code: the reference of ``models.brake.surfaces``."""
 
 import numpy as np
 
@@ -16,6 +16,7 @@ def under_wheels(road: Road, wheel_paths: np.ndarray, surface_kinds: np.ndarray)
 
 
 def _surface_under(road: Road, distance: np.ndarray, surface_kind: int) -> Surface:
+    """Surface under one wheel whose path (2, 2) in m may cross from one stretch or side of the road to another."""
     (behind, front_end), (right, left) = np.sort(distance[:, 0]), np.sort(distance[:, 1])
     first_stretch, last_stretch = _stretch_at(road, behind), _stretch_at(road, front_end)
     if last_stretch > first_stretch:
@@ -34,7 +35,7 @@ def _surface_under(road: Road, distance: np.ndarray, surface_kind: int) -> Surfa
 
 
 def _stretch_at(road: Road, x: float) -> int:
-    """Number of the stretch of road at x (m): the last one that begins at or before x."""
+    """Index of the stretch of road at x (m): the last one that begins at or before x."""
     return max(sum(bool(start <= x) for start in road.starts) - 1, 0)
 
 
@@ -53,8 +54,8 @@ def ground_paths(position: np.ndarray, rates: np.ndarray, points: np.ndarray, st
 def in_row(
     unit_coordinates: np.ndarray, rates: np.ndarray, arm_lengths: np.ndarray, unit: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Position x, y and heading (3,) of a unit's centre, and their rates, from the coordinates (2 + U,) of a row of
-    units.
+    """Position x, y and heading (3,) of a unit's centre in a train, and their rates, from the train's coordinates (2 +
+    U,).
 
     arm_lengths (U,) : m, from the first centre to this one along each unit.
     """

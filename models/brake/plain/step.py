@@ -1,4 +1,4 @@
-"""Steps of a braked vehicle on its suspension in plain code: see ``models.brake.sprung_step`` for the scheme.
+"""Time steps of a braked vehicle on its suspension in plain code: the reference of ``models.brake.sprung_step``.
 
 Half a step by the accelerations at its start leads to its middle, where loads, slip angles and the changes of the
 wheels' speeds are read; the mean forces of the whole step follow, and Runge and Kutta's method marches under them.
@@ -20,16 +20,18 @@ if TYPE_CHECKING:
     from models.brake.plain.relaxation import LaggingTyres
 
 SPINS, UPRIGHT, OVER = 6, 0.5, 6
-"""Column of a wheel's report with its turning; roll and pitch that turn the vehicle over (rad), and the status of
-that."""
+"""Column of a wheel's report with its rotational speed; roll or pitch angle (rad) at which the vehicle counts as turned
+over, and the status for that.
+"""
 BLINK = 1e-5
-"""s: time over which wheels that only roll are looked at."""
+"""Time (s) of the short step in which freely rolling wheels are evaluated."""
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What a step of a vehicle needs: its wheels, tyres and road, steer angles (W,) in rad, and the speed
-    ``least_speed`` (m/s) that replaces lower speeds in slip angles."""
+    """Data that a vehicle's step needs: its wheels, tyres and road, steer angles (W,) in rad, and the speed
+    ``least_speed`` (m/s) that replaces lower speeds in slip angles.
+    """
 
     on: OnRoad
     steer: np.ndarray
@@ -39,7 +41,9 @@ class Course:
 @dataclass(eq=False)
 class Moving:
     """State of a moving vehicle, updated in place: state (2, n), wheel rotation ``turning`` (W,) in rad/s, changes (W,)
-    of the speeds along the wheels (m/s^2), reports (W, 7), accelerations (2 + U,) of its units, and the tyres' lag."""
+    of the speeds along the wheels (m/s^2), reports (W, 7), accelerations (2 + U,) of its units, and the lag of its
+    tyres.
+    """
 
     state: np.ndarray
     turning: np.ndarray
@@ -50,24 +54,25 @@ class Moving:
 
 
 class Steps:
-    """Time steps (s) of a vehicle on its suspension along a course."""
+    """Time steps (s) of a vehicle on its suspension, with given steering and road."""
 
     def __init__(self, vehicle: Suspension, course: Course, step: float) -> None:
         self.vehicle, self.course, self.step = vehicle, course, step
 
     def on(self, moving_vehicle: Moving, torques: np.ndarray) -> tuple[int, float]:
-        """Advance the vehicle by a step between torques (2, W) in N m at its start and end; returns how the step ended
-        and the time (s)."""
+        """Advance the vehicle by a step between torques (2, W) in N m at its start and end; returns the status and the
+        time (s) at its end.
+        """
         half, (q, v) = 0.5 * self.step, moving_vehicle.state
-        under, middle = (
+        surfaces, half_step_torques = (
             self._surfaces_under(moving_vehicle.state, self.step),
             np.array([torques[0], torques.mean(axis=0)]),
         )
         contacts = self._contacts(q, v)
         starts = speeds(contacts)
         if moving_vehicle.lag is not None:
-            moving_vehicle.lag.reach(np.array([starts, [contact.side_speed_of_contact for contact in contacts]]), half)
-        wheel_forces = self._held_wheel_forces(moving_vehicle, contacts, starts, under, middle, half)
+            moving_vehicle.lag.reach(np.array([starts, [contact.speed_across for contact in contacts]]), half)
+        wheel_forces = self._constant_wheel_forces(moving_vehicle, contacts, starts, surfaces, half_step_torques, half)
         rates = self.vehicle.acceleration(q, v, wheel_forces)
         moving_vehicle.accelerations[:] = self._of_units(rates)
         rest_time = self.time_of_rest(moving_vehicle)
@@ -77,7 +82,7 @@ class Steps:
             return (AT_REST, rest_time) if rest_time < self.step else (self._end_status(moving_vehicle), self.step)
         contacts = self._contacts(q + half * v + 0.5 * half**2 * rates, v + half * rates)
         moving_vehicle.speed_changes[:] = (speeds(contacts) - starts) / half
-        wheel_forces = self._held_wheel_forces(moving_vehicle, contacts, starts, under, torques, self.step)
+        wheel_forces = self._constant_wheel_forces(moving_vehicle, contacts, starts, surfaces, torques, self.step)
         states_after = march(
             lambda _, x, u: self.vehicle.acceleration(x, u, wheel_forces), q.copy(), v.copy(), 1, self.step
         )[-1]
@@ -88,25 +93,28 @@ class Steps:
         return self._end_status(moving_vehicle), self.step
 
     def rolling(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,) at a state (2, n) whose wheels roll freely, and the wheels' rotational speeds (W,)."""
+        """Accelerations (n,) at a state (2, n) whose wheels roll freely, and the wheels' rotational speeds (W,) in
+        rad/s.
+        """
         plane, contacts = self.course.on.plane, self._contacts(state[0], state[1])
         starts = speeds(contacts)
         no_torques, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
         moving = Moving(state, starts / plane.radius, np.zeros(starts.size), report, np.zeros(2 + plane.masses.size))
         under = self._surfaces_under(state, 0.0)
-        wheel_forces = self._held_wheel_forces(moving, contacts, starts, under, no_torques, self.step)
+        wheel_forces = self._constant_wheel_forces(moving, contacts, starts, under, no_torques, self.step)
         return self.vehicle.acceleration(state[0], state[1], wheel_forces), moving.turning
 
     def _end_status(self, moving_vehicle: Moving) -> int:
-        """How a step ends: the vehicle leans too far, a train folds, or neither."""
+        """Status at the end of a step: the vehicle leans too far, a train folds, or neither."""
         q, fold = moving_vehicle.state[0], self.course.on.plane.jackknife_angle
         if not np.abs(q[self.vehicle.leans]).max() <= UPRIGHT:
             return OVER
         return FINE if (np.abs(q[self.vehicle.turns]) <= fold).all() else FOLDED
 
     def _of_units(self, all_values: np.ndarray) -> np.ndarray:
-        """Values (2 + U,) of the units, x, y and headings, from those of all coordinates. The heading of a towed unit
-        is the sum of the yaw coordinates up to it."""
+        """Values (2 + U,) for the units, x, y and headings, from values for all coordinates. The heading of a towed
+        unit is the sum of the yaw coordinates up to it.
+        """
         return np.concatenate((all_values[:2], np.cumsum([all_values[2], *all_values[self.vehicle.turns]])))
 
     def _surfaces_under(self, state: np.ndarray, time: float) -> list[Surface]:
@@ -114,14 +122,15 @@ class Steps:
         plane, (position, rates) = self.course.on.plane, map(self._of_units, state)
         paths = np.empty((plane.wheels, 2, 2))
         for k in range(plane.masses.size):
-            mine = plane.unit == k
-            paths[mine] = ground_paths(*in_row(position, rates, plane.reach[k], k), plane.place[mine], time)
+            is_of_unit = plane.unit == k
+            paths[is_of_unit] = ground_paths(*in_row(position, rates, plane.reach[k], k), plane.place[is_of_unit], time)
         return under_wheels(self.course.on.road, paths, self.course.on.kind)
 
     def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[TyreContact]:
+        """Contacts of all tyres at coordinates and rates (n,)."""
         return self.vehicle.contacts(self.vehicle.bodies.move(q, v), self.course.steer)
 
-    def _held_wheel_forces(
+    def _constant_wheel_forces(
         self,
         moving_vehicle: Moving,
         contacts: list[TyreContact],
@@ -130,14 +139,16 @@ class Steps:
         torques: np.ndarray,
         time: float,
     ) -> WheelForces:
-        """Constant wheel forces over a time (s), from loads and motion at the contacts; fills the wheels' reports."""
+        """Wheel forces that are constant over a time (s), from loads and motion at the contacts; fills the wheels'
+        reports.
+        """
         course = self.course
         for i, contact in enumerate(contacts):
             motion = WheelMotion(
                 starts[i],
                 moving_vehicle.speed_changes[i],
-                contact.side_speed,
-                contact.side_speed_of_contact,
+                contact.speed_along,
+                contact.speed_across,
                 course.least_speed,
             )
             if moving_vehicle.lag is not None:
@@ -152,7 +163,8 @@ class Steps:
 
     def time_of_rest(self, moving_vehicle: Moving) -> float | None:
         """Time (s) within the step at which the kinetic energy of the plane motion is least, if the vehicle is about to
-        stop; else None."""
+        stop; else None.
+        """
         plane, v, a = self.course.on.plane, self._of_units(moving_vehicle.state[1]), moving_vehicle.accelerations
         weights = np.array([plane.masses.sum(), plane.masses.sum(), *plane.inertias])
         speed, falling, rate = (float(weights @ product) for product in (v * v, -v * a, a * a))
@@ -165,5 +177,5 @@ class Steps:
 
 
 def speeds(contacts: list[TyreContact]) -> np.ndarray:
-    """Speeds (W,) of the wheels' centres along them (m/s)."""
-    return np.array([contact.side_speed for contact in contacts])
+    """Speeds (W,) of the wheels' centres along the wheels (m/s)."""
+    return np.array([contact.speed_along for contact in contacts])

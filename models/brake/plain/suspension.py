@@ -1,4 +1,4 @@
-"""Bodies, springs and contacts of a braked vehicle on its suspension, in plain code.
+"""Bodies, springs and tyre contacts of a braked vehicle on its suspension, in plain code.
 
 Bodies and springs are those of the independent reference, ``models.multibody.plain``. Here its tyres stand on a flat
 road: discs about axles that keep to the heading of the carrier, or of the towed body that they are on, turned by the
@@ -21,27 +21,29 @@ UPWARD = np.array([0.0, 0.0, 1.0])
 
 
 def round_the_vertical(vector: np.ndarray) -> np.ndarray:
-    """Vector product (3,) of the upward unit vector and a vector."""
+    """Vector product (3,) of the upward unit vector with a vector."""
     return np.array([-vector[1], vector[0], 0.0])
 
 
 @dataclass(frozen=True, eq=False)
 class TyreContact:
-    """Where a tyre touches the road: level axes along and across the wheel, the latter its axle, in space; how far its
-    centre is above the road (m), its load (N), and speeds (m/s) of the centre along and of the contact across."""
+    """Contact of a tyre with the road: level axes along the wheel and along its axle, in space; height of the centre
+    above the road (m), load (N), and speeds (m/s) of the centre along the wheel and of the contact across it.
+    """
 
     along: np.ndarray
     axle: np.ndarray
     height: float
     load: float
-    side_speed: float
-    side_speed_of_contact: float
+    speed_along: float
+    speed_across: float
 
 
 @dataclass(frozen=True, eq=False)
 class WheelForces:
     """Wheel quantities that are constant over a step: steer angles (rad), mean forces (W, 2) on the tyres along and
-    across (N), and the mean moments (N m) that speed up their turning."""
+    across the wheels (N), and the mean moments (N m) that accelerate their rotation.
+    """
 
     steer: np.ndarray
     forces: np.ndarray
@@ -49,7 +51,7 @@ class WheelForces:
 
 
 class Suspension:
-    """A vehicle on its springs and tyres; turns, leans : numbers of its coordinates, see ``Sprung``."""
+    """A vehicle on its springs and tyres; turns, leans : indices of its coordinates, see ``Sprung``."""
 
     def __init__(self, vehicle: Sprung) -> None:
         free = vehicle.handling.vehicle
@@ -76,12 +78,12 @@ class Suspension:
         return self.bodies.size
 
     def contacts(self, motion: PlainMotion, steer: np.ndarray) -> list[TyreContact]:
-        """``TyreContact`` of every tyre, for wheels steered by angles (W,) in rad."""
+        """Contact of every tyre with the road, for wheels steered by angles (W,) in rad."""
         hubs = motion.at(self._hubs)
         return [self._contact(i, hub, motion, float(steer[i])) for i, hub in enumerate(hubs)]
 
     def _heading(self, i: int, motion: PlainMotion) -> np.ndarray:
-        """Axes (3, 3) that define a wheel's heading: those of the carrier, or a towed body's turned upright."""
+        """Axes (3, 3) of a wheel's heading: the carrier's axes, or those of a towed body turned upright."""
         if not self._towed[i]:
             carrier: np.ndarray = motion.axes(self._carrier)[PLACE]
             return carrier
@@ -90,6 +92,7 @@ class Suspension:
         return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
     def _contact(self, i: int, hub: np.ndarray, motion: PlainMotion, steer: float) -> TyreContact:
+        """Contact of one tyre with the road, for a steer angle (rad)."""
         heading = self._heading(i, motion)
         axle = heading @ (-np.sin(steer), np.cos(steer), 0.0)
         rolling_direction = heading @ (np.cos(steer), np.sin(steer), 0.0)
@@ -109,13 +112,13 @@ class Suspension:
         )
 
     def _load(self, i: int, hub: np.ndarray) -> float:
-        """Load (N) of a tyre whose spring and damper together never pull."""
+        """Load (N) of a tyre, whose spring and damper together never pull."""
         tyre = self.tyres[i]
         elastic = self.loads[i] - tyre.stiffness * (hub[PLACE, 2] - tyre.point[2])
         return float(max(elastic - tyre.damping * hub[RATE, 2], 0.0)) if elastic > 0.0 else 0.0
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, constant: WheelForces) -> np.ndarray:
-        """Accelerations (n,) at coordinates and rates (n,)."""
+        """Accelerations (n,) of the vehicle at coordinates and rates (n,), under constant wheel forces."""
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self._gravity)
         travels = self.parts.travels(motion, q, v)
@@ -130,7 +133,8 @@ class Suspension:
 
     def _drag_forces(self, motion: PlainMotion) -> np.ndarray:
         """Generalised forces (n,) of aerodynamic drag at the chassis' centre, opposite to its speed along the vehicle's
-        heading."""
+        heading.
+        """
         centre, forward = motion.at(self._centre)[0], motion.axes(self._carrier)[PLACE][:, 0]
         speed = float(centre[RATE] @ forward)
         forces: np.ndarray = centre[FIRST:] @ (-self._drag * abs(speed) * speed * forward)
@@ -138,7 +142,8 @@ class Suspension:
 
     def _by_tyres(self, motion: PlainMotion, constant: WheelForces) -> np.ndarray:
         """Generalised forces (n,) of all tyres; torques of brakes and locked wheels act on the bodies that carry the
-        wheels."""
+        wheels.
+        """
         hubs, total = motion.at(self._hubs), np.zeros(self.size)
         for i, contact in enumerate(self.contacts(motion, constant.steer)):
             creep = contact.along * constant.forces[i, 0] + contact.axle * constant.forces[i, 1]
@@ -151,12 +156,11 @@ class Suspension:
 
     def liveliness(self) -> float:
         """Largest damping rate (m/s^2) of a motion in the design position by side forces of cornering coefficient 1 at
-        a speed of 1 m/s."""
+        a speed of 1 m/s.
+        """
         still, straight = np.zeros(self.size), np.zeros(len(self.tyres))
         motions = [self.bodies.move(still, rate) for rate in np.eye(self.size)]
-        across = np.array(
-            [[sliding.side_speed_of_contact for sliding in self.contacts(motion, straight)] for motion in motions]
-        )
+        across = np.array([[sliding.speed_across for sliding in self.contacts(motion, straight)] for motion in motions])
         mass, _ = self.bodies.inertia(motions[0], self._gravity)
         damping = np.linalg.solve(mass, across @ (self.loads[:, None] * across.T))
         return float(np.linalg.eigvals(damping).real.max())

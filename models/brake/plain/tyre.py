@@ -1,4 +1,4 @@
-"""Friction of a tyre by its tables, and the forces on one wheel over a step, in plain code.
+"""Friction of a tyre from its tables, and the forces on one wheel over a step, in plain code.
 
 Each table is linear in every variable between its nodes and constant beyond: a sum over the nodes, each with a weight
 that is 1 there and 0 at the next. See ``models.tyre.tyre_table`` and ``models.brake.plane_step`` for the laws.
@@ -13,7 +13,7 @@ from models.brake.plain.wheel import Force, WheelStep, wheel_step
 from models.tyre.tyre_table import Tables
 
 LOCKING_SLIP = 0.98
-"""Slip from which on the force turns to that of a locked tyre, against the way in which it slides."""
+"""Slip above which the force turns to that of a locked tyre, against the direction of sliding."""
 
 
 def interpolation_weights(nodes: np.ndarray, interpolated_at: float) -> np.ndarray:
@@ -31,7 +31,7 @@ def interpolation_weights(nodes: np.ndarray, interpolated_at: float) -> np.ndarr
 
 @dataclass(frozen=True)
 class Surface:
-    """Surface under a wheel: numbers of two friction tables, and the share of the second one in the mixture."""
+    """Surface under a wheel: indices of two friction tables, and the share of the second one in the mixture."""
 
     first: int
     second: int
@@ -40,7 +40,7 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class Friction:
-    """A tyre at one slip angle (rad, from 0) and load (N) on a surface."""
+    """Friction of a tyre at one slip angle (rad, from 0) and load (N) on a surface."""
 
     tables: Tables
     surface: Surface
@@ -48,13 +48,13 @@ class Friction:
     load: float
 
     def mixed_values(self, values: np.ndarray) -> np.ndarray:
-        """Values on the surface, a mixture of the two tables' values among those of all tables (t, ...)."""
+        """Values on the wheel's surface, a mixture of two tables' values out of ``values`` (t, ...) of all tables."""
         share = self.surface.share
         mixed: np.ndarray = (1.0 - share) * values[self.surface.first] + share * values[self.surface.second]
         return mixed
 
-    def ahead(self) -> Force:
-        """Force along the wheel as a function of slip."""
+    def force_along(self) -> Force:
+        """Force (N) along the wheel as a function of slip."""
         t = self.tables
         mu = np.einsum(
             "a,f,tafs->ts",
@@ -64,7 +64,7 @@ class Friction:
         )
         return Force(t.slips, self.load * self.mixed_values(mu))
 
-    def aside(self, slip: float) -> float:
+    def side_force(self, slip: float) -> float:
         """Magnitude (N) of the force across the wheel at a slip."""
         t, by_angle = self.tables, interpolation_weights(self.tables.angles, self.angle)
         g = np.einsum("a,s,tas->t", by_angle, interpolation_weights(t.slips, abs(slip)), t.g)
@@ -76,7 +76,8 @@ class Friction:
 class WheelMotion:
     """Motion of a wheel's centre: speed along the wheel at the start of a step and its mean rate of change (m/s,
     m/s^2), speeds along and across from which the slip angle is computed (m/s), and the speed ``least_speed`` (m/s)
-    that replaces lower ones."""
+    that replaces lower ones.
+    """
 
     start: float
     rate: float
@@ -86,7 +87,7 @@ class WheelMotion:
 
     @property
     def direction(self) -> float:
-        """Direction of motion at the step's start: 1 forwards, -1 backwards."""
+        """Direction of the wheel's motion at the step's start: 1 forwards, -1 backwards."""
         return 1.0 if self.start >= 0.0 else -1.0
 
     @property
@@ -96,14 +97,15 @@ class WheelMotion:
 
     @property
     def angle(self) -> float:
-        """Magnitude (rad) of the slip angle."""
+        """Magnitude (rad) of the wheel's slip angle."""
         return math.atan2(abs(self.across), max(self.forward_speed, self.least_speed))
 
 
 @dataclass(frozen=True)
 class BrakedStep:
     """Braking of a wheel over a step: torques of its brake (N m) at both ends, the step (s), radius (m), inertia (kg
-    m^2), and the turning at the start (rad/s)."""
+    m^2), and the rotational speed at the start (rad/s).
+    """
 
     torques: tuple[float, float]
     step: float
@@ -114,20 +116,22 @@ class BrakedStep:
 
 def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: BrakedStep) -> np.ndarray:
     """Report of a tyre over a step (7,), in the columns of ``plane_step``: mean forces along and across (N), load (N),
-    mean slip, slip angle (rad), time locked (s), rotation (rad/s) at the end."""
+    mean slip, slip angle (rad), time locked (s), rotational speed (rad/s) at the end.
+    """
     friction, sense = Friction(tables, surface, motion.angle, load), motion.direction
     speeds = sense * motion.start, sense * (motion.start + braked.step * motion.rate)
     wheel = WheelStep(speeds, braked.torques, braked.step, braked.radius, braked.inertia)
-    turning, force_along, slip, locked = wheel_step(wheel, sense * braked.turning, friction.ahead())
-    forces = _turned_to_sliding(np.array([force_along, friction.aside(slip)]), slip, motion)
+    turning, force_along, slip, locked = wheel_step(wheel, sense * braked.turning, friction.force_along())
+    forces = _turned_to_sliding(np.array([force_along, friction.side_force(slip)]), slip, motion)
     side = -math.copysign(forces[1], motion.across) if motion.across else 0.0
     angle = math.copysign(motion.angle, motion.across)
     return np.array([-sense * forces[0], side, load, slip, angle, locked, sense * turning])
 
 
 def _turned_to_sliding(forces: np.ndarray, slip: float, motion: WheelMotion) -> np.ndarray:
-    """Sizes (2,) of the forces along and across the wheel, turned towards its sliding direction as the wheel comes near
-    to locking."""
+    """Magnitudes (2,) of the forces along and across the wheel (N), turned towards its sliding direction as the wheel
+    comes near to locking.
+    """
     sliding = np.array([motion.forward_speed, abs(motion.across)])
     speed = float(np.hypot(*sliding))
     if slip <= LOCKING_SLIP or speed == 0.0:

@@ -1,4 +1,4 @@
-"""One wheel through one step, in plain code: see ``models.brake.wheel_step`` for the scheme, not for the algorithm.
+"""Rotation of one braked wheel over one step, in plain code: the reference of ``models.brake.wheel_step``.
 
 The slip s obeys s' = g(s) = kappa (T / r - F(s)) + (1 - s) u' / u with kappa = r^2 / (J u), u at its mean. F is linear
 between nodes, and so is g: it never changes its sign on the way, a way from s0 to s1 takes (s1 - s0) over the
@@ -11,35 +11,37 @@ from dataclasses import dataclass
 import numpy as np
 
 SLOWEST_SPEED = 1e-9
-"""Speed (m/s) below which a wheel's centre is taken to have this one."""
+"""Speed (m/s) that replaces lower speeds of a wheel's centre."""
 SERIES_LIMIT = 1e-3
-"""Argument below which a difference is summed as a series, to rounding in five terms."""
+"""Argument below which a difference quotient is summed as a series, exact to rounding."""
 LOCKED_SLIP = 1.0
-"""Slip of a wheel that stands."""
+"""Slip of a locked wheel."""
 
 
 @dataclass(frozen=True, eq=False)
 class Force:
     """Tyre force as a function of slip: slips (s,) from 0 to 1, and the forces (s,) in N at these; the force is odd in
-    the slip."""
+    the slip.
+    """
 
     slips: np.ndarray
     forces: np.ndarray
 
     @property
     def locked_force(self) -> float:
-        """Force (N) at slip 1."""
+        """Force (N) of the tyre at slip 1."""
         return float(self.forces[-1])
 
     def both_ways(self) -> tuple[np.ndarray, np.ndarray]:
-        """Slips from -1 to 1 and the forces (N) there."""
+        """Slips from -1 to 1 and the tyre forces (N) at these."""
         return np.concatenate((-self.slips[:0:-1], self.slips)), np.concatenate((-self.forces[:0:-1], self.forces))
 
 
 @dataclass(frozen=True)
 class WheelStep:
-    """Input of a wheel over a step: at both ends, speeds of its centre and torques of its brake (linear in time), in
-    m/s and N m, from 0 on; step (s), radius (m), inertia (kg m^2)."""
+    """Data of a wheel over a step: at both ends, speeds of its centre (m/s) and torques of its brake (N m), both linear
+    in time and not negative; step (s), radius (m), inertia (kg m^2).
+    """
 
     speeds: tuple[float, float]
     torques: tuple[float, float]
@@ -48,33 +50,34 @@ class WheelStep:
     inertia: float
 
     def speed(self, time: float) -> float:
-        """Speed (m/s) of the centre at a time (s)."""
+        """Speed (m/s) of the wheel's centre at a time (s) within the step."""
         u0, u1 = max(self.speeds[0], SLOWEST_SPEED), max(self.speeds[1], 0.0)
         return u0 + (u1 - u0) * time / self.step
 
     def torque(self, time: float) -> float:
-        """Torque (N m) at a time (s)."""
+        """Brake torque (N m) at a time (s) within the step."""
         return self.torques[0] + (self.torques[1] - self.torques[0]) * time / self.step
 
     def mean_torque(self, time: float) -> float:
-        """Mean torque (N m) from a time (s) to the end."""
+        """Mean brake torque (N m) from a time (s) to the end of the step."""
         return 0.5 * (self.torque(time) + self.torques[1])
 
     @property
     def mean_speed(self) -> float:
-        """Mean speed (m/s), above 0."""
+        """Mean speed (m/s) of the wheel's centre over the step, above 0."""
         return max(0.5 * (self.speed(0.0) + self.speed(self.step)), SLOWEST_SPEED)
 
     @property
     def gain(self) -> float:
-        """Acceleration of the centre (m/s^2), constant over the step."""
+        """Acceleration of the wheel's centre (m/s^2), constant over the step."""
         return (self.speed(self.step) - self.speed(0.0)) / self.step
 
 
 @dataclass
 class WheelProgress:
-    """Progress of a wheel within a time step: time (s), slip, impulse of the road on the vehicle (N s), integral of
-    the slip (s), time locked (s), and whether it has just been freed."""
+    """Progress of a wheel within a time step: time (s), slip, impulse of the road on the vehicle (N s), integral of the
+    slip (s), time locked (s), and whether it has just been freed.
+    """
 
     time: float
     slip: float
@@ -85,7 +88,7 @@ class WheelProgress:
 
 
 def wheel_step(step_data: WheelStep, rim_turning: float, force: Force) -> tuple[float, float, float, float]:
-    """Speed of turning (rad/s) at the end of a step, mean force (N), mean slip and time locked (s).
+    """Rotational speed (rad/s) at the end of a step, mean force (N), mean slip and time locked (s) of a braked wheel.
 
     rim_turning : at the start (rad/s), below 0 where it is against the direction of the speeds.
     """
@@ -145,7 +148,7 @@ def _advance_locked(step_data: WheelStep, progress: WheelProgress, force: Force)
 
 
 def _excess_rate(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
-    """Rate (m/s^2) of rim speed less twice the centre's speed, while the wheel slides at slip -1."""
+    """Rate (m/s^2) of the rim speed less twice the centre's speed, while the wheel slides at slip -1."""
     return (
         -step_data.radius
         * (step_data.radius * force.locked_force + step_data.mean_torque(progress.time))
@@ -155,7 +158,7 @@ def _excess_rate(step_data: WheelStep, progress: WheelProgress, force: Force) ->
 
 
 def _is_spinning(step_data: WheelStep, progress: WheelProgress, force: Force) -> bool:
-    """Whether the rim's speed is above twice the centre's and stays there."""
+    """Whether the rim's speed is above twice the centre's speed and stays there."""
     return progress.slip < -1.0 or (progress.slip == -1.0 and _excess_rate(step_data, progress, force) > 0.0)
 
 
@@ -177,7 +180,8 @@ def _advance_spinning(step_data: WheelStep, progress: WheelProgress, force: Forc
 
 def _roll(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
     """Advance a wheel with a slip between -1 and 1 until the step ends or the slip reaches one of them. The mean force
-    follows from the wheel's momentum."""
+    follows from the wheel's momentum.
+    """
     start_time, mean, slip = progress.time, step_data.mean_torque(progress.time), min(progress.slip, LOCKED_SLIP)
     nodes, forces = force.both_ways()
     kappa = step_data.radius**2 / (step_data.inertia * step_data.mean_speed)
@@ -223,12 +227,12 @@ def along_nodes(slip: float, nodes: np.ndarray, rates: np.ndarray, remaining: fl
 
 
 def _log_over(x: float) -> float:
-    """log(1 + x) / x."""
+    """The quotient log(1 + x) / x, also for x near 0."""
     return math.log1p(x) / x if abs(x) > SERIES_LIMIT else math.fsum((-x) ** k / (k + 1) for k in range(6))
 
 
 def _phi_function(order: int, z: float) -> float:
-    """phi_1(z) = (exp(z) - 1) / z or phi_2(z) = (exp(z) - 1 - z) / z^2."""
+    """phi_1(z) = (exp(z) - 1) / z or phi_2(z) = (exp(z) - 1 - z) / z^2, also for z near 0."""
     if abs(z) <= SERIES_LIMIT:
         return math.fsum(z**k / math.factorial(k + order) for k in range(6))
     return math.expm1(z) / z if order == 1 else (math.expm1(z) - z) / z**2

@@ -1,4 +1,5 @@
-"""The port: where a controller is asked once per sample, and every way to stand behind it.
+"""The controller port: the interface at which a brake controller is called once per sample, and every kind of
+controller behind it.
 
     frame.py        both frames byte by byte, for another process and for the log
     ask.py          one exchange: what a controller answers is checked, whatever it runs in

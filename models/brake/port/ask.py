@@ -1,4 +1,6 @@
-"""One exchange with a controller: whatever it does wrong ends the run in one named error."""
+"""One exchange with a controller: its command is checked, and any fault of the controller ends the run with one named
+error.
+"""
 
 import math
 from dataclasses import dataclass
@@ -21,25 +23,27 @@ FAULT_NAMES = (
     "below zero",
     "too high",
 )
-"""What a controller can do wrong: it raised, died or closed; did not answer in time; answered with too little or too
-much; what is no answer frame; to another sample; with what is no finite number; with a valve in none of
--1, 0, 1, or 2 where there are such valves; with a pressure below none, or above that of the supply."""
+"""Names of what a controller can do wrong: it raised, died or closed; did not answer in time; answered with too little
+or too much; with what is no answer frame; to another sample; with a value that is no finite number; with a valve in
+none of -1, 0, 1, or 2 where there are such valves; with a pressure below zero, or above the supply pressure.
+"""
 
 VALVE_STATES = frozenset((RELEASE, HOLD, APPLY))
 STATES_WITH_SLOW_APPLY = VALVE_STATES | {SLOW}
-"""States of valves, and of those that can also apply slowly."""
+"""Allowed states of valves that can also apply slowly."""
 
 
 SUPPLY_ROUNDING = 1e-9
-"""Share by which a pressure may exceed that of the supply."""
+"""Share by which a pressure may exceed the supply pressure."""
 PORT_FOLDER = Path(__file__).parent
 LONGEST_ERROR_TEXT = 500
-"""Characters that are kept of an error's text."""
+"""Largest number of characters of an error's text that are reported."""
 
 
 class ControllerFailed(RunFailed):
-    """A controller gave no answer, or one that cannot be used. name : one of ``FAULT_NAMES``; number : of the sample;
-    why : the fault, as a phrase."""
+    """Error of a controller that gave no command, or one that cannot be used. name : one of ``FAULT_NAMES``; number :
+    of the sample; why : the fault, as a phrase.
+    """
 
     def __init__(self, sample: Sample, name: str, reason: str) -> None:
         reason = " ".join(reason.encode(errors="backslashreplace").decode().split())[:LONGEST_ERROR_TEXT]
@@ -53,7 +57,7 @@ def ask(
     states: frozenset[int] = VALVE_STATES,
     maximum_pressure: float = LARGEST_PRESSURE,
 ) -> Command:
-    """A controller's answer after checks; maximum_pressure : largest pressure (bar) allowed.
+    """A controller's command for a sample, after checks; maximum_pressure : largest pressure (bar) allowed.
 
     Raises ControllerFailed, whatever the controller raises.
     """
@@ -68,7 +72,8 @@ def ask(
 
 def exception_text(error: BaseException) -> str:
     """Type and text of an exception, and the line of the user's file in which it was raised, or which called the code
-    that raised it."""
+    that raised it.
+    """
     lines = [
         frame
         for frame in extract_tb(error.__traceback__)
@@ -80,21 +85,22 @@ def exception_text(error: BaseException) -> str:
 
 @dataclass
 class CheckedController:
-    """A controller whose answers are checked before they are used."""
+    """A controller whose commands are checked before they are used."""
 
     controller: Controller
     states: frozenset[int] = VALVE_STATES
 
     def sample(self, sample: Sample) -> Command:
-        """The controller's commands for a sample; raises ControllerFailed."""
+        """The controller's checked command for a sample; raises ControllerFailed."""
         return ask(self.controller, sample, self.states, sample.supply)
 
 
 def checked_answer(
     command: Command, sample: Sample, states: frozenset[int] = VALVE_STATES, maximum_pressure: float = LARGEST_PRESSURE
 ) -> Command:
-    """The controller's answer, if it has exactly one valve state or one pressure per wheel; else raises
-    ControllerFailed."""
+    """The controller's command, if it has exactly one valve state or one pressure per wheel; else raises
+    ControllerFailed.
+    """
     if not isinstance(command, Command) or (command.valves is None) == (command.pressures is None):
         raise ControllerFailed(sample, "wrong frame", "needs either valves or pressures")
     valves = command.valves
@@ -125,6 +131,7 @@ def _listed_text(states: frozenset[int]) -> str:
 
 
 def _answer_array(values: object, sample: Sample) -> np.ndarray:
+    """Values (W,) of a command as numbers; raises ControllerFailed where they are not one number per wheel."""
     if np.ma.is_masked(values):
         raise ControllerFailed(sample, "not a number", "a masked value for a wheel")
     try:

@@ -1,4 +1,4 @@
-"""A controller as a Python class or function that makes one, named as "module:Name" or "file.py:Name"."""
+"""Controllers as Python classes, or functions that make one, named as "module:Name" or "file.py:Name"."""
 
 import importlib.util
 from collections.abc import Callable
@@ -28,6 +28,7 @@ def named_controller(name: str, folder: Path, wheels: int, parameters: dict[str,
 
 
 def _callable_of_path(name: str, folder: Path, file: str) -> Callable[..., Any]:
+    """The class or function that a name "module:Name" or "file.py:Name" refers to; raises InputError."""
     module_name, _, attribute = name.rpartition(":")
     if not module_name or not attribute:
         raise InputError(file, "port.callable", name, 'must be "module:Name" or "file.py:Name"')

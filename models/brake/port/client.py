@@ -1,4 +1,4 @@
-"""The other end of the socket for controllers in Python: ``python -m models.brake.port.client module:Name PORT``."""
+"""Client of the socket port for controllers in Python: ``python -m models.brake.port.client module:Name PORT``."""
 
 import socket
 import sys
@@ -11,7 +11,7 @@ from models.brake.port.socket_port import LOOPBACK_ADDRESS
 
 
 def serve(controller: Controller, port: int) -> int:
-    """Connect to a port of this machine and answer every question until the connection closes.
+    """Connect a controller to a port of this machine and answer every sample until the connection closes.
 
     Returns the number of answers.
     """
@@ -26,7 +26,7 @@ def serve(controller: Controller, port: int) -> int:
 
 
 def main(name: str, port: str, wheels: str = "4") -> None:
-    """Serve the controller ``name`` at a port of this machine."""
+    """Serve the controller ``name`` at a port of this machine, for a number of wheels."""
     serve(named_controller(name, Path(), int(wheels), {}), int(port))
 
 

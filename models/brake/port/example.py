@@ -1,4 +1,4 @@
-"""The controller that the examples of the port are: slip bang-bang, in Python as in ``client_example.c``."""
+"""Example controller of the port: slip control by two thresholds, in Python as in ``client_example.c``."""
 
 import numpy as np
 
@@ -6,13 +6,15 @@ from models.brake.controller import Command, Sample
 
 
 class Example:
-    """Releases above 15 % slip, applies below 8 %, and between them goes on with what it did; needs the given speed."""
+    """Controller that releases above 15 % slip, applies below 8 %, and keeps its last command between them; needs the
+    vehicle's speed.
+    """
 
     def __init__(self, wheels: int) -> None:
         self._valves = np.ones(wheels, dtype=np.int64)
 
     def sample(self, sample: Sample) -> Command:
-        """States of the valves."""
+        """Commands with the states of the valves for a sample."""
         slip = 1.0 - sample.wheels / max(sample.speed, 0.1)
         self._valves[slip > 0.15] = -1
         self._valves[slip < 0.08] = 1

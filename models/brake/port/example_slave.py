@@ -1,4 +1,4 @@
-"""The example of a controller as an FMU. Build: ``pythonfmu build -f example_slave.py``."""
+"""Example of a controller as an FMU. Build: ``pythonfmu build -f example_slave.py``."""
 
 import numpy as np
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
@@ -8,7 +8,7 @@ from models.brake.port.example import Example
 
 
 class ExampleSlave(Fmi2Slave):
-    """Four wheels, valves as answers."""
+    """FMU of the example controller for four wheels, whose outputs are valve states."""
 
     def __init__(self, **kwargs: object) -> None:
         super().__init__(**kwargs)
@@ -24,7 +24,7 @@ class ExampleSlave(Fmi2Slave):
         self._number, self._controller = 0, Example(4)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Answer to the inputs as they are."""
+        """Set the outputs to the controller's command for the present inputs."""
         wheels = np.array([getattr(self, f"wheel_{i}") for i in range(1, 5)])
         sample = Sample(self._number, round(1e9 * current_time), wheels, self.brake, self.supply, self.speed)
         valves = self._controller.sample(sample).valves

@@ -1,4 +1,6 @@
-"""Faults on demand, each within a window of time: samples lost or delayed, valves stuck, teeth missing."""
+"""Planned faults of the controller port, each within a time window: samples lost or delayed, valves stuck, teeth
+missing.
+"""
 
 from collections import deque
 from dataclasses import dataclass, field
@@ -12,9 +14,9 @@ from models.core.strict import Strict, quantity
 
 
 class Fault(Strict):
-    """One fault. ``lost``: signals stay as they were at the last sample before it; ``delayed``: they are those of
-    ``samples`` samples ago; ``stuck``: a valve stays in ``state``, or in that of its last sample before it; ``tooth``:
-    the tooth of this number is missing, for signals that are counted from teeth.
+    """A planned fault. ``lost``: signals stay as they were at the last sample before it; ``delayed``: they are the
+    signals of ``samples`` samples ago; ``stuck``: a valve stays in ``state``, or in the state of its last sample before
+    it; ``tooth``: the tooth of this number is missing, for signals that are counted from teeth.
     """
 
     kind: Literal["lost", "delayed", "stuck", "tooth"]
@@ -40,14 +42,14 @@ class Fault(Strict):
         """Whether the fault is active at a time (s)."""
         return self.start <= time and (self.end is None or time < self.end)
 
-    def of(self, wheels: int) -> list[int]:
-        """Numbers of the wheels that the fault affects."""
+    def affected_wheels(self, wheels: int) -> list[int]:
+        """Indices of the wheels that the fault affects, of so many wheels."""
         return list(range(wheels)) if self.wheels is None else self.wheels
 
 
 @dataclass
 class FaultyController:
-    """A controller whose signals and commands pass through faults; a new one is made for every run."""
+    """A controller whose signals and commands are changed by faults; a new one is made for every run."""
 
     controller: Controller
     faults: list[Fault]
@@ -59,7 +61,7 @@ class FaultyController:
         self._past_signals = deque(maxlen=1 + max((fault.samples or 0 for fault in self.faults), default=0))
 
     def sample(self, sample: Sample) -> Command:
-        """The controller's commands for faulty signals; the commands themselves also get their faults."""
+        """The controller's command for the faulty signals; valves of the command may be stuck."""
         time = 1e-9 * sample.time
         active_faults = [fault for fault in self.faults if fault.holds(time)]
         command = self.controller.sample(sample._replace(wheels=self._faulty_signals(sample.wheels, active_faults)))
@@ -73,7 +75,7 @@ class FaultyController:
         self._past_signals.append(wheels)
         faulty_wheels = wheels.copy()
         for fault in active_faults:
-            for i in fault.of(wheels.size):
+            for i in fault.affected_wheels(wheels.size):
                 if fault.kind == "delayed":
                     faulty_wheels[i] = self._past_signals[max(len(self._past_signals) - 1 - (fault.samples or 0), 0)][i]
                 elif fault.kind == "lost" and self._last_signals is not None:
@@ -83,7 +85,7 @@ class FaultyController:
 
     def _stuck_valves(self, valves: np.ndarray, active_faults: list[Fault]) -> np.ndarray:
         for fault in active_faults:
-            for i in fault.of(valves.size) if fault.kind == "stuck" else ():
+            for i in fault.affected_wheels(valves.size) if fault.kind == "stuck" else ():
                 if fault.state is not None:
                     valves[i] = fault.state
                 elif self._last_valves is not None:
@@ -93,7 +95,7 @@ class FaultyController:
 
 
 def missing_teeth(faults: list[Fault], wheel: int, tooth: int, time: float) -> bool:
-    """Whether a tooth of a wheel is missing at a time (s)."""
+    """Whether a tooth of a wheel is missing at a time (s), by any of the faults."""
     return any(
         fault.kind == "tooth"
         and fault.tooth == tooth

@@ -1,4 +1,4 @@
-"""A controller as an FMU (FMI 2.0, co-simulation), run through fmpy.
+"""Controllers as FMUs (FMI 2.0, co-simulation), run through fmpy.
 
 Inputs: ``wheel_1`` to ``wheel_W`` (real, m/s), and as far as the FMU has them ``brake`` (boolean), ``supply`` (real,
 bar) and ``speed`` (real, m/s; not a number if it is not given). Outputs: ``valve_1`` to ``valve_W`` (real or integer;
@@ -20,7 +20,7 @@ from models.core.errors import InputError
 
 @contextmanager
 def opened_fmu(path: Path, folder: Path, wheels: int, sample: float) -> Iterator["FmuPort"]:
-    """The controller of an FMU file, unpacked into a folder, as a context manager; sample: s.
+    """The controller of an FMU file, unpacked into a folder, as a context manager; sample : duration (s).
 
     Raises InputError.
     """
@@ -65,11 +65,11 @@ def _running_fmu(description: Any, folder: str, file: str) -> Iterator[Any]:
 
 
 OPTIONAL_INPUTS = {"supply": "Real", "speed": "Real", "brake": "Boolean"}
-"""Inputs that an FMU may have."""
+"""Inputs that an FMU may have, with their types."""
 
 
 class FmuPort:
-    """A running FMU. names : value reference and type of each variable, by its name."""
+    """A running FMU as a controller. names : value reference and type of each variable, by its name."""
 
     def __init__(self, slave: Any, names: dict[str, tuple[int, str]], wheels: int, sample: float) -> None:
         self._slave, self._step = slave, sample
@@ -82,7 +82,7 @@ class FmuPort:
         self._get = slave.getInteger if names[f"{self._mode}_1"][1] == "Integer" else slave.getReal
 
     def sample(self, sample: Sample) -> Command:
-        """The controller's commands: the FMU's outputs after one step."""
+        """The controller's command for a sample: the FMU's outputs after one step."""
         self._slave.setReal(
             self._references, sample.wheels.tolist() + [getattr(sample, name) for _, name in self._extra]
         )
@@ -94,6 +94,7 @@ class FmuPort:
 
 
 def _references(names: dict[str, tuple[int, str]], variable_kind: str, wheels: int) -> list[int]:
+    """Value references of a kind of variable for all wheels."""
     return [names[f"{variable_kind}_{i + 1}"][0] for i in range(wheels)]
 
 

@@ -1,4 +1,5 @@
-"""Both frames of the port, byte by byte: fixed size, little-endian, numbers as IEEE 754 doubles bit for bit.
+"""Frames of the port, byte by byte: a question with a sample, and an answer with a command; fixed size, little-endian,
+numbers as IEEE 754 doubles bit for bit.
 
 Question, 104 bytes, from the vehicle
 
@@ -36,11 +37,11 @@ from models.brake.controller import Command, Sample
 QUESTION_LAYOUT, ANSWER_LAYOUT = struct.Struct("<4sIqBB6xdd8d"), struct.Struct("<4sIBB6x8d")
 MOST_WHEELS = 8
 SWITCH, REQUEST_GIVEN = 1, 2
-"""Bits of the question's flags."""
+"""Bits of the question's flags: brake switch closed, speed given."""
 
 
 class WrongFrame(ValueError):
-    """Bytes that do not form a frame of this port; name : as in ``ask.NAMES``."""
+    """Error of bytes that do not form a frame of this port; name : as in ``ask.FAULT_NAMES``."""
 
     def __init__(self, name: str, reason: str) -> None:
         self.name = name
@@ -48,7 +49,7 @@ class WrongFrame(ValueError):
 
 
 def question_frame(sample: Sample) -> bytes:
-    """Frame that carries one sample to the controller."""
+    """Frame (104 bytes) that carries one sample to the controller."""
     flags = SWITCH * sample.brake | REQUEST_GIVEN * (sample.speed == sample.speed)
     return QUESTION_LAYOUT.pack(
         b"TRQ1",
@@ -63,7 +64,7 @@ def question_frame(sample: Sample) -> bytes:
 
 
 def sample_of_question(frame: bytes) -> Sample:
-    """The sample of a question; raises WrongFrame."""
+    """The sample in a question frame; raises WrongFrame."""
     if len(frame) != QUESTION_LAYOUT.size:
         raise WrongFrame("wrong length", f"a question of {len(frame)} bytes, not {QUESTION_LAYOUT.size}")
     magic, number, time, wheels, flags, supply, speed, *signals = QUESTION_LAYOUT.unpack(frame)
@@ -73,14 +74,14 @@ def sample_of_question(frame: bytes) -> Sample:
 
 
 def answer_frame(sample_number: int, command: Command) -> bytes:
-    """Frame that carries a controller's answer to a sample."""
+    """Frame (80 bytes) that carries a controller's command for a sample."""
     mode, values = (b"P", command.pressures) if command.valves is None else (b"V", command.valves)
     assert values is not None
     return ANSWER_LAYOUT.pack(b"TRA1", sample_number, mode[0], len(values), *_eight_values(values))
 
 
 def command_of_answer(frame: bytes, sample_number: int) -> Command:
-    """The commands in the answer frame; raises WrongFrame if the frame does not answer the sample ``sample_number``."""
+    """The command in an answer frame; raises WrongFrame if the frame does not answer the sample ``sample_number``."""
     magic, answered, mode, wheels, *values = ANSWER_LAYOUT.unpack(frame)
     if magic != b"TRA1" or mode not in b"VP":
         raise WrongFrame("wrong frame", f"begins with {magic!r}, mode {mode}, not with b'TRA1' and 'V' or 'P'")
@@ -93,5 +94,5 @@ def command_of_answer(frame: bytes, sample_number: int) -> Command:
 
 
 def _eight_values(values: np.ndarray) -> list[float]:
-    """Eight values, one per possible wheel: the given ones, then zeros."""
+    """Values for eight wheels, the largest number: the given ones, then zeros."""
     return [*np.asarray(values, dtype=float).tolist(), *[0.0] * (MOST_WHEELS - len(values))]

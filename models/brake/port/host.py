@@ -1,7 +1,8 @@
-"""The other end of a hosted controller: the process in which a callable or an FMU runs, and nothing else does.
+"""Program of the separate process in which a controller, a callable or an FMU, runs alone.
 
-It connects, is told what to make, says that it has all that it needs for that, says when the controller is made, and
-answers frame by frame as ``frame`` documents. What goes"""
+It connects, receives the description of the controller, reports that it is ready to make it, reports that the
+controller is made, and answers frame by frame as ``frame`` documents. A failure is reported as a frame with a text.
+"""
 
 import json
 import pickle
@@ -19,7 +20,7 @@ from models.brake.port.frame import QUESTION_LAYOUT, answer_frame, sample_of_que
 from models.brake.port.socket_port import LOOPBACK_ADDRESS
 from models.core.errors import InputError
 
-LENGTH_LAYOUT, READY_MARK, TOLD_MARK = struct.Struct("<Q"), b"TRR1", b"TRE1"
+LENGTH_LAYOUT, READY_MARK, FAILURE_MARK = struct.Struct("<Q"), b"TRR1", b"TRE1"
 HEAD_LAYOUT = struct.Struct("<4sI")
 
 
@@ -42,7 +43,7 @@ class HostedController(NamedTuple):
 
 @contextmanager
 def made_controller(guest: HostedController) -> Iterator[Controller]:
-    """The controller described by ``guest``, as a context manager; raises InputError."""
+    """The controller that ``guest`` describes, as a context manager; raises InputError."""
     if guest.fmu is not None:
         from models.brake.port.fmu_port import opened_fmu
 
@@ -55,13 +56,13 @@ def made_controller(guest: HostedController) -> Iterator[Controller]:
 
 
 def failure_frame(**failure: Any) -> bytes:
-    """Frame that reports the exception now being handled."""
+    """Frame that reports a failure, with its details as JSON."""
     text = json.dumps(failure, default=str).encode()
-    return HEAD_LAYOUT.pack(TOLD_MARK, len(text)) + text
+    return HEAD_LAYOUT.pack(FAILURE_MARK, len(text)) + text
 
 
 def serve(link: socket.socket) -> None:
-    """Make the controller that the other side asks for, and answer samples until the connection closes."""
+    """Make the controller that the simulation's process describes, and answer samples until the connection closes."""
     with link.makefile("rb") as reader:
         guest = pickle.loads(reader.read(LENGTH_LAYOUT.unpack(reader.read(LENGTH_LAYOUT.size))[0]))
         if guest.fmu is not None:
@@ -75,7 +76,9 @@ def serve(link: socket.socket) -> None:
 
 
 def main(port: int) -> None:
-    """Serve at a port of this machine; any exception is reported to the other side if possible."""
+    """Serve a controller at a port of this machine; any exception is reported to the simulation's process if
+    possible.
+    """
     with socket.create_connection((LOOPBACK_ADDRESS, port)) as link:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         try:

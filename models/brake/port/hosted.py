@@ -1,4 +1,5 @@
-"""A callable or an FMU in a process of its own, which is ended when its time is over: nothing in it can prevent that.
+"""Controllers, a callable or an FMU, in a separate process, which is ended after a time limit whatever the controller
+does.
 
 So a controller that never returns, whatever it catches, or that takes its process with it, ends the run in one named
 error. The process is started once per run, before anything of the controller is timed: its start-up is our own. An
@@ -19,17 +20,17 @@ from typing import Any
 from models.brake.controller import Command, Sample
 from models.brake.port.ask import FAULT_NAMES, ControllerFailed
 from models.brake.port.frame import ANSWER_LAYOUT, WrongFrame, command_of_answer, question_frame
-from models.brake.port.host import HEAD_LAYOUT, LENGTH_LAYOUT, READY_MARK, TOLD_MARK, HostedController
+from models.brake.port.host import FAILURE_MARK, HEAD_LAYOUT, LENGTH_LAYOUT, READY_MARK, HostedController
 from models.brake.port.socket_port import START_REMEDY, controller_behind_socket, end_of_process
 from models.core.errors import InputError, RunFailed
 
 FAILURE_TEXT_BYTES = 100_000
-"""Bytes of what a process may tell of its failure."""
+"""Largest number of bytes of a process's report on its failure."""
 STARTUP_SECONDS = 30.0
-"""s for the process to be there, with all that the host needs, before it touches the controller."""
+"""Time (s) within which the process must be ready, before it touches the controller."""
 
 
-class Failed(Exception):
+class ProcessFailed(Exception):
     """Failure reported by the controller's process; what : its details as a table."""
 
     def __init__(self, failure: dict[str, Any]) -> None:
@@ -39,20 +40,20 @@ class Failed(Exception):
 
 @dataclass
 class ProcessController:
-    """A controller in its own process; each answer must arrive within ``timeout`` seconds."""
+    """A controller in a separate process; each answer must arrive within ``timeout`` seconds."""
 
     link: socket
     process: subprocess.Popen[bytes] | None
     timeout: float
 
     def begin(self, guest: HostedController, start_seconds: float) -> None:
-        """Have the process make the controller within ``start_seconds`` seconds; raises InputError, RunFailed."""
+        """Let the process make the controller within ``start_seconds`` seconds; raises InputError, RunFailed."""
         text = pickle.dumps(guest)
         try:
             self._receive(LENGTH_LAYOUT.pack(len(text)) + text, HEAD_LAYOUT.size, READY_MARK, STARTUP_SECONDS)
             self._receive(b"", HEAD_LAYOUT.size, READY_MARK, start_seconds)
-        except Failed as error:
-            raise _as_input(error.what) from None
+        except ProcessFailed as error:
+            raise _error_of_failure(error.what) from None
         except TimeoutError:
             raise RunFailed(
                 "controller", f"silence: it was not made within {start_seconds:g} s; {START_REMEDY}"
@@ -63,14 +64,14 @@ class ProcessController:
             ) from None
 
     def sample(self, sample: Sample) -> Command:
-        """The commands of a controller in another process for a sample; raises ControllerFailed."""
+        """The command of the controller in the other process for a sample; raises ControllerFailed."""
         try:
             return command_of_answer(
                 self._receive(question_frame(sample), ANSWER_LAYOUT.size, b"", self.timeout), sample.number
             )
         except WrongFrame as error:
             raise ControllerFailed(sample, error.name, str(error)) from None
-        except Failed as error:
+        except ProcessFailed as error:
             name = str(error.what.get("name"))
             raise ControllerFailed(
                 sample, name if name in FAULT_NAMES else "crash", str(error.what.get("reason"))
@@ -82,14 +83,14 @@ class ProcessController:
             raise ControllerFailed(sample, "crash", lost) from None
 
     def _receive(self, sent: bytes, byte_count: int, begins: bytes, seconds: float) -> bytes:
-        """The bytes that the process sends back within ``seconds``; raises Failed, TimeoutError, OSError, EOFError."""
+        """Bytes that the process sends back within ``seconds`` (s); raises Failed, TimeoutError, OSError, EOFError."""
         end = time.perf_counter() + seconds
         self.link.settimeout(seconds)
         self.link.sendall(sent)
         got = self._receive_more(b"", byte_count, end)
-        if got[:4] == TOLD_MARK:
+        if got[:4] == FAILURE_MARK:
             length = HEAD_LAYOUT.unpack_from(got)[1]
-            raise Failed(
+            raise ProcessFailed(
                 json.loads(
                     self._receive_more(got, min(HEAD_LAYOUT.size + length, FAILURE_TEXT_BYTES), end)[HEAD_LAYOUT.size :]
                 )
@@ -99,9 +100,11 @@ class ProcessController:
         return got
 
     def _receive_more(self, received: bytes, byte_count: int, deadline: float) -> bytes:
-        """Receive until ``byte_count`` bytes are there, or until a complete, shorter frame reports a failure."""
+        """All bytes received until ``byte_count`` bytes are there, or until a complete, shorter frame reports a
+        failure.
+        """
         while len(received) < byte_count and not (
-            received[:4] == TOLD_MARK and HEAD_LAYOUT.size <= len(received) == _failure_length(received)
+            received[:4] == FAILURE_MARK and HEAD_LAYOUT.size <= len(received) == _failure_length(received)
         ):
             received_part = self.link.recv(byte_count - len(received))
             left = deadline - time.perf_counter()
@@ -116,11 +119,12 @@ class ProcessController:
 
 
 def _failure_length(received: bytes) -> int:
-    """Length of the frame that reports a failure, read from its head."""
+    """Length (bytes) of the frame that reports a failure, read from its head."""
     return HEAD_LAYOUT.size + int(HEAD_LAYOUT.unpack_from(received)[1])
 
 
-def _as_input(failure: dict[str, Any]) -> InputError | RunFailed:
+def _error_of_failure(failure: dict[str, Any]) -> InputError | RunFailed:
+    """The failure that a process reports, as the error to raise."""
     if "place" not in failure:
         return RunFailed("controller", f"{failure.get('name')}: {failure.get('reason')}")
     return InputError(
@@ -130,8 +134,8 @@ def _as_input(failure: dict[str, Any]) -> InputError | RunFailed:
 
 @contextmanager
 def controller_in_process(guest: HostedController, timeout: float, start_seconds: float) -> Iterator[ProcessController]:
-    """The controller of a guest in a separate process, as a context manager; start_seconds : seconds allowed for making
-    it.
+    """The controller of a ``HostedController`` in a separate process, as a context manager; start_seconds : time (s)
+    allowed for making it.
 
     However the block ends, no process of it stays. Raises InputError, RunFailed.
     """

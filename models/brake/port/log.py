@@ -1,4 +1,4 @@
-"""Every exchange in a file, and a controller that replays it.
+"""Log file of every exchange with a controller, and a controller that replays a log.
 
 File: the line ``twinrig braking port log 1``, one line with 64 hexadecimal digits that name the scene, then per
 exchange the frame of the question and that of the answer, as in ``frame``.
@@ -19,8 +19,8 @@ LOG_TITLE = b"twinrig braking port log 1\n"
 RECORD_LENGTH = QUESTION_LAYOUT.size + ANSWER_LAYOUT.size
 
 
-def name_of(scene: str) -> str:
-    """Hash of a scene's text, 64 hexadecimal digits, that identifies the scene."""
+def scene_hash(scene: str) -> str:
+    """Hash of a scene's text, 64 hexadecimal digits, by which a log identifies its scene."""
     return sha256(scene.encode()).hexdigest()
 
 
@@ -32,7 +32,7 @@ class LoggedController:
     file: BinaryIO
 
     def sample(self, sample: Sample) -> Command:
-        """The controller's commands for a sample, which are also written to the log."""
+        """The controller's command for a sample; both are written to the log."""
         question = question_frame(sample)  # before a controller can write into what it is given
         command = self.controller.sample(sample)
         self.file.write(question + answer_frame(sample.number, command))
@@ -41,14 +41,16 @@ class LoggedController:
 
 @contextmanager
 def logged_controller(controller: Controller, path: Path, scene: str) -> Iterator[LoggedController]:
-    """The controller ``controller``, writing a log of its exchanges, as a context manager; scene: from ``name_of``."""
+    """The controller with a log of its exchanges, as a context manager; scene : hash from ``scene_hash``."""
     with path.open("wb") as file:
         file.write(LOG_TITLE + scene.encode() + b"\n")
         yield LoggedController(controller, file)
 
 
 def log_refusal(path: Path) -> str:
-    """Why no log can be written to a path, or "" if one can. An older log is overwritten, any other file is not."""
+    """Reason why no log can be written to a path, or "" if it can. An older log is overwritten, any other file is
+    not.
+    """
     if path.is_dir():
         return "is a folder: name a file"
     if not path.parent.is_dir():
@@ -61,8 +63,9 @@ def log_refusal(path: Path) -> str:
 
 
 class Replay:
-    """Gives the logged answers as long as the questions equal the logged ones; raises InputError for another scene's
-    log."""
+    """Controller that repeats the commands of a log as long as the samples equal the logged ones; raises InputError for
+    another scene's log.
+    """
 
     def __init__(self, path: Path, scene: str) -> None:
         try:
@@ -76,8 +79,9 @@ class Replay:
         self._records, self._path = records, path
 
     def sample(self, sample: Sample) -> Command:
-        """The logged answer to a sample; raises RunFailed if the log has ended, or if its question differs from this
-        one."""
+        """The logged command for a sample; raises RunFailed if the log has ended, or if its sample differs from this
+        one.
+        """
         start = sample.number * RECORD_LENGTH
         record, position_text = (
             self._records[start : start + RECORD_LENGTH],

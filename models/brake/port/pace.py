@@ -1,4 +1,4 @@
-"""The clock on the wall: each exchange at its time, with overruns counted; the numbers stay the same."""
+"""Pacing by the wall clock: each exchange takes place at its time, with overruns counted; the results stay the same."""
 
 import time
 from dataclasses import dataclass
@@ -21,8 +21,9 @@ class WallClock:
     _start: float | None = None
 
     def sample(self, sample: Sample) -> Command:
-        """The controller's commands for a sample. The controller is asked only when the wall clock has reached the
-        sample's time."""
+        """The controller's command for a sample. The controller is called only when the wall clock has reached the
+        sample's time.
+        """
         now = time.perf_counter()
         if self._start is None:
             self._start = now - 1e-9 * sample.time
@@ -36,5 +37,5 @@ class WallClock:
         return command
 
     def report(self) -> str:
-        """One line of text on overruns."""
+        """One line of text on the number of overruns and the worst one."""
         return f"{self.overruns} overruns, the worst by {1e3 * self.worst:.3f} ms"

@@ -1,4 +1,4 @@
-"""Signals on their way to the controller, and pressures on their way back: gain, offset, noise and bits.
+"""Sensors of the controller port, for wheel speeds and commanded pressures: gain, offset, noise and conversion to bits.
 
 A signal x arrives as ``gain x + offset + noise``, and with ``bits`` it is converted: cut to 0 to ``range`` and rounded
 to one of the 2^bits codes, of which the last is ``range``. Nothing named, nothing changes, not by a bit.
@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from models.brake.controller import Command, Controller, Sample
-from models.brake.port.teeth import Counted
+from models.brake.port.teeth import ToothCounter
 from models.core.noise import BRAKE_PRESSURES, BRAKE_SIGNALS, SAMPLES_PER_BLOCK, normal_samples
 from models.core.strict import Strict, quantity
 
@@ -35,7 +35,8 @@ class Conversion(Strict):
 
 class Channels:
     """Conversion of several signals by sensors, sample by sample from 0 on. source: of the noise, see
-    ``models.core.noise``."""
+    ``models.core.noise``.
+    """
 
     def __init__(self, conversion: Conversion, channel_count: int, source: int) -> None:
         self.conversion, self._count, self._source = conversion, channel_count, source
@@ -76,11 +77,12 @@ class SensedController:
     controller: Controller
     wheels: Channels
     pressures: Channels
-    tooth_counter: Counted | None = None
+    tooth_counter: ToothCounter | None = None
 
     def sample(self, sample: Sample) -> Command:
-        """The controller's commands for measured signals, delayed on their way to the valves; negative pressures become
-        zero."""
+        """The controller's command for measured signals; pressures of the command are measured, too, and cut at
+        zero.
+        """
         wheel_signals = sample.wheels if self.tooth_counter is None else self.tooth_counter(sample)
         command = self.controller.sample(sample._replace(wheels=self.wheels(sample.number, wheel_signals)))
         if command.pressures is None:
@@ -91,7 +93,7 @@ class SensedController:
 def controller_behind_sensors(
     controller: Controller, wheels: int, signals: Conversion, pressures: Conversion, **extras: Any
 ) -> SensedController:
-    """A controller behind the sensors of W wheels."""
+    """A controller that receives the signals of W wheels through sensors."""
     return SensedController(
         controller, Channels(signals, wheels, BRAKE_SIGNALS), Channels(pressures, wheels, BRAKE_PRESSURES), **extras
     )

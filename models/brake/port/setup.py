@@ -1,4 +1,6 @@
-"""The port as a scene gives it: what stands behind it, its signals, faults, log and clock; opened for one run."""
+"""Set-up of the controller port from a scene: the controller behind it, its signals, faults, log and clock; opened for
+one run.
+"""
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -18,22 +20,23 @@ from models.brake.port.ask import STATES_WITH_SLOW_APPLY, VALVE_STATES, CheckedC
 from models.brake.port.faults import Fault, FaultyController, missing_teeth
 from models.brake.port.host import HostedController
 from models.brake.port.hosted import controller_in_process
-from models.brake.port.log import Replay, log_refusal, logged_controller, name_of
+from models.brake.port.log import Replay, log_refusal, logged_controller, scene_hash
 from models.brake.port.pace import WallClock
 from models.brake.port.sensors import Conversion, controller_behind_sensors
-from models.brake.port.teeth import Counted, Teeth
+from models.brake.port.teeth import Teeth, ToothCounter
 from models.core.errors import InputError
 from models.core.strict import Strict, quantity
 
 PORT_KEYS = ("callable", "command", "port", "fmu", "replay")
-"""What can stand behind the port in place of a controller of the scene; at most one does."""
-BY_HAND = 20.0
-"""s for a process that somebody starts by hand to connect to a port, where the scene does not say."""
+"""Keys for what can stand behind the port in place of the scene's controller; at most one is given."""
+MANUAL_START_SECONDS = 20.0
+"""Time (s) within which a process that somebody starts by hand must connect to a port, where the scene does not say."""
 
 
 class PortTable(Strict):
-    """[port]: paths are seen from the scene's folder; {procedure} in them is the name of what is driven, {engine} that
-    of what computes it."""
+    """[port]: the controller behind the port, its signals, faults and log. Paths start from the scene's folder;
+    {procedure} in them is the name of the simulated procedure, {engine} that of the engine.
+    """
 
     callable: str | None = Field(default=None, description="module:Name or file.py:Name, a class")
     parameters: dict[str, Any] = Field(
@@ -59,7 +62,7 @@ class PortTable(Strict):
         """Time (s) within which the controller must be ready."""
         if self.start is not None:
             return self.start
-        return self.timeout if self.port is None else BY_HAND
+        return self.timeout if self.port is None else MANUAL_START_SECONDS
 
     @model_validator(mode="after")
     def _one_behind(self) -> "PortTable":
@@ -77,7 +80,8 @@ class PortTable(Strict):
 class ControllerRun:
     """Data of a run that the port needs. radius (W,): of the wheels, m; sample: s; scene: its text, which identifies
     logs; folder: from which paths start; file: name of the scene, for messages; procedure, engine: names that file
-    names may contain; slow: whether valves can apply slowly."""
+    names may contain; slow: whether valves can apply slowly.
+    """
 
     radius: np.ndarray
     sample: float
@@ -89,7 +93,7 @@ class ControllerRun:
     slow: bool = False
 
     def path(self, name: str) -> Path:
-        """Path of a file that the table names."""
+        """Path of a file that the scene's port table names."""
         return self.folder / name.replace("{procedure}", self.procedure).replace("{engine}", self.engine)
 
 
@@ -110,9 +114,11 @@ def controller_of_run(
         clock = WallClock(inner, run.sample) if table.pace == "wall" else None
         watched: Controller = inner if clock is None else clock
         if table.log is not None:
-            watched = stack.enter_context(logged_controller(watched, run.path(table.log), name_of(run.scene)))
+            watched = stack.enter_context(logged_controller(watched, run.path(table.log), scene_hash(run.scene)))
         faulty = FaultyController(watched, table.faults) if table.faults else watched
-        teeth = None if table.teeth is None else Counted(table.teeth, run.radius, partial(missing_teeth, table.faults))
+        teeth = (
+            None if table.teeth is None else ToothCounter(table.teeth, run.radius, partial(missing_teeth, table.faults))
+        )
         plain = teeth is None and table.signals == table.pressures == Conversion()
         wheels = run.radius.size
         yield (
@@ -126,18 +132,19 @@ def controller_of_run(
 @contextmanager
 def _possible_controllers(table: PortTable, run: ControllerRun, controller: Controller) -> Iterator[Controller]:
     """The controller that the table names, as a context manager: behind a socket, in a hosted process or a replayed
-    log; else ``controller``."""
+    log; else ``controller``.
+    """
     with ExitStack() as stack:
         if table.command is not None or table.port is not None:
-            with _told_of_scene(table, run):
+            with _errors_of_scene_key(table, run):
                 link = socket_port.controller_behind_socket(
                     table.command, table.port or 0, table.timeout, table.patience, run.folder
                 )
                 entered = stack.enter_context(link)
             yield entered
         elif table.replay is not None:
-            with _told_of_scene(table, run):
-                replay = Replay(run.path(table.replay), name_of(run.scene))
+            with _errors_of_scene_key(table, run):
+                replay = Replay(run.path(table.replay), scene_hash(run.scene))
             yield replay
         elif table.callable is not None or table.fmu is not None:
             folder = run.folder if table.fmu is None else Path(stack.enter_context(TemporaryDirectory()))
@@ -145,7 +152,7 @@ def _possible_controllers(table: PortTable, run: ControllerRun, controller: Cont
             guest = HostedController(
                 table.callable, fmu, folder, run.radius.size, run.sample, table.parameters, run.file
             )
-            with _told_of_scene(table, run):
+            with _errors_of_scene_key(table, run):
                 made = stack.enter_context(controller_in_process(guest, table.timeout, table.patience))
             yield made
         else:
@@ -153,9 +160,10 @@ def _possible_controllers(table: PortTable, run: ControllerRun, controller: Cont
 
 
 @contextmanager
-def _told_of_scene(table: PortTable, run: ControllerRun) -> Iterator[None]:
+def _errors_of_scene_key(table: PortTable, run: ControllerRun) -> Iterator[None]:
     """Context that converts errors about a named controller into errors about the scene's key; errors inside a file
-    name that file."""
+    name that file.
+    """
     try:
         yield
     except InputError as error:
@@ -177,7 +185,7 @@ def check_port(table: PortTable, run: ControllerRun) -> None:
         raise InputError(run.file, "port.log", table.log, reason)
     wheels = run.radius.size
     for i, fault in enumerate(table.faults):
-        for wheel in fault.of(wheels):
+        for wheel in fault.affected_wheels(wheels):
             if not 0 <= wheel < wheels:
                 raise InputError(run.file, f"port.faults.{i}.wheels", wheel, f"must be from 0 to {wheels - 1}")
         if fault.tooth is not None and table.teeth is not None and fault.tooth >= table.teeth.teeth:

@@ -1,4 +1,4 @@
-"""A controller in a second process, over a TCP socket of this machine alone; the frames are those of ``frame``."""
+"""Controllers in a second process, over a TCP socket of this machine alone; ``frame`` defines the frames."""
 
 import os
 import signal
@@ -16,18 +16,18 @@ from models.brake.port.frame import ANSWER_LAYOUT, WrongFrame, command_of_answer
 from models.core.errors import InputError, RunFailed
 
 LOOPBACK_ADDRESS = "127.0.0.1"
-"""The only address that this port ever listens on."""
+"""The only address at which the port listens: this machine."""
 STANDARD_ERROR = 2
-"""Where a controller's own prints go: standard output is for the results alone."""
+"""File number of standard error, to which a controller's prints go: standard output is for the results alone."""
 START_REMEDY = "if it needs longer, give start (s) under [port]"
-"""Remedy where a controller is not there in time."""
+"""Text on the remedy where a controller does not connect in time."""
 GRACE_SECONDS = 0.5
-"""Seconds for a process to end by itself once its connection is closed at the end of a run."""
+"""Time (s) for a process to end by itself once its connection is closed at the end of a run."""
 
 
 @dataclass
 class SocketPort:
-    """The controller at the other end of a connection; each answer must be whole within ``timeout`` seconds.
+    """The controller at the other end of a connection; each answer must arrive completely within ``timeout`` seconds.
 
     process : that answers, if it was started here.
     """
@@ -37,7 +37,7 @@ class SocketPort:
     process: subprocess.Popen[bytes] | None = None
 
     def sample(self, sample: Sample) -> Command:
-        """The commands of a controller behind a socket for a sample; raises ControllerFailed."""
+        """The command of the controller behind the socket for a sample; raises ControllerFailed."""
         end = time.perf_counter() + self.timeout
         try:
             self.link.settimeout(self.timeout)
@@ -55,7 +55,9 @@ class SocketPort:
             ) from None
 
     def _frame(self, sample: Sample, deadline: float) -> bytes:
-        """Receive exactly one answer; further bytes would answer a question that has not been asked yet."""
+        """Exactly one answer frame, received by a deadline; further bytes would answer a sample that has not been sent
+        yet.
+        """
         got = b""
         while len(got) < ANSWER_LAYOUT.size:
             try:
@@ -80,7 +82,7 @@ class SocketPort:
 
 
 def end_of_process(process: subprocess.Popen[bytes] | None, patience: float) -> str:
-    """How a process with a closed connection ended, as a phrase; "" if it did not end within some seconds."""
+    """Phrase on how a process with a closed connection ended; "" if it did not end within some tenths of a second."""
     if process is None:
         return ""
     with suppress(subprocess.TimeoutExpired):

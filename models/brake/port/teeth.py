@@ -1,4 +1,4 @@
-"""Wheel speed counted from a toothed wheel with a timer: period measurement.
+"""Wheel speed counted from a toothed wheel with a timer: measurement of the period between tooth edges.
 
 Between two samples a wheel's speed is taken to be linear in time, so that the instant of each tooth's edge is the root
 of a quadratic. A timer of ticks tells that instant, rounded down. A sample's speed is the way of the edges that came
@@ -19,15 +19,16 @@ Missing = Callable[[int, int, float], bool]
 
 
 class Teeth(Strict):
-    """A toothed wheel and its timer."""
+    """A toothed wheel with its timer."""
 
     teeth: int = Field(default=100, ge=1, le=10000, description="of one turn")
     tick: float = quantity("s", "of the timer", default=1e-6)
 
 
-class Counted:
+class ToothCounter:
     """Speed signals from the teeth of W wheels, from sample 0 on. radius (W,): m; missing(wheel, tooth, time in s):
-    whether a tooth is missing."""
+    whether a tooth is missing.
+    """
 
     def __init__(self, teeth: Teeth, radius: np.ndarray, missing: Missing | None = None) -> None:
         self._teeth, self._missing = teeth, missing
@@ -42,12 +43,12 @@ class Counted:
             self._wheels = [_Wheel(speed) for speed in speeds]
         elif sample_time > self._before:
             for i, (wheel, speed) in enumerate(zip(self._wheels, speeds, strict=True)):
-                self._go_on(i, wheel, speed, sample_time)
+                self._advance_counter(i, wheel, speed, sample_time)
         self._before = sample_time
         return np.array([wheel.shown for wheel in self._wheels])
 
-    def _go_on(self, i: int, wheel: "_Wheel", speed: float, time: float) -> None:
-        """Advance the tooth counter of wheel i from the last sample to ``time``."""
+    def _advance_counter(self, i: int, wheel: "_Wheel", speed: float, time: float) -> None:
+        """Advance the tooth counter of wheel i from the last sample to ``time`` (s)."""
         tooth_pitch, step = self._way[i], time - self._before
         turned_teeth = wheel.turned + 0.5 * (wheel.speed + speed) * step / tooth_pitch
         edges = [
@@ -69,7 +70,9 @@ class Counted:
 
 
 class _Wheel:
-    """State of a toothed wheel's sensor, in units of teeth since the start, s, and m/s."""
+    """State of a toothed wheel's sensor: angle in teeth since the start, true and measured speed (m/s), and time of the
+    last edge (s).
+    """
 
     def __init__(self, speed: float) -> None:
         self.turned, self.speed, self.shown = 0.5, speed, speed
@@ -77,7 +80,7 @@ class _Wheel:
 
 
 def _time_of_distance(distance: float, speed_before: float, speed_after: float, step: float) -> float:
-    """Time (s) in which a distance is covered, while speed changes linearly between two values over a step."""
+    """Time (s) in which a distance (m) is covered, while speed changes linearly between two values over a step (s)."""
     slope = (speed_after - speed_before) / step
     root = math.sqrt(max(speed_before * speed_before + 2.0 * slope * distance, 0.0))
     return min(2.0 * distance / (speed_before + root), step)

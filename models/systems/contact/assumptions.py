@@ -6,8 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from models.contact.accuracy import SLENDER
-from models.contact.limits import CONSTANT_FRICTION, HALF_SPACE, NO_SLIP, SMALL_CREEPAGE, YIELDS, yields
+from models.contact.accuracy import MEASURED_AXIS_RATIOS
+from models.contact.limits import (
+    CONSTANT_FRICTION,
+    LARGEST_AXIS_SHARE,
+    LINEAR_FORCE_SHARE,
+    SMALL_CREEPAGE,
+    YIELD_PRESSURE,
+    yield_is_known,
+)
 from models.contact.theories import Fastsim, LinearTheory, OnEllipse, OnPatches, RollingContact
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
@@ -34,7 +41,7 @@ def assumptions(scene: ContactScene, body: RollingContact) -> list[Assumption]:
 def of_pressing(scene: ContactScene, body: RollingContact) -> list[Assumption]:
     """Assumptions about bodies that are pressed together, whether they roll or not."""
     listed = [_half_space(_by_radii(scene, body))]
-    if yields(scene.bodies.wheel, scene.bodies.rail):
+    if yield_is_known(scene.bodies.wheel, scene.bodies.rail):
         listed.append(_elastic_assumption(lambda run: {"contact": np.array([1e-6 * body.pressing.peak])}))
     return listed + (_on_profiles(body) if scene.profiles is not None and isinstance(body, OnPatches) else [])
 
@@ -59,7 +66,7 @@ def _half_space(watch: Callable[[Result], Watched]) -> Assumption:
         "lower the load, or compute with finite elements",
         watch,
         "of the radius",
-        upper_limit=HALF_SPACE,
+        upper_limit=LARGEST_AXIS_SHARE,
     )
 
 
@@ -92,7 +99,7 @@ def _elastic_assumption(watch: Callable[[Result], Watched]) -> Assumption:
         "lower the load or take larger radii: a real contact would be larger and its pressure lower",
         watch,
         "MPa",
-        upper_limit=1e-6 * YIELDS,
+        upper_limit=1e-6 * YIELD_PRESSURE,
     )
 
 
@@ -140,7 +147,7 @@ def _no_slip_assumption(watch: Callable[[Result], Watched]) -> Assumption:
         'name the effect saturation: method.name = "fastsim"',
         watch,
         "mu N",
-        upper_limit=NO_SLIP,
+        upper_limit=LINEAR_FORCE_SHARE,
     )
 
 
@@ -157,7 +164,7 @@ def _slender_assumption(watch: Callable[[Result], Watched]) -> Assumption:
         'name the effect half_space: method.name = "exact"',
         watch,
         "",
-        *SLENDER,
+        *MEASURED_AXIS_RATIOS,
     )
 
 

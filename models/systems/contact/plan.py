@@ -2,7 +2,7 @@
 
 from contextlib import suppress
 
-from models.contact.limits import HALF_SPACE
+from models.contact.limits import LARGEST_AXIS_SHARE
 from models.core.assumptions import Assumption, assumption_lines
 from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
@@ -32,10 +32,10 @@ def findings(scene: ContactScene) -> tuple[Finding, ...]:
     doubts = list[Finding]()
     for name, radius in scene.radii:
         axis = float(area.a if name.endswith("x") else area.b)
-        if radius is not None and axis > HALF_SPACE * abs(radius):
+        if radius is not None and axis > LARGEST_AXIS_SHARE * abs(radius):
             text = (
                 f"radii.{name}: {radius:.4g} m, where the contact is {axis:.4g} m long to either side; its theory "
-                f"needs radii of at least {axis / HALF_SPACE:.3g} m. Radii are in m, loads in N."
+                f"needs radii of at least {axis / LARGEST_AXIS_SHARE:.3g} m. Radii are in m, loads in N."
             )
             doubts.append(Finding("size", "doubt", f"radii.{name}", text, radius, "m"))
     return tuple(doubts)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from models.contact.limits import FAST_SLIP, HALF_SPACE, SMALL_CREEPAGE, YIELDS, yields
+from models.contact.limits import FAST_SLIP, LARGEST_AXIS_SHARE, SMALL_CREEPAGE, YIELD_PRESSURE, yield_is_known
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.rail.contact_table import PatchReport
@@ -18,7 +18,7 @@ def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
     result.
     """
     listed = [_half_space(), _within_profiles(scene)]
-    if yields(scene.bodies.wheel, scene.bodies.rail):
+    if yield_is_known(scene.bodies.wheel, scene.bodies.rail):
         listed.append(_elastic_assumption())
     if friction > 0.0:
         listed += [_small_creepage(), _slow_slip(scene.wheelset.speed)]
@@ -53,7 +53,7 @@ def _half_space() -> Assumption:
         "lower wheelset.load, or compute with finite elements",
         _extreme_of_patches(share),
         "of the radius",
-        upper_limit=HALF_SPACE,
+        upper_limit=LARGEST_AXIS_SHARE,
     )
 
 
@@ -84,7 +84,7 @@ def _elastic_assumption() -> Assumption:
         "lower wheelset.load: a real contact would be larger and its pressure lower",
         _extreme_of_patches(lambda patch: 1e-6 * patch.peak),
         "MPa",
-        upper_limit=1e-6 * YIELDS,
+        upper_limit=1e-6 * YIELD_PRESSURE,
     )
 
 

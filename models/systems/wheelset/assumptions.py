@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from models.contact.inputs import Array
-from models.contact.limits import FAST_SLIP, HALF_SPACE, NO_SLIP, YIELDS, yields
+from models.contact.limits import FAST_SLIP, LARGEST_AXIS_SHARE, LINEAR_FORCE_SHARE, YIELD_PRESSURE, yield_is_known
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.rail import wheel_forces as wf
@@ -37,7 +37,7 @@ def assumptions(equations: Equations) -> list[Assumption]:
         _half_space(),
         _slow_slip(equations),
     ]
-    listed += [_elastic_assumption()] if yields(wheelset.material) else []
+    listed += [_elastic_assumption()] if yield_is_known(wheelset.material) else []
     listed += [_no_slip_assumption(wheelset)] if equations.law == "linear" else []
     listed += [_travel_assumption(wheelset)] if equations.body.held else []
     if wheelset.profiles is not None:
@@ -147,7 +147,7 @@ def _half_space() -> Assumption:
         "lower the load, or use profiles whose radii are larger",
         _watch_of_patches(watched),
         "of the radius",
-        upper_limit=HALF_SPACE,
+        upper_limit=LARGEST_AXIS_SHARE,
     )
 
 
@@ -162,7 +162,7 @@ def _elastic_assumption() -> Assumption:
         "lower the load or the displacement: real contacts would be larger, and their pressure lower",
         _watch_of_patches(watched),
         "MPa",
-        upper_limit=1e-6 * YIELDS,
+        upper_limit=1e-6 * YIELD_PRESSURE,
     )
 
 
@@ -191,7 +191,7 @@ def _no_slip_assumption(wheelset: Wheelset) -> Assumption:
         'name the effect fastsim: contact.law = "fastsim"',
         _watch_of_path(watched),
         "mu N",
-        upper_limit=NO_SLIP,
+        upper_limit=LINEAR_FORCE_SHARE,
     )
 
 

@@ -1,4 +1,6 @@
-"""Braking: quantities are the numbers of a stop and of its wheels, a case per procedure."""
+"""Braking scenes for a choice of effects: quantities are the figures of a stop and of its wheels, with one case per
+procedure.
+"""
 
 import time
 from collections import defaultdict
@@ -17,8 +19,8 @@ ENGINE, WINDOWED = "reference", False
 
 
 def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -> RunQuantities:
-    """Drive every procedure and collect its quantities. Those that are not finite, as in a run that does not stop, are
-    left out.
+    """Simulate every braking procedure and collect its quantities. A quantity that is not finite, as where the vehicle
+    does not stop, is left out.
     """
     numbers, steps, states, seconds = defaultdict[str, list[np.ndarray]](list), 0, 0, 0.0
     (engine,) = engines_of(scene, (engine,)) or (engine,)
@@ -45,12 +47,14 @@ def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -
 
 
 def steps(scene: BrakingScene) -> int:
-    """Number of steps of a procedure that lasts as long as a run may."""
+    """Number of steps of a braking procedure that lasts for the longest duration that the scene allows."""
     return round(scene.run.duration / scene.run.sample) * scene.run.substeps
 
 
-def parts(scene: BrakingScene) -> int:
-    """Number of steps within a sample. Only these steps may become longer; the controller's samples stay."""
+def divisible_steps(scene: BrakingScene) -> int:
+    """Number of time steps within a controller sample, which a longer step must divide: only these steps may become
+    longer, the controller's samples stay.
+    """
     return scene.run.substeps
 
 

@@ -1,4 +1,6 @@
-"""Rolling contact: quantities are the forces, a case per creepage; every creepage counts as a call."""
+"""Rolling contact scenes for a choice of effects: quantities are the contact forces, one case per creepage, and every
+creepage counts as a call.
+"""
 
 from typing import Any
 
@@ -12,7 +14,7 @@ QUANTITIES = ("fx", "fy", "mz", "dissipation")
 
 
 def computed_quantities(scene: ContactScene, engine: str, error: bool = False) -> RunQuantities:
-    """Press the bodies together, roll them at every creepage, and collect the quantities."""
+    """Solve the contact at every creepage, and collect forces, spin moment and dissipation."""
     if scene.cases is not None:
         raise InputError(scene.file, "cases", None, "is a table of contacts: give the price of one of them")
     forces = run(scene, error=error)
@@ -25,8 +27,8 @@ def steps(scene: ContactScene) -> int:
     return len(creepages(scene))
 
 
-def parts(scene: ContactScene) -> int:
-    """Number of parts into which a step can be cut: 1, as a contact has no time steps."""
+def divisible_steps(scene: ContactScene) -> int:
+    """Number of steps that a longer step must divide: 1, as a contact has no time steps."""
     return 1
 
 

@@ -1,4 +1,6 @@
-"""A car on rolling tyres: quantities are its motion, loads and forces, a case per manoeuvre."""
+"""Handling scenes, a car on rolling tyres, for a choice of effects: quantities are its motion, loads and forces, one
+case per manoeuvre.
+"""
 
 from typing import Any
 
@@ -11,11 +13,11 @@ from models.systems.handling.scene import HandlingScene
 ENGINE, WINDOWED = "mujoco", True
 MOTION_CHANNELS = {"speed": (0, "m/s"), "side speed": (1, "m/s"), "yaw rate": (2, "rad/s")}
 TYRE_QUANTITIES = ("load", "fx", "fy", "mz")
-"""Of every tyre, a case each."""
+"""Channels of the tyres that are compared, with a case for each tyre."""
 
 
 def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) -> RunQuantities:
-    """Drive every manoeuvre and collect the quantities."""
+    """Simulate every manoeuvre and collect the vehicle's motion and its tyres' loads and forces."""
     runs = [run(scene, engine, name, error) for name in scene.manoeuvres]
     drives = [handling_run.detail for handling_run in runs]
     speeds = [drive.velocity() for drive in drives]
@@ -41,11 +43,11 @@ def steps(scene: HandlingScene) -> int:
     return min(round(manoeuvre.duration / scene.run.step) for manoeuvre in scene.manoeuvres.values())
 
 
-parts = steps
+divisible_steps = steps
 
 
 def shorten(table: dict[str, Any], scene: HandlingScene, steps: int) -> None:
-    """Shorten every manoeuvre of the table to at most ``steps`` of the scene's time steps."""
+    """Edit the table to shorten every manoeuvre to at most ``steps`` of the scene's time steps."""
     for name, manoeuvre in table["manoeuvres"].items():
         manoeuvre["duration"] = min(scene.manoeuvres[name].duration, steps * scene.run.step)
 

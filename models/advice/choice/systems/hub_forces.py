@@ -1,4 +1,6 @@
-"""A vehicle cut at its wheels: quantities are the chassis' motion under its hub forces, and every element's force."""
+"""Scenes of a vehicle cut at its wheel hubs, for a choice of effects: quantities are the chassis motion under measured
+hub forces, and the force of every element.
+"""
 
 from typing import Any
 
@@ -10,7 +12,9 @@ ENGINE, WINDOWED = "mujoco", True
 
 
 def computed_quantities(scene: HubScene, engine: str, error: bool = False) -> RunQuantities:
-    """Measure hub forces, run the vehicle with roll and pitch held as in the scene, and collect the quantities."""
+    """Measure hub forces, run the vehicle with roll and pitch held as in the scene, and collect the chassis motion and
+    the element forces.
+    """
     path = run(scene, engine, error=error)
     quantities = {name: Quantity(unit, (path[name],)) for name, (_, unit) in MOTION_CHANNELS.items()}
     names = path.data["element"].values
@@ -26,11 +30,11 @@ def steps(scene: HubScene) -> int:
     return scene.steps
 
 
-parts = steps
+divisible_steps = steps
 
 
 def shorten(table: dict[str, Any], scene: HubScene, steps: int) -> None:
-    """Shorten the run to ``steps`` steps of the scene's own length."""
+    """Edit the table to shorten the run to ``steps`` time steps of the scene's own length."""
     table.setdefault("run", {})["duration"] = steps * scene.run.step
 
 

@@ -1,5 +1,6 @@
-"""A recording of a vehicle in space: its quantities are the section forces, with roll and pitch held as in the
-scene."""
+"""Recordings of a vehicle in space, for a choice of effects: quantities are the section forces, with roll and pitch
+held as in the scene.
+"""
 
 import math
 import tempfile
@@ -14,12 +15,14 @@ from models.systems.measured.scene import MeasuredScene
 
 ENGINE, WINDOWED = "mujoco", True
 SHORTEST_PART_STEPS = 60
-"""Steps of which whole numbers make up the shortest part, so that it can be taken in longer steps, too."""
+"""Number of steps of which whole multiples make up the shortest part of a recording, so that it can be computed with
+longer steps, too.
+"""
 
 
 def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) -> RunQuantities:
-    """Bring the measurement onto one clock, run the vehicle, and collect the quantities; the seconds are those of the
-    march.
+    """Bring the measurement onto one clock, run the vehicle, and collect the section forces; the seconds are those of
+    the time integration.
     """
     if scene.vehicle.file is None:
         allowed = "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file"
@@ -39,7 +42,7 @@ def steps(scene: MeasuredScene) -> int:
     return round(_period_and_duration(scene)[1] / _step(scene))
 
 
-parts = steps
+divisible_steps = steps
 
 
 def _step(scene: MeasuredScene) -> float:
@@ -60,8 +63,8 @@ def _period_and_duration(scene: MeasuredScene) -> tuple[float, float]:
 
 
 def shorten(table: dict[str, Any], scene: MeasuredScene, few: int) -> None:
-    """Shorten the run to ``few`` steps, at least as many as a recording must have; a virtual measurement ends then,
-    too.
+    """Edit the table to shorten the run to ``few`` steps, but no less than a recording must have; a virtual measurement
+    is shortened with it.
     """
     period, full_duration = _period_and_duration(scene)
     least_steps = SHORTEST_PART_STEPS * math.ceil(FEWEST_SAMPLES * period / (_step(scene) * SHORTEST_PART_STEPS))

@@ -1,4 +1,4 @@
-"""The pitch-plane vehicle: quantities are the channels of its result."""
+"""Scenes of the pitch-plane vehicle, for a choice of effects: quantities are the channels of its result."""
 
 import time
 from typing import Any
@@ -9,11 +9,11 @@ from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 
 ENGINE, WINDOWED = "reference", True
 CALLS_PER_STEP = {"RK4": 4, "RK44": 4, "Euler": 1}
-"""Calls of a step of methods that do not count them."""
+"""Right-hand side calls in a step of the methods that do not count them."""
 
 
 def computed_quantities(scene: Scene, engine: str, error: bool = False) -> RunQuantities:
-    """Run the scene and collect its quantities."""
+    """Run the pitch-plane scene and collect the channels of its result."""
     assembly = assembly_of_scene(scene)
     start_time = time.process_time()
     result = run(scene, engine, assembly=assembly, error=error)
@@ -35,11 +35,11 @@ def steps(scene: Scene) -> int:
     return round(scene.run.duration / scene.run.step)
 
 
-parts = steps
+divisible_steps = steps
 
 
 def shorten(table: dict[str, Any], scene: Scene, steps: int) -> None:
-    """Shorten the run to ``steps`` steps of the scene's own length."""
+    """Edit the table to shorten the run to ``steps`` time steps of the scene's own length."""
     table["run"] |= {"duration": steps * scene.run.step}
     table["run"].pop("output_step", None)
 

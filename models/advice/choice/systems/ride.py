@@ -1,4 +1,6 @@
-"""Ride with bent springs: quantities are the deviations of outputs, a case per speed, told by copies in time."""
+"""Ride scenes with nonlinear springs, for a choice of effects: quantities are standard deviations of outputs, one case
+per speed, estimated from copies of the vehicle in time.
+"""
 
 import time
 from math import gcd
@@ -17,8 +19,8 @@ ENGINE, WINDOWED = "reference", True
 
 
 def opened(scene: RideScene | CopiesInTime) -> CopiesInTime:
-    """The scene as copies that run in time, an object that can leave out effects, shorten the run and lengthen its
-    steps.
+    """The ride scene as an ensemble of copies that are integrated in time, an object that can leave out effects,
+    shorten the run and lengthen its steps.
     """
     if isinstance(scene, CopiesInTime):
         return scene
@@ -27,8 +29,8 @@ def opened(scene: RideScene | CopiesInTime) -> CopiesInTime:
 
 
 def computed_quantities(scene: CopiesInTime, engine: str, error: bool = False) -> RunQuantities:
-    """March the copies at every speed with their own equations, and collect the quantities; InputError for another
-    engine.
+    """Integrate the copies at every speed with their own equations, and collect the mean squares of the outputs;
+    InputError for another engine.
     """
     if engine != ENGINE:
         raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")
@@ -52,10 +54,10 @@ def computed_quantities(scene: CopiesInTime, engine: str, error: bool = False) -
 
 
 def steps(scene: CopiesInTime) -> int:
-    """Number of steps of all copies at all speeds."""
+    """Number of time steps of all copies at all speeds."""
     return scene.steps
 
 
-def parts(scene: CopiesInTime) -> int:
-    """Number by which the steps of a run can be grouped in whole numbers, both before and while outputs count."""
-    return STEP_MULTIPLE // gcd(STEP_MULTIPLE, scene.times)
+def divisible_steps(scene: CopiesInTime) -> int:
+    """Number of steps that a longer step must divide, both in the lead-in and while outputs are averaged."""
+    return STEP_MULTIPLE // gcd(STEP_MULTIPLE, scene.step_factor)

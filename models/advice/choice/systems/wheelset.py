@@ -1,4 +1,6 @@
-"""A wheelset on straight track: quantities are its states and contacts, a case per speed of a path."""
+"""Scenes of a wheelset on straight track, for a choice of effects: quantities are its states and contacts, one case per
+speed.
+"""
 
 from typing import Any
 
@@ -14,8 +16,8 @@ ENGINE, WINDOWED = "reference", True
 
 
 def computed_quantities(scene: WheelsetScene, engine: str, error: bool = False) -> RunQuantities:
-    """Compute every path and collect the quantities. A quantity of patches lists all times of the first patch, then
-    those of the next one.
+    """Compute the path at every speed and collect its states and contact quantities. A quantity of contact patches has
+    all times of the first patch, then all times of the next one.
     """
     paths = [run(scene, engine, speed, error=error) for speed in path_speeds(scene)]
     quantities = {
@@ -34,15 +36,17 @@ def computed_quantities(scene: WheelsetScene, engine: str, error: bool = False) 
 
 
 def steps(scene: WheelsetScene) -> int:
-    """Number of steps of every path."""
+    """Number of time steps of the path at every speed."""
     return round(scene.run.duration / scene.run.step)
 
 
-parts = steps
+divisible_steps = steps
 
 
 def shorten(table: dict[str, Any], scene: WheelsetScene, steps: int) -> None:
-    """Shorten the paths to ``steps`` steps of the scene's own length, at the speeds of the whole scene."""
+    """Edit the table to shorten the paths to ``steps`` time steps of the scene's own length, at the speeds of the whole
+    scene.
+    """
     table.setdefault("run", {}).update(duration=steps * scene.run.step, speeds=path_speeds(scene))
 
 

@@ -1,4 +1,6 @@
-"""A user's scene of braking as the search of the price of accuracy sees it: one of its procedures, to its end."""
+"""Price of accuracy of a user's braking scene: one of its procedures, up to standstill, with the steps of its only
+method.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -17,9 +19,9 @@ from models.systems.braking.stop_report import Stop
 
 METHOD_NAME = "exact wheel"
 SUBSTEPS_TRIED = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
-"""Steps within a sample that are tried, and those of the scene."""
+"""Numbers of steps within a controller sample that are tried, beside the scene's number."""
 FIRST_REFERENCE_SUBSTEPS, REFERENCE_RUNGS = 8, 8
-"""Substeps of the reference's first rung, and how many rungs there are."""
+"""Number of steps within a sample on the reference's first rung, and the number of its rungs."""
 USUAL_QUANTITY = "stopping_distance"
 QUANTITIES: dict[str, tuple[Any, str]] = {
     "stopping_distance": (lambda path: Stop(path).way[-1], "m"),
@@ -27,12 +29,12 @@ QUANTITIES: dict[str, tuple[Any, str]] = {
     "aside": (lambda path: path.states[-1, 0, 1], "m"),
     "yaw": (lambda path: path.states[-1, 0, 2], "rad"),
 }
-"""What can be asked about, at the end, and its unit."""
+"""Quantities that can be priced: functions that read them at the end of the stop, and their units."""
 
 
 @dataclass(frozen=True)
 class PricedBraking:
-    """Braking as a priced scene, see ``models.advice.price.PricedScene``. name : of the procedure."""
+    """A braking procedure as a priced scene, see ``models.advice.price.PricedScene``. name : of the procedure."""
 
     scene: BrakingScene
     name: str
@@ -52,11 +54,11 @@ class PricedBraking:
         return str(QUANTITIES[self.quantity][1])
 
     @property
-    def whole(self) -> float:
+    def full_duration(self) -> float:
         """Longest duration (s) that a run may take."""
         return self.scene.run.duration
 
-    first = whole
+    searched_duration = full_duration
 
     @property
     def counted(self) -> str:
@@ -64,7 +66,7 @@ class PricedBraking:
         return "force calls"
 
     def ladders(self) -> list[SettingLadder]:
-        """Ladder of steps for the only method of braking, one for each engine that carries the chassis."""
+        """Ladders of steps for the only method of braking, one for each engine that integrates the chassis."""
         run = self.scene.run
         values = tuple(run.sample / n for n in sorted({*SUBSTEPS_TRIED, run.substeps}))
         return [
@@ -72,7 +74,7 @@ class PricedBraking:
         ]
 
     def reference(self) -> SettingLadder:
-        """Ladder of the reference, with twice as many steps on every rung."""
+        """Ladder of the reference, with twice as many steps within a sample on every rung."""
         engine = "reference" if "reference" in engines_of(self.scene, ("reference", "exudyn", "mujoco")) else "mujoco"
         return SettingLadder(
             engine,
@@ -81,13 +83,13 @@ class PricedBraking:
             1,
         )
 
-    def second(self, reference_setting: Setting) -> Setting | None:
-        """None: there is only one method for a stop with valves in the loop."""
+    def second_setting(self, reference_setting: Setting) -> Setting | None:
+        """None: braking with valves in the loop has only one method."""
         return None
 
     def solve(self, setting: Setting, duration: float) -> tuple[int, BrakingPath]:
-        """Drive the procedure with a setting; returns the number of substeps and the path. RunFailed where it does not
-        end at rest.
+        """Simulate the braking procedure with a setting; returns the number of steps within a sample and the path.
+        RunFailed where the vehicle does not stop.
         """
         substeps = round(self.scene.run.sample / setting.value)
         run = self.scene.run.model_copy(update={"substeps": substeps})
@@ -96,8 +98,10 @@ class PricedBraking:
             raise RunFailed(setting.engine, f"the vehicle does not stand after {duration:g} s: give it longer")
         return substeps, path
 
-    def answer(self, solution: tuple[int, BrakingPath]) -> PricedRun:
-        """The quantity, a single number, as a constant history. Each step evaluates the forces of each wheel once."""
+    def priced_run(self, solution: tuple[int, BrakingPath]) -> PricedRun:
+        """The quantity, a single number, as a constant time history. Each step evaluates the forces of each wheel
+        once.
+        """
         substeps, path = solution
         value, calls = QUANTITIES[self.quantity][0](path), substeps * path.turning.shape[1] * (len(path.times) - 1)
         return PricedRun(np.array([0.0, 1.0]), np.full((2, 1), value), {"force calls": calls})

@@ -1,4 +1,5 @@
-"""A user's rolling contact, or table of contacts, as the search of the price of accuracy sees it: cells and marches.
+"""Price of accuracy of a user's rolling contact, or table of contacts: the number of cells and the integration scheme
+across them.
 
 The truth is the scene's own theory on ever finer cells: what the theory itself leaves out is no part of the price.
 """
@@ -18,28 +19,28 @@ from models.systems.contact.run import run, table_contacts
 from models.systems.contact.scene import ContactScene, Method
 
 PRICED_ROWS = 1000
-"""Rows of a table by which it is priced, the first ones."""
+"""Number of rows of a table, the first ones, in which the price is computed."""
 CELLS_TRIED = (5, 7, 9, 11, 15, 21, 31, 45, 63, 91, 127, 181, 255)
-"""Cells along each axis that are tried, and those of the scene."""
+"""Numbers of cells along each axis that are tried, beside the scene's number."""
 REFERENCE_CELLS = (25, 50, 100, 200, 400)
-"""Cells of the reference's rungs."""
+"""Numbers of cells along each axis on the reference's rungs."""
 MARCHES_OF_THEORY = {"fastsim": ("second-order", "plain"), "simplified": ("",)}
-"""Theories whose cells can be chosen, with the marches of each."""
+"""Contact theories whose cells can be chosen, with the integration schemes ("marches") of each."""
 UNIT_OF_CHANNEL = {"fx": "N", "fy": "N", "mz": "N m"}
 USUAL_QUANTITY = "fx,fy"
 
 
 @dataclass(frozen=True, eq=False)
 class PricedContact:
-    """A contact as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity; rows : those of
-    a table that can be answered; None for one contact at its creepages.
+    """A contact as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity; rows : the rows
+    of a table that can be solved; None for one contact at its creepages.
     """
 
     scene: ContactScene
     channels: tuple[str, ...]
     rows: RowBlock | None
     kink_period = 0.0
-    whole = first = 1.0
+    full_duration = searched_duration = 1.0
     counted = "contact cells"
 
     @property
@@ -54,21 +55,21 @@ class PricedContact:
 
     @property
     def unit(self) -> str:
-        """Unit that all channels share."""
+        """Unit that all channels of the quantity share."""
         return UNIT_OF_CHANNEL[self.channels[0]]
 
     @property
     def extent(self) -> str:
-        """Text on where the quantity is computed: at every creepage, or in rows of a table."""
+        """Text on where the quantity is computed: at every creepage, or in the first rows of a table."""
         return "at every creepage" if self.rows is None else f"in the first {len(self.rows.lines):,} sound rows"
 
     @property
     def note(self) -> str:
-        """Text on what the price leaves out: the error of the theory."""
+        """Text on what the price leaves out: the error of the contact theory."""
         return "errors are those of cells: how far the theory is off stands beside the forces of a run"
 
     def ladders(self) -> list[SettingLadder]:
-        """Ladder of cells for every march of the scene's theory."""
+        """Ladders of cell numbers for every integration scheme of the scene's theory."""
         name, usual = self.scene.method.name, self.scene.method
         values = tuple(1.0 / n for n in sorted({*CELLS_TRIED, usual.cells}))
         return [
@@ -83,15 +84,15 @@ class PricedContact:
         return int(self._method(march_name, self.scene.method.cells).order)
 
     def reference(self) -> SettingLadder:
-        """Ladder of the reference: cells that halve, with the march of the highest order."""
+        """Ladder of the reference: cells that halve, with the integration scheme of the highest order."""
         name = self.scene.method.name
         march = MARCHES_OF_THEORY[name][0]
         values = tuple(1.0 / n for n in REFERENCE_CELLS)
         change_text = "half the cells change it by"
-        return SettingLadder(name, march or name, values, self._order(march), cells=True, said=change_text)
+        return SettingLadder(name, march or name, values, self._order(march), cells=True, change_text=change_text)
 
-    def second(self, reference_setting: Setting) -> Setting | None:
-        """None: no other family of methods has the same theory."""
+    def second_setting(self, reference_setting: Setting) -> Setting | None:
+        """None: no other family of methods computes the same contact theory."""
         return None
 
     def _method(self, march_name: str, cells: int) -> Method:
@@ -99,7 +100,7 @@ class PricedContact:
         return self.scene.method.model_copy(update=update)
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, int]:
-        """Values (n, k) of the channels with a setting, and the number of cells that all rows took."""
+        """Values (n, k) of the channels with a setting, and the number of cells evaluated in all rows."""
         method = self._method(setting.method, round(1.0 / setting.value))
         if self.rows is None:
             contact = run(self.scene.model_copy(update={"method": method}), error=False)
@@ -109,14 +110,16 @@ class PricedContact:
             values = answered[:, [ANSWER_COLUMNS.index(name) for name in self.channels]]
         return values, len(values) * method.cells**2
 
-    def answer(self, solution: tuple[np.ndarray, int]) -> PricedRun:
-        """The channels as a run, with rows in place of times; a single row is repeated, since a run needs two times."""
+    def priced_run(self, solution: tuple[np.ndarray, int]) -> PricedRun:
+        """The channels in the form of a run, with rows in place of times; a single row is repeated, since a run needs
+        two times.
+        """
         values, cells = solution
         values = np.repeat(values, 2, axis=0) if len(values) == 1 else values
         return PricedRun(np.linspace(0.0, 1.0, len(values)), values, {"steps": len(values), "contact cells": cells})
 
     def lines(self, setting: Setting) -> list[str]:
-        """Lines of a scene that set the number of cells and the march."""
+        """Lines of a scene file that set the number of cells and the integration scheme."""
         march = [f'march = "{setting.method}"'] if setting.method in MARCHES_OF_THEORY["fastsim"] else []
         return ["[method]", f"cells = {round(1.0 / setting.value)}", *march]
 
@@ -137,7 +140,7 @@ def priced_scene(scene: ContactScene, quantity: str | None, engines: tuple[str, 
 
 
 def _sound_rows(scene: ContactScene) -> RowBlock:
-    """The first rows of a table, without those that the theory refuses; InputError where none remain."""
+    """The first rows of a table of contacts, without those that the theory refuses; InputError where none remain."""
     file = scene.cases_file()
     for block in islice(table_blocks(file, (BY_AXES, BY_CURVATURES), PRICED_ROWS), 1):
         coarse = scene.method.model_copy(update={"cells": CELLS_TRIED[0]})

@@ -1,4 +1,6 @@
-"""A user's scene of handling as the search of the price of accuracy sees it: one of its manoeuvres."""
+"""Price of accuracy of a user's handling scene: one of its manoeuvres, with the steps and contact cells of its
+engines.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -7,7 +9,13 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.advice.price.meshed import OTHER_TOLERANCE, MeshedScene, checked_quantity, first_part, run_and_quantity
+from models.advice.price.meshed import (
+    SECOND_SOLVER_TOLERANCE,
+    MeshedScene,
+    checked_quantity,
+    first_part,
+    run_and_quantity,
+)
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
@@ -16,7 +24,7 @@ from models.systems.handling.run import Drive, build, drive_run, judged_drive, r
 from models.systems.handling.scene import HandlingScene
 
 SEARCHED_DURATION = 1.0
-"""s: of a longer manoeuvre only so much is searched."""
+"""Longest part (s) of a manoeuvre over which settings are searched."""
 USUAL_QUANTITY = "yaw_rate"
 QUANTITIES: dict[str, tuple[Any, str]] = {
     "yaw_rate": (lambda drive: drive.velocity()[:, 2], "rad/s"),
@@ -25,18 +33,18 @@ QUANTITIES: dict[str, tuple[Any, str]] = {
     "speed": (lambda drive: drive.velocity()[:, 0], "m/s"),
     "load": (lambda drive: drive["load"], "N"),
 }
-"""What can be asked about, and its unit."""
+"""Quantities that can be priced: functions that read them from a drive, and their units."""
 
 
 @cache
 def _with_cells(handling: Handling, cells: int) -> Handling:
-    """The vehicle with another number of cells in its tyres' patches."""
+    """The vehicle with ``cells`` cells along the contact patches of its tyres."""
     return replace(handling, tyres=replace(handling.tyres, cells=cells))
 
 
 @dataclass(frozen=True)
 class PricedHandling(MeshedScene):
-    """A manoeuvre of handling as a priced scene."""
+    """A handling manoeuvre as a priced scene."""
 
     scene: HandlingScene
     name: str
@@ -44,11 +52,11 @@ class PricedHandling(MeshedScene):
     handling: Handling
 
     def run(self, engine: str, cells: int, step: float, duration: float) -> Drive:
-        """Drive the manoeuvre in an engine with this number of cells and this step (s)."""
+        """Simulate the manoeuvre in an engine with this number of contact cells and this step (s)."""
         return drive_run(engine, _with_cells(self.handling, cells), self.speed, duration, step)
 
     def exact(self, cells: int, step: float, duration: float) -> Drive:
-        """Drive the manoeuvre by the solver DOP853 with the engine's accelerations, as an accurate reference."""
+        """Simulate the manoeuvre by the solver DOP853 with the engine's accelerations, as an accurate reference."""
         handling = _with_cells(self.handling, cells)
         model, start = build(self.reference_engine, handling), np.concatenate(handling.straight(self.speed))
         n, times = start.size // 2, step * np.arange(round(duration / step) + 1)
@@ -58,21 +66,23 @@ class PricedHandling(MeshedScene):
             start,
             "DOP853",
             np.minimum(times, duration),
-            rtol=OTHER_TOLERANCE,
-            atol=OTHER_TOLERANCE,
+            rtol=SECOND_SOLVER_TOLERANCE,
+            atol=SECOND_SOLVER_TOLERANCE,
         )
         if not solved.success:
             raise RunFailed(self.reference_engine, solved.message)
         return read_run(handling, Trajectory(times, solved.y.T), self.reference_engine)
 
     def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
-        """The quantity over the time of a drive, and the number of force calls; the drive's assumptions are judged."""
+        """Times (n,) in s and values (n, k) of the quantity along a manoeuvre, and the number of force calls; the
+        assumptions of the run are judged.
+        """
         judged_drive(self.scene, self.reference_engine, self.name, run)
         values, times = QUANTITIES[self.quantity][0](run), run.run.times
         return times, values.reshape(len(times), -1), 4 * (len(times) - 1) * run.tyres.shape[1]
 
     def lines(self, setting: Setting) -> list[str]:
-        """Lines of a scene that set the number of cells and the step."""
+        """Lines of a scene file that set the number of contact cells and the step."""
         return [
             "[tyres]",
             f"cells = {round(1 / setting.value)}",

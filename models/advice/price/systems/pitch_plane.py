@@ -1,4 +1,4 @@
-"""A user's pitch-plane scene as the search of the price of accuracy sees it."""
+"""Price of accuracy of a user's pitch-plane scene: the methods, steps and tolerances of its engines."""
 
 import math
 from dataclasses import dataclass, replace
@@ -16,21 +16,21 @@ from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 
 ADAPTIVE_STEP = {"exudyn": 5e-3, "reference": 1e-3}
-"""Largest step of Exudyn's adaptive solvers, which they also begin with, and the spacing of scipy's output (s)."""
+"""Largest step (s) of Exudyn's adaptive solvers, with which they also begin, and spacing (s) of scipy's output."""
 SPECTRAL_RADII = {"GeneralizedAlpha 0.9": 0.9, "GeneralizedAlpha 0.6": 0.6}
-"""Spectral radii of the generalised-alpha method that are tried."""
+"""Spectral radii of the generalised-alpha method that are tried, by the name of the method."""
 
 SEARCHED_DURATION = 2.0
-"""s: of a longer run only so much is searched; what is recommended is then confirmed over all of it."""
+"""Longest part (s) of a run over which settings are searched; the recommended ones are confirmed over all of it."""
 STEPS_TRIED = tuple(
     mantissa * 10.0**power
     for power in (-2, -3, -4, -5, -6)
     for mantissa in (10.0, 8.0, 6.25, 5.0, 4.0, 3.2, 2.5, 2.0, 1.6, 1.25)
 )[5:]
-"""Steps that are tried (s), each as the nearest one below that divides the run."""
+"""Steps (s) that are tried, each shortened to a whole fraction of the run's base step."""
 TOLERANCES_TRIED = tuple(10.0**-k for k in range(2, 13))
 DEFAULT_OF_METHOD = {("exudyn", "GeneralizedAlpha 0.9"): 1e-2, ("mujoco", "Euler"): 2e-3}
-"""What the engines do if not told otherwise: Exudyn 100 steps in 1 s, MuJoCo a timestep of 2 ms."""
+"""Default steps (s) of the engines: Exudyn takes 100 steps in 1 s, MuJoCo a timestep of 2 ms."""
 USUAL_QUANTITY = {
     "free": "f1,f2",
     "road": "f1,f2",
@@ -39,21 +39,23 @@ USUAL_QUANTITY = {
     "pitch": "enforced_moment",
     "heave-pitch": "enforced_force",
 }
-"""The quantity that is asked about where the user names none, by what drives the vehicle."""
+"""Quantity that is priced where the user names none, by the vehicle's input."""
 SENSORS = frozenset({"accelerometers", "gyro", "gyro_bias", "pitch_sensor"})
-"""Effects that read and move nothing: they are left out, or no step could be tried that misses a sampling time."""
+"""Effects that only read the motion: they are left out, since otherwise no step could be tried that misses a sampling
+time.
+"""
 FEWEST_ROWS = 4
-"""Rows of the reference between which other rows are interpolated."""
+"""Least number of reference rows between which other times are interpolated."""
 ROW_SPACING = 1e-3
-"""s: of the rows of an adaptive method from outside the tree."""
+"""Spacing (s) of the output rows of an adaptive method of an engine from outside the project."""
 SECOND_SOLVER_TOLERANCE = 1e-10
-"""Relative tolerance of the second solver, a multistep method beside the reference's Runge-Kutta."""
+"""Relative tolerance of the second solver, a multistep method that checks the reference's Runge-Kutta method."""
 
 
 @dataclass(frozen=True)
 class PricedPitchPlane:
-    """The pitch plane as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity; base :
-    step (s) whose whole fractions all divide the run and its samples.
+    """A pitch-plane scene as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity; base
+    : step (s) whose whole fractions all divide the run and its samples.
     """
 
     assembly: Assembly
@@ -61,7 +63,7 @@ class PricedPitchPlane:
     channels: tuple[str, ...]
     unit: str
     base: float
-    first: float
+    searched_duration: float
 
     @property
     def title(self) -> str:
@@ -74,15 +76,15 @@ class PricedPitchPlane:
         return " and ".join(self.channels)
 
     @property
-    def whole(self) -> float:
+    def full_duration(self) -> float:
         """Duration (s) of the scene's run."""
         return self.assembly.scene.run.duration
 
     @property
     def sampled(self) -> bool:
-        """Whether the input is not smooth at its samples."""
+        """Whether the input has kinks or jumps at its sampling times."""
         signal = self.assembly.input
-        return signal is not None and signal.period is not None and len(signal.knots(self.whole)) > 0
+        return signal is not None and signal.period is not None and len(signal.knots(self.full_duration)) > 0
 
     @property
     def kink_period(self) -> float:
@@ -91,7 +93,7 @@ class PricedPitchPlane:
 
     @property
     def note(self) -> str:
-        """Text on what the price leaves out."""
+        """Text on which methods the price leaves out."""
         return "adaptive methods are left out: they restart at every sample" if self.sampled else ""
 
     @property
@@ -100,8 +102,8 @@ class PricedPitchPlane:
         return "force calls"
 
     def ladders(self) -> list[SettingLadder]:
-        """Ladders for every method of the catalogue; generalised-alpha with Exudyn's own spectral radius and with the
-        recommended one.
+        """Ladders of settings for every method of the engines; generalised-alpha with Exudyn's default spectral radius
+        and with the recommended one.
         """
         ladders = []
         for engine in self.engines:
@@ -118,31 +120,31 @@ class PricedPitchPlane:
         return ladders
 
     def reference(self) -> SettingLadder:
-        """Ladder of the reference: RK4 on the written equations; each step is half the one before."""
-        fewest_steps = math.ceil((FEWEST_ROWS - 1) * self.base / self.first * (1 - 1e-9))
+        """Ladder of the reference: RK4 on the hand-written equations of motion; each step is half the previous one."""
+        fewest_steps = math.ceil((FEWEST_ROWS - 1) * self.base / self.searched_duration * (1 - 1e-9))
         coarsest_steps = max(fewest_steps, math.ceil(self.base / 4e-3 * (1 - 1e-9)))
         return SettingLadder("reference", "RK4", tuple(self.base / coarsest_steps / 2**k for k in range(16)), 4)
 
-    def second(self, reference_setting: Setting) -> Setting | None:
-        """LSODA, to check the reference; None where it would restart at every sample."""
+    def second_setting(self, reference_setting: Setting) -> Setting | None:
+        """LSODA as the setting that checks the reference; None where it would restart at every sample."""
         return None if self.sampled else Setting("reference", "LSODA", SECOND_SOLVER_TOLERANCE, 0, adaptive=True)
 
     def solve(self, setting: Setting, duration: float) -> Result:
-        """The result of a run with a setting, with a row at every step."""
+        """The result of a run with a solver setting, with an output row at every step."""
         return self.run(setting.engine, self._settings(setting, duration))
 
     def run(self, engine: str, settings: Settings) -> Result:
-        """The result of the scene in an engine with these settings."""
+        """The result of the scene in an engine with these solver settings, with an output row at every step."""
         scene: Scene = self.assembly.scene
         every_step = scene.model_copy(update={"run": scene.run.model_copy(update={"output_step": None})})
         return run(every_step, engine, settings, self.assembly)
 
-    def answer(self, solution: Result) -> PricedRun:
+    def priced_run(self, solution: Result) -> PricedRun:
         """The quantity's channels along a run."""
         return PricedRun(solution.times, np.column_stack([solution[name] for name in self.channels]), solution.counts())
 
     def lines(self, setting: Setting) -> list[str]:
-        """Lines of a scene file that contain the setting."""
+        """Lines of a scene file that select the solver setting."""
         if setting.engine in OUTSIDE:
             return _outside_engine_lines(setting)
         name, (_, _, radius) = setting.method.split()[0], setting.method.partition(" ")
@@ -162,13 +164,13 @@ class PricedPitchPlane:
         return Settings(setting.method, duration / math.ceil(duration / longest * (1 - 1e-9)), duration, setting.value)
 
     def _steps(self) -> tuple[float, ...]:
-        """Steps (s) that are whole fractions of ``base``, from coarse to fine."""
+        """Steps (s) to try, from coarse to fine, all whole fractions of ``base``."""
         parts = np.unique(np.ceil(self.base / np.array(STEPS_TRIED) * (1 - 1e-9)).astype(int))
         return tuple(self.base / int(k) for k in parts)
 
 
 def _outside_engine_lines(setting: Setting) -> list[str]:
-    """Lines for an engine from outside the tree, which a scene file cannot name."""
+    """Text lines that select a setting of an engine from outside the project, which a scene file cannot name."""
     command_line = f"# twinrig run SCENE --engine {setting.engine}"
     return (
         [command_line, f"# with the {setting.label()} in the class itself"]
@@ -178,7 +180,7 @@ def _outside_engine_lines(setting: Setting) -> list[str]:
 
 
 def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> PricedPitchPlane:
-    """The scene with a quantity to price: channels of its result that share a unit, separated by commas."""
+    """The pitch-plane scene with a quantity to price: channels of its result that share a unit, separated by commas."""
     assembly = assembly_of_scene(_without_sensors(scene))
     channels = tuple(name.strip() for name in (quantity or USUAL_QUANTITY[assembly.mode]).split(","))
     base, first = _base_step_and_duration(assembly)
@@ -187,7 +189,7 @@ def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -
 
 
 def _without_sensors(scene: Scene) -> Scene:
-    """The scene without sensors."""
+    """The pitch-plane scene without its sensor effects."""
     moving = {name: parameters for name, parameters in scene.effects.items() if name not in SENSORS}
     return scene.model_copy(update={"effects": moving})
 
@@ -208,7 +210,7 @@ def _base_step_and_duration(assembly: Assembly) -> tuple[float, float]:
 
 
 def _unit(scene: PricedPitchPlane) -> str:
-    """The common unit of the quantity's channels; InputError for an unknown channel, or several units."""
+    """The common unit of the priced channels; InputError for an unknown channel, or several units."""
     longest = float(scene.assembly.scene.settings("reference").step or scene.base)
     settings = Settings("RK4", scene.base / math.ceil(scene.base / longest * (1 - 1e-9)), scene.base)
     channels = scene.run("reference", settings).data.data_vars
@@ -223,7 +225,7 @@ def _unit(scene: PricedPitchPlane) -> str:
 
 
 def engine_settings(setting: Setting, duration: float) -> Settings:
-    """The setting in the form that engines use."""
+    """The solver setting for a run of ``duration`` (s), in the form that engines use."""
     integrator = setting.method.split()[0]
     radius = SPECTRAL_RADII.get(setting.method, 0.6)
     if setting.adaptive:

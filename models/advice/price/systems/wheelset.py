@@ -1,11 +1,11 @@
-"""A user's scene of a wheelset as the search of the price of accuracy sees it: all its paths at once."""
+"""Price of accuracy of a user's wheelset scene: its paths at all speeds together."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.advice.price.meshed import OTHER_TOLERANCE, MeshedScene, checked_quantity, first_part
+from models.advice.price.meshed import SECOND_SOLVER_TOLERANCE, MeshedScene, checked_quantity, first_part
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.rail.equations import ALLOWED_STEP_RATE, Equations, WheelsetPath
@@ -14,10 +14,10 @@ from models.systems.wheelset.run import CONTACTS, STATES, judged_path, path
 from models.systems.wheelset.scene import WheelsetScene
 
 SEARCHED_DURATION = 0.25
-"""s: of a longer path only so much is searched."""
+"""Longest part (s) of a path over which settings are searched."""
 USUAL_QUANTITY = "y"
 QUANTITIES = {**STATES, **CONTACTS}
-"""Places or fields, and units of what can be asked about: of states, or of the contacts of all patches."""
+"""Quantities that can be priced: state index or contact field, and unit, by name."""
 
 
 @dataclass(frozen=True)
@@ -28,23 +28,25 @@ class PricedWheelset(MeshedScene):
     speeds: tuple[float, ...]
 
     def _scene(self, cells: int, step: float, duration: float) -> WheelsetScene:
-        """The scene with another number of cells, step (s) and duration (s)."""
+        """The wheelset scene with another number of contact cells, step (s) and duration (s)."""
         contact = self.scene.contact.model_copy(update={"cells": cells or 3})
         run = self.scene.run.model_copy(update={"step": step, "duration": duration})
         return self.scene.model_copy(update={"contact": contact, "run": run})
 
     def run(self, engine: str, cells: int, step: float, duration: float) -> list[WheelsetPath]:
-        """Compute the path at every speed in an engine, with this number of cells and this step (s)."""
+        """Compute the wheelset's path at every speed in an engine, with this number of contact cells and this step
+        (s).
+        """
         return [path(self._scene(cells, step, duration), engine, speed) for speed in self.speeds]
 
     def exact(self, cells: int, step: float, duration: float) -> list[WheelsetPath]:
-        """The path at every speed by the solver DOP853, as an accurate reference."""
+        """The wheelset's path at every speed by the solver DOP853, as an accurate reference."""
         scene = self._scene(cells, step, duration)
         return [_exact_path(*equations_and_start(scene, "reference", speed), step, duration) for speed in self.speeds]
 
     def read(self, run: list[WheelsetPath]) -> tuple[np.ndarray, np.ndarray, int]:
-        """The quantity along all paths, as columns over time, and the number of force calls; each path's assumptions
-        are judged.
+        """Times (n,) in s and values (n, k) of the quantity along the paths at all speeds, and the number of force
+        calls; the assumptions of each path are judged.
         """
         for speed, wheelset_run in zip(self.speeds, run, strict=True):
             judged_path(self.scene, self.reference_engine, speed, wheelset_run)
@@ -56,14 +58,14 @@ class PricedWheelset(MeshedScene):
         return times, np.hstack(columns), 4 * len(run) * (len(times) - 1) * run[0].contacts.shape[1]
 
     def lines(self, setting: Setting) -> list[str]:
-        """Lines of a scene that set the number of cells and the step."""
+        """Lines of a scene file that set the number of contact cells and the step."""
         step = f"step = {self.steps.get(setting.method, setting.value)!r}"
         cells = ["[contact]", f"cells = {round(1 / setting.value)}"] if self.cells else []
         return [*cells, "[run]", step, f"# twinrig run SCENE --engine {setting.engine}"]
 
 
 def _exact_path(equations: Equations, start_state: np.ndarray, step: float, duration: float) -> WheelsetPath:
-    """A path by a Runge-Kutta method of order 8 that picks its own steps; RunFailed where it gives up."""
+    """A wheelset's path by a Runge-Kutta method of order 8 with automatic steps; RunFailed where it gives up."""
     times = step * np.arange(round(duration / step) + 1)
     scale = np.maximum(np.abs(start_state), 1e-3)
     solved = solve_ivp(
@@ -72,8 +74,8 @@ def _exact_path(equations: Equations, start_state: np.ndarray, step: float, dura
         start_state,
         "DOP853",
         np.minimum(times, duration),
-        rtol=OTHER_TOLERANCE,
-        atol=OTHER_TOLERANCE * 1e-1 * scale,
+        rtol=SECOND_SOLVER_TOLERANCE,
+        atol=SECOND_SOLVER_TOLERANCE * 1e-1 * scale,
     )
     if not solved.success:
         raise RunFailed("reference", solved.message)
