@@ -9,7 +9,7 @@ from validation.price.many_workers import (
     COMMAND_TIMES,
     DISK_RATE,
     LINK_RATE,
-    PER_BYTE,
+    SECONDS_PER_BYTE,
     Ensemble,
     simulated_shares,
     table,
@@ -22,7 +22,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "cluster.md"
 def test_few_workers_compute_all_the_time_and_many_wait_for_the_slowest_station():
     """Throughput is the least of what workers compute and of what the command takes, to 3 % of filling and emptying."""
     ensemble = Ensemble()
-    slowest = COMMAND_TIMES + PER_BYTE * ensemble.bytes
+    slowest = COMMAND_TIMES + SECONDS_PER_BYTE * ensemble.bytes
     assert ensemble.most_workers == pytest.approx(ensemble.seconds / slowest)
     few, many = simulated_shares(ensemble, 10, 1000), simulated_shares(ensemble, 500, 10_000)
     assert few.rate == pytest.approx(10 / ensemble.seconds, rel=0.03) and few.bottleneck == "workers"

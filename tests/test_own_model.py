@@ -48,7 +48,7 @@ from validation.own_model.files import (
     changed,
     tree,
 )
-from validation.own_model.soft_couplings import softly_coupled
+from validation.own_model.soft_couplings import soft_constraint_equations
 
 
 def _file(folder: Path, text: str, name: str = "a.xml") -> Path:
@@ -105,10 +105,10 @@ def test_what_couplings_give_way_in_mujoco_is_the_law_of_its_documentation(geare
     states = states_of(geared, 10)
     assert softness_difference(geared, 10) > 1e-3
     soft = reference_of_file(geared, states, SOFT_BUILD)
-    assert agreement_of_build("", soft, moved_at(softly_coupled(geared), states)).acceleration < 1e-8
+    assert agreement_of_build("", soft, moved_at(soft_constraint_equations(geared), states)).acceleration < 1e-8
     ties = tuple(replace(tie, solimp=(0.91, *tie.solimp[1:])) for tie in geared.driven.couplings)
     other = replace(geared, driven=replace(geared.driven, couplings=ties))
-    assert agreement_of_build("", soft, moved_at(softly_coupled(other), states)).acceleration > 1e-4
+    assert agreement_of_build("", soft, moved_at(soft_constraint_equations(other), states)).acceleration > 1e-4
 
 
 SPRUNG = changed(
@@ -193,7 +193,7 @@ def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
         assert max(row.mass, row.acceleration) < 1e-11, row  # rounding, MuJoCo's solver included
     soft = reference_of_file(twin, states, SOFT_BUILD)
     assert softness_difference(twin, 5) > 1e-3
-    assert agreement_of_build("", soft, moved_at(softly_coupled(twin), states)).acceleration < 1e-8
+    assert agreement_of_build("", soft, moved_at(soft_constraint_equations(twin), states)).acceleration < 1e-8
     ties = twin.driven.connections
     for i, tie in enumerate(ties):
         body, (x, y, z) = tie.ends[0]
@@ -202,7 +202,7 @@ def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
         assert all(row.acceleration > 1e-6 for row in certificate(wrong, 5))
         other = (*ties[:i], replace(tie, solimp=(tie.solimp[0] + 0.01, *tie.solimp[1:])), *ties[i + 1 :])
         yielding = replace(twin, driven=replace(twin.driven, connections=other))
-        assert agreement_of_build("", soft, moved_at(softly_coupled(yielding), states)).acceleration > 1e-5
+        assert agreement_of_build("", soft, moved_at(soft_constraint_equations(yielding), states)).acceleration > 1e-5
 
 
 def test_welds_hold_both_bodies_as_they_lie(tmp_path, monkeypatch):

@@ -32,7 +32,7 @@ from validation.own_model.files import (
     changed,
     tree,
 )
-from validation.own_model.soft_couplings import softly_coupled
+from validation.own_model.soft_couplings import soft_constraint_equations
 
 TITLE = "A user's own model: MJCF and URDF in every build"
 SYSTEM: System = "rolling-vehicle"
@@ -94,7 +94,9 @@ def _soft(folder: Path, name: str, text: str) -> Row:
     plain equations."""
     twin = _read(folder, name, text).twin
     states = states_of(twin, QUICK_STATES)
-    apart = agreement_of_build("", reference_of_file(twin, states, SOFT_BUILD), moved_at(softly_coupled(twin), states))
+    apart = agreement_of_build(
+        "", reference_of_file(twin, states, SOFT_BUILD), moved_at(soft_constraint_equations(twin), states)
+    )
     return Observed(
         f"twin_files.soft_{name}",
         SYSTEM,

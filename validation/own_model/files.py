@@ -1,4 +1,4 @@
-"""Models of this project in MJCF and URDF, from a cart to a chain of 30 joints, and differences to be planted in them.
+"""Model files in MJCF and URDF, from a cart to a chain of 30 joints, and differences to be planted in them.
 
 ``twinrig twin`` is held to them by the case ``twin_files`` and by the tests.
 """
@@ -66,7 +66,7 @@ TIED = """<mujoco model="tied"><worldbody><site name="hook" pos="0 .3 1"/>
  <spatial name="rope" stiffness="40" damping="2" springlength=".7"><site site="hook"/><site site="tip"/></spatial>
  <spatial name="rubber" stiffness="25" springlength="0"><site site="elbow"/><site site="ring"/></spatial>
  <spatial name="seen"><site site="hook"/><site site="ring"/></spatial></tendon></mujoco>"""
-"""Springs along lines: from the ground, and between two bodies; one has no length, one no force."""
+"""Model with spatial tendons: a spring from the ground, a spring of zero length between bodies, one without force."""
 
 
 GEARED = """<mujoco model="geared"><worldbody>
@@ -82,7 +82,7 @@ GEARED = """<mujoco model="geared"><worldbody>
   <inertial pos="0 0 .2" mass=".2" diaginertia=".01 .01 .02"/></body></body></worldbody>
 <equality><joint name="gear" joint1="slide" joint2="turn" polycoef=".1 .25 0 0 0"/>
  <joint name="shut" joint1="cover" polycoef=".3 0 0 0 0" solimp=".95 .99 .001"/></equality></mujoco>"""
-"""Dry friction of a hinge and a slide, a rack that follows a crank, and a lid that stays shut."""
+"""Model with dry friction in joints, a rack that a joint equality couples to a crank, and a lid that is held shut."""
 
 
 LINKED = """<mujoco model="linked"><worldbody>
@@ -101,7 +101,7 @@ LINKED = """<mujoco model="linked"><worldbody>
 </worldbody><equality>
  <connect name="loop" body1="rod" body2="rocker" anchor=".6 0 0" solimp=".95 .99 .001"/>
  <weld name="grip" site1="lug" site2="tip" solimp=".92 .95 .001" torquescale="2"/></equality></mujoco>"""
-"""Four bars in a loop, whose joint repeats what the plane of their hinges asks, and a box held by an arm."""
+"""Model with a plane four-bar loop, whose closing joint has redundant constraints, and a box welded to an arm."""
 
 LOOP, GRIP = (
     '<connect name="loop" body1="rod" body2="rocker" anchor=".6 0 0"',
@@ -110,13 +110,13 @@ LOOP, GRIP = (
 HELD = LINKED.replace(
     GRIP, '<weld name="grip" body1="box" body2="crank" relpose=".1 .4 .1 .9 .1 .2 .1" anchor=".05 0 0"'
 )
-"""The box held by the crank, at a place and with a turn that are not those of the file."""
+"""``LINKED`` with the box welded to the crank instead, at a relative pose that differs from the one in the file."""
 HUNG = LINKED.replace(GRIP, '<connect name="grip" body1="box" anchor=".1 .2 .1"').replace('torquescale="2"', "")
-"""The box hung by a point on the ground."""
+"""``LINKED`` with a point of the box fixed to the ground instead."""
 
 
 def chain(count: int, seed: int = 1) -> str:
-    """A model file of a chain of hinges and slides with springs, dampers and armatures; all numbers are random."""
+    """MJCF text of a chain of ``count`` bodies on hinges and slides with springs, dampers and armatures, all random."""
     draw = np.random.default_rng(seed)
 
     def row(low: float, high: float, value_count: int) -> str:
@@ -137,7 +137,7 @@ def chain(count: int, seed: int = 1) -> str:
 
 
 def tree(count: int, seed: int) -> str:
-    """A model file of free bodies with branches of hinges, slides and balls; all numbers are random."""
+    """MJCF text of ``count`` bodies: free ones with branches on hinges, slides and ball joints; all numbers random."""
     draw = np.random.default_rng(seed)
     children = dict[int, list[int]]()
     for i in range(1, count):
@@ -160,7 +160,7 @@ def tree(count: int, seed: int) -> str:
 
 
 def changed(text: str, name: str, old: str, new: str) -> str:
-    """A model's text in which ``old`` is replaced by ``new`` where it follows a name."""
+    """Text of a model file in which the first ``old`` after the element called ``name`` is replaced by ``new``."""
     there = text.index(old, text.index(f'"{name}"'))
     return text[:there] + new + text[there + len(old) :]
 
@@ -197,5 +197,5 @@ PLANTED = [
     ("push", 'gear="3"', 'gear="4"', "gear", "actuator 'push'", "4"),
     ("jointed", 'gravity="1 2 -9"', 'gravity="1 2 -9.1"', "gravity", "the model", "-9.1"),
 ]
-"""Differences to be planted in ``JOINTED``: the name that the changed part follows, the part, its new text; the kind
-and owner of the element that must be named, and a piece of the size that must be said."""
+"""Differences to be planted in ``JOINTED``: the name after which the text is changed, the old text and the new one;
+then what the comparison must report: the quantity, its element, and a piece of the text on its size."""

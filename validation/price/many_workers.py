@@ -1,4 +1,4 @@
-"""What a thousand workers would do: blocks of an ensemble in a simulated cluster, event by event.
+"""Efficiency of up to a thousand workers: an event simulation of an ensemble's blocks on a cluster.
 
     command --(block's number)--> a free worker --(arrays)--> link --> command and its disk
 
@@ -18,21 +18,21 @@ import numpy as np
 from models.ensemble.runner import BLOCKS_AHEAD
 
 PATH_SECONDS, PATH_BYTES = 0.8 / 50, 0.4e6 / 50
-"""A path of 60 s in a worker (s), and its states at 121 rows (bytes)."""
-COMMAND_TIMES, PER_BYTE = 12e-3, 2e-3 / 0.4e6
-"""Processor time of command and scheduler for a block of any size (s), and for each byte of it."""
+"""Computing time (s) of a path of 60 s on a worker, and size (bytes) of its states at 121 rows."""
+COMMAND_TIMES, SECONDS_PER_BYTE = 12e-3, 2e-3 / 0.4e6
+"""Processor time of command and scheduler for a block of any size (s), and for each of its bytes (s)."""
 LINK_RATE, DISK_RATE = 1.25e9, 500e6
-"""Bytes per second into the command, by 10 Gbit/s, and onto its disk: assumed."""
+"""Assumed rates (bytes/s) of the network link into the command (10 Gbit/s), and of its disk."""
 TIME_SCATTER = 0.1
-"""Standard deviation of a block's time, by its mean."""
+"""Standard deviation of a block's computing time divided by the mean."""
 SEED = 25
 WORKERS = (2, 10, 100, 1000)
 
 
 @dataclass(frozen=True)
 class Ensemble:
-    """An ensemble that is computed in blocks. block: number of paths in each; thinned: factor by which the time rows
-    that workers send back are thinned."""
+    """An ensemble that is computed in blocks. block: number of paths in each; thinned: factor by which workers thin the
+    time rows that they send back."""
 
     block: int = 50
     thinned: int = 1
@@ -51,7 +51,7 @@ class Ensemble:
     def stations(self) -> dict[str, float]:
         """Time (s) that each station (command, link, disk), which serves one block at a time, needs for a block."""
         return {
-            "command": COMMAND_TIMES + PER_BYTE * self.bytes,
+            "command": COMMAND_TIMES + SECONDS_PER_BYTE * self.bytes,
             "link": self.bytes / LINK_RATE,
             "disk": self.bytes / DISK_RATE,
         }
@@ -64,7 +64,8 @@ class Ensemble:
 
 @dataclass(frozen=True)
 class WorkerShares:
-    """Shares of time for which the workers compute and for which each station is busy, and blocks per second."""
+    """Shares of time for which the workers compute and for which each station is busy, and ``rate`` in blocks per
+    second."""
 
     workers: float
     stations: dict[str, float]
@@ -78,7 +79,8 @@ class WorkerShares:
 
 
 def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerShares:
-    """Simulate a run of ``blocks`` blocks by a number of workers, from sending the first block to saving the last."""
+    """Busy shares in a simulated run of ``blocks`` blocks by ``workers`` workers, from sending the first block to
+    saving the last."""
     seconds = ensemble.seconds * np.random.default_rng(SEED).normal(1.0, TIME_SCATTER, blocks).clip(0.5, 1.5)
     half, waiting, free = ensemble.stations["command"] / 2.0, list[int](), workers
     idle, events, order = dict.fromkeys(("command", "link", "disk"), 0.0), list[tuple[float, int, str, int]](), count()
@@ -122,12 +124,12 @@ SETTINGS = {
     "`options.block=1000`, `options.rows=5`": Ensemble(1000, 10),
     "`options.block=2000`, `options.rows=5`": Ensemble(2000, 10),
 }
-"""Ensembles of the table, by what a user types."""
+"""Ensembles of the table, by the options that a user types."""
 
 
 def table(round_count: int = 20) -> Iterator[str]:
-    """Rows of the table in the docs: share of time for which workers compute, and the busiest station with the most
-    workers. round_count : number of blocks per worker."""
+    """Lines of the table in the docs: share of time for which workers compute, and the busiest station with the largest
+    number of workers. round_count : number of blocks per worker."""
     for name, ensemble in SETTINGS.items():
         outcomes = [simulated_shares(ensemble, workers, round_count * workers) for workers in WORKERS]
         shares = " | ".join(f"{100.0 * outcome.workers:.0f} %" for outcome in outcomes)
