@@ -372,14 +372,14 @@ def test_force_calls_seen_from_outside():
 
 def test_every_integrator_of_the_catalogue_is_tried():
     from models.engines.catalogue import CATALOGUE
-    from validation.price.problems.road_excited import DEFAULTS, FULL_STEPS, QUICK
+    from validation.price.problems.road_excited import DEFAULTS, FULL_STEPS, QUICK_STEPS
 
     tried = {(engine, method.split()[0]) for engine, method in FULL_STEPS}
     assert tried == {(engine, name) for engine, names in CATALOGUE.items() for name in names}
     for engine, method, value in DEFAULTS:
         assert value in FULL_STEPS[engine, method], "a default is left out of the full sweep"
-        assert value in QUICK[engine, method], "a default is left out of the quick one"
-    assert all(set(values) <= set(FULL_STEPS[curve]) for curve, values in QUICK.items())
+        assert value in QUICK_STEPS[engine, method], "a default is left out of the quick one"
+    assert all(set(values) <= set(FULL_STEPS[curve]) for curve, values in QUICK_STEPS.items())
 
 
 def test_defaults_are_those_of_the_installed_engines():

@@ -5,7 +5,7 @@ import pytest
 
 from models.advice.price import runner as cost
 from validation.price.problems import inertial_unit
-from validation.price.problems.inertial_unit import FULL_RATES, QUICK, InertialUnit, attitude, gyro
+from validation.price.problems.inertial_unit import FULL_RATES, QUICK_RATES, InertialUnit, attitude, gyro
 
 
 @pytest.fixture(scope="module")
@@ -44,5 +44,5 @@ def test_every_way_has_its_order(short, engine, method, order):
 
 def test_adaptive_steps_are_refused_and_the_quick_share_is_one(short):
     assert cost.attempt(short, short.setting("exudyn", "DOPRI5", 0.01)).status == "refused"
-    assert all(set(rates) <= set(FULL_RATES[curve]) for curve, rates in QUICK.items())
+    assert all(set(rates) <= set(FULL_RATES[curve]) for curve, rates in QUICK_RATES.items())
     assert short.setting("mujoco", "Euler", 2e-3).default == "MuJoCo"

@@ -1,9 +1,9 @@
-"""Sheet of ten minutes of attitude."""
+"""Problem sheet of the attitude from gyro rates over ten minutes."""
 
 from pathlib import Path
 
 from validation.price.problems import inertial_unit
-from validation.price.problems.inertial_unit import DURATION, SINES, TURN
+from validation.price.problems.inertial_unit import DURATION, SINES, STEADY_YAW_RATE
 from validation.price.sheets.page import Value
 from validation.price.sheets.page import write as write_page
 
@@ -11,7 +11,7 @@ NAMES = ("q1", "q2", "q3", "q4")
 
 
 def write(folder: Path) -> list[Value]:
-    """Write the sheet; returns the reference value of the final quaternion."""
+    """Write the problem sheet into ``folder``; returns the reference values of the final quaternion."""
     problem = inertial_unit.problem(False)
     sure = problem.uncertainty["attitude"]
     values = [
@@ -33,7 +33,7 @@ def _body() -> str:
     angles = "\n".join(
         f"    {name:5s} = "
         + " + ".join(
-            ([f"{TURN:g} t"] if name == "yaw" else [])
+            ([f"{STEADY_YAW_RATE:g} t"] if name == "yaw" else [])
             + [f"{size:g} sin({rate:g} t + {phase:g})" for size, rate, phase in sines]
         )
         for name, sines in SINES.items()

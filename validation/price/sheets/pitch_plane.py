@@ -49,7 +49,9 @@ def on_road(folder: Path) -> list[Value]:
         np.column_stack([road.amplitude, road.wavenumber, road.phase]),
     )
     end = np.array([road_excited.DURATION])
-    true, *other_solutions = (road_excited.dense(problem.assembly, *solver)(end)[:, 0] for solver in SOLVERS[False])
+    true, *other_solutions = (
+        road_excited.continuous_solution(problem.assembly, *solver)(end)[:, 0] for solver in SOLVERS[False]
+    )
     sure = np.max([np.abs(other_solution - true) for other_solution in other_solutions], axis=0)
     return write_page(
         folder,

@@ -13,11 +13,11 @@ from validation.price.problems.free_vehicle import (
     DURATION,
     GOLDEN,
     GRAVITY,
-    HEIGHT,
-    LONGEST_SINE,
+    LARGEST_AMPLITUDE,
+    LONGEST_WAVELENGTH,
     RISE_LENGTH,
-    RISE_PLACE,
-    SINES,
+    RISE_STATION,
+    SINE_COUNT,
     SPEED,
     FreeVehicle,
 )
@@ -49,17 +49,17 @@ coordinate of the body. **Drag** along x at its centre: F = -c v x', x' the rate
 **Road**: at time t a tyre at (x, y) meets the height (m) at s = v t + x, v = {SPEED:g} m/s, of its track, n = 0 on the
 left (y > 0) and 1 on the right:
 
-    z = sum_k {HEIGHT:g} / k sin(2 pi (k s / {LONGEST_SINE:g} + {GOLDEN:.16g} k (k + {SINES} n)))
-        / (1 + exp(-(s - {RISE_PLACE:g}) / {RISE_LENGTH:g}))
+    z = sum_k {LARGEST_AMPLITUDE:g} / k sin(2 pi (k s / {LONGEST_WAVELENGTH:g} + {GOLDEN:.16g} k (k + {SINE_COUNT} n)))
+        / (1 + exp(-(s - {RISE_STATION:g}) / {RISE_LENGTH:g}))
 
-with k = 1 .. {SINES}. Start: all coordinates and rates are 0.
+with k = 1 .. {SINE_COUNT}. Start: all coordinates and rates are 0.
 """
 
 
 def write(folder: Path) -> list[Value]:
     """Write the sheet; returns the reference values of all final coordinates and rates."""
     problem = free_vehicle.problem(False)
-    sure = np.abs(problem.states - problem.others).max(axis=0)
+    sure = np.abs(problem.states - problem.other_states).max(axis=0)
     values = [
         Value("vehicle", name, unit, DURATION, *map(float, known))
         for (name, unit), *known in zip(_states(problem), problem.states[-1], sure, strict=True)
