@@ -193,7 +193,7 @@ def test_parts_of_a_step_from_three_runs():
     from validation.price import split
 
     noise, seconds = np.array([1.3, 1.0, 1.1]), 1e-6 * split.STEPS["road"]
-    runs = zip(split.RUNS, (4, 5, 10), strict=True)
+    runs = zip(split.FORCE_VARIANTS, (4, 5, 10), strict=True)
     saved = {
         "problem": "road",
         "engine": "mujoco",

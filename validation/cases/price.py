@@ -95,7 +95,7 @@ def _beside(quick: bool, round_count: int) -> CaseAnswer:
         "ride": prices,
         "split": [] if quick else split.measure(round_count, SHORTEST_TURN[quick]),
         "callback": {name: speed.callback_cost(road, duration, name, twice, least) for name in ("RK4", "Euler")},
-        "real time": speed.real_time(road, duration, twice, least),
+        "real time": speed.real_time_factors(road, duration, twice, least),
     }
     settings = dict.fromkeys(
         _at_1_ms(problem_rows) for problem_rows in road_excited.settings(quick) if problem_rows.method != "DVERK6"

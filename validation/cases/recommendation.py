@@ -12,7 +12,7 @@ from models.core.errors import InputError, RunFailed
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 from validation.price import unseen_systems
-from validation.price.unseen import ENGINES, Verdict, drawn, judge
+from validation.price.unseen import ENGINES, Verdict, random_scene, verdicts_on_pitch_plane
 
 Judged = tuple[list[Verdict], list[str]]
 
@@ -65,9 +65,9 @@ def judged(system: str, scene_number: int, folder: Path, engines: tuple[str, ...
     for n in range(scene_number, scene_number + (REDRAWS + 1) * STRIDE, STRIDE):
         try:
             reasons = (
-                judge(drawn(n, folder), engines)
+                verdicts_on_pitch_plane(random_scene(n, folder), engines)
                 if system == "pitch-plane"
-                else unseen_systems.judge(unseen_systems.drawn_scene_of_system(system, n))
+                else unseen_systems.verdicts_on_system(unseen_systems.drawn_scene_of_system(system, n))
             )
         except (InputError, RunFailed) as error:
             refused.append(f"{system} {n}: {error}")
@@ -80,7 +80,7 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
     """Rows on the three promises of a recommendation; a scene counts as kept if every recommended setting keeps its
     promise."""
     every = [verdict for of_scene in verdicts for verdict in of_scene]
-    kept_scenes = sum(bool(of_scene) and all(verdict.meets for verdict in of_scene) for of_scene in verdicts)
+    kept_scenes = sum(bool(of_scene) and all(verdict.keeps_tolerance for verdict in of_scene) for of_scene in verdicts)
     factors = [verdict.factor for verdict in every]
     scenes, why = f"{len(verdicts)} scenes drawn at random", "judged by another solver than the search's, DOP853"
     return [

@@ -4,18 +4,18 @@ from pathlib import Path
 
 from validation.price.problems import inertial_unit
 from validation.price.problems.inertial_unit import DURATION, SINES, STEADY_YAW_RATE
-from validation.price.sheets.page import Value
+from validation.price.sheets.page import ReferenceValue
 from validation.price.sheets.page import write as write_page
 
 NAMES = ("q1", "q2", "q3", "q4")
 
 
-def write(folder: Path) -> list[Value]:
+def write(folder: Path) -> list[ReferenceValue]:
     """Write the problem sheet into ``folder``; returns the reference values of the final quaternion."""
     problem = inertial_unit.problem(False)
     sure = problem.uncertainty["attitude"]
     values = [
-        Value("unit", name, "", DURATION, float(component), sure)
+        ReferenceValue("unit", name, "", DURATION, float(component), sure)
         for name, component in zip(NAMES, problem.true[-1], strict=True)
     ]
     return write_page(

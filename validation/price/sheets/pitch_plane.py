@@ -1,4 +1,4 @@
-"""Sheets of the pitch-plane vehicle: on its road, under its wheel forces, with noise on them, its pitch prescribed."""
+"""Problem sheets of the pitch-plane vehicle: on a road, under wheel forces, with noise, and with prescribed pitch."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from models.road.study import FADE_IN_LENGTH, study_road
 from validation.price.problems import force_excited, road_excited
 from validation.price.problems.force_excited import DURATION, FINE_STEP, SAMPLE_PERIOD, ForceExcited
 from validation.price.problems.road_excited import SOLVERS, SPEED
-from validation.price.sheets.page import Value, columns
+from validation.price.sheets.page import ReferenceValue, write_columns
 from validation.price.sheets.page import write as write_page
 
 PROBLEMS = (force_excited.problem, force_excited.noisy, force_excited.guided)
@@ -34,15 +34,18 @@ r is the road, positive down; A_i [m], W_i [rad/m], P_i [rad] are the lines of `
 """
 
 
-def write(folder: Path) -> list[Value]:
-    """Write all four sheets with their inputs; returns the reference values."""
-    return [*on_road(folder), *(value for make in PROBLEMS for value in by_forces(make(False), folder))]
+def write(folder: Path) -> list[ReferenceValue]:
+    """Write all four problem sheets with their input files; returns the reference values."""
+    return [
+        *write_road_sheet(folder),
+        *(value for make in PROBLEMS for value in write_force_sheet(make(False), folder)),
+    ]
 
 
-def on_road(folder: Path) -> list[Value]:
-    """Write the sheet of the vehicle on the study road."""
+def write_road_sheet(folder: Path) -> list[ReferenceValue]:
+    """Write the problem sheet of the vehicle on the study road; returns the reference values."""
     problem, road = road_excited.problem(False), study_road()
-    columns(
+    write_columns(
         folder,
         "road",
         ("amplitude [m]", "wavenumber [rad/m]", "phase [rad]"),
@@ -64,14 +67,14 @@ def on_road(folder: Path) -> list[Value]:
     )
 
 
-def by_forces(problem: ForceExcited, folder: Path) -> list[Value]:
-    """Write the sheet and input file of a problem with given forces."""
+def write_force_sheet(problem: ForceExcited, folder: Path) -> list[ReferenceValue]:
+    """Write the problem sheet and the input file of a vehicle under wheel forces; returns the reference values."""
     signal, guided = problem.assembly.input, bool(problem.assembly.guided)
     assert signal is not None
     heads = ["time [s]", "front [N]", "rear [N]", *(["pitch [rad]"] if guided else [])]
     sample_times = SAMPLE_PERIOD * np.arange(round(DURATION / SAMPLE_PERIOD) + 1)
     inputs = signal.sample(0.0, SAMPLE_PERIOD, len(sample_times))[:, : len(heads) - 1]
-    columns(folder, problem.key, heads, np.column_stack([sample_times, inputs]))
+    write_columns(folder, problem.key, heads, np.column_stack([sample_times, inputs]))
     return write_page(
         folder,
         problem.key,
@@ -79,11 +82,11 @@ def by_forces(problem: ForceExcited, folder: Path) -> list[Value]:
         _body(problem, guided),
         f"End values at {DURATION:g} s "
         f"({problem.reference}); the uncertainty is the largest difference of the two over the run.",
-        ends(problem),
+        final_values(problem),
     )
 
 
-def ends(problem: ForceExcited) -> list[Value]:
+def final_values(problem: ForceExcited) -> list[ReferenceValue]:
     """Reference values of all final states; the uncertainty is the largest difference between two reference solvers
     over the run."""
     runs = [
@@ -94,15 +97,15 @@ def ends(problem: ForceExcited) -> list[Value]:
     return _values(problem.key, DURATION, true[-1], np.abs(true - other_states).max(axis=0))
 
 
-def _values(key: str, time: float, states: np.ndarray, uncertainties: np.ndarray) -> list[Value]:
+def _values(key: str, time: float, states: np.ndarray, uncertainties: np.ndarray) -> list[ReferenceValue]:
     return [
-        Value(key, *entry[:2], time, *map(float, entry[2:]))
+        ReferenceValue(key, *entry[:2], time, *map(float, entry[2:]))
         for entry in zip(NAMES, UNITS, states, uncertainties, strict=True)
     ]
 
 
 def _parameters_and_start(problem: ForceExcited | road_excited.RoadExcited) -> str:
-    """Text of the parameters and the initial state."""
+    """Text of a problem's parameters and initial state."""
     numbers = ", ".join(f"{name} = {value!r}" for name, value in problem.assembly.parameters)
     start = ", ".join(f"{name} = {value:.16e}" for name, value in zip(NAMES, problem.assembly.initial, strict=True))
     return f"Parameters (SI): {numbers}.\n\nStart: {start}."
