@@ -26,7 +26,7 @@ from validation.common import checks
 from validation.common.rows import Independence, Observed, Row, System, behaviour_row, not_run
 from validation.common.scenes import VEHICLE_SETS, force_scene, road_scene
 from validation.hard_cases.case import CaseOutcome, judge
-from validation.run import save, say
+from validation.run import print_summary, save
 
 SYSTEM: System = "pitch-plane"
 HARD_CASE_FAMILIES = (
@@ -84,7 +84,7 @@ def conformity(name: str, folder: Path, command: str) -> int:
     )
     from validation.report.page import write
 
-    return say(rows, None, write(folder))
+    return print_summary(rows, None, write(folder))
 
 
 def _printed_rows(rows: Iterator[Row]) -> Iterator[Row]:
