@@ -21,7 +21,7 @@ from models.systems.handling.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
 from validation.common.checks import largest_relative_difference
-from validation.spatial.towing import keep_to_the_car, levers_error, towed_turn
+from validation.spatial.towing import give_towed_wheels_car_heading, static_load_error, towed_turn
 from validation.spatial.trains import BOX, WHEELS, caravan, train
 from validation.spatial.written_equations import TURN_CONTROLS, rolling_cars, rolling_gap
 
@@ -51,12 +51,15 @@ def file_with(**changes: Any) -> dict[str, Any]:
 
 @pytest.mark.grounds("closed form")
 def test_loads_on_ball_and_axles_are_those_of_levers():
-    assert levers_error() < 1e-9
+    assert static_load_error() < 1e-9
 
 
 @pytest.mark.grounds("closed form")
 def test_a_steady_turn_is_that_of_the_closed_form_and_wheels_that_keep_to_the_car_are_seen():
-    right, wrong = towed_turn(caravan(), 10.0, None, 3.0), towed_turn(caravan(), 10.0, keep_to_the_car, 1.5)
+    right, wrong = (
+        towed_turn(caravan(), 10.0, None, 3.0),
+        towed_turn(caravan(), 10.0, give_towed_wheels_car_heading, 1.5),
+    )
     assert abs(right.yaw) < BOUND and np.abs(right.headings).max() < BOUND
     assert np.abs(wrong.headings).max() > 0.1
 

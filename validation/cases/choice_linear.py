@@ -14,7 +14,7 @@ from models.systems.ride.reduced_scene import Effect, reduced_without
 from validation.choice.judged import asked_speeds, changes_by_frequency, measured_step, worst_nearby
 from validation.choice.price_of_choice import whole_car
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
-from validation.ride.drawn_rides import DrawnRide, drawn_ride
+from validation.ride.drawn_rides import LinearRide, random_linear_ride
 
 SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "ride_choice.toml"
 """The published half car."""
@@ -42,7 +42,7 @@ class Judged:
     covariance of what runs sample.
     """
 
-    scene: DrawnRide
+    scene: LinearRide
     choice: RideChoice
     identity: float
     by_frequency: np.ndarray | None
@@ -61,7 +61,7 @@ class Judged:
         return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
-def judged(scene: DrawnRide, on_second: bool) -> Judged:
+def judged(scene: LinearRide, on_second: bool) -> Judged:
     """Choose effects for a scene, then check the choice by the identity of covariance and adjoint and, if
     ``on_second``, by frequency responses.
     """
@@ -87,7 +87,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     seeds = QUICK_SEEDS if quick else range(SCENES_DRAWN)
     choices = [
         judged(
-            drawn_ride(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0), quick or seed < SECOND_ROUTE
+            random_linear_ride(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0),
+            quick or seed < SECOND_ROUTE,
         )
         for seed in seeds
     ]

@@ -12,7 +12,7 @@ from validation.choice.drawn_scenes import draw_scene
 from validation.choice.judged import JudgedByRuns, judged_of
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row
-from validation.ride.drawn_rides import COPIES, BentRide, drawn_bent
+from validation.ride.drawn_rides import COPIES, NonlinearRide, random_nonlinear_ride
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
@@ -40,16 +40,16 @@ JUDGED_CHANGES = (1e-4, 0.05)
 def judged(system: str, seed: int) -> JudgedByRuns:
     """Choose effects for the random scene of a seed, and judge the choice."""
     if system == "ride":
-        return judged_ride(drawn_bent(seed))
+        return judged_ride(random_nonlinear_ride(seed))
     return judged_of(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
-def judged_ride(asked: BentRide) -> JudgedByRuns:
+def judged_ride(asked: NonlinearRide) -> JudgedByRuns:
     """Choose effects for a ride, then compare the complete and the reduced vehicle on new roads that the choice did not
     use."""
     engine = ENGINES["ride"][0]
-    choice = Chooser(asked.opened(), engine, list(asked.quantities), asked.tolerance).choose()
-    fresh = Variants(asked.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
+    choice = Chooser(asked.prepared_in_time(), engine, list(asked.quantities), asked.tolerance).choose()
+    fresh = Variants(asked.prepared_in_time(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
     full_scene, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
     if full_scene is None or rest is None:
         return JudgedByRuns("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
@@ -106,9 +106,11 @@ def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
 def _refused() -> Row:
     """Row: a choice is refused for a ride with few copies and a fine tolerance, since random scatter could exceed this
     tolerance."""
-    asked, outcome = drawn_bent(NOISY_RIDE), "a choice"
+    asked, outcome = random_nonlinear_ride(NOISY_RIDE), "a choice"
     try:
-        Chooser(asked.opened(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE).choose()
+        Chooser(
+            asked.prepared_in_time(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE
+        ).choose()
     except InputError as error:
         outcome = "refused" if "samples would tell" in error.allowed else error.allowed
     return behaviour_row(

@@ -25,7 +25,7 @@ from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
-from validation.ride.no_variance import CORNER, weighting_rows, without_variance
+from validation.ride.no_variance import CORNER, no_variance_rows, weighting_rows
 from validation.ride.rides import (
     ROAD_INTENSITY,
     changed_vehicle,
@@ -51,7 +51,7 @@ SYMMETRY_ZERO = 1e-20
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All but the engines' own linearisations in quick; there, of the vehicles, two at one speed."""
     routes = [_by_quadrature(*job) for job in _jobs(quick)]
-    rows = [*_closed_rows(), *_route_rows(routes), *_limit_rows(), *weighting_rows(SEED), *without_variance()]
+    rows = [*_closed_rows(), *_route_rows(routes), *_limit_rows(), *weighting_rows(SEED), *no_variance_rows()]
     engines = () if quick else ("exudyn", "mujoco")
     rows += [_engine_row(engine) for engine in engines]
     speeds = SPEEDS[::20] if quick else SPEEDS

@@ -56,7 +56,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def of_name(name: str, gravity: float = 0.0) -> SpatialVehicle:
     """A shipped vehicle, or the asymmetric twin, with or without gravity."""
-    return spatial_twin.vehicle(gravity) if name == "spatial twin" else replace(load_vehicle(name), gravity=gravity)
+    return (
+        spatial_twin.asymmetric_vehicle(gravity)
+        if name == "spatial twin"
+        else replace(load_vehicle(name), gravity=gravity)
+    )
 
 
 def curved(vehicle: SpatialVehicle) -> SpatialVehicle:

@@ -10,7 +10,7 @@ from models.systems.handling.energy import drive_energy, unaccounted
 from models.systems.handling.run import Drive, drive_run
 from models.vehicles.spatial import SpatialVehicle
 from validation.common.rows import CaseAnswer, Observed, Row, System, behaviour_row
-from validation.spatial.towing import circle_error, keep_to_the_car, levers_error, towed_turn
+from validation.spatial.towing import circle_error, give_towed_wheels_car_heading, static_load_error, towed_turn
 from validation.spatial.trains import caravan, train, train_without_tie
 from validation.spatial.written_equations import TURN_CONTROLS
 
@@ -40,7 +40,7 @@ def _levers_row() -> Row:
         "trailer.loads",
         SYSTEM,
         "static loads on the caravan's ball and on all three axles, over those by their levers, less 1",
-        levers_error(),
+        static_load_error(),
         "",
     ).at_most(1e-9, "statics of two bodies on a ball and three axles; rounding of a linear system", "closed form")
 
@@ -100,7 +100,7 @@ def _energy_row() -> Row:
 
 
 def _fault_row() -> Row:
-    errors = towed_turn(caravan(), TURNING, keep_to_the_car)
+    errors = towed_turn(caravan(), TURNING, give_towed_wheels_car_heading)
     seen = abs(errors.yaw) > TURN_BOUND or np.abs(errors.headings).max() > TURN_BOUND
     return behaviour_row(
         "trailer.fault",

@@ -8,11 +8,11 @@ from models.vehicles.spatial_linear import preloads
 from validation.common.checks import largest_relative_difference
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.spatial.written_equations import (
-    bristles_gap,
+    brush_force_gap,
     cut_cars,
     hub_gap,
     hub_path_gap,
-    inside_gap,
+    inner_force_gap,
     report_gap,
     rolling_cars,
     rolling_gap,
@@ -48,7 +48,7 @@ def _laws(states: int) -> list[Row]:
         _row(
             "bristles",
             f"largest difference of the creep forces of {states} random patches, over the load",
-            bristles_gap(states),
+            brush_force_gap(states),
             "1",
             LAW_BOUND,
         )
@@ -85,7 +85,7 @@ def _hubs(states: int, duration: float) -> list[Row]:
                 _row(f"hubs.{engine}.{name}", what, hub_gap(car, engine, states), "of the largest", INSTANT_BOUND)
             )
         what = f"largest difference of {name}'s section forces, wrenches and holding moments at random states"
-        rows.append(_row(f"hubs.inside.{name}", what, inside_gap(car, 4), "of the largest", INSTANT_BOUND))
+        rows.append(_row(f"hubs.inside.{name}", what, inner_force_gap(car, 4), "of the largest", INSTANT_BOUND))
         for kind, rough in (("road", True), ("noise", False)):
             what = f"largest difference of {name}'s coordinates and rates in MuJoCo, {duration:g} s of {kind}"
             rows.append(

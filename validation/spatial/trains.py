@@ -1,4 +1,4 @@
-"""Cars with trailers: the shipped caravan, and an asymmetric train whose hitches turn about some axes alone."""
+"""Cars with trailers: the shipped caravan, and an asymmetric train whose hitches turn about some axes only."""
 
 from dataclasses import replace
 
@@ -26,18 +26,18 @@ WHEELS: dict[str, tuple[str, Vector, float, tuple[Freedom, ...]]] = {
     "bl": (BOX, (-7.0, 0.9, 0.35), 30.0, ("x", "z")),
     "br": (BOX, (-7.0, -0.86, 0.35), 28.0, ("x", "z")),
 }
-"""Wheels of the trailer: what carries them, place (m), mass (kg), freedoms."""
+"""Wheels of the trailer by name: body that carries the wheel, position (m), mass (kg), freedoms."""
 STOP = Curve((-0.1, -0.02, 0.02, 0.1), (-5000.0, 0.0, 0.0, 7000.0))
 DAMPER = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-1500.0, -400.0, 0.0, 200.0, 600.0))
 
 
 def caravan() -> SpatialVehicle:
-    """The shipped car with a caravan of one axle on its ball."""
+    """The shipped car with a caravan of one axle on its ball hitch."""
     return load_vehicle("r19_caravan", towing=True)
 
 
 def train() -> SpatialVehicle:
-    """The asymmetric twin with a trailer of two axles. The drawbar, with the first axle, yaws and pitches about the
+    """The asymmetric car with a trailer of two axles. The drawbar, with the first axle, yaws and pitches about the
     hook, and the box yaws on the drawbar. Springs have curves, friction and skew axes; one connects drawbar and car
     beside the hook."""
     car = twin()
@@ -62,8 +62,8 @@ def train() -> SpatialVehicle:
 
 
 def train_without_tie() -> SpatialVehicle:
-    """The same train without this connecting spring, and with a box that also pitches on the drawbar, so that no hitch
-    transmits a moment.
+    """The train without the spring TIE between car and drawbar, and with a box that also pitches on the drawbar, so
+    that no hitch transmits a moment.
 
     Closed forms of a turn know none. A box that cannot pitch beside a drawbar that rolls with the car yaws by its
     weight: its axis leans.
@@ -74,7 +74,7 @@ def train_without_tie() -> SpatialVehicle:
 
 
 def _bodies() -> tuple[Body, ...]:
-    """Bodies of the trailer: drawbar and box behind their hitches, and wheels."""
+    """Bodies of the trailer: hitches, drawbar, box and wheels."""
     inertia = ((260.0, 6.0, -9.0), (6.0, 700.0, 4.0), (-9.0, 4.0, 720.0))
     light = ((20.0, 0.0, 1.0), (0.0, 60.0, 0.0), (1.0, 0.0, 65.0))
     return (
@@ -90,7 +90,7 @@ def _bodies() -> tuple[Body, ...]:
 
 
 def _springs() -> tuple[SpringDamper, ...]:
-    """Springs of the trailer's wheels, with axes fixed in the body that carries them."""
+    """Springs and bushings of the trailer's wheels, with axes fixed in the body that carries the wheel."""
     upward: Vector = (0.06, 0.0, 0.9981984772580131)
     dampers = {"dl": DAMPER, "br": DAMPER}
     upright = tuple(
