@@ -70,9 +70,9 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
         "cost": sample.extra_calls / sample.calls,
         "ratio": None,
     }
-    if not sample.told:
+    if not sample.stated:
         return sample_table
-    stated, true = sample.told[sample.printed], sample.true[sample.printed]
+    stated, true = sample.stated[sample.printed], sample.true[sample.printed]
     return sample_table | {
         "channel": sample.printed,
         "stated": stated.error,

@@ -1,5 +1,5 @@
-"""Random stops in random numbers of steps to a sample; the truth is the reference's, or MuJoCo's of a vehicle on its
-suspension, with a hundred times as many."""
+"""Stated errors of random braking stops; the true solution has a hundred times as many steps per sample, by the
+reference, or by MuJoCo for a vehicle on its suspension."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,12 +15,12 @@ from models.systems.braking.errors import motion_and_distance
 from models.systems.braking.march import BrakedVehicle, BrakingPath
 from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene, build
-from validation.stated_errors.sample import Sample, drawn_samples
+from validation.stated_errors.sample import Sample, random_samples
 
 FINER_STEPS = 100
-"""Times as many steps in the truth."""
+"""Ratio of the number of steps of the true solution to that of the run."""
 SURFACES = {"ice": 0.15, "snow": 0.25, "wet": 0.6, "dry": 0.7}
-"""With the friction by which circles are drawn."""
+"""Surfaces of random stops, with a coefficient of friction for the choice of the circle's radius."""
 CONTROLLERS = ("none", "slip_bang_bang", "acceleration_phases", "slip_pi")
 AXLE_DATA = {"track": 1.9, "radius": 0.5, "spin_inertia": 13.35, "roll_share": 0.5}
 TRAILER_DATA = {
@@ -36,18 +36,19 @@ TRAILER_DATA = {
 
 
 def samples(sample_count: int, seed: int) -> Iterator[Sample]:
-    """``sample_count`` samples from stops that come to an end, also those whose result states no error."""
-    return drawn_samples(sample_count, seed, _draw_stop)
+    """Yield ``sample_count`` samples from random braking stops; runs that fail are replaced, results without a stated
+    error are not."""
+    return random_samples(sample_count, seed, _sample_of_random_stop)
 
 
-def _draw_stop(random: np.random.Generator) -> Sample:
-    """Sample from one random stop; raises if the tyres cannot hold the circle or the vehicle rolls over."""
+def _sample_of_random_stop(random: np.random.Generator) -> Sample:
+    """Sample from a random braking stop; raises if the tyres cannot hold the circle or the vehicle rolls over."""
     engine, scene = str(random.choice(ENGINES)), build(_table(random), "drawn.toml")
     return _sample_of_stop(scene, engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:
-    """Table of a random scene with one procedure."""
+    """Table of a random braking scene with one procedure."""
     surface, kind, steps = (
         str(random.choice(list(SURFACES))),
         str(random.choice(CONTROLLERS)),
@@ -86,7 +87,7 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
 
 
 def _random_brakes(random: np.random.Generator) -> dict[str, Any]:
-    """Random brakes for a vehicle on its suspension."""
+    """Table of random brakes for a vehicle on its suspension."""
     gradient = random.uniform(200.0, 600.0)
     return {"supply": random.uniform(1.0, 4.0), "front": {"gradient": gradient}, "rear": {"gradient": 0.5 * gradient}}
 
@@ -104,7 +105,7 @@ def _random_procedure(random: np.random.Generator, surface: str) -> dict[str, An
 
 
 def _sample_of_stop(scene: BrakingScene, engine: str) -> Sample:
-    """Run a scene with its stated error, and compute its true error by a finer run."""
+    """Sample from a run of a braking scene with its stated error; the true error is computed by a finer run."""
     with counted_steps() as calls:
         try:
             stated_run = run(scene, engine, error=True)
@@ -128,7 +129,7 @@ def _sample_of_stop(scene: BrakingScene, engine: str) -> Sample:
 
 @contextmanager
 def counted_steps() -> Iterator[list[float]]:
-    """Context that counts the steps of every run."""
+    """Context that yields a list, to which every braking run within it adds its number of steps."""
     calls, march = list[float](), BrakedVehicle.run
 
     def counting(vehicle: BrakedVehicle, *arguments: Any) -> BrakingPath:
