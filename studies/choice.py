@@ -1,4 +1,4 @@
-"""Which effects of a scene do its quantities call for: chosen within a tolerance by runs, and confirmed; any system."""
+"""Which effects of a scene its quantities need within a tolerance: chosen by runs, and confirmed; for any system."""
 
 import csv
 from collections.abc import Callable
@@ -27,11 +27,11 @@ from studies.command.asked import ANY_SYSTEM, load_scene, plan_of
 
 SYSTEM = ANY_SYSTEM
 ACTIVE_SHARE, BLIND_CHANGE = 0.1, 1e-3
-"""Share of the energy activity from which an element counts as active; change below which a quantity is blind to it."""
+"""Share of the energy activity above which an element is active; relative change below which a quantity ignores it."""
 LOWEST_CHANGE, HIGHEST_CHANGE = 1e-3, 1e3
-"""Ends of the axis of changes (percent): what is smaller or larger is drawn at the end."""
+"""Ends of the axis of changes (per cent); smaller or larger changes are drawn at the ends."""
 ELEMENTS_DRAWN = 8
-"""Elements whose activity is drawn, the most active first."""
+"""Largest number of elements whose energy activity is drawn, the most active first."""
 Progress = Callable[[str, float], None]
 
 
@@ -43,9 +43,9 @@ class Options(Strict):
 
 @dataclass(frozen=True)
 class SingleEffect:
-    """One effect alone: the predicted changes (quantities,) if only it is left out (inf if it cannot be), and its
-    saving. work_ratio: ratio of the work of the scene, at steps lengthened for accuracy alone, to the work without the
-    effect at the longest step then allowed."""
+    """A single effect of a scene. changes (quantities,) : predicted relative changes if only this effect is left out,
+    inf if it cannot be; work_ratio : work of the complete scene, at the steps that accuracy allows, divided by the work
+    without the effect at the longest step then allowed."""
 
     effect: str
     changes: np.ndarray
@@ -54,10 +54,9 @@ class SingleEffect:
 
 @dataclass(frozen=True)
 class SceneChoice:
-    """The choice of effects for one scene, with each effect taken alone. further_tolerances: tolerances above which
-    effects that stay would be left out too. activity_of_element: energy activity (W) by element, where it has a closed
-    form.
-    results: runs of the reduced scene, with their errors."""
+    """The choice of effects for a scene, and the changes by each single effect. further_tolerances : tolerance above
+    which a staying effect would be left out, too; activity_of_element : energy activity (W) by element, if it has a
+    closed form. results: runs of the reduced scene, with their errors."""
 
     scene: Any
     engine: str
@@ -69,12 +68,12 @@ class SceneChoice:
 
     @property
     def staying_effects(self) -> list[str]:
-        """Effects that were not left out."""
+        """Names of the effects that were not left out."""
         return [name for name in self.choice.candidates if name not in self.choice.left_out]
 
 
 def check(scene: Any, engines: tuple[str, ...]) -> None:
-    """Refuse scenes without runs in time, and scenes beside that make no choice."""
+    """Raise InputError for further scenes of the option "beside" that ask for no choice of effects."""
     system_of(scene)
     for name in read(Options, scene.options, scene.file, "options").beside:
         other_scene = load_scene(name, None)
@@ -83,14 +82,14 @@ def check(scene: Any, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choose effects of the scenes; saves ``SYSTEM.csv`` for each scene, and a figure."""
+    """Choose the effects of the scene and of further scenes; saves a CSV table for each scene, and a figure."""
     check(scene, engines)
     further_scenes = [load_scene(name, None) for name in scene.options.get("beside", [])]
     return save_choices([scene, *further_scenes], engines, folder, progress)
 
 
 def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choices of scenes, the first by one of these engines, saved and drawn."""
+    """Choose, save and draw the effects of scenes, the first in one of ``engines``; returns the summary."""
     scene, choices = scenes[0], list[SceneChoice]()
     for i, chosen_scene in enumerate(scenes):
         progress(chosen_scene.title, i / len(scenes))
@@ -109,14 +108,14 @@ def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, prog
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
-        "answer": [_answer_of_choice(choice) for choice in choices],
+        "answer": [_summary_of_choice(choice) for choice in choices],
         "table": [line for choice in choices for line in choice_lines(choice, len(choices) > 1)],
         "results": _results(choices),
     }
 
 
 def _results(choices: list[SceneChoice]) -> dict[str, Result]:
-    """Results of the reduced scenes of all choices, each under a name of its system (if there are several) and run
+    """Results of the reduced scenes of all choices, by a name of the system (if there are several) and the run's
     number."""
     return {
         " ".join(
@@ -131,13 +130,13 @@ def _results(choices: list[SceneChoice]) -> dict[str, Result]:
 
 
 def _pass_progress(progress: Progress, title: str, completed: int, scene_count: int, share: float) -> None:
-    """Report progress over several scenes: ``completed`` scenes are done, and ``share`` of the search of the present
-    one."""
+    """Report progress over several scenes: ``completed`` scenes are done, and ``share`` of the search of the current
+    scene."""
     progress(title, (completed + share) / scene_count)
 
 
 def has_closed_form(scene: Any) -> bool:
-    """Whether a scene's choice needs no runs in time."""
+    """Whether the choice of a scene's effects has a closed form, without runs in time: a linear stationary ride."""
     if scene.system != "ride":
         return False
     from models.systems.ride.of_scene import goes_in_time
@@ -146,14 +145,14 @@ def has_closed_form(scene: Any) -> bool:
 
 
 def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
-    """The system's usual engine if it is among the requested ones or none is requested; else the first requested
-    one."""
+    """Engine for the choice: the system's usual engine if it is requested or none is; else the first requested
+    engine."""
     usual: str = system_of(scene).ENGINE
     return usual if not engines or usual in engines else engines[0]
 
 
 def search_text(scene: Any) -> str:
-    """Text on how many runs the search for a scene's choice may take."""
+    """Line for the screen on the number of runs that the search for a scene's choice of effects may take."""
     if has_closed_form(scene):
         from models.advice.ride_choice.estimate import estimate
 
@@ -173,7 +172,7 @@ def search_text(scene: Any) -> str:
 def choice_of_scene(
     scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None
 ) -> SceneChoice:
-    """The choice for a scene in one engine."""
+    """The choice of effects for a scene by runs in one engine."""
     engine = engine_of(scene, engines)
     with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *places_of(scene)) as pool:
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
@@ -191,7 +190,7 @@ def choice_of_scene(
 
 
 def _linear_ride_choice(scene: Any) -> SceneChoice:
-    """The choice for a linear stationary ride scene by its closed form; numbers of calls are for one second of
+    """The choice of effects for a linear stationary ride scene in closed form; numbers of calls are for one second of
     motion."""
     from models.advice.ride_choice.activity import activity_by_element
     from models.advice.ride_choice.choose import Chooser as Linear
@@ -232,8 +231,8 @@ def _linear_ride_choice(scene: Any) -> SceneChoice:
     return SceneChoice(scene, "closed form", choice, single_effects, further, watts)
 
 
-def _answer_of_choice(answered: SceneChoice) -> dict[str, Any]:
-    """Saved answer of a choice: its effects, their changes and the saving."""
+def _summary_of_choice(answered: SceneChoice) -> dict[str, Any]:
+    """Entry of the summary for a choice: its effects, their changes and the saving."""
     choice = answered.choice
     return {
         "system": answered.scene.system,
@@ -260,8 +259,8 @@ def _answer_of_choice(answered: SceneChoice) -> dict[str, Any]:
 
 
 def _save_effect_table(choice: SceneChoice, path: Path) -> None:
-    """Save a CSV file with a row per effect: the changes if it alone is left out, what this saves, and whether it was
-    left out."""
+    """Save a CSV file with a row per effect: the changes if only this effect is left out, the saved work, and whether
+    it was left out."""
     with path.open("x", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         heads = [f"{name}, change [-]" for name in choice.scene.quantities]
@@ -275,7 +274,7 @@ def _save_effect_table(choice: SceneChoice, path: Path) -> None:
 
 
 def percent_text(relative_change: float) -> str:
-    """A relative change as text."""
+    """Text of a relative change in per cent."""
     digits = ".2g" if abs(relative_change) < 0.1 else ",.0f"
     return f"{100 * relative_change:{digits}} %" if np.isfinite(relative_change) else "without end"
 
@@ -285,7 +284,7 @@ def _change_text(relative_change: float, beside: float) -> str:
 
 
 def _why_it_stays(relative_change: float, scene_choice: SceneChoice) -> str:
-    """Text on why an effect stays: how much the quantities would change if it were left out as well."""
+    """Text on why an effect stays: how much the quantities would change if it were left out, too."""
     if (
         relative_change > PREDICTION_SHARE * scene_choice.scene.tolerance
         or scene_choice.activity_of_element
@@ -299,7 +298,7 @@ def _why_it_stays(relative_change: float, scene_choice: SceneChoice) -> str:
 
 
 def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
-    """Text of the choice."""
+    """Lines for the screen on the choice of a scene's effects."""
     choice, scene = scene_choice.choice, scene_choice.scene
     rows = [
         f"  {scene.title} ({scene.system}, {scene_choice.engine})" if with_title else f"  by {scene_choice.engine}",
@@ -344,8 +343,8 @@ def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
 
 
 def misleading_activities(choice_of: SceneChoice) -> list[str]:
-    """Sentences on inertias for which energy activity misleads: they are active, but leaving them out hardly changes a
-    quantity."""
+    """Lines for the screen on inertias for which energy activity misleads: active ones without which a quantity hardly
+    changes."""
     total, rows = sum(value for value in choice_of.activity_of_element.values() if np.isfinite(value)), []
     for effect in choice_of.single_effects:
         share = choice_of.activity_of_element.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
@@ -359,7 +358,7 @@ def misleading_activities(choice_of: SceneChoice) -> list[str]:
 
 
 def choice_figure(choices: list[SceneChoice], path: Path) -> None:
-    """Figure with a panel per scene, and another panel for energy activities if there are any."""
+    """Save a figure with a panel of changes per scene, and a panel of energy activities if there are any."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, save, subplots
 
     shown = [(choice, False) for choice in choices] + [
@@ -379,7 +378,7 @@ def choice_figure(choices: list[SceneChoice], path: Path) -> None:
 
 
 def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
-    """Plot how much each quantity changes if each effect alone is left out.
+    """Plot how much each quantity changes if a single effect is left out, for each effect.
 
     Shaded rows, from the scene's tolerance on, tell why an effect stays; a name says whether it went with the others.
     """
@@ -418,7 +417,7 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
         xlim=(LOWEST_CHANGE / 1.5, HIGHEST_CHANGE * 1.5),
         ylim=(-0.5, len(shown) - 0.5),
         yticks=y,
-        yticklabels=[_effect_and_whether_gone(scene_choice, effect) for effect in shown],
+        yticklabels=[_effect_label(scene_choice, effect) for effect in shown],
         xlabel="change by leaving out this effect alone [%] (at the ends: beyond)",
     )
     calls_before, _, calls_after = scene_choice.choice.calls
@@ -429,8 +428,8 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
     axis.legend(fontsize=SMALL_TEXT, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _effect_and_whether_gone(choice_of: SceneChoice, effect: SingleEffect) -> str:
-    """Name of an effect with "(left out)" or "(stays)". An effect that changes little alone may stay, since it can
+def _effect_label(choice_of: SceneChoice, effect: SingleEffect) -> str:
+    """Label of an effect with "(left out)" or "(stays)". An effect whose own change is small may stay, since it can
     matter together with others that were left out."""
     return effect.effect.replace("_", " ") + (
         " (left out)" if effect.effect in choice_of.choice.left_out else " (stays)"

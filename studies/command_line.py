@@ -21,16 +21,16 @@ from models.measured.file_kinds import is_measurement
 from studies.command.asked import (
     check_by_any,
     checked_study,
+    doubt_lines,
     engines_of,
     findings_of,
     load_scene,
-    plain_arrays,
+    needs_no_extras,
     plan_of,
-    query_lines,
 )
 from studies.command.audits import blind_spot_audit, conformity_report
-from studies.command.crew import given_crew
-from studies.command.finishing import exit_with_message, finish, folder_of, profile_lines, untold_findings
+from studies.command.crew import crew_changes_by_options
+from studies.command.finishing import exit_with_message, finish, folder_of, profiled_work, unprinted_finding_lines
 from studies.command.options import (
     AsJson,
     Changes,
@@ -44,7 +44,7 @@ from studies.command.options import (
     Sweep,
     Workers,
 )
-from studies.command.second_compiler import compiled_beside
+from studies.command.second_compiler import second_process_compiles
 from studies.command.waiting import progress_bar
 
 app = typer.Typer(
@@ -121,7 +121,7 @@ def show(
     if not price:
         check_by_any(loaded, engines_of(getattr(getattr(loaded, "run", None), "engine", None), loaded.system))
         plan = plan_of(loaded).describe(loaded)
-        return print("\n".join([plan, *untold_findings(findings_of(loaded), plan), *_search_lines(loaded)]))
+        return print("\n".join([plan, *unprinted_finding_lines(findings_of(loaded), plan), *_search_lines(loaded)]))
     _say_user_code(loaded)
     from models.advice.price.effects import price_list
     from models.advice.price.effects_text import as_dict
@@ -162,7 +162,7 @@ def run_scene(
     as_json: AsJson = False,
 ) -> None:
     """Run a scene and save its results and figures."""
-    telling = profile_lines(profile)
+    telling = profiled_work(profile)
     if sweep is not None:
         from studies.command.crew import crew_of
         from studies.command.sweep import RECORDS_FOLDER, sweep_points
@@ -174,12 +174,14 @@ def run_scene(
         work = partial(run_points, replace(job, folder=folder), crew=crew)
         return finish(telling(work), folder, as_json, strict=strict)
     loaded = load_scene(scene, changes)
-    loaded = loaded.model_copy(update={"error": loaded.error and not no_error, **given_crew(workers, cluster)})
+    loaded = loaded.model_copy(
+        update={"error": loaded.error and not no_error, **crew_changes_by_options(workers, cluster)}
+    )
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
-    with _telling_queries(loaded), compiled_beside(scene, changes or [], loaded, engines):
+    with _telling_queries(loaded), second_process_compiles(scene, changes or [], loaded, engines):
         with progress_bar("checking the scene", loaded.system):
             module = checked_study(loaded, engines)
-        if plain_arrays(loaded, engines, module):
+        if needs_no_extras(loaded, engines, module):
             leave_out(*OF_LABELS)
         folder = folder_of(Path(loaded.file).stem, getattr(module, "BLOCKS_FOLDER", None), loaded.study, out, resume)
         doubts = findings_of(loaded)
@@ -193,7 +195,7 @@ def _telling_queries(scene: Any) -> Iterator[None]:
     try:
         yield
     except InputError:
-        for line in query_lines(scene):
+        for line in doubt_lines(scene):
             print(line, file=sys.stderr)
         raise
 
@@ -217,7 +219,7 @@ def price(
     from models.advice.price.text import as_dict
     from models.advice.price.text import recommendation_lines as price_lines
 
-    loaded = load_scene(scene, changes).model_copy(update=given_crew(workers, cluster))
+    loaded = load_scene(scene, changes).model_copy(update=crew_changes_by_options(workers, cluster))
     _say_user_code(loaded)
     with progress_bar("runs of every engine in ever finer steps", loaded.system):
         priced = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
@@ -282,7 +284,7 @@ def identify(
     loaded, keys = load_scene(scene, changes), [key.strip() for key in parameters.split(",") if key.strip()]
     if not keys:
         raise InputError("--parameters", "", parameters, "must name keys of the scene, as front.friction,rear.friction")
-    loaded = loaded.model_copy(update=given_crew(workers, cluster))
+    loaded = loaded.model_copy(update=crew_changes_by_options(workers, cluster))
     engines = engines_of(engine, loaded.system)
     checked_study(loaded, engines)
     if not measurement.is_file():
@@ -381,7 +383,7 @@ def validate(
     """Run the validation cases and write report.html, results.json and results.csv."""
     if only is not None and not blind_spots:
         raise InputError("--only", "", only, "goes with --blind-spots")
-    crew = given_crew(workers, cluster)
+    crew = crew_changes_by_options(workers, cluster)
     if engine is not None:
         return conformity_report(engine, quick or blind_spots or against is not None or resume is not None, out)
     if blind_spots:

@@ -130,7 +130,7 @@ def _as_library(scene: Any = None, **names: str) -> "Iterator[None]":
 
     What is unlikely about the vehicle of a scene that is refused is a note of the error: it may be the cause.
     """
-    from studies.command.asked import query_lines
+    from studies.command.asked import doubt_lines
 
     try:
         yield
@@ -139,7 +139,7 @@ def _as_library(scene: Any = None, **names: str) -> "Iterator[None]":
             option = error.file.lstrip("-")
             renamed = InputError(names.get(option, option), error.place, error.value, error.allowed, error.choices)
             raise renamed from None
-        for line in query_lines(scene) if scene is not None else ():
+        for line in doubt_lines(scene) if scene is not None else ():
             error.add_note(line)
         raise
 

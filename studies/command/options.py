@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have: their types, names and help texts."""
+"""Arguments and options that several commands share: types, names and help texts."""
 
 from pathlib import Path
 from typing import Annotated

@@ -25,7 +25,7 @@ from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
-from validation.ride.no_variance import CORNER, no_variance_rows, weighting_rows
+from validation.ride.no_variance import QUARTER_CAR, no_variance_rows, weighting_rows
 from validation.ride.rides import (
     ROAD_INTENSITY,
     changed_vehicle,
@@ -122,13 +122,13 @@ def _closed_rows() -> list[Row]:
     worst = {"acceleration": 0.0, "travel": 0.0, "deflection": 0.0}
     for corner in (0.0, 1e-6, 1e-3, 0.3, 3.0):
         variance = stationary_covariance(
-            vehicle_with_road(quarter_car_vehicle([(0.0, CORNER)]), one_track((0.0,), corner), 20.0)
+            vehicle_with_road(quarter_car_vehicle([(0.0, QUARTER_CAR)]), one_track((0.0,), corner), 20.0)
         ).variance
         q, w = 20.0 * ROAD_INTENSITY, 20.0 * corner
         exact = [
-            CORNER.body_acceleration_variance(q, w),
-            CORNER.suspension_travel_variance(q, w),
-            CORNER.tyre_deflection_variance(q),
+            QUARTER_CAR.body_acceleration_variance(q, w),
+            QUARTER_CAR.suspension_travel_variance(q, w),
+            QUARTER_CAR.tyre_deflection_variance(q),
         ]
         for key, value, expected in zip(worst, variance[:3], exact if corner == 0.0 else exact[:2], strict=False):
             worst[key] = max(worst[key], largest_relative_error(value, expected))
@@ -143,10 +143,10 @@ def _closed_rows() -> list[Row]:
         for key, value in worst.items()
     ]
     a, b, speeds = 1.2, 1.5, (3.0, 17.0, 50.0)
-    front, rear, inertia = split_half_car(CORNER, a, b)
+    front, rear, inertia = split_half_car(QUARTER_CAR, a, b)
     vehicle = quarter_car_vehicle([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
     half = [stationary_covariance(vehicle_with_road(vehicle, one_track((a, -b)), v)).variance[0] for v in speeds]
-    formula = [half_car_acceleration(CORNER, v * ROAD_INTENSITY, a, b, v) for v in speeds]
+    formula = [half_car_acceleration(QUARTER_CAR, v * ROAD_INTENSITY, a, b, v) for v in speeds]
     what = "error of the variance at the centre of a half car that splits into quarter cars, delay exact, 3 to 50 m/s"
     worst_half = largest_relative_error(np.array(half), np.array(formula))
     return [
