@@ -27,7 +27,7 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
 
     progress(f"{scene.vehicle} in {', '.join(LABELS[engine] for engine in engines)}", 0.0)
     film, vehicle = scene.film, import_module(f"studies.pictures.{scene.vehicle}")
-    stage, motions = vehicle.filmed(film.duration, film.times(), engines)
+    stage, motions = vehicle.stage_and_motions(film.duration, film.times(), engines)
     page = Page(stage, motions)
     best = page.frame_of_largest_force()
     written = [write_png(folder / "page.png", page.frame(best))]

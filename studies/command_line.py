@@ -54,8 +54,8 @@ app = typer.Typer(
 )
 
 
-def _say_version(wanted: bool) -> None:
-    """Print the version and end, where that is what the user wants."""
+def _print_version(wanted: bool) -> None:
+    """Print the version and end the process if the option ``--version`` is given."""
     if wanted:
         from importlib.metadata import version
 
@@ -66,7 +66,7 @@ def _say_version(wanted: bool) -> None:
 @app.callback()
 def common(
     version: Annotated[
-        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Print the version and end.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end.")
     ] = False,
 ) -> None:
     """Options that belong to no command."""
@@ -122,7 +122,7 @@ def show(
         check_by_any(loaded, engines_of(getattr(getattr(loaded, "run", None), "engine", None), loaded.system))
         plan = plan_of(loaded).describe(loaded)
         return print("\n".join([plan, *unprinted_finding_lines(findings_of(loaded), plan), *_search_lines(loaded)]))
-    _say_user_code(loaded)
+    _announce_user_code(loaded)
     from models.advice.price.effects import price_list
     from models.advice.price.effects_text import as_dict
     from models.advice.price.effects_text import price_list_lines as price_lines
@@ -132,15 +132,15 @@ def show(
     print(json.dumps(as_dict(prices), indent=1) if as_json else "\n".join(price_lines(prices, loaded.quantities)))
 
 
-def _say_user_code(scene: Any) -> None:
-    """Say on the terminal that code of the user's is about to run, which a price calls many times."""
+def _announce_user_code(scene: Any) -> None:
+    """Print on stderr that code of the user is about to run many times, if the scene has any."""
     code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)
     if code:
         print(f"twinrig: this runs your own code, many times: [port] {code}", file=sys.stderr, flush=True)
 
 
 def _search_lines(scene: Any) -> list[str]:
-    """Lines on the number of runs that a search for a choice may take, where a scene asks for a choice."""
+    """Lines for the screen on the number of runs that a choice of effects may take, if the scene asks for a choice."""
     from studies.choice import search_text
 
     return [] if scene.tolerance is None else [search_text(scene)]
@@ -178,7 +178,7 @@ def run_scene(
         update={"error": loaded.error and not no_error, **crew_changes_by_options(workers, cluster)}
     )
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
-    with _telling_queries(loaded), second_process_compiles(scene, changes or [], loaded, engines):
+    with _doubts_printed_on_refusal(loaded), second_process_compiles(scene, changes or [], loaded, engines):
         with progress_bar("checking the scene", loaded.system):
             module = checked_study(loaded, engines)
         if needs_no_extras(loaded, engines, module):
@@ -190,8 +190,9 @@ def run_scene(
 
 
 @contextmanager
-def _telling_queries(scene: Any) -> Iterator[None]:
-    """Where a scene is refused, tell queries about its vehicle and channels, too: they may be the cause."""
+def _doubts_printed_on_refusal(scene: Any) -> Iterator[None]:
+    """Context that prints doubtful values of a scene's vehicle and channels if the scene is refused, as a possible
+    cause."""
     try:
         yield
     except InputError:
@@ -220,7 +221,7 @@ def price(
     from models.advice.price.text import recommendation_lines as price_lines
 
     loaded = load_scene(scene, changes).model_copy(update=crew_changes_by_options(workers, cluster))
-    _say_user_code(loaded)
+    _announce_user_code(loaded)
     with progress_bar("runs of every engine in ever finer steps", loaded.system):
         priced = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
     print(json.dumps(as_dict(priced), indent=1) if as_json else "\n".join(price_lines(priced)))
@@ -344,12 +345,12 @@ def twin(
     The file as MuJoCo parsed it is held to the same model built in Exudyn, in MuJoCo and by plain equations, at random
     states. Of two files the elements that make them move differently are named. Ends with code 1 if anything differs.
     """
-    from studies.command.twin import TwinOptions, check_asked, content_kinds, examine, twin_lines
+    from studies.command.twin import TwinOptions, check_arguments, examine, listed_content_kinds, twin_lines
 
-    check_asked(files, page)
+    check_arguments(files, page)
     with progress_bar("building the model") as tell:
         wanted = TwinOptions(states, march, tolerance, quantity, controls, folder)
-        twins = examine(files, content_kinds(without), wanted, tell)
+        twins = examine(files, listed_content_kinds(without), wanted, tell)
     print("\n".join(twin_lines(twins)))
     if page is not None:
         from studies.twin_page import write

@@ -1,4 +1,4 @@
-"""What accuracy costs in rolling contact: every theory on the scene's ellipse, its error beside its time and cells."""
+"""Cost of accuracy in rolling contact: error, computing time and cells of every theory on the scene's ellipse."""
 
 from collections.abc import Callable
 from dataclasses import asdict
@@ -42,7 +42,8 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Every theory on every number of cells; saves ``price.nc``, ``price.png`` and ``table.txt``."""
+    """Compute errors and times of every theory with every number of cells; saves ``price.nc``, ``price.png`` and
+    ``table.txt``, and returns the summary."""
     check(scene, engines)
     price = priced_theories(scene, tuple(read(Options, scene.options, scene.file, "options").levels), progress)
     price.save(folder / "price.nc")
@@ -66,7 +67,8 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def _table(points: list[TheoryPoint], contact_count: int, uncertain: float) -> list[str]:
-    """Table of all theories and numbers of cells, then the cheapest for each target error."""
+    """Lines for the screen: errors and times of all theories and cells, then the cheapest theory for each target
+    error."""
     return [
         f"  error of the tangential force in % of mu N over {contact_count} contacts (exact ones known to "
         f"{100 * uncertain:.2g} %)",

@@ -25,7 +25,8 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Answer every row into ``forces.csv``; saves the first ones and sizes of all as ``forces.nc``."""
+    """Compute the forces of every row into ``forces.csv``; saves the first rows and the magnitudes of all as
+    ``forces.nc``, and returns the summary."""
     check(scene, engines)
     rows = run_scene(scene, error=scene.error, answers=folder / "forces.csv", progress=progress)
     rows.save(folder / "forces.nc")
@@ -43,8 +44,8 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def summary_lines(rows: int, wrong: int, name: str, seconds: float, errors: bool = True) -> list[str]:
-    """Lines for the screen on how many rows of the file ``name`` were computed, how many have errors, and the time
-    taken."""
+    """Lines for the screen on the number of computed rows of the file ``name``, the number of wrong rows, and the
+    computing time (s)."""
     if rows == 0:
         return [f"  no rows in {name}"]
     sound = ", all of them sound" if rows > 1 else ", sound"

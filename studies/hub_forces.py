@@ -1,4 +1,5 @@
-"""How far noisy hub forces let a vehicle drift, what that does to its springs and mounts, and what holding it takes."""
+"""Drift of a vehicle under noisy hub forces, its effect on section forces and damage, and the moments of
+stabilisers."""
 
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,13 @@ class Options(Strict):
 
 
 def check(scene: HubScene, engines: tuple[str, ...]) -> None:
-    """Refuse options: there are none."""
+    """Raise InputError for any option, as this study has none."""
     read(Options, scene.options, scene.file, "options")
 
 
 def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Measure hub forces; run the vehicle free, with the Kalman filter and with prescribed roll and pitch. Saves the
-    measurement, all runs and two figures."""
+    """Measure hub forces virtually; run the vehicle free, with the Kalman filter and with prescribed roll and pitch.
+    Saves the measurement, all runs and two figures; returns the summary."""
     from studies.hub_forces_figures import damage_figure, drift_figure
 
     comparison = compare(scene, engines, progress)
@@ -76,7 +77,7 @@ def _table(scene: HubScene, comparison: Comparison) -> list[str]:
 
 
 def save(comparison: Comparison, folder: Path) -> None:
-    """Save the measurement as a user would have it, and every run: ``runs.nc``, and the chassis' motion as
+    """Save the measurement as CSV files of a user, all runs as ``runs.nc``, and the motion of the chassis as
     ``runs.csv``."""
     measurement = comparison.measurement
     names = [
@@ -103,7 +104,7 @@ def save(comparison: Comparison, folder: Path) -> None:
 
 
 def _write_samples(path: Path, names: list[tuple[str, str]], measured: Any) -> None:
-    """Write sampled hub forces or angles to a CSV file, with a column for each name and unit."""
+    """Write sampled hub forces or angles to a CSV file, with a column for each (name, unit)."""
     columns = {name: (unit, measured.samples[:, i]) for i, (name, unit) in enumerate(names)}
     write_time_series(path, columns, measured.period)
 

@@ -24,13 +24,13 @@ TIMES = np.array([0.0, 0.02, 0.05])
 
 @pytest.fixture(scope="module")
 def hunting():
-    return import_module("studies.pictures.wheelset").filmed(0.05, TIMES, ("exudyn", "mujoco"))
+    return import_module("studies.pictures.wheelset").stage_and_motions(0.05, TIMES, ("exudyn", "mujoco"))
 
 
 @pytest.mark.parametrize("vehicle", ["wheelset", "pitch_plane", "r19_free"])
 def test_both_engines_report_the_same_poses(vehicle, hunting):
     found = import_module(f"studies.pictures.{vehicle}")
-    _, motions = hunting if vehicle == "wheelset" else found.filmed(0.05, TIMES, ("exudyn", "mujoco"))
+    _, motions = hunting if vehicle == "wheelset" else found.stage_and_motions(0.05, TIMES, ("exudyn", "mujoco"))
     places, turns, _ = largest_differences(*motions)
     assert places < 1e-9 and turns < 1e-9
     for motion in motions:  # they move, and a hundred times further than that: the slowest on a road that fades in
@@ -118,7 +118,7 @@ def changed(*changes):
 def test_without_the_extra_the_stills_are_kept_and_one_sentence_names_it(hunting, monkeypatch, tmp_path):
     monkeypatch.setattr(video, "VIDEO_PACKAGES", ("no_such_package",))
     own = import_module("studies.pictures.wheelset")
-    monkeypatch.setattr(own, "filmed", lambda *given: hunting)
+    monkeypatch.setattr(own, "stage_and_motions", lambda *given: hunting)
     summary = animation.run(changed("film.duration=0.05"), ("exudyn", "mujoco"), tmp_path, lambda text, part: None)
     assert {path.name for path in tmp_path.iterdir()} == {"page.png", "exudyn.png", "mujoco.png"}
     assert "twinrig[video]" in summary["table"][-1] and "twinrig[video]" not in "".join(summary["table"][:-1])

@@ -15,13 +15,13 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from studies.command.asked import load_scene, needs_no_extras, study_of
-from studies.command.waiting import Kernels
+from studies.command.waiting import CompilationTimer
 
 COMPILATION_SECONDS = 1.0
 """Compilation time (s) above which kernels are taken to be missing: loading a scene's compiled kernels takes less."""
 
 
-class SecondCompiler(Kernels):
+class SecondCompiler(CompilationTimer):
     """Observer of compilation that starts a command once, when this process has compiled for COMPILATION_SECONDS."""
 
     def __init__(self, command: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""The bar of a command that takes longer than a second: what is being done and the time left, on a terminal alone.
+"""Progress bar of a command that takes longer than a second: current task and remaining time, on a terminal only.
 
 A thread draws it on stderr, so that results on stdout stay as they are. It knows three things: what a study tells, the
 share of the march that an engine is at, and that numba compiles, which happens once after an installation.
@@ -15,11 +15,11 @@ from typing import Any
 from models.core.waiting import SHARES_OF_MARCHES
 
 BAR_DELAY, BAR_PERIOD = 1.0, 0.1
-"""s until a bar is shown, and between two looks."""
+"""Time (s) until the bar is shown, and between two updates."""
 SLOW_COMPILATION = 0.4
-"""s of one compilation from which on it is told: loading what was compiled before takes less."""
-KNOWN_SHARE = 0.01
-"""Share of a work from which on its time left is told."""
+"""Time (s) of a compilation from which the bar shows it; loading a compiled kernel takes less."""
+LEAST_SHARE = 0.01
+"""Finished share of the work from which the bar shows the remaining time."""
 COMPILE_SECONDS = {
     "pitch-plane": 5.0,
     "ride": 5.0,
@@ -29,23 +29,23 @@ COMPILE_SECONDS = {
     "handling": 30.0,
     "braking": 40.0,
 }
-"""s of processor that the kernels of a system's scenes take to compile; an upper bound, as some may be there."""
+"""Processor time (s) for the compilation of the kernels of a system's scenes; an upper bound, as some may exist."""
 COMPILER_LOCK_EVENT = "numba:compiler_lock"
-"""Numba's event from the beginning to the end of each compilation."""
+"""Name of numba's event that lasts from the beginning to the end of each compilation."""
 Tell = Callable[[str, float], None]
-"""Told what is done now, and which part of all (0 to 1)."""
+"""Function that reports progress: the current task as text, and the finished share (0 to 1) of all work."""
 
 
-class Kernels:
-    """Timer of numba's compilations: their total time, and since when one is running. Numba calls ``on_start`` and
-    ``on_end``."""
+class CompilationTimer:
+    """Timer of numba's compilations: their total time (s), and the start time of a running one; numba's events call
+    ``_start`` and ``_end_compilation``."""
 
     def __init__(self) -> None:
         self.depth, self.total, self.since, self.attached = 0, 0.0, 0.0, False
         self._remove: Callable[[], None] = lambda: None
 
     def attach(self) -> None:
-        """Register for numba's compilation events if numba has been imported already; this call does not import it."""
+        """Register for numba's compilation events if numba is imported already; numba is not imported for this."""
         if self.attached or "numba.core.compiler_lock" not in sys.modules:  # which has imported the events
             return
         event: Any = sys.modules["numba.core.event"]
@@ -68,17 +68,17 @@ class Kernels:
             self.total += time.monotonic() - self.since
 
     def spent(self) -> float:
-        """Time (s) spent in all compilations so far, the running one included."""
+        """Time (s) spent in all compilations so far, including a running one."""
         return self.total + (time.monotonic() - self.since if self.depth else 0.0)
 
     def is_compiling(self) -> bool:
-        """Whether a compilation has been running long enough for the progress bar to show it."""
+        """Whether a compilation is running and has taken longer than SLOW_COMPILATION."""
         return self.depth > 0 and time.monotonic() - self.since > SLOW_COMPILATION
 
 
 @dataclass
-class Waiting:
-    """State of a progress bar: text and share of the work, the march that runs, numba's compiling.
+class ProgressState:
+    """State of the progress bar: current task, finished share, the running time integration, and numba's compilations.
 
     system : of the scene, for the time that its kernels take.
     """
@@ -87,15 +87,16 @@ class Waiting:
     system: str = ""
     share: float = 0.0
     start_time: float = field(default_factory=time.monotonic)
-    compilations: Kernels = field(default_factory=Kernels)
+    compilations: CompilationTimer = field(default_factory=CompilationTimer)
     _march: tuple[Any, float] = (None, 0.0)
 
     def tell(self, text: str, share: float) -> None:
-        """Set the text of the bar to the task that begins, and its share to the finished part."""
+        """Set the bar's text to the task that begins, and its finished share (0 to 1)."""
         self.text, self.share = text, min(max(share, 0.0), 1.0)
 
     def state(self) -> tuple[str, float | None, str]:
-        """Text, finished share and remaining time to show now; the share is None where it is unknown."""
+        """Current task, finished share and text of the remaining time for the bar; the share is None if it is
+        unknown."""
         if self.compilations.is_compiling():
             spent, expected_seconds = self.compilations.spent(), COMPILE_SECONDS.get(self.system, 0.0)
             share = spent / expected_seconds if expected_seconds > spent else None
@@ -113,8 +114,8 @@ class Waiting:
 
 
 def _remaining_seconds(share: float, seconds: float) -> float | None:
-    """Remaining seconds of a task of which ``share`` took ``seconds``; None while the share is too small to tell."""
-    return seconds * (1.0 - share) / share if share > KNOWN_SHARE else None
+    """Remaining time (s) of a task of which ``share`` took ``seconds``; None while the share is too small."""
+    return seconds * (1.0 - share) / share if share > LEAST_SHARE else None
 
 
 def _time_left_text(seconds: float | None, spent: float) -> str:
@@ -128,16 +129,16 @@ def _duration_text(seconds: float) -> str:
 
 @contextmanager
 def progress_bar(text: str, system: str = "") -> Iterator[Tell]:
-    """Context that shows a progress bar on the terminal if the block takes longer than BAR_DELAY. It yields the
-    function to which the block reports its progress.
+    """Context that shows a progress bar on the terminal if its block takes longer than BAR_DELAY; it yields the
+    function that reports progress.
 
     Nothing is written, and no thread runs, where stderr is no terminal.
     """
     if not sys.stderr.isatty():
         yield lambda text, share: None
         return
-    waiting, is_over = Waiting(text, system), threading.Event()
-    thread = threading.Thread(target=_draw, args=(waiting, is_over), daemon=True)
+    waiting, is_over = ProgressState(text, system), threading.Event()
+    thread = threading.Thread(target=_draw_bar, args=(waiting, is_over), daemon=True)
     thread.start()
     try:
         yield waiting.tell
@@ -147,8 +148,8 @@ def progress_bar(text: str, system: str = "") -> Iterator[Tell]:
         waiting.compilations.detach()
 
 
-def _draw(waiting: Waiting, finished: threading.Event) -> None:
-    """Draw the bar until the work is over, from BAR_DELAY on."""
+def _draw_bar(waiting: ProgressState, finished: threading.Event) -> None:
+    """Draw the progress bar from BAR_DELAY on until ``finished`` is set."""
     while not finished.wait(BAR_PERIOD):
         waiting.compilations.attach()
         waiting.state()  # which sees when a march begins

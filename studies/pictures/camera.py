@@ -1,4 +1,4 @@
-"""Where the spectator stands, and what a surface looks like from there: triangles to pixels.
+"""Camera of a picture, and drawing of shaded triangles into pixels.
 
 The nearest surface wins at every pixel; colours run straight between corners.
 """
@@ -13,13 +13,13 @@ from models.machine.compiled import njit
 from studies.pictures.shapes import PaintedSurface
 
 NEAREST_DRAWN = 0.05
-"""m: what is nearer to the eye, or behind it, is not drawn."""
+"""Least distance (m) from the camera at which surfaces are drawn."""
 LIGHT_DIRECTION = np.array([0.35, 0.5, 0.8])
-"""Towards the lamp: to the spectator's right, back to him, up."""
+"""Direction towards the lamp in the camera's axes: right, up, back."""
 HAZE_DISTANCE = 70.0
-"""m: how far one sees until the sky's lower colour hides two thirds."""
+"""Distance (m) at which haze in the colour of the horizon covers 63 % of a surface's colour."""
 SHADED_BRIGHTNESS = 0.4
-"""Brightness of a surface that looks away from the lamp."""
+"""Brightness of a surface that faces away from the lamp, relative to one that faces it."""
 
 
 @dataclass(frozen=True)
@@ -34,27 +34,29 @@ class Camera:
 
     @cached_property
     def axes(self) -> np.ndarray:
-        """Unit vectors (3, 3) of the camera as rows: right, up, and from the target back to the camera."""
+        """Unit vectors (3, 3) of the camera's axes as rows: right, up, and from the target back to the camera."""
         back = np.subtract(self.eye, self.target)
         back /= np.linalg.norm(back)
         right = np.cross(self.up, back)
         right /= np.linalg.norm(right)
         return np.array([right, np.cross(back, right), back])
 
-    def pixels(self, height: int) -> float:
-        """Pixels per metre at the target, in a picture of this height."""
-        return height / (2.0 * np.tan(self.opening / 2.0) * float(np.linalg.norm(np.subtract(self.eye, self.target))))
+    def pixels(self, picture_height: int) -> float:
+        """Pixels per metre at the camera's target, in a picture of a height in pixels."""
+        return picture_height / (
+            2.0 * np.tan(self.opening / 2.0) * float(np.linalg.norm(np.subtract(self.eye, self.target)))
+        )
 
-    def horizon(self, height: int) -> float:
-        """Row (pixels from the top) of the horizon in a picture of this height; negative where it lies above the
+    def horizon(self, picture_height: int) -> float:
+        """Row (pixels from the top) of the horizon in a picture of a height in pixels; negative if it lies above the
         picture."""
         _, upright, back = self.axes
         level = float(np.dot(back, self.up) / np.dot(upright, self.up))
-        return height / 2.0 * (1.0 - level / np.tan(self.opening / 2.0))
+        return picture_height / 2.0 * (1.0 - level / np.tan(self.opening / 2.0))
 
     def projected(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-        """Pixels (..., 2) at which points (..., 3) appear, and their inverse distances (...) along the line of sight;
-        the inverse distance of a point behind the camera is negative."""
+        """Pixels (..., 2) of points (..., 3) in m, and inverse distances (...) in 1/m along the camera's axis; these
+        are negative for points behind the camera."""
         in_camera_axes = (points - self.eye) @ self.axes.T
         near = -1.0 / in_camera_axes[..., 2]
         scale = height / (2.0 * np.tan(self.opening / 2.0)) * near
@@ -66,8 +68,8 @@ class Camera:
 def painted_picture(
     camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky: np.ndarray
 ) -> np.ndarray:
-    """Image (h, w, 3) of surfaces in front of a sky, with the sky's two colours at the picture's top and at the
-    horizon.
+    """Image (height, width, 3) of surfaces in front of a sky; sky (2, 3) : its colours at the top of the picture and at
+    the horizon.
 
     A later layer lies over all earlier ones, as arrows over bodies do.
     """
@@ -89,7 +91,7 @@ def painted_picture(
 def _shaded_triangles(
     camera: Camera, surfaces: list[PaintedSurface], width: int, height: int, haze: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, depths and colours, for ``paint``, of the triangles in front of the camera."""
+    """Corners, inverse distances and colours, as ``paint`` takes them, of the triangles in front of the camera."""
     corners, near = camera.projected(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
     normals = np.concatenate([surface.normals for surface in surfaces])
     sizes = [len(surface.corners) for surface in surfaces]
@@ -103,8 +105,8 @@ def _shaded_triangles(
 
 @njit(cache=True, error_model="numpy")
 def columns_within(start_value, growth, left_column, right_column):
-    """First and last column between ``left_column`` and ``right_column`` for which start + column * growth is not
-    negative; the first is greater than the last where there is no such column.
+    """First and last column between ``left_column`` and ``right_column`` for which start_value + column * growth is not
+    negative; the first is greater than the last if there is no such column.
     """
     if growth > 0.0:
         return max(left_column, -start_value / growth), right_column
@@ -115,8 +117,8 @@ def columns_within(start_value, growth, left_column, right_column):
 
 @njit(cache=True, error_model="numpy")
 def paint(corners, near, colours, image, nearest):
-    """Paint triangles into ``image`` (h, w, 3). A pixel is painted if the triangle is nearer to the camera than what
-    ``nearest`` (h, w), inverse distances (1/m), records there.
+    """Paint triangles into ``image`` (h, w, 3), at pixels where the triangle is nearer to the camera than the surface
+    recorded in ``nearest`` (h, w), inverse distances in 1/m.
 
     corners (m, 3, 2) : pixels, x to the right, y down; near (m, 3) : inverse distances (1/m), which are linear in
     pixels; colours (m, 3, 3) : red, green, blue from 0 to 1 at each corner.

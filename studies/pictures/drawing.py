@@ -1,4 +1,4 @@
-"""One picture of a motion on its stage."""
+"""Drawing of one frame of a filmed motion on its stage."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -8,14 +8,14 @@ from studies.pictures.film import FilmedMotion, Stage
 from studies.pictures.shapes import arrow, rod
 
 SKY_COLOURS = np.array([[0.80, 0.87, 0.94], [0.985, 0.99, 1.0]])
-"""Colour at the top of a picture and at the horizon."""
+"""Colours (red, green, blue) of the sky at the top of a picture and at the horizon."""
 ARROW_HALF_WIDTH = 0.024
-"""Half width of an arrow's head, by the height that the picture shows at its target."""
+"""Half width of an arrow's head divided by the height (m) that the picture shows at the camera's target."""
 GREY_COLOUR = (0.35, 0.37, 0.4)
 
 
 def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: int) -> np.ndarray:
-    """Image (height, width, 3), colours from 0 to 1, of frame ``k``."""
+    """Image (height, width, 3), with colours from 0 to 1, of frame ``k`` of a motion."""
     poses = {name: drawn_pose(motion, stage, name, k) for name in stage.shapes}
     bodies = [surface.moved(*poses[name]) for name, shapes in stage.shapes.items() for surface in shapes]
     around = stage.scenery(float(motion.times[k]))
@@ -38,7 +38,7 @@ def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: i
 
 
 def arrow_lines(motion: FilmedMotion, stage: Stage, k: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """For each arrow of frame ``k``, its start and its vector (3,), in m of the picture."""
+    """Start point (3,) and vector (3,) in m, as drawn, of each force arrow in frame ``k``."""
     spans = []
     for force in motion.arrows:
         position, turn = drawn_pose(motion, stage, force.body, k)
@@ -48,7 +48,7 @@ def arrow_lines(motion: FilmedMotion, stage: Stage, k: int) -> list[tuple[np.nda
 
 
 def drawn_pose(motion: FilmedMotion, stage: Stage, body: str, k: int) -> tuple[np.ndarray, np.ndarray]:
-    """Position (3,) and rotation (3, 3) with which a body is drawn in frame ``k``. Its displacement and rotation from
+    """Position (3,) in m and rotation (3, 3) with which a body is drawn in frame ``k``. Displacement and rotation from
     rest are magnified, except for a wheel's spin."""
     rest_position = np.array(stage.rest_positions[body])
     position, turn = (

@@ -15,7 +15,7 @@ from models.systems.ride.scene import build as ride_scene
 from models.vehicles.spatial import PointOutput, SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Poses, Stage, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Poses, Stage, exudyn_poses, mujoco_poses
 from studies.pictures.road import DRAWN_ROAD, PassingRoad
 from studies.pictures.shapes import PAINT_COLOUR, Colour, PaintedSurface, ball, box, extruded_outline, tyred_wheel
 
@@ -38,7 +38,7 @@ ENGINE_COLOUR: Colour = (0.75, 0.45, 0.15)
 PERSON_COLOUR: Colour = (0.93, 0.76, 0.55)
 
 
-def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
+def stage_and_motions(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
     """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
     scene = ride_scene(SCENE)
     vehicle = vehicle_with_road_forces(vehicle_of(scene))
@@ -71,7 +71,7 @@ def _motion_of_engine(
     else:
         joints = np.empty_like(kept_run.positions)
         joints[:, model.numbers.columns] = kept_run.positions
-        poses = of_mujoco(model.model, model.numbers.bodies, joints)
+        poses = mujoco_poses(model.model, model.numbers.bodies, joints)
     return FilmedMotion(engine, kept_run.times, *poses, arrows(vehicle, kept_run, table[2 * rows], poses))
 
 
@@ -79,7 +79,7 @@ def _exudyn_poses(model: Any, positions: np.ndarray) -> Poses:
     markers = {body.name: model.built.marker(body.name, body.position, True) for body in model.vehicle.bodies}
     model.mbs.Assemble()
     marker_output = {name: partial(model.mbs.GetMarkerOutput, marker) for name, marker in markers.items()}
-    body_positions, turns = of_exudyn(
+    body_positions, turns = exudyn_poses(
         model.mbs, marker_output, np.array([model._values_in_exudyn_order(row) for row in positions])
     )
     axes = {name: np.transpose([model.built.in_body_axes(name, axis) for axis in np.eye(3)]) for name in markers}

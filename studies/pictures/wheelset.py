@@ -15,7 +15,7 @@ from models.systems.wheelset.of_scene import equations_and_start
 from models.systems.wheelset.run import run as simulate
 from models.systems.wheelset.scene import build
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Stage, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Stage, exudyn_poses, mujoco_poses
 from studies.pictures.shapes import Colour, PaintedSurface, box, extruded_outline, floor, surface_of_revolution
 
 SPEED, START_SHIFT, CELLS, STEP = 75.0, 6e-3, 11, 5e-4
@@ -37,7 +37,7 @@ FORCE_CURVE = ForceCurve("creep force", (0.0, 1.0, 0.0), "across the track, to t
 SIDE_SIGNS = {"right": RIGHT, "left": LEFT}
 
 
-def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
+def stage_and_motions(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
     """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
     return stage(CHOSEN_WHEELSET), [_motion_of_engine(engine, duration, times) for engine in engines]
 
@@ -59,7 +59,7 @@ def _motion_of_engine(engine: str, duration: float, times: np.ndarray) -> Filmed
     path_of_frames = WheelsetPath(path.times[rows], path.states[rows], contacts=path.contacts[rows])
     joints = to_joints(path_of_frames.states)[:, :JOINTS]
     if engine == "mujoco":
-        poses = of_mujoco(equations.model.model, {"wheelset": 1}, joints)
+        poses = mujoco_poses(equations.model.model, {"wheelset": 1}, joints)
     else:  # by a marker in the middle of the axle: the last link of its tree
         from models.engines.exudyn_system import items
 
@@ -69,7 +69,7 @@ def _motion_of_engine(engine: str, duration: float, times: np.ndarray) -> Filmed
         )
         middle = mbs.AddMarker(link)
         mbs.Assemble()
-        poses = of_exudyn(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
+        poses = exudyn_poses(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
     return FilmedMotion(engine, path_of_frames.times, *poses, arrows(CHOSEN_WHEELSET, path_of_frames), run)
 
 
