@@ -1,4 +1,4 @@
-"""Figure of the race car: what was predicted with bands beside what was measured, and what simpler vehicles lose."""
+"""Figure of the race car: predicted channels with bands beside measured ones, and errors of simpler vehicles."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,11 +11,12 @@ if TYPE_CHECKING:
     from studies.race_car import Identified
 
 SECONDS_SHOWN = 60.0
-"""s of the prediction that are shown."""
+"""Length (s) of the shown part of the prediction."""
 
 
 def draw(identified_full: "Identified", identified: dict[str, "Identified"], title: str, path: Path) -> Path:
-    """Plot channels over time with their prediction bands, and below them the errors of all vehicles."""
+    """Save a figure of the channels over time with their prediction bands, and of the errors of all vehicles; returns
+    its path."""
     problem = identified_full.bands.problem
     clock_times = problem.clock.times
     shown = clock_times <= clock_times[0] + SECONDS_SHOWN

@@ -1,4 +1,4 @@
-"""Which effects of a ride scene do its quantities call for: chosen within a tolerance, and confirmed."""
+"""Which effects of a ride scene its quantities need within a tolerance: chosen, and confirmed."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -27,19 +27,19 @@ SYSTEM = "ride"
 Progress = Callable[[str, float], None]
 
 LOWEST_CHANGE, HIGHEST_CHANGE = 1e-4, 1e3
-"""Ends of the axis of changes (percent): what is smaller or larger is drawn at the end."""
+"""Ends of the axis of changes (per cent); smaller or larger changes are drawn at the ends."""
 ELEMENTS_DRAWN = 12
-"""Elements whose activity is drawn, the most active first."""
+"""Largest number of elements whose energy activity is drawn, the most active first."""
 
 
 class Options(Samples):
-    """[options] of this study: the copies of a vehicle whose springs are bent; none for a linear one."""
+    """[options] of this study: Monte Carlo copies of a vehicle with nonlinear springs; none for a linear vehicle."""
 
 
 @dataclass(frozen=True)
-class EffectAlone:
-    """One effect that is left out alone: predicted and confirmed changes (quantities,), and the reason why it may not
-    be left out (else empty)."""
+class SingleEffect:
+    """A single effect of a ride scene: predicted and confirmed relative changes (quantities,) if only it is left out,
+    and the reason why it may not be left out, else ""."""
 
     effect: Effect
     predicted_change: np.ndarray
@@ -48,7 +48,7 @@ class EffectAlone:
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
-    """Refuse scenes that ask no question, and options of copies where there are none."""
+    """Raise InputError for scenes without a choice of effects, and for options of copies if the vehicle is linear."""
     read(Options, scene.options, scene.file, "options")
     if goes_in_time(scene):
         opened(scene)
@@ -63,8 +63,8 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choose effects, for nonlinear springs by runs; saves ``choice.nc``, two CSV files, a figure, and files of the
-    reduced scene."""
+    """Choose the effects of a ride scene, by runs for nonlinear springs; saves ``choice.nc``, two CSV files, a figure
+    and files of the reduced scene; returns the summary."""
     check(scene, engines)
     if goes_in_time(scene):
         return save_choices([scene], engines, folder, progress)
@@ -74,7 +74,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         choice = chooser.choose()
         progress("single effects", 0.7)
         further = chooser.change_if_left_out_too(frozenset(choice.left_out))
-        single_effects = [_effect_alone(chooser, effect) for effect in chooser.effects]
+        single_effects = [_single_effect(chooser, effect) for effect in chooser.effects]
         watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
         write(chooser.rest(frozenset(choice.left_out)), folder)
@@ -87,14 +87,13 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "folder": str(folder),
         "failed": {},
         "results": results,
-        "answer": _answer_of_choice(scene, choice, further),
+        "answer": _summary_of_choice(scene, choice, further),
         "table": _table(scene, choice, single_effects, further),
     }
 
 
 def _deviation_results(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
-    """Standard deviations in the complete scene and in the reduced one, as results with their errors and
-    assumptions."""
+    """Results of the complete scene and of the reduced scene: standard deviations with their errors and assumptions."""
     results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
     vehicle = replace(reduced.vehicle, limits=reduced.limits)
     if reduced != ReducedScene.complete(scene):
@@ -102,15 +101,15 @@ def _deviation_results(scene: RideScene, reduced: ReducedScene) -> dict[str, Res
     return results
 
 
-def _effect_alone(chooser: Chooser, effect: Effect) -> EffectAlone:
+def _single_effect(chooser: Chooser, effect: Effect) -> SingleEffect:
     single = frozenset([effect])
-    return EffectAlone(
+    return SingleEffect(
         effect, chooser.predicted_changes(single), chooser.changes_by_modes(single), refusal_reason(single)
     )
 
 
-def _answer_of_choice(scene: RideScene, choice: RideChoice, change_by_effect: dict[Effect, float]) -> dict[str, Any]:
-    """Plain values of a ride's choice: its effects, their changes and the saving."""
+def _summary_of_choice(scene: RideScene, choice: RideChoice, change_by_effect: dict[Effect, float]) -> dict[str, Any]:
+    """Summary of a ride's choice as plain values: its effects, their changes and the saving."""
     columns = {
         "predicted": choice.predicted_change,
         "confirmed": choice.confirmed_change,
@@ -137,14 +136,14 @@ def _answer_of_choice(scene: RideScene, choice: RideChoice, change_by_effect: di
 
 def _save_effect_table(
     scene: RideScene,
-    single_effects: list[EffectAlone],
+    single_effects: list[SingleEffect],
     choice: RideChoice,
     watts: dict[str, float],
     runs: tuple[dict[str, Result], dict[str, int]],
     folder: Path,
 ) -> None:
-    """Save, for each effect, the predicted and confirmed changes if it alone is left out, and whether it was left out.
-    A result and a CSV file hold these; another CSV file holds the energy activity of every element."""
+    """Save, as netCDF and CSV, each effect's predicted and confirmed changes if only it is left out, and whether it was
+    left out; and as another CSV file the energy activity (W) of every element."""
     import pandas as pd
 
     results, counts = runs
@@ -183,14 +182,14 @@ def _save_effect_table(
 
 def choice_figure(
     scene: RideScene,
-    single_effects: list[EffectAlone],
+    single_effects: list[SingleEffect],
     choice: RideChoice,
     watts: dict[str, float],
     results: dict[str, Result],
     path: Path,
 ) -> None:
-    """Plot the changes by leaving out each effect alone and all together, with the tolerance, and the energy activity
-    of each element."""
+    """Save a figure of the changes if each effect alone, or all chosen effects, are left out, with the tolerance; and
+    of each element's energy activity."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, save, subplots
 
     names = [
@@ -223,8 +222,8 @@ def choice_figure(
 
 
 def _plot_activity(axis: Any, watts: dict[str, float]) -> None:
-    """Bar chart of each element's share of the mean power, from the activities ``watts`` (W). Inertias under white
-    noise are left out, as their activity is not finite."""
+    """Draw a bar chart of each element's share of the mean power, from the activities ``watts`` (W); infinite ones, of
+    inertias under white noise, are left out."""
     from models.drawing.figures import BLUE
 
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}
@@ -237,15 +236,15 @@ def _plot_activity(axis: Any, watts: dict[str, float]) -> None:
 
 
 def percent_text(relative_change: float) -> str:
-    """A relative change as text, in per cent."""
+    """Text of a relative change in per cent, with its sign."""
     digits = "+.2g" if abs(relative_change) < 0.1 else "+,.0f"
     return f"{100 * relative_change:{digits}} %" if np.isfinite(relative_change) else "without end"
 
 
 def _table(
-    scene: RideScene, choice: RideChoice, single_effects: list[EffectAlone], change_by_effect: dict[Effect, float]
+    scene: RideScene, choice: RideChoice, single_effects: list[SingleEffect], change_by_effect: dict[Effect, float]
 ) -> list[str]:
-    """Text of the choice."""
+    """Lines for the screen on the choice of effects, their changes and the saving."""
     tolerance = f"{100 * (scene.tolerance or 0):g} %"
     lines = [f"  left out: {', '.join(effect.name for effect in choice.left_out) or 'nothing'}"]
     lines += [f"    {effect.name}: {effect.says}" for effect in choice.left_out]
@@ -281,7 +280,7 @@ def _table(
 
 
 def saving_lines(choice: RideChoice, tolerance: str) -> list[str]:
-    """Text on steps and calls at equal accuracy before and after the choice."""
+    """Lines for the screen on steps and calls at equal accuracy before and after the choice of effects."""
     cost_before, cost_after = choice.cost_before, choice.cost_after
     lines = [
         f"  a run confirms {1e3 * cost_before.step:.3g} ms as the longest step of the classical Runge-Kutta method "

@@ -1,4 +1,4 @@
-"""Figures of the ride studies."""
+"""Figures of the ride studies: standard deviations over speed, spectra, roads, and drives."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -40,7 +40,7 @@ from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
 CORRELATION_COLOURS = (DARK, BLUE, SKY, VERMILION, PINK)
-"""One colour per correlation: the scene's own, then two of the axles and two of the tracks."""
+"""Colours of the cases of road correlation: as in the scene, then two for the axles and two for the tracks."""
 CORRELATION_STYLES = ("-", "--", ":", "--", ":")
 
 
@@ -51,7 +51,7 @@ class Heading(NamedTuple):
     results: Results
 
 
-def along_figure(
+def body_acceleration_figure(
     point_positions: Sequence[float],
     sweep_of_points: Sweep,
     over: Sweep,
@@ -60,8 +60,8 @@ def along_figure(
     heading: Heading,
     path: Path,
 ) -> None:
-    """Plot the standard deviation of the body's vertical acceleration in each case of road correlation: left along the
-    body at one speed, right over speed for the output nearest to the middle of the axles."""
+    """Save a figure of the standard deviation of the body's vertical acceleration in each case of road correlation:
+    along the body at a speed (m/s), and over speed for the output nearest to the middle of the axles."""
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     name = _middle_acceleration(vehicle)
     for i, case in enumerate(sweep_of_points.cases):
@@ -80,13 +80,13 @@ def along_figure(
     right.set(xlabel="speed [m/s]", title=f"At {name!r} over speed" if name else "")
     for axis in (left, right):
         axis.set(ylabel="standard deviation [m/s²]", ylim=(0, None))
-        _say_where_none(axis)
+        _note_if_no_finite_curve(axis)
     legend_below(figure, left, columns=2)
     _save_figure(figure, heading, ": which correlations of the road matter where", path)
 
 
 def _middle_acceleration(vehicle: SpatialVehicle) -> str:
-    """The vertical acceleration nearest to the middle of the axles."""
+    """Name of the vertical acceleration output nearest to the middle of the axles, "" if there is none."""
     middle = (vehicle.axles[0] + vehicle.axles[-1]) / 2
     points = [o for o in vehicle.outputs if o.kind == "acceleration" and getattr(o, "axis", None) == (0.0, 0.0, 1.0)]
     heaviest = max(vehicle.bodies, key=lambda body: body.mass).name
@@ -100,8 +100,8 @@ NO_FINITE_VARIANCE = "\n(no finite variance)"
 def outputs_figure(
     swept: Sweep, kind_and_unit: Sequence[tuple[str, str]], static: Mapping[str, float], heading: Heading, path: Path
 ) -> None:
-    """Plot the standard deviations of the outputs over speed in the scene's own case, with a panel for each kind and
-    unit in ``kind_and_unit``."""
+    """Save a figure of the outputs' standard deviations over speed on the scene's road, with a panel for each kind and
+    unit in ``kind_and_unit``; tyre forces are divided by their static loads ``static`` (N)."""
     groups = list(dict.fromkeys(kind_and_unit))
     figure, axes = panels(len(groups), min(2, len(groups)), 3.4)
     for axis, (kind, si) in zip(axes, groups, strict=True):
@@ -116,13 +116,13 @@ def outputs_figure(
         if not np.isfinite(list(curves.values())).any():
             axis.set(xlim=(0, swept.speeds.max()), yticks=[])
         axis.set(xlabel="speed [m/s]", ylabel=axis_label, ylim=(0, None), title=kind.capitalize())
-        _say_where_none(axis)
-        _name_below(axis)
+        _note_if_no_finite_curve(axis)
+        _legend_under_panel(axis)
     _save_figure(figure, heading, ": standard deviations over speed", path)
 
 
-def _say_where_none(axis: Axes) -> None:
-    """Write into a panel that no curve in it is finite, as for forces under white noise."""
+def _note_if_no_finite_curve(axis: Axes) -> None:
+    """Write "no finite variance" into a panel in which no curve is finite, as for forces under white noise."""
     if not any(np.isfinite(line.get_ydata()).any() for line in axis.lines if line.get_transform() == axis.transData):
         axis.text(0.5, 0.5, "no finite variance", transform=axis.transAxes, ha="center")
         axis.set_yticks([])
@@ -133,17 +133,17 @@ def _unit_text(unit: str) -> str:
 
 
 def _squared_unit(unit: str) -> str:
-    """The square of a unit as text, with brackets around a unit of several symbols."""
+    """Text of the square of a unit, with brackets around a unit of several symbols."""
     return f"{unit}²" if unit.isalpha() else f"({_unit_text(unit)})²"
 
 
 def _shown_unit(unit: str) -> tuple[str, float]:
-    """Unit in which an SI quantity is plotted (mm for m), and the factor that converts values to it."""
+    """Unit in which an SI quantity is plotted (mm for m), and the factor that converts SI values to it."""
     return ("mm", 1e3) if unit == "m" else (_unit_text(unit), 1.0)
 
 
 def _distinct_curves(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Curves by name; curves that coincide, mostly those of left and right, become one curve with both names."""
+    """Curves by name; coinciding curves, mostly of left and right, become one curve with both names."""
     groups: list[tuple[list[str], np.ndarray]] = []
     for name, values in curves.items():
         for names, known in groups:
@@ -157,7 +157,8 @@ def _distinct_curves(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, heading: Heading, path: Path) -> None:
-    """One-sided spectra of the accelerations and tyre forces over frequency at one speed; no figure where all is 0."""
+    """Save a figure of the one-sided spectral densities of accelerations and tyre forces over frequency at a speed
+    (m/s); no figure if all are 0."""
     frequency = np.geomspace(0.1, 100.0, 800)
     densities = one_sided(linear, excitation, speed, frequency)
     moving_kinds = {output.kind for i, output in enumerate(linear.outputs) if densities[:, i].any()}
@@ -173,13 +174,13 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
         axis.set(xlabel="frequency [Hz]", ylabel=f"one-sided density [{units[kind]}]", title=kind.capitalize())
         top = max(values.max() for values in curves.values())
         axis.set_ylim(1e-6 * top, 2 * top)
-        _name_below(axis)
+        _legend_under_panel(axis)
     _save_figure(figure, heading, f": spectra at {speed:g} m/s", path)
 
 
 def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading: Heading, path: Path) -> None:
-    """Plot the spectrum of the left track and the coherency of both tracks, measured, fitted, and for an isotropic
-    road."""
+    """Save a figure of the spectrum of the left track and the coherency of both tracks: of the road model, measured if
+    ``fitted`` is given, and of an isotropic road. y : half of the track width (m)."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     if fitted is not None:
@@ -207,7 +208,8 @@ def detail_figure(
     heading: Heading,
     path: Path,
 ) -> None:
-    """Table of colours with the errors of all outputs by model and road, and the cost of a covariance."""
+    """Save a coloured table of the errors of all outputs by vehicle and road model, with the computing time (s) of a
+    covariance."""
     share = 0.66 * COLUMN_WIDTH / len(errors)
     heads = [wrapped_text(f"{model}\n{1e3 * cost[model]:.2g} ms\n{road}", share, SMALL_TEXT) for model, road in errors]
     values = 100 * np.array(list(errors.values())).T
@@ -234,7 +236,7 @@ def detail_figure(
 
 
 def _signed_text(percent: float) -> str:
-    """Text of a whole number with its sign; no sign for zero."""
+    """Text of a percentage as a whole number with its sign; no sign for zero."""
     return f"{percent:+.0f}" if round(percent) else "0"
 
 
@@ -246,8 +248,7 @@ def drive_figure(
     heading: Heading,
     path: Path,
 ) -> None:
-    """Plot the standard deviations along a drive (dashed: each speed taken by itself), with a panel of the speed below
-    them."""
+    """Save a figure of the standard deviations along a drive (dashed: quasi-stationary), with the speed below them."""
     groups = list(dict.fromkeys(kind_and_unit[name] for name in drawn_outputs))
     heights = [3.0] * len(groups) + [1.3]
     figure, axes = subplots(
@@ -264,19 +265,19 @@ def drive_figure(
             (line,) = axis.plot(varied.time, exact, label=label)
             axis.plot(varied.time, quasi, "--", color=line.get_color(), linewidth=0.8)
         axis.set(ylabel=f"standard deviation [{_unit_text(unit)}]", title=kind.capitalize(), ylim=(0, None))
-        _name_below(axis, 0.03)
+        _legend_under_panel(axis, 0.03)
     axes[-1, 0].plot(varied.time, varied.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
     _save_figure(figure, heading, "\nSolid: exact; dashed: each speed taken by itself", path)
 
 
 MOST_OUTPUTS = 12
-"""Outputs that a figure shows."""
+"""Largest number of outputs in a figure."""
 
 
 def nonlinear_figure(nonlinear: Nonlinear, heading: Heading, path: Path) -> None:
-    """Plot each output's standard deviation over speed by small motion, statistical linearisation and Monte Carlo. Open
-    marks: statistical linearisation is no longer good by its own measure."""
+    """Save a figure of each output's standard deviation over speed by small motion, statistical linearisation and Monte
+    Carlo copies; open marks show where statistical linearisation states a large error."""
     outputs = nonlinear.shown.vehicle.outputs
     figure, axes = _few_panels(min(len(outputs), MOST_OUTPUTS))
     left = nonlinear.of("left_out")
@@ -325,7 +326,8 @@ def nonlinear_figure(nonlinear: Nonlinear, heading: Heading, path: Path) -> None
 def engine_spectra_figure(
     runs: Mapping[str, Ride], linear: LinearVehicle, road: Excitation, speed: float, heading: Heading, path: Path
 ) -> None:
-    """Plot spectra of the engines' runs, by Welch's method, over those of the statistically linearised vehicle."""
+    """Save a figure of the spectra of the engines' runs, by Welch's method, and of the statistically linearised
+    vehicle."""
     frequency = np.geomspace(0.3, 40.0, 300)
     expected = one_sided(linear, road, speed, frequency)
     first = next(iter(runs.values()))
@@ -345,15 +347,14 @@ def engine_spectra_figure(
 
 
 def _few_panels(panel_count: int) -> tuple[Figure, list[Axes]]:
-    """Figure with two or three small panels side by side."""
+    """Figure and axes of small panels, two or three side by side."""
     figure, axes = panels(panel_count, 2 if panel_count in (1, 2, 4) else 3, 2.6)
     figure.set_figheight(figure.get_figheight() + 0.8)  # for title and legend
     return figure, axes
 
 
-def _name_below(axis: Axes, drop: float = 0.18) -> None:
-    """Put the legend below a panel, lower by the share ``drop`` of the panel's height to leave room for the axis
-    label."""
+def _legend_under_panel(axis: Axes, drop: float = 0.18) -> None:
+    """Put the legend below a panel, ``drop`` times the panel's height lower to leave room for the axis label."""
     axis.legend(fontsize=SMALL_TEXT, loc="upper center", bbox_to_anchor=(0.5, -drop), ncols=2)
 
 

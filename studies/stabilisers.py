@@ -1,4 +1,4 @@
-"""Which stabiliser can be trusted: all of them on the same wrong model and noisy forces, scored by damage.
+"""Comparison of all stabilisers on the same perturbed model and noisy forces, by the damage of section forces.
 
 The runs are those of models/systems/pitch_plane/stabilised.py, on the road as it is and on the same road with a grade,
 where whatever keeps the pitch near zero is wrong. The first engine runs all methods, the others those that it accepts.
@@ -23,7 +23,8 @@ check = options_of
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """All methods on both roads; saves every road's files, ``score.csv``, ``score.nc``, ``table.txt``, two figures."""
+    """Run all methods on both roads; saves every road's files, ``score.csv``, ``score.nc``, ``table.txt`` and two
+    figures, and returns the summary."""
     from models.drawing.drift import decision_figure, stiffness
     from models.drawing.figures import save
 
@@ -31,7 +32,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     options = benches[0].options
     progress("sweep of stiffness and cut-off", len(benches) / (len(benches) + 1))
     sweep = {bench.road: bench.sweep() for bench in benches}
-    table = text(rows, benches, options)
+    table = summary_lines(rows, benches, options)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     with whole_file(folder / "score.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
@@ -57,15 +58,15 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def _step_error_text(results: Results) -> str:
-    """Step error of the score as JSON text: that of the measurement, because all runs use its steps."""
+    """JSON text of the step error of the score, which is that of the measurement, because all runs use its steps."""
     error = json.loads(next(iter(results.values())).data.attrs["error"])
     return json.dumps(
         error | {"how": f"{error['how']}, of the measurement, whose steps all runs share"} if error else {}
     )
 
 
-def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
-    """The table as lines of text, with a block for each engine and road."""
+def summary_lines(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
+    """Lines for the screen: a table of all methods, with a block for each engine and road."""
     lines = [
         f"  Damage ratios: {COUNTING_CONVENTION}, exponent {options.slope:g}. Accepted: all four "
         "body-frame ratios within "

@@ -12,7 +12,17 @@ from models.systems.pitch_plane.scene import assembly_of_scene, settings_of
 from models.systems.pitch_plane.scene import build as scene_of
 from models.vehicles.pitch_plane import equilibrium
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Poses, Stage, Strut, of_exudyn, of_mujoco
+from studies.pictures.film import (
+    Arrow,
+    ArrowStyle,
+    FilmedMotion,
+    ForceCurve,
+    Poses,
+    Stage,
+    Strut,
+    exudyn_poses,
+    mujoco_poses,
+)
 from studies.pictures.road import DRAWN_ROAD, PassingRoad
 from studies.pictures.shapes import PAINT_COLOUR, PaintedSurface, box, tyred_wheel
 
@@ -56,7 +66,7 @@ def _motion_of_engine(engine: str, assembly: Assembly, times: np.ndarray) -> tup
 
 def _mujoco_poses(model: Any, states: np.ndarray) -> Poses:
     names = [body.name for body in model.assembly.vehicle.bodies]
-    positions, turns = of_mujoco(model.model, {name: model.model.body(name).id for name in names}, states)
+    positions, turns = mujoco_poses(model.model, {name: model.model.body(name).id for name in names}, states)
     return {name: position * [0.0, 1.0, 1.0] for name, position in positions.items()}, turns
 
 
@@ -74,7 +84,7 @@ def _exudyn_poses(model: Any, states: np.ndarray) -> Poses:
 
     coordinates = np.zeros((len(states), 7))
     coordinates[:, [1, 3, 5, 6]] = states
-    positions, turns = of_exudyn(mbs, {name: partial(ask, node) for name, node in nodes.items()}, coordinates)
+    positions, turns = exudyn_poses(mbs, {name: partial(ask, node) for name, node in nodes.items()}, coordinates)
     return (
         {name: position @ EXUDYN_AXES.T for name, position in positions.items()},
         {name: EXUDYN_AXES @ turn @ EXUDYN_AXES.T for name, turn in turns.items()},

@@ -1,4 +1,4 @@
-"""The car of 19 freedoms on a random road: shapes, camera and the forces of the road on its tyres."""
+"""Film of the car of 19 freedoms on a random road: shapes, camera, and the road's forces on the tyres."""
 
 from dataclasses import replace
 from functools import partial
@@ -20,7 +20,7 @@ from studies.pictures.road import DRAWN_ROAD, PassingRoad
 from studies.pictures.shapes import PAINT_COLOUR, Colour, PaintedSurface, ball, box, extruded_outline, tyred_wheel
 
 SPEED, STEP, SEED, LATERAL_START_SPEED = 20.0, 1e-3, 3, 0.5
-"""m/s, largest step (s), seed of the road, lateral speed of the body at the start (m/s)."""
+"""Speed (m/s), largest step (s), seed of the road, and initial lateral speed of the body (m/s)."""
 MAGNIFICATION = 4.0
 SCENE = {
     "title": "",
@@ -39,7 +39,7 @@ PERSON_COLOUR: Colour = (0.93, 0.76, 0.55)
 
 
 def stage_and_motions(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
-    """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
+    """Stage of the film, and the motion by each engine, with frames at the steps nearest to ``times`` (s)."""
     scene = ride_scene(SCENE)
     vehicle = vehicle_with_road_forces(vehicle_of(scene))
     road = road_path(excitation_of(scene, wheels(vehicle)), SPEED, STEP)
@@ -51,7 +51,7 @@ def stage_and_motions(duration: float, times: np.ndarray, engines: tuple[str, ..
 
 
 def vehicle_with_road_forces(vehicle: SpatialVehicle) -> SpatialVehicle:
-    """The vehicle with the outputs of its road forces: tyre forces, then lateral speeds where side forces act."""
+    """The vehicle with other outputs: tyre forces, then lateral velocities at the points of side forces."""
     tyres = tuple(TyreOutput(tyre.name, "tyre force", tyre.name) for tyre in vehicle.tyres)
     across = tuple(PointOutput(f.name, "velocity", f.body, f.point, (0.0, 1.0, 0.0)) for f in vehicle.side_forces)
     return replace(vehicle, outputs=(*tyres, *across))
@@ -89,7 +89,8 @@ def _exudyn_poses(model: Any, positions: np.ndarray) -> Poses:
 
 
 def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
-    """Wheel loads, static ones included, and side forces, both at the road, from the states of a run (small motion)."""
+    """Force arrows of the wheel loads, with their static part, and of the side forces, both at the road, from a run's
+    states."""
     forces = [
         run.rates @ output.rate_factors
         + run.positions @ output.displacement_factors
@@ -111,15 +112,15 @@ def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Po
 def _road_force_arrow(
     arrow_kind: str, vehicle: SpatialVehicle, tyre_or_force: Any, force: np.ndarray, axis: int, poses: Poses
 ) -> Arrow:
-    """Arrow of a tyre force or side force (f,) along one axis of space. It starts on the road below the force's point
-    on its body."""
+    """Arrow of a tyre force or side force (f,) in N along an axis of space (0 to 2), from the road below the force's
+    point on its body."""
     (x, y, _), body = tyre_or_force.point, tyre_or_force.body
     points = poses[0][body] + poses[1][body] @ np.subtract((x, y, 0.0), vehicle.body(body).position)
     return Arrow(f"{arrow_kind}, {tyre_or_force.name}", arrow_kind, body, points, force[:, None] * np.eye(3)[axis])
 
 
 def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
-    """The car, seen from ahead and to its left, on a road that passes by."""
+    """Stage of the film: the car, seen from ahead and to its left, on a passing road."""
     front = [tyre for tyre in vehicle.tyres if tyre.axle == 0]
     columns = [vehicle.tyres.index(tyre) for tyre in front]
     distances = front[0].point[0] + SPEED * road.half * np.arange(len(table))
@@ -135,7 +136,7 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
 
 
 def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
-    """Surfaces of wheels at the tyres, a car around the chassis, and the engine and occupants inside."""
+    """Drawn shapes by body: wheels, a car around the chassis, engine and occupants."""
     person = [ball(0.13, PERSON_COLOUR).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON_COLOUR).at(0.0, 0.0, 0.02)]
     return {
         **{tyre.body: tyred_wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres},
@@ -147,7 +148,7 @@ def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
 
 
 def _car_body(vehicle: SpatialVehicle) -> list[PaintedSurface]:
-    """Transparent car body of two convex outlines, about the chassis' centre of mass."""
+    """Transparent car body of two convex outlines, in axes at the chassis' centre of mass."""
     x, _, z = vehicle.body("body").position
     front, rear = max(t.point[0] for t in vehicle.tyres), min(t.point[0] for t in vehicle.tyres)
     lower = [

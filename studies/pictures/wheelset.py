@@ -1,4 +1,4 @@
-"""A wheelset that hunts on its rails: shapes, camera and the forces at its contacts."""
+"""Film of a wheelset that hunts on its rails: shapes, camera, and contact forces."""
 
 from functools import partial
 from typing import Any
@@ -19,10 +19,10 @@ from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, S
 from studies.pictures.shapes import Colour, PaintedSurface, box, extruded_outline, floor, surface_of_revolution
 
 SPEED, START_SHIFT, CELLS, STEP = 75.0, 6e-3, 11, 5e-4
-"""Speed of travel (m/s), first lateral displacement (m), cells of FASTSIM, step (s)."""
+"""Speed of travel (m/s), initial lateral displacement (m), number of cells of FASTSIM, and step (s)."""
 MAGNIFICATION = 5.0
 SLEEPER_SPACING = 0.6
-"""m from one sleeper to the next."""
+"""Distance (m) from one sleeper to the next."""
 STEEL_COLOUR: Colour = (0.62, 0.66, 0.71)
 DARK_COLOUR: Colour = (0.42, 0.45, 0.5)
 RUST_COLOUR: Colour = (0.45, 0.27, 0.16)
@@ -38,7 +38,7 @@ SIDE_SIGNS = {"right": RIGHT, "left": LEFT}
 
 
 def stage_and_motions(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
-    """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
+    """Stage of the film, and the motion by each engine, with frames at the steps nearest to ``times`` (s)."""
     return stage(CHOSEN_WHEELSET), [_motion_of_engine(engine, duration, times) for engine in engines]
 
 
@@ -74,7 +74,7 @@ def _motion_of_engine(engine: str, duration: float, times: np.ndarray) -> Filmed
 
 
 def arrows(w: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
-    """Arrows of the normal force and of the creep force on both wheels, at the contact points along a path."""
+    """Force arrows of the normal force and the creep force on both wheels, at the contact points along a run."""
     drawn_arrows = []
     for k, (name, side) in enumerate(SIDE_SIGNS.items()):
         cone = Cone(w.radius, w.half_gauge, w.conicity, w.head_radius)
@@ -92,7 +92,7 @@ def arrows(w: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
 
 
 def stage(wheelset: Wheelset) -> Stage:
-    """Wheelset, rails and sleepers, seen from ahead and to the right; z down."""
+    """Stage of the film: wheelset, rails and sleepers, seen from ahead and to the right; z down."""
     camera = Camera((2.75, 1.75, -0.95), (0.0, 0.12, 0.06), (0.0, 0.0, -1.0), 0.54)
     return Stage(
         f"Wheelset that hunts at {SPEED:g} m/s, creep forces by FASTSIM",
@@ -109,7 +109,7 @@ def stage(wheelset: Wheelset) -> Stage:
 
 
 def shapes(w: Wheelset) -> list[PaintedSurface]:
-    """Surfaces of an axle and two wheels with the model's conical treads. The flange clearance is drawn magnified."""
+    """Surfaces of an axle and two wheels with the model's conical treads; the flange clearance is drawn magnified."""
     end = w.half_spacing + 0.12
     surfaces = [surface_of_revolution([-end, -end, end, end], [0.0, 0.085, 0.085, 0.0], DARK_COLOUR)]
     inner, outer = 0.036 + MAGNIFICATION * w.flange_clearance + 0.004, 0.075
