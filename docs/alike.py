@@ -1,4 +1,4 @@
-"""When two printed outputs say the same: seconds and versions may differ, numbers by their last digit.
+"""Comparison of two printed outputs: seconds and versions may differ, and numbers by their last digit.
 
 - white space counts as one space, as the widths of columns depend on the numbers in them
 - a number before a unit of time (s, ms, us, min) stands for any number: seconds are those of the machine
@@ -14,27 +14,26 @@ from decimal import Decimal
 TIME = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]?\d+)?(?= ?(?:s|ms|us|min)\b(?!/))")
 DATE = r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?)?"
 COMMIT = r"\b(?=[0-9]*[a-f])(?=[a-f]*[0-9])[0-9a-f]{7,40}\b"
-DATE = r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?)?"
-COMMIT = r"\b(?=[0-9]*[a-f])(?=[a-f]*[0-9])[0-9a-f]{7,40}\b"
 VERSION = re.compile(rf"\b\d+(?:\.\d+){{2,}}\w*|{DATE}|{COMMIT}")
 NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
 ROUNDING = Decimal("1e-9")
 
 
 def alike(written: str, printed: str) -> bool:
-    """Whether a printed output says what stands in a page."""
-    (words, numbers), (others, values) = _parts(written), _parts(printed)
-    return words == others and all(map(_same, numbers, values))
+    """Whether a printed output agrees with the output that a page shows, by the rules of this module."""
+    (words, numbers), (others, values) = _text_and_numbers(written), _text_and_numbers(printed)
+    return words == others and all(map(_agree, numbers, values))
 
 
-def _parts(text: str) -> tuple[str, list[str]]:
-    """The text with a sign in place of every number, and the numbers."""
+def _text_and_numbers(text: str) -> tuple[str, list[str]]:
+    """The text with "#" in place of every number, and the numbers as text; times and versions are replaced by words."""
     text = TIME.sub("TIME", VERSION.sub("VERSION", " ".join(text.split())))
     return NUMBER.sub("#", text), NUMBER.findall(text)
 
 
-def _same(shown: str, printed: str) -> bool:
-    """Whether two numbers agree to the last digit that both have."""
+def _agree(shown: str, printed: str) -> bool:
+    """Whether the texts of two numbers agree to within one in the last digit that both have; whole numbers must be
+    equal."""
     if shown == printed:
         return True
     first, second = Decimal(shown), Decimal(printed)

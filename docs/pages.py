@@ -1,4 +1,4 @@
-"""Pages of the documentation and the fenced blocks in them.
+"""Pages of the documentation and their fenced blocks.
 
 A block is marked by a comment in the line before its fence:
 
@@ -15,20 +15,20 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 OUTSIDE = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
-"""Pages that lie at the top of the repository."""
+"""Pages in the top folder of the repository."""
 MARK = re.compile(r"<!--\s*(run|run: fails|output|file: (?P<file>\S+)|picture: (?P<picture>\S+))\s*-->")
 IMAGE = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
 
 
 def pages(root: Path = ROOT) -> list[Path]:
-    """All pages, sorted; those at the top of the repository first."""
+    """Paths of all pages of the documentation, sorted; those in the top folder of the repository first."""
     outside = [root / name for name in OUTSIDE if (root / name).is_file()]
     return [*outside, *sorted((root / "docs").rglob("*.md"))]
 
 
 @dataclass(frozen=True)
 class ExampleBlock:
-    """A fenced block of a page, or an image that examples draw.
+    """A fenced block of a page, or an image that its examples draw.
 
     mark : text of the comment before it, "" where there is none; language : the word after the fence, "image" for an
     image; text : what stands between the fences, or the address of the image; first, last : its lines, counted from 0,
@@ -43,12 +43,12 @@ class ExampleBlock:
 
     @property
     def file(self) -> str:
-        """Name of the file that the mark names, "" where it names none."""
+        """Name of the file in the block's mark; "" if it names none."""
         return self.mark.partition(": ")[2] if self.mark.startswith(("file: ", "picture: ")) else ""
 
 
 def blocks(text: str) -> list[ExampleBlock]:
-    """All fenced blocks and marked images of a page, in order."""
+    """All fenced blocks and marked images in the text of a page, in order."""
     from markdown_it import MarkdownIt
 
     lines, blocks_of_page, mark = text.splitlines(keepends=True), [], ""

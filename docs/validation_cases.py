@@ -1,4 +1,4 @@
-"""The reference of the validation report: its cases, and the rows of a report.
+"""Reference page of the validation report: its cases, and the rows of a report.
 
 ``python -m docs.validation_cases`` writes the cases into ``docs/reference/report_rows.md``; the site has the rows of
 the newest report of the machine in that page, too (``docs.website``).
@@ -19,7 +19,7 @@ FOLDER = ROOT / "validation" / "cases"
 
 
 def _constant(tree: ast.Module, name: str) -> str:
-    """Value of a constant of a module, read and not imported."""
+    """Text of a constant of a module, from the syntax tree of its source; "" if it has no such constant."""
     for node in tree.body:
         targets = getattr(node, "targets", None) or [getattr(node, "target", None)]
         value = getattr(node, "value", None)
@@ -28,8 +28,8 @@ def _constant(tree: ast.Module, name: str) -> str:
     return ""
 
 
-def cases() -> str:
-    """The table of cases in Markdown, in the order of the report."""
+def cases_table() -> str:
+    """Markdown table of the validation cases, in the order of the report."""
     lines = ["| case | title | system | what is compared |", "|---|---|---|---|"]
     for name in CASES:
         tree = ast.parse((FOLDER / f"{name}.py").read_text(encoding="utf-8"))
@@ -39,18 +39,18 @@ def cases() -> str:
 
 
 def page(text: str) -> str:
-    """The page with the cases as they are now; what stands before them is written by hand."""
-    return text.partition(START)[0] + START + "\n" + cases()
+    """Text of the reference page with the current cases; the part before the mark is unchanged."""
+    return text.partition(START)[0] + START + "\n" + cases_table()
 
 
 def newest_report(folder: Path = ROOT / "results") -> Path | None:
-    """The newest results.json of a report below a folder, None where there is none."""
+    """Path of the newest results.json of a report below a folder; None if there is none."""
     reports = [path for path in folder.glob("*/results.json") if "rows" in json.loads(path.read_text(encoding="utf-8"))]
     return max(reports, key=lambda path: path.stat().st_mtime, default=None)
 
 
-def rows(report: Path) -> str:
-    """All rows of a report in Markdown: what is compared, with what, and how it ended."""
+def rows_table(report: Path) -> str:
+    """Markdown table of all rows of a report: quantity, expected value, tolerance, independence and status."""
     lines = ["\n## Rows of the newest report\n", "| row | quantity | expected | tolerance | second side | status |"]
     lines += ["|---|---|---|---|---|---|"]
     shown = ("quantity", "expected", "tolerance", "independence", "status")
@@ -60,8 +60,9 @@ def rows(report: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
-def counts(report: Path) -> str:
-    """Rows of a report per system and kind of second side in Markdown; those that were not run do not count."""
+def counts_table(report: Path) -> str:
+    """Markdown table of the numbers of a report's rows by system and independence; rows that were not run are left
+    out."""
     from validation.report.page import INDEPENDENCE_TEXTS, evidence_counts
 
     lines = [
@@ -75,13 +76,13 @@ def counts(report: Path) -> str:
 
 
 def _cell(value: Any) -> str:
-    """Text of a cell; brackets are escaped, as a pair of them would be a link to a reference."""
+    """Text of a table cell; brackets are escaped, because Markdown would take a pair as a link."""
     text = "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
     return re.sub(r"([|\[\]])", r"\\\1", text).replace("\n", " ")
 
 
 def main(path: Path = PAGE) -> None:
-    """Write the cases into the page."""
+    """Write the current cases into the reference page."""
     path.write_text(page(path.read_text(encoding="utf-8")), encoding="utf-8")
 
 

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from docs.gallery import WIDTH, add_pictures, listed
+from docs.gallery import WIDTH, add_pictures, listed_figures
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "gallery.md"
-FIGURES = listed(PAGE.read_text(encoding="utf-8"))
+FIGURES = listed_figures(PAGE.read_text(encoding="utf-8"))
 SCENES = ROOT / "studies" / "scenes"
 
 

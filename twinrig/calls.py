@@ -1,4 +1,5 @@
-"""Functions for users: load, run, compare, price, choose, export, validate; thin layers on what the command line uses.
+"""Functions of the library: load, run, compare, price, choose, export, validate; thin layers on the command line's
+code.
 
 Heavy packages are imported by the functions that use them.
 """
@@ -21,15 +22,16 @@ if TYPE_CHECKING:
     from twinrig.scene import Scene
 
 AnyScene: TypeAlias = "str | Path | Mapping[str, Any] | Scene"
-"""A shipped scene's name, a file, a table, or a loaded scene."""
+"""Type of an argument that is a scene: the name of a shipped scene, a file, a table, or a loaded scene."""
 Changes: TypeAlias = "Mapping[str, Any] | None"
-"""Values by dotted keys, as ``{"run.step": 5e-4}``."""
-PARTS = {
+"""Type of changes of a scene: values by dotted keys, as ``{"run.step": 5e-4}``."""
+MANOEUVRE_OPTIONS = {
     "braking": ("procedure", "procedures"),
     "handling": ("manoeuvre", "manoeuvres"),
     "wheel-rail": ("case", "cases"),
 }
-"""By system: the option of its run that names one of several drives, and the table of the scene that has them."""
+"""For each system with several manoeuvres in a scene, the option of ``run`` that selects one, and the scene's table of
+them."""
 
 
 def load(scene: AnyScene, set: Changes = None) -> "Scene":
@@ -70,9 +72,9 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
 
     loaded = load(scene, set).checked
     options = _options(loaded)
-    _check_how(loaded, how, options)
+    _check_run_options(loaded, how, options)
     chosen, checked = _engines(loaded, engine, options["engine"].default == "")
-    with _as_library(loaded):
+    with _library_messages(loaded):
         plan_of(loaded).check(loaded, checked)
         doubtful = findings_as_dicts(merged_findings(findings_of(loaded)))
         with progress_bar(f"{loaded.title}: {chosen or loaded.system}", loaded.system):
@@ -82,7 +84,7 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
 
 
 def _options(scene: Any) -> Mapping[str, Any]:
-    """Parameters of the run of a scene's system; InputError where the system has none."""
+    """Parameters of the function that runs a scene of the system; raises InputError for a system without one."""
     from importlib import import_module
 
     from models.core.systems import SYSTEMS
@@ -94,20 +96,20 @@ def _options(scene: Any) -> Mapping[str, Any]:
     return signature(import_module(f"{SYSTEMS[scene.system].package}.run").run).parameters
 
 
-def _check_how(scene: Any, run_options: Mapping[str, Any], options: Mapping[str, Any]) -> None:
-    """Refuse options that the run of this system does not have, and drives that the scene does not have."""
+def _check_run_options(scene: Any, run_options: Mapping[str, Any], options: Mapping[str, Any]) -> None:
+    """Raise InputError for options that the system's run does not have, and for manoeuvres that the scene does not
+    have."""
     names = (*(name for name in options if name not in ("scene", "engine", "error")), "engine", "error", "set")
     for name in run_options:
         if name not in names:
             raise InputError("run", name, None, f"is no option of a run of {scene.system}", names)
-    option, table = PARTS.get(scene.system, ("", ""))
+    option, table = MANOEUVRE_OPTIONS.get(scene.system, ("", ""))
     if run_options.get(option) is not None and run_options[option] not in getattr(scene, table):
         raise InputError(scene.file, option, run_options[option], f"is not among {table}", tuple(getattr(scene, table)))
 
 
 def _engines(scene: Any, requested_engine: str, optional: bool) -> tuple[str, tuple[str, ...]]:
-    """The engine of a run ("" where the system chooses its engine itself), and the engines for which the scene is
-    checked."""
+    """The engine of a run ("" if the system chooses it), and the engines for which the scene is checked."""
     from studies.command.asked import engines_of
 
     named = requested_engine or getattr(getattr(scene, "run", None), "engine", None) or None
@@ -124,7 +126,7 @@ def _engines(scene: Any, requested_engine: str, optional: bool) -> tuple[str, tu
 
 
 @contextmanager
-def _as_library(scene: Any = None, **names: str) -> "Iterator[None]":
+def _library_messages(scene: Any = None, **names: str) -> "Iterator[None]":
     """Context in which error messages name the argument of the library's function in place of the command line's
     option. ``names`` maps options to arguments; an option that is not in it keeps its name.
 
@@ -228,7 +230,7 @@ def price(
     from twinrig.report import Report
 
     loaded = load(scene, set).checked
-    with _as_library(loaded):
+    with _library_messages(loaded):
         engines = engines_of(engine, loaded.system, "engine")
         with progress_bar("runs of every engine in ever finer steps", loaded.system):
             answer = recommended(loaded, tolerance, _channels_in_words(quantity), engines)
@@ -236,7 +238,7 @@ def price(
 
 
 def _channels_in_words(quantity: "str | list[str] | None") -> str | None:
-    """Channels as the command line takes them, separated by commas."""
+    """Names of channels as one text, separated by commas, as the command line takes them."""
     if quantity is None or isinstance(quantity, str):
         return quantity
     if not isinstance(quantity, list | tuple) or not all(isinstance(name, str) for name in quantity):
@@ -266,9 +268,9 @@ def choose(
     from studies.command.waiting import progress_bar
     from twinrig.report import Report
 
-    loaded = _choosing(load(scene, set), quantities, tolerance).checked
+    loaded = _scene_for_choice(load(scene, set), quantities, tolerance).checked
     engines = engines_of(engine, loaded.system, "engine")
-    with _as_library(loaded), TemporaryDirectory() as temporary:
+    with _library_messages(loaded), TemporaryDirectory() as temporary:
         study = checked_study(loaded, engines)
         result_folder = _new_folder(folder, "choice") if folder is not None else Path(temporary)
         with progress_bar(loaded.title, loaded.system) as progress:
@@ -276,9 +278,8 @@ def choose(
     return Report((loaded.title, *summary["table"]), summary)
 
 
-def _choosing(scene: "Scene", quantities: "list[str] | None", tolerance: float | None) -> "Scene":
-    """The scene with its study changed to the one that makes a choice of effects, and with these quantities and
-    tolerance."""
+def _scene_for_choice(scene: "Scene", quantities: "list[str] | None", tolerance: float | None) -> "Scene":
+    """The scene with the study that chooses effects, and with the given quantities and tolerance."""
     choice_keys = {"quantities": quantities, "tolerance": tolerance}
     changes: dict[str, Any] = {key: value for key, value in choice_keys.items() if value is not None}
     study = scene.checked.CHOOSING
@@ -303,7 +304,7 @@ def export(scene: AnyScene, engine: str, file: str | Path | None = None, *, set:
     from twinrig.report import Report
 
     loaded = load(scene, set).checked
-    with _as_library(loaded, out="file"), progress_bar("building the vehicle", loaded.system):
+    with _library_messages(loaded, out="file"), progress_bar("building the vehicle", loaded.system):
         exported = write(loaded, engine, None if file is None else Path(file))
     return Report(tuple(export_lines(loaded.title, exported)), exported)
 
@@ -327,5 +328,5 @@ def validate(quick: bool = False, folder: str | Path | None = None) -> "Report":
 def _new_folder(requested_folder: str | Path | None, name: str) -> Path:
     from models.core.result_folders import new_folder
 
-    with _as_library(out="folder"):
+    with _library_messages(out="folder"):
         return new_folder(None if requested_folder is None else Path(requested_folder), name)
