@@ -31,15 +31,15 @@ def _text_and_numbers(text: str) -> tuple[str, list[str]]:
     return NUMBER.sub("#", text), NUMBER.findall(text)
 
 
-def _agree(shown: str, printed: str) -> bool:
+def _agree(shown_number: str, printed_number: str) -> bool:
     """Whether the texts of two numbers agree to within one in the last digit that both have; whole numbers must be
     equal."""
-    if shown == printed:
+    if shown_number == printed_number:
         return True
-    first, second = Decimal(shown), Decimal(printed)
+    first, second = Decimal(shown_number), Decimal(printed_number)
     if max(abs(first), abs(second)) < ROUNDING:
         return True
-    if not {".", "e"} & {*shown, *printed}:
+    if not {".", "e"} & {*shown_number, *printed_number}:
         return False
     digit = Decimal(1).scaleb(max(int(number.as_tuple().exponent) for number in (first, second)))
     return abs(first - second) <= digit

@@ -31,13 +31,16 @@ HEADINGS = {
 """Sentence before the list of each kind of ``uncovered_functions``."""
 
 
-def count_sentence(lines: list[Line]) -> str:
+def count_sentence(audit_lines: list[Line]) -> str:
     """Sentence for the page on the number of the audit's lines, their commits, and the covered functions."""
-    noticed, empty = sum(line.is_covered for line in lines), sum(line.ended == "no numbers" for line in lines)
-    commits = [f"{count} to `{commit}`" for commit, count in Counter(line.commit for line in lines).most_common()]
+    noticed, empty = (
+        sum(line.is_covered for line in audit_lines),
+        sum(line.ended == "no numbers" for line in audit_lines),
+    )
+    commits = [f"{count} to `{commit}`" for commit, count in Counter(line.commit for line in audit_lines).most_common()]
     belong = ", ".join(commits[:-1]) + " and " + commits[-1] if len(commits) > 1 else commits[0]
     text = (
-        f"The table has {len(lines)} lines; by commit, {belong}. {noticed} functions were noticed by something "
+        f"The table has {len(audit_lines)} lines; by commit, {belong}. {noticed} functions were noticed by something "
         f"independent, and {empty} give no number."
     )
     return fill(text, 120) + "\n"

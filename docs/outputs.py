@@ -64,9 +64,9 @@ class Session:
         fails = [False] * (len(lines) - 1) + [block.mark == "run: fails"]
         return "".join(self._command(line, wanted) for line, wanted in zip(lines, fails, strict=True))
 
-    def _command(self, line: str, fails: bool) -> str:
+    def _command(self, command: str, fails: bool) -> str:
         ended = subprocess.run(
-            ["bash", "-c", line],
+            ["bash", "-c", command],
             cwd=self.folder,
             env=self.environment,
             stdout=subprocess.PIPE,
@@ -75,7 +75,7 @@ class Session:
             timeout=EXAMPLE_TIMEOUT,
         )
         if (ended.returncode != 0) is not fails:
-            raise ExampleFailed(f"`{line}` ended with code {ended.returncode}: {ended.stdout}{ended.stderr or ''}")
+            raise ExampleFailed(f"`{command}` ended with code {ended.returncode}: {ended.stdout}{ended.stderr or ''}")
         return ended.stdout
 
 
@@ -127,19 +127,19 @@ def page_with_outputs(page: Path, draw: bool) -> tuple[str, list[str]]:
     return "".join(lines), changes
 
 
-def copy_picture(picture: Path, shown: Path, draw: bool) -> None:
+def copy_picture(picture: Path, shown_file: Path, draw: bool) -> None:
     """Copy a picture that examples drew to the file that the page shows, if ``draw``; raises ExampleFailed if it is
     missing."""
     if not picture.is_file():
         raise ExampleFailed(f"its examples draw no {picture.name}")
     if draw:
-        shown.parent.mkdir(exist_ok=True)
-        shutil.copyfile(picture, shown)
+        shown_file.parent.mkdir(exist_ok=True)
+        shutil.copyfile(picture, shown_file)
 
 
-def as_shown_in_page(said: str) -> str:
+def as_shown_in_page(output: str) -> str:
     """An output as a page shows it: without white space at the ends of lines, and without empty lines at its ends."""
-    return "\n".join(line.rstrip() for line in said.strip("\n").splitlines()) + "\n"
+    return "\n".join(line.rstrip() for line in output.strip("\n").splitlines()) + "\n"
 
 
 def has_examples(page: Path) -> bool:

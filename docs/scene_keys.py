@@ -68,8 +68,10 @@ def keys_of(model: type[BaseModel], prefix: str = "") -> Iterator[Key]:
         if issubclass(model, SceneFile) and name in MADE_BY_READER:
             continue
         place, inner = _inner_table(field.annotation)
-        meaning = _sentence(field.description or (_summary(inner) if inner else "")) or MEANINGS.get(name, "")
-        yield Key(prefix + name, _kind(field), _unit(field), _default(field, inner), meaning)
+        meaning = _meaning_in_line(field.description or (_first_paragraph(inner) if inner else "")) or MEANINGS.get(
+            name, ""
+        )
+        yield Key(prefix + name, _type_and_limits(field), _unit(field), _default(field, inner), meaning)
         if inner is not None:
             yield from keys_of(inner, f"{prefix}{name}{place}.")
 
@@ -99,7 +101,7 @@ def _inner_table(annotation: Any) -> tuple[str, type[BaseModel] | None]:
     return "", None
 
 
-def _kind(field: FieldInfo) -> str:
+def _type_and_limits(field: FieldInfo) -> str:
     """Text of a field's type, with the limits of a number."""
     signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
     limits = [(sign, getattr(rule, kind, None)) for rule in field.metadata for kind, sign in signs.items()]
@@ -149,28 +151,28 @@ def _default(field: FieldInfo, inner: type[BaseModel] | None) -> str:
         return "as below" if inner is not None else "usual"
     if value in ([], {}, (), ""):
         return "empty"
-    return f"`{_toml(value)}`"
+    return f"`{_toml_text(value)}`"
 
 
-def _toml(value: Any) -> str:
+def _toml_text(scene_value: Any) -> str:
     """Text of a value in the notation of scene files (TOML)."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, BaseModel):
-        return _toml(value.model_dump(exclude_none=True))
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return f'"{value}"' if isinstance(value, str) else f"{value:.6g}"
+    if isinstance(scene_value, bool):
+        return str(scene_value).lower()
+    if isinstance(scene_value, BaseModel):
+        return _toml_text(scene_value.model_dump(exclude_none=True))
+    if isinstance(scene_value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml_text(each)}" for key, each in scene_value.items()) + " }"
+    if isinstance(scene_value, list | tuple):
+        return "[" + ", ".join(map(_toml_text, scene_value)) + "]"
+    return f'"{scene_value}"' if isinstance(scene_value, str) else f"{scene_value:.6g}"
 
 
-def _summary(model: type[BaseModel]) -> str:
+def _first_paragraph(model: type[BaseModel]) -> str:
     """First paragraph of the docstring of a table's model, without its full stop."""
     return (getdoc(model) or "").partition("\n\n")[0].replace("\n", " ").rstrip(".")
 
 
-def _sentence(meaning: str) -> str:
+def _meaning_in_line(meaning: str) -> str:
     """Meaning of a key in one line, without a leading name of its table."""
     return re.sub(r"^(One of )?\[[^\]]*\]+(, \[[^\]]*\]+)*[:.,]? *", "", " ".join(meaning.split()))
 
@@ -196,7 +198,7 @@ def system_section(system: str) -> list[str]:
         lines += ["", f"### Effects of {system}", "", "| effect | named by | what it adds | what it takes |"]
         lines += [
             "|---|---|---|---|",
-            *(_effect(system, name, says) for name, says in effect_sentences(system).items()),
+            *(_effect_row(system, name, says) for name, says in effect_sentences(system).items()),
         ]
     for name in names_of(system):
         model = getattr(module_of(system, name), "Parameters", None)
@@ -205,10 +207,10 @@ def system_section(system: str) -> list[str]:
     return lines
 
 
-def _effect(system: str, name: str, says: str) -> str:
+def _effect_row(system: str, name: str, sentence: str) -> str:
     module = module_of(system, name)
     place = module.PLACE if hasattr(module, "named") else f"[effects.{name}]"
-    cells = (f"`{name}`", f"`{place}`", says, str(module.COST).rstrip("."))
+    cells = (f"`{name}`", f"`{place}`", sentence, str(module.COST).rstrip("."))
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
@@ -227,7 +229,7 @@ def other_table_sections() -> list[str]:
     lines = []
     for title, module, name in OTHER_TABLES:
         model = getattr(import_module(module), name)
-        lines += ["", f"## {title}", "", f"{_summary(model)}.", "", *table(model)]
+        lines += ["", f"## {title}", "", f"{_first_paragraph(model)}.", "", *table(model)]
     return lines
 
 
@@ -252,7 +254,7 @@ def controllers_section() -> list[str]:
 
 def _parameter_lines(kind: type, but: tuple[str, ...]) -> list[str]:
     """Lines on the fields of a controller's class and their defaults; ``but`` : names of fields that are left out."""
-    rows = [f"| `{each.name}` | `{_toml(each.default)}` |" for each in fields(kind) if each.name not in but]
+    rows = [f"| `{each.name}` | `{_toml_text(each.default)}` |" for each in fields(kind) if each.name not in but]
     head = ["", "| parameter | default |", "|---|---|"] if rows else []
     return [" ".join((getdoc(kind) or "").split()), *head, *rows]
 

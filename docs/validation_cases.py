@@ -18,7 +18,7 @@ START = "<!-- cases: written by `python -m docs.validation_cases`; do not edit b
 FOLDER = ROOT / "validation" / "cases"
 
 
-def _constant(tree: ast.Module, name: str) -> str:
+def _constant_text(tree: ast.Module, name: str) -> str:
     """Text of a constant of a module, from the syntax tree of its source; "" if it has no such constant."""
     for node in tree.body:
         targets = getattr(node, "targets", None) or [getattr(node, "target", None)]
@@ -34,7 +34,7 @@ def cases_table() -> str:
     for name in CASES:
         tree = ast.parse((FOLDER / f"{name}.py").read_text(encoding="utf-8"))
         says = (ast.get_docstring(tree) or "").partition("\n\n")[0].replace("\n", " ")
-        lines.append(f"| `{name}` | {_constant(tree, 'TITLE')} | {_constant(tree, 'SYSTEM')} | {says} |")
+        lines.append(f"| `{name}` | {_constant_text(tree, 'TITLE')} | {_constant_text(tree, 'SYSTEM')} | {says} |")
     return "\n".join(lines) + "\n"
 
 
@@ -56,7 +56,7 @@ def rows_table(report: Path) -> str:
     shown = ("quantity", "expected", "tolerance", "independence", "status")
     for row in json.loads(report.read_text(encoding="utf-8"))["rows"]:
         cells = (f"`{row['id']}`", *(row[key] for key in shown))
-        lines.append("| " + " | ".join(_cell(cell) for cell in cells) + " |")
+        lines.append("| " + " | ".join(_cell_text(cell) for cell in cells) + " |")
     return "\n".join(lines) + "\n"
 
 
@@ -75,9 +75,9 @@ def counts_table(report: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _cell(value: Any) -> str:
+def _cell_text(cell_value: Any) -> str:
     """Text of a table cell; brackets are escaped, because Markdown would take a pair as a link."""
-    text = "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+    text = "" if cell_value is None else f"{cell_value:.6g}" if isinstance(cell_value, float) else str(cell_value)
     return re.sub(r"([|\[\]])", r"\\\1", text).replace("\n", " ")
 
 

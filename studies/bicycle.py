@@ -50,7 +50,7 @@ def run(scene: BicycleScene, engines: tuple[str, ...], folder: Path, progress: P
         "failed": failed,
         "answer": _figures_of_runs(scene, runs),
         "results": runs,
-        "table": [_line(engine, result) for engine, result in runs.items()],
+        "table": [_run_line(engine, result) for engine, result in runs.items()],
     }
 
 
@@ -72,7 +72,7 @@ def _figures_of_runs(scene: BicycleScene, runs: dict[str, Result]) -> dict[str, 
     return figures
 
 
-def _line(engine: str, result: Result) -> str:
+def _run_line(engine: str, result: Result) -> str:
     lean, steer = (np.abs(result[name]).max() for name in ("lean", "steer"))
     gap = result.detail.unaccounted()
     return f"    {engine:<12}largest lean {lean:.5f} rad, steer {steer:.5f} rad; energy unaccounted for {gap:.1e}"

@@ -110,11 +110,11 @@ def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, prog
         "failed": {},
         "answer": [_summary_of_choice(choice) for choice in choices],
         "table": [line for choice in choices for line in choice_lines(choice, len(choices) > 1)],
-        "results": _results(choices),
+        "results": _results_by_name(choices),
     }
 
 
-def _results(choices: list[SceneChoice]) -> dict[str, Result]:
+def _results_by_name(choices: list[SceneChoice]) -> dict[str, Result]:
     """Results of the reduced scenes of all choices, by a name of the system (if there are several) and the run's
     number."""
     return {
@@ -279,8 +279,8 @@ def percent_text(relative_change: float) -> str:
     return f"{100 * relative_change:{digits}} %" if np.isfinite(relative_change) else "without end"
 
 
-def _change_text(relative_change: float, beside: float) -> str:
-    return percent_text(relative_change) + (f" +- {percent_text(beside)}" if beside else "")
+def _change_text(relative_change: float, uncertainty: float) -> str:
+    return percent_text(relative_change) + (f" +- {percent_text(uncertainty)}" if uncertainty else "")
 
 
 def _why_it_stays(relative_change: float, scene_choice: SceneChoice) -> str:
@@ -373,7 +373,7 @@ def choice_figure(choices: list[SceneChoice], path: Path) -> None:
     for axis, (choice, active) in zip(axes.flat, shown, strict=True):
         _plot_activity(axis, choice) if active else _plot_changes(axis, choice)
     title = "Which effects matter for which question: change by leaving out one effect, against the tolerance"
-    add_heading(figure, title, _results(choices))
+    add_heading(figure, title, _results_by_name(choices))
     save(figure, path)
 
 

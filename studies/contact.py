@@ -59,11 +59,11 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
         "failed": {},
         "answer": answer,
         "results": {"forces": forces},
-        "table": _table(scene, forces),
+        "table": _table_lines(scene, forces),
     }
 
 
-def _table(scene: ContactScene, forces: Result) -> list[str]:
+def _table_lines(scene: ContactScene, forces: Result) -> list[str]:
     """Lines for the screen: the normal contact, then creep forces with errors, at all creepages or at some of a
     sweep."""
     rolls: ContactResults = forces.detail

@@ -48,7 +48,7 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     price = priced_theories(scene, tuple(read(Options, scene.options, scene.file, "options").levels), progress)
     price.save(folder / "price.nc")
     points, uncertain = price.detail, price["uncertainty"]
-    table = _table(points, uncertain.size, uncertain.max())
+    table = _table_lines(points, uncertain.size, uncertain.max())
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     from models.drawing.figures import save
     from studies.contact_figures import price_figure
@@ -66,7 +66,7 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def _table(points: list[TheoryPoint], contact_count: int, uncertain: float) -> list[str]:
+def _table_lines(points: list[TheoryPoint], contact_count: int, uncertain: float) -> list[str]:
     """Lines for the screen: errors and times of all theories and cells, then the cheapest theory for each target
     error."""
     return [

@@ -160,11 +160,11 @@ def _result_channels(
 
 
 def _with_errors(
-    result: Result, first: Result, rows: list[dict[str, float]], options: Options, statistics: PathStatistics
+    result: Result, first_path: Result, rows: list[dict[str, float]], options: Options, statistics: PathStatistics
 ) -> Result:
     """The ensemble's result with two stated errors: the step error, estimated on the first path, and the standard
     errors of the standard deviations."""
-    error = json.loads(first.data.attrs["error"])
+    error = json.loads(first_path.data.attrs["error"])
     result.data.attrs["error"] = json.dumps(error | ({"how": f"{error['how']}, of the first path"} if error else {}))
     worst = {
         name: by_chance(row[f"{name} error"], row[name], unit, options.paths)

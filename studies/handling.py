@@ -36,7 +36,7 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
             manoeuvre_figure(runs, title, folder / f"{name}.png")
             results |= {f"{name}, {engine}": run for engine, run in runs.items()}
             answer[name] = _figures_of_runs(runs)
-            lines.append(_line(name, answer[name]))
+            lines.append(_manoeuvre_line(name, answer[name]))
     head = (
         f"    {'':<16}{'largest':>26}{'least':>12}{'friction':>10}{'engines':>10}\n"
         f"    {'':<16}{'yaw rate':>12}{'lateral acc.':>14}{'load':>12}{'used':>10}{'differ':>10}"
@@ -69,7 +69,7 @@ def _figures_of_runs(runs: dict[str, Result]) -> dict[str, float]:
     return {key: float(value) for key, value in figures.items()}
 
 
-def _line(name: str, figures: dict[str, float]) -> str:
+def _manoeuvre_line(name: str, figures: dict[str, float]) -> str:
     yaw, lateral, load, used = list(figures.values())[:4]
     gap = f"{figures[DIFFERENCE_TITLE]:>10.1e}" if DIFFERENCE_TITLE in figures else ""
     return f"    {name:<16}{yaw:>6.3f} rad/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %{gap}"

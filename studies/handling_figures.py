@@ -57,9 +57,9 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
     return save(figure, path)
 
 
-def _tyre_style(i: int) -> dict[str, Any]:
-    """Line colour and line style of tyre number ``i``."""
-    return {"color": TYRE_COLOURS[i % 4], "linestyle": TYRE_LINES[i // 4 % 4]}
+def _tyre_style(tyre_number: int) -> dict[str, Any]:
+    """Line colour and line style of a tyre by its number."""
+    return {"color": TYRE_COLOURS[tyre_number % 4], "linestyle": TYRE_LINES[tyre_number // 4 % 4]}
 
 
 def _plot_path(axis: Axes, drive: Drive) -> None:

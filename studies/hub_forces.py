@@ -41,11 +41,11 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
         "answer": comparison.answer(),
         "results": comparison.results,
         "doubts": list(comparison.measurement.tilt.objections),
-        "table": _table(scene, comparison),
+        "table": _table_lines(scene, comparison),
     }
 
 
-def _table(scene: HubScene, comparison: Comparison) -> list[str]:
+def _table_lines(scene: HubScene, comparison: Comparison) -> list[str]:
     known, tilt = comparison.truth is not None, comparison.measurement.tilt
     error_heading = "largest error" if known else "largest difference"
     damage = "damage / true damage" if known else "damage / that with the filter"

@@ -65,7 +65,7 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
         contacts = result.detail
         failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failures.items()}
         text = f"{case_text(case.yaw, case.friction)}; {cost(contacts.seconds)} a position"
-        table += [f"  {name}: {text}", *_table(contacts.placed)]
+        table += [f"  {name}: {text}", *_table_lines(contacts.placed)]
         if contacts.placed:
             _save_tables(name, result, folder)
     if drawn := {name: result for name, result in results.items() if result.detail.placed}:
@@ -83,8 +83,10 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     }
 
 
-def _report_progress(progress: Progress, scene: WheelRailScene, k: int, lateral_shift: float, share: float) -> None:
-    progress(f"{[*scene.cases][k]} at {lateral_shift:g} mm", (k + share) / len(scene.cases))
+def _report_progress(
+    progress: Progress, scene: WheelRailScene, case_number: int, lateral_shift: float, share: float
+) -> None:
+    progress(f"{[*scene.cases][case_number]} at {lateral_shift:g} mm", (case_number + share) / len(scene.cases))
 
 
 def _save_tables(name: str, result: Result, folder: Path) -> None:
@@ -138,7 +140,7 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
     save(drawn, path)
 
 
-def _table(placements: list[WheelsetPlacement]) -> list[str]:
+def _table_lines(placements: list[WheelsetPlacement]) -> list[str]:
     """Lines for the screen: a line per contact patch, the positions at which a wheel has several patches, and the first
     flange contact."""
     heads = (

@@ -75,14 +75,14 @@ def figure_of_finding(finding: Finding, evidence: Evidence, path: Path) -> Path 
 
 
 def _save_titled(
-    drawn: Any, title: str, path: Path, legend: Any = None, legend_position: str = "outside upper right"
+    figure: Any, title: str, path: Path, legend: Any = None, legend_position: str = "outside upper right"
 ) -> Path:
     """Add a title, and the legend of an axis if one is given, to a figure, and save it; returns its path."""
     if legend is not None:
         columns = 3 if "lower" in legend_position else 2
-        drawn.legend(*legend.get_legend_handles_labels(), loc=legend_position, ncols=columns)
-    add_heading(drawn, title)
-    return save(drawn, path)
+        figure.legend(*legend.get_legend_handles_labels(), loc=legend_position, ncols=columns)
+    add_heading(figure, title)
+    return save(figure, path)
 
 
 def _plot_signals(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:

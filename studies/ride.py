@@ -114,7 +114,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "failed": {},
         "results": results,
         "answer": _summary_of_deviations(first),
-        "table": [*_table(scene, vehicle, sweeps, speed, options), *notes],
+        "table": [*_table_lines(scene, vehicle, sweeps, speed, options), *notes],
     }
 
 
@@ -180,7 +180,7 @@ def _summary_of_deviations(sweep: Sweep) -> dict[str, Any]:
     }
 
 
-def _table(
+def _table_lines(
     scene: RideScene, vehicle: SpatialVehicle, sweeps: dict[str, Sweep], speed: float, options: Options
 ) -> list[str]:
     """Lines for the screen: each output's standard deviation at a speed (m/s), and its change on roads with simpler

@@ -88,7 +88,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "failed": {},
         "results": results,
         "answer": _summary_of_choice(scene, choice, further),
-        "table": _table(scene, choice, single_effects, further),
+        "table": _table_lines(scene, choice, single_effects, further),
     }
 
 
@@ -241,7 +241,7 @@ def percent_text(relative_change: float) -> str:
     return f"{100 * relative_change:{digits}} %" if np.isfinite(relative_change) else "without end"
 
 
-def _table(
+def _table_lines(
     scene: RideScene, choice: RideChoice, single_effects: list[SingleEffect], change_by_effect: dict[Effect, float]
 ) -> list[str]:
     """Lines for the screen on the choice of effects, their changes and the saving."""

@@ -99,7 +99,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "failed": {},
         "results": results,
         "answer": answer,
-        "table": _table(errors, costs, full),
+        "table": _table_lines(errors, costs, full),
     }
 
 
@@ -161,7 +161,7 @@ def _save_errors(
     write_whole(folder / "errors.csv", table.to_csv())
 
 
-def _table(errors: Errors, costs: dict[str, list[float]], full_vehicle: SpatialVehicle) -> list[str]:
+def _table_lines(errors: Errors, costs: dict[str, list[float]], full_vehicle: SpatialVehicle) -> list[str]:
     """Lines for the screen: the largest error of each vehicle model on each road model, with a column per kind of
     output."""
     kinds = np.array([output.kind for output in full_vehicle.outputs])

@@ -62,7 +62,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "failed": {},
         "results": {engine: result},
         "answer": _summary_of_drive(drive, quasi_stationary),
-        "table": [f"  linear vehicle of {engine}", *_table(drive, quasi_stationary, units)],
+        "table": [f"  linear vehicle of {engine}", *_table_lines(drive, quasi_stationary, units)],
     }
 
 
@@ -80,7 +80,7 @@ def _summary_of_drive(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> dict
     }
 
 
-def _table(drive: VaryingSpeed, quasi_stationary: np.ndarray, units: list[str]) -> list[str]:
+def _table_lines(drive: VaryingSpeed, quasi_stationary: np.ndarray, units: list[str]) -> list[str]:
     """Lines for the screen: each output's largest standard deviation along the drive, and the largest error of the
     quasi-stationary solution, which takes each speed as constant."""
     heads = [f"{name} [{unit}]" for name, unit in zip(drive.names, units, strict=True)]

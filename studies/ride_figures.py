@@ -178,9 +178,9 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
     _save_figure(figure, heading, f": spectra at {speed:g} m/s", path)
 
 
-def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading: Heading, path: Path) -> None:
+def road_figure(road: TwoTrackRoad, half_track: float, fitted: FittedRoad | None, heading: Heading, path: Path) -> None:
     """Save a figure of the spectrum of the left track and the coherency of both tracks: of the road model, measured if
-    ``fitted`` is given, and of an isotropic road. y : half of the track width (m)."""
+    ``fitted`` is given, and of an isotropic road. half_track : half of the track width (m)."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     if fitted is not None:
@@ -188,12 +188,15 @@ def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading
         left.loglog(spectra.wavenumber, spectra.left, color=GREY, linewidth=0.8, label="measured")
         right.semilogx(spectra.wavenumber, spectra.coherency, color=GREY, linewidth=0.8, label="measured")
         right.axhline(spectra.chance_coherency(), color=GREY, linestyle=":", label="what chance alone shows (95 %)")
-    left.loglog(wavenumber, road.spectrum(wavenumber, y), "k", label="mean and roll process")
-    right.semilogx(wavenumber, road.coherency(wavenumber, y, -y), "k", label="mean and roll process")
+    left.loglog(wavenumber, road.spectrum(wavenumber, half_track), "k", label="mean and roll process")
+    right.semilogx(wavenumber, road.coherency(wavenumber, half_track, -half_track), "k", label="mean and roll process")
     if road.mean.cutoff is None:
-        isotropic_road = isotropic_like(road, y)
+        isotropic_road = isotropic_like(road, half_track)
         right.semilogx(
-            wavenumber, isotropic_road.coherency(wavenumber, 2 * y), "k--", label="isotropic, same track spectrum"
+            wavenumber,
+            isotropic_road.coherency(wavenumber, 2 * half_track),
+            "k--",
+            label="isotropic, same track spectrum",
         )
     left.set(xlabel="wavenumber [rad/m]", ylabel="two-sided density [m³]", title="Spectrum of the left track")
     right.set(xlabel="wavenumber [rad/m]", ylabel="coherency [-]", ylim=(0, 1.05), title="Left and right track")

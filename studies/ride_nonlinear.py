@@ -80,7 +80,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "failed": failed,
         "results": results,
         "answer": _summary_of_deviations(answer),
-        "table": _table(answer, speed)
+        "table": _table_lines(answer, speed)
         + _lift_off_shares(vehicle, answer, runs)
         + _time_table(runs, answer, road, speed),
     }
@@ -108,7 +108,7 @@ def _summary_of_deviations(nonlinear: Nonlinear) -> dict[str, Any]:
     return table
 
 
-def _table(nonlinear: Nonlinear, speed: float) -> list[str]:
+def _table_lines(nonlinear: Nonlinear, speed: float) -> list[str]:
     """Lines for the screen: the springs' equivalent gains at a speed (m/s), and the Monte Carlo copies with the errors
     of both linear vehicles relative to them."""
     lines, shown = [f"  at {speed:g} m/s"], nonlinear.shown
@@ -134,15 +134,16 @@ def _table(nonlinear: Nonlinear, speed: float) -> list[str]:
     return lines
 
 
-def _errors_at_speed(nonlinear: Nonlinear, speed: float, i: int) -> str:
-    """Text on the errors of small motion and of statistical linearisation for output number ``i`` at a speed (m/s); ""
+def _errors_at_speed(nonlinear: Nonlinear, speed: float, output_number: int) -> str:
+    """Text on the errors of small motion and of statistical linearisation of an output at a speed (m/s); ""
     if the sweep does not have the speed."""
     matching = np.flatnonzero(np.isclose(nonlinear.speeds, speed))
     if not len(matching):
         return ""
-    true = nonlinear.copies[speed].deviation[i]
+    true = nonlinear.copies[speed].deviation[output_number]
     small, replaced = (
-        100 * (values[matching[0], i] / true - 1) for values in (nonlinear.small_motion, nonlinear.deviation)
+        100 * (values[matching[0], output_number] / true - 1)
+        for values in (nonlinear.small_motion, nonlinear.deviation)
     )
     return f"   small motion {small:+.1f} %, statistical linearisation {replaced:+.1f} %"
 

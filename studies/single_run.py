@@ -42,7 +42,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     return {
         "scene": scene.title,
         "folder": str(folder),
-        "runs": {engine: _line(result) for engine, result in results.items()},
+        "runs": {engine: _run_summary(result) for engine, result in results.items()},
         "failed": failed,
         "results": results,
         "largest difference of states": differences_of_engines(results),
@@ -51,7 +51,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     }
 
 
-def _line(result: Result) -> dict[str, Any]:
+def _run_summary(result: Result) -> dict[str, Any]:
     attributes = {name: result.data.attrs[name] for name in ("integrator", "step", "seconds")}
     return {**attributes, "counts": result.counts(), "channels": channel_summary(result)}
 
@@ -61,21 +61,25 @@ def differences_of_engines(results: dict[str, Result]) -> dict[str, float]:
     return {f"{a} - {b}": largest_state_difference(results[a], results[b]) for a, b in combinations(results, 2)}
 
 
-def largest_state_difference(first: Result, other_result: Result) -> float:
+def largest_state_difference(first_result: Result, other_result: Result) -> float:
     """Largest difference of any state between two runs; if their times differ, the denser run is interpolated by a
     cubic spline."""
-    if same_times(first, other_result):
-        return float(np.abs(first.states - other_result.states).max())
+    if same_times(first_result, other_result):
+        return float(np.abs(first_result.states - other_result.states).max())
     from scipy.interpolate import CubicSpline
 
-    fine, coarse = (first, other_result) if len(first.times) > len(other_result.times) else (other_result, first)
+    fine, coarse = (
+        (first_result, other_result)
+        if len(first_result.times) > len(other_result.times)
+        else (other_result, first_result)
+    )
     return float(np.abs(CubicSpline(fine.times, fine.states)(coarse.times) - coarse.states).max())
 
 
-def same_times(first: Result, other_result: Result) -> bool:
+def same_times(first_result: Result, other_result: Result) -> bool:
     """Whether the rows of both runs are at the same times."""
-    return len(first.times) == len(other_result.times) and bool(
-        np.allclose(first.times, other_result.times, rtol=0, atol=1e-9)
+    return len(first_result.times) == len(other_result.times) and bool(
+        np.allclose(first_result.times, other_result.times, rtol=0, atol=1e-9)
     )
 
 

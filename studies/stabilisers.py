@@ -86,7 +86,7 @@ def summary_lines(rows: list[Row], benches: list[Bench], options: Options) -> li
             f"can be trusted for {bench.trusted:.1f} s, springs hold from {bench.holding:.0f} N m/rad on",
         ]
         lines += [HEADING_LINE, UNITS_LINE]
-        lines += [_line(row, free) for row in of_engine]
+        lines += [_score_line(row, free) for row in of_engine]
     return lines
 
 
@@ -100,12 +100,12 @@ UNITS_LINE = (
 )
 
 
-def _line(row: Row, free: float) -> str:
+def _score_line(row: Row, free_seconds: float) -> str:
     ratios = "".join(f"{_ratio_text(row[f'damage {channel}']):>7}" for channel in SECTION_FORCE_CHANNELS)
     return (
         f"  {row['method']:<25}{ratios}{_ratio_text(row['vertical damage f3']):>9}{row['pitch error max [rad]']:>9.4f}"
         f"{row['pitch error rms [rad]']:>7.4f}{row['moment rms [N m]']:>7.0f}{row['moment max [N m]']:>8.0f}"
-        f"{row['moment share to 15 Hz']:>6.0%}{row['seconds'] / free:>8.1f}{row['verdict']:>11}"
+        f"{row['moment share to 15 Hz']:>6.0%}{row['seconds'] / free_seconds:>8.1f}{row['verdict']:>11}"
         f"{row['without truth']:>11}"
     )
 

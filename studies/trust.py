@@ -87,12 +87,15 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         wrong = run_away(
             changed_scene(base, vehicle={"override": {**base.vehicle.override, "I": other_parameters.I}}), engines[0]
         )
-        runs = {"interpolation": _error(clean, measured["pitch"]), "inertia": _error(wrong, clean["pitch"])}
+        runs = {
+            "interpolation": _pitch_difference(clean, measured["pitch"]),
+            "inertia": _pitch_difference(wrong, clean["pitch"]),
+        }
     progress("noise paths", 0.4)
     quiet = run_away(base, "reference", scene.error)
     spread = _ensemble_of_paths(base, quiet, deviation, options, engines[0], Crew.of(scene, default_workers=1))
     rows = _drift_off_rows(curves, runs, spread, options)
-    table = _text(rows, options, deviation, pitch_error_growth(assembly).rate, base, curves)
+    table = _table_lines(rows, options, deviation, pitch_error_growth(assembly).rate, base, curves)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     saved = _with_errors(_saved_paths(scene, rows, spread), quiet, spread, options)
     saved.save(folder / "trust.nc")
@@ -132,7 +135,7 @@ def _scene_under_forces(scene: Scene, options: Options, folder: Path) -> tuple[S
     return follower_builder(scene, folder)({}, {}), measured, largest
 
 
-def _error(run: Result, pitch: np.ndarray) -> GrowthCurve:
+def _pitch_difference(run: Result, pitch: np.ndarray) -> GrowthCurve:
     """Magnitude of the difference between a run's pitch and the pitch (n,) in rad of a run without one source of
     error."""
     return GrowthCurve(run.times, np.abs(run["pitch"] - pitch))
@@ -211,7 +214,7 @@ def _drift_off_rows(
     return rows
 
 
-def _text(
+def _table_lines(
     rows: list[Row], options: Options, deviation: float, rate: float, base_scene: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
     """Lines for the screen: predicted and measured drift-off times, and the requirements of a longer trustworthy

@@ -61,7 +61,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
         "answer": _summary_of_paths(wheelset, linear, paths)
         | (conicity.conicity_numbers(conicities) if conicities else {}),
         "results": {
-            **_results(paths),
+            **_results_by_name(paths),
             **{f"{engine}, eigenvalues": linear_run for engine, linear_run in eigenvalues.items()},
             **({"conicity": conicities} if conicities else {}),
         },
@@ -74,7 +74,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     }
 
 
-def _results(paths: Paths) -> dict[str, Result]:
+def _results_by_name(paths: Paths) -> dict[str, Result]:
     """Results of all runs, by a name of engine and speed."""
     return {
         f"{engine}, {speed_text}": path
@@ -140,10 +140,12 @@ def _stability_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]
     ]
 
 
-def _critical_speed_text(critical: float | None, reason: str, first: float | None = None) -> str:
+def _critical_speed_text(critical: float | None, reason: str, first_critical: float | None = None) -> str:
     if critical is None:
         return f"none: the wheelset {reason}"
-    return f"{critical:>14.9g} m/s" + (f" {critical / first - 1:+.0e} from the first" if first else "")
+    return f"{critical:>14.9g} m/s" + (
+        f" {critical / first_critical - 1:+.0e} from the first" if first_critical else ""
+    )
 
 
 def _path_lines(scene: WheelsetScene, paths: Paths) -> list[str]:

@@ -31,11 +31,11 @@ def hunting():
 def test_both_engines_report_the_same_poses(vehicle, hunting):
     found = import_module(f"studies.pictures.{vehicle}")
     _, motions = hunting if vehicle == "wheelset" else found.stage_and_motions(0.05, TIMES, ("exudyn", "mujoco"))
-    places, turns, _ = largest_differences(*motions)
-    assert places < 1e-9 and turns < 1e-9
+    places, rotations, _ = largest_differences(*motions)
+    assert places < 1e-9 and rotations < 1e-9
     for motion in motions:  # they move, and a hundred times further than that: the slowest on a road that fades in
         assert max(np.ptp(place, axis=0).max() for place in motion.positions.values()) > 1e-7
-        for turn in motion.turns.values():
+        for turn in motion.rotations.values():
             np.testing.assert_allclose(turn @ turn.swapaxes(1, 2), np.broadcast_to(np.eye(3), turn.shape), atol=1e-12)
 
 
@@ -72,7 +72,7 @@ def test_what_is_magnified_leans_more_and_spins_as_it_does(hunting):
     lean, spin = Rotation.from_euler("x", 0.01), Rotation.from_euler("y", 2.0)
     turned = replace(
         motion,
-        turns={"wheelset": np.array([(lean * spin).as_matrix()])},
+        rotations={"wheelset": np.array([(lean * spin).as_matrix()])},
         positions={"wheelset": np.array([[0.0, 2e-3, 0.0]])},
     )
     place, turn = drawn_pose(turned, replace(stage, magnification=5.0), "wheelset", 0)

@@ -71,7 +71,7 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     from twinrig.result import Result
 
     loaded = load(scene, set).checked
-    options = _options(loaded)
+    options = _run_parameters(loaded)
     _check_run_options(loaded, how, options)
     chosen, checked = _engines(loaded, engine, options["engine"].default == "")
     with _library_messages(loaded):
@@ -83,7 +83,7 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     return Result(answer.data, answer.detail)
 
 
-def _options(scene: Any) -> Mapping[str, Any]:
+def _run_parameters(scene: Any) -> Mapping[str, Any]:
     """Parameters of the function that runs a scene of the system; raises InputError for a system without one."""
     from importlib import import_module
 
@@ -173,16 +173,16 @@ def compare(first: "Result | str | Path", second: "Result | str | Path", shift: 
     if isinstance(second, str | Path) and Path(second).suffix != ".nc" and is_measurement(Path(second)):
         from studies.command.against_measurement import overlay_of_run
 
-        laid = overlay_of_run(_result(first), second, shift)
+        laid = overlay_of_run(_loaded_result(first), second, shift)
         values = {
             "shift": laid.shift.seconds,
             "channels": {compared.name: compared.values() for compared in laid.matches},
         }
-        return Report((f"{second} over {_name(first, 'the run')}", *laid.lines()), values, laid)
+        return Report((f"{second} over {_result_name(first, 'the run')}", *laid.lines()), values, laid)
     if shift is not None:
         raise InputError("compare", "shift", shift, "belongs to a comparison of a run with a measurement")
-    names = (_name(first, "the first"), _name(second, "the second"))
-    differences, notes = compare_runs(_result(first), _result(second), names)
+    names = (_result_name(first, "the first"), _result_name(second, "the second"))
+    differences, notes = compare_runs(_loaded_result(first), _loaded_result(second), names)
     values = {
         compared.name: {key: getattr(compared, key) for key in ("largest", "rms", "at", "share")}
         for compared in differences
@@ -190,7 +190,7 @@ def compare(first: "Result | str | Path", second: "Result | str | Path", shift: 
     return Report((f"{names[1]} less {names[0]}", *comparison_lines(differences, notes)), values, differences)
 
 
-def _result(run_or_path: Any) -> "Result":
+def _loaded_result(run_or_path: Any) -> "Result":
     from models.core.result import Result as SavedResult
 
     if isinstance(run_or_path, SavedResult):
@@ -202,7 +202,7 @@ def _result(run_or_path: Any) -> "Result":
     )
 
 
-def _name(run_or_path: Any, otherwise: str) -> str:
+def _result_name(run_or_path: Any, otherwise: str) -> str:
     if isinstance(run_or_path, str | Path):
         return str(run_or_path)
     engine = getattr(run_or_path, "data", None) is not None and run_or_path.data.attrs.get("engine")

@@ -78,7 +78,7 @@ class Result(saved.Result):
         rows = []
         for name, channel in self.data.data_vars.items():
             axes = " x ".join(f"{axis} {size}" for axis, size in channel.sizes.items())
-            limits = _limits(channel.values)
+            limits = _limit_texts(channel.values)
             unit, meaning = (str(channel.attrs.get(key, "")) for key in ("units", "long_name"))
             rows.append((str(name), unit or "-", axes or "-", *limits, meaning))
         return rows
@@ -162,9 +162,9 @@ class Result(saved.Result):
         return self.data.copy(deep=True)
 
 
-def _limits(values: np.ndarray) -> tuple[str, str]:
+def _limit_texts(channel_values: np.ndarray) -> tuple[str, str]:
     """Texts of the least and the largest finite number of a channel."""
-    if values.dtype.kind not in "fiub":
+    if channel_values.dtype.kind not in "fiub":
         return "text", ""
-    finite = values[np.isfinite(values)]
+    finite = channel_values[np.isfinite(channel_values)]
     return (f"{finite.min():.5g}", f"{finite.max():.5g}") if finite.size else ("none", "none")

@@ -115,9 +115,9 @@ def measured_cases(
     another version or share, RunFailed for a full disk.
     """
 
-    def lost(cases: range, reason: str) -> Arrays:
+    def lost(case_numbers: range, reason: str) -> Arrays:
         return _json_array(
-            [{"rows": [_row_of_failed_case(job.names[i], reason).as_dict()], "seconds": 0.0} for i in cases]
+            [{"rows": [_row_of_failed_case(job.names[i], reason).as_dict()], "seconds": 0.0} for i in case_numbers]
         )
 
     store, blocks = (

@@ -124,7 +124,7 @@ def results_of(first_path: Path, second_path: Path) -> dict[str, Result]:
     """Results of both files or folders by file, whose stated errors and assumptions are known; for a CSV table beside a
     netCDF file, the netCDF file is read."""
     files = [file for _, *pair in _file_pairs(first_path, second_path)[0] for file in pair]
-    results = ((str(file), _result(file)) for file in files)
+    results = ((str(file), _result_of_file(file)) for file in files)
     return {
         name: run
         for name, run in results
@@ -132,7 +132,7 @@ def results_of(first_path: Path, second_path: Path) -> dict[str, Result]:
     }
 
 
-def _result(path: Path) -> Result | None:
+def _result_of_file(path: Path) -> Result | None:
     """The saved result of a netCDF file, or of the netCDF file beside a CSV table; None if there is none."""
     netcdf_path = path.with_suffix(".nc")
     return load(netcdf_path) if netcdf_path.is_file() else None
@@ -140,7 +140,9 @@ def _result(path: Path) -> Result | None:
 
 def _quantities_of_file(path: Path) -> Iterator[tuple[str, Quantity]]:
     """Yield name and values of each quantity of a file, with the error that its result states."""
-    yield from _with_errors(_result(path), channels_of(load(path).data) if path.suffix == ".nc" else _table(path))
+    yield from _with_errors(
+        _result_of_file(path), channels_of(load(path).data) if path.suffix == ".nc" else _quantities_of_table(path)
+    )
 
 
 def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]]) -> Iterator[tuple[str, Quantity]]:
@@ -188,7 +190,7 @@ def _grid_of_dimension(channel: Any, dimension: Any) -> tuple[str, np.ndarray]:
     return f"{dimension} [{unit}]" if unit else str(dimension), channel[dimension].values.astype(float)
 
 
-def _table(path: Path) -> Iterator[tuple[str, Quantity]]:
+def _quantities_of_table(path: Path) -> Iterator[tuple[str, Quantity]]:
     """Yield name and values of each numeric column of a CSV file over its first column; an empty cell is NaN."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:

@@ -12,7 +12,7 @@ from models.core.finding import Finding, finding_lines, findings_as_dicts
 from models.core.whole_files import write_whole
 from studies.command.waiting import progress_bar
 
-Work = Callable[[Any], dict[str, Any]]
+StudyRun = Callable[[Any], dict[str, Any]]
 """Function that runs a study: its argument reports progress, and it returns the summary."""
 
 
@@ -23,7 +23,7 @@ def exit_with_message(message: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def profiled_work(profile: bool) -> Callable[[Work], Work]:
+def profiled_work(profile: bool) -> Callable[[StudyRun], StudyRun]:
     """Wrapper for the function that runs a study: with ``profile``, its summary also states where computing time was
     spent; without, the function is unchanged."""
     if not profile:
@@ -35,7 +35,12 @@ def profiled_work(profile: bool) -> Callable[[Work], Work]:
 
 
 def finish(
-    work: Work, folder: Path, as_json: bool, doubts: tuple[Finding, ...] = (), strict: bool = False, system: str = ""
+    work: StudyRun,
+    folder: Path,
+    as_json: bool,
+    doubts: tuple[Finding, ...] = (),
+    strict: bool = False,
+    system: str = "",
 ) -> None:
     """Run a study, whose results are saved in ``folder``, with a progress bar, and print its summary.
 

@@ -24,7 +24,7 @@ NAMED_SHARE = 0.3
 """Least component of a unit vector of a parameter combination for which the parameter is named."""
 SHIFT_IMPROVEMENT = 2.0
 """Factor by which a time shift must reduce the difference of run and measurement for it to be reported."""
-Tell = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 def identify(
@@ -35,7 +35,7 @@ def identify(
     engine: str = "",
     low_pass: float = 0.0,
     folder: Path | None = None,
-    report_progress: Tell = lambda text, share: None,
+    report_progress: ReportProgress = lambda text, share: None,
 ) -> Uncertainty:
     """Estimates of a scene's keys from a measurement, with their uncertainty; the run must have channels over time.
 
@@ -53,7 +53,10 @@ def identify(
 
 
 def profiles_of(
-    scene: Any, uncertainty: Uncertainty, all_profiles: bool = False, report_progress: Tell = lambda text, share: None
+    scene: Any,
+    uncertainty: Uncertainty,
+    all_profiles: bool = False,
+    report_progress: ReportProgress = lambda text, share: None,
 ) -> Iterator[LikelihoodProfile]:
     """Yield the likelihood profiles of all parameters, or only of those that the data do not determine; the scene's
     workers compute them."""
@@ -93,7 +96,7 @@ def report(
     measurement: Path,
     parameters: Sequence[str],
     folder: Path,
-    report_progress: Tell,
+    report_progress: ReportProgress,
     all_profiles: bool,
     **identify_options: Any,
 ) -> dict[str, Any]:

@@ -31,7 +31,7 @@ class SecondCompiler(CompilationTimer):
 
     def _start(self, *event: Any) -> None:
         super()._start(*event)
-        if self.process is None and self.spent() > COMPILATION_SECONDS:
+        if self.process is None and self.compilation_seconds() > COMPILATION_SECONDS:
             nowhere = subprocess.DEVNULL
             self.process = subprocess.Popen(self.command, stdin=nowhere, stdout=nowhere, stderr=nowhere)
 

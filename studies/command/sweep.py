@@ -65,9 +65,9 @@ class SweepJob:
         """Array "record" (n,): the record of each of the n points as JSON text."""
         return _json_array(map(self.record, paths))
 
-    def prepared_point(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
+    def prepared_point(self, point_number: int) -> tuple[Any, tuple[str, ...], Any]:
         """Scene, engines and study of a point of the sweep; raises InputError if the point cannot be run."""
-        scene = load_scene(self.scene, [*self.changes, f"{self.key}={_value_text(self.values[i])}"])
+        scene = load_scene(self.scene, [*self.changes, f"{self.key}={_value_text(self.values[point_number])}"])
         scene = scene.model_copy(update={"error": scene.error and self.error})
         engine = self.engine or getattr(getattr(scene, "run", None), "engine", None)
         engines = engines_of(engine, scene.system)
@@ -85,13 +85,13 @@ class SweepJob:
         assert first is not None
         raise first
 
-    def record(self, i: int) -> Record:
+    def record(self, point_number: int) -> Record:
         """Run a point of the sweep; returns its record: its numbers by name, its failures (by engine, if the study
         gives them), and the errors and assumptions that its results state."""
         try:
-            scene, engines, study = self.prepared_point(i)
+            scene, engines, study = self.prepared_point(point_number)
             scene = scene.model_copy(update={"workers": 1, "cluster": None})
-            with whole_folder(self.folder / RUNS_FOLDER / f"{i:04d}") as run_folder:
+            with complete_folder(self.folder / RUNS_FOLDER / f"{point_number:04d}") as run_folder:
                 summary = study.run(scene, engines, run_folder, lambda text, part: None)
         except (InputError, RunFailed) as error:
             return _failed_record(error)
@@ -122,7 +122,7 @@ def _failed_record(reason: object) -> Record:
 
 
 @contextmanager
-def whole_folder(folder: Path) -> Iterator[Path]:
+def complete_folder(folder: Path) -> Iterator[Path]:
     """Context that yields a temporary folder to write into; at the end it gets its final name, and replaces an older
     folder of this name."""
     partial_folder = folder.with_name(f".{folder.name}.{os.getpid()}.part")
@@ -224,7 +224,7 @@ def run(job: SweepJob, progress: Callable[[str, float], None], crew: Crew) -> di
         "folder": str(job.folder),
         "values": list(job.values),
         "numbers": swept.columns,
-        "table": _table(swept.columns, pages),
+        "table": _table_lines(swept.columns, pages),
         "results": {
             f"{job.key}={value} {name}".rstrip(): run
             for value, results in zip(job.values, swept.results, strict=True)
@@ -242,10 +242,10 @@ def _sweep_columns(job: SweepJob, records: list[Record]) -> "SweepResults":
     columns = {name: [record["numbers"].get(name) for record in records] for name in quantities}
     failures = [record["failed"] for record in records]
     results: list[told.Results] = [told.results_with_attributes(record["results"]) for record in records]
-    return SweepResults(job.scene, job.key, job.values, columns, failures, results, _unit(job))
+    return SweepResults(job.scene, job.key, job.values, columns, failures, results, _unit_of_key(job))
 
 
-def _unit(job: SweepJob) -> str:
+def _unit_of_key(job: SweepJob) -> str:
     """Unit of the swept key; "-" if the key has no unit, "SI" if no table describes it."""
     owner: Any = load_scene(job.scene, list(job.changes))
     *tables, name = job.key.split(".")
@@ -315,7 +315,7 @@ def _broken_assumptions_text(results: told.Results) -> str:
     return "; ".join(f"{name}: {breach.name} ({100.0 * breach.share:.2g} %)" for name, breach in breaches)
 
 
-def _table(columns: Columns, pages: list[str]) -> list[str]:
+def _table_lines(columns: Columns, pages: list[str]) -> list[str]:
     """Lines for the screen on at most 12 quantities that change in the sweep: first, last, least and largest value."""
     moving = {name: present_numbers(column) for name, column in columns.items() if has_several_values(column)}
     lines = [

@@ -131,11 +131,11 @@ def _draw_page(
     save(figure, path)
 
 
-def _axis_positions(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
+def _axis_positions(key_values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
     """Positions of the sweep's values on the axis, and tick labels; these are empty if the values are numbers."""
-    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-        return np.array(values, float), []
-    return np.arange(float(len(values))), [str(value)[:18] for value in values]
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in key_values):
+        return np.array(key_values, float), []
+    return np.arange(float(len(key_values))), [str(value)[:18] for value in key_values]
 
 
 def _draw_panel(
@@ -164,12 +164,16 @@ def _draw_panel(
     axis.set_title(wrapped_text(_with_unit(quantity), 0.47 * COLUMN_WIDTH, 9), fontsize=9)
 
 
-def _draw_marks(axis: Any, sweep_positions: np.ndarray, values: np.ndarray, swept: SweepResults, engine: str) -> None:
+def _draw_marks(
+    axis: Any, sweep_positions: np.ndarray, curve_values: np.ndarray, swept: SweepResults, engine: str
+) -> None:
     """Draw open marks around the points of a curve at which a result broke an assumption or states a large error."""
     for points, look in ((swept.broken_points(engine), BROKEN_MARK), (swept.warned_points(engine), WARNING_MARK)):
-        shown = [i for i in points if np.isfinite(values[i])]
+        shown = [i for i in points if np.isfinite(curve_values[i])]
         if shown:
-            axis.plot(sweep_positions[shown], values[shown], linestyle="none", markerfacecolor="none", zorder=4, **look)
+            axis.plot(
+                sweep_positions[shown], curve_values[shown], linestyle="none", markerfacecolor="none", zorder=4, **look
+            )
 
 
 def _with_unit(quantity: str) -> str:

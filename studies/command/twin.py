@@ -27,7 +27,7 @@ from models.own_model.states import STATE_COUNT
 from models.own_model.two_paths import PathGap, paths_apart
 from models.own_model.urdf import Misread, misread_numbers
 
-Tell = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 """Function that reports progress: the current task as text, and the finished share (0 to 1) of all work."""
 
 
@@ -116,7 +116,10 @@ def listed_content_kinds(text: str) -> tuple[str, ...]:
 
 
 def examine(
-    files: Sequence[Path], without: Sequence[str], twin_options: TwinOptions, report_progress: Tell = _ignore_progress
+    files: Sequence[Path],
+    without: Sequence[str],
+    twin_options: TwinOptions,
+    report_progress: ReportProgress = _ignore_progress,
 ) -> Twins:
     """Compare each model file with its builds, and both files if there are two; raises InputError if a file cannot be
     read or built.
@@ -159,13 +162,15 @@ def examine(
     return Twins(tuple(examined), comparison, gap)
 
 
-def _report_progress(report_progress: Tell, file_number: int, file_count: int, activity: str, share: float) -> None:
+def _report_progress(
+    report_progress: ReportProgress, file_number: int, file_count: int, activity: str, share: float
+) -> None:
     """Report the progress within one model file as a share of the progress of all files."""
     report_progress(activity, (file_number + share) / file_count)
 
 
 def _examine_file(
-    file: ModelFile, table: ControlTable | None, twin_options: TwinOptions, report_progress: Tell
+    file: ModelFile, table: ControlTable | None, twin_options: TwinOptions, report_progress: ReportProgress
 ) -> ExaminedFile:
     """Compare a model file with its builds, then its runs in time, and find its cheapest settings if requested. Each
     task counts as a third of the progress."""
@@ -219,9 +224,7 @@ def _friction_line(twin: TwinModel, count: int) -> str:
     """Line on dry friction: the number of states at which builds are compared, and the law that each build is compared
     with."""
     states = states_of(twin, count)
-    head = (
-        f"dry friction of {counted(len(twin.driven.frictions), 'joint')}: compared at {len(states)} of {count} states"
-    )
+    head = f"dry friction of {plural(len(twin.driven.frictions), 'joint')}: compared at {len(states)} of {count} states"
     if sliding_states(twin, states):
         return (
             f"{head}, at which all of it slides, with faster rates where it would not; where it sticks, MuJoCo's gives "
@@ -233,7 +236,7 @@ def _friction_line(twin: TwinModel, count: int) -> str:
     )
 
 
-def counted(number: int, noun: str) -> str:
+def plural(number: int, noun: str) -> str:
     """Text of a number with its noun, in the plural unless the number is 1."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
@@ -241,7 +244,7 @@ def counted(number: int, noun: str) -> str:
 def limits_sentence(names: Sequence[str]) -> str:
     """Sentence on the number of joints and tendons whose limits are not built; names : such as "joint hinge"."""
     sorts = {sort: sum(name.startswith(sort) for name in names) for sort in ("joint", "tendon")}
-    told = " and ".join(counted(number, sort) for sort, number in sorts.items() if number)
+    told = " and ".join(plural(number, sort) for sort, number in sorts.items() if number)
     return f"limits of {told} are not built; states are drawn inside the ranges of joints"
 
 
@@ -258,7 +261,7 @@ def verdict_sentence(examined_file: ExaminedFile) -> str:
     """Sentence with the verdict on a model file: whether its builds move as it does."""
     worst = max(row.acceleration for row in examined_file.agreements)
     if examined_file.misread:
-        return f"MuJoCo's parser made something else of {counted(len(examined_file.misread), 'number')} of the file"
+        return f"MuJoCo's parser made something else of {plural(len(examined_file.misread), 'number')} of the file"
     if examined_file.is_certified:
         bound = max(row.bound for row in examined_file.agreements)
         said = f"; up to {bound:.0e} may be rounding" if bound > EQUAL_ACCELERATION_SHARE else ""
@@ -271,7 +274,7 @@ def _file_lines(examined_file: ExaminedFile) -> list[str]:
     model, twin = examined_file.file.twin.model, examined_file.file.twin
     rows = [
         f"{examined_file.name}: {examined_file.file.document.kind}, {model.nbody - 1} bodies, "
-        f"{counted(twin.size, 'coordinate')}, {counted(model.ntendon, 'tendon')}, {counted(model.nu, 'actuator')}",
+        f"{plural(twin.size, 'coordinate')}, {plural(model.ntendon, 'tendon')}, {plural(model.nu, 'actuator')}",
         f"  {verdict_sentence(examined_file)}",
     ]
     for row in examined_file.agreements:

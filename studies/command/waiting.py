@@ -32,7 +32,7 @@ COMPILE_SECONDS = {
 """Processor time (s) for the compilation of the kernels of a system's scenes; an upper bound, as some may exist."""
 COMPILER_LOCK_EVENT = "numba:compiler_lock"
 """Name of numba's event that lasts from the beginning to the end of each compilation."""
-Tell = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 """Function that reports progress: the current task as text, and the finished share (0 to 1) of all work."""
 
 
@@ -67,7 +67,7 @@ class CompilationTimer:
         if self.depth == 0:
             self.total += time.monotonic() - self.since
 
-    def spent(self) -> float:
+    def compilation_seconds(self) -> float:
         """Time (s) spent in all compilations so far, including a running one."""
         return self.total + (time.monotonic() - self.since if self.depth else 0.0)
 
@@ -98,10 +98,17 @@ class ProgressState:
         """Current task, finished share and text of the remaining time for the bar; the share is None if it is
         unknown."""
         if self.compilations.is_compiling():
-            spent, expected_seconds = self.compilations.spent(), COMPILE_SECONDS.get(self.system, 0.0)
-            share = spent / expected_seconds if expected_seconds > spent else None
-            return "compiling kernels, once", share, _time_left_text(expected_seconds - spent if share else None, spent)
-        worked = time.monotonic() - self.start_time - self.compilations.spent()
+            compilation_seconds, expected_seconds = (
+                self.compilations.compilation_seconds(),
+                COMPILE_SECONDS.get(self.system, 0.0),
+            )
+            share = compilation_seconds / expected_seconds if expected_seconds > compilation_seconds else None
+            return (
+                "compiling kernels, once",
+                share,
+                _time_left_text(expected_seconds - compilation_seconds if share else None, compilation_seconds),
+            )
+        worked = time.monotonic() - self.start_time - self.compilations.compilation_seconds()
         march = SHARES_OF_MARCHES[-1] if SHARES_OF_MARCHES else None
         if march is None:
             return self.text, self.share or None, _time_left_text(_remaining_seconds(self.share, worked), worked)
@@ -118,9 +125,9 @@ def _remaining_seconds(share: float, seconds: float) -> float | None:
     return seconds * (1.0 - share) / share if share > LEAST_SHARE else None
 
 
-def _time_left_text(seconds: float | None, spent: float) -> str:
+def _time_left_text(seconds: float | None, elapsed_seconds: float) -> str:
     """Text of the remaining time or, if it is unknown, of the elapsed time."""
-    return f"{_duration_text(spent)} so far" if seconds is None else f"{_duration_text(seconds)} left"
+    return f"{_duration_text(elapsed_seconds)} so far" if seconds is None else f"{_duration_text(seconds)} left"
 
 
 def _duration_text(seconds: float) -> str:
@@ -128,7 +135,7 @@ def _duration_text(seconds: float) -> str:
 
 
 @contextmanager
-def progress_bar(text: str, system: str = "") -> Iterator[Tell]:
+def progress_bar(text: str, system: str = "") -> Iterator[ReportProgress]:
     """Context that shows a progress bar on the terminal if its block takes longer than BAR_DELAY; it yields the
     function that reports progress.
 

@@ -30,7 +30,7 @@ class Camera:
     eye: tuple[float, float, float]
     target: tuple[float, float, float]
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    opening: float = 0.5
+    angle_of_view: float = 0.5
 
     @cached_property
     def axes(self) -> np.ndarray:
@@ -44,7 +44,7 @@ class Camera:
     def pixels(self, picture_height: int) -> float:
         """Pixels per metre at the camera's target, in a picture of a height in pixels."""
         return picture_height / (
-            2.0 * np.tan(self.opening / 2.0) * float(np.linalg.norm(np.subtract(self.eye, self.target)))
+            2.0 * np.tan(self.angle_of_view / 2.0) * float(np.linalg.norm(np.subtract(self.eye, self.target)))
         )
 
     def horizon(self, picture_height: int) -> float:
@@ -52,14 +52,14 @@ class Camera:
         picture."""
         _, upright, back = self.axes
         level = float(np.dot(back, self.up) / np.dot(upright, self.up))
-        return picture_height / 2.0 * (1.0 - level / np.tan(self.opening / 2.0))
+        return picture_height / 2.0 * (1.0 - level / np.tan(self.angle_of_view / 2.0))
 
     def projected(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (..., 2) of points (..., 3) in m, and inverse distances (...) in 1/m along the camera's axis; these
         are negative for points behind the camera."""
         in_camera_axes = (points - self.eye) @ self.axes.T
         near = -1.0 / in_camera_axes[..., 2]
-        scale = height / (2.0 * np.tan(self.opening / 2.0)) * near
+        scale = height / (2.0 * np.tan(self.angle_of_view / 2.0)) * near
         return np.stack(
             [width / 2.0 + scale * in_camera_axes[..., 0], height / 2.0 - scale * in_camera_axes[..., 1]], -1
         ), near

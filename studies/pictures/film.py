@@ -38,7 +38,7 @@ class FilmedMotion:
     engine: str
     times: np.ndarray
     positions: dict[str, np.ndarray]
-    turns: dict[str, np.ndarray]
+    rotations: dict[str, np.ndarray]
     arrows: tuple[Arrow, ...] = ()
     run: Result | None = None
 
@@ -98,10 +98,11 @@ def largest_differences(first_motion: FilmedMotion, second_motion: FilmedMotion)
     """Largest differences between two filmed motions: of positions (m), of elements of rotation matrices, and of forces
     (N)."""
     position_pairs = [(position, second_motion.positions[name]) for name, position in first_motion.positions.items()]
-    turns = [(turn, second_motion.turns[name]) for name, turn in first_motion.turns.items()]
+    rotations = [(turn, second_motion.rotations[name]) for name, turn in first_motion.rotations.items()]
     forces = [(a.vectors, b.vectors) for a, b in zip(first_motion.arrows, second_motion.arrows, strict=True)]
     largest = (
-        max((float(np.abs(a - b).max()) for a, b in pairs), default=0.0) for pairs in (position_pairs, turns, forces)
+        max((float(np.abs(a - b).max()) for a, b in pairs), default=0.0)
+        for pairs in (position_pairs, rotations, forces)
     )
     return next(largest), next(largest), next(largest)
 

@@ -68,9 +68,9 @@ class Page:
         """Yield the page (720, 1280, 3) of every frame, with 8 bits per colour."""
         return (self.frame(k) for k in range(len(self.motions[0].times)))
 
-    def frame(self, k: int) -> np.ndarray:
+    def frame(self, frame_number: int) -> np.ndarray:
         """The page (720, 1280, 3) of frame ``k``, with 8 bits per colour."""
-        time, canvas = float(self.motions[0].times[k]), self._canvas
+        time, canvas = float(self.motions[0].times[frame_number]), self._canvas
         canvas.restore_region(self._still)
         self._clock.set_text(f"t = {time:.3f} s")
         self._cursor.set_xdata([time, time])
@@ -78,7 +78,7 @@ class Page:
             self._figure.draw_artist(artist)
         page = np.asarray(canvas.buffer_rgba())[..., :3].copy()
         for left, motion in zip(self._lefts, self.motions, strict=True):
-            image = draw_frame(motion, self.stage, k, self._wide, PICTURE_HEIGHT)
+            image = draw_frame(motion, self.stage, frame_number, self._wide, PICTURE_HEIGHT)
             page[TITLE_HEIGHT : TITLE_HEIGHT + PICTURE_HEIGHT, left : left + self._wide] = eight_bits(image)
         return page
 

@@ -127,7 +127,7 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
     tracks = front[0].point[1], front[1].point[1]
     passing = PassingRoad(distances, table[:, columns], tracks, SPEED, magnification=MAGNIFICATION)
     rest_positions = {body.name: body.position for body in vehicle.bodies}
-    camera = Camera((5.6, 4.6, 2.3), (-0.1, 0.1, 0.5), opening=0.5)
+    camera = Camera((5.6, 4.6, 2.3), (-0.1, 0.1, 0.5), angle_of_view=0.5)
     caption = f"displacements and road drawn {MAGNIFICATION:g} times as large; forces of the road on the tyres"
     title = f"Car of {len(vehicle.coordinates())} freedoms at {SPEED:g} m/s on a road of class C, after a gust"
     return Stage(

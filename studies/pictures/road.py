@@ -20,8 +20,8 @@ class PassingRoad:
     """Road that moves past the vehicle at a speed (m/s): heights (n, 2) in m at ``distances`` (n,) in m along it, for
     two tracks at lateral positions ``tracks`` (m).
 
-    up_component : vertical component of the upward direction, 1 or -1; magnification : factor on the heights; half :
-    half of the road's width (m).
+    up_component : vertical component of the upward direction, 1 or -1; magnification : factor on the heights;
+    half_width : half of the road's width (m).
     """
 
     distances: np.ndarray
@@ -30,20 +30,20 @@ class PassingRoad:
     speed: float
     up_component: float = 1.0
     magnification: float = 1.0
-    half: float = 2.6
+    half_width: float = 2.6
 
     def at(self, time: float) -> list[PaintedSurface]:
         """Surfaces of road, edge lines and grass at a time (s)."""
         first = np.floor((self.speed * time - DRAWN_ROAD) / TILE_LENGTH)
         stations = np.arange(first, first + 2.0 * DRAWN_ROAD / TILE_LENGTH)
-        across = np.linspace(-self.half, self.half, 2 * round(self.half / TILE_LENGTH) + 1)
+        across = np.linspace(-self.half_width, self.half_width, 2 * round(self.half_width / TILE_LENGTH) + 1)
         x, y = np.meshgrid(TILE_LENGTH * stations - self.speed * time, across, indexing="ij")
         net = np.stack([x, y, self._height(x + self.speed * time, y)], -1)
         dark = (stations[:-1, None] + np.arange(len(across) - 1)) % 2 == 1
         if self.up_component < 0:
             net, dark = net[:, ::-1], dark[:, ::-1]
         grass = floor(-0.35 * self.up_component, GRASS_COLOUR, self.up_component)
-        side, starts = self.half - 0.15, 4.0 * np.arange(-10, 11) - self.speed * time % 4.0
+        side, starts = self.half_width - 0.15, 4.0 * np.arange(-10, 11) - self.speed * time % 4.0
         marks = [
             box(1.6, 0.1, 0.02, LINE_COLOUR).at(
                 x, y, float(self._height(x + self.speed * time, y)) + 0.01 * self.up_component

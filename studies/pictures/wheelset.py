@@ -73,11 +73,11 @@ def _motion_of_engine(engine: str, duration: float, times: np.ndarray) -> Filmed
     return FilmedMotion(engine, path_of_frames.times, *poses, arrows(CHOSEN_WHEELSET, path_of_frames), run)
 
 
-def arrows(w: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
+def arrows(wheelset: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
     """Force arrows of the normal force and the creep force on both wheels, at the contact points along a run."""
     drawn_arrows = []
     for k, (name, side) in enumerate(SIDE_SIGNS.items()):
-        cone = Cone(w.radius, w.half_gauge, w.conicity, w.head_radius)
+        cone = Cone(wheelset.radius, wheelset.half_gauge, wheelset.conicity, wheelset.head_radius)
         touched = [cone_on_rail(side, Pose(*state[[Y, Z, ROLL, YAW]].tolist()), cone) for state in path.states]
         points = np.array(touched)[:, -3:] + path.states[:, [Y, Z]] @ np.eye(3)[1:]  # in the track's axes
         contact = path.contacts[:, k]
@@ -108,27 +108,33 @@ def stage(wheelset: Wheelset) -> Stage:
     )
 
 
-def shapes(w: Wheelset) -> list[PaintedSurface]:
+def shapes(wheelset: Wheelset) -> list[PaintedSurface]:
     """Surfaces of an axle and two wheels with the model's conical treads; the flange clearance is drawn magnified."""
-    end = w.half_spacing + 0.12
+    end = wheelset.half_spacing + 0.12
     surfaces = [surface_of_revolution([-end, -end, end, end], [0.0, 0.085, 0.085, 0.0], DARK_COLOUR)]
-    inner, outer = 0.036 + MAGNIFICATION * w.flange_clearance + 0.004, 0.075
-    across = np.array([-inner - 0.03, -inner - 0.025, -inner, outer, outer, 0.02, 0.02, 0.05, 0.05]) + w.half_gauge
-    tread = [w.radius + 0.028, w.radius + w.conicity * inner, w.radius - w.conicity * outer]
+    inner, outer = 0.036 + MAGNIFICATION * wheelset.flange_clearance + 0.004, 0.075
+    across = (
+        np.array([-inner - 0.03, -inner - 0.025, -inner, outer, outer, 0.02, 0.02, 0.05, 0.05]) + wheelset.half_gauge
+    )
+    tread = [
+        wheelset.radius + 0.028,
+        wheelset.radius + wheelset.conicity * inner,
+        wheelset.radius - wheelset.conicity * outer,
+    ]
     radii = np.array([0.0, *tread, 0.39, 0.37, 0.19, 0.16, 0.0])
     for side, order in ((1.0, slice(None)), (-1.0, slice(None, None, -1))):
         surfaces.append(surface_of_revolution(side * across[order], radii[order], STEEL_COLOUR, piece_count=72))
         surfaces += [
-            box(0.09, 0.03, 0.09, RUST_COLOUR).at(0.28 * np.cos(a), side * (w.half_gauge + y), 0.28 * np.sin(a))
+            box(0.09, 0.03, 0.09, RUST_COLOUR).at(0.28 * np.cos(a), side * (wheelset.half_gauge + y), 0.28 * np.sin(a))
             for a in np.arange(6) * np.pi / 3.0
             for y in (0.016, -inner - 0.02)
         ]
     return surfaces
 
 
-def track(w: Wheelset, distance: float) -> list[PaintedSurface]:
+def track(wheelset: Wheelset, distance: float) -> list[PaintedSurface]:
     """Surfaces of rails, sleepers and ballast after the wheelset has travelled a distance (m)."""
-    first, rail_end, top = -24.0, 2.4, w.radius
+    first, rail_end, top = -24.0, 2.4, wheelset.radius
     head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
     rotation = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # the outline lies in y and z
     rail = [
@@ -136,7 +142,7 @@ def track(w: Wheelset, distance: float) -> list[PaintedSurface]:
         box(rail_end - first, 0.02, 0.1, RAIL_COLOUR).at(0.0, 0.0, 0.1),
         box(rail_end - first, 0.14, 0.02, RAIL_COLOUR).at(0.0, 0.0, 0.16),
     ]
-    sides = w.half_gauge, -w.half_gauge
+    sides = wheelset.half_gauge, -wheelset.half_gauge
     surfaces = [surface.at((first + rail_end) / 2.0, y, top) for y in sides for surface in rail]
     phase = distance % SLEEPER_SPACING
     for i in range(int(np.ceil(first / SLEEPER_SPACING)), int(np.floor(rail_end / SLEEPER_SPACING)) + 1):

@@ -43,8 +43,8 @@ PROBLEMS: tuple[Make, ...] = (
     inertial_unit.problem,
 )
 FULL_ONLY: tuple[Make, ...] = (
-    force_excited.noisy,
-    force_excited.guided,
+    force_excited.noisy_problem,
+    force_excited.prescribed_pitch_problem,
     free_vehicle.problem,
     partial(wheelset.problem, speed=5.0),
     partial(wheelset.problem, speed=1.0),

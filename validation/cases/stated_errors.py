@@ -72,9 +72,9 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
     }
     if not sample.stated:
         return sample_table
-    stated, true = sample.stated[sample.printed], sample.true[sample.printed]
+    stated, true = sample.stated[sample.printed_channel], sample.true[sample.printed_channel]
     return sample_table | {
-        "channel": sample.printed,
+        "channel": sample.printed_channel,
         "stated": stated.error,
         "true": true,
         "unit": stated.unit,

@@ -21,16 +21,16 @@ from models.own_model.path import EQUAL_PATH_SHARE, compare_paths
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.own_model.files import (
     ARM_URDF,
+    BOX_WELDED_TO_CRANK,
     CART,
     GEARED,
-    HELD,
     JOINTED,
     LINKED,
     PLANTED,
     TIED,
-    chain,
-    changed,
-    tree,
+    model_with_change,
+    random_chain,
+    random_tree,
 )
 from validation.own_model.soft_couplings import soft_constraint_equations
 
@@ -48,10 +48,10 @@ OUTSIDE = tuple(kind for kind in CONTENT_KINDS if kind not in ("flex", "turning_
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Quick: seven models, five states, six planted differences; in full 24 models, eight of them exported, all 30."""
     texts = {"jointed": JOINTED, "cart": CART, "arm": ARM_URDF, "tied": TIED, "geared": GEARED}
-    texts |= {"linked": LINKED, "held": HELD}
+    texts |= {"linked": LINKED, "held": BOX_WELDED_TO_CRANK}
     if not quick:
-        texts |= {f"chain_{count}": chain(count) for count in (8, 30)}
-        texts |= {f"tree_{seed}": tree(4 + 2 * seed, seed) for seed in range(1, 8)}
+        texts |= {f"chain_{count}": random_chain(count) for count in (8, 30)}
+        texts |= {f"tree_{seed}": random_tree(4 + 2 * seed, seed) for seed in range(1, 8)}
     rows = [_agreement(name, _read(folder, name, text), quick) for name, text in texts.items()]
     rows += [] if quick else [_agreement(name, _exported(folder, name), quick) for name in EXPORTED]
     return [
@@ -133,7 +133,7 @@ def _planted(folder: Path, quick: bool) -> Row:
     first, named = _read(folder, "original", JOINTED).twin, 0
     chosen = PLANTED[::5] if quick else PLANTED
     for name, old, new, kind, owner, size in chosen:
-        second = _read(folder, "planted", changed(JOINTED, name, old, new)).twin
+        second = _read(folder, "planted", model_with_change(JOINTED, name, old, new)).twin
         influential = compare(first, second, 3).influential
         sentence = influential[0].sentence(("original", "planted")) if influential else ""
         named += sentence.startswith(f"{kind} of {owner}: ") and size.replace("b.xml", "planted") in sentence

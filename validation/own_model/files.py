@@ -103,19 +103,21 @@ LINKED = """<mujoco model="linked"><worldbody>
  <weld name="grip" site1="lug" site2="tip" solimp=".92 .95 .001" torquescale="2"/></equality></mujoco>"""
 """Model with a plane four-bar loop, whose closing joint has redundant constraints, and a box welded to an arm."""
 
-LOOP, GRIP = (
+LOOP_CONSTRAINT, GRIP_CONSTRAINT = (
     '<connect name="loop" body1="rod" body2="rocker" anchor=".6 0 0"',
     '<weld name="grip" site1="lug" site2="tip"',
 )
-HELD = LINKED.replace(
-    GRIP, '<weld name="grip" body1="box" body2="crank" relpose=".1 .4 .1 .9 .1 .2 .1" anchor=".05 0 0"'
+BOX_WELDED_TO_CRANK = LINKED.replace(
+    GRIP_CONSTRAINT, '<weld name="grip" body1="box" body2="crank" relpose=".1 .4 .1 .9 .1 .2 .1" anchor=".05 0 0"'
 )
 """``LINKED`` with the box welded to the crank instead, at a relative pose that differs from the one in the file."""
-HUNG = LINKED.replace(GRIP, '<connect name="grip" body1="box" anchor=".1 .2 .1"').replace('torquescale="2"', "")
+BOX_ON_GROUND_POINT = LINKED.replace(GRIP_CONSTRAINT, '<connect name="grip" body1="box" anchor=".1 .2 .1"').replace(
+    'torquescale="2"', ""
+)
 """``LINKED`` with a point of the box fixed to the ground instead."""
 
 
-def chain(count: int, seed: int = 1) -> str:
+def random_chain(count: int, seed: int = 1) -> str:
     """MJCF text of a chain of ``count`` bodies on hinges and slides with springs, dampers and armatures, all random."""
     draw = np.random.default_rng(seed)
 
@@ -136,7 +138,7 @@ def chain(count: int, seed: int = 1) -> str:
     return f'<mujoco model="chain"><worldbody>{text}{"</body>" * count}</worldbody></mujoco>'
 
 
-def tree(count: int, seed: int) -> str:
+def random_tree(count: int, seed: int) -> str:
     """MJCF text of ``count`` bodies: free ones with branches on hinges, slides and ball joints; all numbers random."""
     draw = np.random.default_rng(seed)
     children = dict[int, list[int]]()
@@ -159,10 +161,10 @@ def tree(count: int, seed: int) -> str:
     return f'<mujoco model="tree"><worldbody>{body(0)}</worldbody></mujoco>'
 
 
-def changed(text: str, name: str, old: str, new: str) -> str:
-    """Text of a model file in which the first ``old`` after the element called ``name`` is replaced by ``new``."""
-    there = text.index(old, text.index(f'"{name}"'))
-    return text[:there] + new + text[there + len(old) :]
+def model_with_change(text: str, name: str, old_text: str, new_text: str) -> str:
+    """Text of a model file in which the first ``old_text`` after the name of an element is replaced by ``new_text``."""
+    there = text.index(old_text, text.index(f'"{name}"'))
+    return text[:there] + new_text + text[there + len(old_text) :]
 
 
 PLANTED = [

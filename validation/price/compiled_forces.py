@@ -24,7 +24,7 @@ HEADER_LENGTH = 17
 
 def _compiled_callback(numeric, passive, time, position, velocity):
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
-    def law(model, case_data):
+    def force_callback(model, case_data):
         header = carray(array_at(model, numeric), (HEADER_LENGTH,))
         row = int(np.rint(carray(double_at(case_data, time), (1,))[0] * header[0]))
         if not 0 <= row < int(header[1]):
@@ -44,11 +44,11 @@ def _compiled_callback(numeric, passive, time, position, velocity):
         force[2] -= f3 + f4
         force[3] += cosine * (b * f3 - a * f4)
 
-    return law
+    return force_callback
 
 
 @cache
-def law() -> Any:
+def force_callback() -> Any:
     """The MuJoCo callback that adds all forces of the vehicle, compiled at its first use."""
     return _compiled_callback(*offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
 
@@ -72,10 +72,10 @@ class CompiledForces:
     def run(self) -> np.ndarray:
         """States (n + 1, 8) of a run with the forces, without the checks of an engine: for comparison and timing
         only."""
-        with installed(law()):
-            return self.coast()
+        with installed(force_callback()):
+            return self.run_with_installed_callback()
 
-    def coast(self) -> np.ndarray:
+    def run_with_installed_callback(self) -> np.ndarray:
         """States (n + 1, 8) of a run with whatever callback is installed; without any, weight alone acts."""
         start = np.concatenate(([0.0], self.assembly.initial))
         path, _ = rollout.rollout(self.model, self.data, start[None, :], nstep=self.settings.steps)

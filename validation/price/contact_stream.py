@@ -32,19 +32,19 @@ class ProcessCost(NamedTuple):
     seconds: float
 
 
-def write(path: Path, rows: int) -> None:
+def write_table(path: Path, rows: int) -> None:
     """Write a table (CSV) of contacts with creepages from rolling to sliding; rows : a multiple of REPEATED_ROWS."""
     lines = (f"5e-3,4e-3,{8e4 + i},0.3,{1e-5 * i:.6g},1e-4,{1e-3 * i:.4g}\n" for i in range(REPEATED_ROWS))
     text = "".join(lines)
     with path.open("w") as file:
-        file.write(HEADER)
+        file.write_table(HEADER)
         file.writelines(text for _ in range(rows // REPEATED_ROWS))
 
 
-def answered(folder: Path, rows: int) -> ProcessCost:
+def cost_of_table(folder: Path, rows: int) -> ProcessCost:
     """Compute a table of ``rows`` contacts into ``forces.csv``, with few cells and without error estimates; returns the
     cost."""
-    write(folder / "cases.csv", rows)
+    write_table(folder / "cases.csv", rows)
     start_time = time.perf_counter()
     counts = answer_table(
         folder / "cases.csv", folder / "forces.csv", partial(Built, MaterialPair()), Method(cells=5), errors=False
@@ -63,5 +63,5 @@ def in_fresh_process(function: Callable[[Path, int], ProcessCost], rows: int) ->
 
 if __name__ == "__main__":
     for rows in map(int, sys.argv[1:]) if sys.argv[1:] else ROWS:
-        taken = in_fresh_process(answered, rows)
+        taken = in_fresh_process(cost_of_table, rows)
         print(f"{rows:>12,} rows: {taken.memory / 1e6:.0f} MB, {taken.seconds:.0f} s", flush=True)

@@ -32,7 +32,9 @@ def linear_force_function(
     return law
 
 
-def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], methods: list[str]) -> list[Any]:
+def exudyn_marches(
+    masses: list[float], force_function: Callable[[Any, Any], list[float]], methods: list[str]
+) -> list[Any]:
     """For each integration method of Exudyn, a function that integrates a number of steps."""
     import exudyn as exu
     import exudyn.itemInterface as items
@@ -49,7 +51,7 @@ def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
             initialCoordinates_t=[0.0] * 4,
         )
     )
-    user: Any = lambda mbs, t, item, q, v: law(q, v)  # noqa: E731
+    user: Any = lambda mbs, t, item, q, v: force_function(q, v)  # noqa: E731
     mbs.AddObject(items.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.diag(masses), forceUserFunction=user))
     mbs.Assemble()
     options = exu.SimulationSettings()
@@ -65,7 +67,9 @@ def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
     return [lambda steps, method=method: march(method, steps) for method in methods]
 
 
-def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], methods: list[str]) -> list[Any]:
+def mujoco_marches(
+    masses: list[float], force_function: Callable[[Any, Any], list[float]], methods: list[str]
+) -> list[Any]:
     """For each integration method of MuJoCo, a function that integrates a number of steps in MuJoCo's own loop."""
     import mujoco
 
@@ -80,7 +84,7 @@ def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
     data = mujoco.MjData(model)
 
     def passive(model: Any, case_data: Any) -> None:
-        case_data.qfrc_passive[:] = law(case_data.qpos.tolist(), case_data.qvel.tolist())
+        case_data.qfrc_passive[:] = force_function(case_data.qpos.tolist(), case_data.qvel.tolist())
 
     def march(method: str, steps: int) -> None:
         model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{method.upper()}")

@@ -146,13 +146,15 @@ def _spring_element(
     name: str,
     first_body: str,
     second_body: str,
-    law: SpringDamper | Tyre,
+    spring_or_tyre: SpringDamper | Tyre,
     start_point: Vector,
     end_point: Vector,
     axis: Vector,
 ) -> Element:
     vectors = (np.array(start_point, float), np.array(end_point, float), np.array(axis, float))
-    return Element(name, first_body, second_body, *vectors, law.stiffness, law.damping, 0.0, second_body)
+    return Element(
+        name, first_body, second_body, *vectors, spring_or_tyre.stiffness, spring_or_tyre.damping, 0.0, second_body
+    )
 
 
 @contextmanager

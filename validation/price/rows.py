@@ -28,7 +28,7 @@ def rows_of(problem: Problem, measured_points: MeasuredPoints, quick: bool) -> l
         _offenders_row(
             f"price.{problem.key}.silent",
             f"wrong answers without a word, of {len(points)} settings",
-            [_label(p) for p in points if p.status == "SILENT"],
+            [_setting_text(p) for p in points if p.status == "SILENT"],
             f"an error that is not finite, or beyond {problem.bound:.3g} {measured_points.unit}, "
             "must come with an exception",
         ),
@@ -41,7 +41,7 @@ def rows_of(problem: Problem, measured_points: MeasuredPoints, quick: bool) -> l
         _offenders_row(
             f"price.{problem.key}.counts.repeat",
             f"settings that count or err otherwise in the last round, of {len(repeated)} that have rounds",
-            [_label(p) for p in repeated if p.changed],
+            [_setting_text(p) for p in repeated if p.changed],
             "exact: all counts, and errors to the last digit",
         ),
         _cheapest_settings_row(problem, measured_points),
@@ -50,7 +50,7 @@ def rows_of(problem: Problem, measured_points: MeasuredPoints, quick: bool) -> l
     ]
 
 
-def _label(p: Point) -> str:
+def _setting_text(p: Point) -> str:
     return f"{p.setting.curve} {p.setting.label()}"
 
 

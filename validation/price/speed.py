@@ -32,7 +32,7 @@ def callback_cost(
     models = [build("mujoco", assembly, settings) for assembly in (bare, flat, road_assembly)]
     compiled = CompiledForces(road_assembly, settings)
     runs: list[Callable[[], Any]] = [model.run for model in models]
-    seconds = interleave([*runs, compiled.coast, compiled.run], round_count, minimum_seconds)
+    seconds = interleave([*runs, compiled.run_with_installed_callback, compiled.run], round_count, minimum_seconds)
     names = ("without forces", "springs and dampers", "with callback", "bare", "all in the callback")
     return {
         "gap": float(np.abs(compiled.run() - models[2].run().states).max()),

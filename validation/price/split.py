@@ -39,7 +39,7 @@ STEP = {"road": 1e-3, "wheel-20": 2.5e-4}
 WEAK_DAMPING = 1e-3
 """Damping (N s/m) of the cheap force law, which hardly changes the motion."""
 METHODS = {"exudyn": "RK44", "mujoco": "RK4"}
-Of = Callable[[Any, Any], Any]
+ForceFunction = Callable[[Any, Any], Any]
 
 
 @njit(cache=True, error_model="numpy")
@@ -93,13 +93,13 @@ def _road_runs_in_mujoco() -> Runs:
     settings = Settings(METHODS["mujoco"], STEP["road"], STEPS["road"] * STEP["road"])
     compiled = CompiledForces(assembly_of_scene(road_excited.scene()), settings)
     return [
-        partial(_run_with_callback, counted, compiled.coast)
+        partial(_run_with_callback, counted, compiled.run_with_installed_callback)
         for counted in (empty_law(), kernel_law(add_weak_damper), law())
     ]
 
 
 def _wheel_runs_in_exudyn() -> Runs:
-    wheels, steps, step = _wheels()
+    wheels, steps, step = _wheels_steps_and_step()
     return [
         partial(Rolling(wheels, force_function).run, *wheels.state(), steps, step, METHODS["exudyn"])
         for force_function in (zero_forces, listed(4, np.zeros(0), weak_damper_in_block), Forces(wheels).of)
@@ -107,7 +107,7 @@ def _wheel_runs_in_exudyn() -> Runs:
 
 
 def _wheel_runs_in_mujoco() -> Runs:
-    wheels, steps, step = _wheels()
+    wheels, steps, step = _wheels_steps_and_step()
     marcher, start = Marcher(model(wheels, step, METHODS["mujoco"])), np.concatenate(wheels.state())[None]
     return [
         partial(_run_with_callback, law, partial(marcher.run, start, steps))
@@ -115,7 +115,7 @@ def _wheel_runs_in_mujoco() -> Runs:
     ]
 
 
-def _wheels() -> tuple[Wheels, int, float]:
+def _wheels_steps_and_step() -> tuple[Wheels, int, float]:
     return Wheels(1, cells=wheelset.CELLS, speed=20.0), STEPS["wheel-20"], STEP["wheel-20"]
 
 

@@ -14,11 +14,11 @@ from validation.replay import jobs as asked
 from validation.replay.answers import (
     JOBS_FILE,
     CommandOutput,
-    load,
+    load_output,
     output_difference,
     output_of_job,
     read_jobs,
-    save,
+    save_output,
     write_jobs,
 )
 
@@ -45,9 +45,9 @@ def _record_outputs(arguments: argparse.Namespace) -> int:
     arguments.folder.mkdir(parents=True, exist_ok=True)
     if not (arguments.folder / JOBS_FILE).exists():
         write_jobs(arguments.folder, asked.replay_jobs(arguments.command))
-    left = [job for job in _selected_jobs(arguments) if load(arguments.folder, job.name) is None]
+    left = [job for job in _selected_jobs(arguments) if load_output(arguments.folder, job.name) is None]
     for job, current_answer in _outputs_of_jobs(left, arguments):
-        save(arguments.folder, job.name, current_answer)
+        save_output(arguments.folder, job.name, current_answer)
         codes = ", ".join(map(str, current_answer.codes))
         print(
             f"{current_answer.seconds:7.1f} s  {len(current_answer.arrays):4} arrays  {job.name}: {codes}", flush=True
@@ -59,7 +59,7 @@ def _check_outputs(arguments: argparse.Namespace) -> int:
     renamed = tomllib.loads(arguments.renamed.read_text()) if arguments.renamed else {}
     counts = {"same": 0, "differ": 0, "other words": 0}
     for job, current_answer in _outputs_of_jobs(_selected_jobs(arguments), arguments):
-        recorded_answer = load(arguments.folder, job.name)
+        recorded_answer = load_output(arguments.folder, job.name)
         if recorded_answer is None:
             print(f"{job.name}: was not recorded")
             continue

@@ -60,7 +60,7 @@ def output_of_job(job: ReplayJob, command: str, folder: Path) -> CommandOutput:
 def _run_command(command_words: list[str], folder: Path, job_answer: CommandOutput) -> None:
     """Run one command, and add its exit code, message and printed tables to the job's output."""
     start_time = time.monotonic()
-    code, printed_output, wrong = _run(command_words, folder)
+    code, printed_output, wrong = _process_output(command_words, folder)
     job_answer.seconds += time.monotonic() - start_time
     printed = _parsed_json(printed_output)
     if printed is not None:
@@ -73,7 +73,7 @@ def _run_command(command_words: list[str], folder: Path, job_answer: CommandOutp
     job_answer.message += _masked_message(printed_output + wrong)
 
 
-def _run(command_words: list[str], folder: Path) -> tuple[int, str, str]:
+def _process_output(command_words: list[str], folder: Path) -> tuple[int, str, str]:
     surroundings = os.environ | {"COLUMNS": "200", "NO_COLOR": "1", "MPLBACKEND": "agg"}
     try:
         completed_process = subprocess.run(
@@ -165,7 +165,7 @@ def read_jobs(folder: Path) -> list[ReplayJob]:
     ]
 
 
-def save(folder: Path, name: str, job_answer: CommandOutput) -> None:
+def save_output(folder: Path, name: str, job_answer: CommandOutput) -> None:
     """Save the output of a job; its summary file is written last, as a mark that the output is complete."""
     arrays = {str(i): array for i, array in enumerate(job_answer.arrays.values())}
     np.savez_compressed(folder / f"{name}.npz", allow_pickle=False, **arrays)
@@ -178,11 +178,11 @@ def save(folder: Path, name: str, job_answer: CommandOutput) -> None:
     (folder / f"{name}.json").write_text(json.dumps(note, indent=1))
 
 
-def load(folder: Path, name: str) -> CommandOutput | None:
+def load_output(folder: Path, name: str) -> CommandOutput | None:
     """The saved output of a job; None if it is missing or incomplete."""
     try:
         note = json.loads((folder / f"{name}.json").read_text())
-        with np.load(folder / f"{name}.npz") as file:
+        with np.load_output(folder / f"{name}.npz") as file:
             arrays = {key: file[str(i)] for i, key in enumerate(note["arrays"])}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         return None

@@ -43,11 +43,11 @@ def _function_record(audit_line: Line) -> Saved:
     }
 
 
-def _counts_by_module(lines: list[Line]) -> list[tuple[str, int, int, int]]:
+def _counts_by_module(audit_lines: list[Line]) -> list[tuple[str, int, int, int]]:
     """For each module, its name and the numbers of functions: all, covered by an independent check, and covered by any
     check."""
     of: dict[str, list[Line]] = {}
-    for line in lines:
+    for line in audit_lines:
         of.setdefault(line.function.partition(":")[0], []).append(line)
     return [
         (module, len(same), sum(line.is_covered for line in same), sum(line.noticed > 0 for line in same))

@@ -58,14 +58,16 @@ def report_sizes_of_systems(results: Saved) -> list[Saved]:
     counted = _row_counts(results["rows"])
     main = {case: systems.most_common(1)[0][0] for case, systems in counted.items()}
     return [
-        _line(system, counted, main, results["provenance"]["seconds"])
+        _sizes_of_system(system, counted, main, results["provenance"]["seconds"])
         for system in QUICK_SECONDS
         if any(system in systems for systems in counted.values())
     ]
 
 
-def _line(system: str, counted: dict[str, Counter[str]], main: dict[str, str], seconds: dict[str, float]) -> Saved:
-    main_cases = [case for case in counted if main[case] == system]
+def _sizes_of_system(
+    system: str, counted: dict[str, Counter[str]], main_system_of_case: dict[str, str], seconds: dict[str, float]
+) -> Saved:
+    main_cases = [case for case in counted if main_system_of_case[case] == system]
     shared = [case for case in counted if system in counted[case]]
     return {
         "name": system,

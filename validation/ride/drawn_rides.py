@@ -50,13 +50,13 @@ class NonlinearRide:
         return in_time(replace(self.scene, ride=self.scene.ride.model_copy(update={"options": options})))
 
 
-class Draw:
+class RandomNumbers:
     """Generator of the random numbers of a ride scene, for a seed."""
 
     def __init__(self, seed: int | list[int]) -> None:
         self.random = np.random.default_rng(seed)
 
-    def between(self, low: float, high: float) -> float:
+    def log_uniform(self, low: float, high: float) -> float:
         """Random number between two positive limits, uniform in its logarithm."""
         return float(np.exp(self.random.uniform(np.log(low), np.log(high))))
 
@@ -67,13 +67,13 @@ def random_linear_ride(seed: int, tolerance: float | None = None, detailed: bool
     detailed : a vehicle as multibody programs hold it, every wheel on a stiff bushing and a light part on stiff mounts;
     else each of them in about half of the scenes, and soft at times.
     """
-    draw = Draw(seed)
+    draw = RandomNumbers(seed)
     rng = draw.random
     name = str(rng.choice(VEHICLES))
     vehicle = _random_vehicle(changed_vehicle(_load_vehicle(name), seed), draw, detailed)
-    cutoff = draw.between(20.0, 200.0) if rng.random() < 0.4 else None
+    cutoff = draw.log_uniform(20.0, 200.0) if rng.random() < 0.4 else None
     speed = float(rng.uniform(8.0, 40.0))
-    scene = _scene("drawn", name, {} if cutoff is None else {"cutoff": cutoff}, speed, vehicle)
+    scene = _ride_scene("drawn", name, {} if cutoff is None else {"cutoff": cutoff}, speed, vehicle)
     ride = stationary_covariance(FullScene(scene, speed).full.system)
     silent = 1e-9 * max(abs(v) for v in ride.variance if np.isfinite(v))
     finite_names = [
@@ -81,25 +81,25 @@ def random_linear_ride(seed: int, tolerance: float | None = None, detailed: bool
     ]
     count = min(len(finite_names), int(rng.integers(1, 3)))
     drawn_quantities = tuple(map(str, rng.choice(finite_names, count, replace=False)))
-    return LinearRide(scene, speed, drawn_quantities, tolerance or draw.between(0.005, 0.1))
+    return LinearRide(scene, speed, drawn_quantities, tolerance or draw.log_uniform(0.005, 0.1))
 
 
-def _scene(title: str, file: str, road: dict[str, float], speed: float, vehicle: SpatialVehicle) -> ReducedScene:
+def _ride_scene(title: str, file: str, road: dict[str, float], speed: float, vehicle: SpatialVehicle) -> ReducedScene:
     table = {"title": title, "system": "ride", "vehicle": {"file": file}, "road": road, "speeds": {"values": [speed]}}
     return ReducedScene(build(table, "drawn"), vehicle)
 
 
-def _random_vehicle(vehicle: SpatialVehicle, generator: Draw, detailed: bool) -> SpatialVehicle:
+def _random_vehicle(vehicle: SpatialVehicle, generator: RandomNumbers, detailed: bool) -> SpatialVehicle:
     """Random variant of a vehicle: changed wheel masses and dampers, damped tyres in three of five variants, sometimes
     a stiff fore-aft bushing at each wheel and a small body on a mount."""
-    rng, between, wheels = generator.random, generator.between, wheels_of(vehicle)
-    light, firm = between(0.15, 1.2), between(0.5, 4.0)
-    damping = between(30.0, 400.0) if rng.random() < 0.6 else 0.0
+    rng, log_uniform, wheels = generator.random, generator.log_uniform, wheels_of(vehicle)
+    light, firm = log_uniform(0.15, 1.2), log_uniform(0.5, 4.0)
+    damping = log_uniform(30.0, 400.0) if rng.random() < 0.6 else 0.0
     bodies = [replace(b, mass=light * b.mass) if b.name in wheels else b for b in vehicle.bodies]
     springs = [replace(s, damping=firm * s.damping) for s in vehicle.springs]
     outputs = list(vehicle.outputs)
     if detailed or rng.random() < 0.4:
-        k, lean = between(1e6 if detailed else 3e5, 2e7), rng.uniform(0.02, 0.15)
+        k, lean = log_uniform(1e6 if detailed else 3e5, 2e7), rng.uniform(0.02, 0.15)
         axis = (float(np.cos(lean)), 0.0, float(np.sin(lean)))
         for i, body in enumerate(bodies):
             if body.name in wheels:
@@ -108,9 +108,9 @@ def _random_vehicle(vehicle: SpatialVehicle, generator: Draw, detailed: bool) ->
                 springs.append(SpringDamper(f"{body.name} bush", "body", body.name, position, position, axis, k, c))
     if detailed or rng.random() < 0.6:
         chassis = next(b for b in bodies if b.name == "body")
-        m = chassis.mass * between(0.002, 0.02 if detailed else 0.15)
+        m = chassis.mass * log_uniform(0.002, 0.02 if detailed else 0.15)
         position = (chassis.position[0] + float(rng.uniform(-1, 1)), *chassis.position[1:])
-        k = m * (2 * np.pi * between(20.0 if detailed else 3.0, 200.0)) ** 2
+        k = m * (2 * np.pi * log_uniform(20.0 if detailed else 3.0, 200.0)) ** 2
         bodies.append(Body("part", m, position, ("z",)))
         springs.append(SpringDamper("part", "part", "body", position, position, UPWARD, k, 0.2 * float(np.sqrt(k * m))))
         if not detailed:
@@ -121,27 +121,27 @@ def _random_vehicle(vehicle: SpatialVehicle, generator: Draw, detailed: bool) ->
 
 def random_nonlinear_ride(scene_number: int) -> NonlinearRide:
     """The random ride scene with nonlinear springs for a number, which seeds it."""
-    draw = Draw([SEED, scene_number])
+    draw = RandomNumbers([SEED, scene_number])
     name = NONLINEAR_VEHICLES[scene_number % len(NONLINEAR_VEHICLES)]
     vehicle = load_vehicle(name)
     springs = tuple(_nonlinear_spring(spring, draw) for spring in vehicle.springs)
-    level, speed = draw.between(1e-5, 1.5e-4), float(draw.random.uniform(10.0, 35.0))
+    level, speed = draw.log_uniform(1e-5, 1.5e-4), float(draw.random.uniform(10.0, 35.0))
     drawn_quantities = draw.random.choice([output.name for output in vehicle.outputs], 2, replace=False)
-    scene = _scene(f"bent {scene_number}", name, {"level": level}, speed, replace(vehicle, springs=springs))
+    scene = _ride_scene(f"bent {scene_number}", name, {"level": level}, speed, replace(vehicle, springs=springs))
     return NonlinearRide(scene, tuple(map(str, drawn_quantities)), TOLERANCES[scene_number % len(TOLERANCES)])
 
 
-def _nonlinear_spring(spring: SpringDamper, generator: Draw) -> SpringDamper:
+def _nonlinear_spring(spring: SpringDamper, generator: RandomNumbers) -> SpringDamper:
     """The spring with a digressive damper that is harder in rebound, two bump stops, and friction, each with high
     probability."""
-    c, rebound, digressive = spring.damping, generator.between(1.0, 2.5), generator.between(0.3, 1.0)
+    c, rebound, digressive = spring.damping, generator.log_uniform(1.0, 2.5), generator.log_uniform(0.3, 1.0)
     curve = Curve(
         (-1.0, -0.2, 0.0, 0.2, 1.0),
         (-c * rebound * (0.2 + 0.8 * digressive), -0.2 * c * rebound, 0.0, 0.2 * c, c * (0.2 + 0.8 * digressive)),
     )
-    gap, hard = generator.between(0.02, 0.08), generator.between(2e4, 2e5)
+    gap, hard = generator.log_uniform(0.02, 0.08), generator.log_uniform(2e4, 2e5)
     stops = Curve((-gap - 0.05, -gap, gap, gap + 0.05), (-0.05 * hard, 0.0, 0.0, 0.05 * hard))
-    friction = generator.between(5.0, 80.0)
+    friction = generator.log_uniform(5.0, 80.0)
     bent, stopped, dry = generator.random.random(3) < (0.8, 0.7, 0.7)
     bent = bent or not (stopped or dry)
     return replace(

@@ -177,9 +177,9 @@ def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) ->
     right.semilogx(k, isotropic.coherency(k, 2 * half_track), "k-.", label="isotropic, same track spectrum")
     for i, shown in enumerate(measured_roads):
         thin = {"color": f"C{i}", "lw": 0.8}
-        left.loglog(shown["wavenumber"], shown["left"], label=_label(shown), **thin)
+        left.loglog(shown["wavenumber"], shown["left"], label=_road_label(shown), **thin)
         if shown["fits"][1] is not None:
-            right.semilogx(shown["wavenumber"], shown["coherency"], label=_label(shown), **thin)
+            right.semilogx(shown["wavenumber"], shown["coherency"], label=_road_label(shown), **thin)
             right.axhline(shown["chance"], ls=(0, (1, 3)), **thin)
     left.set(
         title="Left track: two-sided density [m³]", xlabel="wavenumber [rad/m]", xlim=(0.02, 100), ylim=(1e-10, 1e-1)
@@ -197,6 +197,6 @@ def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) ->
     return caption, figure
 
 
-def _label(road: dict[str, Any]) -> str:
+def _road_label(road: dict[str, Any]) -> str:
     name, length = road["name"].removesuffix(".crg").replace("_", " "), road["length"]
     return f"{name}, {length:.3g} m" if length < 999 else f"{name}, {length / 1e3:.3g} km"

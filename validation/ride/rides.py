@@ -77,9 +77,9 @@ STANDARD_WEIGHTINGS = (
 """ISO 2631-1:1997, Table 3, from two copies of it in print: Hz, 1000 Wk, 1000 Wd. The standard itself was not read."""
 
 
-def largest_relative_error(values: ArrayLike, expected: ArrayLike) -> float:
+def largest_relative_error(computed: ArrayLike, expected: ArrayLike) -> float:
     """Largest relative error of computed values (n,) against expected ones (n,)."""
-    return float(np.abs(np.asarray(values) / np.asarray(expected) - 1.0).max())
+    return float(np.abs(np.asarray(computed) / np.asarray(expected) - 1.0).max())
 
 
 def one_track(axle_positions: tuple[float, ...], corner: float = 0.0) -> Excitation:

@@ -26,14 +26,14 @@ class Sample:
     extra_calls: float
 
     @property
-    def printed(self) -> str:
+    def printed_channel(self) -> str:
         """Name of the channel whose stated error is printed: it has the largest relative error (``Estimate.share``)."""
         return max(self.stated, key=lambda channel: self.stated[channel].share)
 
     @property
     def ratio(self) -> float:
         """Ratio of the true to the stated error of the channel whose error is printed."""
-        return self.true[self.printed] / self.stated[self.printed].error
+        return self.true[self.printed_channel] / self.stated[self.printed_channel].error
 
 
 def random_samples(

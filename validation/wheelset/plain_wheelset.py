@@ -27,8 +27,8 @@ class WheelRailContact(NamedTuple):
 
     depth: float
     normal: np.ndarray
-    place: np.ndarray
-    along: float
+    position: np.ndarray
+    curvature_along: float
 
 
 class PlainAxle(NamedTuple):
@@ -38,7 +38,7 @@ class PlainAxle(NamedTuple):
     centre: np.ndarray
     velocity: np.ndarray
     axle: np.ndarray
-    ahead: np.ndarray
+    forward: np.ndarray
     turning: np.ndarray
 
 
@@ -105,14 +105,14 @@ def hertz_force(
 
 
 def creep_forces(
-    wheelset: Wheelset, contact: tuple[float, float, float], slip: np.ndarray, law: str, cells: int
+    wheelset: Wheelset, contact: tuple[float, float, float], slip: np.ndarray, creep_law: str, cells: int
 ) -> np.ndarray:
     """Creep forces (N) and moment (N m) (3,) of a contact with load (N) and semi-axes a, b (m), at creepages and spin
     (3,), by a creep law."""
     load, a, b = contact
     if a == 0.0:
         return np.zeros(3)
-    if law == "linear":
+    if creep_law == "linear":
         return np.array([float(force) for force in linear_forces(a, b, slip[0], slip[1], slip[2], wheelset.pair)])
     creep = fastsim(
         RollingEllipse(a, b, load, wheelset.friction, slip[0], slip[1], slip[2]), wheelset.pair, cells=cells
@@ -120,13 +120,13 @@ def creep_forces(
     return np.array([float(creep.fx), float(creep.fy), float(creep.mz)])
 
 
-def patch_forces(wheelset: Wheelset, wheel_side: float, axle: PlainAxle, law: str, cells: int) -> PatchForces:
+def patch_forces(wheelset: Wheelset, wheel_side: float, axle: PlainAxle, creep_law: str, cells: int) -> PatchForces:
     """Force and moment of a rail on the wheelset, by a creep law; wheel_side : 1 right, -1 left."""
     w, speed, touch = wheelset, axle.velocity[0], contact_of_wheel(wheelset, wheel_side, axle)
     across = np.cross(touch.normal, np.array([1.0, 0.0, 0.0]))
-    velocity = axle.velocity + np.cross(axle.turning, touch.place)
+    velocity = axle.velocity + np.cross(axle.turning, touch.position)
     slip, approach = np.array([velocity[0], velocity @ across, axle.turning @ touch.normal]), velocity @ touch.normal
-    elastic, a, b = hertz_force(touch.depth, touch.along, 0.5 / w.head_radius, w.pair.modulus)
+    elastic, a, b = hertz_force(touch.depth, touch.curvature_along, 0.5 / w.head_radius, w.pair.modulus)
     load = elastic * max(0.0, 1.0 + w.contact_damping * approach)
     forwards, reference_speed = (
         float(np.clip(0.5 + 0.5 * speed / SLOWEST_SPEED, 0.0, 1.0)),
@@ -134,9 +134,11 @@ def patch_forces(wheelset: Wheelset, wheel_side: float, axle: PlainAxle, law: st
     )
     mirror, creep = np.array([-1.0, 1.0, -1.0]), np.zeros(3)
     if forwards > 0.0:
-        creep += forwards * creep_forces(w, (load, a, b), slip / reference_speed, law, cells)
+        creep += forwards * creep_forces(w, (load, a, b), slip / reference_speed, creep_law, cells)
     if forwards < 1.0:
-        creep += (1.0 - forwards) * mirror * creep_forces(w, (load, a, b), mirror * slip / reference_speed, law, cells)
+        creep += (
+            (1.0 - forwards) * mirror * creep_forces(w, (load, a, b), mirror * slip / reference_speed, creep_law, cells)
+        )
     beyond = max(0.0, wheel_side * axle.centre[1] - w.flange_clearance)
     push = np.array([0.0, -wheel_side * w.flange_stiffness * beyond, 0.0])
     force = np.array([creep[0], 0.0, 0.0]) + creep[1] * across - load * touch.normal + push
@@ -147,10 +149,10 @@ def patch_forces(wheelset: Wheelset, wheel_side: float, axle: PlainAxle, law: st
         "spin": slip[2] / reference_speed,
         "power": float(creep @ slip),
     }
-    report |= {"x": touch.place[0], "y": touch.place[1], "z": touch.place[2], "flange_force": push[1]}
+    report |= {"x": touch.position[0], "y": touch.position[1], "z": touch.position[2], "flange_force": push[1]}
     report |= {"angle": float(np.arcsin(-touch.normal[1])), "damping_power": (elastic - load) * approach}
     report["elastic_power"] = float(push @ velocity) - elastic * approach
-    return PatchForces(force, np.cross(touch.place, force) + creep[2] * touch.normal, report)
+    return PatchForces(force, np.cross(touch.position, force) + creep[2] * touch.normal, report)
 
 
 class PlainWheelset:
@@ -205,8 +207,8 @@ class PlainWheelset:
         ]
         weight = w.load * np.array([0.0, self.lean, 1.0])
         acceleration = (sums[0] + weight) / w.mass
-        upright = np.cross(axle.ahead, axle.axle)
-        moments = np.array([axis @ sums[1] for axis in (axle.ahead, axle.axle, upright)])
+        upright = np.cross(axle.forward, axle.axle)
+        moments = np.array([axis @ sums[1] for axis in (axle.forward, axle.axle, upright)])
         inertia, turning = (
             np.array([w.yaw_inertia, w.spin_inertia, w.yaw_inertia]),
             np.array([roll_rate, spin, yaw_rate * np.cos(roll)]),
@@ -221,7 +223,7 @@ class PlainWheelset:
         """Generalised forces (5,) of both rails on y, z, yaw, roll and spin about the axle (N, N m), by virtual
         work."""
         axle, (force, moment) = axle_of(state, self.speed), self.rail_force_and_moment(state)
-        return np.array([force[1], force[2], moment[2], moment @ axle.ahead, moment @ axle.axle])
+        return np.array([force[1], force[2], moment[2], moment @ axle.forward, moment @ axle.axle])
 
     def run(self, state: np.ndarray, step: float, step_count: int) -> np.ndarray:
         """States (step_count + 1, 10) from a start state (10,), by steps (s) of the classical Runge-Kutta method."""

@@ -171,8 +171,8 @@ class BrakingStop:
             FRONT_WHEEL, PAPER_FRONT, stretches, ReplayedController(self.valves), self.speed, tolerance, method
         )
 
-    def _friction(self, i: int, slip: float) -> float:
-        return float(np.interp(slip, self.slips, self.mu[i]))
+    def _friction(self, surface_number: int, slip: float) -> float:
+        return float(np.interp(slip, self.slips, self.mu[surface_number]))
 
     def _torques(self, substeps: int) -> np.ndarray:
         """Brake torques (n, 1) in N m at the start and at the end of every step."""

@@ -60,7 +60,7 @@ SEED, DEVIATION = 77, 100.0
 """Seed of the noise on the wheel forces, and its standard deviation, N."""
 
 
-def driven() -> Assembly:
+def vehicle_under_forces() -> Assembly:
     """The vehicle without a road, under the sampled wheel forces of its run on the road."""
     on_road = assembly_of_scene(scene(DURATION))
     true = simulate(on_road.scene, "reference", Settings("RK4", SAMPLE_PERIOD / 80, DURATION))
@@ -88,7 +88,7 @@ class ForceExcited:
             f"Pitch-plane vehicle {self.excitation_text}, {DURATION:g} s at {SPEED:g} m/s, before "
             f"drift-off, fixed steps of {min(steps):g} to {max(steps):g} ms"
         )
-        self.assembly = self.driven()
+        self.assembly = self.vehicle_under_forces()
         other_settings = (
             Settings("RK4", 2 * FINE_STEP, DURATION) if quick else Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-12)
         )
@@ -100,9 +100,9 @@ class ForceExcited:
         self.uncertainty = largest_differences(check, self._true)
         self.bound = 10 * float(np.abs(next(iter(self._true.values()))).max())
 
-    def driven(self) -> Assembly:
+    def vehicle_under_forces(self) -> Assembly:
         """The vehicle with its inputs, whose equations are solved."""
-        return driven()
+        return vehicle_under_forces()
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
         """The compared quantities (n, ...) by name, at all n rows of a run."""
@@ -144,9 +144,9 @@ class NoisyForces(ForceExcited):
     excitation_text = "driven by noisy wheel forces"
     judged_quantities = (("suspension force", "N"),)
 
-    def driven(self) -> Assembly:
+    def vehicle_under_forces(self) -> Assembly:
         """The vehicle under wheel forces with noise on every sample."""
-        clean = driven()
+        clean = vehicle_under_forces()
         assert isinstance(clean.input, Sampled)
         noise = DEVIATION * normal_samples(SEED, 0, *clean.input.values.shape)
         return replace(clean, input=Sampled(clean.input.values + noise, SAMPLE_PERIOD, held=False))
@@ -172,18 +172,18 @@ class PrescribedPitch(ForceExcited):
     excitation_text = "driven by its wheel forces, pitch prescribed"
     judged_quantities = (("enforced moment", "N m"),)
 
-    def driven(self) -> Assembly:
+    def vehicle_under_forces(self) -> Assembly:
         """The vehicle with wheel forces and prescribed pitch as inputs; it starts with the prescribed pitch and pitch
         rate."""
-        forces = driven()
+        forces = vehicle_under_forces()
         assert isinstance(forces.input, Sampled)
         run = build(
             "reference", assembly_of_scene(scene(DURATION)), Settings("RK4", SAMPLE_PERIOD / 80, DURATION)
         ).run()
         pitch = Smooth(run.states[::80, 3, None], SAMPLE_PERIOD, derivatives=2, degree=5)
-        guided = replace(forces, initial=forces.initial.copy()).with_input("pitch", Stacked((forces.input, pitch)))
-        guided.initial[[3, 7]] = pitch.at(0.0)[:2]
-        return guided
+        assembly = replace(forces, initial=forces.initial.copy()).with_input("pitch", Stacked((forces.input, pitch)))
+        assembly.initial[[3, 7]] = pitch.at(0.0)[:2]
+        return assembly
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
         """Enforced moment (n,) in N m and states (n, 8) of a run."""
@@ -198,12 +198,12 @@ def problem(quick: bool) -> ForceExcited:
 
 
 @cache
-def noisy(quick: bool) -> NoisyForces:
+def noisy_problem(quick: bool) -> NoisyForces:
     """The test problem of a vehicle under noisy wheel forces, computed once per process."""
     return NoisyForces(quick)
 
 
 @cache
-def guided(quick: bool) -> PrescribedPitch:
+def prescribed_pitch_problem(quick: bool) -> PrescribedPitch:
     """The test problem of a vehicle with prescribed pitch, computed once per process."""
     return PrescribedPitch(quick)

@@ -14,7 +14,7 @@ from validation.price.problems.braking_stop import SPEED, SURFACE_CHANGE, SURFAC
 from validation.price.sheets.page import ReferenceValue, write_columns
 from validation.price.sheets.page import write as write_page
 
-BODY = f"""A wheel, and the mass that it carries, are braked straight ahead:
+SHEET_TEXT = f"""A wheel, and the mass that it carries, are braked straight ahead:
 
     m u' = -F        J w' = r F - T        x' = u        F = m g mu(slip)        slip = 1 - r w / u, held to 0 .. 1
 
@@ -50,7 +50,7 @@ def write(folder: Path) -> list[ReferenceValue]:
         folder,
         "braking",
         problem.title,
-        BODY,
+        SHEET_TEXT,
         f"The distance ({problem.reference}); the uncertainty is the difference of the two.",
         values,
     )

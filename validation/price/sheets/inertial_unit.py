@@ -22,14 +22,14 @@ def write(folder: Path) -> list[ReferenceValue]:
         folder,
         "unit",
         problem.title,
-        _body(),
+        _sheet_text(),
         f"The quaternion at {DURATION:g} s ({problem.reference}); the "
         "uncertainty is the largest angle between the two, rad. q and -q are the same attitude.",
         values,
     )
 
 
-def _body() -> str:
+def _sheet_text() -> str:
     angles = "\n".join(
         f"    {name:5s} = "
         + " + ".join(

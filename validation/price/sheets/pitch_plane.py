@@ -13,7 +13,7 @@ from validation.price.problems.road_excited import SOLVERS, SPEED
 from validation.price.sheets.page import ReferenceValue, write_columns
 from validation.price.sheets.page import write as write_page
 
-PROBLEMS = (force_excited.problem, force_excited.noisy, force_excited.guided)
+PROBLEMS = (force_excited.problem, force_excited.noisy_problem, force_excited.prescribed_pitch_problem)
 NAMES = ("z1", "z2", "z3", "pitch", "z1_rate", "z2_rate", "z3_rate", "pitch_rate")
 UNITS = ("m", "m", "m", "rad", "m/s", "m/s", "m/s", "rad/s")
 EQUATIONS = r"""
@@ -63,7 +63,7 @@ def write_road_sheet(folder: Path) -> list[ReferenceValue]:
         f"{EQUATIONS}{ON_ROAD}\n{_parameters_and_start(problem)}",
         f"End values at {problem.duration:g} s ({problem.reference}); the "
         "uncertainty is the largest difference of the three.",
-        _values("road", problem.duration, true, sure),
+        _reference_values("road", problem.duration, true, sure),
     )
 
 
@@ -79,7 +79,7 @@ def write_force_sheet(problem: ForceExcited, folder: Path) -> list[ReferenceValu
         folder,
         problem.key,
         problem.title,
-        _body(problem, guided),
+        _sheet_text(problem, guided),
         f"End values at {DURATION:g} s "
         f"({problem.reference}); the uncertainty is the largest difference of the two over the run.",
         final_values(problem),
@@ -94,10 +94,10 @@ def final_values(problem: ForceExcited) -> list[ReferenceValue]:
         for settings in (Settings("RK4", FINE_STEP, DURATION), Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-12))
     ]
     true, other_states = (run.states[:: (len(run.states) - 1) // round(DURATION / SAMPLE_PERIOD)] for run in runs)
-    return _values(problem.key, DURATION, true[-1], np.abs(true - other_states).max(axis=0))
+    return _reference_values(problem.key, DURATION, true[-1], np.abs(true - other_states).max(axis=0))
 
 
-def _values(key: str, time: float, states: np.ndarray, uncertainties: np.ndarray) -> list[ReferenceValue]:
+def _reference_values(key: str, time: float, states: np.ndarray, uncertainties: np.ndarray) -> list[ReferenceValue]:
     return [
         ReferenceValue(key, *entry[:2], time, *map(float, entry[2:]))
         for entry in zip(NAMES, UNITS, states, uncertainties, strict=True)
@@ -111,7 +111,7 @@ def _parameters_and_start(problem: ForceExcited | road_excited.RoadExcited) -> s
     return f"Parameters (SI): {numbers}.\n\nStart: {start}."
 
 
-def _body(problem: ForceExcited, guided: bool) -> str:
+def _sheet_text(problem: ForceExcited, guided: bool) -> str:
     pitch = (
         " The pitch is a quintic spline through its samples (not-a-knot at both ends), prescribed; M is the "
         "moment that this takes."

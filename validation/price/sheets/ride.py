@@ -38,7 +38,7 @@ def write(folder: Path) -> list[ReferenceValue]:
         folder,
         "ride",
         f"Standard deviations of a passenger car of 19 freedoms at {ride.SPEED:g} m/s",
-        _body(problem),
+        _sheet_text(problem),
         "Standard deviations by quadrature over frequencies; the uncertainty holds its own "
         "estimate and the largest relative difference from a Lyapunov equation.",
         values,
@@ -46,7 +46,7 @@ def write(folder: Path) -> list[ReferenceValue]:
     return values
 
 
-def _body(problem: ride.PricedRide) -> str:
+def _sheet_text(problem: ride.PricedRide) -> str:
     road = road_of_level(half_track(problem.vehicle.wheels))
     wheels = "\n".join(
         f"| {i} | {w.name} | {w.x:.17g} | {w.y:.17g} |" for i, w in enumerate(problem.vehicle.wheels, start=1)

@@ -72,7 +72,7 @@ def write(folder: Path) -> list[ReferenceValue]:
         folder,
         "vehicle",
         problem.title,
-        f"{LAWS}\n{_tables(problem.vehicle)}\n\n{question}",
+        f"{LAWS}\n{_parameter_tables(problem.vehicle)}\n\n{question}",
         f"End values at {DURATION:g} s ({problem.reference}); the uncertainty is the largest difference of the "
         "two over the run.",
         values,
@@ -88,7 +88,7 @@ def _names_and_units_of_states(problem: FreeVehicle) -> list[tuple[str, str]]:
     return coordinates + [(f"{name} rate", f"{unit}/s") for name, unit in coordinates]
 
 
-def _tables(vehicle: SpatialVehicle) -> str:
+def _parameter_tables(vehicle: SpatialVehicle) -> str:
     """Text with tables of all parameters of a vehicle."""
     preload = preloads(vehicle)
     parts: dict[tuple[str, ...], Sequence[Sequence[Any]]] = {
@@ -136,10 +136,10 @@ def _tables(vehicle: SpatialVehicle) -> str:
         ],
         ("drag", "c [N s^2/m^2]"): [(d.body, d.coefficient) for d in vehicle.drags],
     }
-    return "\n\n".join(_table(heads, rows) for heads, rows in parts.items())
+    return "\n\n".join(_markdown_table(heads, rows) for heads, rows in parts.items())
 
 
-def _table(headings: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
+def _markdown_table(headings: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
     """Markdown text of a table; its numbers have all digits."""
     text_rows = [[cell if isinstance(cell, str) else f"{cell:.17g}" for cell in row] for row in rows]
     return "\n".join(f"| {' | '.join(row)} |" for row in (headings, ("---",) * len(headings), *text_rows))

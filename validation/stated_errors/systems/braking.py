@@ -43,11 +43,11 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
 
 def _sample_of_random_stop(random: np.random.Generator) -> Sample:
     """Sample from a random braking stop; raises if the tyres cannot hold the circle or the vehicle rolls over."""
-    engine, scene = str(random.choice(ENGINES)), build(_table(random), "drawn.toml")
+    engine, scene = str(random.choice(ENGINES)), build(_random_scene_table(random), "drawn.toml")
     return _sample_of_stop(scene, engine)
 
 
-def _table(random: np.random.Generator) -> dict[str, Any]:
+def _random_scene_table(random: np.random.Generator) -> dict[str, Any]:
     """Table of a random braking scene with one procedure."""
     surface, kind, steps = (
         str(random.choice(list(SURFACES))),

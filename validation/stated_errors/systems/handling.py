@@ -30,10 +30,10 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
 def _sample_of_random_manoeuvre(random: np.random.Generator) -> Sample:
     """Sample from a random manoeuvre; raises, before the error is estimated, if the step is too long for the tyres."""
     engine = str(random.choice(ENGINES))
-    return _sample_of_drive(build(_table(random), "drawn.toml"), engine)
+    return _sample_of_drive(build(_random_scene_table(random), "drawn.toml"), engine)
 
 
-def _table(random: np.random.Generator) -> dict[str, Any]:
+def _random_scene_table(random: np.random.Generator) -> dict[str, Any]:
     """Table of a random handling scene with one manoeuvre; its duration is a multiple of the step."""
     step, steps = float(f"{10.0 ** random.uniform(-3.4, -2.3):.3g}"), int(random.integers(120, 400))
     lasts = steps * step

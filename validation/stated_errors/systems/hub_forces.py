@@ -33,10 +33,10 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
 def _sample_of_random_scene(random: np.random.Generator) -> Sample:
     """Sample from a random scene of hub forces; raises before the run if the step would be unstable."""
     engine = str(random.choice(ENGINES))
-    return _sample_of_run(build(_table(random), "drawn.toml"), engine)
+    return _sample_of_run(build(_random_scene_table(random), "drawn.toml"), engine)
 
 
-def _table(random: np.random.Generator) -> dict[str, Any]:
+def _random_scene_table(random: np.random.Generator) -> dict[str, Any]:
     """Table of a random scene of hub forces, with a virtual measurement whose sampling period is a multiple of the
     step."""
     step, steps_per_sample = float(f"{10.0 ** random.uniform(-3.0, -1.9):.3g}"), int(random.choice([1, 1, 2, 2, 3, 4]))

@@ -30,10 +30,10 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
 def _sample_of_random_recording(random: np.random.Generator) -> Sample:
     """Sample from a random recording; raises before the run if the step would be unstable."""
     engine = str(random.choice(ENGINES))
-    return _sample_of_recording(_table(random), engine)
+    return _sample_of_recording(_random_scene_table(random), engine)
 
 
-def _table(random: np.random.Generator) -> dict[str, Any]:
+def _random_scene_table(random: np.random.Generator) -> dict[str, Any]:
     """Table of a random virtual measurement. The steps of the run on the road divide the sampling period; the steps of
     the run under the measured forces are equal to it."""
     period, steps_per_sample = float(f"{10.0 ** random.uniform(-2.9, -2.1):.3g}"), int(random.choice([1, 2]))

@@ -45,7 +45,7 @@ def _sample_of_run(random: np.random.Generator, folder: Path) -> Sample:
     integrator = str(random.choice(known))
     scene = _random_scene(random, folder, engine, integrator)
     with _count_force_calls() as calls:
-        run = _run(scene, engine)
+        run = _run_with_error(scene, engine)
     truth = _reference_run(scene, engine)
     estimates = errors_of(run)
     true = {name: float(np.sqrt(np.mean((run[name] - _truth_at(truth, name, run.times)) ** 2))) for name in estimates}
@@ -55,7 +55,7 @@ def _sample_of_run(random: np.random.Generator, folder: Path) -> Sample:
     return Sample(sample_name, engine, estimates, true, calls[0], sum(calls[1:]))
 
 
-def _run(scene: Scene, engine: str) -> Result:
+def _run_with_error(scene: Scene, engine: str) -> Result:
     try:
         return single.run(scene, engine, error=True)
     except RunFailed as failure:

@@ -199,7 +199,7 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
     vehicle, engine = _varied_vehicle(generator, vehicle_of(scene)), str(generator.choice(ENGINES))
     sampling = Sampling(step=float(10 ** generator.uniform(-3.7, -2.5)), driven=3.0, skipped=0.5, seed=sample_number)
     road = excitation_of(scene, wheels(vehicle))
-    path = _path(scene, engine, vehicle, sampling, road, speed)
+    path = _road_path_of_run(scene, engine, vehicle, sampling, road, speed)
     steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half=path.half / FINER_STEPS)
     table = finer.table(steps * FINER_STEPS, sample_number)
     try:
@@ -217,7 +217,7 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
     return _sample_of(result, name, engine, true, calls, 0.54 * RUNGE_KUTTA_ORDER * steps + read)
 
 
-def _path(
+def _road_path_of_run(
     scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: Sampling, road: Excitation, speed: float
 ) -> RoadPath:
     """Road path with the step that ``in_engine`` uses."""
