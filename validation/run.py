@@ -149,8 +149,8 @@ def validate(
 ) -> int:
     """Measure all validation cases, save results and report in ``folder``; returns the number of failed rows.
 
-    crew : measures the cases that need not be alone; its workers see the folder, too. earlier : ``changes.read`` of a
-    report. resumed : the folder may hold cases that have ended; the time of them all together is then not known.
+    crew : measures the cases that need not be alone; its workers see the folder, too. earlier_report : ``changes.read``
+    of a report. resumed : the folder may hold cases that have ended; the time of them all together is then not known.
     """
     start, start_date = time.perf_counter(), datetime.now(UTC)
     (folder / "data").mkdir(exist_ok=True)

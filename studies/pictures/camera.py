@@ -25,7 +25,7 @@ SHADED_BRIGHTNESS = 0.4
 @dataclass(frozen=True)
 class Camera:
     """A camera at ``eye`` that looks at ``target`` (both in m); ``up``: vector that points upward in the picture;
-    opening: vertical angle of view (rad)."""
+    angle_of_view: vertical angle of view (rad)."""
 
     eye: tuple[float, float, float]
     target: tuple[float, float, float]

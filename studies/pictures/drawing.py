@@ -15,7 +15,7 @@ GREY_COLOUR = (0.35, 0.37, 0.4)
 
 
 def draw_frame(motion: FilmedMotion, stage: Stage, frame_number: int, width: int, height: int) -> np.ndarray:
-    """Image (height, width, 3), with colours from 0 to 1, of frame ``k`` of a motion."""
+    """Image (height, width, 3), with colours from 0 to 1, of frame number ``frame_number`` of a motion."""
     poses = {name: drawn_pose(motion, stage, name, frame_number) for name in stage.shapes}
     bodies = [surface.moved(*poses[name]) for name, shapes in stage.shapes.items() for surface in shapes]
     around = stage.scenery(float(motion.times[frame_number]))
@@ -38,7 +38,7 @@ def draw_frame(motion: FilmedMotion, stage: Stage, frame_number: int, width: int
 
 
 def arrow_lines(motion: FilmedMotion, stage: Stage, frame_number: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Start point (3,) and vector (3,) in m, as drawn, of each force arrow in frame ``k``."""
+    """Start point (3,) and vector (3,) in m, as drawn, of each force arrow in frame number ``frame_number``."""
     spans = []
     for force in motion.arrows:
         position, turn = drawn_pose(motion, stage, force.body, frame_number)
@@ -50,8 +50,8 @@ def arrow_lines(motion: FilmedMotion, stage: Stage, frame_number: int) -> list[t
 
 
 def drawn_pose(motion: FilmedMotion, stage: Stage, body: str, frame_number: int) -> tuple[np.ndarray, np.ndarray]:
-    """Position (3,) in m and rotation (3, 3) with which a body is drawn in frame ``k``. Displacement and rotation from
-    rest are magnified, except for a wheel's spin."""
+    """Position (3,) in m and rotation (3, 3) with which a body is drawn in frame number ``frame_number``. Displacement
+    and rotation from rest are magnified, except for a wheel's spin."""
     rest_position = np.array(stage.rest_positions[body])
     position, turn = (
         rest_position + stage.magnification * (motion.positions[body][frame_number] - rest_position),

@@ -69,7 +69,7 @@ class Page:
         return (self.frame(k) for k in range(len(self.motions[0].times)))
 
     def frame(self, frame_number: int) -> np.ndarray:
-        """The page (720, 1280, 3) of frame ``k``, with 8 bits per colour."""
+        """The page (720, 1280, 3) of frame number ``frame_number``, with 8 bits per colour."""
         time, canvas = float(self.motions[0].times[frame_number]), self._canvas
         canvas.restore_region(self._still)
         self._clock.set_text(f"t = {time:.3f} s")

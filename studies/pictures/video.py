@@ -23,8 +23,8 @@ def missing_extra(format_name: str) -> str:
 
 
 def write(path: Path, frames: Iterable[np.ndarray], frames_per_second: int) -> Path:
-    """Write frames (h, w, 3) with 8 bits per colour to a film file, .mp4 or .gif; returns its path. per_second : frames
-    per second of film."""
+    """Write frames (h, w, 3) with 8 bits per colour to a film file, .mp4 or .gif; returns its path.
+    frames_per_second : frames per second of film."""
     import imageio.v2 as imageio
 
     gif: dict[str, Any] = {"duration": 1000.0 / frames_per_second, "loop": 0}

@@ -7,7 +7,7 @@ RADIUS = 0.31
 
 
 def _front_strut_text(name: str, side_sign: int) -> str:
-    """MJCF text of a front strut with a steered upright and a spinning wheel; ``sign`` is 1 left and -1 right."""
+    """MJCF text of a front strut with a steered upright and a spinning wheel; ``side_sign`` is 1 left and -1 right."""
     x, y = CORNERS[name]
     return f"""
   <body name="{name} strut" pos="{x} {y} {RADIUS - 0.55}">
@@ -22,7 +22,8 @@ def _front_strut_text(name: str, side_sign: int) -> str:
 
 
 def _rear_arm_text(name: str, side_sign: int) -> str:
-    """MJCF text of a rear trailing arm with a sprung hinge and a spinning wheel; ``sign`` is 1 left and -1 right."""
+    """MJCF text of a rear trailing arm with a sprung hinge and a spinning wheel; ``side_sign`` is 1 left and -1
+    right."""
     x, y = CORNERS[name]
     return f"""
   <body name="{name} arm" pos="{x + 0.4} {y - 0.1 * side_sign} {RADIUS + 0.02 - 0.55}">

@@ -37,7 +37,7 @@ def write_table(path: Path, rows: int) -> None:
     lines = (f"5e-3,4e-3,{8e4 + i},0.3,{1e-5 * i:.6g},1e-4,{1e-3 * i:.4g}\n" for i in range(REPEATED_ROWS))
     text = "".join(lines)
     with path.open("w") as file:
-        file.write_table(HEADER)
+        file.write(HEADER)
         file.writelines(text for _ in range(rows // REPEATED_ROWS))
 
 

@@ -25,7 +25,7 @@ from models.machine.stack import at, beyond
 from models.machine.timing import interleave, median
 from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.common.rows import Observed, Row, Saved, System, Table
-from validation.price.compiled_forces import CompiledForces, law
+from validation.price.compiled_forces import CompiledForces, force_callback
 from validation.price.instructions_run import exudyn_marches
 from validation.price.problems import road_excited, wheelset
 from validation.price.problems.road_excited import STAGES
@@ -94,7 +94,7 @@ def _road_runs_in_mujoco() -> Runs:
     compiled = CompiledForces(assembly_of_scene(road_excited.scene()), settings)
     return [
         partial(_run_with_callback, counted, compiled.run_with_installed_callback)
-        for counted in (empty_law(), kernel_law(add_weak_damper), law())
+        for counted in (empty_law(), kernel_law(add_weak_damper), force_callback())
     ]
 
 

@@ -182,7 +182,7 @@ def load_output(folder: Path, name: str) -> CommandOutput | None:
     """The saved output of a job; None if it is missing or incomplete."""
     try:
         note = json.loads((folder / f"{name}.json").read_text())
-        with np.load_output(folder / f"{name}.npz") as file:
+        with np.load(folder / f"{name}.npz") as file:
             arrays = {key: file[str(i)] for i, key in enumerate(note["arrays"])}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         return None
