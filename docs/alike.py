@@ -11,24 +11,24 @@
 import re
 from decimal import Decimal
 
-TIME = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]?\d+)?(?= ?(?:s|ms|us|min)\b(?!/))")
-DATE = r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?)?"
-COMMIT = r"\b(?=[0-9]*[a-f])(?=[a-f]*[0-9])[0-9a-f]{7,40}\b"
-VERSION = re.compile(rf"\b\d+(?:\.\d+){{2,}}\w*|{DATE}|{COMMIT}")
-NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
+TIME_PATTERN = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]?\d+)?(?= ?(?:s|ms|us|min)\b(?!/))")
+DATE_PATTERN = r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?)?"
+COMMIT_PATTERN = r"\b(?=[0-9]*[a-f])(?=[a-f]*[0-9])[0-9a-f]{7,40}\b"
+VERSION_PATTERN = re.compile(rf"\b\d+(?:\.\d+){{2,}}\w*|{DATE_PATTERN}|{COMMIT_PATTERN}")
+NUMBER_PATTERN = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
 ROUNDING = Decimal("1e-9")
 
 
-def alike(written: str, printed: str) -> bool:
+def alike(shown_output: str, printed_output: str) -> bool:
     """Whether a printed output agrees with the output that a page shows, by the rules of this module."""
-    (words, numbers), (others, values) = _text_and_numbers(written), _text_and_numbers(printed)
+    (words, numbers), (others, values) = _text_and_numbers(shown_output), _text_and_numbers(printed_output)
     return words == others and all(map(_agree, numbers, values))
 
 
 def _text_and_numbers(text: str) -> tuple[str, list[str]]:
     """The text with "#" in place of every number, and the numbers as text; times and versions are replaced by words."""
-    text = TIME.sub("TIME", VERSION.sub("VERSION", " ".join(text.split())))
-    return NUMBER.sub("#", text), NUMBER.findall(text)
+    text = TIME_PATTERN.sub("TIME", VERSION_PATTERN.sub("VERSION", " ".join(text.split())))
+    return NUMBER_PATTERN.sub("#", text), NUMBER_PATTERN.findall(text)
 
 
 def _agree(shown_number: str, printed_number: str) -> bool:

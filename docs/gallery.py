@@ -9,27 +9,27 @@ import argparse
 import re
 from pathlib import Path
 
-WIDTH = 480
+PICTURE_WIDTH = 480
 """Width (pixels) of a small picture: half a page, so that outlines are readable."""
-COLOURS = 64
+COLOUR_COUNT = 64
 """Number of colours of a small picture: enough for lines and text, with a third of the file size."""
-LISTED = re.compile(r"^\| `(?P<figure>[\w/]+\.png)` \|", re.MULTILINE)
+FIGURE_LINE_PATTERN = re.compile(r"^\| `(?P<figure>[\w/]+\.png)` \|", re.MULTILINE)
 
 
 def listed_figures(text: str) -> list[str]:
     """Figures that the gallery page lists, as ``SCENE/NAME.png``, in the order of the page."""
-    return LISTED.findall(text)
+    return FIGURE_LINE_PATTERN.findall(text)
 
 
 def shrink(figure: Path, target: Path) -> Path:
-    """Write a small picture (PNG, at most ``WIDTH`` pixels wide) of a figure; returns its path."""
+    """Write a small picture (PNG, at most ``PICTURE_WIDTH`` pixels wide) of a figure; returns its path."""
     from PIL import Image
 
     target.parent.mkdir(parents=True, exist_ok=True)
     with Image.open(figure) as image:
         small = image.convert("RGB")
-        small.thumbnail((WIDTH, 10 * WIDTH))
-        small.quantize(COLOURS).save(target, optimize=True)
+        small.thumbnail((PICTURE_WIDTH, 10 * PICTURE_WIDTH))
+        small.quantize(COLOUR_COUNT).save(target, optimize=True)
     return target
 
 

@@ -18,10 +18,10 @@ def on_page_content(html: str, page: Any = None, **unused: Any) -> str:
     read."""
     from latex2mathml.converter import convert
 
-    def drawn(marked: re.Match[str]) -> str:
-        formula = unescape(marked["formula"]).strip()
+    def drawn(formula_match: re.Match[str]) -> str:
+        formula = unescape(formula_match["formula"]).strip()
         try:
-            math = convert(formula, display="inline" if marked["tag"] == "span" else "block")
+            math = convert(formula, display="inline" if formula_match["tag"] == "span" else "block")
         except Exception as error:  # the library has one for each kind of mistake
             raise ValueError(f"{page}: the formula {formula!r} cannot be read: {error!r}") from error
         if "\\" in math:

@@ -11,7 +11,7 @@ from docs.pages import ROOT
 from validation.blind_spots.table import NOT_AUDITED, WHY_HARMLESS, Line, read, uncovered_functions
 
 PAGE = ROOT / "docs" / "not_covered.md"
-START = "<!-- functions: written by `python -m docs.not_covered`; do not edit below -->\n"
+GENERATED_PART_MARK = "<!-- functions: written by `python -m docs.not_covered`; do not edit below -->\n"
 HEADINGS = {
     "noticed by nothing": "No row or test that has an independent second side and runs them noticed these:",
     "noticed by nothing independent": "Rows noticed these, but none with an independent second side:",
@@ -59,7 +59,8 @@ def page(text: str) -> str:
     lines = read()
     kinds = uncovered_functions(lines, [line.function for line in lines])
     parts = [f"{fill(HEADINGS[kind], 120)}\n\n{function_list(names)}" for kind, names in kinds.items()]
-    return text.partition(START)[0] + START + "\n" + "\n".join([count_sentence(lines), *parts])
+    head = text.partition(GENERATED_PART_MARK)[0] + GENERATED_PART_MARK
+    return head + "\n" + "\n".join([count_sentence(lines), *parts])
 
 
 if __name__ == "__main__":

@@ -64,17 +64,17 @@ class Session:
         fails = [False] * (len(lines) - 1) + [block.mark == "run: fails"]
         return "".join(self._command(line, wanted) for line, wanted in zip(lines, fails, strict=True))
 
-    def _command(self, command: str, fails: bool) -> str:
+    def _command(self, command: str, must_fail: bool) -> str:
         ended = subprocess.run(
             ["bash", "-c", command],
             cwd=self.folder,
             env=self.environment,
             stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT if fails else subprocess.PIPE,
+            stderr=subprocess.STDOUT if must_fail else subprocess.PIPE,
             text=True,
             timeout=EXAMPLE_TIMEOUT,
         )
-        if (ended.returncode != 0) is not fails:
+        if (ended.returncode != 0) is not must_fail:
             raise ExampleFailed(f"`{command}` ended with code {ended.returncode}: {ended.stdout}{ended.stderr or ''}")
         return ended.stdout
 

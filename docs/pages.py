@@ -14,15 +14,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-OUTSIDE = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
+TOP_FOLDER_PAGES = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
 """Pages in the top folder of the repository."""
-MARK = re.compile(r"<!--\s*(run|run: fails|output|file: (?P<file>\S+)|picture: (?P<picture>\S+))\s*-->")
-IMAGE = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
+MARK_PATTERN = re.compile(r"<!--\s*(run|run: fails|output|file: (?P<file>\S+)|picture: (?P<picture>\S+))\s*-->")
+IMAGE_PATTERN = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
 
 
 def pages(root: Path = ROOT) -> list[Path]:
     """Paths of all pages of the documentation, sorted; those in the top folder of the repository first."""
-    outside = [root / name for name in OUTSIDE if (root / name).is_file()]
+    outside = [root / name for name in TOP_FOLDER_PAGES if (root / name).is_file()]
     return [*outside, *sorted((root / "docs").rglob("*.md"))]
 
 
@@ -54,7 +54,7 @@ def blocks(text: str) -> list[ExampleBlock]:
     lines, blocks_of_page, mark = text.splitlines(keepends=True), [], ""
     for token in MarkdownIt("commonmark").parse(text):
         if token.type == "html_block":
-            matched = MARK.fullmatch(token.content.strip())
+            matched = MARK_PATTERN.fullmatch(token.content.strip())
             mark = matched[1] if matched else ""
         elif token.type == "fence" and token.map:
             first, last = token.map
@@ -63,6 +63,7 @@ def blocks(text: str) -> list[ExampleBlock]:
             )
             mark = ""
         elif token.type == "inline" and mark.startswith("picture: ") and token.map:
-            blocks_of_page += [ExampleBlock(mark, "image", name, *token.map) for name in IMAGE.findall(token.content)]
+            names = IMAGE_PATTERN.findall(token.content)
+            blocks_of_page += [ExampleBlock(mark, "image", name, *token.map) for name in names]
             mark = ""
     return blocks_of_page

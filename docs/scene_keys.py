@@ -25,7 +25,7 @@ from models.core.systems import SYSTEMS
 from studies.command.asked import study_names
 
 PAGE = ROOT / "docs" / "reference" / "scenes.md"
-HEAD = """# Scene keys
+PAGE_HEAD = """# Scene keys
 
 <!-- written by `python -m docs.scene_keys`; do not edit -->
 
@@ -33,8 +33,8 @@ A scene is a TOML file. Its key `system` says which of the sections below holds;
 A key that is not here is refused, with the nearest name that is. Quantities are in SI units. A default of *needed*
 means that the scene must have the key; *none* means that what the key describes is absent.
 """
-NAMES = {float: "number", int: "whole number", str: "text", bool: "true or false", Any: "any value"}
-MADE_BY_READER = ("file", "folder")
+TYPE_NAMES = {float: "number", int: "whole number", str: "text", bool: "true or false", Any: "any value"}
+READER_FIELDS = ("file", "folder")
 """Fields of a scene that are no keys, but state where it was read."""
 OTHER_TABLES = (
     ("Vehicle files", "models.vehicles.vehicle_tables", "VehicleTable"),
@@ -65,7 +65,7 @@ def keys_of(model: type[BaseModel], prefix: str = "") -> Iterator[Key]:
     """Yield the keys of a table and of its inner tables; NAME stands for a name that the user chooses, [] for entries
     of a list."""
     for name, field in model.model_fields.items():
-        if issubclass(model, SceneFile) and name in MADE_BY_READER:
+        if issubclass(model, SceneFile) and name in READER_FIELDS:
             continue
         place, inner = _inner_table(field.annotation)
         meaning = _meaning_in_line(field.description or (_first_paragraph(inner) if inner else "")) or MEANINGS.get(
@@ -112,8 +112,8 @@ def _type_and_limits(field: FieldInfo) -> str:
 def _type_in_words(annotation: Any) -> str:
     """Text of a type in plain words, such as "whole number"."""
     origin, arguments = get_origin(annotation), [each for each in get_args(annotation) if each is not type(None)]
-    if annotation in NAMES:
-        return NAMES[annotation]
+    if annotation in TYPE_NAMES:
+        return TYPE_NAMES[annotation]
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return "table"
     if origin is Literal:
@@ -140,7 +140,7 @@ def _unit(field: FieldInfo) -> str:
     return str(extra.get("unit") or "") if isinstance(extra, dict) else ""
 
 
-def _default(field: FieldInfo, inner: type[BaseModel] | None) -> str:
+def _default(field: FieldInfo, table_class: type[BaseModel] | None) -> str:
     """Text on the default of a key, which holds if a scene leaves it out."""
     if field.is_required():
         return "*needed*"
@@ -148,7 +148,7 @@ def _default(field: FieldInfo, inner: type[BaseModel] | None) -> str:
     if value is None:
         return "*none*"
     if isinstance(value, BaseModel):
-        return "as below" if inner is not None else "usual"
+        return "as below" if table_class is not None else "usual"
     if value in ([], {}, (), ""):
         return "empty"
     return f"`{_toml_text(value)}`"
@@ -252,9 +252,10 @@ def controllers_section() -> list[str]:
     return lines
 
 
-def _parameter_lines(kind: type, but: tuple[str, ...]) -> list[str]:
-    """Lines on the fields of a controller's class and their defaults; ``but`` : names of fields that are left out."""
-    rows = [f"| `{each.name}` | `{_toml_text(each.default)}` |" for each in fields(kind) if each.name not in but]
+def _parameter_lines(kind: type, excluded_fields: tuple[str, ...]) -> list[str]:
+    """Lines on the fields of a controller's class and their defaults; without the fields ``excluded_fields``."""
+    shown_fields = [each for each in fields(kind) if each.name not in excluded_fields]
+    rows = [f"| `{each.name}` | `{_toml_text(each.default)}` |" for each in shown_fields]
     head = ["", "| parameter | default |", "|---|---|"] if rows else []
     return [" ".join((getdoc(kind) or "").split()), *head, *rows]
 
@@ -262,7 +263,11 @@ def _parameter_lines(kind: type, but: tuple[str, ...]) -> list[str]:
 def page() -> str:
     """Text of the reference page of scene keys."""
     lines = [line for system in SYSTEMS for line in system_section(system)]
-    return HEAD + "\n".join([*lines, *other_table_sections(), *controllers_section(), *study_options_section()]) + "\n"
+    return (
+        PAGE_HEAD
+        + "\n".join([*lines, *other_table_sections(), *controllers_section(), *study_options_section()])
+        + "\n"
+    )
 
 
 def main(path: Path = PAGE) -> None:

@@ -14,8 +14,8 @@ from docs.pages import ROOT
 from validation.cases import CASES
 
 PAGE = ROOT / "docs" / "reference" / "report_rows.md"
-START = "<!-- cases: written by `python -m docs.validation_cases`; do not edit below -->\n"
-FOLDER = ROOT / "validation" / "cases"
+GENERATED_PART_MARK = "<!-- cases: written by `python -m docs.validation_cases`; do not edit below -->\n"
+CASES_FOLDER = ROOT / "validation" / "cases"
 
 
 def _constant_text(tree: ast.Module, name: str) -> str:
@@ -32,7 +32,7 @@ def cases_table() -> str:
     """Markdown table of the validation cases, in the order of the report."""
     lines = ["| case | title | system | what is compared |", "|---|---|---|---|"]
     for name in CASES:
-        tree = ast.parse((FOLDER / f"{name}.py").read_text(encoding="utf-8"))
+        tree = ast.parse((CASES_FOLDER / f"{name}.py").read_text(encoding="utf-8"))
         says = (ast.get_docstring(tree) or "").partition("\n\n")[0].replace("\n", " ")
         lines.append(f"| `{name}` | {_constant_text(tree, 'TITLE')} | {_constant_text(tree, 'SYSTEM')} | {says} |")
     return "\n".join(lines) + "\n"
@@ -40,7 +40,7 @@ def cases_table() -> str:
 
 def page(text: str) -> str:
     """Text of the reference page with the current cases; the part before the mark is unchanged."""
-    return text.partition(START)[0] + START + "\n" + cases_table()
+    return text.partition(GENERATED_PART_MARK)[0] + GENERATED_PART_MARK + "\n" + cases_table()
 
 
 def newest_report(folder: Path = ROOT / "results") -> Path | None:

@@ -1,10 +1,10 @@
 """Build of the documentation site: every example is run anew, and its output is compared with the page and shown.
 
-``python -m docs.website FOLDER`` copies the pages into a folder beside the site, runs their examples there, and builds
-the site with MkDocs (extra ``docs``) into ``FOLDER``, where every warning is an error: a broken link, an anchor that is
-not there, a page without a place. It ends with code 1 where a page of the repository shows what its examples do not
-print. ``--as-shown`` leaves the examples out and shows what stands in the pages. ``python -m mkdocs`` cannot build from
-``docs`` itself: its pages link to those at the top of the repository.
+``python -m docs.website FOLDER`` copies the pages into a folder beside the site, runs their examples there, and
+builds the site with MkDocs (extra ``docs``) into ``FOLDER``, where every warning is an error: a broken link, an
+anchor that is not there, a page without a place. It ends with code 1 where a page of the repository shows what its
+examples do not print. ``--as-shown`` leaves the examples out and shows what stands in the pages. ``python -m mkdocs``
+cannot build from ``docs`` itself: its pages link to those at the top of the repository.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 
 from docs.gallery import add_pictures
 from docs.outputs import run_pages
-from docs.pages import OUTSIDE, ROOT, pages
+from docs.pages import ROOT, TOP_FOLDER_PAGES, pages
 from docs.validation_cases import counts_table, newest_report, rows_table
 
 QUIET_ENVIRONMENT = {"NO_MKDOCS_2_WARNING": "1"}
@@ -29,7 +29,7 @@ def copy_pages(target: Path) -> None:
     """Copy all pages and their pictures into a folder, with the same relative paths as in the repository."""
     shutil.copytree(ROOT / "docs", target / "docs", ignore=SKIPPED_FILES)
     shutil.copyfile(ROOT / "docs" / "nav.yml", target / "nav.yml")
-    for name in OUTSIDE:
+    for name in TOP_FOLDER_PAGES:
         shutil.copyfile(ROOT / name, target / name)
     (target / "studies").mkdir()
     for picture in (ROOT / "studies").glob("*.png"):
@@ -51,7 +51,7 @@ def build(site: Path, work: Path, as_shown: bool) -> bool:
     their examples."""
     sources = work / "pages"
     copy_pages(sources)
-    well = as_shown or run_pages(pages(sources), check=False, strict=True)
+    outputs_agree = as_shown or run_pages(pages(sources), check=False, strict=True)
     add_rows(sources)
     add_pictures(ROOT / "results", sources / "docs" / "gallery.md")
     for name in ("mkdocs.yml", "mathml.py"):
@@ -59,7 +59,7 @@ def build(site: Path, work: Path, as_shown: bool) -> bool:
     command = [sys.executable, "-m", "mkdocs", "build", "--strict"]
     command += ["--config-file", str(work / "mkdocs.yml"), "--site-dir", str(site.absolute())]
     subprocess.run(command, check=True, cwd=ROOT, env=os.environ | QUIET_ENVIRONMENT)
-    return well
+    return outputs_agree
 
 
 def main() -> None:
@@ -70,12 +70,12 @@ def main() -> None:
     asked = parser.parse_args()
     with TemporaryDirectory(prefix="website") as work:
         try:
-            well = build(asked.site, Path(work), asked.as_shown)
+            outputs_agree = build(asked.site, Path(work), asked.as_shown)
         except subprocess.CalledProcessError as error:
             sys.exit(error.returncode)
     differs = "pages show what their examples do not print; `python -m docs.outputs` writes it"
-    print(f"the site is in {asked.site}" if well else differs)
-    sys.exit(0 if well else 1)
+    print(f"the site is in {asked.site}" if outputs_agree else differs)
+    sys.exit(0 if outputs_agree else 1)
 
 
 if __name__ == "__main__":

@@ -231,14 +231,14 @@ def _linear_ride_choice(scene: Any) -> SceneChoice:
     return SceneChoice(scene, "closed form", choice, single_effects, further, watts)
 
 
-def _summary_of_choice(answered: SceneChoice) -> dict[str, Any]:
+def _summary_of_choice(scene_choice: SceneChoice) -> dict[str, Any]:
     """Entry of the summary for a choice: its effects, their changes and the saving."""
-    choice = answered.choice
+    choice = scene_choice.choice
     return {
-        "system": answered.scene.system,
-        "implementation": answered.engine,
+        "system": scene_choice.scene.system,
+        "implementation": scene_choice.engine,
         "left out": list(choice.left_out),
-        "stay": answered.staying_effects,
+        "stay": scene_choice.staying_effects,
         "step times": choice.times,
         "errors": {
             name: {
@@ -246,12 +246,12 @@ def _summary_of_choice(answered: SceneChoice) -> dict[str, Any]:
                 "confirmed": float(choice.confirmed_change[i]),
                 "chance": float(choice.statistical_error[i]),
             }
-            for i, name in enumerate(answered.scene.quantities)
+            for i, name in enumerate(scene_choice.scene.quantities)
         },
         "kept": choice.within_tolerance,
         "calls": list(choice.calls),
         "confirmations": choice.confirmations,
-        "would matter no more above": answered.further_tolerances,
+        "would matter no more above": scene_choice.further_tolerances,
         "would break an assumption": {
             name: [asdict(breach) for breach in barred] for name, barred in choice.assumptions_barring.items()
         },
@@ -342,13 +342,13 @@ def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
     return [*rows, f"    the choice holds for tolerances down to {percent_text(worst)}"] if choice.left_out else rows
 
 
-def misleading_activities(choice_of: SceneChoice) -> list[str]:
+def misleading_activities(scene_choice: SceneChoice) -> list[str]:
     """Lines for the screen on inertias for which energy activity misleads: active ones without which a quantity hardly
     changes."""
-    total, rows = sum(value for value in choice_of.activity_of_element.values() if np.isfinite(value)), []
-    for effect in choice_of.single_effects:
-        share = choice_of.activity_of_element.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
-        for name, change in zip(choice_of.scene.quantities, effect.changes, strict=True):
+    total, rows = sum(value for value in scene_choice.activity_of_element.values() if np.isfinite(value)), []
+    for effect in scene_choice.single_effects:
+        share = scene_choice.activity_of_element.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
+        for name, change in zip(scene_choice.scene.quantities, effect.changes, strict=True):
             if np.isfinite(share) and share > ACTIVE_SHARE and change < BLIND_CHANGE:
                 rows.append(
                     f"    energy activity misleads: {effect.effect} holds {percent_text(share)} of it, and without "
@@ -428,11 +428,11 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
     axis.legend(fontsize=SMALL_TEXT, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _effect_label(choice_of: SceneChoice, effect: SingleEffect) -> str:
+def _effect_label(scene_choice: SceneChoice, effect: SingleEffect) -> str:
     """Label of an effect with "(left out)" or "(stays)". An effect whose own change is small may stay, since it can
     matter together with others that were left out."""
     return effect.effect.replace("_", " ") + (
-        " (left out)" if effect.effect in choice_of.choice.left_out else " (stays)"
+        " (left out)" if effect.effect in scene_choice.choice.left_out else " (stays)"
     )
 
 

@@ -32,17 +32,17 @@ from studies.command.audits import blind_spot_audit, conformity_report
 from studies.command.crew import crew_changes_by_options
 from studies.command.finishing import exit_with_message, finish, folder_of, profiled_work, unprinted_finding_lines
 from studies.command.options import (
-    AsJson,
-    Changes,
-    Cluster,
-    NoError,
-    Out,
-    Profile,
-    Resume,
+    ClusterOption,
+    JsonOption,
+    NoErrorOption,
+    OutOption,
+    ProfileOption,
+    ResumeOption,
     SceneName,
-    Strictly,
-    Sweep,
-    Workers,
+    SetOption,
+    StrictOption,
+    SweepOption,
+    WorkersOption,
 )
 from studies.command.second_compiler import second_process_compiles
 from studies.command.waiting import progress_bar
@@ -107,8 +107,8 @@ def show(
     scene: SceneName,
     price: Annotated[bool, typer.Option("--price", help="What each effect costs and changes, by short runs.")] = False,
     engine: Annotated[str | None, typer.Option(help="Of --price: one of exudyn, mujoco, reference.")] = None,
-    changes: Changes = None,
-    as_json: AsJson = False,
+    changes: SetOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Print what a scene will compute, without running it, or what is in a measurement file, with a scene for it."""
     if not price and (engine is not None or as_json):
@@ -150,16 +150,16 @@ def _search_lines(scene: Any) -> list[str]:
 def run_scene(
     scene: SceneName,
     engine: Annotated[str | None, typer.Option(help="exudyn, mujoco, reference or all (which is the default)")] = None,
-    out: Out = None,
-    resume: Resume = None,
-    sweep: Sweep = None,
-    workers: Workers = None,
-    cluster: Cluster = None,
-    changes: Changes = None,
-    no_error: NoError = False,
-    strict: Strictly = False,
-    profile: Profile = False,
-    as_json: AsJson = False,
+    out: OutOption = None,
+    resume: ResumeOption = None,
+    sweep: SweepOption = None,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    changes: SetOption = None,
+    no_error: NoErrorOption = False,
+    strict: StrictOption = False,
+    profile: ProfileOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Run a scene and save its results and figures."""
     telling = profiled_work(profile)
@@ -207,10 +207,10 @@ def price(
     tolerance: Annotated[float, typer.Option(help="Largest error that is allowed, in the unit of the quantity.")],
     quantity: Annotated[str | None, typer.Option(help="Channels of the result, e.g. f1,f2, if not the usual.")] = None,
     engine: Annotated[str | None, typer.Option(help="exudyn, mujoco, reference or all (which is the default)")] = None,
-    workers: Workers = None,
-    cluster: Cluster = None,
-    changes: Changes = None,
-    as_json: AsJson = False,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    changes: SetOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Find the cheapest engine, integrator and step that hold a scene's quantity to a tolerance.
 
@@ -233,12 +233,12 @@ def price(
 def compare(
     first: Annotated[Path, typer.Argument(help="A folder of results, or one file of it.")],
     second: Annotated[Path, typer.Argument(help="Another one of the same study, or a measurement (.csv, .mf4, ...).")],
-    out: Out = None,
+    out: OutOption = None,
     shift: Annotated[
         float | None,
         typer.Option(help="Of a measurement: s that its clock shows at the run's start, if it is not to be sought."),
     ] = None,
-    as_json: AsJson = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compare two results quantity by quantity, or lay a measurement over a run.
 
@@ -272,12 +272,12 @@ def identify(
     engine: Annotated[str | None, typer.Option(help="One of exudyn, mujoco, reference.")] = None,
     low_pass: Annotated[float, typer.Option(help="Hz, of run and measurement alike, without phase; 0 for none.")] = 0.0,
     profiles: Annotated[bool, typer.Option("--profiles", help="Profile likelihood of every parameter.")] = False,
-    workers: Workers = None,
-    cluster: Cluster = None,
-    out: Out = None,
-    resume: Resume = None,
-    changes: Changes = None,
-    as_json: AsJson = False,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    out: OutOption = None,
+    resume: ResumeOption = None,
+    changes: SetOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Identify numbers of a scene from a measurement, with standard errors, and say what it does not determine."""
     from studies.command.identify import STAGES_FOLDER, report
@@ -304,7 +304,7 @@ def export(
     scene: SceneName,
     engine: Annotated[str, typer.Option(help="mujoco, for an MJCF file, or exudyn, for a script in Python.")],
     out: Annotated[Path | None, typer.Option(help="The file to write; SCENE_ENGINE.xml or .py here if none.")] = None,
-    changes: Changes = None,
+    changes: SetOption = None,
 ) -> None:
     """Write the vehicle of a scene as a file of an engine that opens without twinrig.
 
@@ -376,10 +376,10 @@ def validate(
         str | None,
         typer.Option(metavar="PATTERN", help="Of --blind-spots: functions of this name alone, as 'models.tyre.*'."),
     ] = None,
-    workers: Workers = None,
-    cluster: Cluster = None,
-    out: Out = None,
-    resume: Resume = None,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    out: OutOption = None,
+    resume: ResumeOption = None,
 ) -> None:
     """Run the validation cases and write report.html, results.json and results.csv."""
     if only is not None and not blind_spots:

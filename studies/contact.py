@@ -167,15 +167,15 @@ EXACT_THEORY_CELLS = 40
 """Number of cells along each axis of the exact theory that checks a sweep."""
 
 
-def _exact_checks(scene: ContactScene, rolls: ContactResults) -> dict[int, Any]:
+def _exact_checks(scene: ContactScene, contact_results: ContactResults) -> dict[int, Any]:
     """Results of the exact theory at a few creepages of a sweep, by the number of the creepage. Empty if the contact is
     no Hertzian ellipse, is exact already, or has falling friction."""
-    body, points = rolls.contact, read(Options, scene.options, scene.file, "options").exact
+    body, points = contact_results.contact, read(Options, scene.options, scene.file, "options").exact
     if not isinstance(body, OnEllipse) or isinstance(body, ExactOnEllipse) or scene_contact(scene).falling is not None:
         return {}
     exact = ExactOnEllipse(body.hertz, body.friction, body.pair)
-    chosen = np.unique(np.linspace(0, len(rolls.motions) - 1, points).round().astype(int))
-    return {int(i): exact.roll(rolls.motions[i], EXACT_THEORY_CELLS) for i in chosen}
+    chosen = np.unique(np.linspace(0, len(contact_results.motions) - 1, points).round().astype(int))
+    return {int(i): exact.roll(contact_results.motions[i], EXACT_THEORY_CELLS) for i in chosen}
 
 
 if __name__ == "__main__":

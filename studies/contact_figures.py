@@ -132,10 +132,11 @@ CREEPAGE_LABELS = {"xi_x": "longitudinal creepage [%]", "xi_y": "lateral creepag
 FORCE_COLOURS = {"fx": BLUE, "fy": VERMILION, "mz": GREEN}
 
 
-def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title: str, path: Path) -> None:
+def sweep_figure(sweep: Sweep, forces: Result, exact_results: dict[int, Rolled], title: str, path: Path) -> None:
     """Save a figure of creep forces and moment over a creepage, with error bands and some results of the exact theory.
 
-    forces : those of the scene, and their errors; checks : exact ones by the number of the motion.
+    forces : those of the scene, and their errors; exact_results : results of the exact theory by the number of the
+    motion.
     """
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     values, body = (1.0 if sweep.of == "spin" else 100.0) * sweep.values(), forces.detail.contact
@@ -155,8 +156,8 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
         )
         axis.fill_between(values, low, high, color=colour, alpha=0.18, linewidth=0)
         axis.plot(values, force, color=colour, linewidth=1.6, label=label)
-        exact = [scale * getattr(check, name) for check in checks.values()]
-        axis.plot(values[list(checks)], exact, "o", color=colour, markerfacecolor="white", markersize=5)
+        exact = [scale * getattr(check, name) for check in exact_results.values()]
+        axis.plot(values[list(exact_results)], exact, "o", color=colour, markerfacecolor="white", markersize=5)
     for sign in (-1, 1):
         left.axhline(sign * limit, color=DARK, linewidth=0.7, linestyle=":")
     left.set(title="Force on the wheel; dotted: ±μN", ylabel="tangential force [kN]")
@@ -166,7 +167,7 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
         axis.set_xscale("log" if sweep.spacing == "logarithmic" and sweep.start > 0 else "linear")
     if stated:
         left.fill_between([], [], color=GREY, alpha=0.3, linewidth=0, label="error of cells and theory")
-    if checks:
+    if exact_results:
         left.plot([], [], "o", color=DARK, markerfacecolor="white", markersize=5, label="exact theory")
     legend_below(figure, left)
     add_heading(figure, title, {"forces": forces})

@@ -66,12 +66,12 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def _table_lines(points: list[TheoryPoint], contact_count: int, uncertain: float) -> list[str]:
+def _table_lines(points: list[TheoryPoint], contact_count: int, reference_uncertainty: float) -> list[str]:
     """Lines for the screen: errors and times of all theories and cells, then the cheapest theory for each target
     error."""
     return [
         f"  error of the tangential force in % of mu N over {contact_count} contacts (exact ones known to "
-        f"{100 * uncertain:.2g} %)",
+        f"{100 * reference_uncertainty:.2g} %)",
         f"    {'':<28}{'cells':>6}{'mean':>8}{'95 of 100':>11}{'largest':>9}   time of contacts",
         *(
             f"    {point.name:<28}{point.cells:>6}{100 * point.mean:>8.2f}{100 * point.most:>11.2f}"

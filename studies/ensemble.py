@@ -201,7 +201,11 @@ def _deviation_rows(options: Options, times: np.ndarray, statistics: PathStatist
 
 
 def summary_lines(
-    options: Options, scene: Scene, rows: list[dict[str, float]], statistics: PathStatistics, gaps: dict[str, float]
+    options: Options,
+    scene: Scene,
+    rows: list[dict[str, float]],
+    statistics: PathStatistics,
+    engine_differences: dict[str, float],
 ) -> list[str]:
     """Lines for the screen: standard deviations over time, quantiles of the drift-off time, and differences of
     engines."""
@@ -220,7 +224,7 @@ def summary_lines(
         value, low, high = statistics.drift_off.quantile(level)
         lines.append(f"  {100 * level:7g} %   {_time_text(value)}   ({_time_text(low)} to {_time_text(high)})")
     lines += [f"  {statistics.lost} paths left all bounds and count as drifted off by then"] if statistics.lost else []
-    for engine, worst in gaps.items():
+    for engine, worst in engine_differences.items():
         differ = (
             f"{options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state before drift-off"
         )

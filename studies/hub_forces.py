@@ -103,10 +103,10 @@ def save(comparison: Comparison, folder: Path) -> None:
     join_results(runs, "run").save(folder / "runs.nc")
 
 
-def _write_samples(path: Path, names: list[tuple[str, str]], measured: Any) -> None:
+def _write_samples(path: Path, names: list[tuple[str, str]], sampled: Any) -> None:
     """Write sampled hub forces or angles to a CSV file, with a column for each (name, unit)."""
-    columns = {name: (unit, measured.samples[:, i]) for i, (name, unit) in enumerate(names)}
-    write_time_series(path, columns, measured.period)
+    columns = {name: (unit, sampled.samples[:, i]) for i, (name, unit) in enumerate(names)}
+    write_time_series(path, columns, sampled.period)
 
 
 if __name__ == "__main__":

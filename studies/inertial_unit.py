@@ -170,12 +170,12 @@ def angle_error_deviation(seconds: np.ndarray, options: Options, grade: int) -> 
 
 
 def _row_of_grade(
-    options: Options, grade: int, minutes: float, every_angle: np.ndarray, curves: dict[str, CubicSpline]
+    options: Options, grade: int, minutes: float, simulated_angles: np.ndarray, curves: dict[str, CubicSpline]
 ) -> dict[str, Any]:
     """Results for a gyro grade over a duration: angle error (deg) in closed form and of the simulated units, and damage
     errors by engine."""
     end = round(60 * minutes)
-    angles = every_angle[:, : end + 1]
+    angles = simulated_angles[:, : end + 1]
     worst = {engine: np.abs(damage_errors(curve, angles)).max(axis=1) for engine, curve in curves.items()}
     return {
         "grade": options.grades[grade],

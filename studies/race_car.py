@@ -165,13 +165,13 @@ def identified_simpler(
     return identified_vehicle(_with_values(first_scene, holds), _with_values(second_scene, holds), simpler_search, tell)
 
 
-def _with_values(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrackScene:
+def _with_values(scene: SingleTrackScene, new_values: dict[str, float]) -> SingleTrackScene:
     from models.core.scene_file import set_key
 
     table = scene.table()
     for axle in ("front", "rear"):
         set_key(table, f"{axle}.sharpness", 2.0)
-    for key, value in holds.items():
+    for key, value in new_values.items():
         set_key(table, key, value)
     return build(table, scene.file, Path(scene.folder))
 
@@ -197,9 +197,9 @@ def error_ratios(identified: Identified) -> dict[str, Any]:
     }
 
 
-def _result_lines(identified_full: Identified, identified: dict[str, Identified]) -> list[str]:
+def _result_lines(full_identification: Identified, identified: dict[str, Identified]) -> list[str]:
     table = [f"  {'prediction':<26}{'error':>9}{'aim':>8}{'inside 95 %':>13}{'half-width':>12}{'parts':>9}"]
-    for name, identified_one in error_ratios(identified_full).items():
+    for name, identified_one in error_ratios(full_identification).items():
         table.append(
             f"  {name:<26}{identified_one['error']:>9.1%}{AIMED_ERRORS[name]:>8.0%}{identified_one['inside']:>13.1%}"
             f"{identified_one['half-width by error']:>12.2f}{identified_one['error between parts']:>9.1%}"

@@ -75,12 +75,12 @@ def figure_of_finding(finding: Finding, evidence: Evidence, path: Path) -> Path 
 
 
 def _save_titled(
-    figure: Any, title: str, path: Path, legend: Any = None, legend_position: str = "outside upper right"
+    figure: Any, title: str, path: Path, legend_axis: Any = None, legend_position: str = "outside upper right"
 ) -> Path:
     """Add a title, and the legend of an axis if one is given, to a figure, and save it; returns its path."""
-    if legend is not None:
+    if legend_axis is not None:
         columns = 3 if "lower" in legend_position else 2
-        figure.legend(*legend.get_legend_handles_labels(), loc=legend_position, ncols=columns)
+        figure.legend(*legend_axis.get_legend_handles_labels(), loc=legend_position, ncols=columns)
     add_heading(figure, title)
     return save(figure, path)
 
@@ -309,10 +309,10 @@ def forces_figure(run: SectionOutcome, section_channels: Sequence[SectionChannel
     return save(drawn, path)
 
 
-def counting_figure(counted: dict[SectionChannel, CountedLoad], path: Path) -> Path:
+def counting_figure(counted_loads: dict[SectionChannel, CountedLoad], path: Path) -> Path:
     """Save a figure of the level crossings and range pairs of some section forces."""
     drawn, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
-    for colour, (answer, counts) in zip(WHEEL_COLOURS, counted.items(), strict=False):
+    for colour, (answer, counts) in zip(WHEEL_COLOURS, counted_loads.items(), strict=False):
         left.plot(np.maximum(counts.crossings, 0.5), 1e-3 * counts.levels, drawstyle="steps-mid", color=colour)
         right.plot(np.maximum(counts.pairs_of_range, 0.25), 1e-3 * counts.ranges, color=colour, label=answer.name)
     for panel, title, quantity_name in (
@@ -328,12 +328,14 @@ def counting_figure(counted: dict[SectionChannel, CountedLoad], path: Path) -> P
 
 
 def overlay_figure(
-    examination: Examination, run: SectionOutcome, compared: Sequence[ChannelComparison], path: Path
+    examination: Examination, run: SectionOutcome, channel_comparisons: Sequence[ChannelComparison], path: Path
 ) -> Path:
     """Save a figure of measured channels that were not inputs of the run, and of the computed ones: over the complete
     time, and for two seconds about the largest error."""
-    drawn, panels = _panels_over_time(len(compared), 1.7 * len(compared) + 0.7, columns=2, width_ratios=(2.4, 1))
-    for (left, right), comparison in zip(panels, compared, strict=True):
+    drawn, panels = _panels_over_time(
+        len(channel_comparisons), 1.7 * len(channel_comparisons) + 0.7, columns=2, width_ratios=(2.4, 1)
+    )
+    for (left, right), comparison in zip(panels, channel_comparisons, strict=True):
         common_times, measured, computed = paired_channels(
             examination.recording, run, comparison.signal, comparison.answer
         )

@@ -155,7 +155,7 @@ def _save_deviations(results: Mapping[str, Result], folder: Path) -> None:
     write_whole(folder / "deviations.csv", saved.data["deviation"].drop_vars("unit").to_dataframe().to_csv())
 
 
-def _save_system(scene: RideScene, linear: LinearVehicle, speed: float, folder: Path) -> None:
+def _save_system(scene: RideScene, linear_vehicle: LinearVehicle, speed: float, folder: Path) -> None:
     """Save the matrices of the linear system at a speed (m/s), and its covariance, for other programs."""
     from models.ride.covariance import stationary_covariance
     from models.ride.excited import vehicle_with_road
@@ -163,7 +163,7 @@ def _save_system(scene: RideScene, linear: LinearVehicle, speed: float, folder: 
     from models.ride.weighting import system_with_weightings
 
     system = system_with_weightings(
-        vehicle_with_road(linear, excitation_of(scene, linear.wheels), speed), scene.weighting
+        vehicle_with_road(linear_vehicle, excitation_of(scene, linear_vehicle.wheels), speed), scene.weighting
     )
     save(system, stationary_covariance(system), folder / "system")
 

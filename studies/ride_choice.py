@@ -92,12 +92,12 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     }
 
 
-def _deviation_results(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
+def _deviation_results(scene: RideScene, reduced_scene: ReducedScene) -> dict[str, Result]:
     """Results of the complete scene and of the reduced scene: standard deviations with their errors and assumptions."""
     results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
-    vehicle = replace(reduced.vehicle, limits=reduced.limits)
-    if reduced != ReducedScene.complete(scene):
-        results["what is left"] = run_scene(reduced.ride, "reference", vehicle=vehicle, error=scene.error)
+    vehicle = replace(reduced_scene.vehicle, limits=reduced_scene.limits)
+    if reduced_scene != ReducedScene.complete(scene):
+        results["what is left"] = run_scene(reduced_scene.ride, "reference", vehicle=vehicle, error=scene.error)
     return results
 
 

@@ -127,13 +127,13 @@ def _road_names(vehicle: SpatialVehicle) -> list[str]:
     return list(ROADS_BY_KNOWLEDGE) if any(wheel.y for wheel in wheels(vehicle)) else ["one track"]
 
 
-def _computing_times(scene: RideScene, models: dict[str, SpatialVehicle]) -> dict[str, list[float]]:
+def _computing_times(scene: RideScene, vehicle_models: dict[str, SpatialVehicle]) -> dict[str, list[float]]:
     """Computing times (s) of the covariance at one speed, TIMING_REPEATS for each vehicle, in turns."""
     assert scene.speeds is not None
     speed = float(scene.speeds.all()[0])
     systems = {
         name: vehicle_with_road(linear_vehicle(vehicle)(speed), excitation_of(scene, wheels(vehicle)), speed)
-        for name, vehicle in models.items()
+        for name, vehicle in vehicle_models.items()
     }
     seconds: dict[str, list[float]] = {name: [] for name in systems}
     for _ in range(TIMING_REPEATS):
@@ -161,7 +161,7 @@ def _save_errors(
     write_whole(folder / "errors.csv", table.to_csv())
 
 
-def _table_lines(errors: Errors, costs: dict[str, list[float]], full_vehicle: SpatialVehicle) -> list[str]:
+def _table_lines(errors: Errors, computing_times: dict[str, list[float]], full_vehicle: SpatialVehicle) -> list[str]:
     """Lines for the screen: the largest error of each vehicle model on each road model, with a column per kind of
     output."""
     kinds = np.array([output.kind for output in full_vehicle.outputs])
@@ -175,7 +175,7 @@ def _table_lines(errors: Errors, costs: dict[str, list[float]], full_vehicle: Sp
         of_kinds = [values[(kinds == kind) & np.isfinite(values)] for kind in shown]
         worst = [f"{100 * max(of_kind, key=abs):+.1f} %" if len(of_kind) else "-" for of_kind in of_kinds]
         columns = "".join(f"{text:>22}" for text in worst)
-        lines.append(f"    {f'{model}, {road}':<{width}}{cost(costs[model]):>30}{columns}")
+        lines.append(f"    {f'{model}, {road}':<{width}}{cost(computing_times[model]):>30}{columns}")
     return lines
 
 

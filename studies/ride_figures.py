@@ -54,7 +54,7 @@ class Heading(NamedTuple):
 def body_acceleration_figure(
     point_positions: Sequence[float],
     sweep_of_points: Sweep,
-    over: Sweep,
+    speed_sweep: Sweep,
     vehicle: SpatialVehicle,
     speed: float,
     heading: Heading,
@@ -73,7 +73,12 @@ def body_acceleration_figure(
             label=case,
         )
         if name:
-            right.plot(over.speeds[:-1], over.of(case, name)[:-1], CORRELATION_STYLES[i], color=CORRELATION_COLOURS[i])
+            right.plot(
+                speed_sweep.speeds[:-1],
+                speed_sweep.of(case, name)[:-1],
+                CORRELATION_STYLES[i],
+                color=CORRELATION_COLOURS[i],
+            )
     for x in vehicle.axles:
         left.axvline(x, color="0.8", zorder=0)
     left.set(xlabel="x forward [m]  (grey: axles)", title=f"Vertical acceleration along the body, {speed:g} m/s")
@@ -98,7 +103,11 @@ NO_FINITE_VARIANCE = "\n(no finite variance)"
 
 
 def outputs_figure(
-    swept: Sweep, kind_and_unit: Sequence[tuple[str, str]], static: Mapping[str, float], heading: Heading, path: Path
+    speed_sweep: Sweep,
+    kind_and_unit: Sequence[tuple[str, str]],
+    static_loads: Mapping[str, float],
+    heading: Heading,
+    path: Path,
 ) -> None:
     """Save a figure of the outputs' standard deviations over speed on the scene's road, with a panel for each kind and
     unit in ``kind_and_unit``; tyre forces are divided by their static loads ``static`` (N)."""
@@ -107,14 +116,21 @@ def outputs_figure(
     for axis, (kind, si) in zip(axes, groups, strict=True):
         unit, factor = _shown_unit(si)
         axis_label = "deviation / static load [-]" if kind == "tyre force" else f"standard deviation [{unit}]"
-        names = [name for name, unit_of in zip(swept.outputs, kind_and_unit, strict=True) if unit_of == (kind, si)]
-        curves = {name: factor * swept.of(swept.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
+        names = [
+            name for name, unit_of in zip(speed_sweep.outputs, kind_and_unit, strict=True) if unit_of == (kind, si)
+        ]
+        curves = {
+            name: factor * speed_sweep.of(speed_sweep.cases[0], name)[:-1] / static_loads.get(name, 1.0)
+            for name in names
+        }
         for label, values in _distinct_curves(curves).items():
             axis.plot(
-                swept.speeds[:-1], values, label=label if np.isfinite(values).any() else label + NO_FINITE_VARIANCE
+                speed_sweep.speeds[:-1],
+                values,
+                label=label if np.isfinite(values).any() else label + NO_FINITE_VARIANCE,
             )
         if not np.isfinite(list(curves.values())).any():
-            axis.set(xlim=(0, swept.speeds.max()), yticks=[])
+            axis.set(xlim=(0, speed_sweep.speeds.max()), yticks=[])
         axis.set(xlabel="speed [m/s]", ylabel=axis_label, ylim=(0, None), title=kind.capitalize())
         _note_if_no_finite_curve(axis)
         _legend_under_panel(axis)
@@ -156,19 +172,23 @@ def _distinct_curves(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {"\n= ".join(names): values for names, values in groups}
 
 
-def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, heading: Heading, path: Path) -> None:
+def spectra_figure(
+    linear_vehicle: LinearVehicle, excitation: Excitation, speed: float, heading: Heading, path: Path
+) -> None:
     """Save a figure of the one-sided spectral densities of accelerations and tyre forces over frequency at a speed
     (m/s); no figure if all are 0."""
     frequency = np.geomspace(0.1, 100.0, 800)
-    densities = one_sided(linear, excitation, speed, frequency)
-    moving_kinds = {output.kind for i, output in enumerate(linear.outputs) if densities[:, i].any()}
+    densities = one_sided(linear_vehicle, excitation, speed, frequency)
+    moving_kinds = {output.kind for i, output in enumerate(linear_vehicle.outputs) if densities[:, i].any()}
     shown = [kind for kind in ("acceleration", "tyre force") if kind in moving_kinds]
     if not shown:
         return
     figure, axes = subplots(1, len(shown), figsize=(COLUMN_WIDTH, 4.2), squeeze=False)
     units = {"acceleration": "(m/s²)²/Hz", "tyre force": "N²/Hz"}
     for axis, kind in zip(axes[0], shown, strict=True):
-        curves = {output.name: densities[:, i] for i, output in enumerate(linear.outputs) if output.kind == kind}
+        curves = {
+            output.name: densities[:, i] for i, output in enumerate(linear_vehicle.outputs) if output.kind == kind
+        }
         for label, values in _distinct_curves(curves).items():
             axis.loglog(frequency, values, label=label)
         axis.set(xlabel="frequency [Hz]", ylabel=f"one-sided density [{units[kind]}]", title=kind.capitalize())
@@ -178,13 +198,15 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
     _save_figure(figure, heading, f": spectra at {speed:g} m/s", path)
 
 
-def road_figure(road: TwoTrackRoad, half_track: float, fitted: FittedRoad | None, heading: Heading, path: Path) -> None:
+def road_figure(
+    road: TwoTrackRoad, half_track: float, fitted_road: FittedRoad | None, heading: Heading, path: Path
+) -> None:
     """Save a figure of the spectrum of the left track and the coherency of both tracks: of the road model, measured if
     ``fitted`` is given, and of an isotropic road. half_track : half of the track width (m)."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
-    if fitted is not None:
-        spectra = fitted.spectra
+    if fitted_road is not None:
+        spectra = fitted_road.spectra
         left.loglog(spectra.wavenumber, spectra.left, color=GREY, linewidth=0.8, label="measured")
         right.semilogx(spectra.wavenumber, spectra.coherency, color=GREY, linewidth=0.8, label="measured")
         right.axhline(spectra.chance_coherency(), color=GREY, linestyle=":", label="what chance alone shows (95 %)")
@@ -207,14 +229,17 @@ def road_figure(road: TwoTrackRoad, half_track: float, fitted: FittedRoad | None
 def detail_figure(
     errors: Mapping[tuple[str, str], np.ndarray],
     names: Sequence[str],
-    cost: Mapping[str, float],
+    computing_times: Mapping[str, float],
     heading: Heading,
     path: Path,
 ) -> None:
     """Save a coloured table of the errors of all outputs by vehicle and road model, with the computing time (s) of a
     covariance."""
     share = 0.66 * COLUMN_WIDTH / len(errors)
-    heads = [wrapped_text(f"{model}\n{1e3 * cost[model]:.2g} ms\n{road}", share, SMALL_TEXT) for model, road in errors]
+    heads = [
+        wrapped_text(f"{model}\n{1e3 * computing_times[model]:.2g} ms\n{road}", share, SMALL_TEXT)
+        for model, road in errors
+    ]
     values = 100 * np.array(list(errors.values())).T
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 0.3 * len(names) + 2.2))
     picture = axis.imshow(values, cmap="RdBu_r", vmin=-60, vmax=60, aspect="auto")
@@ -244,7 +269,7 @@ def _signed_text(percent: float) -> str:
 
 
 def drive_figure(
-    varied: VaryingSpeed,
+    varying_speed: VaryingSpeed,
     quasi_stationary: np.ndarray,
     drawn_outputs: Sequence[str],
     kind_and_unit: Mapping[str, tuple[str, str]],
@@ -258,18 +283,22 @@ def drive_figure(
         len(heights), 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.8), sharex=True, height_ratios=heights, squeeze=False
     )
     for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
-        columns = {name: varied.names.index(name) for name in drawn_outputs if kind_and_unit[name] == (kind, unit)}
-        pairs = {name: np.concatenate([varied.deviation[:, i], quasi_stationary[:, i]]) for name, i in columns.items()}
+        columns = {
+            name: varying_speed.names.index(name) for name in drawn_outputs if kind_and_unit[name] == (kind, unit)
+        }
+        pairs = {
+            name: np.concatenate([varying_speed.deviation[:, i], quasi_stationary[:, i]]) for name, i in columns.items()
+        }
         for label, both_curves in _distinct_curves(pairs).items():
             exact, quasi = np.split(both_curves, 2)
             if not np.isfinite(exact).all():  # what is left at standstill is rounding
                 axis.plot([], label=label + NO_FINITE_VARIANCE)
                 continue
-            (line,) = axis.plot(varied.time, exact, label=label)
-            axis.plot(varied.time, quasi, "--", color=line.get_color(), linewidth=0.8)
+            (line,) = axis.plot(varying_speed.time, exact, label=label)
+            axis.plot(varying_speed.time, quasi, "--", color=line.get_color(), linewidth=0.8)
         axis.set(ylabel=f"standard deviation [{_unit_text(unit)}]", title=kind.capitalize(), ylim=(0, None))
         _legend_under_panel(axis, 0.03)
-    axes[-1, 0].plot(varied.time, varied.speed, color="0.3")
+    axes[-1, 0].plot(varying_speed.time, varying_speed.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
     _save_figure(figure, heading, "\nSolid: exact; dashed: each speed taken by itself", path)
 
@@ -327,14 +356,19 @@ def nonlinear_figure(nonlinear: Nonlinear, heading: Heading, path: Path) -> None
 
 
 def engine_spectra_figure(
-    runs: Mapping[str, Ride], linear: LinearVehicle, road: Excitation, speed: float, heading: Heading, path: Path
+    runs: Mapping[str, Ride],
+    linear_vehicle: LinearVehicle,
+    road: Excitation,
+    speed: float,
+    heading: Heading,
+    path: Path,
 ) -> None:
     """Save a figure of the spectra of the engines' runs, by Welch's method, and of the statistically linearised
     vehicle."""
     frequency = np.geomspace(0.3, 40.0, 300)
-    expected = one_sided(linear, road, speed, frequency)
+    expected = one_sided(linear_vehicle, road, speed, frequency)
     first = next(iter(runs.values()))
-    shown = [i for i in range(len(linear.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST_OUTPUTS]
+    shown = [i for i in range(len(linear_vehicle.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST_OUTPUTS]
     figure, axes = _few_panels(len(shown))
     for axis, i in zip(axes, shown, strict=True):
         for (engine, run), (line, width) in zip(runs.items(), (("-", 2.2), ("--", 1.0)), strict=False):
@@ -342,7 +376,7 @@ def engine_spectra_figure(
             label = f"{LABELS[engine]}, nonlinear in time"
             axis.loglog(f, density[:, i], line, linewidth=width, color=ENGINES[engine], label=label)
         axis.loglog(frequency, expected[:, i], "k", label="statistical linearisation")
-        output, top = linear.outputs[i], expected[:, i].max()
+        output, top = linear_vehicle.outputs[i], expected[:, i].max()
         unit = f"one-sided density [{_squared_unit(output.unit)}/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
     legend_below(figure, axes[0], columns=3)

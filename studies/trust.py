@@ -135,10 +135,10 @@ def _scene_under_forces(scene: Scene, options: Options, folder: Path) -> tuple[S
     return follower_builder(scene, folder)({}, {}), measured, largest
 
 
-def _pitch_difference(run: Result, pitch: np.ndarray) -> GrowthCurve:
+def _pitch_difference(run: Result, undisturbed_pitch: np.ndarray) -> GrowthCurve:
     """Magnitude of the difference between a run's pitch and the pitch (n,) in rad of a run without one source of
     error."""
-    return GrowthCurve(run.times, np.abs(run["pitch"] - pitch))
+    return GrowthCurve(run.times, np.abs(run["pitch"] - undisturbed_pitch))
 
 
 def _ensemble_of_paths(
@@ -194,14 +194,16 @@ SOURCE_NAMES = {
 
 
 def _drift_off_rows(
-    curves: dict[str, GrowthCurve], runs: dict[str, GrowthCurve], spread: dict[str, np.ndarray], options: Options
+    curves: dict[str, GrowthCurve], runs: dict[str, GrowthCurve], path_results: dict[str, np.ndarray], options: Options
 ) -> list[Row]:
     """Predicted and measured drift-off times (s) for each source of error; None if they lie beyond the run."""
     rows = list[Row]()
     for name, curve in curves.items():
         measured, quartiles = runs[name].passing_time(options.angle) if name in runs else None, None
         if name == "noise":
-            drift_off_times = [quantile_with_interval(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
+            drift_off_times = [
+                quantile_with_interval(path_results["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)
+            ]
             measured, *quartiles = [time if math.isfinite(time) else None for time in drift_off_times]
         rows.append(
             {

@@ -15,7 +15,7 @@ COLOUR_MAP = colormaps["viridis"]
 
 
 def tyre_figure(
-    tables: Mapping[str, TyreTable],
+    tyre_tables: Mapping[str, TyreTable],
     angles_and_load: tuple[Sequence[float], float],
     title: str,
     path: Path,
@@ -24,8 +24,8 @@ def tyre_figure(
     """Save a figure with a row per tyre table: mu_x over slip, mu_y over slip, and mu_y over mu_x. angles_and_load :
     slip angles (deg) of the curves, and the load (N)."""
     angles, load = angles_and_load
-    figure, axes = subplots(len(tables), 3, figsize=(COLUMN_WIDTH, 2.9 * len(tables) + 0.5), squeeze=False)
-    for row, (name, table) in zip(axes, tables.items(), strict=True):
+    figure, axes = subplots(len(tyre_tables), 3, figsize=(COLUMN_WIDTH, 2.9 * len(tyre_tables) + 0.5), squeeze=False)
+    for row, (name, table) in zip(axes, tyre_tables.items(), strict=True):
         x, y = table.friction(np.deg2rad(angles), DRAWN_SLIPS, load)
         top = 1.08 * max(x.max(), y.max())
         for i, angle in enumerate(angles):

@@ -83,23 +83,23 @@ def _results_by_name(paths: Paths) -> dict[str, Result]:
     }
 
 
-def _save_table(linear: dict[str, Linear], folder: Path) -> None:
+def _save_table(linear_results: dict[str, Linear], folder: Path) -> None:
     """Save a CSV table of growth rate (1/s), and damping and frequency of hunting, over speed."""
-    columns = {"speed": ("m/s", next(iter(linear.values())).speeds)}
-    for engine, linear_run in linear.items():
+    columns = {"speed": ("m/s", next(iter(linear_results.values())).speeds)}
+    for engine, linear_run in linear_results.items():
         columns[f"{engine} growth"] = ("1/s", linear_run.values.real.max(axis=1))
         columns[f"{engine} hunting damping"] = ("1/s", -linear_run.hunting.real)
         columns[f"{engine} hunting frequency"] = ("Hz", linear_run.hunting.imag / (2.0 * np.pi))
     write_table(folder / "over_speed.csv", columns)
 
 
-def _summary_of_paths(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict[str, Any]:
+def _summary_of_paths(wheelset: Wheelset, linear_results: dict[str, Linear], paths: Paths) -> dict[str, Any]:
     """Summary in SI units: wavelengths, critical speed by engine (None if there is none), and largest power of the
     creep forces."""
     return {
         "klingel": klingel_wavelength(wheelset),
-        "wavelength": {engine: linear_run.wavelength for engine, linear_run in linear.items()},
-        "critical_speed": {engine: linear_run.critical_speed for engine, linear_run in linear.items()},
+        "wavelength": {engine: linear_run.wavelength for engine, linear_run in linear_results.items()},
+        "critical_speed": {engine: linear_run.critical_speed for engine, linear_run in linear_results.items()},
         "largest_power": {
             engine: max(float(path["power"].max()) for path in paths_of_engine.values())
             for engine, paths_of_engine in paths.items()
@@ -107,17 +107,20 @@ def _summary_of_paths(wheelset: Wheelset, linear: dict[str, Linear], paths: Path
     }
 
 
-def _wavelength_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
+def _wavelength_lines(wheelset: Wheelset, linear_results: dict[str, Linear]) -> list[str]:
     """Lines for the screen on the wavelength of the free wheelset: Klingel's closed form, and the deviation of each
     engine's eigenvalues from it."""
     closed_form = "closed form of the cones, no slip" if wheelset.profiles else "closed form, no slip"
-    closed, first = klingel_wavelength(wheelset), next((linear_run.wavelength for linear_run in linear.values()), 0.0)
+    closed, first = (
+        klingel_wavelength(wheelset),
+        next((linear_run.wavelength for linear_run in linear_results.values()), 0.0),
+    )
     lines = [
         "  wavelength of the free wheelset",
         f"    {closed_form:<34}{closed:>14.9g} m",
         f"    {'creep forces alone':<34}{kinematic_wavelength(wheelset):>14.9g} m",
     ]
-    for engine, linear_run in linear.items():
+    for engine, linear_run in linear_results.items():
         lines.append(
             f"    {f'eigenvalues of {engine}':<34}{linear_run.wavelength:>14.9g} m   "
             f"{linear_run.wavelength / closed - 1:+.1e} from the closed form, "
@@ -126,25 +129,25 @@ def _wavelength_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str
     return lines
 
 
-def _stability_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
+def _stability_lines(wheelset: Wheelset, linear_results: dict[str, Linear]) -> list[str]:
     """Lines for the screen on the critical speed in every engine, or the reason why there is none."""
     lines = [
         "  critical speed with linear creep",
         f"    {'lateral and yaw motion alone':<34}" + _critical_speed_text(*critical_or_why(wheelset)),
     ]
-    first = next((linear_run.critical_speed for linear_run in linear.values()), None)
+    first = next((linear_run.critical_speed for linear_run in linear_results.values()), None)
     return lines + [
         f"    {f'eigenvalues of {engine}':<34}"
         + _critical_speed_text(linear_run.critical_speed, linear_run.no_critical_reason, first if k else None)
-        for k, (engine, linear_run) in enumerate(linear.items())
+        for k, (engine, linear_run) in enumerate(linear_results.items())
     ]
 
 
-def _critical_speed_text(critical: float | None, reason: str, first_critical: float | None = None) -> str:
-    if critical is None:
+def _critical_speed_text(critical_speed: float | None, reason: str, first_critical_speed: float | None = None) -> str:
+    if critical_speed is None:
         return f"none: the wheelset {reason}"
-    return f"{critical:>14.9g} m/s" + (
-        f" {critical / first_critical - 1:+.0e} from the first" if first_critical else ""
+    return f"{critical_speed:>14.9g} m/s" + (
+        f" {critical_speed / first_critical_speed - 1:+.0e} from the first" if first_critical_speed else ""
     )
 
 

@@ -27,7 +27,7 @@ def short():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(braking_stop, "SPEED", 4.0)
         patch.setattr(braking_stop, "SURFACE_CHANGE", 1.2)
-        patch.setattr(braking_stop, "SOLVERS", {True: (("DOP853", 1e-8), ("LSODA", 1e-8))})
+        patch.setattr(braking_stop, "REFERENCE_SOLVERS", {True: (("DOP853", 1e-8), ("LSODA", 1e-8))})
         yield BrakingStop(True)
 
 

@@ -372,11 +372,11 @@ def test_force_calls_seen_from_outside():
 
 def test_every_integrator_of_the_catalogue_is_tried():
     from models.engines.catalogue import CATALOGUE
-    from validation.price.problems.road_excited import DEFAULTS, FULL_STEPS, QUICK_STEPS
+    from validation.price.problems.road_excited import DEFAULT_SETTING_OWNERS, FULL_STEPS, QUICK_STEPS
 
     tried = {(engine, method.split()[0]) for engine, method in FULL_STEPS}
     assert tried == {(engine, name) for engine, names in CATALOGUE.items() for name in names}
-    for engine, method, value in DEFAULTS:
+    for engine, method, value in DEFAULT_SETTING_OWNERS:
         assert value in FULL_STEPS[engine, method], "a default is left out of the full sweep"
         assert value in QUICK_STEPS[engine, method], "a default is left out of the quick one"
     assert all(set(values) <= set(FULL_STEPS[curve]) for curve, values in QUICK_STEPS.items())
@@ -387,12 +387,12 @@ def test_defaults_are_those_of_the_installed_engines():
     import mujoco
 
     from models.advice.price.systems.pitch_plane import SPECTRAL_RADII
-    from validation.price.problems.road_excited import DEFAULTS
+    from validation.price.problems.road_excited import DEFAULT_SETTING_OWNERS
 
     ti, option = exudyn.SimulationSettings().timeIntegration, mujoco.MjOption()
-    assert DEFAULTS["exudyn", "GeneralizedAlpha 0.9", ti.endTime / ti.numberOfSteps] == "Exudyn"
+    assert DEFAULT_SETTING_OWNERS["exudyn", "GeneralizedAlpha 0.9", ti.endTime / ti.numberOfSteps] == "Exudyn"
     assert SPECTRAL_RADII["GeneralizedAlpha 0.9"] == ti.generalizedAlpha.spectralRadius
-    assert DEFAULTS["mujoco", "Euler", option.timestep] == "MuJoCo"
+    assert DEFAULT_SETTING_OWNERS["mujoco", "Euler", option.timestep] == "MuJoCo"
     assert option.integrator == mujoco.mjtIntegrator.mjINT_EULER
 
 

@@ -29,7 +29,7 @@ def test_every_method_of_both_engines_is_tried():
 @pytest.mark.full
 def test_engines_come_to_the_equations_by_hand(monkeypatch):
     """RK4 at 5 ms, whose error is 0.2 N of some 970 N; at 2.5 ms a sixteenth of that."""
-    monkeypatch.setattr(free_vehicle, "REFERENCES", (("DOP853", 1e-8, "by hand"), ("LSODA", 1e-9, "engine")))
+    monkeypatch.setattr(free_vehicle, "REFERENCE_SOLVERS", (("DOP853", 1e-8, "by hand"), ("LSODA", 1e-9, "engine")))
     problem = FreeVehicle(False)
     assert problem.uncertainty["wheel load"] < 1e-3
     errors = [

@@ -41,8 +41,8 @@ INSTANT, PATH = 1e-12, 1e-10
 def test_a_cut_car_moves_as_in_mujoco(name):
     vehicle = cut_cars()[name]
     assert hub_gap(vehicle, "mujoco", 18) < INSTANT
-    assert hub_path_gap(vehicle, "mujoco", 0.01, rough=True) < PATH
-    assert hub_path_gap(vehicle, "mujoco", 0.01, rough=False) < PATH
+    assert hub_path_gap(vehicle, "mujoco", 0.01, rough_road=True) < PATH
+    assert hub_path_gap(vehicle, "mujoco", 0.01, rough_road=False) < PATH
 
 
 def test_what_is_felt_inside_is_that_of_its_own_state():

@@ -63,19 +63,19 @@ def of_table(table: Mapping[str, Any], file: str, folder: Path, changes: Mapping
 
     if not isinstance(changes, Mapping):
         raise InputError("set", "", changes, 'must be a table of dotted keys, for example {"run.step": 5e-4}')
-    changed = plain(table)
+    changed = plain_value(table)
     file = file + CHANGED_SUFFIX if changes and not file.endswith(CHANGED_SUFFIX) else file
     for key, value in changes.items():
-        set_key(changed, str(key), plain(value))
-    return Scene(changed, file, folder, checked(plain(changed), file, folder, KNOWN_SYSTEMS))
+        set_key(changed, str(key), plain_value(value))
+    return Scene(changed, file, folder, checked(plain_value(changed), file, folder, KNOWN_SYSTEMS))
 
 
-def plain(value: Any) -> Any:
+def plain_value(value: Any) -> Any:
     """A value as a scene file would hold it: arrays and tuples as lists, numpy's numbers as Python's, paths as text."""
     if isinstance(value, Mapping):
-        return {str(key): plain(inner) for key, inner in value.items()}
+        return {str(key): plain_value(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(inner) for inner in value]
+        return [plain_value(inner) for inner in value]
     if isinstance(value, Path):
         return str(value)
     return value.tolist() if hasattr(value, "tolist") else value

@@ -23,7 +23,7 @@ def conformity_report(engine: str, has_other_options: bool, requested_folder: Pa
 
 
 def blind_spot_audit(
-    has_other_options: bool, only: str | None, requested_folder: Path | None, resume: Path | None
+    has_other_options: bool, function_pattern: str | None, requested_folder: Path | None, resume: Path | None
 ) -> None:
     """Audit which rows and tests detect faults in shared functions, all or those that match ``only``; raises InputError
     for options of a report."""
@@ -31,11 +31,13 @@ def blind_spot_audit(
         raise InputError("--blind-spots", "", True, "goes without --quick and --against")
     from validation.blind_spots.audit import TRACE, audit, audit_of, audit_summary
 
-    command = "twinrig validate --blind-spots" + ("" if only is None else f" --only '{only}'")
+    command = "twinrig validate --blind-spots" + ("" if function_pattern is None else f" --only '{function_pattern}'")
     folder = folder_of("blind-spots", TRACE, "", requested_folder, resume)
     try:
         with progress_bar("blind spots") as progress:
-            lines = audit(folder, progress) if only is None else audit_of(only, folder, progress)
+            lines = (
+                audit(folder, progress) if function_pattern is None else audit_of(function_pattern, folder, progress)
+            )
     except KeyboardInterrupt:
         exit_with_message(f"interrupted; finished functions are kept: {command} --resume {folder}", 130)
     print("\n".join(audit_summary(lines, folder)))

@@ -283,23 +283,31 @@ def _absolute_path(scene: str) -> str:
     return str(Path(scene).resolve()) if Path(scene).is_file() else scene
 
 
-def _save_sweep(folder: Path, swept: "SweepResults") -> None:
+def _save_sweep(folder: Path, sweep_results: "SweepResults") -> None:
     """Save the results of a sweep as ``sweep.csv`` and ``sweep.json``; equal points give equal bytes."""
     errors, broken = (
-        [_largest_error(results) for results in swept.results],
-        [_broken_assumptions_text(results) for results in swept.results],
+        [_largest_error(results) for results in sweep_results.results],
+        [_broken_assumptions_text(results) for results in sweep_results.results],
     )
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([swept.key, *swept.columns, "failed", "largest error [-]", "broken assumptions"])
-    for i, value in enumerate(swept.values):
+    writer.writerow([sweep_results.key, *sweep_results.columns, "failed", "largest error [-]", "broken assumptions"])
+    for i, value in enumerate(sweep_results.values):
         failed = "; ".join(
-            f"{engine_name}: {reason}" if engine_name else reason for engine_name, reason in swept.failures[i].items()
+            f"{engine_name}: {reason}" if engine_name else reason
+            for engine_name, reason in sweep_results.failures[i].items()
         )
-        writer.writerow([value, *(column[i] for column in swept.columns.values()), failed, errors[i], broken[i]])
+        writer.writerow(
+            [value, *(column[i] for column in sweep_results.columns.values()), failed, errors[i], broken[i]]
+        )
     write_whole(folder / "sweep.csv", text.getvalue().encode())
-    content = {"key": swept.key, "values": list(swept.values), "numbers": swept.columns, "failed": swept.failures}
-    content |= {"results": [told.as_json(results) for results in swept.results]}
+    content = {
+        "key": sweep_results.key,
+        "values": list(sweep_results.values),
+        "numbers": sweep_results.columns,
+        "failed": sweep_results.failures,
+    }
+    content |= {"results": [told.as_json(results) for results in sweep_results.results]}
     write_whole(folder / "sweep.json", json.dumps(content, indent=1).encode())
 
 

@@ -84,15 +84,17 @@ def _results_of_engine(results: Results, engine: str) -> Results:
     return {name: run for name, run in results.items() if run.data.attrs["engine"] not in other_engines}
 
 
-def draw_sweep(swept: SweepResults, folder: Path) -> list[str]:
+def draw_sweep(sweep_results: SweepResults, folder: Path) -> list[str]:
     """Save the figures ``sweep.png``, ``sweep-2.png``, ... of a sweep, and return their names; none if no number
     changes."""
-    changing = _changing_quantities(swept.columns)
+    changing = _changing_quantities(sweep_results.columns)
     size, names = PANELS_ACROSS * PANELS_DOWN, list[str]()
     shown = list(changing.items())[: size * MOST_PAGES]
     for first in range(0, len(shown), size):
         name = f"sweep-{first // size + 1}.png" if first else "sweep.png"
-        _draw_page(swept, shown[first : first + size], folder / name, f"the {len(changing)} quantities that change")
+        _draw_page(
+            sweep_results, shown[first : first + size], folder / name, f"the {len(changing)} quantities that change"
+        )
         names.append(name)
     return names
 
@@ -113,21 +115,21 @@ def _changing_quantities(columns: Columns) -> dict[str, dict[str, list[Any]]]:
 
 
 def _draw_page(
-    swept: SweepResults, shown_curves: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str
+    sweep_results: SweepResults, shown_curves: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str
 ) -> None:
     figure, axes = panels(len(shown_curves), min(PANELS_ACROSS, len(shown_curves)), 2.3)
-    sweep_positions, ticks = _axis_positions(swept.values)
+    sweep_positions, ticks = _axis_positions(sweep_results.values)
     for axis, (quantity_name, curves) in zip(axes, shown_curves, strict=True):
-        _draw_panel(axis, sweep_positions, quantity_name, curves, swept, "o" if ticks else "o-")
+        _draw_panel(axis, sweep_positions, quantity_name, curves, sweep_results, "o" if ticks else "o-")
         if ticks:
             axis.set_xticks(sweep_positions, ticks)
         elif _wants_log_axis(sweep_positions):
             axis.set_xscale("log")
         else:
             axis.locator_params(axis="x", nbins=6)
-        axis.set_xlabel(swept.key if ticks else f"{swept.key} [{swept.unit}]")
+        axis.set_xlabel(sweep_results.key if ticks else f"{sweep_results.key} [{sweep_results.unit}]")
     legend_below(figure, *axes)
-    add_heading(figure, f"{swept.scene.rpartition('/')[2]} over {swept.key}: {note}")
+    add_heading(figure, f"{sweep_results.scene.rpartition('/')[2]} over {sweep_results.key}: {note}")
     save(figure, path)
 
 
@@ -139,7 +141,12 @@ def _axis_positions(key_values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]
 
 
 def _draw_panel(
-    axis: Any, sweep_positions: np.ndarray, quantity: str, curves: dict[str, list[Any]], swept: SweepResults, style: str
+    axis: Any,
+    sweep_positions: np.ndarray,
+    quantity: str,
+    curves: dict[str, list[Any]],
+    sweep_results: SweepResults,
+    style: str,
 ) -> None:
     order = np.argsort(sweep_positions)
     for i, (engine, column) in enumerate(curves.items()):
@@ -152,12 +159,16 @@ def _draw_panel(
             linewidth=2.2 - 0.6 * min(i, 2),
             label=LABELS[engine] or None,
         )
-        _draw_marks(axis, sweep_positions, np.array(column, float), swept, engine)
+        _draw_marks(axis, sweep_positions, np.array(column, float), sweep_results, engine)
     if all(_wants_log_axis(np.array(present_numbers(column), float)) for column in curves.values()):
         axis.set_yscale("log")
     else:
         axis.ticklabel_format(axis="y", useOffset=False)
-    lost = [i for i, failed in enumerate(swept.failures) if failed and any(col[i] is None for col in curves.values())]
+    lost = [
+        i
+        for i, failed in enumerate(sweep_results.failures)
+        if failed and any(col[i] is None for col in curves.values())
+    ]
     if lost:
         foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "linestyle": "none"}
         axis.plot(sweep_positions[lost], np.full(len(lost), 0.04), **FAILED_MARK, **foot)
@@ -165,10 +176,13 @@ def _draw_panel(
 
 
 def _draw_marks(
-    axis: Any, sweep_positions: np.ndarray, curve_values: np.ndarray, swept: SweepResults, engine: str
+    axis: Any, sweep_positions: np.ndarray, curve_values: np.ndarray, sweep_results: SweepResults, engine: str
 ) -> None:
     """Draw open marks around the points of a curve at which a result broke an assumption or states a large error."""
-    for points, look in ((swept.broken_points(engine), BROKEN_MARK), (swept.warned_points(engine), WARNING_MARK)):
+    for points, look in (
+        (sweep_results.broken_points(engine), BROKEN_MARK),
+        (sweep_results.warned_points(engine), WARNING_MARK),
+    ):
         shown = [i for i in points if np.isfinite(curve_values[i])]
         if shown:
             axis.plot(

@@ -66,7 +66,7 @@ class Camera:
 
 
 def painted_picture(
-    camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky: np.ndarray
+    camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky_colours: np.ndarray
 ) -> np.ndarray:
     """Image (height, width, 3) of surfaces in front of a sky; sky (2, 3) : its colours at the top of the picture and at
     the horizon.
@@ -74,22 +74,22 @@ def painted_picture(
     A later layer lies over all earlier ones, as arrows over bodies do.
     """
     height_share = np.clip(np.arange(2 * height) / max(1.0, 2.0 * camera.horizon(height)), 0.0, 1.0)[:, None]
-    shade = (sky[0] + height_share * (sky[1] - sky[0])).astype(np.float32)
+    shade = (sky_colours[0] + height_share * (sky_colours[1] - sky_colours[0])).astype(np.float32)
     image = np.broadcast_to(shade[:, None], (2 * height, 2 * width, 3)).copy()
     for layer in layers:
         nearest = np.zeros(image.shape[:2], np.float32)
         solid = [surface for surface in layer if surface.alpha == 1.0]
         if solid:
-            paint(*_shaded_triangles(camera, solid, width, height, sky[1]), image, nearest)
+            paint(*_shaded_triangles(camera, solid, width, height, sky_colours[1]), image, nearest)
         for surface in (surface for surface in layer if surface.alpha < 1.0):
             veil, front = image.copy(), nearest.copy()
-            paint(*_shaded_triangles(camera, [surface], width, height, sky[1]), veil, front)
+            paint(*_shaded_triangles(camera, [surface], width, height, sky_colours[1]), veil, front)
             image += np.float32(surface.alpha) * (veil - image)
     return (image[::2, ::2] + image[1::2, ::2] + image[::2, 1::2] + image[1::2, 1::2]) / 4.0  # smooth edges
 
 
 def _shaded_triangles(
-    camera: Camera, surfaces: list[PaintedSurface], width: int, height: int, haze: np.ndarray
+    camera: Camera, surfaces: list[PaintedSurface], width: int, height: int, haze_colour: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners, inverse distances and colours, as ``paint`` takes them, of the triangles in front of the camera."""
     corners, near = camera.projected(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
@@ -100,7 +100,11 @@ def _shaded_triangles(
     towards = LIGHT_DIRECTION @ camera.axes / np.linalg.norm(LIGHT_DIRECTION)
     light = SHADED_BRIGHTNESS + (1.0 - SHADED_BRIGHTNESS) * (0.5 + 0.5 * normals[in_front] @ towards)
     clear = np.exp(-1.0 / (HAZE_DISTANCE * near[in_front]))[..., None]
-    return corners[in_front], near[in_front], clear * light[..., None] * colours[in_front, None] + (1.0 - clear) * haze
+    return (
+        corners[in_front],
+        near[in_front],
+        clear * light[..., None] * colours[in_front, None] + (1.0 - clear) * haze_colour,
+    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -95,7 +95,7 @@ def _instructions(folder: Path) -> np.ndarray:
         "valgrind",
         "--tool=callgrind",
         "--instr-atstart=no",
-        f"--dump-before={instructions_run.MARK}",
+        f"--dump-before={instructions_run.MARKING_SYSTEM_CALL}",
         f"--callgrind-out-file={folder}/count.%p",
         sys.executable,
         instructions_run.__file__,

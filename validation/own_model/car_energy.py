@@ -9,7 +9,7 @@ from models.systems.handling.energy import bodies_energy
 from models.vehicles.free_vehicle import rotor
 from validation.own_model.cars import CORNERS, SALOON
 
-BACKWARDS = ("rl swing", "rr swing", "rl spin", "rr spin")
+REVERSED_JOINTS = ("rl swing", "rr swing", "rl spin", "rr spin")
 """Joints of the file whose axes point along -y."""
 
 
@@ -48,7 +48,7 @@ def _energy_by_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float
     mujoco.mju_mat2Quat(data.qpos[3:7], motion.rotation.ravel())
     data.qvel[3:6] = motion.rotation.T @ turning
     for name, place in _coordinate_names().items():
-        joint, sign = model.joint(name), -1.0 if name in BACKWARDS else 1.0
+        joint, sign = model.joint(name), -1.0 if name in REVERSED_JOINTS else 1.0
         i = [*coordinates].index(place)  # type: ignore[arg-type]
         data.qpos[joint.qposadr], data.qvel[joint.dofadr] = sign * q[i], sign * v[i]
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY

@@ -22,16 +22,16 @@ HEADER_LENGTH = 17
 """Length of the header: rows per second, number of rows, and the vehicle's fifteen parameters."""
 
 
-def _compiled_callback(numeric, passive, time, position, velocity):
+def _compiled_callback(numeric_offset, passive_force_offset, time_offset, position_offset, velocity_offset):
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
     def force_callback(model, case_data):
-        header = carray(array_at(model, numeric), (HEADER_LENGTH,))
-        row = int(np.rint(carray(double_at(case_data, time), (1,))[0] * header[0]))
+        header = carray(array_at(model, numeric_offset), (HEADER_LENGTH,))
+        row = int(np.rint(carray(double_at(case_data, time_offset), (1,))[0] * header[0]))
         if not 0 <= row < int(header[1]):
             return
-        road = carray(array_at(model, numeric), (HEADER_LENGTH + 4 * int(header[1]),))
-        q, v = carray(array_at(case_data, position), (4,)), carray(array_at(case_data, velocity), (4,))
-        force = carray(array_at(case_data, passive), (4,))
+        road = carray(array_at(model, numeric_offset), (HEADER_LENGTH + 4 * int(header[1]),))
+        q, v = carray(array_at(case_data, position_offset), (4,)), carray(array_at(case_data, velocity_offset), (4,))
+        force = carray(array_at(case_data, passive_force_offset), (4,))
         road_index = HEADER_LENGTH + 4 * row
         a, b = header[2], header[3]
         sine, cosine = np.sin(q[3]), np.cos(q[3])

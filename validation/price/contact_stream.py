@@ -1,7 +1,7 @@
 """Peak memory of the computation of a long table of contacts, which is read and written as a stream.
 
-``python -m validation.price.contact_stream [ROWS ...]`` computes tables of so many rows, each in a fresh process, and
-prints memory and time; 10,000,000 rows need 2 GB of disk.
+``python -m validation.price.contact_stream [ROWS ...]`` computes tables of so many rows, each in a fresh process,
+and prints memory and time; 10,000,000 rows need 2 GB of disk.
 """
 
 import sys
@@ -19,7 +19,7 @@ from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
 from validation.common.peak_memory import peak_memory
 
-ROWS = (100_000, 1_000_000)
+ROW_COUNTS = (100_000, 1_000_000)
 REPEATED_ROWS = 1000
 """Number of rows after which the contents of a table repeat."""
 HEADER = "a [m],b [m],load [N],friction [-],xi_x [-],xi_y [-],spin [1/m]\n"
@@ -62,6 +62,6 @@ def in_fresh_process(function: Callable[[Path, int], ProcessCost], rows: int) ->
 
 
 if __name__ == "__main__":
-    for rows in map(int, sys.argv[1:]) if sys.argv[1:] else ROWS:
+    for rows in map(int, sys.argv[1:]) if sys.argv[1:] else ROW_COUNTS:
         taken = in_fresh_process(cost_of_table, rows)
         print(f"{rows:>12,} rows: {taken.memory / 1e6:.0f} MB, {taken.seconds:.0f} s", flush=True)

@@ -11,7 +11,7 @@ from unittest.mock import patch
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
 
-AT_START = {"VelocityVerlet": 1, "GeneralizedAlpha": 1, "TrapezoidalIndex2": 1}
+START_FORCE_CALLS = {"VelocityVerlet": 1, "GeneralizedAlpha": 1, "TrapezoidalIndex2": 1}
 """Force evaluations before the first step, for the start accelerations of a method; twinrig does not report them."""
 
 
@@ -54,4 +54,4 @@ def counted_calls(engine: str, assembly: Assembly, settings: Settings) -> tuple[
         return _mujoco_calls(model), reported_calls
     with _counted_loads() as calls:
         reported_calls = build(engine, assembly, settings).run().counts["force calls"]
-    return calls[0] - AT_START.get(settings.integrator, 0), reported_calls
+    return calls[0] - START_FORCE_CALLS.get(settings.integrator, 0), reported_calls

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 STEP = 1e-3
-MARK = "getpgid"
+MARKING_SYSTEM_CALL = "getpgid"
 """System call that separates valgrind's counts: a function of the C library that no engine calls."""
 
 
@@ -134,8 +134,8 @@ def run_in_forked_copy(marches: list[Callable[[int], None]], step_counts: list[i
 
 
 def run_marked_marches(marches: list[Callable[[int], None]], step_counts: list[int]) -> None:
-    """Run every time integration for each number of steps, with the system call MARK before each and at the end; then
-    exit the process."""
+    """Run every time integration for each number of steps, with the system call MARKING_SYSTEM_CALL before each and at
+    the end; then exit the process."""
     for march in marches:
         for steps in step_counts:
             os.getpgid(0)

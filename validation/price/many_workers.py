@@ -31,11 +31,11 @@ WORKERS = (2, 10, 100, 1000)
 
 @dataclass(frozen=True)
 class Ensemble:
-    """An ensemble that is computed in blocks. block: number of paths in each; thinned: factor by which workers thin the
-    time rows that they send back."""
+    """An ensemble that is computed in blocks. block: number of paths in each; thinning_factor: factor by which workers
+    thin the time rows that they send back."""
 
     block: int = 50
-    thinned: int = 1
+    thinning_factor: int = 1
 
     @property
     def seconds(self) -> float:
@@ -45,7 +45,7 @@ class Ensemble:
     @property
     def bytes(self) -> float:
         """Size (bytes) of the result that a worker sends back for a block."""
-        return self.block * PATH_BYTES / self.thinned
+        return self.block * PATH_BYTES / self.thinning_factor
 
     @property
     def stations(self) -> dict[str, float]:
@@ -87,10 +87,10 @@ def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerSha
     saved_blocks, first, sent, current_time = set[int](), 0, 0, 0.0
     blocks_ahead = max(BLOCKS_AHEAD, 2 * workers)
 
-    def serve(station_name: str, takes: float, then: str, block: int) -> None:
+    def serve(station_name: str, service_seconds: float, next_station: str, block: int) -> None:
         """Let a station serve a block as soon as it is idle."""
-        idle[station_name] = max(idle[station_name], current_time) + takes
-        heappush(events, (idle[station_name], next(order), then, block))
+        idle[station_name] = max(idle[station_name], current_time) + service_seconds
+        heappush(events, (idle[station_name], next(order), next_station, block))
 
     while len(saved_blocks) < blocks:
         while sent < min(blocks, first + blocks_ahead) and sent - len(saved_blocks) < blocks_ahead:
@@ -127,7 +127,7 @@ SETTINGS = {
 """Ensembles of the table, by the options that a user types."""
 
 
-def table(round_count: int = 20) -> Iterator[str]:
+def shares_table(round_count: int = 20) -> Iterator[str]:
     """Lines of the table in the docs: share of time for which workers compute, and the busiest station with the largest
     number of workers. round_count : number of blocks per worker."""
     for name, ensemble in SETTINGS.items():
@@ -138,4 +138,4 @@ def table(round_count: int = 20) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    print("\n".join(table()))
+    print("\n".join(shares_table()))

@@ -54,10 +54,10 @@ def _setting_text(p: Point) -> str:
     return f"{p.setting.curve} {p.setting.label()}"
 
 
-def _offenders_row(name: str, offence: str, offending: list[str], tolerance_reason: str) -> Row:
+def _offenders_row(name: str, offence_text: str, offending_settings: list[str], tolerance_reason: str) -> Row:
     """Row that passes if the list of offending settings is empty; otherwise it names them."""
-    offenders = f": {', '.join(offending)}" if offending else ""
-    return Observed(name, SYSTEM, offence + offenders, len(offending), "settings").within(
+    offenders = f": {', '.join(offending_settings)}" if offending_settings else ""
+    return Observed(name, SYSTEM, offence_text + offenders, len(offending_settings), "settings").within(
         0, 0, tolerance_reason, "closed form"
     )
 

@@ -60,12 +60,12 @@ def weak_damper_in_block(block, t, n):
     add_weak_damper(f, t, beyond(f, n), beyond(f, 2 * n), f)
 
 
-ZEROS = [0.0] * 4
+ZERO_FORCES = [0.0] * 4
 
 
 def zero_forces(positions: Any, rates: Any) -> Any:
     """Force function that returns zero forces at every state."""
-    return ZEROS
+    return ZERO_FORCES
 
 
 Runs = list[Callable[[], Any]]

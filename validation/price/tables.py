@@ -81,12 +81,12 @@ def rounds_of(points: list[Point]) -> str:
 
 def _text_of_winner(
     measured_points: MeasuredPoints,
-    reaches: CostsAtTolerance,
+    costs_at_tolerance: CostsAtTolerance,
     engine: str,
     unit: str,
     groups: list[tuple[str, ...]] | None = None,
 ) -> str:
-    best = runner.cheapest_curve(reaches, engine)
+    best = runner.cheapest_curve(costs_at_tolerance, engine)
     if best is None:
         return "none of those tried"
     curve, cheapest = best
@@ -203,11 +203,11 @@ def _mark_of_single_runs(points: list[Point], cheapest_reach: ToleranceCost | No
     )
 
 
-def _cost_text(cheapest_reach: ToleranceCost | None, unit_scale: float, form: str) -> str:
+def _cost_text(cheapest_reach: ToleranceCost | None, unit_scale: float, number_format: str) -> str:
     return (
         "not met"
         if cheapest_reach is None
-        else format(unit_scale * cheapest_reach.cost, form) + _coarsest_text(cheapest_reach)
+        else format(unit_scale * cheapest_reach.cost, number_format) + _coarsest_text(cheapest_reach)
     )
 
 

@@ -5,8 +5,8 @@ then the same blocks by two workers through ``models.ensemble.runner``, and thro
 the extra ``cluster`` is installed. The efficiency is the ratio of the first's seconds to the others', with its 95 %
 interval. It says nothing on a machine with fewer than two idle cores.
 
-``python -m validation.price.two_workers [ROUNDS]`` prints it, with the seconds of the processor that a block costs the
-command, by the size of what a block sends.
+``python -m validation.price.two_workers [ROUNDS]`` prints it, with the seconds of the processor that a block
+costs the command, by the size of what a block sends.
 """
 
 import os
@@ -31,7 +31,7 @@ from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.scenes import force_scene, road_scene
 
-ROUNDS = 9
+TIMING_ROUNDS = 9
 PATHS_PER_RUN, BLOCKS_OF_RUN = 400, Blocks(25)
 """Number of paths of a timed run, and their blocks: about 3 s by two workers, and 8 blocks each."""
 SENT_COUNTS = (1_000, 50_000, 500_000)
@@ -101,7 +101,7 @@ def worker_pools() -> Iterator[dict[str, Executor]]:
         yield pools
 
 
-def measured_pools(round_count: int = ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]:
+def measured_pools(round_count: int = TIMING_ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]:
     """Measurement of each pool of workers: ``efficiency`` relative to two separate processes and ``seconds`` of a run,
     both with intervals; ``cost`` of a block (s)."""
     job = ensemble_job() if job is None else job
@@ -139,4 +139,4 @@ def measurement_lines(measurement: dict[str, dict[str, Any]]) -> list[str]:
 
 if __name__ == "__main__":
     print(f"{os.cpu_count()} cores; load before: {os.getloadavg()[0]:.2f}")
-    print("\n".join(measurement_lines(measured_pools(int(sys.argv[1]) if sys.argv[1:] else ROUNDS))))
+    print("\n".join(measurement_lines(measured_pools(int(sys.argv[1]) if sys.argv[1:] else TIMING_ROUNDS))))

@@ -38,7 +38,7 @@ ENGINES = ("reference", "exudyn", "mujoco")
 TRUTH_TOLERANCE = 1e-11
 COARSE_SPACING, FINE_SPACING = 5e-5, 2e-5
 """Largest row spacing (s) of the true solution, and least one at which all settings are compared at common times."""
-ROUNDS = 9, 25
+TIMING_ROUNDS = 9, 25
 """Numbers of interleaved timing rounds of a first comparison, and of a second that must confirm it."""
 LARGEST_TIMED_RATIO = 3.0
 """Ratio of seconds from which a default setting is not timed again, as times do not scatter that much."""
@@ -126,7 +126,7 @@ Kind = tuple[str, dict[str, Any], dict[str, Any]]
 """Name, effects, and further tables of a random scene."""
 
 
-def _iso_road(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_iso_road(generator: Random, folder: Path, scene_number: int) -> Kind:
     road = {
         "source": "iso8608",
         "road_class": str(generator.choice(list("ABCDE"))),
@@ -136,7 +136,7 @@ def _iso_road(generator: Random, folder: Path, scene_number: int) -> Kind:
     return "rough road", {"road": road}, {}
 
 
-def _study_road(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_study_road(generator: Random, folder: Path, scene_number: int) -> Kind:
     source = str(generator.choice(["study", "hills"]))
     return f"{source} road", {"road": {"source": source, "speed": float(round(generator.uniform(5.0, 35.0), 1))}}, {}
 
@@ -147,7 +147,7 @@ def _random_release(generator: Random, folder: Path, scene_number: int) -> Kind:
     return "release", {}, {"start": start_values, "duration": float(generator.choice([0.2, 0.4, 2.5]))}
 
 
-def _forces(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_measured_forces(generator: Random, folder: Path, scene_number: int) -> Kind:
     interpolation, period = (
         str(generator.choice(["linear", "held", "smooth"])),
         float(generator.choice([1e-2, 5e-3, 2e-3])),
@@ -160,7 +160,7 @@ def _forces(generator: Random, folder: Path, scene_number: int) -> Kind:
     )
 
 
-def _random_guided(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_guided_vehicle(generator: Random, folder: Path, scene_number: int) -> Kind:
     file, pitch = _write_wheel_forces(generator, folder, scene_number, 5e-3), f"pitch{scene_number}.csv"
     sample_times = 5e-3 * np.arange(101)
     wave = generator.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * generator.uniform(0.5, 3.0) * sample_times))
@@ -170,16 +170,16 @@ def _random_guided(generator: Random, folder: Path, scene_number: int) -> Kind:
 
 
 SCENE_KINDS: tuple[Callable[[Random, Path, int], Kind], ...] = (
-    _iso_road,
-    _forces,
+    _random_iso_road,
+    _random_measured_forces,
     _random_release,
-    _iso_road,
-    _random_guided,
-    _study_road,
-    _forces,
-    _iso_road,
+    _random_iso_road,
+    _random_guided_vehicle,
+    _random_study_road,
+    _random_measured_forces,
+    _random_iso_road,
     _random_release,
-    _forces,
+    _random_measured_forces,
 )
 
 
@@ -245,7 +245,7 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
     else:
         parts = dict.fromkeys(runs, common)
     exact = {
-        n: ReferenceTruth(_exact_solution(scene, scene.base / n), 0.0, "", 0, scene.kink_period)
+        n: ReferenceTruth(_accurate_solution(scene, scene.base / n), 0.0, "", 0, scene.kink_period)
         for n in set(parts.values())
     }
     return {setting: exact[parts[setting]].error(run) for setting, run in runs.items()}
@@ -256,7 +256,7 @@ def _fine_multiple(scene: PricedPitchPlane, part_count: int) -> int:
     return part_count * math.ceil(scene.base / part_count / COARSE_SPACING * (1 - 1e-9))
 
 
-def _exact_solution(scene: PricedPitchPlane, spacing: float) -> PricedRun:
+def _accurate_solution(scene: PricedPitchPlane, spacing: float) -> PricedRun:
     return scene.answer(scene.run("reference", Settings("DOP853", spacing, scene.whole, TRUTH_TOLERANCE)))
 
 
@@ -286,14 +286,14 @@ def _coarsest_defaults(recommendation: Recommendation) -> list[TriedSetting]:
     return list({tried.setting.curve: tried for tried in able}.values())
 
 
-def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, rival: TriedSetting) -> bool:
-    if rival.setting == choice.tried.setting or rival.seconds > LARGEST_TIMED_RATIO * choice.seconds:
+def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, rival_setting: TriedSetting) -> bool:
+    if rival_setting.setting == choice.tried.setting or rival_setting.seconds > LARGEST_TIMED_RATIO * choice.seconds:
         return False
     jobs = [
         partial(recommendation.scene.solve, attempt.setting, recommendation.scene.first)
-        for attempt in (choice.tried, rival)
+        for attempt in (choice.tried, rival_setting)
     ]
     return all(
         paired_ratio(*interleave(jobs, rounds, SHORTEST_TURN, clock=time.process_time))[1] > SLOWER_RATIO
-        for rounds in ROUNDS
+        for rounds in TIMING_ROUNDS
     )

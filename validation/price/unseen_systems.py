@@ -117,7 +117,7 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
 
     def error(setting: Setting) -> float:
         exact = (
-            _exact_solution(scene, setting)
+            _accurate_solution(scene, setting)
             if isinstance(scene, MeshedScene)
             else scene.answer(scene.solve(finer, scene.whole))
         )
@@ -126,7 +126,7 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
     return {setting: error(setting) for setting in settings}
 
 
-def _exact_solution(scene: MeshedScene, setting: Setting) -> PricedRun:
+def _accurate_solution(scene: MeshedScene, setting: Setting) -> PricedRun:
     cells = min(MOST_CELLS, max(FEWEST_CELLS, TRUTH_CELLS_RATIO * round(1.0 / setting.value))) if scene.cells else 0
     step = min(scene.steps.values()) if scene.cells else setting.value
     return scene.answer((cells, scene.exact(cells, step, scene.whole)))

@@ -48,11 +48,11 @@ def output_of_job(job: ReplayJob, command: str, folder: Path) -> CommandOutput:
     for file in BASE_SCENES.glob("*.[!t]*"):
         shutil.copy(file, folder)
     (folder / "scene.toml").write_text(job.scene)
-    given_files = {path.name for path in folder.iterdir()}
+    input_files = {path.name for path in folder.iterdir()}
     job_answer = CommandOutput([], "", 0.0)
     for words in job.commands:
         _run_command([command, *words], folder, job_answer)
-    job_answer.arrays |= dict(_arrays_of_files(folder, given_files))
+    job_answer.arrays |= dict(_arrays_of_files(folder, input_files))
     shutil.rmtree(folder)
     return job_answer
 
@@ -116,12 +116,12 @@ def _masked_message(text: str) -> str:
     return text
 
 
-def _arrays_of_files(folder: Path, given_files: set[str]) -> Iterator[tuple[str, np.ndarray]]:
+def _arrays_of_files(folder: Path, input_files: set[str]) -> Iterator[tuple[str, np.ndarray]]:
     """Yield name ("file: channel") and values of each array in the files that a job's commands wrote into the
     folder."""
     for path in sorted(folder.rglob("*")):
         read = {".nc": _netcdf_channels, ".csv": _csv_columns}.get(path.suffix)
-        if read is not None and path.name not in given_files:
+        if read is not None and path.name not in input_files:
             yield from ((f"{path.relative_to(folder)}: {name}", array) for name, array in read(path))
 
 
@@ -199,27 +199,27 @@ class OutputDifference:
 
 
 def output_difference(
-    recorded: CommandOutput, current_answer: CommandOutput, bound: float, renamed: Mapping[str, str]
+    recorded_output: CommandOutput, current_answer: CommandOutput, bound: float, renamed_channels: Mapping[str, str]
 ) -> OutputDifference:
     """Differences of a job's output from the recorded output.
 
-    bound : largest change of a number by the largest one of its channel; 0 asks for the same bits. renamed : earlier
-    names of channels to later ones; a channel that is in another file now is looked for by its name.
+    bound : largest change of a number by the largest one of its channel; 0 asks for the same bits. renamed_channels :
+    earlier names of channels to later ones; a channel that is in another file now is looked for by its name.
     """
     difference = OutputDifference()
-    if recorded.codes != current_answer.codes:
+    if recorded_output.codes != current_answer.codes:
         difference.wrong.append(
-            f"exit codes {recorded.codes} are {current_answer.codes}: {current_answer.message.strip()[-200:]}"
+            f"exit codes {recorded_output.codes} are {current_answer.codes}: {current_answer.message.strip()[-200:]}"
         )
-    if recorded.message != current_answer.message:
+    if recorded_output.message != current_answer.message:
         difference.tolerated.append(
-            f"message {recorded.message.strip()[:200]!r} is {current_answer.message.strip()[:200]!r}"
+            f"message {recorded_output.message.strip()[:200]!r} is {current_answer.message.strip()[:200]!r}"
         )
     matched = set()
-    for name, array in recorded.arrays.items():
+    for name, array in recorded_output.arrays.items():
         if not {*re.split(r"[:/ ]+", name)}.isdisjoint(UNWATCHED_KEYS):
             continue
-        if (later := _renamed_channel(name, current_answer.arrays, renamed)) is None:
+        if (later := _renamed_channel(name, current_answer.arrays, renamed_channels)) is None:
             difference.wrong.append(f"{name} is gone")
             continue
         matched.add(later)
@@ -229,31 +229,36 @@ def output_difference(
     return difference
 
 
-def _renamed_channel(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, str]) -> str | None:
+def _renamed_channel(name: str, arrays: Mapping[str, np.ndarray], renamed_channels: Mapping[str, str]) -> str | None:
     """Name of a recorded channel in later arrays: unchanged, renamed, or in another file if only one file has this
     channel; None if it is missing."""
-    if (name_then := renamed.get(name, name)) in arrays:
+    if (name_then := renamed_channels.get(name, name)) in arrays:
         return name_then
     channel = name_then.partition(": ")[2]
     other_names = [other_name for other_name in arrays if other_name.partition(": ")[2] == channel]
     return other_names[0] if len(other_names) == 1 else None
 
 
-def _change_text(recorded: np.ndarray, current_values: np.ndarray, bound: float) -> str:
+def _change_text(recorded_values: np.ndarray, current_values: np.ndarray, bound: float) -> str:
     """Sentence part on how an array changed; "" if no change exceeds the bound, relative to its largest number."""
-    if recorded.dtype.kind == current_values.dtype.kind == "U" and recorded.size == current_values.size == 1:
-        return "" if recorded == current_values else f"{recorded} is {current_values}"
-    if recorded.shape != current_values.shape or recorded.dtype != current_values.dtype:
-        return f"{recorded.dtype} {recorded.shape} is {current_values.dtype} {current_values.shape}"
-    if recorded.tobytes() == current_values.tobytes():
-        return ""
-    if recorded.dtype.kind != "f" or not bound:
-        return "other values" if recorded.size > 1 else f"{recorded} is {current_values}"
-    known = np.isfinite(recorded)
     if (
-        not np.array_equal(recorded[~known], current_values[~known], equal_nan=True)
+        recorded_values.dtype.kind == current_values.dtype.kind == "U"
+        and recorded_values.size == current_values.size == 1
+    ):
+        return "" if recorded_values == current_values else f"{recorded_values} is {current_values}"
+    if recorded_values.shape != current_values.shape or recorded_values.dtype != current_values.dtype:
+        return f"{recorded_values.dtype} {recorded_values.shape} is {current_values.dtype} {current_values.shape}"
+    if recorded_values.tobytes() == current_values.tobytes():
+        return ""
+    if recorded_values.dtype.kind != "f" or not bound:
+        return "other values" if recorded_values.size > 1 else f"{recorded_values} is {current_values}"
+    known = np.isfinite(recorded_values)
+    if (
+        not np.array_equal(recorded_values[~known], current_values[~known], equal_nan=True)
         or not np.isfinite(current_values[known]).all()
     ):
         return "numbers are finite elsewhere"
-    share = abs(recorded - current_values)[known].max(initial=0.0) / max(abs(recorded)[known].max(initial=0.0), 1e-300)
+    share = abs(recorded_values - current_values)[known].max(initial=0.0) / max(
+        abs(recorded_values)[known].max(initial=0.0), 1e-300
+    )
     return "" if share <= bound else f"a number changed by {share:.2g} of the largest"

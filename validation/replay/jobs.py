@@ -81,34 +81,34 @@ def _varied_jobs() -> Iterator[ReplayJob]:
     bases = sorted(BASE_SCENES.glob("*.toml"))
     for i in range(VARIED_JOBS):
         base = bases[i % len(bases)]
-        random = np.random.default_rng([SEED, i])
-        yield _random_job(f"{base.stem}-{i:03d}", tomllib.loads(base.read_text()), random)
+        generator = np.random.default_rng([SEED, i])
+        yield _random_job(f"{base.stem}-{i:03d}", tomllib.loads(base.read_text()), generator)
 
 
-def _random_job(name: str, scene: Table, random: np.random.Generator) -> ReplayJob:
+def _random_job(name: str, scene: Table, generator: np.random.Generator) -> ReplayJob:
     """Job that runs a random variant of a base scene: tables removed, numbers changed, a random engine, and sometimes a
     mistake."""
     from tomli_w import dumps
 
     engines = scene.pop("engines_asked", ENGINES)
-    engine = str(random.choice(engines)) if engines else ""
-    _drop_random_tables(scene, random)
-    if random.random() < CHANGED_CHANCE:
-        for number_path in random.permutation(list(_paths_of_numbers(scene)))[:3]:
-            _change_number(scene, str(number_path), float(random.uniform(*FACTOR_RANGE)))
-    if random.random() < MISTAKE_CHANCE:
-        engine = _make_mistake(scene, engine, random)
+    engine = str(generator.choice(engines)) if engines else ""
+    _drop_random_tables(scene, generator)
+    if generator.random() < CHANGED_CHANCE:
+        for number_path in generator.permutation(list(_paths_of_numbers(scene)))[:3]:
+            _change_number(scene, str(number_path), float(generator.uniform(*FACTOR_RANGE)))
+    if generator.random() < MISTAKE_CHANCE:
+        engine = _make_mistake(scene, engine, generator)
     return ReplayJob(name, (_run_command(engine),), dumps(scene))
 
 
-def _drop_random_tables(scene: Table, random: np.random.Generator) -> None:
+def _drop_random_tables(scene: Table, generator: np.random.Generator) -> None:
     effects = scene.get("effects")
     for table in (scene, effects if isinstance(effects, dict) else {}):
         for key in list(table):
             if (
                 isinstance(table[key], dict)
                 and key not in (*NEVER_DROPPED_KEYS, "effects")
-                and random.random() < DROPPED_CHANCE
+                and generator.random() < DROPPED_CHANCE
             ):
                 del table[key]
 
@@ -134,16 +134,16 @@ def _change_number(scene: Table, number_path: str, factor: float) -> None:
     table[key] = float(f"{factor * table[key]:.4g}")
 
 
-def _make_mistake(scene: Table, engine: str, random: np.random.Generator) -> str:
+def _make_mistake(scene: Table, engine: str, generator: np.random.Generator) -> str:
     """Put a typical user's mistake into a scene; returns the name of the engine to run, which may be the mistake."""
     original_scene = copy.deepcopy(scene)
     number_paths = sorted(_paths_of_numbers(original_scene))
-    kind = int(random.integers(5))
+    kind = int(generator.integers(5))
     if kind == 0 or not number_paths:
         scene["vehicel"] = {}
     elif kind == 4:
         return "exodyn"
     else:
-        table, key = _table_and_key(scene, str(random.choice(number_paths)))
+        table, key = _table_and_key(scene, str(generator.choice(number_paths)))
         table[key] = {1: "a text", 2: -abs(table[key]) - 1.0, 3: float("nan")}[kind]
     return engine

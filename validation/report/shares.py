@@ -65,14 +65,14 @@ def report_sizes_of_systems(results: Saved) -> list[Saved]:
 
 
 def _sizes_of_system(
-    system: str, counted: dict[str, Counter[str]], main_system_of_case: dict[str, str], seconds: dict[str, float]
+    system: str, row_counts: dict[str, Counter[str]], main_system_of_case: dict[str, str], seconds: dict[str, float]
 ) -> Saved:
-    main_cases = [case for case in counted if main_system_of_case[case] == system]
-    shared = [case for case in counted if system in counted[case]]
+    main_cases = [case for case in row_counts if main_system_of_case[case] == system]
+    shared = [case for case in row_counts if system in row_counts[case]]
     return {
         "name": system,
         "cases": len(main_cases),
-        "rows": sum(counted[case][system] for case in shared),
+        "rows": sum(row_counts[case][system] for case in shared),
         "seconds": sum(seconds.get(case, 0.0) for case in main_cases),
         "stated": QUICK_SECONDS[system],
         "full_rows": sum(full_report_data()[case]["rows"].get(system, 0) for case in shared)

@@ -66,17 +66,17 @@ def _case_module(name: str) -> ModuleType | None:
         return None
 
 
-def _first_paragraph(documented: Any) -> str:
+def _first_paragraph(documented_object: Any) -> str:
     """First paragraph of the docstring of a module or function."""
-    return "" if documented is None else (inspect.getdoc(documented) or "").partition("\n\n")[0]
+    return "" if documented_object is None else (inspect.getdoc(documented_object) or "").partition("\n\n")[0]
 
 
-def _tables_of_case(module: Any, saved: Any, name: str) -> Iterable[Any]:
-    return module.tables(saved) if hasattr(module, "tables") else ()
+def _tables_of_case(module: Any, saved_data: Any, name: str) -> Iterable[Any]:
+    return module.tables(saved_data) if hasattr(module, "tables") else ()
 
 
-def _figures_of_case(module: Any, saved: Any, name: str) -> Iterator[tuple[str, Any]]:
-    for i, (caption, figure) in enumerate(module.draw(saved) if hasattr(module, "draw") else ()):
+def _figures_of_case(module: Any, saved_data: Any, name: str) -> Iterator[tuple[str, Any]]:
+    for i, (caption, figure) in enumerate(module.draw(saved_data) if hasattr(module, "draw") else ()):
         yield caption, inline_figure(figure, caption, f"{name}-{i}")
 
 

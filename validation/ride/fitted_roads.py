@@ -57,11 +57,11 @@ def generated_road_rows(length: float) -> tuple[list[Row], dict[str, Any]]:
     return rows, _figure_numbers(tracks, fitted)
 
 
-def _first_order_samples(shape_filter: ShapeFilter, noise: np.ndarray, step: float) -> np.ndarray:
+def _first_order_samples(shape_filter: ShapeFilter, unit_noise: np.ndarray, step: float) -> np.ndarray:
     """Samples (n,) of a stationary first-order process at stations ``step`` m apart, from unit noise (n,); exact."""
     decay = math.exp(-shape_filter.corner * step)
-    driven = noise * math.sqrt((1.0 - decay**2) * shape_filter.intensity / (2.0 * shape_filter.corner))
-    driven[0] = noise[0] * math.sqrt(shape_filter.intensity / (2.0 * shape_filter.corner))
+    driven = unit_noise * math.sqrt((1.0 - decay**2) * shape_filter.intensity / (2.0 * shape_filter.corner))
+    driven[0] = unit_noise[0] * math.sqrt(shape_filter.intensity / (2.0 * shape_filter.corner))
     return lfilter([1.0], [1.0, -decay], driven)
 
 
@@ -98,9 +98,9 @@ def measured_road_rows() -> tuple[list[Row], list[dict[str, Any]]]:
     return rows, shown
 
 
-def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any]:
+def _figure_numbers(tracks: MeasuredTracks, fitted_road: FittedRoad) -> dict[str, Any]:
     """Numbers of a fitted road that are saved for the figure and the table."""
-    spectra = fitted.spectra
+    spectra = fitted_road.spectra
     drawn_rows = np.unique(np.geomspace(1, len(spectra.wavenumber), 160).astype(int)) - 1
     fits = [
         fit
@@ -112,7 +112,7 @@ def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any
             fit.log_residual,
             fit.corner_is_resolved,
         ]
-        for fit in (fitted.mean, fitted.roll)
+        for fit in (fitted_road.mean, fitted_road.roll)
     ]
     return {
         "name": tracks.name,
@@ -121,14 +121,14 @@ def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any
         "fits": fits,
         **{key: getattr(spectra, key)[drawn_rows].tolist() for key in ("wavenumber", "left", "coherency")},
         "chance": spectra.chance_coherency(),
-        "notes": fitted.notes,
+        "notes": fitted_road.notes,
     }
 
 
-def _verdict_text(resolved: bool, residual: float) -> str:
+def _verdict_text(is_resolved: bool, residual: float) -> str:
     if residual > math.log(2.0):
         return "not of first order"
-    return "first order" if resolved else "a level only"
+    return "first order" if is_resolved else "a level only"
 
 
 def fits_table(roads: list[dict[str, Any]]) -> Table:

@@ -143,16 +143,16 @@ def linear_engine_rows() -> tuple[list[Row], dict[str, Any]]:
     return rows, _spectral_densities(runs, linear, excitation_)
 
 
-def _spectral_densities(runs: dict[str, Ride], linear: LinearVehicle, excitation: Excitation) -> dict[str, Any]:
+def _spectral_densities(runs: dict[str, Ride], linear_vehicle: LinearVehicle, excitation: Excitation) -> dict[str, Any]:
     """One-sided spectral densities (1/Hz) of SHOWN_OUTPUTS: of the linear vehicle in closed form, and by Welch's method
     of each engine's run."""
     frequency = np.geomspace(0.2, 40.0, 300)
-    sides = {"own": (frequency, one_sided(linear, excitation, SPEED, frequency))}
+    sides = {"own": (frequency, one_sided(linear_vehicle, excitation, SPEED, frequency))}
     sides |= {engine: run.densities(frequency[-1]) for engine, run in runs.items()}
     return {
         side: {
             "frequency": f.tolist(),
-            **{name: density[:, linear.names.index(name)].tolist() for name in SHOWN_OUTPUTS},
+            **{name: density[:, linear_vehicle.names.index(name)].tolist() for name in SHOWN_OUTPUTS},
         }
         for side, (f, density) in sides.items()
     }

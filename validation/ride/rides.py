@@ -153,19 +153,21 @@ def changed_vehicle(vehicle: SpatialVehicle, seed: int) -> SpatialVehicle:
     """Asymmetric twin: the vehicle with each mass, stiffness and damping randomly changed by up to LARGEST_CHANGE."""
     rng = np.random.default_rng(seed)
 
-    def changed(parameter_value: float) -> float:
+    def changed_value(parameter_value: float) -> float:
         return parameter_value * (1 + LARGEST_CHANGE * rng.uniform(-1, 1))
 
     bodies = []
     for body in vehicle.bodies:
-        factor = changed(1.0)
+        factor = changed_value(1.0)
         inertia = tuple(tuple(factor * entry for entry in row) for row in body.inertia)
         bodies.append(replace(body, mass=factor * body.mass, inertia=inertia))  # type: ignore[arg-type]
     return replace(
         vehicle,
         name=f"{vehicle.name}, asymmetric twin {seed}",
         bodies=tuple(bodies),
-        springs=tuple(replace(s, stiffness=changed(s.stiffness), damping=changed(s.damping)) for s in vehicle.springs),
-        bars=tuple(replace(bar, stiffness=changed(bar.stiffness)) for bar in vehicle.bars),
-        tyres=tuple(replace(tyre, stiffness=changed(tyre.stiffness)) for tyre in vehicle.tyres),
+        springs=tuple(
+            replace(s, stiffness=changed_value(s.stiffness), damping=changed_value(s.damping)) for s in vehicle.springs
+        ),
+        bars=tuple(replace(bar, stiffness=changed_value(bar.stiffness)) for bar in vehicle.bars),
+        tyres=tuple(replace(tyre, stiffness=changed_value(tyre.stiffness)) for tyre in vehicle.tyres),
     )

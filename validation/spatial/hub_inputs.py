@@ -16,9 +16,9 @@ from models.systems.hub_forces.measurement import HubForces
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from validation.common.rows import Observed, Row, System
 from validation.spatial.cars import random_states, static_forces
-from validation.spatial.written_equations import FRAMES
+from validation.spatial.written_equations import FORCE_FRAMES
 
-SEED, SAMPLES, STEP, STEPS_PER_SAMPLE = 37, 12, 2e-3, 4
+SEED, SAMPLE_COUNT, STEP, STEPS_PER_SAMPLE = 37, 12, 2e-3, 4
 """Seed and number of the force samples, step (s), and number of steps from one sample to the next."""
 SOLVER_TOLERANCE = 1e-11
 """Relative tolerance of the adaptive integrators."""
@@ -73,12 +73,12 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
 
 def settings(integrator: str = FIXED) -> Settings:
     """Settings of a run over all force samples with an integrator."""
-    return Settings(integrator, STEP, (SAMPLES - 1) * STEPS_PER_SAMPLE * STEP, SOLVER_TOLERANCE)
+    return Settings(integrator, STEP, (SAMPLE_COUNT - 1) * STEPS_PER_SAMPLE * STEP, SOLVER_TOLERANCE)
 
 
 def samples(vehicle: CutVehicle) -> HubForces:
     """Hub force samples in axes fixed in space: static loads, with noise of 400 N and 40 N m."""
-    static_inputs = static_forces(vehicle, SAMPLES, "inertial")
+    static_inputs = static_forces(vehicle, SAMPLE_COUNT, "inertial")
     deviations = np.tile([400.0] * 3 + [40.0] * 3, len(vehicle.hubs))
     return HubForces(static_inputs.hubs, STEPS_PER_SAMPLE * STEP, "inertial").noisy(deviations, SEED)
 
@@ -104,7 +104,7 @@ def _falling_path(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) ->
     """Path (samples, 3) in m, from rest, of a point mass with the vehicle's mass under weight and the sum of all hub
     forces."""
     mass, period = sum(body.mass for body in vehicle.tree.bodies), forces.period
-    hubs = forces.samples.reshape(SAMPLES, -1, WRENCH)[:, :, :3].sum(axis=1)
+    hubs = forces.samples.reshape(SAMPLE_COUNT, -1, WRENCH)[:, :, :3].sum(axis=1)
     begin = hubs[:-1] / mass - [0.0, 0.0, GRAVITY]
     end = begin if hold_samples else hubs[1:] / mass - [0.0, 0.0, GRAVITY]
     speeds = np.vstack([np.zeros(3), np.cumsum(period / 2.0 * (begin + end), axis=0)])
@@ -118,7 +118,7 @@ def acceleration_gap_between_rows(vehicle: CutVehicle, state_count: int) -> floa
     rng, rows, worst = np.random.default_rng(SEED), 7, 0.0
     for i in range(state_count):
         hubs = static_forces(vehicle, rows).hubs + rng.normal(0.0, 500.0, (rows, WRENCH * len(vehicle.hubs)))
-        hub_inputs = HubInputs(hubs, FRAMES[i % 3], guide=rng.normal(0.0, 0.1, (rows, 6)))
+        hub_inputs = HubInputs(hubs, FORCE_FRAMES[i % 3], guide=rng.normal(0.0, 0.1, (rows, 6)))
         run_settings = Settings("DOP853", STEP, (rows // 2) * STEP)
         compiled, plain = (HubModel(engine, vehicle, hub_inputs, run_settings) for engine in ("reference", PLAIN))
         state, time = random_states(vehicle, i), rng.uniform(0.0, run_settings.duration)

@@ -100,10 +100,10 @@ class _LoadedModel:
             self._load_elements()
             mujoco.mj_forward(self.model, self.data)
 
-    def _point(self, body: str, design: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _point(self, body: str, design_position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position (m) and velocity (m/s) in space of a point fixed to a body, given by its design position (m)."""
         number, jacobian = self.ids[body], np.zeros((3, self.model.nv))
-        arm = design - np.array(self.vehicle.tree.body(body).position)
+        arm = design_position - np.array(self.vehicle.tree.body(body).position)
         position = self.data.xpos[number] + self.data.xmat[number].reshape(3, 3) @ arm
         mujoco.mj_jac(self.model, self.data, jacobian, None, position, number)
         return position, jacobian @ self.data.qvel

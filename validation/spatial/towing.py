@@ -56,19 +56,22 @@ def static_loads(car: Handling) -> list[float]:
 
 
 def towed_turn(
-    vehicle: SpatialVehicle, speed: float, change: Callable[[Handling], None] | None = None, duration: float = 8.0
+    vehicle: SpatialVehicle,
+    speed: float,
+    change_handling: Callable[[Handling], None] | None = None,
+    duration: float = 8.0,
 ) -> TurnErrors:
     """Errors of a steady turn with small slip at a speed (m/s) in MuJoCo, against the closed form.
 
-    One to the left less one to the right: a vehicle without symmetry pulls. change : plants a fault in the table;
-    duration : s.
+    One to the left less one to the right: a vehicle without symmetry pulls. change_handling : plants a fault in the
+    table; duration : s.
     """
     turns = []
     for steer in (SMALL_STEER, -SMALL_STEER):
         car = Handling(replace(vehicle, drags=()), controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
         wanted = steady_turn(car, speed)
-        if change is not None:
-            change(car)
+        if change_handling is not None:
+            change_handling(car)
         turns.append(drive_run("mujoco", car, speed, duration))
     left, right = (np.array([turn.velocity()[-1, 2], *final_headings(turn)]) for turn in turns)
     yaw, *towed = (left - right) / (2.0 * SMALL_STEER)

@@ -33,7 +33,7 @@ from validation.spatial.trains import caravan, train
 SEED, STEP, SPEED = 41, 1e-3, 22.0
 ROLLING_STEP = 2e-3
 """Step (s) of a run on tyres; an evaluation of the plain equations takes 5 ms."""
-FRAMES = ("hub", "body", "inertial")
+FORCE_FRAMES = ("hub", "body", "inertial")
 LARGEST_TILT = 0.3
 """Largest random roll and pitch angle (rad) of a chassis."""
 LARGEST_FOLD = 1.5
@@ -134,7 +134,7 @@ def hub_input_sets(vehicle: CutVehicle) -> list[HubInputs]:
     rng, rows = np.random.default_rng(SEED), static_forces(vehicle, 3).hubs
     hubs = rows + rng.normal(0.0, 500.0, rows.shape)
     guide, pull = rng.normal(0.0, 0.1, (3, 6)), (2e4, 3e3, 5e4, 4e3)
-    wrenches = [HubInputs(hubs, frame, guide=guide_values) for frame in FRAMES for guide_values in (None, guide)]
+    wrenches = [HubInputs(hubs, frame, guide=guide_values) for frame in FORCE_FRAMES for guide_values in (None, guide)]
     road = HubInputs(rng.normal(0.0, 0.01, (3, 2 * len(vehicle.hubs))), speed=SPEED)
     return [*wrenches, HubInputs(hubs, guide=guide, pull=pull), road, replace(road, frame="inertial")]
 
@@ -175,11 +175,11 @@ def inner_force_gap(vehicle: CutVehicle, state_count: int) -> float:
     return worst
 
 
-def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough: bool) -> float:
+def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough_road: bool) -> float:
     """Largest difference of a cut vehicle's coordinates and rates between runs by an engine and by the plain equations,
     on a rough road or with noisy hub forces."""
     steps = round(duration / STEP)
-    if rough:
+    if rough_road:
         left, right = (iso8608_road("C", seed) for seed in (1, 2))
         hub_inputs = two_tracks(vehicle, left, right, SPEED, STEP, steps)
     else:

@@ -14,9 +14,9 @@ Curves = dict[tuple[str, str], tuple[float, ...]]
 """Steps (s), tolerances or sampling rates that are tried, by engine and method."""
 
 
-def curves_of_methods(engine: str, values: tuple[float, ...], *methods: str) -> Curves:
+def curves_of_methods(engine: str, steps_or_tolerances: tuple[float, ...], *methods: str) -> Curves:
     """Curves of several methods of an engine, all with the same steps or tolerances."""
-    return {(engine, method): values for method in methods}
+    return {(engine, method): steps_or_tolerances for method in methods}
 
 
 def milliseconds(*steps: float) -> tuple[float, ...]:

@@ -39,13 +39,13 @@ CALLS_PER_STEP = {EXACT_WHEEL_METHOD: 2, EULER: 1, RK4: 4, LITERAL: 1}
 """Force calls per step by method; those of the exact wheel are walks from node to node of the tyre's table."""
 DEFAULT_METHODS = {(EXACT_WHEEL_METHOD, BrakedVehicle.substeps): "twinrig", (LITERAL, 1): "paper"}
 """For a (method, number of steps per sample), the owner whose default it is."""
-SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
-ORDERS = {EULER: 1, LITERAL: 1}
-FULL_SUBSTEPS = {EXACT_WHEEL_METHOD: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
+ALL_SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
+METHOD_ORDERS = {EULER: 1, LITERAL: 1}
+FULL_SUBSTEPS = {EXACT_WHEEL_METHOD: ALL_SUBSTEPS, EULER: ALL_SUBSTEPS, RK4: ALL_SUBSTEPS, LITERAL: ALL_SUBSTEPS}
 QUICK_SUBSTEPS = {EXACT_WHEEL_METHOD: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
 """Substeps per sample, by method, of the quick report, whose stop begins at half the speed; the paper's single step
 is far from where its order shows."""
-SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
+REFERENCE_SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
 """Reference solvers with their relative tolerances, by ``quick``: a Runge-Kutta method and a multistep one."""
 
 
@@ -114,7 +114,7 @@ class BrakingStop:
         self._chambers, self._brakes = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY), of_wheels(PAPER_FRONT)
         self.valves = self._recorded_commands()
         self.duration = self.valves.size * SAMPLE
-        solvers = SOLVERS[quick]
+        solvers = REFERENCE_SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
         self.true, other_distance = (self._distance_by_scipy(*solver_arguments) for solver_arguments in solvers)
         self.uncertainty = {"stopping distance": abs(self.true - other_distance)}
@@ -136,7 +136,7 @@ class BrakingStop:
             engine,
             method,
             SAMPLE / substeps,
-            ORDERS.get(method, 0),
+            METHOD_ORDERS.get(method, 0),
             default=DEFAULT_METHODS.get((method, substeps), ""),
         )
 

@@ -23,7 +23,14 @@ from models.systems.pitch_plane.run import output_channels
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.price.problems import Curves, curves_of_methods, largest_differences, milliseconds, settings_of_curves
-from validation.price.problems.road_excited import MUJOCO, SPEED, result_with_assumptions, scene, setting, settings_of
+from validation.price.problems.road_excited import (
+    MUJOCO_METHODS,
+    SPEED,
+    result_with_assumptions,
+    scene,
+    setting,
+    settings_of,
+)
 
 DURATION, SAMPLING_RATE = 2.0, 100.0
 """Length of the run (s); sampling rate of the forces (Hz), whose period every fixed step divides."""
@@ -52,7 +59,7 @@ PRESCRIBED_PITCH_STEPS: Curves = {
     ("reference", "RK4"): STEPS,
     **curves_of_methods("exudyn", (*milliseconds(10), *STEPS), "GeneralizedAlpha 0.9", "GeneralizedAlpha 0.6"),
     ("exudyn", "RK44"): milliseconds(1),
-    **curves_of_methods("mujoco", STEPS[:-2], *MUJOCO),
+    **curves_of_methods("mujoco", STEPS[:-2], *MUJOCO_METHODS),
 }
 """Steps (s), by engine and method, with a prescribed pitch. RK44 is there to be refused, as it cannot solve for a
 constraint; MuJoCo calls Python in every step."""

@@ -54,7 +54,7 @@ FULL_STEPS: Curves = {
 methods are there to be refused, as the road is sampled at half steps."""
 OUTPUT_KINDS = {"wheel load": "tyre force", "acceleration": "acceleration"}
 """Kind of the vehicle's outputs that are compared, by the name of the quantity."""
-REFERENCES = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "MuJoCo's accelerations"))
+REFERENCE_SOLVERS = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "MuJoCo's accelerations"))
 """Reference solvers: method of scipy, relative tolerance, and name of the equations that it solves."""
 
 
@@ -95,12 +95,12 @@ class FreeVehicle:
         self.units = {"wheel load": "N", "acceleration": "m/s^2"}
         self.vehicle = replace(load_vehicle("r19_free"), gravity=GRAVITY)
         self.instants = COMPARED_GRID * np.arange(round(DURATION / COMPARED_GRID) + 1)
-        self.reference = " and ".join(f"{purpose} by {method} at {tol:g}" for method, tol, purpose in REFERENCES)
+        self.reference = " and ".join(f"{purpose} by {method} at {tol:g}" for method, tol, purpose in REFERENCE_SOLVERS)
         self._outputs = linearise(self.vehicle, SPEED).outputs
         self._model = build("mujoco", self.vehicle, None, SPEED)
         laws = SpatialReference(self.vehicle, SPEED).acceleration, self._model.acceleration
         self.states, self.other_states = (
-            self._solved(law, *setting[:2]) for law, setting in zip(laws, REFERENCES, strict=True)
+            self._solved(law, *setting[:2]) for law, setting in zip(laws, REFERENCE_SOLVERS, strict=True)
         )
         self._true = self.read(self.states, self.instants)
         self.uncertainty = largest_differences(self.read(self.other_states, self.instants), self._true)

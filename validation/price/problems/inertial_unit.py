@@ -20,12 +20,12 @@ from models.sensors.rotations import (
     rotation_vector,
 )
 from validation.price.problems import Curves, curves_of_methods, settings_of_curves
-from validation.price.problems.road_excited import DEFAULTS, STAGES
+from validation.price.problems.road_excited import DEFAULT_SETTING_OWNERS, STAGES
 from validation.price.problems.turning_sphere import Attitudes, attitudes_in_exudyn, attitudes_in_mujoco
 
 DURATION, COMPARED_GRID = 600.0, 1.0
 """Length of the run (s), and spacing (s) of the times at which attitudes are compared, which every step divides."""
-SINES = {
+ANGLE_SINES = {
     "roll": ((0.03, 1.1, 0.4), (0.015, 7.3, 1.9)),
     "pitch": ((0.02, 0.9, 2.2), (0.01, 8.1, 0.7)),
     "yaw": ((0.6, 0.05, 0.0), (0.01, 2.7, 1.1)),
@@ -64,7 +64,7 @@ FINE_STEP = 5e-3
 def angles(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Roll, pitch and yaw (n, 3) in rad of the car at times (n,) in s, and their rates (n, 3) in rad/s."""
     angle_columns, rates = [], []
-    for name, sines in SINES.items():
+    for name, sines in ANGLE_SINES.items():
         steady = STEADY_YAW_RATE if name == "yaw" else 0.0
         angle_columns.append(steady * times + sum(size * np.sin(f * times + phase) for size, f, phase in sines))
         rates.append(steady + sum(size * f * np.cos(f * times + phase) for size, f, phase in sines))
@@ -176,7 +176,7 @@ class InertialUnit:
             order,
             method in ADAPTIVE_METHODS,
             stages,
-            default=DEFAULTS.get((engine, method, float(step)), ""),
+            default=DEFAULT_SETTING_OWNERS.get((engine, method, float(step)), ""),
         )
 
     def build(self, setting: Setting) -> AttitudeSolver:

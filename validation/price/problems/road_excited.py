@@ -30,7 +30,7 @@ from models.systems.pitch_plane.scene import build as build_scene
 from validation.price.problems import Curves, curves_of_methods, milliseconds, settings_of_curves
 
 DURATION, SPEED = 2.0, 20.0
-GRID = 1.25e-4
+REFERENCE_SPACING = 1.25e-4
 """Spacing (s) of the rows of the stored reference solution; every fixed step is a multiple of it."""
 STAGES = {
     "RK44": 4,
@@ -46,10 +46,10 @@ STAGES = {
     "discrete": 1,
 }
 """Force evaluations per step by method, from the tableaux; methods with Newton iterations have no fixed number."""
-DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
+DEFAULT_SETTING_OWNERS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
 """Owner of each default setting, by engine, method and step (s): 10 ms in Exudyn, 2 ms in MuJoCo."""
 
-MUJOCO = ("RK4", "Euler", "implicit", "implicitfast", "discrete")
+MUJOCO_METHODS = ("RK4", "Euler", "implicit", "implicitfast", "discrete")
 _STEPS = milliseconds(5, 4, 2.5, 2, 1, 0.5, 0.25, 0.125)
 _TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 FULL_STEPS: Curves = {
@@ -67,7 +67,7 @@ FULL_STEPS: Curves = {
     ("exudyn", "DOPRI5"): (1e-2, *_TOLERANCES),
     ("exudyn", "DVERK6"): (1e-6,),
     ("exudyn", "ODE23"): (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
-    **curves_of_methods("mujoco", _STEPS, *MUJOCO),
+    **curves_of_methods("mujoco", _STEPS, *MUJOCO_METHODS),
 }
 QUICK_STEPS: Curves = {
     ("reference", "RK4"): milliseconds(4, 2, 1, 0.5, 0.25),
@@ -84,7 +84,7 @@ QUICK_STEPS: Curves = {
 """Steps (s) or tolerances of the quick report, by engine and method: each engine's default, a fourth-order method, one
 adaptive solver, one that is unstable, one that is refused."""
 
-SOLVERS = {True: (("DOP853", 1e-11), ("LSODA", 1e-12)), False: (("DOP853", 1e-13), ("LSODA", 1e-13))}
+REFERENCE_SOLVERS = {True: (("DOP853", 1e-11), ("LSODA", 1e-12)), False: (("DOP853", 1e-13), ("LSODA", 1e-13))}
 """Reference solvers with their relative tolerances, by ``quick``: an explicit Runge-Kutta method and a multistep
 one."""
 
@@ -118,7 +118,7 @@ def setting(engine: str, method: str, step_or_tolerance: float) -> Setting:
     """Setting of an engine and a method, with the order, stages and default that the catalogue declares."""
     known = CATALOGUE[engine][method.split()[0]]
     order = 0 if method == "LSODA" else known.order
-    default = DEFAULTS.get((engine, method, step_or_tolerance), "")
+    default = DEFAULT_SETTING_OWNERS.get((engine, method, step_or_tolerance), "")
     return Setting(engine, method, step_or_tolerance, order, known.adaptive, STAGES.get(method, 0), default)
 
 
@@ -170,17 +170,17 @@ class RoadExcited:
         )
         self.units = {"wheel force": "N", "state": "m, rad, m/s, rad/s"}
         self.assembly = assembly_of_scene(scene())
-        solvers = SOLVERS[quick]
+        solvers = REFERENCE_SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
         self._solution = continuous_solution(self.assembly, *solvers[0])
-        grid_times = GRID * np.arange(round(DURATION / GRID) + 1)
+        grid_times = REFERENCE_SPACING * np.arange(round(DURATION / REFERENCE_SPACING) + 1)
         self._states = self._solution(grid_times).T
         other_solutions = [continuous_solution(self.assembly, *solver)(grid_times).T for solver in solvers[1:]]
         differences = [self._largest_errors(other_solution - self._states) for other_solution in other_solutions]
         self.uncertainty = {name: max(gaps[name] for gaps in differences) for name in self.units}
         signal, p = self.assembly.input, self.assembly.parameters
         assert signal is not None
-        deflections = self._states[:, [0, 1, 4, 5]] - signal.sample(0.0, GRID, len(grid_times))
+        deflections = self._states[:, [0, 1, 4, 5]] - signal.sample(0.0, REFERENCE_SPACING, len(grid_times))
         self.bound = 10 * float(np.abs(deflections[:, :2] * [p.k1, p.k2] + deflections[:, 2:] * [p.d1, p.d2]).max())
 
     def build(self, setting: Setting) -> Model:
@@ -196,8 +196,8 @@ class RoadExcited:
     def _reference_states(self, times: np.ndarray) -> np.ndarray:
         """Reference states (n, 8) at times (n,) in s: from the stored grid if the times lie on it, else by the solver's
         interpolant."""
-        index = np.rint(times / GRID).astype(int)
-        if np.abs(times - GRID * index).max() < 1e-12:
+        index = np.rint(times / REFERENCE_SPACING).astype(int)
+        if np.abs(times - REFERENCE_SPACING * index).max() < 1e-12:
             return self._states[index]
         return self._solution(times).T
 

@@ -22,7 +22,7 @@ from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_quiet import without_warnings
 from models.sensors.rotations import from_matrix, quaternion_product, rotation_vector
 
-KINDS = exu.OutputVariableType
+OUTPUT_TYPES = exu.OutputVariableType
 Gyro = Callable[[np.ndarray], np.ndarray]
 """Function that returns the local rates (n, 3) in rad/s at times (n,) in s."""
 HALF_DIFFERENCE_INTERVAL = 1e-4
@@ -134,7 +134,7 @@ def _sphere(
             nodeNumber=node,
             storeInternal=True,
             writeToFile=False,
-            outputVariableType=KINDS.Coordinates if implicit else KINDS.RotationMatrix,
+            outputVariableType=OUTPUT_TYPES.Coordinates if implicit else OUTPUT_TYPES.RotationMatrix,
         )
     )
     mbs.Assemble()

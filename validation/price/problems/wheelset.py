@@ -30,12 +30,12 @@ from models.engines.stability import LONG_RUN, limit
 from models.machine.compiled import njit
 from models.machine.stack import start
 from validation.contact.slow_wheels import counting_calls
-from validation.price.force_calls import AT_START
+from validation.price.force_calls import START_FORCE_CALLS
 from validation.price.problems.road_excited import STAGES, setting
 
 DURATION = 0.1
 """s"""
-CELLS = 11
+CONTACT_CELLS = 11
 START_FACTORS = np.array([1.0, 1.0, 0.0, 1.0])
 """Factors (4,) on the start coordinates and rates of the wheel; the third is 0: it starts in balance on its rail."""
 SMOOTH_SPEED = 20.0
@@ -43,11 +43,11 @@ SMOOTH_SPEED = 20.0
 JACOBIAN_EVALUATIONS = 16
 """Force evaluations that one Jacobian of the creep forces counts as."""
 MILLISECOND = 1e-3
-SOLVERS = (("DOP853", 1e-12), ("LSODA", 1e-12))
+REFERENCE_SOLVERS = (("DOP853", 1e-12), ("LSODA", 1e-12))
 """Reference solvers with their relative tolerances."""
 STEP_RATIOS = (0.5, 1, 1.5, 2, 3, 5, 8)
 """Number of steps of an explicit method divided by the fewest with which it is stable; the first is to be refused."""
-WITH_JACOBIAN = "with slopes"
+JACOBIAN_SUFFIX = "with slopes"
 """Suffix of Exudyn's implicit methods that get the Jacobian of the linear creep theory; without it, Exudyn computes
 the Jacobian by differences of the forces."""
 EXPLICIT_METHODS = {
@@ -73,9 +73,9 @@ OTHER_CURVES: dict[tuple[str, str], tuple[float, ...]] = {
     ("reference", "Radau"): (1e-1, 3e-2, *_TOLERANCES[:4]),
     ("reference", "LSODA"): _TOLERANCES,
     ("exudyn", "GeneralizedAlpha 0.9"): _LONG_STEPS,
-    ("exudyn", f"GeneralizedAlpha {WITH_JACOBIAN}"): _LONG_STEPS,
+    ("exudyn", f"GeneralizedAlpha {JACOBIAN_SUFFIX}"): _LONG_STEPS,
     ("exudyn", "TrapezoidalIndex2"): _LONG_STEPS,
-    ("exudyn", f"TrapezoidalIndex2 {WITH_JACOBIAN}"): _LONG_STEPS,
+    ("exudyn", f"TrapezoidalIndex2 {JACOBIAN_SUFFIX}"): _LONG_STEPS,
     ("exudyn", "DOPRI5"): _TOLERANCES,
     ("exudyn", "ODE23"): _TOLERANCES,
     ("exudyn", "DVERK6"): (1e-6,),
@@ -151,11 +151,11 @@ class RollingWheels:
         self.units = {"creep force": "N", "displacement": "m"}
         self.key = f"wheel-{speed:g}"
         self.title = f"A wheel with FASTSIM at {speed:g} m/s, released from sliding, {DURATION:g} s"
-        self.wheels = Wheels(1, cells=CELLS, speed=speed)
+        self.wheels = Wheels(1, cells=CONTACT_CELLS, speed=speed)
         self._start = np.concatenate([state_part * START_FACTORS for state_part in self.wheels.state()])
         self._table = np.array([self.wheels.masses, self.wheels.stiffness, self.wheels.damping])
-        self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in SOLVERS)
-        self._true, other_solution = (self.read(self._run_by_method(*solver).state) for solver in SOLVERS)
+        self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in REFERENCE_SOLVERS)
+        self._true, other_solution = (self.read(self._run_by_method(*solver).state) for solver in REFERENCE_SOLVERS)
         self.uncertainty = self._channel_errors(other_solution)
         self.bound = self.wheels.mu * self.wheels.load
 
@@ -245,7 +245,9 @@ class RollingWheels:
     def _solver_in_exudyn(self, setting: Setting, method: str) -> WheelsetSolver:
         calls, law = [0], Forces(self.wheels)
         slopes = (
-            counting_calls(law.slopes, calls, JACOBIAN_EVALUATIONS) if setting.method.endswith(WITH_JACOBIAN) else None
+            counting_calls(law.slopes, calls, JACOBIAN_EVALUATIONS)
+            if setting.method.endswith(JACOBIAN_SUFFIX)
+            else None
         )
         rolling = Rolling(self.wheels, counting_calls(law.of, calls), slopes=slopes)
         steps = round(DURATION / (LARGEST_STEP if setting.adaptive else setting.value))
@@ -256,7 +258,7 @@ class RollingWheels:
             q, v = np.split(self._start, 2)
             state = rolling.run(q, v, steps, DURATION / steps, method, tolerance)
             return WheelsetResult(
-                state, {**solver_counts(rolling.mbs), "force calls": calls[0] - AT_START.get(method, 0)}
+                state, {**solver_counts(rolling.mbs), "force calls": calls[0] - START_FORCE_CALLS.get(method, 0)}
             )
 
         return WheelsetSolver(run)

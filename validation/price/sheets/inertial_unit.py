@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from validation.price.problems import inertial_unit
-from validation.price.problems.inertial_unit import DURATION, SINES, STEADY_YAW_RATE
+from validation.price.problems.inertial_unit import ANGLE_SINES, DURATION, STEADY_YAW_RATE
 from validation.price.sheets.page import ReferenceValue
 from validation.price.sheets.page import write as write_page
 
@@ -36,7 +36,7 @@ def _sheet_text() -> str:
             ([f"{STEADY_YAW_RATE:g} t"] if name == "yaw" else [])
             + [f"{size:g} sin({rate:g} t + {phase:g})" for size, rate, phase in sines]
         )
-        for name, sines in SINES.items()
+        for name, sines in ANGLE_SINES.items()
     )
     return f"""{inertial_unit.InertialUnit.note}
 

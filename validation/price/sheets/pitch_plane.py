@@ -9,7 +9,7 @@ from models.engines.protocol import build
 from models.road.study import FADE_IN_LENGTH, study_road
 from validation.price.problems import force_excited, road_excited
 from validation.price.problems.force_excited import DURATION, FINE_STEP, SAMPLE_PERIOD, ForceExcited
-from validation.price.problems.road_excited import SOLVERS, SPEED
+from validation.price.problems.road_excited import REFERENCE_SOLVERS, SPEED
 from validation.price.sheets.page import ReferenceValue, write_columns
 from validation.price.sheets.page import write as write_page
 
@@ -53,7 +53,7 @@ def write_road_sheet(folder: Path) -> list[ReferenceValue]:
     )
     end = np.array([road_excited.DURATION])
     true, *other_solutions = (
-        road_excited.continuous_solution(problem.assembly, *solver)(end)[:, 0] for solver in SOLVERS[False]
+        road_excited.continuous_solution(problem.assembly, *solver)(end)[:, 0] for solver in REFERENCE_SOLVERS[False]
     )
     sure = np.max([np.abs(other_solution - true) for other_solution in other_solutions], axis=0)
     return write_page(

@@ -41,65 +41,73 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
     return random_samples(sample_count, seed, _sample_of_random_stop)
 
 
-def _sample_of_random_stop(random: np.random.Generator) -> Sample:
+def _sample_of_random_stop(generator: np.random.Generator) -> Sample:
     """Sample from a random braking stop; raises if the tyres cannot hold the circle or the vehicle rolls over."""
-    engine, scene = str(random.choice(ENGINES)), build(_random_scene_table(random), "drawn.toml")
+    engine, scene = str(generator.choice(ENGINES)), build(_random_scene_table(generator), "drawn.toml")
     return _sample_of_stop(scene, engine)
 
 
-def _random_scene_table(random: np.random.Generator) -> dict[str, Any]:
+def _random_scene_table(generator: np.random.Generator) -> dict[str, Any]:
     """Table of a random braking scene with one procedure."""
     surface, kind, steps = (
-        str(random.choice(list(SURFACES))),
-        str(random.choice(CONTROLLERS)),
-        int(random.choice(8)) + 1,
+        str(generator.choice(list(SURFACES))),
+        str(generator.choice(CONTROLLERS)),
+        int(generator.choice(8)) + 1,
     )
-    supply = random.uniform(0.9, 2.5) if kind == "none" else random.uniform(3.0, 9.0)
+    supply = generator.uniform(0.9, 2.5) if kind == "none" else generator.uniform(3.0, 9.0)
     table: dict[str, Any] = {
         "title": f"drawn: {kind} on {surface}, {steps} steps",
         "system": "braking",
         "road": {"stretches": [{"left": surface}]},
-        "tyres": {"scale": {"dry": random.uniform(0.6, 1.0)}},
+        "tyres": {"scale": {"dry": generator.uniform(0.6, 1.0)}},
         "brakes": {
             "supply": supply,
-            "front": {"gradient": random.uniform(800.0, 2000.0), "push_out": random.uniform(0.0, 0.8)},
-            "rear": {"gradient": random.uniform(600.0, 1500.0), "push_out": 0.25},
+            "front": {"gradient": generator.uniform(800.0, 2000.0), "push_out": generator.uniform(0.0, 0.8)},
+            "rear": {"gradient": generator.uniform(600.0, 1500.0), "push_out": 0.25},
         },
         "controller": {"kind": kind},
-        "procedures": {"stop": _random_procedure(random, surface)},
-        "run": {"sample": float(random.choice([0.004, 0.0055, 0.01])), "substeps": steps},
+        "procedures": {"stop": _random_procedure(generator, surface)},
+        "run": {"sample": float(generator.choice([0.004, 0.0055, 0.01])), "substeps": steps},
     }
-    if random.random() < 0.2:
-        return table | {"vehicle": {"file": "r19_free", "spin_inertia": 1.0}, "brakes": _random_brakes(random)}
-    table["vehicle"] = {"override": {"mass": random.uniform(4500.0, 9000.0), "yaw_inertia": random.uniform(2e4, 4e4)}}
+    if generator.random() < 0.2:
+        return table | {"vehicle": {"file": "r19_free", "spin_inertia": 1.0}, "brakes": _random_brakes(generator)}
+    table["vehicle"] = {
+        "override": {"mass": generator.uniform(4500.0, 9000.0), "yaw_inertia": generator.uniform(2e4, 4e4)}
+    }
     effects = {
         "load_transfer": {},
-        "pressure": {"fill": random.uniform(0.05, 0.25), "empty": random.uniform(0.05, 0.2)},
+        "pressure": {"fill": generator.uniform(0.05, 0.25), "empty": generator.uniform(0.05, 0.2)},
         "trailer": TRAILER_DATA,
-        "relaxation": {"front": random.uniform(0.2, 0.6), "rear": random.uniform(0.2, 0.6)},
+        "relaxation": {"front": generator.uniform(0.2, 0.6), "rear": generator.uniform(0.2, 0.6)},
     }
     shares = (0.7, 0.8, 0.25, 0.2)
     return table | {
         name: effect_table
         for (name, effect_table), share in zip(effects.items(), shares, strict=True)
-        if random.random() < share
+        if generator.random() < share
     }
 
 
-def _random_brakes(random: np.random.Generator) -> dict[str, Any]:
+def _random_brakes(generator: np.random.Generator) -> dict[str, Any]:
     """Table of random brakes for a vehicle on its suspension."""
-    gradient = random.uniform(200.0, 600.0)
-    return {"supply": random.uniform(1.0, 4.0), "front": {"gradient": gradient}, "rear": {"gradient": 0.5 * gradient}}
+    gradient = generator.uniform(200.0, 600.0)
+    return {
+        "supply": generator.uniform(1.0, 4.0),
+        "front": {"gradient": gradient},
+        "rear": {"gradient": 0.5 * gradient},
+    }
 
 
-def _random_procedure(random: np.random.Generator, surface: str) -> dict[str, Any]:
-    kind, speed = str(random.choice(["straight", "split", "turn", "j_turn"])), random.uniform(5.0, 20.0)
-    radius = random.choice([-1.0, 1.0]) * max(speed**2 / (SURFACES[surface] * 9.81 * random.uniform(0.2, 0.6)), 25.0)
-    other_surface = str(random.choice([name for name in SURFACES if name != surface]))
+def _random_procedure(generator: np.random.Generator, surface: str) -> dict[str, Any]:
+    kind, speed = str(generator.choice(["straight", "split", "turn", "j_turn"])), generator.uniform(5.0, 20.0)
+    radius = generator.choice([-1.0, 1.0]) * max(
+        speed**2 / (SURFACES[surface] * 9.81 * generator.uniform(0.2, 0.6)), 25.0
+    )
+    other_surface = str(generator.choice([name for name in SURFACES if name != surface]))
     of_kind = {
         "split": {"right": other_surface},
         "turn": {"radius": radius},
-        "j_turn": {"steer": random.uniform(-0.06, 0.06)},
+        "j_turn": {"steer": generator.uniform(-0.06, 0.06)},
     }
     return {"kind": kind, "speed": speed, **of_kind.get(kind, {})}
 

@@ -27,29 +27,29 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
     return random_samples(sample_count, seed, _sample_of_random_manoeuvre)
 
 
-def _sample_of_random_manoeuvre(random: np.random.Generator) -> Sample:
+def _sample_of_random_manoeuvre(generator: np.random.Generator) -> Sample:
     """Sample from a random manoeuvre; raises, before the error is estimated, if the step is too long for the tyres."""
-    engine = str(random.choice(ENGINES))
-    return _sample_of_drive(build(_random_scene_table(random), "drawn.toml"), engine)
+    engine = str(generator.choice(ENGINES))
+    return _sample_of_drive(build(_random_scene_table(generator), "drawn.toml"), engine)
 
 
-def _random_scene_table(random: np.random.Generator) -> dict[str, Any]:
+def _random_scene_table(generator: np.random.Generator) -> dict[str, Any]:
     """Table of a random handling scene with one manoeuvre; its duration is a multiple of the step."""
-    step, steps = float(f"{10.0 ** random.uniform(-3.4, -2.3):.3g}"), int(random.integers(120, 400))
+    step, steps = float(f"{10.0 ** generator.uniform(-3.4, -2.3):.3g}"), int(generator.integers(120, 400))
     lasts = steps * step
     manoeuvre: dict[str, Any] = {
-        "speed": random.uniform(10.0, 35.0),
+        "speed": generator.uniform(10.0, 35.0),
         "duration": lasts,
-        "steer": [[0.1 * lasts, 0.0], [random.uniform(0.3, 0.9) * lasts, random.uniform(-0.08, 0.08)]],
-        "rough": bool(random.integers(2)),
+        "steer": [[0.1 * lasts, 0.0], [generator.uniform(0.3, 0.9) * lasts, generator.uniform(-0.08, 0.08)]],
+        "rough": bool(generator.integers(2)),
     }
-    if pedal := random.choice(["brake", "drive", ""]):
-        manoeuvre[str(pedal)] = [[0.2 * lasts, 0.0], [0.6 * lasts, random.uniform(100.0, 2500.0)]]
+    if pedal := generator.choice(["brake", "drive", ""]):
+        manoeuvre[str(pedal)] = [[0.2 * lasts, 0.0], [0.6 * lasts, generator.uniform(100.0, 2500.0)]]
     return {
         "title": f"drawn, steps of {step:g} s",
         "system": "handling",
-        "tyres": {"friction": random.uniform(0.3, 1.1), "cells": int(random.integers(5, 20))},
-        "road": {"iso8608": str(random.choice(list("ABC"))), "seed": int(random.integers(1000))},
+        "tyres": {"friction": generator.uniform(0.3, 1.1), "cells": int(generator.integers(5, 20))},
+        "road": {"iso8608": str(generator.choice(list("ABC"))), "seed": int(generator.integers(1000))},
         "run": {"step": step},
         "manoeuvres": {"drawn": manoeuvre},
     }

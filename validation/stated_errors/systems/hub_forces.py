@@ -30,39 +30,42 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
     return random_samples(sample_count, seed, _sample_of_random_scene)
 
 
-def _sample_of_random_scene(random: np.random.Generator) -> Sample:
+def _sample_of_random_scene(generator: np.random.Generator) -> Sample:
     """Sample from a random scene of hub forces; raises before the run if the step would be unstable."""
-    engine = str(random.choice(ENGINES))
-    return _sample_of_run(build(_random_scene_table(random), "drawn.toml"), engine)
+    engine = str(generator.choice(ENGINES))
+    return _sample_of_run(build(_random_scene_table(generator), "drawn.toml"), engine)
 
 
-def _random_scene_table(random: np.random.Generator) -> dict[str, Any]:
+def _random_scene_table(generator: np.random.Generator) -> dict[str, Any]:
     """Table of a random scene of hub forces, with a virtual measurement whose sampling period is a multiple of the
     step."""
-    step, steps_per_sample = float(f"{10.0 ** random.uniform(-3.0, -1.9):.3g}"), int(random.choice([1, 1, 2, 2, 3, 4]))
-    noise = str(random.choice(["white", "none"]))
+    step, steps_per_sample = (
+        float(f"{10.0 ** generator.uniform(-3.0, -1.9):.3g}"),
+        int(generator.choice([1, 1, 2, 2, 3, 4])),
+    )
+    noise = str(generator.choice(["white", "none"]))
     return {
         "title": f"drawn, steps of {step:g} s, {steps_per_sample} a sample",
         "system": "hub-forces",
-        "vehicle": {"file": str(random.choice(["r19_free", "r19_ride"]))},
+        "vehicle": {"file": str(generator.choice(["r19_free", "r19_ride"]))},
         "run": {
             "step": step,
-            "duration": step * steps_per_sample * int(random.uniform(0.8, 1.6) / (step * steps_per_sample)),
+            "duration": step * steps_per_sample * int(generator.uniform(0.8, 1.6) / (step * steps_per_sample)),
         },
         "road": {
-            "iso8608": str(random.choice(list("BCDE"))),
-            "speed": random.uniform(15.0, 60.0),
-            "seed": int(random.integers(1000)),
+            "iso8608": str(generator.choice(list("BCDE"))),
+            "speed": generator.uniform(15.0, 60.0),
+            "seed": int(generator.integers(1000)),
         },
         "forces": {
             "sampling_rate": 1.0 / (step * steps_per_sample),
-            "frame": str(random.choice(["hub", "body"])),
-            "interpolation": str(random.choice(["linear", "smooth"])),
+            "frame": str(generator.choice(["hub", "body"])),
+            "interpolation": str(generator.choice(["linear", "smooth"])),
             "noise": noise,
         },
         "angles": {"noise": noise},
-        "effects": {"lift_off": {}} if random.integers(4) == 0 else {},
-        "stabilise": {"method": str(random.choice(["none", "kalman", "prescribed"])), "smoothing": 3.0},
+        "effects": {"lift_off": {}} if generator.integers(4) == 0 else {},
+        "stabilise": {"method": str(generator.choice(["none", "kalman", "prescribed"])), "smoothing": 3.0},
     }
 
 

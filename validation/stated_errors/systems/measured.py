@@ -27,20 +27,20 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
     return random_samples(sample_count, seed, _sample_of_random_recording)
 
 
-def _sample_of_random_recording(random: np.random.Generator) -> Sample:
+def _sample_of_random_recording(generator: np.random.Generator) -> Sample:
     """Sample from a random recording; raises before the run if the step would be unstable."""
-    engine = str(random.choice(ENGINES))
-    return _sample_of_recording(_random_scene_table(random), engine)
+    engine = str(generator.choice(ENGINES))
+    return _sample_of_recording(_random_scene_table(generator), engine)
 
 
-def _random_scene_table(random: np.random.Generator) -> dict[str, Any]:
+def _random_scene_table(generator: np.random.Generator) -> dict[str, Any]:
     """Table of a random virtual measurement. The steps of the run on the road divide the sampling period; the steps of
     the run under the measured forces are equal to it."""
-    period, steps_per_sample = float(f"{10.0 ** random.uniform(-2.9, -2.1):.3g}"), int(random.choice([1, 2]))
+    period, steps_per_sample = float(f"{10.0 ** generator.uniform(-2.9, -2.1):.3g}"), int(generator.choice([1, 2]))
     road = {
-        "iso8608": str(random.choice(list("BCD"))),
-        "speed": random.uniform(15.0, 45.0),
-        "seed": int(random.integers(99)),
+        "iso8608": str(generator.choice(list("BCD"))),
+        "speed": generator.uniform(15.0, 45.0),
+        "seed": int(generator.integers(99)),
     }
     return {
         "title": f"drawn, every {period:g} s, {steps_per_sample} steps of the road each",
@@ -48,14 +48,14 @@ def _random_scene_table(random: np.random.Generator) -> dict[str, Any]:
         "vehicle": {"file": "r19_free"},
         "virtual": {
             "road": road,
-            "duration": period * int(random.uniform(2.0, 4.0) / period),
+            "duration": period * int(generator.uniform(2.0, 4.0) / period),
             "sampling_rate": 1.0 / period,
             "step": period / steps_per_sample,
-            "frame": str(random.choice(["hub", "body"])),
-            "faults": {"noise": {"force": random.uniform(0.0, 10.0), "angle": 1e-3, "angular rate": 3e-3}},
+            "frame": str(generator.choice(["hub", "body"])),
+            "faults": {"noise": {"force": generator.uniform(0.0, 10.0), "angle": 1e-3, "angular rate": 3e-3}},
             "format": "csv",
         },
-        "stabilise": {"method": str(random.choice(["none", "kalman", "prescribed"])), "smoothing": 3.0},
+        "stabilise": {"method": str(generator.choice(["none", "kalman", "prescribed"])), "smoothing": 3.0},
     }
 
 

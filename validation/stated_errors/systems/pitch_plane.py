@@ -35,15 +35,15 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
     """Yield ``sample_count`` samples from random runs of the pitch-plane vehicle; scenes that an engine refuses are
     replaced."""
     with TemporaryDirectory() as folder:
-        yield from random_samples(sample_count, [seed, 1], lambda random: _sample_of_run(random, Path(folder)))
+        yield from random_samples(sample_count, [seed, 1], lambda generator: _sample_of_run(generator, Path(folder)))
 
 
-def _sample_of_run(random: np.random.Generator, folder: Path) -> Sample:
+def _sample_of_run(generator: np.random.Generator, folder: Path) -> Sample:
     """Sample from a random run; raises for an unstable step, and for an interpolation that the method cannot use."""
-    engine = str(random.choice(["reference", "exudyn", "mujoco"]))
+    engine = str(generator.choice(["reference", "exudyn", "mujoco"]))
     known = [name for name in CATALOGUE[engine] if (engine, name) not in MISSING]
-    integrator = str(random.choice(known))
-    scene = _random_scene(random, folder, engine, integrator)
+    integrator = str(generator.choice(known))
+    scene = _random_scene(generator, folder, engine, integrator)
     with _count_force_calls() as calls:
         run = _run_with_error(scene, engine)
     truth = _reference_run(scene, engine)

@@ -65,10 +65,10 @@ def _varied_vehicle(generator: np.random.Generator, vehicle: SpatialVehicle) -> 
 
 
 def _sample_of(
-    result: Result, name: str, engine: str, true_errors: Mapping[str, float], calls: float, extra: float
+    result: Result, name: str, engine: str, true_errors: Mapping[str, float], calls: float, extra_calls: float
 ) -> Sample:
     estimates = {channel: estimate for channel, estimate in errors_of(result).items() if channel in true_errors}
-    return Sample(name, engine, estimates, true_errors, calls, extra)
+    return Sample(name, engine, estimates, true_errors, calls, extra_calls)
 
 
 def _sample_of_sweep(generator: np.random.Generator, sample_number: int) -> Sample:
@@ -88,20 +88,20 @@ def _sample_of_sweep(generator: np.random.Generator, sample_number: int) -> Samp
     )
 
 
-def exact_deviations(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
+def exact_deviations(linear_vehicle: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
     """Standard deviations (p,) of the outputs of a linear vehicle with undamped tyres, computed in extended
     precision."""
-    system, n, m = vehicle_with_road(linear, road, speed), len(linear.mass), len(road.F)
+    system, n, m = vehicle_with_road(linear_vehicle, road, speed), len(linear_vehicle.mass), len(road.F)
     A, C = system.A.astype(np.longdouble), system.C.astype(np.longdouble)
-    forces = np.hstack([linear.road_stiffness.astype(np.longdouble) @ heights for heights in road.heights])
-    wanted = np.hstack([-linear.stiffness, -linear.damping, forces])
+    forces = np.hstack([linear_vehicle.road_stiffness.astype(np.longdouble) @ heights for heights in road.heights])
+    wanted = np.hstack([-linear_vehicle.stiffness, -linear_vehicle.damping, forces])
     for _ in range(3):
-        left = wanted - linear.mass.astype(np.longdouble) @ A[n : 2 * n]
-        A[n : 2 * n] += np.linalg.solve(linear.mass, left.astype(float))
+        left = wanted - linear_vehicle.mass.astype(np.longdouble) @ A[n : 2 * n]
+        A[n : 2 * n] += np.linalg.solve(linear_vehicle.mass, left.astype(float))
     A[2 * n :, 2 * n :] = np.kron(np.eye(len(road.heights)), speed * road.F.astype(np.longdouble)).reshape(
         len(road.heights) * m, -1
     )
-    C += linear.read.acceleration_factors @ (A - system.A)[n : 2 * n]
+    C += linear_vehicle.read.acceleration_factors @ (A - system.A)[n : 2 * n]
     met = noise_arrivals(system)
     earlier_response, Q = np.zeros_like(met.B[0], np.longdouble), np.zeros_like(A)
     for j, b in enumerate(met.B):
