@@ -21,7 +21,7 @@ def listed_figures(text: str) -> list[str]:
     return FIGURE_LINE_PATTERN.findall(text)
 
 
-def shrink(figure: Path, target: Path) -> Path:
+def shrink_picture(figure: Path, target: Path) -> Path:
     """Write a small picture (PNG, at most ``PICTURE_WIDTH`` pixels wide) of a figure; returns its path."""
     from PIL import Image
 
@@ -42,7 +42,7 @@ def add_pictures(results: Path, page: Path) -> list[str]:
         if not figure.is_file():
             missing.append(name)
             continue
-        small = shrink(figure, page.parent / "gallery" / name.replace("/", "_"))
+        small = shrink_picture(figure, page.parent / "gallery" / name.replace("/", "_"))
         shown = f"![{name}](gallery/{small.name})<br>`{name}`"
         text = text.replace(f"| `{name}` |", f"| {shown} |")
     page.write_text(text, encoding="utf-8")

@@ -24,7 +24,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from docs.alike import alike
-from docs.pages import ROOT, ExampleBlock, blocks, pages
+from docs.pages import ROOT, ExampleBlock, example_blocks, pages
 
 COLUMNS = 100
 """Width (characters) of the terminal that examples see."""
@@ -60,7 +60,7 @@ class Session:
         return said.getvalue()
 
     def _console(self, block: ExampleBlock) -> str:
-        lines = commands(block.text)
+        lines = console_commands(block.text)
         fails = [False] * (len(lines) - 1) + [block.mark == "run: fails"]
         return "".join(self._command(line, wanted) for line, wanted in zip(lines, fails, strict=True))
 
@@ -79,7 +79,7 @@ class Session:
         return ended.stdout
 
 
-def commands(text: str) -> list[str]:
+def console_commands(text: str) -> list[str]:
     """Commands of a console block; lines that do not begin with ``$`` continue the command before."""
     return [part.strip() for part in re.split(r"^\$ ", text, flags=re.MULTILINE) if part.strip()]
 
@@ -108,7 +108,7 @@ def page_with_outputs(page: Path, draw: bool) -> tuple[str, list[str]]:
     text = page.read_text(encoding="utf-8")
     lines, changes, said, shift = text.splitlines(keepends=True), [], None, 0
     with session() as here:
-        for block in blocks(text):
+        for block in example_blocks(text):
             if block.mark.startswith("run"):
                 said = here.run(block)
             elif block.mark.startswith("file: "):
@@ -144,7 +144,7 @@ def as_shown_in_page(output: str) -> str:
 
 def has_examples(page: Path) -> bool:
     """Whether a page has marked examples."""
-    return any(block.mark for block in blocks(page.read_text(encoding="utf-8")))
+    return any(block.mark for block in example_blocks(page.read_text(encoding="utf-8")))
 
 
 def run_page(page: Path, check: bool) -> tuple[Path, list[str], str]:

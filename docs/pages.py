@@ -47,7 +47,7 @@ class ExampleBlock:
         return self.mark.partition(": ")[2] if self.mark.startswith(("file: ", "picture: ")) else ""
 
 
-def blocks(text: str) -> list[ExampleBlock]:
+def example_blocks(text: str) -> list[ExampleBlock]:
     """All fenced blocks and marked images in the text of a page, in order."""
     from markdown_it import MarkdownIt
 

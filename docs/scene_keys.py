@@ -61,11 +61,11 @@ class Key:
         return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
 
 
-def keys_of(model: type[BaseModel], prefix: str = "") -> Iterator[Key]:
+def keys_of(table_class: type[BaseModel], prefix: str = "") -> Iterator[Key]:
     """Yield the keys of a table and of its inner tables; NAME stands for a name that the user chooses, [] for entries
     of a list."""
-    for name, field in model.model_fields.items():
-        if issubclass(model, SceneFile) and name in READER_FIELDS:
+    for name, field in table_class.model_fields.items():
+        if issubclass(table_class, SceneFile) and name in READER_FIELDS:
             continue
         place, inner = _inner_table(field.annotation)
         meaning = _meaning_in_line(field.description or (_first_paragraph(inner) if inner else "")) or MEANINGS.get(
@@ -167,9 +167,9 @@ def _toml_text(scene_value: Any) -> str:
     return f'"{scene_value}"' if isinstance(scene_value, str) else f"{scene_value:.6g}"
 
 
-def _first_paragraph(model: type[BaseModel]) -> str:
-    """First paragraph of the docstring of a table's model, without its full stop."""
-    return (getdoc(model) or "").partition("\n\n")[0].replace("\n", " ").rstrip(".")
+def _first_paragraph(table_class: type[BaseModel]) -> str:
+    """First paragraph of the docstring of a scene table's class, without its full stop."""
+    return (getdoc(table_class) or "").partition("\n\n")[0].replace("\n", " ").rstrip(".")
 
 
 def _meaning_in_line(meaning: str) -> str:
@@ -177,23 +177,23 @@ def _meaning_in_line(meaning: str) -> str:
     return re.sub(r"^(One of )?\[[^\]]*\]+(, \[[^\]]*\]+)*[:.,]? *", "", " ".join(meaning.split()))
 
 
-def scene_model(system: str) -> type[SceneFile]:
+def scene_class(system: str) -> type[SceneFile]:
     """The pydantic model of the scenes of a system."""
     module = import_module(SYSTEMS[system].scene)
     models = [each for each in vars(module).values() if isinstance(each, type) and issubclass(each, SceneFile)]
     return next(each for each in models if each.__module__ == module.__name__)
 
 
-def table(model: type[BaseModel], prefix: str = "") -> list[str]:
-    """Lines of a Markdown table of all keys of a model."""
+def keys_table(table_class: type[BaseModel], prefix: str = "") -> list[str]:
+    """Lines of a Markdown table of all keys of a scene table's class."""
     head = ["| key | type | unit | default | meaning |", "|---|---|---|---|---|"]
-    return [*head, *(key.row() for key in keys_of(model, prefix))]
+    return [*head, *(key.row() for key in keys_of(table_class, prefix))]
 
 
 def system_section(system: str) -> list[str]:
     """Lines of the section on a system: its description, scene keys and effects."""
     says = (getdoc(import_module(SYSTEMS[system].package)) or "").partition("\n\n")[0].replace("\n", " ")
-    lines = ["", f"## {system}", "", says, "", *table(scene_model(system))]
+    lines = ["", f"## {system}", "", says, "", *keys_table(scene_class(system))]
     if SYSTEMS[system].effects:
         lines += ["", f"### Effects of {system}", "", "| effect | named by | what it adds | what it takes |"]
         lines += [
@@ -203,7 +203,7 @@ def system_section(system: str) -> list[str]:
     for name in names_of(system):
         model = getattr(module_of(system, name), "Parameters", None)
         if model is not None and model.model_fields:
-            lines += ["", f"`[effects.{name}]` of {system}", "", *table(model)]
+            lines += ["", f"`[effects.{name}]` of {system}", "", *keys_table(model)]
     return lines
 
 
@@ -220,7 +220,7 @@ def study_options_section() -> list[str]:
     for name in study_names():
         model = getattr(import_module(f"studies.{name}"), "Options", None)
         if isinstance(model, type) and issubclass(model, BaseModel):
-            lines += ["", f"### Study `{name}`", "", *table(model)]
+            lines += ["", f"### Study `{name}`", "", *keys_table(model)]
     return lines
 
 
@@ -229,7 +229,7 @@ def other_table_sections() -> list[str]:
     lines = []
     for title, module, name in OTHER_TABLES:
         model = getattr(import_module(module), name)
-        lines += ["", f"## {title}", "", f"{_first_paragraph(model)}.", "", *table(model)]
+        lines += ["", f"## {title}", "", f"{_first_paragraph(model)}.", "", *keys_table(model)]
     return lines
 
 

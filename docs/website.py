@@ -36,7 +36,7 @@ def copy_pages(target: Path) -> None:
         shutil.copyfile(picture, target / "studies" / picture.name)
 
 
-def add_rows(pages_folder: Path) -> None:
+def add_report_rows(pages_folder: Path) -> None:
     """Append the rows of the newest report, if there is one, and their counts to the pages that explain them."""
     report = newest_report()
     if report is None:
@@ -52,7 +52,7 @@ def build(site: Path, work: Path, as_shown: bool) -> bool:
     sources = work / "pages"
     copy_pages(sources)
     outputs_agree = as_shown or run_pages(pages(sources), check=False, strict=True)
-    add_rows(sources)
+    add_report_rows(sources)
     add_pictures(ROOT / "results", sources / "docs" / "gallery.md")
     for name in ("mkdocs.yml", "mathml.py"):
         shutil.copyfile(ROOT / "docs" / name, work / name)

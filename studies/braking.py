@@ -24,7 +24,7 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     adhesion: bool = Field(True, description="measure adhesion utilisation too, by many short runs")
 

@@ -41,7 +41,7 @@ FITTED_FIGURES = {"deceleration": 1.36, "aside": 7.5}
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     procedure: str = Field("j_turn", description="name of the J-turn")
     surface: str = Field("ice", description="whose friction is fitted")

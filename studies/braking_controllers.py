@@ -38,7 +38,7 @@ ESTIMATED_SPEED_NOTE = (
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     surfaces: dict[str, str] = Field(
         {"ice": "snow", "snow": "dry", "dry": "snow"},

@@ -38,7 +38,7 @@ RUNS_PER_BLOCK = 5
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     runs: int = Field(100, ge=2, le=100_000, description="stops in each ensemble")
     procedure: str = Field("straight", description="name of the procedure that is repeated")

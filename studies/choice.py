@@ -36,7 +36,7 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     beside: list[str] = Field(default_factory=list, description="other scenes, drawn beside this one")
 

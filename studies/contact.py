@@ -26,7 +26,7 @@ PRINTED_ROWS = 12
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     exact: int = Field(9, ge=0, le=100, description="points of a sweep that the exact theory checks, on an ellipse")
 

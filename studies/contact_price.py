@@ -20,7 +20,7 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     levels: list[float] = Field(
         [0.5, 1.5], min_length=1, description="sizes of the creepage; at 1 the linear theory reaches mu N"

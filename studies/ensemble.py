@@ -45,7 +45,7 @@ HEAVE_STATE = 2
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     paths: int = Field(500, ge=2, le=1_000_000, description="number of noise paths in the reference")
     saved: int = Field(1000, ge=1, le=1_000_000, description="first paths that are saved; statistics are of all")

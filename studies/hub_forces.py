@@ -17,7 +17,7 @@ SYSTEM = "hub-forces"
 
 
 class Options(Strict):
-    """[options] of this study: none."""
+    """Keys of the table [options] of this study: none."""
 
 
 def check(scene: HubScene, engines: tuple[str, ...]) -> None:

@@ -43,7 +43,7 @@ SAVED_SPACING = 0.01
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     grades: list[Positive] = Field(
         [0.001, 0.01, 0.1, 1.0, 10.0],

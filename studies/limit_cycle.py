@@ -20,7 +20,7 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     speed: float | None = quantity(
         "m/s", "of the cycle in all implementations; 1.1 of where the branch begins if not given", default=None

@@ -54,7 +54,7 @@ SENSORS_KEY = "effects.accelerometers.sensors"
 
 
 class Options(Strict):
-    """Keys of the table [options] for this study."""
+    """Keys of the table [options] of this study."""
 
     file: str | None = Field(None, description="CSV of measured readings: time [s], ax1 [m/s^2], ay1, az1, ax2, ...")
     zeroed: bool = Field(False, description="true for readings set to zero at rest on level ground (eq. 17)")

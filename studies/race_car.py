@@ -28,7 +28,7 @@ AIMED_ERRORS = {"yaw rate": 0.12, "lateral acceleration": 0.12, "side slip": 0.2
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     measurement: str = Field("", description="file of the race in TWINRIG_DATA, or a path; empty for the scene's drive")
     prediction: str = Field("", description="another such file that is predicted; empty: the last part of the first")

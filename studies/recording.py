@@ -18,7 +18,7 @@ SYSTEM, BLOCKS_FOLDER = "measured", WORK_FOLDER
 
 
 class Options(Strict):
-    """[options] of this study: none."""
+    """Keys of the table [options] of this study: none."""
 
 
 def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:

@@ -56,7 +56,7 @@ OVERHANG_LENGTH = 0.2
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     speed: float | None = quantity("m/s", "of tables, spectra and export; the middle one if not given", default=None)
     free_travel: float | None = quantity("m", "free travel of every output that is a travel", default=None)

@@ -33,7 +33,8 @@ ELEMENTS_DRAWN = 12
 
 
 class Options(Samples):
-    """[options] of this study: Monte Carlo copies of a vehicle with nonlinear springs; none for a linear vehicle."""
+    """Keys of the table [options] of this study: Monte Carlo copies of a vehicle with nonlinear springs; none for a
+    linear vehicle."""
 
 
 @dataclass(frozen=True)

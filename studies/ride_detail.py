@@ -40,7 +40,7 @@ Errors = dict[tuple[str, str], np.ndarray]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     simpler: list[str] = Field(
         ["quarter_car", "half_car", "seven_freedoms"],

@@ -20,7 +20,7 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     outputs: list[str] = Field(default_factory=list, description="outputs to draw; accelerations, tyre forces if none")
 

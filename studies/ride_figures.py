@@ -110,7 +110,7 @@ def outputs_figure(
     path: Path,
 ) -> None:
     """Save a figure of the outputs' standard deviations over speed on the scene's road, with a panel for each kind and
-    unit in ``kind_and_unit``; tyre forces are divided by their static loads ``static`` (N)."""
+    unit in ``kind_and_unit``; tyre forces are divided by their ``static_loads`` (N)."""
     groups = list(dict.fromkeys(kind_and_unit))
     figure, axes = panels(len(groups), min(2, len(groups)), 3.4)
     for axis, (kind, si) in zip(axes, groups, strict=True):
@@ -202,7 +202,7 @@ def road_figure(
     road: TwoTrackRoad, half_track: float, fitted_road: FittedRoad | None, heading: Heading, path: Path
 ) -> None:
     """Save a figure of the spectrum of the left track and the coherency of both tracks: of the road model, measured if
-    ``fitted`` is given, and of an isotropic road. half_track : half of the track width (m)."""
+    ``fitted_road`` is given, and of an isotropic road. half_track : half of the track width (m)."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     if fitted_road is not None:

@@ -27,7 +27,7 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Sampling):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:

@@ -55,7 +55,7 @@ ORDER_OF_INTERPOLATION = {"held": 2, "linear": 2, "smooth": 4}
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     sampling_rate: float | None = quantity("Hz", "rate of the virtual measurement on a road", default=None)
     noise_fraction: float = quantity("", "standard deviation of the force noise by the largest force", default=0.002)

@@ -24,7 +24,7 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     slip_angles: list[float] = Field([0.0, 2.0, 4.0, 8.0, 16.0], min_length=1, description="slip angles in deg")
     load: float = Field(15e3, gt=0, le=1e6, description="load of the figure in N")

@@ -3,8 +3,8 @@
 import pytest
 
 from docs.alike import alike
-from docs.outputs import ExampleFailed, commands, page_with_outputs
-from docs.pages import blocks
+from docs.outputs import ExampleFailed, console_commands, page_with_outputs
+from docs.pages import example_blocks
 
 PAGE = """# A page
 
@@ -58,7 +58,7 @@ def page(tmp_path):
 def test_outputs_are_written_where_they_differ(page):
     text, changes = page_with_outputs(page(PAGE), draw=False)
     assert len(changes) == 2 and "13\n" in changes[0] and "12\n" in changes[0]
-    assert [block.text for block in blocks(text) if block.mark == "output"] == ["12\n", "3\n", "3 4\nwrong\n"]
+    assert [block.text for block in example_blocks(text) if block.mark == "output"] == ["12\n", "3\n", "3 4\nwrong\n"]
     assert page_with_outputs(page(text), draw=False) == (text, [])
 
 
@@ -91,7 +91,7 @@ def test_pictures_are_drawn_where_the_page_shows_them(page, tmp_path):
 
 
 def test_commands_go_on_in_lines_without_a_dollar():
-    assert commands("$ a \\\n  b\n$ c\n") == ["a \\\n  b", "c"]
+    assert console_commands("$ a \\\n  b\n$ c\n") == ["a \\\n  b", "c"]
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from validation.absence.hub_forces import BARE_SCENE, write
 from validation.spatial.cars import r19, random_wrenches, static_forces
 from validation.spatial.hub_inputs import (
     SOLVER_TOLERANCE,
-    acceleration_gap_between_rows,
+    acceleration_difference_between_rows,
     centre_of_mass_error,
     samples,
     settings,
@@ -61,7 +61,7 @@ def test_methods_that_pick_their_steps_read_forces_at_their_times(engine, integr
 
 @pytest.mark.grounds("plain counterpart")
 def test_between_rows_compiled_forces_are_those_of_the_plain_equations():
-    assert acceleration_gap_between_rows(r19(), 6) < 1e-12
+    assert acceleration_difference_between_rows(r19(), 6) < 1e-12
     nearest = HubModel.__init__
 
     def blunt(self, *given):
@@ -70,7 +70,7 @@ def test_between_rows_compiled_forces_are_those_of_the_plain_equations():
             self.model.numbers[cut_kernel.ANY_TIME] = 0.0
 
     with patch.object(HubModel, "__init__", blunt):
-        assert acceleration_gap_between_rows(r19(), 1) > 1e-3
+        assert acceleration_difference_between_rows(r19(), 1) > 1e-3
 
 
 def test_a_run_is_the_same_by_every_route_and_says_what_it_took():

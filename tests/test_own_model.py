@@ -42,7 +42,7 @@ from validation.own_model.files import (
     JOINTED,
     LINKED,
     LOOP_CONSTRAINT,
-    PLANTED,
+    PLANTED_DIFFERENCES,
     TIED,
     model_with_change,
     random_chain,
@@ -343,7 +343,7 @@ def original(tmp_path_factory):
     return _read(tmp_path_factory.mktemp("original"), JOINTED)
 
 
-@pytest.mark.parametrize("name,old,new,kind,owner,size", PLANTED)
+@pytest.mark.parametrize("name,old,new,kind,owner,size", PLANTED_DIFFERENCES)
 def test_planted_difference_is_named_with_its_size(tmp_path, original, name, old, new, kind, owner, size):
     other = _read(tmp_path, model_with_change(JOINTED, name, old, new), "b.xml")
     comparison = compare(original.twin, other.twin, 3)

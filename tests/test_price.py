@@ -13,7 +13,7 @@ from models.advice.price.problem import Setting
 from models.core.errors import Refused, RunFailed
 from models.machine.timing import describe, interleave, paired_ratio
 from validation.price.rows import rows_of
-from validation.price.tables import rounds_of, tables
+from validation.price.tables import rounds_sentence, tables
 
 STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)
 
@@ -300,8 +300,8 @@ def test_a_job_that_has_not_been_is_timed_in_its_first_round():
 
 def test_rounds_are_told():
     points = [replace(p, changed=None, seconds=p.seconds[:1]) if p.setting.method == "first" else p for p in timed()]
-    assert rounds_of(points).startswith("Seconds are medians of 15 interleaved rounds for 6 settings")
-    assert "one run for 6" in rounds_of(points)
+    assert rounds_sentence(points).startswith("Seconds are medians of 15 interleaved rounds for 6 settings")
+    assert "one run for 6" in rounds_sentence(points)
 
 
 def test_tables_come_from_saved_points():

@@ -23,7 +23,7 @@ from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
 from validation.common.checks import largest_relative_difference
 from validation.spatial.towing import give_towed_wheels_car_heading, static_load_error, towed_turn
 from validation.spatial.trains import BOX, WHEELS, caravan, train
-from validation.spatial.written_equations import TURN_CONTROLS, rolling_cars, rolling_gap
+from validation.spatial.written_equations import TURN_CONTROLS, rolling_acceleration_difference, rolling_cars
 
 BOUND = 3e-3
 """Of the closed form of a settled turn: what is left of its settling after 3 s."""
@@ -103,7 +103,10 @@ def test_springs_of_a_trailer_are_the_engines_own_and_bear_it(engine):
     wanted = {spring.name for spring in car.given.springs if spring.frame in car.given.towed} | {"trailer's bar"}
     assert set(names) == wanted
     assert all("friction" in why for why in division.reasons.values()) and len(division.reasons) == 4
-    assert rolling_gap(car, engine, 3) < 1e-12 and rolling_gap(car.changed(forces="compiled"), engine, 3) < 1e-12
+    assert (
+        rolling_acceleration_difference(car, engine, 3) < 1e-12
+        and rolling_acceleration_difference(car.changed(forces="compiled"), engine, 3) < 1e-12
+    )
     q, v = car.straight(20.0)
     without = free_model(engine, replace(driven_by_both, parts=division.native[:-1])).acceleration(0.0, q + 0.01, v)
     assert largest_relative_difference(without, build_model(engine, car).acceleration(0.0, q + 0.01, v)) > 1e-6

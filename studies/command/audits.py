@@ -25,8 +25,8 @@ def conformity_report(engine: str, has_other_options: bool, requested_folder: Pa
 def blind_spot_audit(
     has_other_options: bool, function_pattern: str | None, requested_folder: Path | None, resume: Path | None
 ) -> None:
-    """Audit which rows and tests detect faults in shared functions, all or those that match ``only``; raises InputError
-    for options of a report."""
+    """Audit which rows and tests detect faults in shared functions, all or those that match ``function_pattern``;
+    raises InputError for options of a report."""
     if has_other_options:
         raise InputError("--blind-spots", "", True, "goes without --quick and --against")
     from validation.blind_spots.audit import TRACE, audit, audit_of, audit_summary

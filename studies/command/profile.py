@@ -16,7 +16,7 @@ from typing import Any
 SAMPLING_PERIOD = 0.004
 """Time (s) between two samples of the call stack."""
 PYTHON_START_KIND, IMPORTS_KIND, KERNELS_KIND = "start of Python", "imports", "compiling and loading kernels"
-FIGURES_KIND, SAVING_KIND, EVERYTHING_ELSE = "figures", "saving", "everything else"
+FIGURES_KIND, SAVING_KIND, OTHER_KIND = "figures", "saving", "everything else"
 OUTSIDE_ENGINES = "marching beside the engines"
 """Label of time spent in a controller, in wheels with their own steps, or in equations that belong to no engine."""
 KIND_OF_LIBRARY = {
@@ -58,7 +58,7 @@ class Profiler:
         while not self._over.wait(SAMPLING_PERIOD):
             current_time = time.perf_counter()
             frame = sys._current_frames().get(self._main or 0)
-            self.seconds[EVERYTHING_ELSE if frame is None else kind_of_work(frame)] += current_time - last_time
+            self.seconds[OTHER_KIND if frame is None else kind_of_work(frame)] += current_time - last_time
             last_time = current_time
 
     def run_profiled(self, work: Callable[[Any], dict[str, Any]], progress: Any) -> dict[str, Any]:
@@ -89,7 +89,7 @@ def kind_of_work(frame: FrameType) -> str:
         if name in MARCH_FUNCTIONS and (within or path.stem == "march"):
             work_part = f"marching in {engine}" if engine else OUTSIDE_ENGINES
             return f"forces asked for by {engine}" if engine and forces else work_part
-    return f"building in {engine}" if engine else EVERYTHING_ELSE
+    return f"building in {engine}" if engine else OTHER_KIND
 
 
 def _calls_of_stack(frame: FrameType | None) -> Iterator[tuple[str, PurePath]]:

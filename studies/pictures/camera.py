@@ -68,8 +68,8 @@ class Camera:
 def painted_picture(
     camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky_colours: np.ndarray
 ) -> np.ndarray:
-    """Image (height, width, 3) of surfaces in front of a sky; sky (2, 3) : its colours at the top of the picture and at
-    the horizon.
+    """Image (height, width, 3) of surfaces in front of a sky; sky_colours (2, 3) : its colours at the top of the
+    picture and at the horizon.
 
     A later layer lies over all earlier ones, as arrows over bodies do.
     """

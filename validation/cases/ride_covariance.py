@@ -29,7 +29,7 @@ from validation.ride.no_variance import QUARTER_CAR, no_variance_rows, weighting
 from validation.ride.rides import (
     ROAD_INTENSITY,
     changed_vehicle,
-    five_cases,
+    five_correlation_cases,
     largest_relative_error,
     one_track,
     paper_road,
@@ -91,7 +91,8 @@ def _by_quadrature(name: str, seed: int, road: TwoTrackRoad | None, speed: float
     five cases of correlation, with the error that each route states."""
     vehicle = linearise(_vehicle(name, seed), speed)
     compared = [
-        _compared(vehicle, vehicle, excitation, speed) for excitation in five_cases(vehicle.wheels, road).values()
+        _compared(vehicle, vehicle, excitation, speed)
+        for excitation in five_correlation_cases(vehicle.wheels, road).values()
     ]
     worst, by_covariance, by_quadrature, counts = zip(*compared, strict=True)
     return {
@@ -202,7 +203,9 @@ def _inputs_row() -> Row:
     """Row: covariance of the road heights under the wheels, as the system's outputs state it."""
     vehicle = linearise(_vehicle("three_axle_truck", SEED))
     road, worst = road_of_level(1.0), 0.0
-    for met, case in zip(five_cases(vehicle.wheels, road).values(), CORRELATION_CASES.values(), strict=True):
+    for met, case in zip(
+        five_correlation_cases(vehicle.wheels, road).values(), CORRELATION_CASES.values(), strict=True
+    ):
         H = np.hstack([np.zeros((len(vehicle.wheels), 2 * len(vehicle.mass))), *met.heights])
         heights = H @ stationary_covariance(vehicle_with_road(vehicle, met, 13.0)).P @ H.T
         expected = input_covariance(road, vehicle.wheels, *case)
@@ -224,7 +227,7 @@ def _engine_row(engine: str) -> Row:
     for name, speed in (("r19_ride", 20.0), ("r19_free", 33.0), ("three_axle_truck", 9.0)):
         vehicle = _vehicle(name, SEED)
         linear, analytic = build(engine, vehicle, speed=speed).linearise(), linearise(vehicle, speed)
-        roads = five_cases(analytic.wheels).values()
+        roads = five_correlation_cases(analytic.wheels).values()
         worst = max(worst, *(_compared(linear, analytic, road, speed)[0] for road in roads))
     return Observed(
         f"ride_covariance.engine.{engine}",
@@ -241,7 +244,7 @@ def _fast(speeds: np.ndarray, vehicle_name: str) -> tuple[list[Row], dict[str, A
     direct route, with processor times."""
     vehicle = _vehicle("r19_ride")
     linear = linear_vehicle(vehicle, vehicle_name)
-    roads = five_cases(linear(20.0).wheels)
+    roads = five_correlation_cases(linear(20.0).wheels)
     variance_sweep(linear, roads, speeds[:1], FILTERS)  # what is loaded and linearised once is no part of the sweep
     start = time.process_time()
     quick = variance_sweep(linear, roads, speeds, FILTERS)

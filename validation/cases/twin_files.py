@@ -26,7 +26,7 @@ from validation.own_model.files import (
     GEARED,
     JOINTED,
     LINKED,
-    PLANTED,
+    PLANTED_DIFFERENCES,
     TIED,
     model_with_change,
     random_chain,
@@ -131,7 +131,7 @@ def _path(folder: Path) -> list[Row]:
 def _planted(folder: Path, quick: bool) -> Row:
     """Row: number of planted differences that the comparison names first, with their right size."""
     first, named = _read(folder, "original", JOINTED).twin, 0
-    chosen = PLANTED[::5] if quick else PLANTED
+    chosen = PLANTED_DIFFERENCES[::5] if quick else PLANTED_DIFFERENCES
     for name, old, new, kind, owner, size in chosen:
         second = _read(folder, "planted", model_with_change(JOINTED, name, old, new)).twin
         influential = compare(first, second, 3).influential

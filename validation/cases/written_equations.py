@@ -8,15 +8,15 @@ from models.vehicles.spatial_linear import preloads
 from validation.common.checks import largest_relative_difference
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.spatial.written_equations import (
-    brush_force_gap,
+    brush_force_difference,
+    cut_car_acceleration_difference,
+    cut_car_path_difference,
     cut_cars,
-    hub_gap,
-    hub_path_gap,
-    inner_force_gap,
-    report_gap,
+    inner_force_difference,
+    report_difference,
+    rolling_acceleration_difference,
     rolling_cars,
-    rolling_gap,
-    rolling_path_gap,
+    rolling_path_difference,
 )
 
 TITLE = "Cars by plain equations that share no force with the engines"
@@ -48,7 +48,7 @@ def _laws(states: int) -> list[Row]:
         _row(
             "bristles",
             f"largest difference of the creep forces of {states} random patches, over the load",
-            brush_force_gap(states),
+            brush_force_difference(states),
             "1",
             LAW_BOUND,
         )
@@ -82,15 +82,25 @@ def _hubs(states: int, duration: float) -> list[Row]:
                 f"in {engine}, {states} random states"
             )
             rows.append(
-                _row(f"hubs.{engine}.{name}", what, hub_gap(car, engine, states), "of the largest", INSTANT_BOUND)
+                _row(
+                    f"hubs.{engine}.{name}",
+                    what,
+                    cut_car_acceleration_difference(car, engine, states),
+                    "of the largest",
+                    INSTANT_BOUND,
+                )
             )
         what = f"largest difference of {name}'s section forces, wrenches and holding moments at random states"
-        rows.append(_row(f"hubs.inside.{name}", what, inner_force_gap(car, 4), "of the largest", INSTANT_BOUND))
+        rows.append(_row(f"hubs.inside.{name}", what, inner_force_difference(car, 4), "of the largest", INSTANT_BOUND))
         for kind, rough in (("road", True), ("noise", False)):
             what = f"largest difference of {name}'s coordinates and rates in MuJoCo, {duration:g} s of {kind}"
             rows.append(
                 _row(
-                    f"hubs.{kind}.{name}", what, hub_path_gap(car, "mujoco", duration, rough), "m, rad, 1/s", PATH_BOUND
+                    f"hubs.{kind}.{name}",
+                    what,
+                    cut_car_path_difference(car, "mujoco", duration, rough),
+                    "m, rad, 1/s",
+                    PATH_BOUND,
                 )
             )
     return rows
@@ -102,13 +112,13 @@ def _rolling(states: int, duration: float) -> list[Row]:
     for name, car in rolling_cars().items():
         for engine in ENGINES:
             what = f"largest difference of {name}'s accelerations on tyres in {engine}, {states} random states"
-            gap = rolling_gap(car, engine, states)
+            gap = rolling_acceleration_difference(car, engine, states)
             rows.append(_row(f"tyres.{engine}.{name}", what, gap, "of the largest", INSTANT_BOUND))
         what = (
             f"largest difference of the tyre reports and ledgers of {name} at random states, over the largest of each"
         )
-        rows.append(_row(f"tyres.reports.{name}", what, report_gap(car, states), "1", INSTANT_BOUND))
+        rows.append(_row(f"tyres.reports.{name}", what, report_difference(car, states), "1", INSTANT_BOUND))
         what = f"largest difference of {name}'s positions and rates in MuJoCo, {duration:g} s of a turn on a rough road"
-        gap = rolling_path_gap(car, "mujoco", duration)
+        gap = rolling_path_difference(car, "mujoco", duration)
         rows.append(_row(f"tyres.path.{name}", what, gap, "m, rad, 1/s", PATH_BOUND))
     return rows

@@ -167,7 +167,7 @@ def model_with_change(text: str, name: str, old_text: str, new_text: str) -> str
     return text[:there] + new_text + text[there + len(old_text) :]
 
 
-PLANTED = [
+PLANTED_DIFFERENCES = [
     ("hinge", 'damping=".3"', 'damping=".31"', "damping", "joint 'hinge'", "0.3 N m s/rad"),
     ("hinge", 'armature=".02"', 'armature=".03"', "armature", "joint 'hinge'", "0.02 kg m^2"),
     ("hinge", 'armature=".02"', "", "armature", "joint 'hinge'", "none in b.xml"),

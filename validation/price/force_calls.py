@@ -16,7 +16,7 @@ START_FORCE_CALLS = {"VelocityVerlet": 1, "GeneralizedAlpha": 1, "TrapezoidalInd
 
 
 @contextmanager
-def _counted_loads() -> Iterator[list[int]]:
+def _counting_load_calls() -> Iterator[list[int]]:
     """Context that counts the calls of the first load in every Exudyn model built within it; yields the count in a
     list."""
     from models.engines import exudyn
@@ -52,6 +52,6 @@ def counted_calls(engine: str, assembly: Assembly, settings: Settings) -> tuple[
         model: Any = build(engine, assembly, settings)
         reported_calls = model.run().counts["force calls"]
         return _mujoco_calls(model), reported_calls
-    with _counted_loads() as calls:
+    with _counting_load_calls() as calls:
         reported_calls = build(engine, assembly, settings).run().counts["force calls"]
     return calls[0] - START_FORCE_CALLS.get(settings.integrator, 0), reported_calls

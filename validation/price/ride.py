@@ -26,7 +26,7 @@ from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Observed, Row, System, Table
-from validation.ride.rides import five_cases
+from validation.ride.rides import five_correlation_cases
 
 SYSTEM: System = "cost"
 SPEED, LOWEST_FREQUENCY = 20.0, 1e-2
@@ -84,7 +84,7 @@ class PricedRide:
 def problem() -> PricedRide:
     """Problem of the cost of accuracy in ride, for the vehicle R19-ride at 20 m/s."""
     vehicle = linearise(load_vehicle("r19_ride"))
-    roads = five_cases(vehicle.wheels)
+    roads = five_correlation_cases(vehicle.wheels)
     true = variances_by_quadrature(vehicle, roads["3"], SPEED)
     return PricedRide(vehicle, roads, np.sqrt(true.variance), float(true.error.max()))
 

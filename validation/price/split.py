@@ -28,7 +28,7 @@ from validation.common.rows import Observed, Row, Saved, System, Table
 from validation.price.compiled_forces import CompiledForces, force_callback
 from validation.price.instructions_run import exudyn_marches
 from validation.price.problems import road_excited, wheelset
-from validation.price.problems.road_excited import STAGES
+from validation.price.problems.road_excited import STAGES_OF_METHOD
 
 SYSTEM: System = "cost"
 FORCE_VARIANTS = ("empty", "cheap", "real")
@@ -186,7 +186,12 @@ def table(case_data: list[Saved], problem: str) -> list[Table]:
             _, low, high = bridge_share(saved)
             values = (f"{value:.2f}" for value in step_parts(saved))
             lines.append(
-                (_engine_text(saved), str(STAGES[METHODS[saved["engine"]]]), *values, f"{low:.0f} to {high:.0f}")
+                (
+                    _engine_text(saved),
+                    str(STAGES_OF_METHOD[METHODS[saved["engine"]]]),
+                    *values,
+                    f"{low:.0f} to {high:.0f}",
+                )
             )
     note = (
         f"Microseconds a step, median of all rounds, over {STEPS.get(problem, 0):,} steps; all forces in one "

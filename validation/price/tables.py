@@ -47,7 +47,7 @@ def cheapest_table(measured_points: MeasuredPoints) -> Table:
         "Fixed steps are interpolated log-log between neighbouring settings; methods without one order count at "
         "the loosest setting tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. "
         f"{work.capitalize()} are exact and the same on every machine; seconds are those of this processor, "
-        f"everything built anew. {rounds_of(measured_points.points)}"
+        f"everything built anew. {rounds_sentence(measured_points.points)}"
     )
     heads = (
         f"{measured_points.quantity} error at most [{measured_points.unit}]",
@@ -58,7 +58,7 @@ def cheapest_table(measured_points: MeasuredPoints) -> Table:
     return Table("Cheapest setting that meets the tolerance", note, heads, tuple(rows))
 
 
-def rounds_of(points: list[Point]) -> str:
+def rounds_sentence(points: list[Point]) -> str:
     """Sentence on how many settings were timed in how many rounds, and how much the times scatter."""
     answered = [p for p in points if p.status == "ok"]
     in_rounds = [p.seconds for p in answered if p.changed is not None]

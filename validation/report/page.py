@@ -30,7 +30,7 @@ from validation.report.numbers import (
     powers_markup,
     share_markup,
 )
-from validation.report.shares import case_of, report_sizes_of_systems
+from validation.report.shares import case_of_row, report_sizes_of_systems
 from validation.report.shown import case_on_page
 
 PAGE_TEMPLATE = "page.html.jinja"
@@ -88,8 +88,8 @@ def rows_by_system(results: Saved, page_content: dict[str, Saved]) -> list[Saved
 
 
 def _cases_of_system(rows: list[Saved], seconds: dict[str, float], page_content: dict[str, Saved]) -> Iterator[Saved]:
-    for name in dict.fromkeys(map(case_of, rows)):
-        of_case = [row for row in rows if case_of(row) == name]
+    for name in dict.fromkeys(map(case_of_row, rows)):
+        of_case = [row for row in rows if case_of_row(row) == name]
         groups: dict[str, list[Saved]] = {}
         for row in of_case:
             groups.setdefault(row["why"], []).append(row)
@@ -109,8 +109,10 @@ def independence_counts(results: Saved, page_content: dict[str, Saved]) -> Saved
     """Number of rows of each case for each kind of independence of the two compared sides; page_content : title, tables
     and figures of each case."""
     lines = []
-    for name in dict.fromkeys(map(case_of, results["rows"])):
-        kinds = [row["independence"] for row in results["rows"] if case_of(row) == name and row["status"] != "not run"]
+    for name in dict.fromkeys(map(case_of_row, results["rows"])):
+        kinds = [
+            row["independence"] for row in results["rows"] if case_of_row(row) == name and row["status"] != "not run"
+        ]
         lines.append((name, page_content[name]["title"], [kinds.count(kind) for kind in INDEPENDENCE_TEXTS]))
     return {
         "kinds": INDEPENDENCE_TEXTS,
@@ -137,7 +139,7 @@ def allowed_assumptions(rows: list[Saved]) -> list[tuple[str, list[Saved]]]:
     alike_rows: dict[tuple[str, str], list[Saved]] = {}
     for row in rows:
         if row["allowed"]:
-            alike_rows.setdefault((case_of(row), NUMBERS_AND_RUNS.sub("", row["allowed"])), []).append(row)
+            alike_rows.setdefault((case_of_row(row), NUMBERS_AND_RUNS.sub("", row["allowed"])), []).append(row)
     return [(alike[0]["allowed"], alike) for alike in alike_rows.values()]
 
 
@@ -220,8 +222,8 @@ def page_text(results: Saved, case_data: Path, map_cases: Callable[..., Iterable
         "marked": docstring_markup,
         "numeric_columns": numeric_columns,
     }
-    environment.globals |= {"margin": margin_of_row, "case_of": case_of}
-    names = list(dict.fromkeys(map(case_of, results["rows"])))
+    environment.globals |= {"margin": margin_of_row, "case_of": case_of_row}
+    names = list(dict.fromkeys(map(case_of_row, results["rows"])))
     drawn = dict(zip(names, map_cases(partial(case_on_page, case_data), names), strict=True))
     return environment.get_template(PAGE_TEMPLATE).render(
         verdict=report_verdict(results),

@@ -43,7 +43,7 @@ def full_report_data() -> dict[str, Saved]:
     return kept
 
 
-def case_of(row: Saved) -> str:
+def case_of_row(row: Saved) -> str:
     """Name of the case that a row belongs to: the row's id begins with it, or with one of its words."""
     first = row["id"].partition(".")[0]
     return first if first in CASES else next((case for case in CASES if first in case.split("_")), first)
@@ -88,7 +88,7 @@ def _row_counts(rows: list[Saved]) -> dict[str, Counter[str]]:
     """Numbers of rows by system, for each case."""
     counted: dict[str, Counter[str]] = {}
     for row in rows:
-        counted.setdefault(case_of(row), Counter())[row["system"]] += 1
+        counted.setdefault(case_of_row(row), Counter())[row["system"]] += 1
     return counted
 
 

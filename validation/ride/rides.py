@@ -104,7 +104,7 @@ def paper_road(
     return road_excitation(road_of_level(y or 1.0, level_factor, cutoff=cutoff), placed, *correlation_words)
 
 
-def five_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
+def five_correlation_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
     """The paper's road, or a given road, in the paper's five cases of correlation, by the number of the case."""
     road = road or road_of_level(half_track(wheels))
     return {str(number): road_excitation(road, wheels, *case) for number, case in CORRELATION_CASES.items()}

@@ -65,7 +65,7 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
             SYSTEM,
             "relative difference of the accelerations at random times between the rows of forces and of angles from "
             "the plain equations",
-            acceleration_gap_between_rows(vehicle, 6),
+            acceleration_difference_between_rows(vehicle, 6),
             "1",
         ).at_most(1e-12, "weights of the compiled forces, differences of the plain ones", "native"),
     ]
@@ -112,7 +112,7 @@ def _falling_path(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) ->
     return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
 
-def acceleration_gap_between_rows(vehicle: CutVehicle, state_count: int) -> float:
+def acceleration_difference_between_rows(vehicle: CutVehicle, state_count: int) -> float:
     """Largest relative difference between accelerations by compiled forces and by the plain equations, at random states
     and times, with random hub forces and guides that are interpolated between their rows."""
     rng, rows, worst = np.random.default_rng(SEED), 7, 0.0

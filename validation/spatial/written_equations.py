@@ -91,7 +91,7 @@ def rolling_states(car: Handling, state_count: int) -> Iterator[tuple[float, np.
         yield rng.uniform(0.0, 1.0), q, v
 
 
-def rolling_gap(car: Handling, engine: str, state_count: int) -> float:
+def rolling_acceleration_difference(car: Handling, engine: str, state_count: int) -> float:
     """Largest difference between the accelerations of an engine and of the plain equations, divided by the largest of
     the state."""
     plain, model = build(REFERENCE, car), build(engine, car)
@@ -101,7 +101,7 @@ def rolling_gap(car: Handling, engine: str, state_count: int) -> float:
     )
 
 
-def report_gap(car: Handling, state_count: int) -> float:
+def report_difference(car: Handling, state_count: int) -> float:
     """Largest difference of the reported tyre quantities and energies from the plain equations, each column divided by
     its largest value."""
     plain, numbers, worst = PlainRolling(car), car.numbers, 0.0
@@ -116,7 +116,7 @@ def report_gap(car: Handling, state_count: int) -> float:
     return worst
 
 
-def rolling_path_gap(car: Handling, engine: str, duration: float) -> float:
+def rolling_path_difference(car: Handling, engine: str, duration: float) -> float:
     """Largest difference of a car's coordinates and rates between runs by an engine and by the plain equations."""
     settings = Settings("RK4", ROLLING_STEP, duration)
     ours, theirs = (build(name, car, settings).run(*car.straight(SPEED)) for name in (engine, REFERENCE))
@@ -148,7 +148,7 @@ def cut_state(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return q, v
 
 
-def hub_gap(vehicle: CutVehicle, engine: str, state_count: int) -> float:
+def cut_car_acceleration_difference(vehicle: CutVehicle, engine: str, state_count: int) -> float:
     """Largest difference between the accelerations of an engine and of the plain equations, divided by the largest of
     the state."""
     worst, input_sets = 0.0, hub_input_sets(vehicle)
@@ -161,7 +161,7 @@ def hub_gap(vehicle: CutVehicle, engine: str, state_count: int) -> float:
     return worst
 
 
-def inner_force_gap(vehicle: CutVehicle, state_count: int) -> float:
+def inner_force_difference(vehicle: CutVehicle, state_count: int) -> float:
     """Largest difference of element forces, hub forces and moments, and stabilising moments from the plain equations,
     each divided by its largest value."""
     worst = 0.0
@@ -175,7 +175,7 @@ def inner_force_gap(vehicle: CutVehicle, state_count: int) -> float:
     return worst
 
 
-def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough_road: bool) -> float:
+def cut_car_path_difference(vehicle: CutVehicle, engine: str, duration: float, rough_road: bool) -> float:
     """Largest difference of a cut vehicle's coordinates and rates between runs by an engine and by the plain equations,
     on a rough road or with noisy hub forces."""
     steps = round(duration / STEP)
@@ -193,7 +193,7 @@ def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough_road: 
     return float(np.abs(paths[0] - paths[1]).max())
 
 
-def brush_force_gap(state_count: int) -> float:
+def brush_force_difference(state_count: int) -> float:
     """Largest difference of the creep forces and moments of random brush contact patches from plain code; forces are
     divided by the load, moments by load times half width."""
     rng, worst, width = np.random.default_rng(SEED), 0.0, 0.09

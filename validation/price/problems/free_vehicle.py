@@ -58,7 +58,7 @@ REFERENCE_SOLVERS = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "M
 """Reference solvers: method of scipy, relative tolerance, and name of the equations that it solves."""
 
 
-def heights(positions: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
+def track_heights(positions: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
     """Height (m) and slope of the road's left (0) or right (1) track at positions (...) in m along the road."""
     x, k = np.asarray(positions, dtype=float), np.arange(1, SINE_COUNT + 1)
     angle = 2 * np.pi * (x[..., None] * k / LONGEST_WAVELENGTH + GOLDEN * k * (k + SINE_COUNT * track))
@@ -109,7 +109,8 @@ class FreeVehicle:
     def road(self, times: ArrayLike) -> np.ndarray:
         """Road heights (m) under the w wheels at times (...) in s, then their rates (m/s): (..., 2 w)."""
         waves = [
-            heights(SPEED * np.asarray(times) + tyre.point[0], int(tyre.point[1] < 0)) for tyre in self.vehicle.tyres
+            track_heights(SPEED * np.asarray(times) + tyre.point[0], int(tyre.point[1] < 0))
+            for tyre in self.vehicle.tyres
         ]
         return np.stack([*(height for height, _ in waves), *(SPEED * slope for _, slope in waves)], axis=-1)
 

@@ -20,7 +20,7 @@ from models.sensors.rotations import (
     rotation_vector,
 )
 from validation.price.problems import Curves, curves_of_methods, settings_of_curves
-from validation.price.problems.road_excited import DEFAULT_SETTING_OWNERS, STAGES
+from validation.price.problems.road_excited import DEFAULT_SETTING_OWNERS, STAGES_OF_METHOD
 from validation.price.problems.turning_sphere import Attitudes, attitudes_in_exudyn, attitudes_in_mujoco
 
 DURATION, COMPARED_GRID = 600.0, 1.0
@@ -61,7 +61,7 @@ FINE_STEP = 5e-3
 """Step (s) of the sixth-order Magnus method that the closed form is compared with."""
 
 
-def angles(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def car_angles(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Roll, pitch and yaw (n, 3) in rad of the car at times (n,) in s, and their rates (n, 3) in rad/s."""
     angle_columns, rates = [], []
     for name, sines in ANGLE_SINES.items():
@@ -71,14 +71,14 @@ def angles(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.column_stack(angle_columns), np.column_stack(rates)
 
 
-def attitude(times: np.ndarray) -> np.ndarray:
+def car_attitude(times: np.ndarray) -> np.ndarray:
     """Quaternions (n, 4) of the car's attitude at times (n,) in s, in closed form."""
-    return from_cardan(*angles(times)[0].T)
+    return from_cardan(*car_angles(times)[0].T)
 
 
 def gyro(times: np.ndarray) -> np.ndarray:
     """Angular rates (n, 3) in rad/s in body axes at times (n,) in s, as an ideal gyro measures them."""
-    (roll, pitch, _), (by_roll, by_pitch, by_yaw) = (columns.T for columns in angles(times))
+    (roll, pitch, _), (by_roll, by_pitch, by_yaw) = (columns.T for columns in car_angles(times))
     return np.column_stack(
         [
             by_roll - by_yaw * np.sin(pitch),
@@ -104,7 +104,7 @@ def magnus_attitudes(step: float) -> np.ndarray:
     second_commutator = np.cross(middle, 2 * bend + odd) / 60
     turn = middle + bend / 12 - np.cross(-20 * middle - bend + odd, slope + second_commutator) / 240
     # a chain of rotations is what rates that are held for one second each make
-    return integrate(np.concatenate([turn, turn[-1:]]), 1.0, attitude(np.zeros(1))[0], "held")
+    return integrate(np.concatenate([turn, turn[-1:]]), 1.0, car_attitude(np.zeros(1))[0], "held")
 
 
 def largest_angle(computed_attitudes: np.ndarray, true_values: np.ndarray) -> float:
@@ -125,7 +125,7 @@ class AttitudeSolver:
     def run(self) -> Attitudes:
         """Attitudes at the compared times; Refused or RunFailed from the engine pass through."""
         engine, method, period = self.setting.engine, self.setting.method, self.setting.value
-        count, stride, start = round(DURATION / period), round(COMPARED_GRID / period), attitude(np.zeros(1))[0]
+        count, stride, start = round(DURATION / period), round(COMPARED_GRID / period), car_attitude(np.zeros(1))[0]
         if engine != "reference":
             return (attitudes_in_exudyn if engine == "exudyn" else attitudes_in_mujoco)(
                 method, period, count, stride, start, gyro
@@ -151,7 +151,7 @@ class InertialUnit:
         )
         self.units = {"attitude": "rad"}
         self.reference = f"closed form, and a Magnus method of order six at {1e3 * FINE_STEP:g} ms"
-        self.true = attitude(COMPARED_GRID * np.arange(round(DURATION / COMPARED_GRID) + 1))
+        self.true = car_attitude(COMPARED_GRID * np.arange(round(DURATION / COMPARED_GRID) + 1))
         self.uncertainty = {
             "attitude": largest_angle(magnus_attitudes(FINE_STEP)[:: round(COMPARED_GRID / FINE_STEP)], self.true)
         }
@@ -168,7 +168,7 @@ class InertialUnit:
         """
         step = COMPARED_GRID / np.ceil(COMPARED_GRID / step_or_tolerance * (1 - 1e-9))
         order = INTEGRATION_RULES[method][1] if engine == "reference" else 1 if method in FIRST_ORDER_METHODS else 2
-        stages = 1 if engine == "reference" else STAGES.get(method, 0)
+        stages = 1 if engine == "reference" else STAGES_OF_METHOD.get(method, 0)
         return Setting(
             engine,
             method,

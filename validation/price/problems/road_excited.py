@@ -32,7 +32,7 @@ from validation.price.problems import Curves, curves_of_methods, milliseconds, s
 DURATION, SPEED = 2.0, 20.0
 REFERENCE_SPACING = 1.25e-4
 """Spacing (s) of the rows of the stored reference solution; every fixed step is a multiple of it."""
-STAGES = {
+STAGES_OF_METHOD = {
     "RK44": 4,
     "RK67": 7,
     "RK33": 3,
@@ -119,7 +119,7 @@ def setting(engine: str, method: str, step_or_tolerance: float) -> Setting:
     known = CATALOGUE[engine][method.split()[0]]
     order = 0 if method == "LSODA" else known.order
     default = DEFAULT_SETTING_OWNERS.get((engine, method, step_or_tolerance), "")
-    return Setting(engine, method, step_or_tolerance, order, known.adaptive, STAGES.get(method, 0), default)
+    return Setting(engine, method, step_or_tolerance, order, known.adaptive, STAGES_OF_METHOD.get(method, 0), default)
 
 
 def settings(quick: bool) -> tuple[Setting, ...]:

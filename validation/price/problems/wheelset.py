@@ -31,7 +31,7 @@ from models.machine.compiled import njit
 from models.machine.stack import start
 from validation.contact.slow_wheels import counting_calls
 from validation.price.force_calls import START_FORCE_CALLS
-from validation.price.problems.road_excited import STAGES, setting
+from validation.price.problems.road_excited import STAGES_OF_METHOD, setting
 
 DURATION = 0.1
 """s"""
@@ -238,7 +238,7 @@ class RollingWheels:
         def run() -> WheelsetResult:
             with installed(kernel_law(forces)):
                 state = marcher.run(self._start[None], steps)[0, -1]
-            return WheelsetResult(state, {"steps": steps, "force calls": STAGES[method] * steps})
+            return WheelsetResult(state, {"steps": steps, "force calls": STAGES_OF_METHOD[method] * steps})
 
         return WheelsetSolver(run)
 

@@ -19,7 +19,7 @@ WRITERS: tuple[Callable[[Path], list[ReferenceValue]], ...] = (
     ride.write,
     inertial_unit.write,
 )
-HEADS = ("problem", "quantity", "unit", "time [s]", "value", "uncertainty")
+TABLE_HEADS = ("problem", "quantity", "unit", "time [s]", "value", "uncertainty")
 
 
 def main(folder: Path, writers: tuple[Callable[[Path], list[ReferenceValue]], ...] = WRITERS) -> None:
@@ -27,4 +27,4 @@ def main(folder: Path, writers: tuple[Callable[[Path], list[ReferenceValue]], ..
     values = [value for write in writers for value in write(folder)]
     with open(folder / "reference_values.csv", "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerows([HEADS, *(value.cells() for value in values)])
+        table.writerows([TABLE_HEADS, *(value.cells() for value in values)])

@@ -7,7 +7,7 @@ from validation.price.problems.inertial_unit import ANGLE_SINES, DURATION, STEAD
 from validation.price.sheets.page import ReferenceValue
 from validation.price.sheets.page import write as write_page
 
-NAMES = ("q1", "q2", "q3", "q4")
+QUATERNION_NAMES = ("q1", "q2", "q3", "q4")
 
 
 def write(folder: Path) -> list[ReferenceValue]:
@@ -16,7 +16,7 @@ def write(folder: Path) -> list[ReferenceValue]:
     sure = problem.uncertainty["attitude"]
     values = [
         ReferenceValue("unit", name, "", DURATION, float(component), sure)
-        for name, component in zip(NAMES, problem.true[-1], strict=True)
+        for name, component in zip(QUATERNION_NAMES, problem.true[-1], strict=True)
     ]
     return write_page(
         folder,

@@ -13,10 +13,10 @@ from validation.price.problems.road_excited import REFERENCE_SOLVERS, SPEED
 from validation.price.sheets.page import ReferenceValue, write_columns
 from validation.price.sheets.page import write as write_page
 
-PROBLEMS = (force_excited.problem, force_excited.noisy_problem, force_excited.prescribed_pitch_problem)
-NAMES = ("z1", "z2", "z3", "pitch", "z1_rate", "z2_rate", "z3_rate", "pitch_rate")
-UNITS = ("m", "m", "m", "rad", "m/s", "m/s", "m/s", "rad/s")
-EQUATIONS = r"""
+FORCE_PROBLEMS = (force_excited.problem, force_excited.noisy_problem, force_excited.prescribed_pitch_problem)
+STATE_NAMES = ("z1", "z2", "z3", "pitch", "z1_rate", "z2_rate", "z3_rate", "pitch_rate")
+STATE_UNITS = ("m", "m", "m", "rad", "m/s", "m/s", "m/s", "rad/s")
+EQUATIONS_TEXT = r"""
     m1 z1'' = m1 g + F3 - f1            F3 = k3 (z3 - z1 - b sin p) + d3 (z3' - z1' - b p' cos p)
     m2 z2'' = m2 g + F4 - f2            F4 = k4 (z3 - z2 + a sin p) + d4 (z3' - z2' + a p' cos p)
     m3 z3'' = m3 g - F3 - F4
@@ -24,7 +24,7 @@ EQUATIONS = r"""
 
 z positive down, the pitch p positive nose up; f1, f2 are the wheel forces, positive up.
 """
-ON_ROAD = f"""
+ROAD_FORCES_TEXT = f"""
     f1 = k1 (z1 - r(s)) + d1 (z1' - v r'(s))                s = v t
     f2 = k2 (z2 - r(s - l)) + d2 (z2' - v r'(s - l))        l = a + b
     r(s) = -w(s / {FADE_IN_LENGTH:g} m) sum_i A_i sin(W_i s + P_i)  for s > 0, else 0
@@ -38,7 +38,7 @@ def write(folder: Path) -> list[ReferenceValue]:
     """Write all four problem sheets with their input files; returns the reference values."""
     return [
         *write_road_sheet(folder),
-        *(value for make in PROBLEMS for value in write_force_sheet(make(False), folder)),
+        *(value for make in FORCE_PROBLEMS for value in write_force_sheet(make(False), folder)),
     ]
 
 
@@ -60,7 +60,7 @@ def write_road_sheet(folder: Path) -> list[ReferenceValue]:
         folder,
         "road",
         problem.title,
-        f"{EQUATIONS}{ON_ROAD}\n{_parameters_and_start(problem)}",
+        f"{EQUATIONS_TEXT}{ROAD_FORCES_TEXT}\n{_parameters_and_start(problem)}",
         f"End values at {problem.duration:g} s ({problem.reference}); the "
         "uncertainty is the largest difference of the three.",
         _reference_values("road", problem.duration, true, sure),
@@ -100,14 +100,16 @@ def final_values(problem: ForceExcited) -> list[ReferenceValue]:
 def _reference_values(key: str, time: float, states: np.ndarray, uncertainties: np.ndarray) -> list[ReferenceValue]:
     return [
         ReferenceValue(key, *entry[:2], time, *map(float, entry[2:]))
-        for entry in zip(NAMES, UNITS, states, uncertainties, strict=True)
+        for entry in zip(STATE_NAMES, STATE_UNITS, states, uncertainties, strict=True)
     ]
 
 
 def _parameters_and_start(problem: ForceExcited | road_excited.RoadExcited) -> str:
     """Text of a problem's parameters and initial state."""
     numbers = ", ".join(f"{name} = {value!r}" for name, value in problem.assembly.parameters)
-    start = ", ".join(f"{name} = {value:.16e}" for name, value in zip(NAMES, problem.assembly.initial, strict=True))
+    start = ", ".join(
+        f"{name} = {value:.16e}" for name, value in zip(STATE_NAMES, problem.assembly.initial, strict=True)
+    )
     return f"Parameters (SI): {numbers}.\n\nStart: {start}."
 
 
@@ -120,7 +122,7 @@ def _sheet_text(problem: ForceExcited, guided: bool) -> str:
     )
     question = ", ".join(f"largest error of the {name} [{unit}]" for name, unit in problem.units.items())
     return f"""{problem.note}
-{EQUATIONS}
+{EQUATIONS_TEXT}
 {_parameters_and_start(problem)}
 
 Input: `{problem.key}.csv`; between samples, forces are linear.{pitch}

@@ -114,7 +114,7 @@ def _random_procedure(generator: np.random.Generator, surface: str) -> dict[str,
 
 def _sample_of_stop(scene: BrakingScene, engine: str) -> Sample:
     """Sample from a run of a braking scene with its stated error; the true error is computed by a finer run."""
-    with counted_steps() as calls:
+    with counting_steps() as calls:
         try:
             stated_run = run(scene, engine, error=True)
         except RunFailed as error:
@@ -136,7 +136,7 @@ def _sample_of_stop(scene: BrakingScene, engine: str) -> Sample:
 
 
 @contextmanager
-def counted_steps() -> Iterator[list[float]]:
+def counting_steps() -> Iterator[list[float]]:
     """Context that yields a list, to which every braking run within it adds its number of steps."""
     calls, march = list[float](), BrakedVehicle.run
 

@@ -57,7 +57,7 @@ def _random_scene_table(generator: np.random.Generator) -> dict[str, Any]:
 
 def _sample_of_drive(scene: HandlingScene, engine: str) -> Sample:
     """Sample from a run of a handling scene with its stated error; the true error is computed by a finer run."""
-    with counted_forces() as calls:
+    with counting_force_calls() as calls:
         try:
             stated_run = run(scene, engine, error=True)
         except RunFailed as error:
@@ -83,7 +83,7 @@ def _true_errors(scene: HandlingScene, drive: Drive, engine: str, stated_result:
 
 
 @contextmanager
-def counted_forces() -> Iterator[list[float]]:
+def counting_force_calls() -> Iterator[list[float]]:
     """Context that yields a list, to which every run within it adds its number of force evaluations times cells of a
     tyre."""
     calls, march = list[float](), FreeModel.run

@@ -71,7 +71,7 @@ def _random_scene_table(generator: np.random.Generator) -> dict[str, Any]:
 
 def _sample_of_run(scene: HubScene, engine: str) -> Sample:
     """Sample from a run under hub forces with its stated error; the true error is computed by a finer run."""
-    with counted_forces() as calls:
+    with counting_force_calls() as calls:
         stated_run = _run_with_error(scene, engine)
     errors, plain = errors_of(stated_run), 2 * scene.steps
     names = list(errors)
@@ -103,7 +103,7 @@ def _true_errors(scene: HubScene, engine: str, stated_result: Result, names: lis
 
 
 @contextmanager
-def counted_forces() -> Iterator[list[float]]:
+def counting_force_calls() -> Iterator[list[float]]:
     """Context that yields a list, to which every run of a cut vehicle within it adds its number of force
     evaluations."""
     calls, march = list[float](), HubModel.marched

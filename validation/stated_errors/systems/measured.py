@@ -15,7 +15,7 @@ from models.engines.cut_vehicle import ENGINES
 from models.systems.measured.run import run
 from models.systems.measured.scene import build
 from validation.stated_errors.sample import Sample, random_samples
-from validation.stated_errors.systems.hub_forces import counted_forces
+from validation.stated_errors.systems.hub_forces import counting_force_calls
 
 FINER_STEPS = 12
 """Ratio of the run's step to the step of the true solution."""
@@ -63,7 +63,7 @@ def _sample_of_recording(table: dict[str, Any], engine: str) -> Sample:
     """Sample from the run of a recording with its stated error; the true error is computed by a finer measurement and
     run."""
     scene = build(table, "drawn.toml")
-    with counted_forces() as calls:
+    with counting_force_calls() as calls:
         try:
             stated_run = run(scene, engine, error=True)
         except RunFailed as error:
