@@ -94,7 +94,7 @@ def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, prog
     for i, chosen_scene in enumerate(scenes):
         progress(chosen_scene.title, i / len(scenes))
         linear, engines_asked = has_closed_form(chosen_scene), engines if chosen_scene is scene else ()
-        plan_of(chosen_scene).check(chosen_scene, () if linear else (engine_of(chosen_scene, engines_asked),))
+        plan_of(chosen_scene).check(chosen_scene, () if linear else (engine_for_choice(chosen_scene, engines_asked),))
         report_share = partial(
             _pass_progress, progress, f"{chosen_scene.title}, of at most {RUN_BUDGET} runs", i, len(scenes)
         )
@@ -144,7 +144,7 @@ def has_closed_form(scene: Any) -> bool:
     return not goes_in_time(scene)
 
 
-def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
+def engine_for_choice(scene: Any, engines: tuple[str, ...]) -> str:
     """Engine for the choice: the system's usual engine if it is requested or none is; else the first requested
     engine."""
     usual: str = system_of(scene).ENGINE
@@ -162,7 +162,7 @@ def search_text(scene: Any) -> str:
             f"{takes.states} states and {takes.speeds} speeds, about {takes.seconds:.1g} s of the processor "
             "to a factor of two"
         )
-    runs = Variants(scene, engine_of(scene, ()))
+    runs = Variants(scene, engine_for_choice(scene, ()))
     return (
         f"  choice     among {len(runs.effects)} effects; the search ends at the calls of {RUN_BUDGET} runs of the "
         f"scene, of {runs.system.steps(runs.scene):,} steps each, and confirms {MOST_CONFIRMATIONS} sets at most"
@@ -173,7 +173,7 @@ def choice_of_scene(
     scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None
 ) -> SceneChoice:
     """The choice of effects for a scene by runs in one engine."""
-    engine = engine_of(scene, engines)
+    engine = engine_for_choice(scene, engines)
     with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *places_of(scene)) as pool:
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
         choice, full_work = chooser.choose(), chooser.work(frozenset())

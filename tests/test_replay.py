@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validation.replay import __main__ as replay
-from validation.replay.answers import CommandOutput, load, output_difference, output_of_job, save
+from validation.replay.answers import CommandOutput, load_output, output_difference, output_of_job, save_output
 from validation.replay.jobs import ReplayJob, replay_jobs
 
 COMMAND = """#!{python}
@@ -53,7 +53,10 @@ def test_a_recording_that_was_begun_goes_on(tmp_path, capsys):
     (tmp_path / "kept" / "shipped-alone.npz").write_bytes(b"cut")
     capsys.readouterr()
     replay.main(words)
-    assert "shipped-alone" in capsys.readouterr().out and load(tmp_path / "kept", "shipped-alone").codes == [0, 0]
+    assert "shipped-alone" in capsys.readouterr().out and load_output(tmp_path / "kept", "shipped-alone").codes == [
+        0,
+        0,
+    ]
 
 
 def test_channels_that_vanish_move_or_are_renamed():
@@ -79,8 +82,8 @@ def test_channels_that_vanish_move_or_are_renamed():
 def test_every_bit_counts(tmp_path, now):
     """Signs of zeros, kinds of numbers, and what no number is, after a way through the files, too."""
     array = np.array([0.0, 1.0, np.inf, np.nan])
-    save(tmp_path, "a", CommandOutput([0], "", 1.0, {"a.nc: x": array}))
-    kept = load(tmp_path, "a")
+    save_output(tmp_path, "a", CommandOutput([0], "", 1.0, {"a.nc: x": array}))
+    kept = load_output(tmp_path, "a")
     assert not output_difference(kept, CommandOutput([0], "", 1.0, {"a.nc: x": array}), 0.0, {}).wrong
     assert output_difference(kept, CommandOutput([0], "", 1.0, {"a.nc: x": now}), 0.0, {}).wrong
 

@@ -9,7 +9,7 @@ import pytest
 from models.advice.choice.answer import by_chance
 from models.advice.choice.choose import Chooser
 from models.advice.choice.screen import Screen
-from models.advice.choice.systems.ride import prepared_in_time
+from models.advice.choice.systems.ride import opened
 from models.advice.choice.variants import Variants
 from models.advice.price import effects
 from models.advice.price.effects import price_list
@@ -60,11 +60,11 @@ def test_a_change_that_is_the_same_in_all_samples_is_sure_and_nothing_left_is_al
 
 
 def test_longer_steps_meet_the_same_roads():
-    whole = prepared_in_time(quarter_car())
+    whole = opened(quarter_car())
     pace = whole.steps_at_speeds[0]
     one, two = (scene.mean_squares(pace, scene.roads(pace))[1] for scene in (whole, whole.in_longer_steps(2)))
     other = whole.mean_squares(
-        pace, prepared_in_time(quarter_car(options={"copies": 16, "lasting": 2.0, "seed": 2})).roads(pace)
+        pace, opened(quarter_car(options={"copies": 16, "lasting": 2.0, "seed": 2})).roads(pace)
     )[1]
     assert np.array_equal(whole.in_longer_steps(2).roads(pace), whole.roads(pace)[::2])
     same, apart = (by_chance((rest[:, 0] - one[:, 0],), (one[:, 0],)) for rest in (two, other))
@@ -72,7 +72,7 @@ def test_longer_steps_meet_the_same_roads():
 
 
 def test_what_is_left_out_is_gone_and_gains_stand_for_it():
-    whole = prepared_in_time(quarter_car())
+    whole = opened(quarter_car())
     rest = whole.without(LAWS)
     (spring,) = nonlinear_springs(whole.vehicle(whole.steps_at_speeds[0]))
     (gains,) = rest.vehicle(rest.steps_at_speeds[0]).springs
@@ -80,7 +80,7 @@ def test_what_is_left_out_is_gone_and_gains_stand_for_it():
     k, c = whole.steps_at_speeds[0].springs[spring.name].equivalent_gains
     assert (gains.stiffness, gains.damping) == pytest.approx((k, c))  # those of statistical linearisation
     with pytest.raises(InputError, match="closed form"):
-        prepared_in_time(quarter_car(vehicle={"file": "quarter_car_nonlinear", "small_motion": True}))
+        opened(quarter_car(vehicle={"file": "quarter_car_nonlinear", "small_motion": True}))
 
 
 def test_a_mount_that_is_left_out_seats_its_body_on_the_other():

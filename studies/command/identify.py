@@ -20,7 +20,7 @@ from models.measured.time_shift import ChannelPair, time_shift
 
 STAGES_FOLDER = "stages"
 """Name of the folder of finished stages, from which ``--resume`` continues."""
-NAMED_SHARE = 0.3
+LEAST_NAMED_COMPONENT = 0.3
 """Least component of a unit vector of a parameter combination for which the parameter is named."""
 SHIFT_IMPROVEMENT = 2.0
 """Factor by which a time shift must reduce the difference of run and measurement for it to be reported."""
@@ -243,7 +243,7 @@ def _combination_lines(uncertainty: Uncertainty) -> list[str]:
 
     def vector_text(vector: np.ndarray) -> str:
         order = np.argsort(-np.abs(vector))
-        return " ".join(f"{vector[k]:+.2f} {names[k]}" for k in order if abs(vector[k]) >= NAMED_SHARE)
+        return " ".join(f"{vector[k]:+.2f} {names[k]}" for k in order if abs(vector[k]) >= LEAST_NAMED_COMPONENT)
 
     (best, first_direction), (worst, last_direction) = combinations[0], combinations[-1]
     return [

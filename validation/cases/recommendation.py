@@ -81,7 +81,7 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
     promise."""
     every = [verdict for of_scene in verdicts for verdict in of_scene]
     kept_scenes = sum(bool(of_scene) and all(verdict.keeps_tolerance for verdict in of_scene) for of_scene in verdicts)
-    factors = [verdict.factor for verdict in every]
+    factors = [verdict.error_ratio for verdict in every]
     scenes, why = f"{len(verdicts)} scenes drawn at random", "judged by another solver than the search's, DOP853"
     return [
         Observed(

@@ -70,9 +70,9 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
         "cost": sample.extra_calls / sample.calls,
         "ratio": None,
     }
-    if not sample.stated:
+    if not sample.stated_errors:
         return sample_table
-    stated, true = sample.stated[sample.printed_channel], sample.true[sample.printed_channel]
+    stated, true = sample.stated_errors[sample.printed_channel], sample.true_errors[sample.printed_channel]
     return sample_table | {
         "channel": sample.printed_channel,
         "stated": stated.error,

@@ -38,28 +38,28 @@ class Ensemble:
     thinning_factor: int = 1
 
     @property
-    def seconds(self) -> float:
+    def block_seconds(self) -> float:
         """Computing time (s) of a block on a worker."""
         return self.block * PATH_SECONDS
 
     @property
-    def bytes(self) -> float:
+    def result_bytes(self) -> float:
         """Size (bytes) of the result that a worker sends back for a block."""
         return self.block * PATH_BYTES / self.thinning_factor
 
     @property
-    def stations(self) -> dict[str, float]:
+    def station_times(self) -> dict[str, float]:
         """Time (s) that each station (command, link, disk), which serves one block at a time, needs for a block."""
         return {
-            "command": COMMAND_TIMES + SECONDS_PER_BYTE * self.bytes,
-            "link": self.bytes / LINK_RATE,
-            "disk": self.bytes / DISK_RATE,
+            "command": COMMAND_TIMES + SECONDS_PER_BYTE * self.result_bytes,
+            "link": self.result_bytes / LINK_RATE,
+            "disk": self.result_bytes / DISK_RATE,
         }
 
     @property
     def most_workers(self) -> float:
         """Number of workers that the slowest station can keep busy."""
-        return self.seconds / max(self.stations.values())
+        return self.block_seconds / max(self.station_times.values())
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ class WorkerShares:
 def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerShares:
     """Busy shares in a simulated run of ``blocks`` blocks by ``workers`` workers, from sending the first block to
     saving the last."""
-    seconds = ensemble.seconds * np.random.default_rng(SEED).normal(1.0, TIME_SCATTER, blocks).clip(0.5, 1.5)
-    half, waiting, free = ensemble.stations["command"] / 2.0, list[int](), workers
+    seconds = ensemble.block_seconds * np.random.default_rng(SEED).normal(1.0, TIME_SCATTER, blocks).clip(0.5, 1.5)
+    half, waiting, free = ensemble.station_times["command"] / 2.0, list[int](), workers
     idle, events, order = dict.fromkeys(("command", "link", "disk"), 0.0), list[tuple[float, int, str, int]](), count()
     saved_blocks, first, sent, current_time = set[int](), 0, 0, 0.0
     blocks_ahead = max(BLOCKS_AHEAD, 2 * workers)
@@ -101,11 +101,11 @@ def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerSha
             waiting.append(block)
         elif event == "computed":
             free += 1
-            serve("link", ensemble.stations["link"], "here", block)
+            serve("link", ensemble.station_times["link"], "here", block)
         elif event == "here":
             serve("command", half, "taken", block)
         elif event == "taken":
-            serve("disk", ensemble.stations["disk"], "kept", block)
+            serve("disk", ensemble.station_times["disk"], "kept", block)
         else:
             saved_blocks.add(block)
             while first in saved_blocks:
@@ -114,7 +114,7 @@ def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerSha
             free -= 1
             start_time = waiting.pop(0)
             heappush(events, (current_time + float(seconds[start_time]), next(order), "computed", start_time))
-    busy = {name: blocks * takes / current_time for name, takes in ensemble.stations.items()}
+    busy = {name: blocks * takes / current_time for name, takes in ensemble.station_times.items()}
     return WorkerShares(float(seconds.sum()) / (workers * current_time), busy, blocks / current_time)
 
 
@@ -133,7 +133,7 @@ def shares_table(round_count: int = 20) -> Iterator[str]:
     for name, ensemble in SETTINGS.items():
         outcomes = [simulated_shares(ensemble, workers, round_count * workers) for workers in WORKERS]
         shares = " | ".join(f"{100.0 * outcome.workers:.0f} %" for outcome in outcomes)
-        sent = outcomes[-1].rate * ensemble.bytes / 1e6
+        sent = outcomes[-1].rate * ensemble.result_bytes / 1e6
         yield f"| {name} | {shares} | {outcomes[-1].bottleneck} | {sent:.0f} MB/s | {ensemble.most_workers:.0f} |"
 
 

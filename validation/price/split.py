@@ -116,7 +116,7 @@ def _wheel_runs_in_mujoco() -> Runs:
 
 
 def _wheels_steps_and_step() -> tuple[Wheels, int, float]:
-    return Wheels(1, cells=wheelset.CELLS, speed=20.0), STEPS["wheel-20"], STEP["wheel-20"]
+    return Wheels(1, cells=wheelset.CONTACT_CELLS, speed=20.0), STEPS["wheel-20"], STEP["wheel-20"]
 
 
 def _run_with_callback(callback: Any, run: Callable[[], Any]) -> None:

@@ -88,7 +88,7 @@ class Verdict:
         return self.true <= self.tolerance
 
     @property
-    def factor(self) -> float:
+    def error_ratio(self) -> float:
         """Ratio of the larger to the smaller of predicted and true error; errors below the floor are replaced by the
         floor."""
         first, larger_true = max(self.predicted, self.floor), max(self.true, self.floor)
@@ -260,9 +260,9 @@ def _accurate_solution(scene: PricedPitchPlane, spacing: float) -> PricedRun:
     return scene.answer(scene.run("reference", Settings("DOP853", spacing, scene.whole, TRUTH_TOLERANCE)))
 
 
-def default_is_cheaper(recommendation: Recommendation, key: tuple[str, str], choice: SettingChoice) -> bool:
+def default_is_cheaper(recommendation: Recommendation, engine_and_kind: tuple[str, str], choice: SettingChoice) -> bool:
     """Whether an engine's default setting keeps the tolerance and is cheaper than the recommended setting."""
-    engine, kind = key
+    engine, kind = engine_and_kind
     rivals = [attempt for attempt in _coarsest_defaults(recommendation) if attempt.setting.engine.startswith(engine)]
     if kind == "calls":
         return any(rival.calls < choice.calls for rival in rivals)

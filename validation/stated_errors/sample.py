@@ -11,29 +11,29 @@ from models.core.errors import InputError, RunFailed
 
 @dataclass(frozen=True)
 class Sample:
-    """Comparison of the stated and the true error of a run. name : scene with its random values; stated : errors that
-    the result states, by channel, empty if it states none; true : root mean square error against a finer run, for the
-    same channels and units.
+    """Comparison of the stated and the true error of a run. name : scene with its random values; stated_errors : errors
+    that the result states, by channel, empty if it states none; true_errors : root mean square error against a finer
+    run, for the same channels and units.
 
     calls, extra_calls : force evaluations (cells, frequencies) of the run and of its estimate.
     """
 
     name: str
     engine: str
-    stated: Mapping[str, Estimate]
-    true: Mapping[str, float]
+    stated_errors: Mapping[str, Estimate]
+    true_errors: Mapping[str, float]
     calls: float
     extra_calls: float
 
     @property
     def printed_channel(self) -> str:
         """Name of the channel whose stated error is printed: it has the largest relative error (``Estimate.share``)."""
-        return max(self.stated, key=lambda channel: self.stated[channel].share)
+        return max(self.stated_errors, key=lambda channel: self.stated_errors[channel].share)
 
     @property
     def ratio(self) -> float:
         """Ratio of the true to the stated error of the channel whose error is printed."""
-        return self.true[self.printed_channel] / self.stated[self.printed_channel].error
+        return self.true_errors[self.printed_channel] / self.stated_errors[self.printed_channel].error
 
 
 def random_samples(
@@ -42,10 +42,10 @@ def random_samples(
     """Yield ``sample_count`` samples made by ``draw`` from a random generator; ``draw`` is called again if a scene is
     refused, a run fails, or it returns None.
     """
-    random, samples_made = np.random.default_rng(seed), 0
+    generator, samples_made = np.random.default_rng(seed), 0
     while samples_made < sample_count:
         try:
-            sample = draw(random)
+            sample = draw(generator)
         except (InputError, RunFailed):
             continue
         if sample is not None:
