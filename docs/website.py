@@ -25,15 +25,15 @@ QUIET_ENVIRONMENT = {"NO_MKDOCS_2_WARNING": "1"}
 SKIPPED_FILES = shutil.ignore_patterns("*.py", "__pycache__", "*.yml")
 
 
-def copy_pages(target: Path) -> None:
+def copy_pages(target_folder: Path) -> None:
     """Copy all pages and their pictures into a folder, with the same relative paths as in the repository."""
-    shutil.copytree(ROOT / "docs", target / "docs", ignore=SKIPPED_FILES)
-    shutil.copyfile(ROOT / "docs" / "nav.yml", target / "nav.yml")
+    shutil.copytree(ROOT / "docs", target_folder / "docs", ignore=SKIPPED_FILES)
+    shutil.copyfile(ROOT / "docs" / "nav.yml", target_folder / "nav.yml")
     for name in TOP_FOLDER_PAGES:
-        shutil.copyfile(ROOT / name, target / name)
-    (target / "studies").mkdir()
+        shutil.copyfile(ROOT / name, target_folder / name)
+    (target_folder / "studies").mkdir()
     for picture in (ROOT / "studies").glob("*.png"):
-        shutil.copyfile(picture, target / "studies" / picture.name)
+        shutil.copyfile(picture, target_folder / "studies" / picture.name)
 
 
 def add_report_rows(pages_folder: Path) -> None:

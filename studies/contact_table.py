@@ -43,17 +43,17 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def summary_lines(rows: int, wrong_row_count: int, name: str, seconds: float, errors: bool = True) -> list[str]:
+def summary_lines(row_count: int, wrong_row_count: int, name: str, seconds: float, errors: bool = True) -> list[str]:
     """Lines for the screen on the number of computed rows of the file ``name``, the number of wrong rows, and the
     computing time (s)."""
-    if rows == 0:
+    if row_count == 0:
         return [f"  no rows in {name}"]
-    sound = ", all of them sound" if rows > 1 else ", sound"
+    sound = ", all of them sound" if row_count > 1 else ", sound"
     state = f"; {wrong_row_count:,} of them wrong, see their status" if wrong_row_count else sound
-    row_time_text = f", {duration(seconds / rows)} a row" if rows > 1 else ""
+    row_time_text = f", {duration(seconds / row_count)} a row" if row_count > 1 else ""
     twice = " twice for the error of cells" if errors else ""
     return [
-        f"  {rows:,} row{'s' * (rows > 1)} of {name}{state}",
+        f"  {row_count:,} row{'s' * (row_count > 1)} of {name}{state}",
         f"  {duration(seconds)}{row_time_text}, once: reading, forces{twice}, writing",
     ]
 

@@ -228,9 +228,9 @@ def thinned_curve(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
     return np.repeat(times[: rows * width : width], 2), extremes.ravel()
 
 
-def _panels_over_time(rows: int, height: float, **options_of_panels: Any) -> tuple[Any, np.ndarray]:
+def _panels_over_time(row_count: int, height: float, **options_of_panels: Any) -> tuple[Any, np.ndarray]:
     """Figure and axes of rows of panels over time."""
-    drawn, panels = subplots(rows, figsize=(COLUMN_WIDTH, height), squeeze=False, **options_of_panels)
+    drawn, panels = subplots(row_count, figsize=(COLUMN_WIDTH, height), squeeze=False, **options_of_panels)
     for panel in panels[-1] if options_of_panels.get("sharex") else panels.flat:
         panel.set_xlabel("time [s]")
     return drawn, panels

@@ -64,7 +64,7 @@ def differences_of_engines(results: dict[str, Result]) -> dict[str, float]:
 def largest_state_difference(first_result: Result, other_result: Result) -> float:
     """Largest difference of any state between two runs; if their times differ, the denser run is interpolated by a
     cubic spline."""
-    if same_times(first_result, other_result):
+    if have_same_times(first_result, other_result):
         return float(np.abs(first_result.states - other_result.states).max())
     from scipy.interpolate import CubicSpline
 
@@ -76,7 +76,7 @@ def largest_state_difference(first_result: Result, other_result: Result) -> floa
     return float(np.abs(CubicSpline(fine.times, fine.states)(coarse.times) - coarse.states).max())
 
 
-def same_times(first_result: Result, other_result: Result) -> bool:
+def have_same_times(first_result: Result, other_result: Result) -> bool:
     """Whether the rows of both runs are at the same times."""
     return len(first_result.times) == len(other_result.times) and bool(
         np.allclose(first_result.times, other_result.times, rtol=0, atol=1e-9)
@@ -114,7 +114,7 @@ def _plot_differences(axis: Any, results: dict[str, Result]) -> None:
 
     (base, first), *other_results = results.items()
     for engine, result in other_results:
-        if same_times(result, first):
+        if have_same_times(result, first):
             gap = np.abs(result.states - first.states).max(axis=1)
             axis.semilogy(
                 result.times, np.maximum(gap, 1e-18), color=COLOURS[engine], label=f"{LABELS[engine]} - {LABELS[base]}"

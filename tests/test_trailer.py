@@ -60,8 +60,8 @@ def test_a_steady_turn_is_that_of_the_closed_form_and_wheels_that_keep_to_the_ca
         towed_turn(caravan(), 10.0, None, 3.0),
         towed_turn(caravan(), 10.0, give_towed_wheels_car_heading, 1.5),
     )
-    assert abs(right.yaw) < BOUND and np.abs(right.headings).max() < BOUND
-    assert np.abs(wrong.headings).max() > 0.1
+    assert abs(right.yaw_rate) < BOUND and np.abs(right.towed_headings).max() < BOUND
+    assert np.abs(wrong.towed_headings).max() > 0.1
 
 
 def test_energy_is_accounted_for():

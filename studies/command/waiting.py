@@ -155,12 +155,12 @@ def progress_bar(text: str, system: str = "") -> Iterator[ReportProgress]:
         waiting.compilations.detach()
 
 
-def _draw_bar(waiting: ProgressState, finished: threading.Event) -> None:
+def _draw_bar(progress_state: ProgressState, finished: threading.Event) -> None:
     """Draw the progress bar from BAR_DELAY on until ``finished`` is set."""
     while not finished.wait(BAR_PERIOD):
-        waiting.compilations.attach()
-        waiting.state()  # which sees when a march begins
-        if time.monotonic() - waiting.start_time > BAR_DELAY:
+        progress_state.compilations.attach()
+        progress_state.state()  # which sees when a march begins
+        if time.monotonic() - progress_state.start_time > BAR_DELAY:
             break
     else:
         return
@@ -170,10 +170,10 @@ def _draw_bar(waiting: ProgressState, finished: threading.Event) -> None:
     columns = TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.fields[left]}")
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False) as bar:
-        task = bar.add_task(waiting.text, total=None, left="")
+        task = bar.add_task(progress_state.text, total=None, left="")
         while True:
-            waiting.compilations.attach()
-            text, share, left = waiting.state()
+            progress_state.compilations.attach()
+            text, share, left = progress_state.state()
             total = None if share is None else 1.0
             bar.update(task, description=text, total=total, completed=share or 0.0, left=left)
             if finished.wait(BAR_PERIOD):

@@ -89,7 +89,7 @@ def _beside(quick: bool, round_count: int) -> CaseAnswer:
     """Rows and data of price cases that are not problems for the common runner: ride, shares of a step, force calls,
     claims about speed."""
     road = assembly_of_scene(road_excited.scene())
-    rows, prices = ride.measure(quick, round_count, SHORTEST_TURN[True])
+    rows, prices = ride.measure_routes(quick, round_count, SHORTEST_TURN[True])
     twice, least, duration = 2 * round_count, 2 * SHORTEST_TURN[quick], road_excited.DURATION
     data: Saved = {
         "ride": prices,

@@ -65,14 +65,14 @@ def _turn_rows(name: str) -> list[Row]:
             f"trailer.turn.{name}",
             SYSTEM,
             f"yaw gain of a steady turn of small slip of the {name} at {TURNING:g} m/s, over the closed form's, less 1",
-            errors.yaw,
+            errors.yaw_rate,
             "",
         ).at_most(TURN_BOUND, why, "closed form"),
         Observed(
             f"trailer.heading.{name}",
             SYSTEM,
             f"headings of what is towed in it beside the car, less the closed form's, per rad of steer ({name})",
-            float(np.abs(errors.headings).max()),
+            float(np.abs(errors.towed_headings).max()),
             "rad/rad",
         ).at_most(TURN_BOUND, why, "closed form"),
     ]
@@ -101,7 +101,7 @@ def _energy_row() -> Row:
 
 def _fault_row() -> Row:
     errors = towed_turn(caravan(), TURNING, give_towed_wheels_car_heading)
-    seen = abs(errors.yaw) > TURN_BOUND or np.abs(errors.headings).max() > TURN_BOUND
+    seen = abs(errors.yaw_rate) > TURN_BOUND or np.abs(errors.towed_headings).max() > TURN_BOUND
     return behaviour_row(
         "trailer.fault",
         SYSTEM,

@@ -117,15 +117,16 @@ BOX_ON_GROUND_POINT = LINKED.replace(GRIP_CONSTRAINT, '<connect name="grip" body
 """``LINKED`` with a point of the box fixed to the ground instead."""
 
 
-def random_chain(count: int, seed: int = 1) -> str:
-    """MJCF text of a chain of ``count`` bodies on hinges and slides with springs, dampers and armatures, all random."""
+def random_chain(body_count: int, seed: int = 1) -> str:
+    """MJCF text of a chain of ``body_count`` bodies on hinges and slides with springs, dampers and armatures, all
+    random."""
     draw = np.random.default_rng(seed)
 
     def row(low: float, high: float, value_count: int) -> str:
         return " ".join(f"{number:.4g}" for number in draw.uniform(low, high, value_count))
 
     text = ""
-    for i in range(count):
+    for i in range(body_count):
         kind = "slide" if i % 5 == 4 else "hinge"
         text += (
             f'<body name="b{i}" pos="{row(-0.3, 0.3, 3)}" euler="{row(-90, 90, 3)}">'
@@ -135,14 +136,15 @@ def random_chain(count: int, seed: int = 1) -> str:
             f'<inertial pos="{row(-0.1, 0.1, 3)}" quat="{row(-1, 1, 4)}" mass="{row(0.5, 2, 1)}" '
             f'diaginertia="{row(0.1, 0.15, 3)}"/>'
         )
-    return f'<mujoco model="chain"><worldbody>{text}{"</body>" * count}</worldbody></mujoco>'
+    return f'<mujoco model="chain"><worldbody>{text}{"</body>" * body_count}</worldbody></mujoco>'
 
 
-def random_tree(count: int, seed: int) -> str:
-    """MJCF text of ``count`` bodies: free ones with branches on hinges, slides and ball joints; all numbers random."""
+def random_tree(body_count: int, seed: int) -> str:
+    """MJCF text of ``body_count`` bodies: free ones with branches on hinges, slides and ball joints; all numbers
+    random."""
     draw = np.random.default_rng(seed)
     children = dict[int, list[int]]()
-    for i in range(1, count):
+    for i in range(1, body_count):
         children.setdefault(int(draw.integers(i)), []).append(i)
 
     def row(low: float, high: float, value_count: int) -> str:

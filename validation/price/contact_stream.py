@@ -32,32 +32,33 @@ class ProcessCost(NamedTuple):
     seconds: float
 
 
-def write_table(path: Path, rows: int) -> None:
-    """Write a table (CSV) of contacts with creepages from rolling to sliding; rows : a multiple of REPEATED_ROWS."""
+def write_table(path: Path, row_count: int) -> None:
+    """Write a table (CSV) of contacts with creepages from rolling to sliding; row_count : a multiple of
+    REPEATED_ROWS."""
     lines = (f"5e-3,4e-3,{8e4 + i},0.3,{1e-5 * i:.6g},1e-4,{1e-3 * i:.4g}\n" for i in range(REPEATED_ROWS))
     text = "".join(lines)
     with path.open("w") as file:
         file.write(HEADER)
-        file.writelines(text for _ in range(rows // REPEATED_ROWS))
+        file.writelines(text for _ in range(row_count // REPEATED_ROWS))
 
 
-def cost_of_table(folder: Path, rows: int) -> ProcessCost:
-    """Compute a table of ``rows`` contacts into ``forces.csv``, with few cells and without error estimates; returns the
-    cost."""
-    write_table(folder / "cases.csv", rows)
+def cost_of_table(folder: Path, row_count: int) -> ProcessCost:
+    """Compute a table of ``row_count`` contacts into ``forces.csv``, with few cells and without error estimates;
+    returns the cost."""
+    write_table(folder / "cases.csv", row_count)
     start_time = time.perf_counter()
     counts = answer_table(
         folder / "cases.csv", folder / "forces.csv", partial(Built, MaterialPair()), Method(cells=5), errors=False
     )
-    if counts != {"rows": rows, "wrong": 0}:
-        raise AssertionError(f"{counts} in place of {rows} sound rows")
+    if counts != {"rows": row_count, "wrong": 0}:
+        raise AssertionError(f"{counts} in place of {row_count} sound rows")
     return ProcessCost(peak_memory(), time.perf_counter() - start_time)
 
 
-def in_fresh_process(function: Callable[[Path, int], ProcessCost], rows: int) -> ProcessCost:
-    """Cost that function(folder, rows) returns, computed in a new process."""
+def in_fresh_process(function: Callable[[Path, int], ProcessCost], row_count: int) -> ProcessCost:
+    """Cost that function(folder, row_count) returns, computed in a new process."""
     with TemporaryDirectory() as name, process_pool(1) as executor:
-        process_cost: ProcessCost = executor.submit(function, Path(name), rows).result()
+        process_cost: ProcessCost = executor.submit(function, Path(name), row_count).result()
         return process_cost
 
 

@@ -231,13 +231,17 @@ def _mark_failures(ax: Axes, measured_points: MeasuredPoints, top: float) -> Non
         ax.annotate(text, (0.995, 0.995), xycoords="axes fraction", ha="right", va="top", fontsize=SMALL_TEXT)
 
 
-def _expected_calls(p: Point, measured_points: MeasuredPoints) -> float:
+def _expected_calls(failed_point: Point, measured_points: MeasuredPoints) -> float:
     """Number of force calls that a failed setting made, or would need by extrapolation from its curve; 0 if unknown."""
     work = measured_points.costs[0]
-    if p.counts:
-        return p.cost(work)
-    first = next(iter(measured_points.curves().get(p.setting.curve, ())), None)
-    return 0.0 if first is None or p.setting.adaptive else first.cost(work) * first.setting.value / p.setting.value
+    if failed_point.counts:
+        return failed_point.cost(work)
+    first = next(iter(measured_points.curves().get(failed_point.setting.curve, ())), None)
+    return (
+        0.0
+        if first is None or failed_point.setting.adaptive
+        else first.cost(work) * first.setting.value / failed_point.setting.value
+    )
 
 
 def _methods_text(failed: list[Point], status: str) -> str:

@@ -115,7 +115,7 @@ def deviations_on_grid(
     return np.sqrt(2 * np.trapezoid(spectral_densities(ride.vehicle, ride.road, SPEED, omega), omega, axis=0))
 
 
-def measure(quick: bool, round_count: int, minimum_seconds: float) -> tuple[list[Row], dict[str, Any]]:
+def measure_routes(quick: bool, round_count: int, minimum_seconds: float) -> tuple[list[Row], dict[str, Any]]:
     """Rows and saved data of all methods; counts and errors are judged, times are not."""
     ride = problem()
     swept = 3 if quick else SWEPT_SPEEDS

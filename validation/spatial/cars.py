@@ -65,9 +65,9 @@ def rough_car() -> CutVehicle:
     return cut(replace(full_vehicle, bodies=bodies, springs=(*springs, lateral)), "body")
 
 
-def static_forces(vehicle: CutVehicle, rows: int, frame: str = "hub") -> HubInputs:
-    """Hub input of ``rows`` equal rows: the vertical hub forces that carry the vehicle at rest."""
-    forces = np.zeros((rows, WRENCH * len(vehicle.hubs)))
+def static_forces(vehicle: CutVehicle, row_count: int, frame: str = "hub") -> HubInputs:
+    """Hub input of ``row_count`` equal rows: the vertical hub forces that carry the vehicle at rest."""
+    forces = np.zeros((row_count, WRENCH * len(vehicle.hubs)))
     forces[:, 2::WRENCH] = vehicle.loads
     return HubInputs(forces, frame)
 

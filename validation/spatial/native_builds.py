@@ -26,10 +26,10 @@ def random_states(vehicle: CutVehicle, state_count: int) -> list[State]:
     return [(ranges * rng.uniform(-1.0, 1.0, n), rng.uniform(-0.5, 0.5, n)) for _ in range(state_count)]
 
 
-def random_hub_input(vehicle: CutVehicle, rows: int) -> HubInputs:
+def random_hub_input(vehicle: CutVehicle, row_count: int) -> HubInputs:
     """Hub input of static wheel loads and a random force and moment on every hub at every half step, in the hubs'
     axes."""
-    static_inputs = static_forces(vehicle, rows)
+    static_inputs = static_forces(vehicle, row_count)
     return replace(
         static_inputs,
         hubs=static_inputs.hubs + np.random.default_rng(SEED).normal(0.0, 300.0, static_inputs.hubs.shape),

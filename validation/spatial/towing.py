@@ -20,11 +20,11 @@ SMALL_STEER = 2e-5
 
 @dataclass(frozen=True)
 class TurnErrors:
-    """Errors of a steady turn against its closed form. yaw : relative error of the yaw rate per steer angle; headings :
-    errors of the towed bodies' headings relative to the car (rad per rad of steer)."""
+    """Errors of a steady turn against its closed form. yaw_rate : relative error of the yaw rate per steer angle;
+    towed_headings : errors of the towed bodies' headings relative to the car (rad per rad of steer)."""
 
-    yaw: float
-    headings: np.ndarray
+    yaw_rate: float
+    towed_headings: np.ndarray
 
 
 def static_load_error() -> float:

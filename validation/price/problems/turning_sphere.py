@@ -38,10 +38,10 @@ class Attitudes:
 
 
 def attitudes_in_mujoco(
-    method: str, sample_period: float, step_count: int, stride: int, start_attitude: np.ndarray, gyro: Gyro
+    method: str, sample_period: float, step_count: int, steps_per_row: int, start_attitude: np.ndarray, gyro: Gyro
 ) -> Attitudes:
     """Attitudes of the rotating sphere in MuJoCo: ``step_count`` steps of ``sample_period`` (s) from an attitude (4,),
-    of which every ``stride``-th is kept.
+    of which every ``steps_per_row``-th is kept.
     """
     spec = mujoco.MjSpec()
     spec.option.timestep, spec.option.gravity, spec.option.integrator = sample_period, [0, 0, 0], INTEGRATORS[method]
@@ -59,14 +59,14 @@ def attitudes_in_mujoco(
             torques,
             control_spec=int(mujoco.mjtState.mjSTATE_QFRC_APPLIED),
         )
-    attitudes = np.vstack([start_attitude, path[0, stride - 1 :: stride, 1:5]])
+    attitudes = np.vstack([start_attitude, path[0, steps_per_row - 1 :: steps_per_row, 1:5]])
     return _normalised_attitudes(
         "mujoco", attitudes, {"steps": step_count, "force calls": (4 if method == "RK4" else 1) * step_count}
     )
 
 
 def attitudes_in_exudyn(
-    method: str, sample_period: float, step_count: int, stride: int, start_attitude: np.ndarray, gyro: Gyro
+    method: str, sample_period: float, step_count: int, steps_per_row: int, start_attitude: np.ndarray, gyro: Gyro
 ) -> Attitudes:
     """Attitudes of the rotating sphere in Exudyn; raises Refused for methods whose steps cannot end on samples."""
     name = method.split()[0]
@@ -86,13 +86,13 @@ def attitudes_in_exudyn(
     mbs, sensor = _sphere(start_attitude, rates[0], pushed.tolist(), sample_period, implicit, known.holds)
     options = exu.SimulationSettings()
     options.solution.file.write, options.solution.sensors.active = False, True
-    options.solution.sensors.writePeriod = sample_period * stride
+    options.solution.sensors.writePeriod = sample_period * steps_per_row
     options.timeIntegration.automaticStepSize = False
     options.timeIntegration.generalizedAlpha.spectralRadius = 0.9
     note = solve(mbs, Settings(name, sample_period, step_count * sample_period), options)
     stored = mbs.GetSensorStoredData(sensor)[:, 1:]
-    if note or len(stored) != step_count // stride + 1:
-        raise RunFailed("exudyn", "the solver reported failure", sample_period * stride * len(stored))
+    if note or len(stored) != step_count // steps_per_row + 1:
+        raise RunFailed("exudyn", "the solver reported failure", sample_period * steps_per_row * len(stored))
     attitudes = start_attitude + stored[:, 3:] if implicit else from_matrix(stored.reshape(-1, 3, 3))
     return _normalised_attitudes("exudyn", attitudes, solver_counts(mbs))
 
