@@ -48,9 +48,9 @@ CASES_ALONE = {
     True: ("recommendation",),
     False: ("effect_prices", "price", "recommendation", "ensemble", "contact_bridges", "stated_errors"),
 }
-"""Cases that begin when all others have ended, and have the machine alone, by ``quick``: those that tell seconds first
-of all, and, in full, those that take all processors themselves. Seconds of the processor alone do not spare a case
-that: of small steps, beside others that empty the caches, a ratio rises by a quarter."""
+"""Cases, by ``quick``, that run after all others and alone on the machine, because they measure seconds or, in the full
+report, use all processors. Processor seconds need this too: other running cases empty the caches, which raises a ratio
+of the times of small steps by a quarter."""
 FINISHED_CASES = "cases"
 """Name of the folder of finished cases in the report's folder."""
 

@@ -1,7 +1,7 @@
-"""Accelerations with the soft constraints of MuJoCo, by the law of its documentation about the plain equations.
+"""Accelerations with MuJoCo's soft constraints, by the law in its documentation, applied to the plain equations.
 
-At a state that satisfies a constraint, in place and in speed, its reference acceleration is 0. What is left of the law:
-accelerations a minimise (a - a0) M (a - a0) + c c / R with c = J a + J' q', where a0 are those without it, J its rows,
+At a state that satisfies a constraint, in place and in speed, its reference acceleration is 0. Then the accelerations a
+minimise (a - a0) M (a - a0) + c c / R with c = J a + J' q', where a0 are those without the constraint, J its rows,
 d the first number of solimp, and R = (1 - d) / d times what the documentation calls the diagonal approximation: the sum
 of the joints' entries in the inverse of the mass matrix in the design position; between bodies, the sum of both
 bodies' means over three directions, of their centres' shifts or of their turns.

@@ -1,4 +1,4 @@
-"""Problem D: an anti-lock braking stop of a quarter vehicle that rolls from snow on to a wet road.
+"""Test problem: an anti-lock braking stop of a quarter vehicle that rolls from snow on to a wet road.
 
 The valves are those that a slip controller set in one fine run, replayed to every solver alike: in the loop itself one
 valve that changes a sample earlier moves the distance by more than any step, and the error would not be the step's.

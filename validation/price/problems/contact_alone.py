@@ -1,4 +1,4 @@
-"""Problem G: creep forces of single contacts by every theory of rolling contact, over the number of cells.
+"""Test problem: creep forces of single contacts by every theory of rolling contact, over the number of cells.
 
 Contacts of the saved set differ in ellipse, kind and size of creepage. The reference is the exact theory of the half
 space, extrapolated to infinitely small cells. It is independent of all other theories; the curve of the exact theory

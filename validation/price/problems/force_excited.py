@@ -1,4 +1,4 @@
-"""Problems B: the pitch-plane vehicle, without a road, under samples of its wheel forces, before it drifts off.
+"""Test problems: the pitch-plane vehicle, without a road, under samples of its wheel forces, before it drifts off.
 
 The forces are a virtual measurement of the study road at 100 Hz, linear between the samples: every solver reads the
 same ones, so the error here is the integrator's alone, and not that of the interpolation, from which such a run

@@ -1,4 +1,5 @@
-"""Problem F: time integration of the passenger car of 19 freedoms, free on the road; variances are in ``price.ride``.
+"""Test problem: time integration of the passenger car of 19 freedoms, free on the road; variances are in
+``price.ride``.
 
 The road is a formula, smooth in every derivative, so that a method keeps its order and another tool has the same one:
 two tracks of sines that rise out of the plane some metres after the start. An engineer reads wheel loads and the

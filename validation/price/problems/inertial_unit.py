@@ -1,4 +1,4 @@
-"""Problem G: the attitude of a car over ten minutes, integrated from sampled gyro rates.
+"""Test problem: the attitude of a car over ten minutes, integrated from sampled gyro rates.
 
 The motion is a formula: roll, pitch and yaw as sums of sines and a steady turn, with the exact local rates that belong
 to them. So the attitude is known in closed form at every sample, and methods differ in how they integrate the rates

@@ -1,4 +1,4 @@
-"""Problem A: the pitch-plane vehicle over the study road, nonlinear in pitch.
+"""Test problem: the pitch-plane vehicle over the study road, nonlinear in pitch.
 
 Quantities of interest: the largest error of a wheel force, which is what durability work reads, and the
 largest error of any state, over every instant that an integrator returns. The road fades in over its

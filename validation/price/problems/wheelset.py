@@ -1,4 +1,4 @@
-"""Problems C: a wheel rolls at 1, 5 or 20 m/s with creep forces by FASTSIM, and is released from a sliding state.
+"""Test problems: a wheel rolls at 1, 5 or 20 m/s with creep forces by FASTSIM, and is released from a sliding state.
 
 The creep forces are those of the engines' callback in every solver, so that what differs is the integrator. They have
 kinks wherever a cell begins to slip or to stick, so that no method keeps an order above two, and at low speed not even
