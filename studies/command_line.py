@@ -54,9 +54,9 @@ app = typer.Typer(
 )
 
 
-def _print_version(wanted: bool) -> None:
+def _print_version(is_requested: bool) -> None:
     """Print the version and end the process if the option ``--version`` is given."""
-    if wanted:
+    if is_requested:
         from importlib.metadata import version
 
         print(f"twinrig {version('twinrig')}")
@@ -328,7 +328,7 @@ def twin(
     ] = "",
     states: Annotated[int, typer.Option(help="Random states at which accelerations are compared.")] = 100,
     page: Annotated[Path | None, typer.Option(help="Write one HTML file with all of it there.")] = None,
-    march: Annotated[bool, typer.Option("--paths/--no-paths", help="Compare paths over 1 s, too.")] = True,
+    compare_paths: Annotated[bool, typer.Option("--paths/--no-paths", help="Compare paths over 1 s, too.")] = True,
     tolerance: Annotated[
         float | None, typer.Option(help="Find the engine, integrator and step that hold this error, rad or m.")
     ] = None,
@@ -349,8 +349,8 @@ def twin(
 
     check_arguments(files, page)
     with progress_bar("building the model") as tell:
-        wanted = TwinOptions(states, march, tolerance, quantity, controls, folder)
-        twins = examine(files, listed_content_kinds(without), wanted, tell)
+        twin_options = TwinOptions(states, compare_paths, tolerance, quantity, controls, folder)
+        twins = examine(files, listed_content_kinds(without), twin_options, tell)
     print("\n".join(twin_lines(twins)))
     if page is not None:
         from studies.twin_page import write

@@ -176,15 +176,15 @@ def _with_values(scene: SingleTrackScene, new_values: dict[str, float]) -> Singl
     return build(table, scene.file, Path(scene.folder))
 
 
-def error_ratios(identified: Identified) -> dict[str, Any]:
+def error_ratios(identification: Identified) -> dict[str, Any]:
     """For each channel, ratios of: rms prediction error to rms of the measurement; samples inside the bands to all
     samples; half-width of the bands to the error; rms cross-validation error to rms of the measurement."""
-    sizes = np.array([channel.size for channel in identified.uncertainty.fit.problem.channels])
-    crossed = np.sqrt(np.mean(identified.cross_validation_errors**2, axis=1)) / sizes
+    sizes = np.array([channel.size for channel in identification.uncertainty.fit.problem.channels])
+    crossed = np.sqrt(np.mean(identification.cross_validation_errors**2, axis=1)) / sizes
     share_inside, width, relative = (
-        identified.bands.share_inside(),
-        identified.bands.width(),
-        identified.bands.relative_error(),
+        identification.bands.share_inside(),
+        identification.bands.width(),
+        identification.bands.relative_error(),
     )
     return {
         name: {
@@ -197,14 +197,14 @@ def error_ratios(identified: Identified) -> dict[str, Any]:
     }
 
 
-def _result_lines(full_identification: Identified, identified: dict[str, Identified]) -> list[str]:
+def _result_lines(full_identification: Identified, identifications: dict[str, Identified]) -> list[str]:
     table = [f"  {'prediction':<26}{'error':>9}{'aim':>8}{'inside 95 %':>13}{'half-width':>12}{'parts':>9}"]
     for name, identified_one in error_ratios(full_identification).items():
         table.append(
             f"  {name:<26}{identified_one['error']:>9.1%}{AIMED_ERRORS[name]:>8.0%}{identified_one['inside']:>13.1%}"
             f"{identified_one['half-width by error']:>12.2f}{identified_one['error between parts']:>9.1%}"
         )
-    for name, identified_one in identified.items():
+    for name, identified_one in identifications.items():
         errors = ", ".join(
             f"{n} {e:.1%}" for n, e in zip(AIMED_ERRORS, identified_one.bands.relative_error(), strict=True)
         )
@@ -212,11 +212,11 @@ def _result_lines(full_identification: Identified, identified: dict[str, Identif
     return table
 
 
-def residual_correlations(identified: Identified) -> dict[str, dict[str, float]]:
+def residual_correlations(identification: Identified) -> dict[str, dict[str, float]]:
     """For each channel, correlations of the cross-validation error, or of its magnitude, with accelerations, speed and
     braking of the car."""
-    problem = identified.uncertainty.fit.problem
-    model = problem.model.result(identified.uncertainty.fit.values)  # type: ignore[attr-defined]
+    problem = identification.uncertainty.fit.problem
+    model = problem.model.result(identification.uncertainty.fit.values)  # type: ignore[attr-defined]
     clock = problem.clock.times
     lateral, forward_acceleration = (
         np.interp(clock, model.times, model[n]) for n in ("lateral acceleration", "forward acceleration")
@@ -233,7 +233,7 @@ def residual_correlations(identified: Identified) -> dict[str, dict[str, float]]
     }
     return {
         name: {cause: float(np.corrcoef(transform(row), values)[0, 1]) for cause, (transform, values) in causes.items()}
-        for name, row in zip(AIMED_ERRORS, identified.cross_validation_errors, strict=True)
+        for name, row in zip(AIMED_ERRORS, identification.cross_validation_errors, strict=True)
     }
 
 

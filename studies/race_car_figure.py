@@ -14,7 +14,7 @@ SECONDS_SHOWN = 60.0
 """Length (s) of the shown part of the prediction."""
 
 
-def draw(full_identification: "Identified", identified: dict[str, "Identified"], title: str, path: Path) -> Path:
+def draw(full_identification: "Identified", identifications: dict[str, "Identified"], title: str, path: Path) -> Path:
     """Save a figure of the channels over time with their prediction bands, and of the errors of all vehicles; returns
     its path."""
     problem = full_identification.bands.problem
@@ -33,7 +33,7 @@ def draw(full_identification: "Identified", identified: dict[str, "Identified"],
         unit = channel.unit.replace("^2", "²")
         axis.set(title=channel.name.capitalize(), ylabel=f"[{unit}]", xlabel="time [s]")
     names = [channel.name for channel in problem.channels]
-    vehicles = {"chosen": full_identification, **identified}
+    vehicles = {"chosen": full_identification, **identifications}
     for i, (name, identified_vehicle) in enumerate(vehicles.items()):
         bar_positions = np.arange(len(names)) + 0.25 * i
         axes[-1].bar(

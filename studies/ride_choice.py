@@ -76,13 +76,13 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         progress("single effects", 0.7)
         further = chooser.change_if_left_out_too(frozenset(choice.left_out))
         single_effects = [_single_effect(chooser, effect) for effect in chooser.effects]
-        watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
+        activities = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
         write(chooser.rest(frozenset(choice.left_out)), folder)
     progress("what is left", 0.9)
     results = _deviation_results(scene, chooser.rest(frozenset(choice.left_out)))
-    _save_effect_table(scene, single_effects, choice, watts, (results, chooser.counts), folder)
-    choice_figure(scene, single_effects, choice, watts, results, folder / "choice.png")
+    _save_effect_table(scene, single_effects, choice, activities, (results, chooser.counts), folder)
+    choice_figure(scene, single_effects, choice, activities, results, folder / "choice.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -139,7 +139,7 @@ def _save_effect_table(
     scene: RideScene,
     single_effects: list[SingleEffect],
     choice: RideChoice,
-    watts: dict[str, float],
+    activities: dict[str, float],
     runs: tuple[dict[str, Result], dict[str, int]],
     folder: Path,
 ) -> None:
@@ -161,10 +161,10 @@ def _save_effect_table(
     )
     channels = {stage: Channel(("effect", "quantity"), values, "1") for stage, values in changes.items()}
     channels |= {"left_out": Channel("effect", columns["left out"]), "not_alone_because": Channel("effect", why)}
-    axes = {"effect": effects, "quantity": list(scene.quantities), "element": list(watts)}
+    axes = {"effect": effects, "quantity": list(scene.quantities), "element": list(activities)}
     saved = result(
         scene,
-        channels | {"activity": Channel("element", list(watts.values()), "W", "energy activity")},
+        channels | {"activity": Channel("element", list(activities.values()), "W", "energy activity")},
         {name: Channel(name, values) for name, values in axes.items()},
         engine="reference",
         counts={"confirmations": choice.confirmations} | counts,
@@ -177,15 +177,15 @@ def _save_effect_table(
     }
     table = pd.DataFrame(columns | {"not alone because": why}, pd.Index(effects, name="effect"))
     write_whole(folder / "effects.csv", table.to_csv(na_rep="nan"))
-    activities = saved.data["activity"].to_pandas().rename("activity [W]")
-    write_whole(folder / "activity.csv", activities.to_csv(na_rep="nan"))
+    activity_column = saved.data["activity"].to_pandas().rename("activity [W]")
+    write_whole(folder / "activity.csv", activity_column.to_csv(na_rep="nan"))
 
 
 def choice_figure(
     scene: RideScene,
     single_effects: list[SingleEffect],
     choice: RideChoice,
-    watts: dict[str, float],
+    activities: dict[str, float],
     results: dict[str, Result],
     path: Path,
 ) -> None:
@@ -217,21 +217,21 @@ def choice_figure(
         title="What leaving out an effect changes",
     )
     changes_axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    _plot_activity(activity_axis, watts)
+    _plot_activity(activity_axis, activities)
     add_heading(figure, scene.title, results)
     save(figure, path)
 
 
-def _plot_activity(axis: Any, watts: dict[str, float]) -> None:
-    """Draw a bar chart of each element's share of the mean power, from the activities ``watts`` (W); infinite ones, of
+def _plot_activity(axis: Any, activities: dict[str, float]) -> None:
+    """Draw a bar chart of each element's share of the mean power, from the ``activities`` (W); infinite ones, of
     inertias under white noise, are left out."""
     from models.drawing.figures import BLUE
 
-    finite = {name: value for name, value in watts.items() if np.isfinite(value)}
+    finite = {name: value for name, value in activities.items() if np.isfinite(value)}
     total = sum(finite.values())
     shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS_DRAWN][::-1]
     axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color=BLUE, alpha=0.7)
-    without = [name for name in watts if name not in finite]
+    without = [name for name in activities if name not in finite]
     note = f"\n{len(without)} inertias are unbounded under white noise" if without else ""
     axis.set(title="Energy activity: blind to the question", xlabel=f"share of the mean power [%]{note}")
 

@@ -28,24 +28,24 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     from models.drawing.drift import decision_figure, stiffness
     from models.drawing.figures import save
 
-    benches, rows, failed = compare(scene, engines, folder, progress)
-    options = benches[0].options
-    progress("sweep of stiffness and cut-off", len(benches) / (len(benches) + 1))
-    sweep = {bench.road: bench.sweep() for bench in benches}
-    table = summary_lines(rows, benches, options)
+    benches_of_roads, rows, failed = compare(scene, engines, folder, progress)
+    options = benches_of_roads[0].options
+    progress("sweep of stiffness and cut-off", len(benches_of_roads) / (len(benches_of_roads) + 1))
+    sweep = {bench.road: bench.sweep() for bench in benches_of_roads}
+    table = summary_lines(rows, benches_of_roads, options)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     with whole_file(folder / "score.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
-    results = {name: result for bench in benches for name, result in bench.results.items()}
+    results = {name: result for bench in benches_of_roads for name, result in bench.results.items()}
     saved = result_from_table(scene, rows, "run")
-    saved.data.attrs["error"] = _step_error_text(benches[0].results)
+    saved.data.attrs["error"] = _step_error_text(benches_of_roads[0].results)
     saved.save(folder / "score.nc")
     progress("figures", 1.0)
     of_first = [row for row in rows if row["engine"] == engines[0]]
     save(decision_figure(of_first, options.limits, options.grade, results), folder / "decide.png")
-    save(stiffness(sweep, benches[0], options.limits, options.grade), folder / "stiffness.png")
+    save(stiffness(sweep, benches_of_roads[0], options.limits, options.grade), folder / "stiffness.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -65,7 +65,7 @@ def _step_error_text(results: Results) -> str:
     )
 
 
-def summary_lines(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
+def summary_lines(rows: list[Row], benches_of_roads: list[Bench], options: Options) -> list[str]:
     """Lines for the screen: a table of all methods, with a block for each engine and road."""
     lines = [
         f"  Damage ratios: {COUNTING_CONVENTION}, exponent {options.slope:g}. Accepted: all four "
@@ -77,7 +77,7 @@ def summary_lines(rows: list[Row], benches: list[Bench], options: Options) -> li
     ]
     for engine, road in dict.fromkeys((row["engine"], row["road"]) for row in rows):
         of_engine = [row for row in rows if (row["engine"], row["road"]) == (engine, road)]
-        bench = next(bench for bench in benches if bench.road == road)
+        bench = next(bench for bench in benches_of_roads if bench.road == road)
         road_text = "the road" if road == "road" else f"a grade of {options.grade:g} rad"
         free = next(row["seconds"] for row in of_engine if row["method"] == "free")
         lines += [

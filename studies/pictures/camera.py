@@ -77,12 +77,12 @@ def painted_picture(
     shade = (sky_colours[0] + height_share * (sky_colours[1] - sky_colours[0])).astype(np.float32)
     image = np.broadcast_to(shade[:, None], (2 * height, 2 * width, 3)).copy()
     for layer in layers:
-        nearest = np.zeros(image.shape[:2], np.float32)
+        inverse_depths = np.zeros(image.shape[:2], np.float32)
         solid = [surface for surface in layer if surface.alpha == 1.0]
         if solid:
-            paint(*_shaded_triangles(camera, solid, width, height, sky_colours[1]), image, nearest)
+            paint(*_shaded_triangles(camera, solid, width, height, sky_colours[1]), image, inverse_depths)
         for surface in (surface for surface in layer if surface.alpha < 1.0):
-            veil, front = image.copy(), nearest.copy()
+            veil, front = image.copy(), inverse_depths.copy()
             paint(*_shaded_triangles(camera, [surface], width, height, sky_colours[1]), veil, front)
             image += np.float32(surface.alpha) * (veil - image)
     return (image[::2, ::2] + image[1::2, ::2] + image[::2, 1::2] + image[1::2, 1::2]) / 4.0  # smooth edges
@@ -120,14 +120,14 @@ def columns_within(start_value, growth, left_column, right_column):
 
 
 @njit(cache=True, error_model="numpy")
-def paint(corners, near, colours, image, nearest):
+def paint(corners, inverse_distances, colours, image, inverse_depths):
     """Paint triangles into ``image`` (h, w, 3), at pixels where the triangle is nearer to the camera than the surface
-    recorded in ``nearest`` (h, w), inverse distances in 1/m.
+    recorded in ``inverse_depths`` (h, w), in 1/m.
 
-    corners (m, 3, 2) : pixels, x to the right, y down; near (m, 3) : inverse distances (1/m), which are linear in
-    pixels; colours (m, 3, 3) : red, green, blue from 0 to 1 at each corner.
+    corners (m, 3, 2) : pixels, x to the right, y down; inverse_distances (m, 3) : from the camera (1/m), which are
+    linear in pixels; colours (m, 3, 3) : red, green, blue from 0 to 1 at each corner.
     """
-    height, width = nearest.shape
+    height, width = inverse_depths.shape
     for k in range(len(corners)):
         x0, y0 = corners[k, 0]
         x1, y1 = corners[k, 1]
@@ -146,8 +146,8 @@ def paint(corners, near, colours, image, nearest):
             for column in range(math.ceil(left), math.floor(right) + 1):
                 b, c = first + column * one_on, weight_of_second + column * two_on
                 a = 1.0 - b - c
-                inverse_depth = a * near[k, 0] + b * near[k, 1] + c * near[k, 2]
-                if inverse_depth > nearest[row, column]:
-                    nearest[row, column] = inverse_depth
+                inverse_depth = a * inverse_distances[k, 0] + b * inverse_distances[k, 1] + c * inverse_distances[k, 2]
+                if inverse_depth > inverse_depths[row, column]:
+                    inverse_depths[row, column] = inverse_depth
                     for i in range(3):
                         image[row, column, i] = a * colours[k, 0, i] + b * colours[k, 1, i] + c * colours[k, 2, i]
