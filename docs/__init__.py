@@ -1,4 +1,4 @@
-"""The documentation: pages in Markdown, and what runs their examples, writes the reference and builds the site.
+"""The documentation: pages in Markdown, and modules that run their examples, write the reference and build the site.
 
 - ``pages``: the pages, and their fenced blocks with the marks before them
 - ``outputs``: runs the examples of pages and writes or compares what they print

@@ -1,4 +1,4 @@
-"""Run the examples of pages and write, or compare, what they print.
+"""Run the examples of documentation pages, and write or compare their outputs.
 
 ``python -m docs.outputs [PAGE ...]`` runs the examples of pages (all of them, if none is named) and writes into each
 what they print, where that says something else than what stands there (``docs.alike``). ``--check`` writes nothing, and
@@ -24,30 +24,30 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from docs.alike import alike
-from docs.pages import ROOT, ExampleBlock, blocks, pages
+from docs.pages import ROOT, ExampleBlock, example_blocks, pages
 
 COLUMNS = 100
-"""Width of the terminal that examples see."""
+"""Width (characters) of the terminal that examples see."""
 WORKERS = 2
-"""Pages that run at the same time."""
+"""Number of pages whose examples run at the same time."""
 EXAMPLE_TIMEOUT = 600.0
-"""Seconds after which an example is ended: far more than any takes on a busy machine."""
+"""Time (s) after which an example is stopped: far more than any example takes on a busy machine."""
 
 
 class ExampleFailed(Exception):
-    """An example that ends otherwise than its page says."""
+    """Raised for an example that fails, or succeeds, contrary to its mark in the page."""
 
 
 @dataclass
 class Session:
-    """The folder in which the examples of one page run, and the names of its Python blocks."""
+    """State in which the examples of a page run: folder, environment variables, and names of the Python blocks."""
 
     folder: Path
     environment: dict[str, str]
     names: dict[str, Any] = field(default_factory=lambda: {"__name__": "__main__"})
 
     def run(self, block: ExampleBlock) -> str:
-        """The output of a block; raises ExampleFailed where the block ends otherwise than its mark says."""
+        """Run an example block; returns its output. Raises ExampleFailed if it ends contrary to its mark."""
         return self._python(block.text) if block.language == "python" else self._console(block)
 
     def _python(self, text: str) -> str:
@@ -60,33 +60,33 @@ class Session:
         return said.getvalue()
 
     def _console(self, block: ExampleBlock) -> str:
-        lines = commands(block.text)
+        lines = console_commands(block.text)
         fails = [False] * (len(lines) - 1) + [block.mark == "run: fails"]
         return "".join(self._command(line, wanted) for line, wanted in zip(lines, fails, strict=True))
 
-    def _command(self, line: str, fails: bool) -> str:
+    def _command(self, command: str, must_fail: bool) -> str:
         ended = subprocess.run(
-            ["bash", "-c", line],
+            ["bash", "-c", command],
             cwd=self.folder,
             env=self.environment,
             stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT if fails else subprocess.PIPE,
+            stderr=subprocess.STDOUT if must_fail else subprocess.PIPE,
             text=True,
             timeout=EXAMPLE_TIMEOUT,
         )
-        if (ended.returncode != 0) is not fails:
-            raise ExampleFailed(f"`{line}` ended with code {ended.returncode}: {ended.stdout}{ended.stderr or ''}")
+        if (ended.returncode != 0) is not must_fail:
+            raise ExampleFailed(f"`{command}` ended with code {ended.returncode}: {ended.stdout}{ended.stderr or ''}")
         return ended.stdout
 
 
-def commands(text: str) -> list[str]:
-    """Commands of a console block; lines that do not begin with ``$`` go on with the one before."""
+def console_commands(text: str) -> list[str]:
+    """Commands of a console block; lines that do not begin with ``$`` continue the command before."""
     return [part.strip() for part in re.split(r"^\$ ", text, flags=re.MULTILINE) if part.strip()]
 
 
 @contextlib.contextmanager
 def session() -> Iterator[Session]:
-    """A session in a new folder; ``twinrig`` and ``python`` are those of this process."""
+    """Context that yields a session in a new folder, in which ``twinrig`` and ``python`` are those of this process."""
     with TemporaryDirectory(prefix="example") as parent:
         folder, programs = Path(parent, "work"), Path(parent, "programs")
         folder.mkdir()
@@ -100,25 +100,25 @@ def session() -> Iterator[Session]:
         yield Session(folder, environment)
 
 
-def rewritten(page: Path, draw: bool) -> tuple[str, list[str]]:
-    """The text of a page with what its examples print, and what is otherwise than it was, a line for each.
+def page_with_outputs(page: Path, draw: bool) -> tuple[str, list[str]]:
+    """The text of a page with the outputs of its examples, and a text on each output that differs from the page.
 
     draw : pictures that the examples draw are written to where the page shows them. Raises ExampleFailed.
     """
     text = page.read_text(encoding="utf-8")
     lines, changes, said, shift = text.splitlines(keepends=True), [], None, 0
     with session() as here:
-        for block in blocks(text):
+        for block in example_blocks(text):
             if block.mark.startswith("run"):
                 said = here.run(block)
             elif block.mark.startswith("file: "):
                 (here.folder / block.file).write_text(block.text, encoding="utf-8")
             elif block.mark.startswith("picture: "):
-                place(here.folder / block.file, page.parent / block.text, draw)
+                copy_picture(here.folder / block.file, page.parent / block.text, draw)
             elif block.mark == "output":
                 if said is None:
                     raise ExampleFailed(f"line {block.first}: an output without an example before it")
-                printed = plain(said)
+                printed = as_shown_in_page(said)
                 if not alike(block.text, printed):
                     changes.append(f"line {block.first}: shows\n{block.text}where its example prints\n{printed}")
                     lines[block.first + shift : block.last + shift] = [printed]
@@ -127,31 +127,33 @@ def rewritten(page: Path, draw: bool) -> tuple[str, list[str]]:
     return "".join(lines), changes
 
 
-def place(picture: Path, shown: Path, draw: bool) -> None:
-    """Put a picture where a page shows it, if it is to be drawn; ExampleFailed where there is none."""
+def copy_picture(picture: Path, shown_file: Path, draw: bool) -> None:
+    """Copy a picture that examples drew to the file that the page shows, if ``draw``; raises ExampleFailed if it is
+    missing."""
     if not picture.is_file():
         raise ExampleFailed(f"its examples draw no {picture.name}")
     if draw:
-        shown.parent.mkdir(exist_ok=True)
-        shutil.copyfile(picture, shown)
+        shown_file.parent.mkdir(exist_ok=True)
+        shutil.copyfile(picture, shown_file)
 
 
-def plain(said: str) -> str:
-    """An output as a page shows it: no white space at the ends of lines, no empty lines at either end."""
-    return "\n".join(line.rstrip() for line in said.strip("\n").splitlines()) + "\n"
+def as_shown_in_page(output: str) -> str:
+    """An output as a page shows it: without white space at the ends of lines, and without empty lines at its ends."""
+    return "\n".join(line.rstrip() for line in output.strip("\n").splitlines()) + "\n"
 
 
 def has_examples(page: Path) -> bool:
-    """Whether a page has anything to run."""
-    return any(block.mark for block in blocks(page.read_text(encoding="utf-8")))
+    """Whether a page has marked examples."""
+    return any(block.mark for block in example_blocks(page.read_text(encoding="utf-8")))
 
 
-def answer(page: Path, check: bool) -> tuple[Path, list[str], str]:
-    """Run the examples of a page and, unless this is a check, write what they print: changes, and what failed."""
+def run_page(page: Path, check: bool) -> tuple[Path, list[str], str]:
+    """Run the examples of a page and, unless ``check``, write their outputs into it; returns the page, texts on changed
+    outputs, and the message of a failure, else ""."""
     os.environ |= {"COLUMNS": str(COLUMNS), "MPLBACKEND": "Agg", "NO_COLOR": "1"}
     os.environ.pop("TWINRIG_DATA", None)
     try:
-        text, changes = rewritten(page, draw=not check)
+        text, changes = page_with_outputs(page, draw=not check)
     except (ExampleFailed, OSError, subprocess.TimeoutExpired) as error:
         return page, [], str(error)
     if changes and not check:
@@ -160,14 +162,14 @@ def answer(page: Path, check: bool) -> tuple[Path, list[str], str]:
 
 
 def run_pages(pages: list[Path], check: bool, strict: bool) -> bool:
-    """Run the examples of pages, two pages at a time; prints differences, and returns whether there are none.
+    """Run the examples of pages, two pages at a time; prints differing outputs, and returns whether all is well.
 
     strict : an output that differs is not well.
     """
     with_examples = [page for page in pages if has_examples(page)]
     well = True
     with ProcessPoolExecutor(WORKERS, get_context("spawn"), max_tasks_per_child=1) as pool:
-        for page, changes, failed in pool.map(partial(answer, check=check), with_examples):
+        for page, changes, failed in pool.map(partial(run_page, check=check), with_examples):
             for told in (*changes, *([failed] if failed else [])):
                 print(f"{page}: {told}")
             print(f"{page}: {'failed' if failed else f'{len(changes)} outputs differ' if changes else 'as shown'}")
@@ -176,7 +178,7 @@ def run_pages(pages: list[Path], check: bool, strict: bool) -> bool:
 
 
 def main() -> None:
-    """The command."""
+    """Command: run the examples of pages and write, or check, their outputs."""
     parser = argparse.ArgumentParser(description="Run the examples of pages and write what they print.")
     parser.add_argument("pages", nargs="*", type=Path, help="pages; all of them, if none is named")
     parser.add_argument("--check", action="store_true", help="write nothing; end with code 1 where an output differs")

@@ -1,4 +1,4 @@
-"""The reference of the validation report: its cases, and the rows of a report.
+"""Reference page of the validation report: its cases, and the rows of a report.
 
 ``python -m docs.validation_cases`` writes the cases into ``docs/reference/report_rows.md``; the site has the rows of
 the newest report of the machine in that page, too (``docs.website``).
@@ -14,12 +14,12 @@ from docs.pages import ROOT
 from validation.cases import CASES
 
 PAGE = ROOT / "docs" / "reference" / "report_rows.md"
-START = "<!-- cases: written by `python -m docs.validation_cases`; do not edit below -->\n"
-FOLDER = ROOT / "validation" / "cases"
+GENERATED_PART_MARK = "<!-- cases: written by `python -m docs.validation_cases`; do not edit below -->\n"
+CASES_FOLDER = ROOT / "validation" / "cases"
 
 
-def _constant(tree: ast.Module, name: str) -> str:
-    """Value of a constant of a module, read and not imported."""
+def _constant_text(tree: ast.Module, name: str) -> str:
+    """Text of a constant of a module, from the syntax tree of its source; "" if it has no such constant."""
     for node in tree.body:
         targets = getattr(node, "targets", None) or [getattr(node, "target", None)]
         value = getattr(node, "value", None)
@@ -28,40 +28,41 @@ def _constant(tree: ast.Module, name: str) -> str:
     return ""
 
 
-def cases() -> str:
-    """The table of cases in Markdown, in the order of the report."""
+def cases_table() -> str:
+    """Markdown table of the validation cases, in the order of the report."""
     lines = ["| case | title | system | what is compared |", "|---|---|---|---|"]
     for name in CASES:
-        tree = ast.parse((FOLDER / f"{name}.py").read_text(encoding="utf-8"))
+        tree = ast.parse((CASES_FOLDER / f"{name}.py").read_text(encoding="utf-8"))
         says = (ast.get_docstring(tree) or "").partition("\n\n")[0].replace("\n", " ")
-        lines.append(f"| `{name}` | {_constant(tree, 'TITLE')} | {_constant(tree, 'SYSTEM')} | {says} |")
+        lines.append(f"| `{name}` | {_constant_text(tree, 'TITLE')} | {_constant_text(tree, 'SYSTEM')} | {says} |")
     return "\n".join(lines) + "\n"
 
 
 def page(text: str) -> str:
-    """The page with the cases as they are now; what stands before them is written by hand."""
-    return text.partition(START)[0] + START + "\n" + cases()
+    """Text of the reference page with the current cases; the part before the mark is unchanged."""
+    return text.partition(GENERATED_PART_MARK)[0] + GENERATED_PART_MARK + "\n" + cases_table()
 
 
 def newest_report(folder: Path = ROOT / "results") -> Path | None:
-    """The newest results.json of a report below a folder, None where there is none."""
+    """Path of the newest results.json of a report below a folder; None if there is none."""
     reports = [path for path in folder.glob("*/results.json") if "rows" in json.loads(path.read_text(encoding="utf-8"))]
     return max(reports, key=lambda path: path.stat().st_mtime, default=None)
 
 
-def rows(report: Path) -> str:
-    """All rows of a report in Markdown: what is compared, with what, and how it ended."""
+def rows_table(report: Path) -> str:
+    """Markdown table of all rows of a report: quantity, expected value, tolerance, independence and status."""
     lines = ["\n## Rows of the newest report\n", "| row | quantity | expected | tolerance | second side | status |"]
     lines += ["|---|---|---|---|---|---|"]
     shown = ("quantity", "expected", "tolerance", "independence", "status")
     for row in json.loads(report.read_text(encoding="utf-8"))["rows"]:
         cells = (f"`{row['id']}`", *(row[key] for key in shown))
-        lines.append("| " + " | ".join(_cell(cell) for cell in cells) + " |")
+        lines.append("| " + " | ".join(_cell_text(cell) for cell in cells) + " |")
     return "\n".join(lines) + "\n"
 
 
-def counts(report: Path) -> str:
-    """Rows of a report per system and kind of second side in Markdown; those that were not run do not count."""
+def counts_table(report: Path) -> str:
+    """Markdown table of the numbers of a report's rows by system and independence; rows that were not run are left
+    out."""
     from validation.report.page import INDEPENDENCE_TEXTS, evidence_counts
 
     lines = [
@@ -74,14 +75,14 @@ def counts(report: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _cell(value: Any) -> str:
-    """Text of a cell; brackets are escaped, as a pair of them would be a link to a reference."""
-    text = "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+def _cell_text(cell_value: Any) -> str:
+    """Text of a table cell; brackets are escaped, because Markdown would take a pair as a link."""
+    text = "" if cell_value is None else f"{cell_value:.6g}" if isinstance(cell_value, float) else str(cell_value)
     return re.sub(r"([|\[\]])", r"\\\1", text).replace("\n", " ")
 
 
 def main(path: Path = PAGE) -> None:
-    """Write the cases into the page."""
+    """Write the current cases into the reference page."""
     path.write_text(page(path.read_text(encoding="utf-8")), encoding="utf-8")
 
 

@@ -1,4 +1,4 @@
-"""Studies: one script per question, run as ``python studies/NAME.py`` or ``twinrig run SCENE``.
+"""Studies: one script per engineering question, run as ``python studies/NAME.py`` or ``twinrig run SCENE``.
 
 A study is a module with ``run(scene, engines, folder, progress) -> summary``: it writes results and
 figures into the folder and returns what ``--json`` prints. If it has ``Options``, a scene may set them; if it

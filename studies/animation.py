@@ -1,4 +1,4 @@
-"""Pictures of a vehicle that moves, as each engine reports it, with the forces on it: stills and a film."""
+"""Pictures of a moving vehicle with the forces on it, as each engine computes them: stills and a film."""
 
 from collections.abc import Callable, Iterator
 from importlib import import_module
@@ -15,18 +15,19 @@ from studies.pictures.video import missing_extra, write, write_png
 SYSTEM = "pictures"
 Progress = Callable[[str, float], None]
 STILL_SIZE = 1280, 800
-"""Pixels of an engine's own still."""
+"""Width and height (pixels) of an engine's still."""
 RUN_SHARE = 0.2
-"""Share of the time that the runs take, for the progress bar."""
+"""Share of the total time that the runs take, for the progress bar."""
 
 
 def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Run the vehicle in each engine and draw it; saves ``page.png``, a still of each engine and ``film.mp4``."""
+    """Run the vehicle in each engine and draw it; saves ``page.png``, a still for each engine and ``film.mp4``, and
+    returns the summary."""
     from studies.pictures.drawing import draw_frame
 
     progress(f"{scene.vehicle} in {', '.join(LABELS[engine] for engine in engines)}", 0.0)
     film, vehicle = scene.film, import_module(f"studies.pictures.{scene.vehicle}")
-    stage, motions = vehicle.filmed(film.duration, film.times(), engines)
+    stage, motions = vehicle.stage_and_motions(film.duration, film.times(), engines)
     page = Page(stage, motions)
     best = page.frame_of_largest_force()
     written = [write_png(folder / "page.png", page.frame(best))]
@@ -49,7 +50,7 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def _with_progress(frames: Iterator[np.ndarray], frame_count: int, progress: Progress) -> Iterator[np.ndarray]:
-    """Yield the frames; each one advances the progress bar."""
+    """Yield the frames, and advance the progress bar at each frame."""
     for k, frame in enumerate(frames):
         progress(f"frame {k + 1} of {frame_count}", RUN_SHARE + (1.0 - RUN_SHARE) * k / frame_count)
         yield frame

@@ -1,4 +1,4 @@
-"""A bicycle: eigenvalues over speed by its linear equations, and a run from upright on tyres or with ideal rolling."""
+"""A bicycle: eigenvalues of its linear equations over speed, and a nonlinear run on tyres or with ideal rolling."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +18,8 @@ Progress = Callable[[str, float], None]
 
 
 def run(scene: BicycleScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Saves ``eigenvalues.csv``, ``runs.nc`` and ``bicycle.png``."""
+    """Compute the eigenvalues over speed and a run in each engine; saves ``eigenvalues.csv``, ``runs.nc`` and
+    ``bicycle.png``, and returns the summary."""
     failed, runs, speeds, values = dict[str, str](), dict[str, Result](), *eigenvalues(scene)
     write_table(
         folder / "eigenvalues.csv",
@@ -47,19 +48,19 @@ def run(scene: BicycleScene, engines: tuple[str, ...], folder: Path, progress: P
         "scene": scene.title,
         "folder": str(folder),
         "failed": failed,
-        "answer": _answer_of_run(scene, runs),
+        "answer": _figures_of_runs(scene, runs),
         "results": runs,
-        "table": [_line(engine, result) for engine, result in runs.items()],
+        "table": [_run_line(engine, result) for engine, result in runs.items()],
     }
 
 
 def eigenvalues(scene: BicycleScene) -> tuple[np.ndarray, np.ndarray]:
-    """Speeds (n,) in m/s and eigenvalues (n, 4) in 1/s of the linear equations with the scene's control."""
+    """Speeds (n,) in m/s, and eigenvalues (n, 4) in 1/s of the bicycle's linear equations with the scene's control."""
     speeds = np.linspace(scene.speeds.start, scene.speeds.stop, scene.speeds.count)
     return speeds, np.array([scene.whipple.eigenvalues(float(speed), scene.control) for speed in speeds])
 
 
-def _answer_of_run(scene: BicycleScene, runs: dict[str, Result]) -> dict[str, Any]:
+def _figures_of_runs(scene: BicycleScene, runs: dict[str, Result]) -> dict[str, Any]:
     bicycle = scene.whipple
     figures: dict[str, Any] = {
         "weave speed without control [m/s]": bicycle.weave_speed,
@@ -71,16 +72,18 @@ def _answer_of_run(scene: BicycleScene, runs: dict[str, Result]) -> dict[str, An
     return figures
 
 
-def _line(engine: str, result: Result) -> str:
+def _run_line(engine: str, result: Result) -> str:
     lean, steer = (np.abs(result[name]).max() for name in ("lean", "steer"))
     gap = result.detail.unaccounted()
     return f"    {engine:<12}largest lean {lean:.5f} rad, steer {steer:.5f} rad; energy unaccounted for {gap:.1e}"
 
 
-def figure(scene: BicycleScene, speeds: np.ndarray, values: np.ndarray, runs: dict[str, Result], path: Path) -> Path:
-    """Plot the eigenvalues over speed, and lean and steer angle over time."""
+def figure(
+    scene: BicycleScene, speeds: np.ndarray, eigenvalues_over_speed: np.ndarray, runs: dict[str, Result], path: Path
+) -> Path:
+    """Save a figure of the eigenvalues over speed, and of lean and steer angle over time; returns its path."""
     drawn, axes = panels(4, 2, 2.4)
-    for axis, components in ((axes[0], values.real), (axes[1], values.imag)):
+    for axis, components in ((axes[0], eigenvalues_over_speed.real), (axes[1], eigenvalues_over_speed.imag)):
         axis.plot(speeds, components, ".", ms=2.0, color=DARK)
         axis.axhline(0.0, lw=0.6, color="k")
         axis.set_xlabel("speed [m/s]")

@@ -1,4 +1,5 @@
-"""A measured bicycle: weave eigenvalues of recordings, the model with nothing fitted, and which suspects they call for.
+"""A measured bicycle: weave eigenvalues from recordings, those of the unfitted model, and a choice of suspected
+parameters that explains the differences.
 
 ``python -m studies.bicycle_measured FOLDER`` reads windows.csv and the recordings of a folder (see
 ``models.bicycle.weave``), chooses among the suspects on all speeds, or on those of ``--choose``, and predicts the rest;
@@ -27,14 +28,14 @@ from models.core.errors import InputError
 from models.identification.subsets import Choice
 
 EXPERIMENT_FEEDBACK = Control(gain=2.0, until=6.5)
-"""Of the experimenters during these runs."""
+"""Steer feedback of the experimenters during the recorded runs."""
 
 
 @dataclass(frozen=True, eq=False)
 class BicycleObservations:
-    """Measured weave at all speeds, the suspects that were chosen, and predicted weave. A prediction, by speed, is a
-    mean (2,) and standard deviations (2,). It is made for each speed that was not used in the choice; if all were used,
-    each speed is predicted by a choice on all the others."""
+    """Measured weave at all speeds, the chosen suspected parameters, and predicted weave by speed. A prediction is a
+    mean (2,) and its differences from the measurement in standard deviations (2,). It is made for each speed that was
+    not used in the choice; if all were used, each speed is predicted by a choice on all others."""
 
     observations: list[Observation]
     choice: Choice
@@ -47,8 +48,8 @@ def observed_and_predicted(
     bicycle: Whipple | None = None,
     base_control: Control = EXPERIMENT_FEEDBACK,
 ) -> BicycleObservations:
-    """Choose suspects from the measurements at the speeds ``choose`` (m/s, all by default), and predict weave at the
-    other speeds; raises InputError."""
+    """Choose suspected parameters from the measurements at the speeds ``choose`` (m/s, all by default), and predict
+    weave at the other speeds; raises InputError."""
     all_observations, bicycle = observations(folder), bicycle or load_bicycle("steer_by_wire")
     speeds = [observation.speed for observation in all_observations]
     for speed in choose:
@@ -76,7 +77,7 @@ def observed_and_predicted(
 def observation_lines(
     bicycle_observations: BicycleObservations, bicycle: Whipple, base_control: Control = EXPERIMENT_FEEDBACK
 ) -> list[str]:
-    """Text of the measured and predicted weave."""
+    """Lines for the screen on the measured and predicted weave, and on the chosen suspected parameters."""
     lines = ["speed    windows  damping [1/s]             nothing fitted    frequency [rad/s]         nothing fitted"]
     for observation in bicycle_observations.observations:
         mean, deviation, model = (

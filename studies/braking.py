@@ -1,4 +1,4 @@
-"""Braking with an anti-lock system in the loop: procedures driven one by one, in the paper's terms and as figures."""
+"""Braking with an anti-lock system in the loop: runs of all procedures, with the paper's figures of merit and plots."""
 
 from collections.abc import Callable
 from pathlib import Path as File
@@ -24,14 +24,14 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     adhesion: bool = Field(True, description="measure adhesion utilisation too, by many short runs")
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: Progress) -> dict[str, Any]:
-    """Drive every procedure; saves NAME.nc, NAME.png and NAME_pressures.csv of each, also of one that failed, until it
-    did."""
+    """Run every procedure in each engine; saves NAME.nc, NAME.png and NAME_pressures.csv of each procedure, also of a
+    failed run up to its failure, and returns the summary."""
     from studies.braking_figures import stop_figure
 
     options = read(Options, scene.options, scene.file, "options")
@@ -86,24 +86,26 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
 
 
 def rim_speed_differences(
-    measured_pressures: MeasuredPressures | None, stop: Stop, rims: np.ndarray
+    measured_pressures: MeasuredPressures | None, stop: Stop, rim_speeds: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Rms differences between the computed and the measured rim speeds (m/s); empty if none were measured. rims (n, W):
-    computed rim speeds of the W wheels in m/s."""
+    """Rms differences (m/s) between the computed and the measured rim speed of each wheel; empty if none were measured.
+    rim_speeds (n, W) : computed, in m/s, of the W wheels."""
     if measured_pressures is None or measured_pressures.speeds is None:
         return {}
-    return {"rim less measured, rms [m/s]": measured_pressures.rms(stop.times, rims)}
+    return {"rim less measured, rms [m/s]": measured_pressures.rms(stop.times, rim_speeds)}
 
 
 def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: Stop) -> list[str]:
-    """A line that warns if the run lasts longer than its file of measured pressures."""
+    """Line for the screen, in a list, that warns if the run lasts longer than its file of measured pressures; else an
+    empty list."""
     if measured_pressures is None or measured_pressures.times[-1] > stop.times[-2]:
         return []
     return [f"    measured pressures end at {measured_pressures.times[-1]:.3f} s: from then on the last ones stay"]
 
 
 def comparison_lines(results: dict[str, Result]) -> list[str]:
-    """A line per engine: position and yaw at which the vehicle stopped, stopping time, and computing time."""
+    """Lines for the screen, one per engine: position and yaw at which the vehicle stopped, stopping time, and computing
+    time."""
     rows = []
     for engine, result in results.items():
         path = result.detail
@@ -117,7 +119,8 @@ def comparison_lines(results: dict[str, Result]) -> list[str]:
 
 
 def figures_lines(name: str, stop: Stop, figures: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
-    """Text for one procedure: a table of figures for the vehicle, and a table with a column per wheel."""
+    """Lines for the screen on one procedure: a table of figures for the vehicle, and a table with a column per
+    wheel."""
     remaining_text = f"still {stop.speed[-1]:.2f} m/s; all figures are those until then"
     unfinished = "" if stop.path.ended_at_rest else f": not stopped by {stop.times[-1]:g} s, {remaining_text}"
     rows = [f"  {name.replace('_', ' ')}{unfinished}"]

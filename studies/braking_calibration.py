@@ -1,4 +1,4 @@
-"""The paper's figures of its J-turn on ice: friction and steer angle fitted to two of them, the others compared.
+"""The paper's J-turn on ice: friction and steer angle are fitted to two published figures, the others are compared.
 
 A calibration, no validation: the paper prints neither its tyre matrices nor its steer angle.
 """
@@ -31,16 +31,17 @@ PAPER_VALUES = {
     "time": ("stopping time [s]", "8.15 in one run", "", "compared"),
     "yaw": ("final yaw [deg]", "21.3 in one run, a guessed reading", "", "compared"),
 }
-"""What the paper prints of its simulation and its measurements. "0.4" stands in print, where 0.04 would fit."""
+"""Published figures of the paper: label, simulated value, measured value, and use here. The printed "0.4" is probably
+0.04."""
 QUANTITIES_OF_ROUND = {"scale": "", "steer": "rad", "deceleration": "m/s^2", "aside": "m"}
-"""What is told of every round of the fit, and its unit."""
+"""Unit of each quantity that is saved for every round of the fit."""
 STOPS_PER_BLOCK = 2
-"""Stops per block."""
-PUBLISHED_FIGURES = {"deceleration": 1.36, "aside": 7.5}
+"""Number of stops in a block that a worker computes."""
+FITTED_FIGURES = {"deceleration": 1.36, "aside": 7.5}
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     procedure: str = Field("j_turn", description="name of the J-turn")
     surface: str = Field("ice", description="whose friction is fitted")
@@ -52,7 +53,7 @@ class Options(Strict):
 
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Refuse a procedure that is no J-turn."""
+    """Raise InputError if the procedure is no J-turn with a positive constant steer angle."""
     check_reference(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     procedure = scene.procedures.get(options.procedure)
@@ -69,8 +70,8 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Fit, then run once more; saves the fit as ``rounds.nc`` and ``calibration.csv``, and a stop as fitted as
-    ``calibration.nc`` and ``calibration.png``."""
+    """Fit friction and steer angle, and repeat the stops with them; saves the fit as ``rounds.nc`` and
+    ``calibration.csv``, a fitted stop as ``calibration.nc`` and ``calibration.png``, and returns the summary."""
     from studies.braking_figures import stop_figure
 
     check(scene, engines)
@@ -85,8 +86,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             progress(f"fit, round {i + 1}", i / (options.rounds + 2))
             means = _means_of_stops(fitted_scene(scene, options, scale, steer), options, options.runs, pool)
             steps.append((scale, steer, means["deceleration"].mean, means["aside"].mean))
-            scale *= PUBLISHED_FIGURES["deceleration"] / means["deceleration"].mean
-            steer *= PUBLISHED_FIGURES["aside"] / means["aside"].mean
+            scale *= FITTED_FIGURES["deceleration"] / means["deceleration"].mean
+            steer *= FITTED_FIGURES["aside"] / means["aside"].mean
         progress("as fitted", options.rounds / (options.rounds + 2))
         fitted = fitted_scene(scene, options, scale, steer)
         scatters = _means_of_stops(fitted, options, options.last, pool, options.seed + 1)
@@ -111,8 +112,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def fitted_scene(scene: BrakingScene, options: Options, friction_scale: float, steer: float) -> BrakingScene:
-    """The scene with another friction and steer angle; raises RunFailed if the fit has left the possible range of
-    these."""
+    """The scene with a friction factor of the surface and a steer angle (rad); raises RunFailed if the fit left their
+    possible range."""
     if not (0.05 < friction_scale < 2.0 and steer < 1.0):
         raise RunFailed(
             "calibration", f"the fit diverges: friction times {friction_scale:.3g}, steer angle {steer:.3g} rad"
@@ -138,7 +139,7 @@ def _means_of_stops(
 
 
 def table(options: Options, friction_scale: float, steer: float, scatters: dict[str, Scatter]) -> list[str]:
-    """Lines with the fitted parameters, and with each figure next to the paper's value."""
+    """Lines for the screen: the fitted parameters, and each figure beside the paper's values."""
     lines = [
         f"  calibration: friction of {options.surface} times {friction_scale:.4f}, steer angle {steer:.5f} rad",
         f"  means of {options.last} stops, +- the scatter of one",

@@ -1,4 +1,5 @@
-"""Controllers of anti-lock brakes compared on several surfaces in all procedures, by distance and course."""
+"""Anti-lock controllers compared on several surfaces in all procedures, by stopping distance and course of the
+vehicle."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -37,7 +38,7 @@ ESTIMATED_SPEED_NOTE = (
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     surfaces: dict[str, str] = Field(
         {"ice": "snow", "snow": "dry", "dry": "snow"},
@@ -52,12 +53,12 @@ class Options(Strict):
 
 
 LABEL_COLUMNS = ("surface", "procedure", "controller")
-"""What a run is known by."""
+"""Columns that identify a run."""
 
 
-def scenes_of_runs(scene: BrakingScene) -> dict[tuple[str, str, str], BrakingScene]:
-    """The scene of every single run: for each surface, all procedures, each with every controller and, if there is a
-    trailer, without and with it. Keys: surface, procedure, label of the controller."""
+def scene_of_each_run(scene: BrakingScene) -> dict[tuple[str, str, str], BrakingScene]:
+    """The scene of every run, by surface, procedure and label of the controller; if the scene has a trailer, without
+    and with it."""
     options = read(Options, scene.options, scene.file, "options")
     trains = [scene] if scene.trailer is None else [scene.model_copy(update={"trailer": None}), scene]
     return {
@@ -74,7 +75,8 @@ def scenes_of_runs(scene: BrakingScene) -> dict[tuple[str, str, str], BrakingSce
 def _single_procedure(
     scene: BrakingScene, surface: str, right_surface: str, name: str, controller: ControllerTable
 ) -> BrakingScene:
-    """The scene with one procedure on one surface under one controller."""
+    """The scene reduced to one procedure on one surface with one controller; right_surface : of the right track in
+    split procedures."""
     procedure = scene.procedures[name]
     if procedure.kind == "split":
         procedure = procedure.model_copy(update={"right": right_surface})
@@ -88,15 +90,16 @@ def _single_procedure(
 
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Raise InputError for options of a controller or a surface that are impossible."""
+    """Raise InputError for impossible options of a controller or a surface."""
     check_reference(scene, engines)
-    for single_scene in scenes_of_runs(scene).values():
+    for single_scene in scene_of_each_run(scene).values():
         check_scene(single_scene, ("reference",))
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Drive all; saves ``controllers.nc``, ``controllers.csv`` and ``controllers.png``."""
-    scenes, answer, failed, estimated = scenes_of_runs(scene), list[dict[str, Any]](), dict[str, str](), False
+    """Run all combinations of surface, procedure and controller; saves ``controllers.nc``, ``controllers.csv`` and
+    ``controllers.png``, and returns the summary."""
+    scenes, answer, failed, estimated = scene_of_each_run(scene), list[dict[str, Any]](), dict[str, str](), False
     results = dict[str, Result]()
     for i, (labels, single_scene) in enumerate(scenes.items()):
         name = ", ".join(labels)
@@ -122,7 +125,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def table(stops: list[dict[str, Any]]) -> list[str]:
-    """Table of the stops with a line per run."""
+    """Lines for the screen: a table of the stops with a line per run."""
     heads = [*SHOWN_QUANTITIES, LOCKED_COLUMN]
     lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<32}" + "".join(f"{head:>17}" for head in heads)]
     for stop in stops:
@@ -132,8 +135,8 @@ def table(stops: list[dict[str, Any]]) -> list[str]:
 
 
 def _save_stops(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, results: Results) -> None:
-    """Save the stops: a CSV line for each, and a result with an axis of stops. It holds the assumptions that any stop
-    broke."""
+    """Save the stops: a CSV line for each, and a netCDF result with an axis of stops, which also holds the assumptions
+    that any stop broke."""
     heads = [*SHOWN_QUANTITIES, LOCKED_COLUMN] if stops else []
     texts = {name: Channel("stop", [stop[name] for stop in stops]) for name in LABEL_COLUMNS}
     columns = {head: np.array([stop[head] for stop in stops]) for head in heads}
@@ -151,7 +154,7 @@ PANEL_TITLES = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]
 
 
 def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, results: Results) -> None:
-    """Bar chart of the stops by procedure, with a column of panels per surface and a colour per controller."""
+    """Save a bar chart of the stops by procedure, with a column of panels per surface and a colour per controller."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, save, subplots
     from studies.braking_figures import plain_name
 

@@ -1,4 +1,4 @@
-"""How anti-lock braking scatters run by run: two ensembles of stops, their means, scatter and a test between them."""
+"""Scatter of anti-lock braking: two ensembles of stops, their means, scatter, and a test of their difference."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -32,13 +32,13 @@ from models.systems.braking.stops import (
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
 BLOCKS_FOLDER = "blocks"
-"""Folder of the finished blocks, within that of the results: a killed run can be resumed."""
+"""Name of the folder of finished blocks in the results' folder, from which a killed run can be resumed."""
 RUNS_PER_BLOCK = 5
-"""Runs per block."""
+"""Number of runs in a block that a worker computes."""
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     runs: int = Field(100, ge=2, le=100_000, description="stops in each ensemble")
     procedure: str = Field("straight", description="name of the procedure that is repeated")
@@ -49,7 +49,7 @@ class Options(Strict):
 
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Refuse a procedure that is none, and a second ensemble that cannot be."""
+    """Raise InputError for an unknown procedure, and for an impossible second ensemble."""
     check_reference(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     if options.procedure not in scene.procedures:
@@ -60,7 +60,8 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Run two ensembles; saves each under its name as netCDF and CSV, and ``ensemble.png``."""
+    """Run both ensembles of stops; saves each under its name as netCDF and CSV, and ``ensemble.png``; returns the
+    summary."""
     check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     tables = [scene.table(), merged_tables(scene.table(), options.other)][: 2 if options.other else 1]
@@ -96,7 +97,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         "folder": str(folder),
         "failed": {},
         "results": results,
-        "table": table_of(options, scatters, tests),
+        "table": ensemble_lines(options, scatters, tests),
         "answer": {
             "means": [{key: means[key].mean for key in KEPT_QUANTITIES} for means in scatters],
             "p": {key: test.p_value for key, test in tests.items()},
@@ -104,8 +105,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def table_of(options: Options, scatters: list[dict[str, Scatter]], tests: dict[str, Welch]) -> list[str]:
-    """Means with their standard errors, scatter, and Welch's test."""
+def ensemble_lines(options: Options, scatters: list[dict[str, Scatter]], tests: dict[str, Welch]) -> list[str]:
+    """Lines for the screen: means with standard errors, scatter, and Welch's test of the difference."""
     lines = [
         f"  {options.runs} stops in each ensemble, initial speed scatters by {100 * options.speed_spread:g} %",
         "    "

@@ -1,4 +1,4 @@
-"""Figures of a stop: speeds, slips, pressures and torques over time, and the path on the road with its surfaces."""
+"""Figures of a braking stop: speeds, slips, pressures and torques over time, and the path on the road's surfaces."""
 
 from pathlib import Path as File
 from typing import Any
@@ -32,33 +32,36 @@ from models.systems.braking.stop_report import SLOWEST_SLIP_SPEED, Stop, wheel_n
 WHEEL_COLOURS = (BLUE, SKY, VERMILION, ORANGE, GREEN, "#66c2a5", PINK, "#e7b5d1")
 GROUND_COLOURS = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
 OTHER_SURFACE = "#e8dcc8"
-"""Colours of the road; of a surface of the user's own."""
+"""Colour of a road surface that the user defined."""
 OUTLINE_OVERHANG, HALF_WIDTH = 1.2, 1.1
-"""m, of an outline beyond its axles, chosen, and half of its width."""
+"""Length (m) of a vehicle's drawn outline beyond its axles, which is chosen, and half of its width (m)."""
 
 
 def stop_figure(
     scene: BrakingScene, name: str, results: Results, file: File, measured_pressures: MeasuredPressures | None = None
 ) -> File:
-    """Plot the stop of the first engine over time: speeds, slips, pressures, torques; and the path from above. Lateral
-    motion is added if there is any; body roll and pitch and wheel loads if the vehicle has a suspension."""
+    """Save a figure of the first engine's stop: speeds, slips, pressures and torques over time, and the path from
+    above. Lateral motion is added if there is any; body roll and pitch and wheel loads if the vehicle has a
+    suspension."""
     procedure, stop = scene.procedures[name], Stop(next(iter(results.values())).detail)
-    leaves_straight, lean = _moves_aside(stop), stop.lean
+    leaves_straight, lean = _moves_laterally(stop), stop.lean
     rows: list[Any] = [["speeds", "slips"], ["pressures", "torques"]]
     rows += ([["angles", "across"]] if leaves_straight else []) + ([["lean", "loads"]] if lean is not None else [])
     figure, axes = subplot_mosaic([*rows, ["road", "road"]], figsize=(COLUMN_WIDTH, 2.3 * (len(rows) + 1) + 0.4))
-    _speeds(axes["speeds"], stop, stop.path.turning * plane_of(scene).radius, measured_pressures)
+    _plot_speeds(axes["speeds"], stop, stop.path.turning * plane_of(scene).radius, measured_pressures)
     slips = np.where(stop.speed[:-1, None] > SLOWEST_SLIP_SPEED, stop.path.reports.slip, np.nan)
-    _wheels(axes["slips"], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
-    _wheels(axes["pressures"], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
-    _wheels(axes["torques"], stop.times, stop.path.torques / 1e3, "Torque of each brake", "torque [kN m]")
+    _plot_wheel_curves(axes["slips"], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
+    _plot_wheel_curves(axes["pressures"], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
+    _plot_wheel_curves(axes["torques"], stop.times, stop.path.torques / 1e3, "Torque of each brake", "torque [kN m]")
     if leaves_straight:
         _plot_angles(axes["angles"], stop)
         axes["across"].plot(stop.times[1:], stop.across, color=DARK, lw=0.8)
         axes["across"].set(xlabel="time [s]", ylabel="acceleration [m/s²]", title="Lateral acceleration")
     if lean is not None:
         _plot_lean(axes["lean"], stop.times, lean)
-        _wheels(axes["loads"], stop.times[1:], stop.path.reports.load / 1e3, "Load of each wheel", "load [kN]")
+        _plot_wheel_curves(
+            axes["loads"], stop.times[1:], stop.path.reports.load / 1e3, "Load of each wheel", "load [kN]"
+        )
     draw_path_from_above(axes["road"], scene, name, stop)
     handles, labels = axes["speeds"].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
@@ -86,23 +89,23 @@ READER_SPELLINGS = {
 
 
 def plain_name(name: str) -> str:
-    """Name of a procedure or controller with spaces or in its usual spelling, for titles and labels."""
+    """Name of a procedure or controller for titles and labels, in its usual spelling or with spaces."""
     return READER_SPELLINGS.get(name, name.replace("_", " "))
 
 
 STRAIGHT_LIMIT = 0.05
-"""Degrees, and m/s^2, below which a stop is called straight and its motion to the side is not drawn."""
+"""Angle (degrees) and lateral acceleration (m/s^2) up to which a stop is straight and lateral motion is not drawn."""
 
 
-def _moves_aside(stop: Stop) -> bool:
+def _moves_laterally(stop: Stop) -> bool:
     """Whether yaw, side slip or lateral acceleration during the stop is large enough to be drawn."""
     moving = stop.speed > SLOWEST_SLIP_SPEED
     sideways = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.across
     return any(np.abs(values).max(initial=0.0) > STRAIGHT_LIMIT for values in sideways)
 
 
-def _speeds(axis: Axes, stop: Stop, rims: np.ndarray, measured_pressures: MeasuredPressures | None) -> None:
-    for i, (name, values) in enumerate(zip(wheel_names(rims.shape[1]), rims.T, strict=True)):
+def _plot_speeds(axis: Axes, stop: Stop, rim_speeds: np.ndarray, measured_pressures: MeasuredPressures | None) -> None:
+    for i, (name, values) in enumerate(zip(wheel_names(rim_speeds.shape[1]), rim_speeds.T, strict=True)):
         axis.plot(stop.times, values, color=WHEEL_COLOURS[i], lw=0.8, label=name)
     if measured_pressures is not None and measured_pressures.speeds is not None:
         for i, values in enumerate(measured_pressures.speeds.T):
@@ -118,14 +121,14 @@ def _speeds(axis: Axes, stop: Stop, rims: np.ndarray, measured_pressures: Measur
     axis.set(xlabel="time [s]", ylabel="speed [m/s]", title="Speed of the vehicle and of each rim")
 
 
-def _wheels(axis: Axes, times: np.ndarray, values: np.ndarray, title: str, label: str) -> None:
+def _plot_wheel_curves(axis: Axes, times: np.ndarray, values: np.ndarray, title: str, label: str) -> None:
     for i, (name, row) in enumerate(zip(wheel_names(values.shape[1]), values.T, strict=True)):
         axis.plot(times, row, color=WHEEL_COLOURS[i], lw=0.8, label=name)
     axis.set(xlabel="time [s]", ylabel=label, title=title)
 
 
 def _plot_lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
-    """Plot roll and pitch (n, 2) in rad of the body over time."""
+    """Plot roll and pitch of the body (n, 2) in rad over times (n,) in s."""
     for values, colour, label in zip(
         np.degrees(lean).T, WHEEL_COLOURS[::2], ("roll, to the right", "pitch, nose down"), strict=False
     ):
@@ -146,8 +149,8 @@ def _plot_angles(axis: Axes, stop: Stop) -> None:
 
 
 def unit_outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
-    """Outlines to draw, as unit number and corners (m, 2) in m in the unit's axes. They show truck, drawbar and
-    trailer, or a vehicle on its suspension and what it tows, each with a line to its hitch."""
+    """Outlines of a train's units, as the unit's number and corners (m, 2) in m in its axes: of truck, drawbar and
+    trailer, or of a vehicle on its suspension and its towed units, with a line to the hitch."""
     truck, trailer = vehicle_of(scene), scene.trailer
     boxes = [(0, _box_outline(truck.front.x, truck.rear.x))]
     if trailer is not None:
@@ -164,9 +167,9 @@ def unit_outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
     return boxes
 
 
-def on_ground(unit: int, corners: np.ndarray, positions: np.ndarray, plane: Plane) -> np.ndarray:
-    """Positions (m, 2) on the road of points that are fixed to a unit. positions (2 + U,): x, y (m) of the vehicle and
-    the yaw angles of its U units."""
+def positions_on_road(unit: int, corners: np.ndarray, positions: np.ndarray, plane: Plane) -> np.ndarray:
+    """Positions (m, 2) on the road, in m, of points (m, 2) fixed to a unit of a train. positions (2 + U,) : x, y (m) of
+    the vehicle and the yaw angles (rad) of its U units."""
     return np.array([chain_point_place(ChainPoint(unit, x, y), positions, plane.reach) for x, y in corners])
 
 
@@ -184,7 +187,7 @@ def _box_outline(front: float, rear: float) -> np.ndarray:
 
 
 def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
-    """Draw the path from above on the road's surfaces, with the vehicle's outline at a few moments."""
+    """Draw the path from above on the road's surfaces, with the vehicle's outline at a few times."""
     x, y = stop.path.states[:, 0, :2].T
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
     plane, drawn = plane_of(scene), unit_outlines(scene)
@@ -212,7 +215,7 @@ def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: Stop)
     units = stop.units
     for i in np.searchsorted(stop.way, np.linspace(0.0, stop.way[-1], 6 - len(drawn) // 2)).clip(0, len(x) - 1):
         for unit, corners in drawn:
-            axis.plot(*on_ground(unit, corners, units[i], plane).T, color=DARK, lw=0.7)
+            axis.plot(*positions_on_road(unit, corners, units[i], plane).T, color=DARK, lw=0.7)
     axis.set(
         xlabel="x [m]",
         ylabel="y [m]",

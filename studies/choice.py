@@ -1,4 +1,4 @@
-"""Which effects of a scene do its quantities call for: chosen within a tolerance by runs, and confirmed; any system."""
+"""Which effects of a scene its quantities need within a tolerance: chosen by runs, and confirmed; for any system."""
 
 import csv
 from collections.abc import Callable
@@ -27,25 +27,25 @@ from studies.command.asked import ANY_SYSTEM, load_scene, plan_of
 
 SYSTEM = ANY_SYSTEM
 ACTIVE_SHARE, BLIND_CHANGE = 0.1, 1e-3
-"""Share of the energy activity from which an element counts as active; change below which a quantity is blind to it."""
+"""Share of the energy activity above which an element is active; relative change below which a quantity ignores it."""
 LOWEST_CHANGE, HIGHEST_CHANGE = 1e-3, 1e3
-"""Ends of the axis of changes (percent): what is smaller or larger is drawn at the end."""
+"""Ends of the axis of changes (per cent); smaller or larger changes are drawn at the ends."""
 ELEMENTS_DRAWN = 8
-"""Elements whose activity is drawn, the most active first."""
+"""Largest number of elements whose energy activity is drawn, the most active first."""
 Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     beside: list[str] = Field(default_factory=list, description="other scenes, drawn beside this one")
 
 
 @dataclass(frozen=True)
 class SingleEffect:
-    """One effect alone: the predicted changes (quantities,) if only it is left out (inf if it cannot be), and its
-    saving. work_ratio: ratio of the work of the scene, at steps lengthened for accuracy alone, to the work without the
-    effect at the longest step then allowed."""
+    """A single effect of a scene. changes (quantities,) : predicted relative changes if only this effect is left out,
+    inf if it cannot be; work_ratio : work of the complete scene, at the steps that accuracy allows, divided by the work
+    without the effect at the longest step then allowed."""
 
     effect: str
     changes: np.ndarray
@@ -54,10 +54,9 @@ class SingleEffect:
 
 @dataclass(frozen=True)
 class SceneChoice:
-    """The choice of effects for one scene, with each effect taken alone. further_tolerances: tolerances above which
-    effects that stay would be left out too. activity_of_element: energy activity (W) by element, where it has a closed
-    form.
-    results: runs of the reduced scene, with their errors."""
+    """The choice of effects for a scene, and the changes by each single effect. further_tolerances : tolerance above
+    which a staying effect would be left out, too; activity_of_element : energy activity (W) by element, if it has a
+    closed form. results: runs of the reduced scene, with their errors."""
 
     scene: Any
     engine: str
@@ -69,12 +68,12 @@ class SceneChoice:
 
     @property
     def staying_effects(self) -> list[str]:
-        """Effects that were not left out."""
+        """Names of the effects that were not left out."""
         return [name for name in self.choice.candidates if name not in self.choice.left_out]
 
 
 def check(scene: Any, engines: tuple[str, ...]) -> None:
-    """Refuse scenes without runs in time, and scenes beside that make no choice."""
+    """Raise InputError for further scenes of the option "beside" that ask for no choice of effects."""
     system_of(scene)
     for name in read(Options, scene.options, scene.file, "options").beside:
         other_scene = load_scene(name, None)
@@ -83,19 +82,19 @@ def check(scene: Any, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choose effects of the scenes; saves ``SYSTEM.csv`` for each scene, and a figure."""
+    """Choose the effects of the scene and of further scenes; saves a CSV table for each scene, and a figure."""
     check(scene, engines)
     further_scenes = [load_scene(name, None) for name in scene.options.get("beside", [])]
     return save_choices([scene, *further_scenes], engines, folder, progress)
 
 
 def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choices of scenes, the first by one of these engines, saved and drawn."""
+    """Choose, save and draw the effects of scenes, the first in one of ``engines``; returns the summary."""
     scene, choices = scenes[0], list[SceneChoice]()
     for i, chosen_scene in enumerate(scenes):
         progress(chosen_scene.title, i / len(scenes))
         linear, engines_asked = has_closed_form(chosen_scene), engines if chosen_scene is scene else ()
-        plan_of(chosen_scene).check(chosen_scene, () if linear else (engine_of(chosen_scene, engines_asked),))
+        plan_of(chosen_scene).check(chosen_scene, () if linear else (engine_for_choice(chosen_scene, engines_asked),))
         report_share = partial(
             _pass_progress, progress, f"{chosen_scene.title}, of at most {RUN_BUDGET} runs", i, len(scenes)
         )
@@ -109,14 +108,14 @@ def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, prog
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
-        "answer": [_answer_of_choice(choice) for choice in choices],
+        "answer": [_summary_of_choice(choice) for choice in choices],
         "table": [line for choice in choices for line in choice_lines(choice, len(choices) > 1)],
-        "results": _results(choices),
+        "results": _results_by_name(choices),
     }
 
 
-def _results(choices: list[SceneChoice]) -> dict[str, Result]:
-    """Results of the reduced scenes of all choices, each under a name of its system (if there are several) and run
+def _results_by_name(choices: list[SceneChoice]) -> dict[str, Result]:
+    """Results of the reduced scenes of all choices, by a name of the system (if there are several) and the run's
     number."""
     return {
         " ".join(
@@ -131,13 +130,13 @@ def _results(choices: list[SceneChoice]) -> dict[str, Result]:
 
 
 def _pass_progress(progress: Progress, title: str, completed: int, scene_count: int, share: float) -> None:
-    """Report progress over several scenes: ``completed`` scenes are done, and ``share`` of the search of the present
-    one."""
+    """Report progress over several scenes: ``completed`` scenes are done, and ``share`` of the search of the current
+    scene."""
     progress(title, (completed + share) / scene_count)
 
 
 def has_closed_form(scene: Any) -> bool:
-    """Whether a scene's choice needs no runs in time."""
+    """Whether the choice of a scene's effects has a closed form, without runs in time: a linear stationary ride."""
     if scene.system != "ride":
         return False
     from models.systems.ride.of_scene import goes_in_time
@@ -145,15 +144,15 @@ def has_closed_form(scene: Any) -> bool:
     return not goes_in_time(scene)
 
 
-def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
-    """The system's usual engine if it is among the requested ones or none is requested; else the first requested
-    one."""
+def engine_for_choice(scene: Any, engines: tuple[str, ...]) -> str:
+    """Engine for the choice: the system's usual engine if it is requested or none is; else the first requested
+    engine."""
     usual: str = system_of(scene).ENGINE
     return usual if not engines or usual in engines else engines[0]
 
 
 def search_text(scene: Any) -> str:
-    """Text on how many runs the search for a scene's choice may take."""
+    """Line for the screen on the number of runs that the search for a scene's choice of effects may take."""
     if has_closed_form(scene):
         from models.advice.ride_choice.estimate import estimate
 
@@ -163,7 +162,7 @@ def search_text(scene: Any) -> str:
             f"{takes.states} states and {takes.speeds} speeds, about {takes.seconds:.1g} s of the processor "
             "to a factor of two"
         )
-    runs = Variants(scene, engine_of(scene, ()))
+    runs = Variants(scene, engine_for_choice(scene, ()))
     return (
         f"  choice     among {len(runs.effects)} effects; the search ends at the calls of {RUN_BUDGET} runs of the "
         f"scene, of {runs.system.steps(runs.scene):,} steps each, and confirms {MOST_CONFIRMATIONS} sets at most"
@@ -173,8 +172,8 @@ def search_text(scene: Any) -> str:
 def choice_of_scene(
     scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None
 ) -> SceneChoice:
-    """The choice for a scene in one engine."""
-    engine = engine_of(scene, engines)
+    """The choice of effects for a scene by runs in one engine."""
+    engine = engine_for_choice(scene, engines)
     with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *places_of(scene)) as pool:
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
         choice, full_work = chooser.choose(), chooser.work(frozenset())
@@ -197,7 +196,7 @@ def choice_of_scene(
 
 
 def _linear_ride_choice(scene: Any) -> SceneChoice:
-    """The choice for a linear stationary ride scene by its closed form; numbers of calls are for one second of
+    """The choice of effects for a linear stationary ride scene in closed form; numbers of calls are for one second of
     motion."""
     from models.advice.ride_choice.activity import activity_by_element
     from models.advice.ride_choice.choose import Chooser as Linear
@@ -238,14 +237,14 @@ def _linear_ride_choice(scene: Any) -> SceneChoice:
     return SceneChoice(scene, "closed form", choice, single_effects, further, watts)
 
 
-def _answer_of_choice(answered: SceneChoice) -> dict[str, Any]:
-    """Saved answer of a choice: its effects, their changes and the saving."""
-    choice = answered.choice
+def _summary_of_choice(scene_choice: SceneChoice) -> dict[str, Any]:
+    """Entry of the summary for a choice: its effects, their changes and the saving."""
+    choice = scene_choice.choice
     return {
-        "system": answered.scene.system,
-        "implementation": answered.engine,
+        "system": scene_choice.scene.system,
+        "implementation": scene_choice.engine,
         "left out": list(choice.left_out),
-        "stay": answered.staying_effects,
+        "stay": scene_choice.staying_effects,
         "step times": choice.step_factor,
         "errors": {
             name: {
@@ -253,12 +252,12 @@ def _answer_of_choice(answered: SceneChoice) -> dict[str, Any]:
                 "confirmed": float(choice.confirmed_change[i]),
                 "chance": float(choice.statistical_error[i]),
             }
-            for i, name in enumerate(answered.scene.quantities)
+            for i, name in enumerate(scene_choice.scene.quantities)
         },
         "kept": choice.within_tolerance,
         "calls": list(choice.calls),
         "confirmations": choice.confirmations,
-        "would matter no more above": answered.further_tolerances,
+        "would matter no more above": scene_choice.further_tolerances,
         "would break an assumption": {
             name: [asdict(breach) for breach in barred] for name, barred in choice.assumptions_barring.items()
         },
@@ -266,8 +265,8 @@ def _answer_of_choice(answered: SceneChoice) -> dict[str, Any]:
 
 
 def _save_effect_table(choice: SceneChoice, path: Path) -> None:
-    """Save a CSV file with a row per effect: the changes if it alone is left out, what this saves, and whether it was
-    left out."""
+    """Save a CSV file with a row per effect: the changes if only this effect is left out, the saved work, and whether
+    it was left out."""
     with path.open("x", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         heads = [f"{name}, change [-]" for name in choice.scene.quantities]
@@ -281,17 +280,17 @@ def _save_effect_table(choice: SceneChoice, path: Path) -> None:
 
 
 def percent_text(relative_change: float) -> str:
-    """A relative change as text."""
+    """Text of a relative change in per cent."""
     digits = ".2g" if abs(relative_change) < 0.1 else ",.0f"
     return f"{100 * relative_change:{digits}} %" if np.isfinite(relative_change) else "without end"
 
 
-def _change_text(relative_change: float, beside: float) -> str:
-    return percent_text(relative_change) + (f" +- {percent_text(beside)}" if beside else "")
+def _change_text(relative_change: float, uncertainty: float) -> str:
+    return percent_text(relative_change) + (f" +- {percent_text(uncertainty)}" if uncertainty else "")
 
 
 def _why_it_stays(relative_change: float, scene_choice: SceneChoice) -> str:
-    """Text on why an effect stays: how much the quantities would change if it were left out as well."""
+    """Text on why an effect stays: how much the quantities would change if it were left out, too."""
     if (
         relative_change > PREDICTION_SHARE * scene_choice.scene.tolerance
         or scene_choice.activity_of_element
@@ -305,7 +304,7 @@ def _why_it_stays(relative_change: float, scene_choice: SceneChoice) -> str:
 
 
 def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
-    """Text of the choice."""
+    """Lines for the screen on the choice of a scene's effects."""
     choice, scene = scene_choice.choice, scene_choice.scene
     rows = [
         f"  {scene.title} ({scene.system}, {scene_choice.engine})" if with_title else f"  by {scene_choice.engine}",
@@ -349,13 +348,13 @@ def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
     return [*rows, f"    the choice holds for tolerances down to {percent_text(worst)}"] if choice.left_out else rows
 
 
-def misleading_activities(choice_of: SceneChoice) -> list[str]:
-    """Sentences on inertias for which energy activity misleads: they are active, but leaving them out hardly changes a
-    quantity."""
-    total, rows = sum(value for value in choice_of.activity_of_element.values() if np.isfinite(value)), []
-    for effect in choice_of.single_effects:
-        share = choice_of.activity_of_element.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
-        for name, change in zip(choice_of.scene.quantities, effect.changes, strict=True):
+def misleading_activities(scene_choice: SceneChoice) -> list[str]:
+    """Lines for the screen on inertias for which energy activity misleads: active ones without which a quantity hardly
+    changes."""
+    total, rows = sum(value for value in scene_choice.activity_of_element.values() if np.isfinite(value)), []
+    for effect in scene_choice.single_effects:
+        share = scene_choice.activity_of_element.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
+        for name, change in zip(scene_choice.scene.quantities, effect.changes, strict=True):
             if np.isfinite(share) and share > ACTIVE_SHARE and change < BLIND_CHANGE:
                 rows.append(
                     f"    energy activity misleads: {effect.effect} holds {percent_text(share)} of it, and without "
@@ -365,7 +364,7 @@ def misleading_activities(choice_of: SceneChoice) -> list[str]:
 
 
 def choice_figure(choices: list[SceneChoice], path: Path) -> None:
-    """Figure with a panel per scene, and another panel for energy activities if there are any."""
+    """Save a figure with a panel of changes per scene, and a panel of energy activities if there are any."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, save, subplots
 
     shown = [(choice, False) for choice in choices] + [
@@ -380,12 +379,12 @@ def choice_figure(choices: list[SceneChoice], path: Path) -> None:
     for axis, (choice, active) in zip(axes.flat, shown, strict=True):
         _plot_activity(axis, choice) if active else _plot_changes(axis, choice)
     title = "Which effects matter for which question: change by leaving out one effect, against the tolerance"
-    add_heading(figure, title, _results(choices))
+    add_heading(figure, title, _results_by_name(choices))
     save(figure, path)
 
 
 def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
-    """Plot how much each quantity changes if each effect alone is left out.
+    """Plot how much each quantity changes if a single effect is left out, for each effect.
 
     Shaded rows, from the scene's tolerance on, tell why an effect stays; a name says whether it went with the others.
     """
@@ -424,7 +423,7 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
         xlim=(LOWEST_CHANGE / 1.5, HIGHEST_CHANGE * 1.5),
         ylim=(-0.5, len(shown) - 0.5),
         yticks=y,
-        yticklabels=[_effect_and_whether_gone(scene_choice, effect) for effect in shown],
+        yticklabels=[_effect_label(scene_choice, effect) for effect in shown],
         xlabel="change by leaving out this effect alone [%] (at the ends: beyond)",
     )
     calls_before, _, calls_after = scene_choice.choice.calls
@@ -435,11 +434,11 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
     axis.legend(fontsize=SMALL_TEXT, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _effect_and_whether_gone(choice_of: SceneChoice, effect: SingleEffect) -> str:
-    """Name of an effect with "(left out)" or "(stays)". An effect that changes little alone may stay, since it can
+def _effect_label(scene_choice: SceneChoice, effect: SingleEffect) -> str:
+    """Label of an effect with "(left out)" or "(stays)". An effect whose own change is small may stay, since it can
     matter together with others that were left out."""
     return effect.effect.replace("_", " ") + (
-        " (left out)" if effect.effect in choice_of.choice.left_out else " (stays)"
+        " (left out)" if effect.effect in scene_choice.choice.left_out else " (stays)"
     )
 
 

@@ -22,30 +22,30 @@ from models.measured.file_kinds import is_measurement
 from studies.command.asked import (
     check_by_any,
     checked_study,
+    doubt_lines,
     engines_of,
     findings_of,
     load_scene,
-    plain_arrays,
+    needs_no_extras,
     plan_of,
-    query_lines,
 )
 from studies.command.audits import blind_spot_audit, conformity_report
-from studies.command.crew import given_crew
-from studies.command.finishing import exit_with_message, finish, folder_of, profile_lines, untold_findings
+from studies.command.crew import crew_changes_by_options
+from studies.command.finishing import exit_with_message, finish, folder_of, profiled_work, unprinted_finding_lines
 from studies.command.options import (
-    AsJson,
-    Changes,
-    Cluster,
-    NoError,
-    Out,
-    Profile,
-    Resume,
+    ClusterOption,
+    JsonOption,
+    NoErrorOption,
+    OutOption,
+    ProfileOption,
+    ResumeOption,
     SceneName,
-    Strictly,
-    Sweep,
-    Workers,
+    SetOption,
+    StrictOption,
+    SweepOption,
+    WorkersOption,
 )
-from studies.command.second_compiler import compiled_beside
+from studies.command.second_compiler import second_process_compiles
 from studies.command.waiting import progress_bar
 
 app = typer.Typer(
@@ -55,9 +55,9 @@ app = typer.Typer(
 )
 
 
-def _say_version(wanted: bool) -> None:
-    """Print the version and end, where that is what the user wants."""
-    if wanted:
+def _print_version(is_requested: bool) -> None:
+    """Print the version and end the process if the option ``--version`` is given."""
+    if is_requested:
         from importlib.metadata import version
 
         print(f"twinrig {version('twinrig')}")
@@ -67,7 +67,7 @@ def _say_version(wanted: bool) -> None:
 @app.callback()
 def common(
     version: Annotated[
-        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Print the version and end.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end.")
     ] = False,
 ) -> None:
     """Options that belong to no command."""
@@ -108,8 +108,8 @@ def show(
     scene: SceneName,
     price: Annotated[bool, typer.Option("--price", help="What each effect costs and changes, by short runs.")] = False,
     engine: Annotated[str | None, typer.Option(help="Of --price: one of exudyn, mujoco, reference.")] = None,
-    changes: Changes = None,
-    as_json: AsJson = False,
+    changes: SetOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Print what a scene will compute, without running it, or what is in a measurement file, with a scene for it."""
     if not price and (engine is not None or as_json):
@@ -122,8 +122,8 @@ def show(
     if not price:
         check_by_any(loaded, engines_of(getattr(getattr(loaded, "run", None), "engine", None), loaded.system))
         plan = plan_of(loaded).describe(loaded)
-        return print("\n".join([plan, *untold_findings(findings_of(loaded), plan), *_search_lines(loaded)]))
-    _say_user_code(loaded)
+        return print("\n".join([plan, *unprinted_finding_lines(findings_of(loaded), plan), *_search_lines(loaded)]))
+    _announce_user_code(loaded)
     from models.advice.price.effects import price_list
     from models.advice.price.effects_text import as_dict
     from models.advice.price.effects_text import price_list_lines as price_lines
@@ -133,15 +133,15 @@ def show(
     print(json.dumps(as_dict(prices), indent=1) if as_json else "\n".join(price_lines(prices, loaded.quantities)))
 
 
-def _say_user_code(scene: Any) -> None:
-    """Say on the terminal that code of the user's is about to run, which a price calls many times."""
+def _announce_user_code(scene: Any) -> None:
+    """Print on stderr that code of the user is about to run many times, if the scene has any."""
     code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)
     if code:
         print(f"twinrig: this runs your own code, many times: [port] {code}", file=sys.stderr, flush=True)
 
 
 def _search_lines(scene: Any) -> list[str]:
-    """Lines on the number of runs that a search for a choice may take, where a scene asks for a choice."""
+    """Lines for the screen on the number of runs that a choice of effects may take, if the scene asks for a choice."""
     from studies.choice import search_text
 
     return [] if scene.tolerance is None else [search_text(scene)]
@@ -151,19 +151,19 @@ def _search_lines(scene: Any) -> list[str]:
 def run_scene(
     scene: SceneName,
     engine: Annotated[str | None, typer.Option(help="exudyn, mujoco, reference or all (which is the default)")] = None,
-    out: Out = None,
-    resume: Resume = None,
-    sweep: Sweep = None,
-    workers: Workers = None,
-    cluster: Cluster = None,
-    changes: Changes = None,
-    no_error: NoError = False,
-    strict: Strictly = False,
-    profile: Profile = False,
-    as_json: AsJson = False,
+    out: OutOption = None,
+    resume: ResumeOption = None,
+    sweep: SweepOption = None,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    changes: SetOption = None,
+    no_error: NoErrorOption = False,
+    strict: StrictOption = False,
+    profile: ProfileOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Run a scene and save its results and figures."""
-    telling = profile_lines(profile)
+    telling = profiled_work(profile)
     if out is not None:
         check_unused(out)  # before kernels are compiled
     if sweep is not None:
@@ -177,12 +177,14 @@ def run_scene(
         work = partial(run_points, replace(job, folder=folder), crew=crew)
         return finish(telling(work), folder, as_json, strict=strict)
     loaded = load_scene(scene, changes)
-    loaded = loaded.model_copy(update={"error": loaded.error and not no_error, **given_crew(workers, cluster)})
+    loaded = loaded.model_copy(
+        update={"error": loaded.error and not no_error, **crew_changes_by_options(workers, cluster)}
+    )
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
-    with _telling_queries(loaded), compiled_beside(scene, changes or [], loaded, engines):
+    with _doubts_printed_on_refusal(loaded), second_process_compiles(scene, changes or [], loaded, engines):
         with progress_bar("checking the scene", loaded.system):
             module = checked_study(loaded, engines)
-        if plain_arrays(loaded, engines, module):
+        if needs_no_extras(loaded, engines, module):
             leave_out(*OF_LABELS)
         folder = folder_of(Path(loaded.file).stem, getattr(module, "BLOCKS_FOLDER", None), loaded.study, out, resume)
         doubts = findings_of(loaded)
@@ -191,12 +193,13 @@ def run_scene(
 
 
 @contextmanager
-def _telling_queries(scene: Any) -> Iterator[None]:
-    """Where a scene is refused, tell queries about its vehicle and channels, too: they may be the cause."""
+def _doubts_printed_on_refusal(scene: Any) -> Iterator[None]:
+    """Context that prints doubtful values of a scene's vehicle and channels if the scene is refused, as a possible
+    cause."""
     try:
         yield
     except InputError:
-        for line in query_lines(scene):
+        for line in doubt_lines(scene):
             print(line, file=sys.stderr)
         raise
 
@@ -207,10 +210,10 @@ def price(
     tolerance: Annotated[float, typer.Option(help="Largest error that is allowed, in the unit of the quantity.")],
     quantity: Annotated[str | None, typer.Option(help="Channels of the result, e.g. f1,f2, if not the usual.")] = None,
     engine: Annotated[str | None, typer.Option(help="exudyn, mujoco, reference or all (which is the default)")] = None,
-    workers: Workers = None,
-    cluster: Cluster = None,
-    changes: Changes = None,
-    as_json: AsJson = False,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    changes: SetOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Find the cheapest engine, integrator and step that hold a scene's quantity to a tolerance.
 
@@ -220,8 +223,8 @@ def price(
     from models.advice.price.text import as_dict
     from models.advice.price.text import recommendation_lines as price_lines
 
-    loaded = load_scene(scene, changes).model_copy(update=given_crew(workers, cluster))
-    _say_user_code(loaded)
+    loaded = load_scene(scene, changes).model_copy(update=crew_changes_by_options(workers, cluster))
+    _announce_user_code(loaded)
     with progress_bar("runs of every engine in ever finer steps", loaded.system):
         priced = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
     print(json.dumps(as_dict(priced), indent=1) if as_json else "\n".join(price_lines(priced)))
@@ -233,12 +236,12 @@ def price(
 def compare(
     first: Annotated[Path, typer.Argument(help="A folder of results, or one file of it.")],
     second: Annotated[Path, typer.Argument(help="Another one of the same study, or a measurement (.csv, .mf4, ...).")],
-    out: Out = None,
+    out: OutOption = None,
     shift: Annotated[
         float | None,
         typer.Option(help="Of a measurement: s that its clock shows at the run's start, if it is not to be sought."),
     ] = None,
-    as_json: AsJson = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compare two results quantity by quantity, or lay a measurement over a run.
 
@@ -272,12 +275,12 @@ def identify(
     engine: Annotated[str | None, typer.Option(help="One of exudyn, mujoco, reference.")] = None,
     low_pass: Annotated[float, typer.Option(help="Hz, of run and measurement alike, without phase; 0 for none.")] = 0.0,
     profiles: Annotated[bool, typer.Option("--profiles", help="Profile likelihood of every parameter.")] = False,
-    workers: Workers = None,
-    cluster: Cluster = None,
-    out: Out = None,
-    resume: Resume = None,
-    changes: Changes = None,
-    as_json: AsJson = False,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    out: OutOption = None,
+    resume: ResumeOption = None,
+    changes: SetOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Identify numbers of a scene from a measurement, with standard errors, and say what it does not determine."""
     from studies.command.identify import STAGES_FOLDER, report
@@ -285,7 +288,7 @@ def identify(
     loaded, keys = load_scene(scene, changes), [key.strip() for key in parameters.split(",") if key.strip()]
     if not keys:
         raise InputError("--parameters", "", parameters, "must name keys of the scene, as front.friction,rear.friction")
-    loaded = loaded.model_copy(update=given_crew(workers, cluster))
+    loaded = loaded.model_copy(update=crew_changes_by_options(workers, cluster))
     engines = engines_of(engine, loaded.system)
     checked_study(loaded, engines)
     if not measurement.is_file():
@@ -304,7 +307,7 @@ def export(
     scene: SceneName,
     engine: Annotated[str, typer.Option(help="mujoco, for an MJCF file, or exudyn, for a script in Python.")],
     out: Annotated[Path | None, typer.Option(help="The file to write; SCENE_ENGINE.xml or .py here if none.")] = None,
-    changes: Changes = None,
+    changes: SetOption = None,
 ) -> None:
     """Write the vehicle of a scene as a file of an engine that opens without twinrig.
 
@@ -328,7 +331,7 @@ def twin(
     ] = "",
     states: Annotated[int, typer.Option(help="Random states at which accelerations are compared.")] = 100,
     page: Annotated[Path | None, typer.Option(help="Write one HTML file with all of it there.")] = None,
-    march: Annotated[bool, typer.Option("--paths/--no-paths", help="Compare paths over 1 s, too.")] = True,
+    compare_paths: Annotated[bool, typer.Option("--paths/--no-paths", help="Compare paths over 1 s, too.")] = True,
     tolerance: Annotated[
         float | None, typer.Option(help="Find the engine, integrator and step that hold this error, rad or m.")
     ] = None,
@@ -345,12 +348,12 @@ def twin(
     The file as MuJoCo parsed it is held to the same model built in Exudyn, in MuJoCo and by plain equations, at random
     states. Of two files the elements that make them move differently are named. Ends with code 1 if anything differs.
     """
-    from studies.command.twin import TwinOptions, check_asked, content_kinds, examine, twin_lines
+    from studies.command.twin import TwinOptions, check_arguments, examine, listed_content_kinds, twin_lines
 
-    check_asked(files, page)
+    check_arguments(files, page)
     with progress_bar("building the model") as tell:
-        wanted = TwinOptions(states, march, tolerance, quantity, controls, folder)
-        twins = examine(files, content_kinds(without), wanted, tell)
+        twin_options = TwinOptions(states, compare_paths, tolerance, quantity, controls, folder)
+        twins = examine(files, listed_content_kinds(without), twin_options, tell)
     print("\n".join(twin_lines(twins)))
     if page is not None:
         from studies.twin_page import write
@@ -376,15 +379,15 @@ def validate(
         str | None,
         typer.Option(metavar="PATTERN", help="Of --blind-spots: functions of this name alone, as 'models.tyre.*'."),
     ] = None,
-    workers: Workers = None,
-    cluster: Cluster = None,
-    out: Out = None,
-    resume: Resume = None,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    out: OutOption = None,
+    resume: ResumeOption = None,
 ) -> None:
     """Run the validation cases and write report.html, results.json and results.csv."""
     if only is not None and not blind_spots:
         raise InputError("--only", "", only, "goes with --blind-spots")
-    crew = given_crew(workers, cluster)
+    crew = crew_changes_by_options(workers, cluster)
     if engine is not None:
         return conformity_report(engine, quick or blind_spots or against is not None or resume is not None, out)
     if blind_spots:

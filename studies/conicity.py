@@ -1,4 +1,5 @@
-"""Equivalent conicity of a wheelset by EN 15302 and by the first harmonic, from a table or from profiles."""
+"""Equivalent conicity of a wheelset by EN 15302 and by the first harmonic, from a table or from wheel and rail
+profiles."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +13,8 @@ Progress = Callable[[str, float], None]
 
 
 def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Both conicities at each amplitude; saves ``conicity.nc``, ``conicity.csv``, ``rolling_radii.csv``, a figure.
+    """Compute both equivalent conicities at each amplitude; saves ``conicity.nc``, ``conicity.csv``,
+    ``rolling_radii.csv`` and a figure, and returns the summary.
 
     ``rolling_radii.csv`` holds the differences that were used and can be read as a table again.
     """

@@ -1,4 +1,4 @@
-"""What one contact of wheel and rail does: area, pressure, forces and how far they are off, at one creepage or many."""
+"""A contact of wheel and rail: area, pressure, and creep forces with their errors, at one creepage or many."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -21,25 +21,26 @@ from models.systems.contact.scene import ContactScene, Method
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
-ROWS_PRINTED = 12
-"""Rows of a sweep that are printed, about; the file has all."""
+PRINTED_ROWS = 12
+"""Approximate number of rows of a sweep that are printed; the saved file has all."""
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     exact: int = Field(9, ge=0, le=100, description="points of a sweep that the exact theory checks, on an ellipse")
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
-    """Refuse a table of cases, which is another study's."""
+    """Raise InputError for a scene with a table of cases, which the study ``contact_table`` computes."""
     if scene.cases is not None:
         allowed = "computes one contact; for a table of cases use contact_table"
         raise InputError(scene.file, "study", scene.study, allowed)
 
 
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Press the bodies, roll them; saves forces and fields as CSV and netCDF, and figures."""
+    """Compute the normal contact and the creep forces; saves forces and fields as CSV and netCDF, and figures; returns
+    the summary."""
     check(scene, engines)
     forces = run_scene(scene, error=scene.error, fields=True, progress=progress)
     rolls: ContactResults = forces.detail
@@ -58,12 +59,12 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
         "failed": {},
         "answer": answer,
         "results": {"forces": forces},
-        "table": _table(scene, forces),
+        "table": _table_lines(scene, forces),
     }
 
 
-def _table(scene: ContactScene, forces: Result) -> list[str]:
-    """Lines on the normal contact, then forces with their errors: all for a single creepage, or some rows of a
+def _table_lines(scene: ContactScene, forces: Result) -> list[str]:
+    """Lines for the screen: the normal contact, then creep forces with errors, at all creepages or at some of a
     sweep."""
     rolls: ContactResults = forces.detail
     body, p = rolls.contact, rolls.contact.pressing
@@ -72,7 +73,7 @@ def _table(scene: ContactScene, forces: Result) -> list[str]:
     lines = [
         f"  normal load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
         f"largest pressure {1e-6 * p.peak:,.0f} MPa",
-        *_lines_of_touches(scene),
+        *_contact_point_lines(scene),
         f"  pressed in {duration(rolls.pressing)} once, rolled in {cost(rolls.rolling)} at each creepage"
         + ", errors included" * bool(rolls.errors),
         f"  forces on the wheel by {theory_text(scene.method)}; mu N = {limit:,.0f} N",
@@ -81,7 +82,7 @@ def _table(scene: ContactScene, forces: Result) -> list[str]:
         + "   errors: of cells, of theory [% of mu N], of Mz [N m]"
         * bool(rolls.errors),
     ]
-    step = max(1, (len(rolls.motions) - 1) // ROWS_PRINTED)
+    step = max(1, (len(rolls.motions) - 1) // PRINTED_ROWS)
     errors: Sequence[Error | None] = rolls.errors or [None] * len(rolls.motions)
     for motion, force, error in list(zip(rolls.motions, rolls.rolled, errors, strict=True))[::step]:
         lines.append(
@@ -107,7 +108,7 @@ THEORY_NAMES = {
 
 
 def theory_text(method: Method) -> str:
-    """Name of the contact theory, with its number of cells along each axis where it has cells."""
+    """Name of a contact theory, with its number of cells along each axis if it has cells."""
     return THEORY_NAMES[method.name] + ("" if method.name == "linear" else f", {method.cells} cells along each axis")
 
 
@@ -115,8 +116,8 @@ def _percent_text(error: float, friction_limit: float) -> str:
     return f"{100 * error / friction_limit:.2f}" if friction_limit > 0 else "0"
 
 
-def _lines_of_touches(scene: ContactScene) -> list[str]:
-    """A line for each point at which the wheel's and the rail's profile touch."""
+def _contact_point_lines(scene: ContactScene) -> list[str]:
+    """Lines for the screen, one for each point at which the profiles of wheel and rail touch."""
     if scene.profiles is None:
         return []
     return [
@@ -140,7 +141,7 @@ def _draw_figures(scene: ContactScene, forces: Result, folder: Path) -> None:
         )
         friction = rolls.contact.friction
         contact_figure(
-            list(last_rolled.fields), friction, title, _pressure(rolls.contact), forces, folder / "contact.png"
+            list(last_rolled.fields), friction, title, _pressure_name(rolls.contact), forces, folder / "contact.png"
         )
     if sweep is not None:
         note_on_others = "".join(
@@ -155,26 +156,26 @@ def _draw_figures(scene: ContactScene, forces: Result, folder: Path) -> None:
 CREEPAGE_SYMBOLS = (("ξx", ""), ("ξy", ""), ("spin", " 1/m"))
 
 
-def _pressure(body: RollingContact) -> str:
-    """Text that names the pressure distribution of the cells."""
+def _pressure_name(body: RollingContact) -> str:
+    """Name of the pressure distribution over a contact's cells, for a figure's title."""
     if isinstance(body, Fastsim) and body.choices["bound"] != "elliptic":
         return f"FASTSIM's pressure ({body.choices['bound']} bound)"
     return "pressure"
 
 
-CHECKING_CELLS = 40
-"""Cells along each axis of the exact theory where it checks a sweep."""
+EXACT_THEORY_CELLS = 40
+"""Number of cells along each axis of the exact theory that checks a sweep."""
 
 
-def _exact_checks(scene: ContactScene, rolls: ContactResults) -> dict[int, Any]:
-    """Results of the exact theory, keyed by the motion's number, at a few motions of a sweep. Empty if the contact is
-    not a Hertzian ellipse, is exact already, or has falling friction."""
-    body, points = rolls.contact, read(Options, scene.options, scene.file, "options").exact
+def _exact_checks(scene: ContactScene, contact_results: ContactResults) -> dict[int, Any]:
+    """Results of the exact theory at a few creepages of a sweep, by the number of the creepage. Empty if the contact is
+    no Hertzian ellipse, is exact already, or has falling friction."""
+    body, points = contact_results.contact, read(Options, scene.options, scene.file, "options").exact
     if not isinstance(body, OnEllipse) or isinstance(body, ExactOnEllipse) or scene_contact(scene).falling is not None:
         return {}
     exact = ExactOnEllipse(body.hertz, body.friction, body.pair)
-    chosen = np.unique(np.linspace(0, len(rolls.motions) - 1, points).round().astype(int))
-    return {int(i): exact.roll(rolls.motions[i], CHECKING_CELLS) for i in chosen}
+    chosen = np.unique(np.linspace(0, len(contact_results.motions) - 1, points).round().astype(int))
+    return {int(i): exact.roll(contact_results.motions[i], EXACT_THEORY_CELLS) for i in chosen}
 
 
 if __name__ == "__main__":

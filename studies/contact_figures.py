@@ -1,4 +1,4 @@
-"""Pictures of rolling contact: pressure, tractions with stick and slip, creep forces with their error."""
+"""Figures of rolling contact: pressure, tractions with zones of stick and slip, and creep forces with errors."""
 
 from pathlib import Path
 from typing import Any
@@ -34,14 +34,14 @@ from models.systems.contact.work_precision import ERROR_TARGETS, TheoryPoint
 MILLIMETRES_PER_METRE, MEGAPASCAL_PER_PASCAL = 1e3, 1e-6
 STICK_COLOUR, SLIP_COLOUR = "#cfe3f2", "#f6c9a8"
 ARROW_COUNT = 17
-"""Arrows across the longer side of a contact area, about."""
+"""Approximate number of traction arrows along the longer side of a contact area."""
 
 
 def contact_figure(
     patches: list[Fields], friction: float, title: str, pressure: str, forces: Result, path: Path
 ) -> None:
-    """Figure of the pressure and the tractions over the contact area, with all patches to scale; ``pressure`` is its
-    kind, for the title.
+    """Save a figure of pressure and tractions over the contact area, with all patches to scale; ``pressure`` names the
+    pressure distribution.
 
     forces : the result whose last motion is shown.
     """
@@ -50,7 +50,7 @@ def contact_figure(
     )
     size = COLUMN_WIDTH, float(np.clip(3.2 * width / length + 1.9, 3.8, 8.0))
     figure, axes = subplots(1, 2, figsize=size, sharex=True, sharey=True)
-    _pressure(axes[0], patches, pressure)
+    _draw_pressure(axes[0], patches, pressure)
     _draw_tractions(axes[1], patches, friction, max(length, width) / ARROW_COUNT)
     for axis in axes:
         axis.set(aspect="equal", xlabel="x, direction of rolling [mm]")
@@ -63,7 +63,7 @@ def contact_figure(
 
 
 def _cell_corners(fields_on_cells: Fields) -> list[Array]:
-    """Corners of every cell inside, (4, 2) in mm."""
+    """Corners (4, 2) in mm of every cell inside the contact area."""
     x, y, dx, dy = (
         MILLIMETRES_PER_METRE * getattr(fields_on_cells, name)[fields_on_cells.inside]
         for name in ("x", "y", "dx", "dy")
@@ -72,7 +72,7 @@ def _cell_corners(fields_on_cells: Fields) -> list[Array]:
     return list(np.array(corners).transpose(2, 0, 1))
 
 
-def _pressure(axis: Any, patches: list[Fields], quantity: str) -> None:
+def _draw_pressure(axis: Any, patches: list[Fields], quantity: str) -> None:
     greatest = MEGAPASCAL_PER_PASCAL * max(float(f.pressure.max()) for f in patches)
     for f in patches:
         cells = PolyCollection(
@@ -90,7 +90,7 @@ def _pressure(axis: Any, patches: list[Fields], quantity: str) -> None:
 
 
 def _draw_tractions(axis: Any, patches: list[Fields], friction: float, spacing: float) -> None:
-    """Draw the zones of stick and slip, and arrows of the traction on the wheel every ``spacing`` (mm)."""
+    """Draw the zones of stick and slip, and arrows of the traction on the wheel at a ``spacing`` (mm)."""
     largest = friction * max(float(f.pressure.max()) for f in patches)
     scaled: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": largest / (1.35 * spacing)}
     for f in patches:
@@ -110,8 +110,8 @@ def _draw_tractions(axis: Any, patches: list[Fields], friction: float, spacing: 
 
 
 def _arrow_data(fields_on_cells: Fields, spacing: float) -> Array:
-    """Positions and tractions (4, n) at evenly spaced points, which lie in some rows of cells and are interpolated
-    along them."""
+    """Positions x, y (m) and tractions (Pa) of the arrows, (4, n), at evenly spaced points along some rows of cells,
+    between which tractions are interpolated."""
     arrows, lines = list[Array](), fields_on_cells.y[:, 0]
     step = max(1, round(spacing / float(fields_on_cells.dy[0, 0])))
     for row in range(len(lines) // 2 % step, len(lines), step):
@@ -132,10 +132,11 @@ CREEPAGE_LABELS = {"xi_x": "longitudinal creepage [%]", "xi_y": "lateral creepag
 FORCE_COLOURS = {"fx": BLUE, "fy": VERMILION, "mz": GREEN}
 
 
-def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title: str, path: Path) -> None:
-    """Plot forces and moment over a creepage, with their error band and some results of the exact theory.
+def sweep_figure(sweep: Sweep, forces: Result, exact_results: dict[int, Rolled], title: str, path: Path) -> None:
+    """Save a figure of creep forces and moment over a creepage, with error bands and some results of the exact theory.
 
-    forces : those of the scene, and their errors; checks : exact ones by the number of the motion.
+    forces : those of the scene, and their errors; exact_results : results of the exact theory by the number of the
+    motion.
     """
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     values, body = (1.0 if sweep.of == "spin" else 100.0) * sweep.values(), forces.detail.contact
@@ -155,8 +156,8 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
         )
         axis.fill_between(values, low, high, color=colour, alpha=0.18, linewidth=0)
         axis.plot(values, force, color=colour, linewidth=1.6, label=label)
-        exact = [scale * getattr(check, name) for check in checks.values()]
-        axis.plot(values[list(checks)], exact, "o", color=colour, markerfacecolor="white", markersize=5)
+        exact = [scale * getattr(check, name) for check in exact_results.values()]
+        axis.plot(values[list(exact_results)], exact, "o", color=colour, markerfacecolor="white", markersize=5)
     for sign in (-1, 1):
         left.axhline(sign * limit, color=DARK, linewidth=0.7, linestyle=":")
     left.set(title="Force on the wheel; dotted: ±μN", ylabel="tangential force [kN]")
@@ -166,7 +167,7 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
         axis.set_xscale("log" if sweep.spacing == "logarithmic" and sweep.start > 0 else "linear")
     if stated:
         left.fill_between([], [], color=GREY, alpha=0.3, linewidth=0, label="error of cells and theory")
-    if checks:
+    if exact_results:
         left.plot([], [], "o", color=DARK, markerfacecolor="white", markersize=5, label="exact theory")
     legend_below(figure, left)
     add_heading(figure, title, {"forces": forces})
@@ -186,12 +187,12 @@ THEORY_STYLES = {
 
 
 LARGEST_ERROR = 60.0
-"""Largest error (%) that the figure shows."""
+"""Largest error (% of mu N) that the figure shows."""
 
 
 def price_figure(price: Result, title: str) -> Figure:
-    """Plot the error of every theory over its number of cells and over its time, on logarithmic axes. Bars reach up to
-    the error that 95 of 100 contacts do not exceed.
+    """Figure of the error of every contact theory over its number of cells and over its computing time, on logarithmic
+    axes. Bars reach up to the error that 95 % of the contacts do not exceed.
 
     FASTSIM's choices, which lie within one decade of time, have a panel apart from the theories beside it.
     """
@@ -201,7 +202,7 @@ def price_figure(price: Result, title: str) -> Figure:
     for name in THEORY_STYLES:
         line = [point for point in points if point.name == name]
         if line:
-            _plot_theory(axes[0], name, line, [point.cells**2 for point in line], bar=True)
+            _plot_theory(axes[0], name, line, [point.cells**2 for point in line], with_bar=True)
             micros = [1e6 * point.seconds for point in line]
             _plot_theory(axes[1 if name.startswith("FASTSIM") else 2], name, line, micros)
     for axis, panel_title, label in zip(
@@ -221,13 +222,15 @@ def price_figure(price: Result, title: str) -> Figure:
     return figure
 
 
-def _plot_theory(axis: Any, name: str, points: list[TheoryPoint], x_values: list[float], bar: bool = False) -> None:
-    """Plot the mean error (%) of one theory. An optional bar at its largest number of cells reaches up to the error
-    that 95 of 100 contacts do not exceed."""
+def _plot_theory(
+    axis: Any, name: str, points: list[TheoryPoint], x_values: list[float], with_bar: bool = False
+) -> None:
+    """Plot the mean error (% of mu N) of a contact theory. An optional bar at its largest number of cells reaches up to
+    the error that 95 % of the contacts do not exceed."""
     colour, marker = THEORY_STYLES[name]
     mean, largest_errors = (100 * np.array([getattr(point, key) for point in points]) for key in ("mean", "most"))
     label = name if mean[0] < LARGEST_ERROR else f"{name}: {mean[0]:.0f} %"
     axis.plot(x_values, mean, color=colour, marker=marker, linewidth=1.3, markersize=4.5, label=label)
-    if bar:
+    if with_bar:
         axis.plot([x_values[-1]] * 2, [mean[-1], largest_errors[-1]], color=colour, linewidth=0.8)
         axis.plot(x_values[-1], largest_errors[-1], "_", color=colour, markersize=5)

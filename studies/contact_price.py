@@ -1,4 +1,4 @@
-"""What accuracy costs in rolling contact: every theory on the scene's ellipse, its error beside its time and cells."""
+"""Cost of accuracy in rolling contact: error, computing time and cells of every theory on the scene's ellipse."""
 
 from collections.abc import Callable
 from dataclasses import asdict
@@ -20,7 +20,7 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     levels: list[float] = Field(
         [0.5, 1.5], min_length=1, description="sizes of the creepage; at 1 the linear theory reaches mu N"
@@ -42,12 +42,13 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Every theory on every number of cells; saves ``price.nc``, ``price.png`` and ``table.txt``."""
+    """Compute errors and times of every theory with every number of cells; saves ``price.nc``, ``price.png`` and
+    ``table.txt``, and returns the summary."""
     check(scene, engines)
     price = priced_theories(scene, tuple(read(Options, scene.options, scene.file, "options").levels), progress)
     price.save(folder / "price.nc")
     points, uncertain = price.detail, price["uncertainty"]
-    table = _table(points, uncertain.size, uncertain.max())
+    table = _table_lines(points, uncertain.size, uncertain.max())
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     from models.drawing.figures import save
     from studies.contact_figures import price_figure
@@ -65,11 +66,12 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def _table(points: list[TheoryPoint], contact_count: int, uncertain: float) -> list[str]:
-    """Table of all theories and numbers of cells, then the cheapest for each target error."""
+def _table_lines(points: list[TheoryPoint], contact_count: int, reference_uncertainty: float) -> list[str]:
+    """Lines for the screen: errors and times of all theories and cells, then the cheapest theory for each target
+    error."""
     return [
         f"  error of the tangential force in % of mu N over {contact_count} contacts (exact ones known to "
-        f"{100 * uncertain:.2g} %)",
+        f"{100 * reference_uncertainty:.2g} %)",
         f"    {'':<28}{'cells':>6}{'mean':>8}{'95 of 100':>11}{'largest':>9}   time of contacts",
         *(
             f"    {point.name:<28}{point.cells:>6}{100 * point.mean:>8.2f}{100 * point.most:>11.2f}"

@@ -25,7 +25,8 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Answer every row into ``forces.csv``; saves the first ones and sizes of all as ``forces.nc``."""
+    """Compute the forces of every row into ``forces.csv``; saves the first rows and the magnitudes of all as
+    ``forces.nc``, and returns the summary."""
     check(scene, engines)
     rows = run_scene(scene, error=scene.error, answers=folder / "forces.csv", progress=progress)
     rows.save(folder / "forces.nc")
@@ -42,17 +43,17 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def summary_lines(rows: int, wrong: int, name: str, seconds: float, errors: bool = True) -> list[str]:
-    """Lines for the screen on how many rows of the file ``name`` were computed, how many have errors, and the time
-    taken."""
-    if rows == 0:
+def summary_lines(row_count: int, wrong_row_count: int, name: str, seconds: float, errors: bool = True) -> list[str]:
+    """Lines for the screen on the number of computed rows of the file ``name``, the number of wrong rows, and the
+    computing time (s)."""
+    if row_count == 0:
         return [f"  no rows in {name}"]
-    sound = ", all of them sound" if rows > 1 else ", sound"
-    state = f"; {wrong:,} of them wrong, see their status" if wrong else sound
-    row_time_text = f", {duration(seconds / rows)} a row" if rows > 1 else ""
+    sound = ", all of them sound" if row_count > 1 else ", sound"
+    state = f"; {wrong_row_count:,} of them wrong, see their status" if wrong_row_count else sound
+    row_time_text = f", {duration(seconds / row_count)} a row" if row_count > 1 else ""
     twice = " twice for the error of cells" if errors else ""
     return [
-        f"  {rows:,} row{'s' * (rows > 1)} of {name}{state}",
+        f"  {row_count:,} row{'s' * (row_count > 1)} of {name}{state}",
         f"  {duration(seconds)}{row_time_text}, once: reading, forces{twice}, writing",
     ]
 

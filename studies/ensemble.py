@@ -1,4 +1,4 @@
-"""How noisy forces scatter the run of a vehicle: thousands of noise paths, when they drift off, how wide they spread.
+"""Effect of force noise on a vehicle's run: thousands of noise paths, their drift-off times and their scatter.
 
 A virtual measurement on a road gives wheel forces; every path is driven by them with its own white noise. Finished
 blocks of paths are kept in the folder ``blocks``, so that ``twinrig run ensemble --resume FOLDER`` goes on with a run
@@ -38,14 +38,14 @@ from models.vehicles.pitch_plane import STATE_NAMES
 Progress = Callable[[str, float], None]
 
 BLOCKS_FOLDER = "blocks"
-"""Folder of the finished blocks, within that of the results; a study that has one can be resumed."""
+"""Name of the folder of finished blocks in the results' folder; a study with this constant can be resumed."""
 PITCH_QUANTILES = (0.05, 0.5, 0.95)
 HEAVE_STATE = 2
-"""Place of the heave among the states."""
+"""Index of the heave in the state."""
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     paths: int = Field(500, ge=2, le=1_000_000, description="number of noise paths in the reference")
     saved: int = Field(1000, ge=1, le=1_000_000, description="first paths that are saved; statistics are of all")
@@ -60,7 +60,7 @@ class Options(Strict):
 
 
 def check(scene: Scene, engines: tuple[str, ...]) -> Options:
-    """The scene's options; refuses, before anything is written, one that this study cannot follow."""
+    """Options of the scene; raises InputError if the study cannot compute the scene with them."""
     options = read(Options, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
     for engine in {"reference", *engines}:
@@ -79,7 +79,8 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """All paths in the reference, the first ones in the other engines; saves ``ensemble.nc``, table and figure."""
+    """Run all noise paths in the reference, and the first paths in the other engines; saves ``ensemble.nc``, a table
+    and a figure, and returns the summary."""
     options = check(scene, engines)
     measured, period = measure(scene, scene.error), 1.0 / options.sampling_rate
     row_times = options.rows * np.arange(round(scene.run.duration / options.rows) + 1)
@@ -113,7 +114,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     channels, axes = _result_channels(row_times, statistics, options.saved)
     saved = result(noisy, channels, axes, engine="reference", threshold=options.threshold)
     _with_errors(saved, first, rows, options, statistics).save(folder / "ensemble.nc")
-    table = text(options, scene, rows, statistics, gaps)
+    table = summary_lines(options, scene, rows, statistics, gaps)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     results = {"measurement": measured, "all paths": saved}
     _figure(row_times, statistics, options, results, folder)
@@ -132,7 +133,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 def _result_channels(
     times: np.ndarray, statistics: PathStatistics, saved_paths: int
 ) -> tuple[dict[str, Channel], dict[str, Channel]]:
-    """Channels of the saved result and their axes: the first few paths, and the statistics over all paths."""
+    """Channels and axes of the saved result: the first paths, and statistics over all paths."""
     paths = {name: values[:saved_paths] for name, values in statistics.first.items()}
     units, names = "m, rad, m/s, rad/s", list(STATE_NAMES)
     channels = {
@@ -159,11 +160,11 @@ def _result_channels(
 
 
 def _with_errors(
-    result: Result, first: Result, rows: list[dict[str, float]], options: Options, statistics: PathStatistics
+    result: Result, first_path: Result, rows: list[dict[str, float]], options: Options, statistics: PathStatistics
 ) -> Result:
-    """The ensemble's result with two errors: the step error, estimated on its first path, and the standard errors of
-    the standard deviations."""
-    error = json.loads(first.data.attrs["error"])
+    """The ensemble's result with two stated errors: the step error, estimated on the first path, and the standard
+    errors of the standard deviations."""
+    error = json.loads(first_path.data.attrs["error"])
     result.data.attrs["error"] = json.dumps(error | ({"how": f"{error['how']}, of the first path"} if error else {}))
     worst = {
         name: by_chance(row[f"{name} error"], row[name], unit, options.paths)
@@ -183,13 +184,13 @@ def _with_errors(
 
 
 def _largest_pitch(statistics: PathStatistics) -> Watched:
-    """Largest pitch (rad) over all paths at each time, for the check of an assumption; not a number where no path
-    remains."""
+    """Largest pitch (rad) over all paths at each time, for the check of an assumption; NaN where no path remains."""
     return {"any path": statistics.steepest}
 
 
 def _deviation_rows(options: Options, times: np.ndarray, statistics: PathStatistics) -> list[dict[str, float]]:
-    """Standard deviations of pitch and heave, with their standard errors, at the times that the options list."""
+    """Standard deviations of pitch (rad) and heave (m), with standard errors, at the times (s) that the options
+    list."""
     names, rows = ("time", "pitch", "pitch error", "heave", "heave error"), []
     for time in options.times:
         row = round(time / options.rows)
@@ -199,10 +200,15 @@ def _deviation_rows(options: Options, times: np.ndarray, statistics: PathStatist
     return rows
 
 
-def text(
-    options: Options, scene: Scene, rows: list[dict[str, float]], statistics: PathStatistics, gaps: dict[str, float]
+def summary_lines(
+    options: Options,
+    scene: Scene,
+    rows: list[dict[str, float]],
+    statistics: PathStatistics,
+    engine_differences: dict[str, float],
 ) -> list[str]:
-    """The table as lines of text."""
+    """Lines for the screen: standard deviations over time, quantiles of the drift-off time, and differences of
+    engines."""
     lines = [
         f"  {options.paths} paths of {scene.run.duration:g} s, forces at {options.sampling_rate:g} Hz, noise "
         f"{100 * options.noise_fraction:g} % of the largest force",
@@ -218,7 +224,7 @@ def text(
         value, low, high = statistics.drift_off.quantile(level)
         lines.append(f"  {100 * level:7g} %   {_time_text(value)}   ({_time_text(low)} to {_time_text(high)})")
     lines += [f"  {statistics.lost} paths left all bounds and count as drifted off by then"] if statistics.lost else []
-    for engine, worst in gaps.items():
+    for engine, worst in engine_differences.items():
         differ = (
             f"{options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state before drift-off"
         )
@@ -232,7 +238,7 @@ def _time_text(seconds: float) -> str:
 
 
 def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, results: Results, folder: Path) -> None:
-    """Plot percentiles of the pitch error over time, and a histogram of the drift-off times."""
+    """Save a figure of percentiles of the pitch error over time, and of a histogram of the drift-off times."""
 
     from models.drawing.drift import draw_fan
     from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, add_heading, save, subplots

@@ -1,4 +1,4 @@
-"""A measurement that is made: the car on four rolling tyres, driven through turns of both sides, with sensors' noise.
+"""A virtual measurement: the car on four rolling tyres, driven through turns to both sides, with sensor noise.
 
 ``python -m studies.four_wheel_drive FILE.csv`` writes it. It is what the studies of the car of two axles run on where
 no measured drive is at hand; nothing in it comes from a measurement.
@@ -15,15 +15,15 @@ from models.systems.handling.run import run as run_handling
 from models.systems.handling.scene import build
 
 DURATION, SAMPLING_RATE, START_SPEED = 30.0, 50, 20.0
-"""s, samples a second, m/s at the start."""
+"""Duration (s), sampling rate (Hz), and initial speed (m/s)."""
 NOISE_DEVIATIONS = {"yaw rate": 0.004, "lateral acceleration": 0.3, "side slip": 0.0008}
-"""Standard deviations (rad/s, m/s^2, rad) of white noise, sample by sample."""
+"""Standard deviations (rad/s, m/s^2, rad) of the white noise on every sample of the measured channels."""
 SEED = 20
 Knots = list[list[float]]
 
 
 def random_controls() -> dict[str, Knots]:
-    """Random steer, brake and drive inputs, as values at given times."""
+    """Random steer angle (rad), drive and brake torque (N m), as lists of [time (s), value]."""
     random = np.random.default_rng(SEED)
     steer, drive, brake, time, side = [[0.5, 0.0]], [[0.5, 120.0]], [[0.5, 0.0]], 0.5, 1.0
     while time < DURATION - 4.0:
@@ -42,14 +42,15 @@ def random_controls() -> dict[str, Knots]:
 
 
 def simulated_drive() -> Drive:
-    """The drive, simulated in MuJoCo."""
+    """The run with random steer, drive and brake inputs, computed in MuJoCo."""
     manoeuvre = {"speed": START_SPEED, "duration": DURATION, "front_brake": 0.6, **random_controls()}
     table = {"title": "a drive that is made", "system": "handling", "manoeuvres": {"drive": manoeuvre}}
     return run_handling(build(table), "mujoco").detail
 
 
 def measured_columns(drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
-    """Columns (unit, values) of the drive, as a logger in the car would write them."""
+    """Columns (unit, sampled values) of a run, as a logger in the car would write them: inputs, speed and noisy
+    sensors."""
     stride = round(1.0 / (SAMPLING_RATE * float(drive.run.times[1] - drive.run.times[0])))
     forward_speed, lateral_speed, yaw = drive.velocity().T
     random = np.random.default_rng(SEED + 1)
@@ -68,7 +69,7 @@ def measured_columns(drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
 
 
 def save(path: Path) -> None:
-    """Write the measurement with six digits."""
+    """Write the virtual measurement to a CSV file, with six digits."""
     columns = measured_columns(simulated_drive())
     head = ",".join(f"{name} [{unit}]" for name, (unit, _) in columns.items())
     rows = zip(*(values.tolist() for _, values in columns.values()), strict=True)

@@ -1,4 +1,4 @@
-"""A car on four rolling tyres: manoeuvres in both engines, with its path, slip angles, loads and friction used."""
+"""A car on four rolling tyres: manoeuvres in both engines, with path, slip angles, wheel loads and used friction."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,8 +17,8 @@ DIFFERENCE_TITLE = "largest difference of the engines"
 
 
 def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Drive every manoeuvre in every engine; saves NAME.nc and NAME.png for each, from the first engine whose run
-    succeeded."""
+    """Run every manoeuvre in every engine; saves NAME.nc with all engines' runs and NAME.png for each manoeuvre, and
+    returns the summary."""
     from studies.handling_figures import manoeuvre_figure
 
     failed, lines, answer, results = dict[str, str](), list[str](), dict[str, Any](), dict[str, Result]()
@@ -35,8 +35,8 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
             title = name.replace("_", " ").capitalize() if len(scene.manoeuvres) > 1 else scene.title
             manoeuvre_figure(runs, title, folder / f"{name}.png")
             results |= {f"{name}, {engine}": run for engine, run in runs.items()}
-            answer[name] = _answer_of_drive(runs)
-            lines.append(_line(name, answer[name]))
+            answer[name] = _figures_of_runs(runs)
+            lines.append(_manoeuvre_line(name, answer[name]))
     head = (
         f"    {'':<16}{'largest':>26}{'least':>12}{'friction':>10}{'engines':>10}\n"
         f"    {'':<16}{'yaw rate':>12}{'lateral acc.':>14}{'load':>12}{'used':>10}{'differ':>10}"
@@ -51,7 +51,7 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
     }
 
 
-def _answer_of_drive(runs: dict[str, Result]) -> dict[str, float]:
+def _figures_of_runs(runs: dict[str, Result]) -> dict[str, float]:
     first, *other_runs = runs.values()
     drive = first.detail
     figures = {
@@ -69,7 +69,7 @@ def _answer_of_drive(runs: dict[str, Result]) -> dict[str, float]:
     return {key: float(value) for key, value in figures.items()}
 
 
-def _line(name: str, figures: dict[str, float]) -> str:
+def _manoeuvre_line(name: str, figures: dict[str, float]) -> str:
     yaw, lateral, load, used = list(figures.values())[:4]
     gap = f"{figures[DIFFERENCE_TITLE]:>10.1e}" if DIFFERENCE_TITLE in figures else ""
     return f"    {name:<16}{yaw:>6.3f} rad/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %{gap}"

@@ -11,7 +11,7 @@ from models.drawing.figures import BLUE, DARK, GREEN, ORANGE, SKY, VERMILION, ad
 from models.systems.handling.run import Drive
 
 TYRE_COLOURS, TYRE_LINES = (BLUE, SKY, VERMILION, ORANGE), ("-", "--", ":", "-.")
-"""Colours of four tyres, and lines of the first four, the next four (of what is towed) and so on."""
+"""Colours of four tyres, and line styles of the first four tyres, the next four (of towed bodies) and so on."""
 
 
 CORNER_NAMES = {
@@ -22,16 +22,17 @@ CORNER_NAMES = {
     "cl": "caravan left",
     "cr": "caravan right",
 }
-"""Names of tyres as readers know them; others keep theirs."""
+"""Readable names of tyres; other tyres are called by their names in the vehicle file."""
 
 
 def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
-    """Plot a manoeuvre over time, its path and the friction circle of the first run, with one colour per tyre."""
+    """Save a figure of the first run of a manoeuvre: path, channels over time, and friction circle, a colour per
+    tyre."""
     drive: Drive = next(iter(runs.values())).detail
     figure, axes = panels(8, 2, 2.15)
     over_time, (path_axis, circle_axis) = [axes[i] for i in (1, 2, 3, 4, 5, 6)], (axes[0], axes[7])
     steer, turning, across, slips, loads, moments = over_time
-    _path(path_axis, drive)
+    _plot_path(path_axis, drive)
     for axis, values, label, name in (
         (steer, np.degrees(drive["steer"][:, :1]), "steer angle [deg]", "Steering of the first tyre"),
         (turning, drive.velocity()[:, 2:3], "yaw rate [rad/s]", "Turning"),
@@ -56,12 +57,12 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
     return save(figure, path)
 
 
-def _tyre_style(i: int) -> dict[str, Any]:
-    """Line colour and line style of the tyre with this number."""
-    return {"color": TYRE_COLOURS[i % 4], "linestyle": TYRE_LINES[i // 4 % 4]}
+def _tyre_style(tyre_number: int) -> dict[str, Any]:
+    """Line colour and line style of a tyre by its number."""
+    return {"color": TYRE_COLOURS[tyre_number % 4], "linestyle": TYRE_LINES[tyre_number // 4 % 4]}
 
 
-def _path(axis: Axes, drive: Drive) -> None:
+def _plot_path(axis: Axes, drive: Drive) -> None:
     x, y, _ = drive.path.T
     axis.plot(x, y, color=DARK)
     x, y_few, yaw = drive.path[:: max(1, len(x) // 8)].T
@@ -74,7 +75,7 @@ def _path(axis: Axes, drive: Drive) -> None:
 
 
 def _plot_friction_circle(axis: Axes, drive: Drive) -> None:
-    """Plot the force of each tyre divided by mu N, which lies inside the unit circle."""
+    """Plot the horizontal force of each tyre divided by mu N, which lies inside the unit circle."""
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axis.plot(np.cos(turn), np.sin(turn), color=DARK, lw=0.8)
     bound = np.where(drive["load"] > 0.0, drive.grip(), 1.0)

@@ -1,4 +1,5 @@
-"""How far noisy hub forces let a vehicle drift, what that does to its springs and mounts, and what holding it takes."""
+"""Drift of a vehicle under noisy hub forces, its effect on section forces and damage, and the moments of
+stabilisers."""
 
 from pathlib import Path
 from typing import Any
@@ -16,17 +17,17 @@ SYSTEM = "hub-forces"
 
 
 class Options(Strict):
-    """[options] of this study: none."""
+    """Keys of the table [options] of this study: none."""
 
 
 def check(scene: HubScene, engines: tuple[str, ...]) -> None:
-    """Refuse options: there are none."""
+    """Raise InputError for any option, as this study has none."""
     read(Options, scene.options, scene.file, "options")
 
 
 def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Measure hub forces; run the vehicle free, with the Kalman filter and with prescribed roll and pitch. Saves the
-    measurement, all runs and two figures."""
+    """Measure hub forces virtually; run the vehicle free, with the Kalman filter and with prescribed roll and pitch.
+    Saves the measurement, all runs and two figures; returns the summary."""
     from studies.hub_forces_figures import damage_figure, drift_figure
 
     comparison = compare(scene, engines, progress)
@@ -40,11 +41,11 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
         "answer": comparison.answer(),
         "results": comparison.results,
         "doubts": list(comparison.measurement.tilt.objections),
-        "table": _table(scene, comparison),
+        "table": _table_lines(scene, comparison),
     }
 
 
-def _table(scene: HubScene, comparison: Comparison) -> list[str]:
+def _table_lines(scene: HubScene, comparison: Comparison) -> list[str]:
     known, tilt = comparison.truth is not None, comparison.measurement.tilt
     error_heading = "largest error" if known else "largest difference"
     damage = "damage / true damage" if known else "damage / that with the filter"
@@ -76,7 +77,7 @@ def _table(scene: HubScene, comparison: Comparison) -> list[str]:
 
 
 def save(comparison: Comparison, folder: Path) -> None:
-    """Save the measurement as a user would have it, and every run: ``runs.nc``, and the chassis' motion as
+    """Save the measurement as CSV files of a user, all runs as ``runs.nc``, and the motion of the chassis as
     ``runs.csv``."""
     measurement = comparison.measurement
     names = [
@@ -102,10 +103,10 @@ def save(comparison: Comparison, folder: Path) -> None:
     join_results(runs, "run").save(folder / "runs.nc")
 
 
-def _write_samples(path: Path, names: list[tuple[str, str]], measured: Any) -> None:
-    """Write sampled hub forces or angles to a CSV file, with a column for each name and unit."""
-    columns = {name: (unit, measured.samples[:, i]) for i, (name, unit) in enumerate(names)}
-    write_time_series(path, columns, measured.period)
+def _write_samples(path: Path, names: list[tuple[str, str]], sampled: Any) -> None:
+    """Write sampled hub forces or angles to a CSV file, with a column for each (name, unit)."""
+    columns = {name: (unit, sampled.samples[:, i]) for i, (name, unit) in enumerate(names)}
+    write_time_series(path, columns, sampled.period)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Figures of the study of hub forces."""
+"""Figures of the study of hub forces: drift of the chassis, and damage ratios of section forces."""
 
 from pathlib import Path
 
@@ -21,19 +21,20 @@ from models.systems.hub_forces.comparison import Comparison
 
 METHOD_COLOURS = {"free": VERMILION, "filter": BLUE, "prescribed": GREEN}
 DAMAGE_TICKS = (1e-3, 0.1, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 10.0, 1e3, 1e6)
-"""Marked ratios of damage, as far as there are such."""
+"""Damage ratios that are marked on the axis if they lie in its range."""
 METHOD_LABELS = {"filter": "Kalman filter of roll and pitch", "prescribed": "roll and pitch prescribed"}
 
 
 def _drawn_runs(comparison: Comparison) -> list[tuple[str, str, str]]:
-    """Name, label and colour of each run to draw. Of the free runs, which look alike, only the last is drawn."""
+    """Name, label and colour of each run to draw; of the free runs, which look alike, only the last is drawn."""
     free = [(name, "free") for name in comparison.runs if name.startswith("free")][-1:]
     stabilised = [(name, label) for name, label in METHOD_LABELS.items() if name in comparison.runs]
     return [(name, label, METHOD_COLOURS[name.split(",")[0]]) for name, label in (*free, *stabilised)]
 
 
 def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
-    """Plot roll, pitch, heading and position of every run over time, with the true ones where these are known."""
+    """Save a figure of roll, pitch, heading and position of every run over time, with the true motion if it is
+    known."""
     figure, axes = subplots(2, 3, figsize=(COLUMN_WIDTH, 5.0), sharex=True)
     panels = [(name, name, 1e3, "mrad") for name in ("roll", "pitch", "heading")]
     panels += [("x, beside steady travel", "x", 1, "m"), ("y, to the left", "y", 1, "m"), ("z, up", "z", 1, "m")]
@@ -53,8 +54,8 @@ def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
 
 
 def damage_figure(comparison: Comparison, title: str, path: Path) -> None:
-    """Plot the damage ratio of every section force: damage divided by the true damage or, where this is unknown, by the
-    damage of the filter's run."""
+    """Save a figure of the damage ratio of every section force: damage divided by the true damage or, if this is
+    unknown, by the damage of the run with the Kalman filter."""
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.6))
     shown, values = _drawn_runs(comparison), list[float]()
     for k, (run, label, colour) in enumerate(shown):

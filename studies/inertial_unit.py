@@ -1,4 +1,4 @@
-"""Which inertial unit is good enough: from the grade of a gyro to the error in the damage of a component.
+"""Required grade of an inertial unit: from the drift of a gyro to the error in the damage of a component.
 
 The pitch that a gyro gives errs by its random walk and by its wandering bias, as effects ``gyro`` and
 ``gyro_bias`` have them. What such an angle does to the damage is in models/drift/angle_damage.py (shown by a guided run
@@ -34,16 +34,16 @@ Progress = Callable[[str, float], None]
 Positive = Annotated[float, Field(gt=0)]
 Minutes = Annotated[float, Field(ge=0.1, le=600)]
 
-KEEPING_SHARE = 0.9
-"""Part of all units of one grade that must keep within the allowed error."""
+SUFFICIENT_SHARE = 0.9
+"""Share of the units of a grade whose damage error must be within the allowed error."""
 LARGEST_ANGLE_ERROR = 0.5
-"""rad: an angle error beyond it is no tilt of a vehicle on any road."""
+"""Largest angle error (rad) for which the study is valid; it exceeds any tilt of a vehicle on a road."""
 SAVED_SPACING = 0.01
-"""Spacing (s) of the saved runs."""
+"""Row spacing (s) of the saved runs."""
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     grades: list[Positive] = Field(
         [0.001, 0.01, 0.1, 1.0, 10.0],
@@ -64,7 +64,7 @@ class Options(Strict):
 
 
 def check(scene: Scene, engines: tuple[str, ...]) -> Options:
-    """The scene's options; refuses, before anything is written, no road and lists that do not fit each other."""
+    """Options of the scene; raises InputError for a scene without a road and for lists that do not fit each other."""
     options = read(Options, scene.options, scene.file, "options")
     if "road" not in scene.effects:
         raise InputError(scene.file, "effects.road", None, "is missing: this study needs a run on a road")
@@ -79,7 +79,8 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """The road run in each engine, angle errors, damage errors; saves runs, a table and two figures."""
+    """Run the vehicle on the road in each engine, and compute angle and damage errors of all gyro grades; saves runs, a
+    table and two figures, and returns the summary."""
     options = check(scene, engines)
     progress("angle errors", 0.0)
     length = round(60 * options.durations[-1])
@@ -103,7 +104,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     rows = [
         _row_of_grade(options, grade, minutes, angle_errors(paths, options, grade), curves) for grade, minutes in pairs
     ]
-    table = text(rows, options, tuple(curves))
+    table = summary_lines(rows, options, tuple(curves))
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     if curves:
         from models.drawing.figures import save
@@ -123,17 +124,17 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def angle_errors(paths: UnitPaths, options: Options, grade: int) -> np.ndarray:
-    """Angle errors (samples, seconds + 1) in rad of the grade with this number."""
+    """Angle errors (samples, seconds + 1) in rad of the units of gyro grade number ``grade``, at every full second."""
     walk, drift = options.random_walks[grade] * DEGREES_PER_ROOT_HOUR, options.grades[grade] * DEGREES_PER_HOUR
     return walk * paths[0] + drift * paths[1]
 
 
 def _errors_of_grades(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline) -> Result:
-    """For each grade, the largest angle error (rad) over the longest drive. Also the damage error that the share
-    KEEPING_SHARE of its units does not exceed, with its standard error."""
+    """Result with, for each gyro grade, the largest angle error (rad) over the longest drive, and the damage error that
+    the share SUFFICIENT_SHARE of its units does not exceed, with its standard error."""
     angles = [angle_errors(paths, options, grade) for grade in range(len(options.grades))]
     worst = [np.abs(damage_errors(curve, errors_of_grade)).max(axis=1) for errors_of_grade in angles]
-    bounds_of_grades = [quantile_with_interval(errors_of_grade, KEEPING_SHARE) for errors_of_grade in worst]
+    bounds_of_grades = [quantile_with_interval(errors_of_grade, SUFFICIENT_SHARE) for errors_of_grade in worst]
     channels = {
         "angle_error": Channel(
             "grade", [float(np.abs(errors_of_grade).max()) for errors_of_grade in angles], "rad", "largest angle error"
@@ -162,36 +163,36 @@ def _errors_of_grades(scene: Scene, paths: UnitPaths, options: Options, curve: C
     return of_chance(units, chances, options.samples)
 
 
-def angle_law(seconds: np.ndarray, options: Options, grade: int) -> np.ndarray:
-    """Standard deviation (deg) of a grade's angle error by its law at times (s)."""
+def angle_error_deviation(seconds: np.ndarray, options: Options, grade: int) -> np.ndarray:
+    """Standard deviation (deg) of the angle error of a gyro grade at times (s), in closed form."""
     walk, drift = options.random_walks[grade] * DEGREES_PER_ROOT_HOUR, options.grades[grade] * DEGREES_PER_HOUR
     return np.degrees(angle_variance(seconds, walk, 0.0, drift, options.correlation_time) ** 0.5)
 
 
 def _row_of_grade(
-    options: Options, grade: int, minutes: float, every_angle: np.ndarray, curves: dict[str, CubicSpline]
+    options: Options, grade: int, minutes: float, simulated_angles: np.ndarray, curves: dict[str, CubicSpline]
 ) -> dict[str, Any]:
-    """Results for one gyro grade over one duration: angle error by the law and by measurement, and damage error per
-    engine."""
+    """Results for a gyro grade over a duration: angle error (deg) in closed form and of the simulated units, and damage
+    errors by engine."""
     end = round(60 * minutes)
-    angles = every_angle[:, : end + 1]
+    angles = simulated_angles[:, : end + 1]
     worst = {engine: np.abs(damage_errors(curve, angles)).max(axis=1) for engine, curve in curves.items()}
     return {
         "grade": options.grades[grade],
         "random walk": options.random_walks[grade],
         "minutes": minutes,
-        "angle by law": float(angle_law(np.array(float(end)), options, grade)),
+        "angle by law": float(angle_error_deviation(np.array(float(end)), options, grade)),
         "angle measured": float(np.degrees(np.mean(angles[:, -1] ** 2) ** 0.5)),
         "damage error": {
-            name: [float(np.quantile(errors, level)) for level in (0.5, KEEPING_SHARE)]
+            name: [float(np.quantile(errors, level)) for level in (0.5, SUFFICIENT_SHARE)]
             for name, errors in worst.items()
         },
     }
 
 
 def coarsest_sufficient_grade(rows: list[dict[str, Any]], options: Options) -> dict[str, float | None]:
-    """For each duration in minutes, the coarsest grade (deg/h) of which the share KEEPING_SHARE of units keeps the
-    allowed damage error."""
+    """For each duration (min), the coarsest gyro grade (deg/h) of which the share SUFFICIENT_SHARE of units keeps the
+    allowed damage error; None if no grade does."""
     cheapest_grades: dict[str, float | None] = {}
     for minutes in options.durations:
         judged = (row for row in rows if row["minutes"] == minutes and row["damage error"])
@@ -201,8 +202,8 @@ def coarsest_sufficient_grade(rows: list[dict[str, Any]], options: Options) -> d
     return cheapest_grades
 
 
-def text(rows: list[dict[str, Any]], options: Options, engines: tuple[str, ...]) -> list[str]:
-    """The table as lines of text."""
+def summary_lines(rows: list[dict[str, Any]], options: Options, engines: tuple[str, ...]) -> list[str]:
+    """Lines for the screen: angle and damage errors of all grades and durations, and the coarsest sufficient grades."""
     names = " ".join(f"{engine:>18}" for engine in engines)
     lines = [
         f"  {row['grade']:>7g} {row['random walk']:>9g} {row['minutes']:>8g}   {row['angle by law']:>9.2e} "
@@ -217,12 +218,12 @@ def text(rows: list[dict[str, Any]], options: Options, engines: tuple[str, ...])
     return [
         f"  Damage: rainflow after ASTM E1049-85, the run repeated; slope {WOEHLER_SLOPE:g}; worst of "
         f"{', '.join(SECTION_FORCE_CHANNELS)}.",
-        f"  Angle: rms of {options.samples} units at the end. Damage error [%]: median / {KEEPING_SHARE:.0%} of all "
+        f"  Angle: rms of {options.samples} units at the end. Damage error [%]: median / {SUFFICIENT_SHARE:.0%} of all "
         "units.",
         f"    grade      walk     time     angle error [deg]   {names}",
         "    deg/h  deg/rt(h)     min          law  measured",
         *lines,
-        f"  Coarsest grade of which {KEEPING_SHARE:.0%} of all units keep the damage within "
+        f"  Coarsest grade of which {SUFFICIENT_SHARE:.0%} of all units keep the damage within "
         f"{options.allowed_damage_error:.2g}:",
         *best,
     ]
@@ -233,7 +234,7 @@ def _percent_text(share: float) -> str:
 
 
 def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Results) -> Any:
-    """Plot angle error and damage error over the length of the drive, with a line for each gyro grade."""
+    """Figure of angle error and damage error over the duration of the drive, with a line for each gyro grade."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, legend_below, subplots
 
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
@@ -241,14 +242,14 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Result
     for i, grade in enumerate(options.grades):
         of_grade = [row for row in rows if row["grade"] == grade]
         minutes = [row["minutes"] for row in of_grade]
-        axes[0].loglog(duration_minutes, angle_law(60 * duration_minutes, options, i), color=f"C{i}")
+        axes[0].loglog(duration_minutes, angle_error_deviation(60 * duration_minutes, options, i), color=f"C{i}")
         axes[0].loglog(minutes, [row["angle measured"] for row in of_grade], "o", color=f"C{i}", markersize=4)
         error = [100 * next(iter(row["damage error"].values()))[1] for row in of_grade]
         axes[1].loglog(minutes, error, "o-", color=f"C{i}", markersize=4, label=f"{grade:g} deg/h")
     axes[1].axhline(100 * options.allowed_damage_error, color=DARK, linestyle=":", label="allowed")
     axes[0].set(title="Angle error, rms [deg]; line: law, dots: measured", xlabel="length of the drive [min]")
     axes[1].set(
-        title=f"Damage error that {KEEPING_SHARE:.0%} of all units keep [%]", xlabel="length of the drive [min]"
+        title=f"Damage error that {SUFFICIENT_SHARE:.0%} of all units keep [%]", xlabel="length of the drive [min]"
     )
     legend_below(figure, axes[1], columns=len(options.grades) + 1)
     add_heading(figure, "What the grade of a gyro does to angle and damage", results)
@@ -256,7 +257,7 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Result
 
 
 def _figure_curve(curve: CubicSpline) -> Any:
-    """Plot the damage error over a constant angle error."""
+    """Figure of the damage ratio of each section force over a constant pitch error."""
     from models.drawing.drift import CHANNEL_LABELS
     from models.drawing.figures import add_heading, subplots
 

@@ -1,4 +1,4 @@
-"""Limit cycles of a wheelset on straight track: amplitude and frequency over speed, those that repel as well."""
+"""Limit cycles of a wheelset on straight track: amplitude and frequency over speed, stable and unstable ones."""
 
 import json
 from collections.abc import Callable
@@ -20,7 +20,7 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     speed: float | None = quantity(
         "m/s", "of the cycle in all implementations; 1.1 of where the branch begins if not given", default=None
@@ -28,7 +28,7 @@ class Options(Strict):
 
 
 def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
-    """Raise InputError for a scene without a limit cycle or a range of speeds."""
+    """Raise InputError for a scene with the linear creep law or without a range of speeds."""
     if scene.contact.law == "linear":
         allowed = "without bound on the creep forces only flanges hold the motion: use fastsim"
         raise InputError(scene.file, "contact.law", scene.contact.law, allowed)
@@ -37,7 +37,8 @@ def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Follow the branch, close the cycle in every engine; saves ``branch`` and ``cycle_ENGINE.nc``, and figures.
+    """Compute the branch of limit cycles over speed, and the cycle at one speed in every engine; saves ``branch`` and
+    ``cycle_ENGINE.nc``, and figures; returns the summary.
 
     The branch is a table (CSV) and a result (netCDF).
     """
@@ -79,12 +80,12 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
 
 
 def _numbers_of_orbit(orbit: Orbit, *names: str) -> dict[str, float]:
-    """Numbers of a limit cycle as plain values in SI."""
+    """Named quantities of a limit cycle as plain numbers in SI units."""
     return {name: float(getattr(orbit, name)) for name in names}
 
 
 def _branch_lines(orbits: list[Orbit]) -> list[str]:
-    """Lines of text, one for each limit cycle of the branch."""
+    """Lines for the screen, one for each limit cycle of the branch."""
     if not orbits:
         return []
     lines = [
@@ -101,7 +102,7 @@ def _branch_lines(orbits: list[Orbit]) -> list[str]:
 
 
 def _cycle_lines(cycles: dict[str, Orbit]) -> list[str]:
-    """Lines on amplitude, frequency, forces and power of the limit cycle in every engine."""
+    """Lines for the screen on amplitude, frequency, forces and power of the limit cycle in every engine."""
     if not cycles:
         return []
     first = next(iter(cycles.values()))

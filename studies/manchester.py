@@ -1,4 +1,4 @@
-"""Where a held wheelset touches its rails, and with which forces, at every lateral displacement: both wheels."""
+"""Contacts of a wheelset with its rails at prescribed lateral displacements: positions and forces at both wheels."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -25,7 +25,7 @@ from models.systems.wheel_rail.scene import WheelRailScene
 SYSTEM = "wheel-rail"
 Progress = Callable[[str, float], None]
 FLANGE_ANGLE = 0.8
-"""Contact angle (rad) from which on a patch is called one of the flange."""
+"""Contact angle (rad) above which a patch counts as flange contact."""
 PANEL_TITLES = {
     "on_rail": "on the rail,\nfrom its top [mm]",
     "on_wheel": "on the wheel [mm]",
@@ -33,7 +33,7 @@ PANEL_TITLES = {
     "normal": "normal force [kN]",
     "peak": "largest pressure [MPa]",
 }
-"""What is drawn, a row each."""
+"""Labels of the drawn quantities, one for each row of panels."""
 PRINTED_COLUMNS = {
     "on_rail": "8.2f",
     "on_wheel": "8.2f",
@@ -46,7 +46,7 @@ PRINTED_COLUMNS = {
     "fx": "7.3f",
     "fy": "7.3f",
 }
-"""Columns that are printed, and how."""
+"""Formats of the printed quantities of a patch."""
 TABLE_NOTES = [
     "  centre of pressure: on the rail from its highest point, on the wheel from the taping line, outwards (mm);",
     "  angle of the rail there (deg, down towards the middle); N: normal; Fx, Fy: on the wheel, out (kN); peak (MPa);",
@@ -55,7 +55,8 @@ TABLE_NOTES = [
 
 
 def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Every case at every position; saves each as a result and as CSV of positions and of patches, and a figure."""
+    """Compute every case at every displacement; saves each as netCDF and as CSV tables of positions and patches, and a
+    figure; returns the summary."""
     results, failed, table = dict[str, Result](), dict[str, str](), list[str]()
     for k, (name, case) in enumerate(scene.cases.items()):
         result = results[name] = system.run(
@@ -64,7 +65,7 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
         contacts = result.detail
         failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failures.items()}
         text = f"{case_text(case.yaw, case.friction)}; {cost(contacts.seconds)} a position"
-        table += [f"  {name}: {text}", *_table(contacts.placed)]
+        table += [f"  {name}: {text}", *_table_lines(contacts.placed)]
         if contacts.placed:
             _save_tables(name, result, folder)
     if drawn := {name: result for name, result in results.items() if result.detail.placed}:
@@ -82,12 +83,15 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     }
 
 
-def _report_progress(progress: Progress, scene: WheelRailScene, k: int, lateral_shift: float, share: float) -> None:
-    progress(f"{[*scene.cases][k]} at {lateral_shift:g} mm", (k + share) / len(scene.cases))
+def _report_progress(
+    progress: Progress, scene: WheelRailScene, case_number: int, lateral_shift: float, share: float
+) -> None:
+    progress(f"{[*scene.cases][case_number]} at {lateral_shift:g} mm", (case_number + share) / len(scene.cases))
 
 
 def _save_tables(name: str, result: Result, folder: Path) -> None:
-    """Save the result, with a CSV row for each position and another file's row for each patch of each wheel."""
+    """Save the result of a case: netCDF, a CSV table with a row for each position, and one with a row for each patch
+    for each wheel."""
     result.save(folder / f"{name}.nc")
     result.save_table(folder / f"{name}.csv", *POSITION_UNITS)
     units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _, _) in PATCH_QUANTITIES.items()}}
@@ -103,7 +107,8 @@ def _save_tables(name: str, result: Result, folder: Path) -> None:
 
 
 def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> None:
-    """Plot the contact patches, with a column of panels per wheel; bars in the first row show the patches' widths."""
+    """Save a figure of the contact patches, with a column of panels per wheel; bars in the first row are patch
+    widths."""
     from models.drawing.figures import COLUMN_WIDTH, CURVE_COLOURS, add_heading, legend_below, save, subplots
 
     drawn, axes = subplots(len(PANEL_TITLES), 2, figsize=(COLUMN_WIDTH, 9.6), sharex=True, sharey="row")
@@ -135,9 +140,9 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
     save(drawn, path)
 
 
-def _table(placements: list[WheelsetPlacement]) -> list[str]:
-    """Table with a line per contact patch, the positions at which a wheel has several patches, and the first flange
-    contact."""
+def _table_lines(placements: list[WheelsetPlacement]) -> list[str]:
+    """Lines for the screen: a line per contact patch, the positions at which a wheel has several patches, and the first
+    flange contact."""
     heads = (
         f"    {'shift':>6} {'wheel':<5}{'rail':>8}{'wheel':>8}{'angle':>7}{'N':>8}{'peak':>7}{'area':>7}{'a':>6}"
         f"{'b':>6}{'Fx':>7}{'Fy':>7}{'dr':>8}"
@@ -160,7 +165,7 @@ def _table(placements: list[WheelsetPlacement]) -> list[str]:
 
 
 def _patch_lines(position: dict[str, Any]) -> Iterator[str]:
-    """A line for each patch of a position."""
+    """Yield a line for the screen for each contact patch at a position."""
     for wheel in WHEEL_NAMES:
         for k, patch in enumerate(position[wheel]):
             lead = f"{position['shift']:6.2f} {wheel:<5}" if k == 0 else " " * 12

@@ -1,4 +1,4 @@
-"""Motion of the chassis from accelerometers: pitch, rate and heave, how good the readings are, and what filters do.
+"""Motion of the chassis from accelerometers: pitch, pitch rate and heave, quality of the readings, and filters.
 
 Each engine's run leaves its readings as a file; the motion is then recovered from the file alone, as from a measured
 one. A user's own file takes the place of the runs; nothing is known of the truth then.
@@ -47,14 +47,14 @@ from models.systems.pitch_plane.scene import Scene
 
 Progress = Callable[[str, float], None]
 COMPARED_CHANNELS = {"pitch": ("pitch", "rad"), "rate": ("pitch_rate", "rad/s"), "heave": ("z3", "m")}
-"""What is compared -> the run's channel and its unit."""
+"""Channel of the run and its unit, for each compared quantity."""
 TABLE_TILT = 1e-3
-"""Tilt error (rad) of the false displacement in the table."""
+"""Tilt error (rad) for which the table states the false displacement."""
 SENSORS_KEY = "effects.accelerometers.sensors"
 
 
 class Options(Strict):
-    """Keys of the table [options] for this study."""
+    """Keys of the table [options] of this study."""
 
     file: str | None = Field(None, description="CSV of measured readings: time [s], ax1 [m/s^2], ay1, az1, ax2, ...")
     zeroed: bool = Field(False, description="true for readings set to zero at rest on level ground (eq. 17)")
@@ -64,8 +64,8 @@ class Options(Strict):
 
 @dataclass
 class Source:
-    """Accelerometer readings (n, sensors, 3) of an engine or a file, ``period`` (s) apart, with the true motion and a
-    gyro if there are any."""
+    """Accelerometer readings (n, sensors, 3) in m/s^2 of an engine's run or a file, ``period`` (s) apart, with the true
+    motion and gyro readings if there are any."""
 
     name: str
     readings: np.ndarray
@@ -78,13 +78,14 @@ class Source:
 
     @property
     def start(self) -> StartState:
-        """Initial attitude and velocity of the recovered motion: those of the run, or at rest and level."""
+        """Initial state of the recovered motion: that of the run, or level and at rest."""
         first = (float(self.truth[name][0]) for name in ("pitch", "rate", "heave", "heave rate") if self.truth)
         return StartState.pitched(*first) if self.truth else StartState()
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Readings of each engine or of the file, the motion recovered in each way, a table and a figure."""
+    """Take readings of each engine's run or of the file, and recover the motion by each method; saves the motions, a
+    table and a figure, and returns the summary."""
     options, p = check(scene, engines)
     array = _sensor_array(scene, p.positions())
     failed: dict[str, str] = {}
@@ -93,7 +94,9 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     for i, name in enumerate(engines if options.file is None else (options.file,)):
         progress(f"{name}: readings and motion", i / len(engines))
         try:
-            source = _run(scene, name, folder) if options.file is None else _measured_readings(scene, options, p)
+            source = (
+                _readings_of_run(scene, name, folder) if options.file is None else _measured_readings(scene, options, p)
+            )
             _recover_motions(source, array, options, p)
         except (RunFailed, GimbalLock) as error:
             failed[name] = str(error)
@@ -113,12 +116,12 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "failed": failed,
         "results": results,
         "table": table,
-        "rows": [_numbers_of_ways(source) for source in sources],
+        "rows": [_summary_of_methods(source) for source in sources],
     }
 
 
 def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
-    """Refuse, before anything is written, a scene whose readings could not be used."""
+    """Options and accelerometers of the scene; raises InputError if the readings cannot be used."""
     options = read(Options, scene.options, scene.file, "options")
     if "accelerometers" not in scene.effects:
         raise InputError(scene.file, "effects.accelerometers", None, "is missing: this study reads accelerometers")
@@ -144,7 +147,7 @@ def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
 
 
 def _sensor_array(scene: Scene, positions: dict[str, tuple[float, float, float]]) -> SensorArray:
-    """The scene's sensors as an array. An InputError about them names the scene's file and the sensors' key."""
+    """Array of the accelerometers at positions (m); an InputError about them names the scene's file and key."""
     try:
         return sensor_array(positions)
     except InputError as error:
@@ -152,23 +155,23 @@ def _sensor_array(scene: Scene, positions: dict[str, tuple[float, float, float]]
 
 
 def _measured_readings(scene: Scene, options: Options, parameters: Parameters) -> Source:
-    """Readings of the user's file, columns in the order of the scene's sensors."""
+    """Readings of the user's file, in the order of the scene's accelerometers."""
     assert options.file is not None
-    return _from_file(options.file, scene.path(options.file, "options.file"), parameters)
+    return _readings_of_file(options.file, scene.path(options.file, "options.file"), parameters)
 
 
-def _from_file(name: str, path: Path, parameters: Parameters) -> Source:
+def _readings_of_file(name: str, path: Path, parameters: Parameters) -> Source:
     values, period = read_time_series(path, dict.fromkeys(chain(*channels_of_sensors(parameters)), ACCELERATIONS))
     return Source(name, values.reshape(len(values), -1, 3), period)
 
 
-def _run(scene: Scene, engine: str, folder: Path) -> Source:
-    """One engine's run; its readings go through a file as measured ones do."""
+def _readings_of_run(scene: Scene, engine: str, folder: Path) -> Source:
+    """Readings of an engine's run, which are written to a file and read again like measured readings."""
     p = scene.effects["accelerometers"]
     computed = simulate(scene, engine, error=scene.error)
     path = folder / f"{engine} readings.csv"
     write(computed, {channel: channel for channel in chain(*channels_of_sensors(p))}, p.sampling_rate, path)
-    source = _from_file(engine, path, p)
+    source = _readings_of_file(engine, path, p)
     rows = np.searchsorted(computed.times, source.period * (np.arange(len(source.readings)) - 1e-3))
     wanted = {name: channel for name, (channel, _) in COMPARED_CHANNELS.items()} | {"heave rate": "z3_rate"}
     source.truth = {name: computed[channel][rows] for name, channel in wanted.items()}
@@ -178,8 +181,8 @@ def _run(scene: Scene, engine: str, folder: Path) -> Source:
 
 
 def _recover_motions(readings_source: Source, array: SensorArray, options: Options, parameters: Parameters) -> None:
-    """Recover the motion by every method. A suspect sensor, whose readings do not fit a rigid body, is used by the
-    first method only."""
+    """Recover the motion from the readings by every method, and store it in the source. A suspect sensor, whose
+    readings do not fit a rigid body, is used by the first method only."""
     readings_source.quality = fit_quality(array, readings_source.readings, parameters.deviation)
     suspect, readings = readings_source.quality.suspect, readings_source.readings
     recover = partial(
@@ -217,8 +220,8 @@ def _compared_values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
 
 
 def _save_motions(scene: Scene, readings_source: Source, folder: Path, options: Options) -> Result:
-    """Save the recovered pitch, pitch rate and heave: a CSV file per method, and one result with all methods, which is
-    returned."""
+    """Save the recovered pitch, pitch rate and heave: a CSV file per method, and a netCDF result with all methods,
+    which is returned."""
     stem, values_of_methods = (
         Path(readings_source.name).stem,
         {method_name: _compared_values(motion) for method_name, motion in readings_source.recovered_motions.items()},
@@ -250,9 +253,9 @@ def _save_motions(scene: Scene, readings_source: Source, folder: Path, options: 
     return saved
 
 
-def _numbers_of_ways(readings_source: Source) -> dict[str, Any]:
-    """Plain numbers of the recovered motion. They hold the share of misfit in the readings, the suspect sensor, and the
-    largest and rms error of each method; without a true motion, the largest and rms value in place of errors."""
+def _summary_of_methods(readings_source: Source) -> dict[str, Any]:
+    """Summary of the recovered motions: share of misfit in the readings, suspect sensor, and largest and rms error of
+    each method; without a true motion, largest and rms value in place of errors."""
     assert readings_source.quality is not None
     errors_of_methods = {}
     for method_name, motion in readings_source.recovered_motions.items():
@@ -267,9 +270,9 @@ def _numbers_of_ways(readings_source: Source) -> dict[str, Any]:
 
 
 def _screen_lines(readings_source: Source, parameters: Parameters) -> list[str]:
-    """Lines for the screen: the verdict on the readings, then the largest and rms error (or size) for each method."""
+    """Lines for the screen: verdict on the readings, then largest and rms error (or value) for each method."""
     assert readings_source.quality is not None
-    numbers, kind = _numbers_of_ways(readings_source), "error" if readings_source.truth else "size"
+    numbers, kind = _summary_of_methods(readings_source), "error" if readings_source.truth else "size"
     head = f"largest {kind} (rms)"
     lines = [
         f"  {readings_source.name}",
@@ -288,7 +291,7 @@ def _screen_lines(readings_source: Source, parameters: Parameters) -> list[str]:
 
 
 def _rigidity_text(quality: Quality) -> str:
-    """Text on the consistency of the readings with rigid-body motion."""
+    """Sentence on the consistency of the readings with rigid-body motion."""
     if quality.rigid is None:
         return "whether the body is rigid cannot be told: no sensor is left over"
     share = f"{100 * quality.share:.2g} % of the relative accelerations fit no rigid body"
@@ -310,7 +313,8 @@ def _rigidity_text(quality: Quality) -> str:
 
 
 def _closing_lines(options: Options) -> list[str]:
-    """Closing lines on the time that the filters take, and on the damage error that a tilt causes."""
+    """Lines for the screen on the cut-off frequencies of the filters, and on the false displacement that a tilt
+    causes."""
     far = float(tilt_displacement(TABLE_TILT, np.array([10.0]))[0])
     return [
         f"  High-pass: rates and angles {options.turning_cut_off:g} Hz, velocity and position "
@@ -323,8 +327,8 @@ def _closing_lines(options: Options) -> list[str]:
 
 
 def _figure(readings_source: Source, results: Results, path: Path) -> None:
-    """Plot pitch and heave for one source of readings, the error of each method where the true motion is known, and the
-    misfit of the readings from rigid-body motion."""
+    """Save a figure of pitch and heave for one source of readings, the error of each method if the true motion is
+    known, and the misfit of the readings from rigid-body motion."""
     from models.drawing.figures import COLUMN_WIDTH, GREY, add_heading, legend_below, save, subplot_mosaic
 
     assert readings_source.quality is not None
@@ -378,8 +382,7 @@ def _plot_motions(
     readings_source: Source,
     name: str,
 ) -> None:
-    """Plot the true motion where it is known, since good methods would only cover it; else the motion by each
-    method."""
+    """Plot the true motion over time if it is known, else the motion recovered by each method."""
     from models.drawing.figures import TRUTH_COLOUR
 
     if readings_source.truth:
@@ -392,7 +395,7 @@ def _plot_motions(
 
 
 def _plot_errors(axis: Any, times: np.ndarray, errors: dict[str, np.ndarray], title: str) -> None:
-    """Plot the largest error of each method up to every time, on a logarithmic scale."""
+    """Plot the largest error of each method up to each time, on a logarithmic scale."""
     for method_name, error in errors.items():
         axis.semilogy(times[1:], np.maximum.accumulate(error)[1:], label=method_name)
     axis.set_title(title)

@@ -1,4 +1,4 @@
-"""A measured race car: tyres identified on one stretch, the motion of another stretch predicted with bands of 95 %.
+"""A measured race car: tyres identified on one section of a drive, motion on another predicted with 95 % bands.
 
 Input of the prediction is measured steer angle and speed alone. The file of the drive is that of the scene, or, where
 ``options.measurement`` names one, columns as in the race's file: t, delta, vx, beta_true, yawRate, ayCG in SI units.
@@ -19,16 +19,16 @@ from models.identification.held_out import Identified, Search, identified_vehicl
 from models.identification.of_scene import SceneModel
 from models.systems.single_track.race_file import IDENTIFIED_PARAMETERS, RACE_CAR, write_plain_table
 from models.systems.single_track.scene import SingleTrackScene, build
-from studies.command.identify import as_dict, identification_lines
+from studies.command.identify import identification_lines, identification_record
 
 SYSTEM = "single-track"
 Progress = Callable[[str, float], None]
 AIMED_ERRORS = {"yaw rate": 0.12, "lateral acceleration": 0.12, "side slip": 0.25}
-"""Rms error by the rms of the measurement that is asked for."""
+"""Aim for the rms prediction error of each channel, divided by the rms of the measurement."""
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     measurement: str = Field("", description="file of the race in TWINRIG_DATA, or a path; empty for the scene's drive")
     prediction: str = Field("", description="another such file that is predicted; empty: the last part of the first")
@@ -43,8 +43,8 @@ class Options(Strict):
         "of the scene's own short drive, which determines no more",
     )
 
-    def asked(self) -> list[str]:
-        """Keys of the parameters to identify."""
+    def identified_keys(self) -> list[str]:
+        """Keys of the parameters to identify, each KEY or KEY=LOW:HIGH."""
         return self.parameters or list(IDENTIFIED_PARAMETERS if self.measurement else FITTED_PARAMETERS)
 
 
@@ -55,16 +55,16 @@ FITTED_PARAMETERS = (
     "rear.stiffness=5:50",
     "rear.friction=0.3:3",
 )
-"""What half a minute of driving determines; with all fifteen the search does not settle, and predicts badly."""
+"""Parameters that half a minute of driving determines; with all fifteen the search does not converge."""
 SIMPLER_VEHICLES: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
     "linear single track": ({"front.friction": 50.0, "rear.friction": 50.0}, ("stiffness", "yaw_inertia", "offset")),
     "six numbers": ({}, ("stiffness", "friction", "yaw_inertia", "steer_offset")),
 }
-"""Vehicles with fewer numbers: what they hold, and words of the parameters that stay."""
+"""Simpler vehicles by name: values of fixed keys, and words in the keys that are still identified."""
 
 
 def check(scene: SingleTrackScene, engines: tuple[str, ...]) -> None:
-    """Refuse options that cannot be."""
+    """Raise InputError for missing files, and for a prediction without a measurement."""
     options = read(Options, scene.options, scene.file, "options")
     for name in ("measurement", "prediction"):
         if getattr(options, name):
@@ -74,13 +74,14 @@ def check(scene: SingleTrackScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Identify, predict, compare with simpler vehicles: saves race_car.png, predicted.nc and the drives."""
+    """Identify the vehicle, predict its motion, and compare with simpler vehicles; saves ``race_car.png``,
+    ``predicted.nc`` and the measured drives, and returns the summary."""
     from studies.race_car_figure import draw
 
     options = read(Options, scene.options, scene.file, "options")
     first, second = identification_and_test_scenes(scene, options, folder)
     chosen = identified_vehicle(
-        first, second, Search(options.asked(), list(AIMED_ERRORS), options.low_pass, options.blocks), progress
+        first, second, Search(options.identified_keys(), list(AIMED_ERRORS), options.low_pass, options.blocks), progress
     )
     simpler = {name: identified_simpler(first, second, options, name, progress) for name in SIMPLER_VEHICLES}
     draw(chosen, simpler, scene.title, folder / "race_car.png")
@@ -90,7 +91,7 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     )
     predicted.save(folder / "predicted.nc")
     answer = error_ratios(chosen)
-    answer["identified"] = as_dict(chosen.uncertainty)
+    answer["identified"] = identification_record(chosen.uncertainty)
     answer["simpler vehicles"] = {
         name: dict(zip(AIMED_ERRORS, identified_one.bands.relative_error(), strict=True))
         for name, identified_one in simpler.items()
@@ -105,7 +106,7 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
         "table": [
             *identification_lines(chosen.uncertainty),
             *_result_lines(chosen, simpler),
-            *_unmet_aims(answer["residuals"]),
+            *_residual_lines(answer["residuals"]),
         ],
     }
 
@@ -113,8 +114,8 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
 def identification_and_test_scenes(
     scene: SingleTrackScene, options: Options, folder: Path
 ) -> tuple[SingleTrackScene, SingleTrackScene]:
-    """Scenes of the section of the drive for identification and of the section for prediction; their measured drives
-    are files in ``folder``."""
+    """Scene of the drive's section for identification, and scene of the section for prediction; measured drives are
+    written into ``folder``."""
     if not options.measurement:
         full_scene, path = scene, scene.path(scene.drive.file, "drive.file")
     else:
@@ -134,13 +135,13 @@ def identification_and_test_scenes(
 
 
 def _data_file(scene: SingleTrackScene, name: str, key_path: str) -> Path:
-    """Path of a file in the folder TWINRIG_DATA if it is there; else the path that the scene resolves the name to."""
+    """Path of a file in the folder TWINRIG_DATA if it is there; else the path that the scene finds for the name."""
     data = os.environ.get("TWINRIG_DATA", "")
     return Path(data) / name if data and (Path(data) / name).is_file() else scene.path(name, key_path)
 
 
 def _scene_with_car(scene: SingleTrackScene, path: Path, car: dict[str, Any]) -> SingleTrackScene:
-    """The scene with the race car and a drive."""
+    """Scene of a car, given as tables, on the drive in a file."""
     table = {"title": scene.title, "system": SYSTEM, **car, "drive": {"file": path.name, "low_pass": 10.0}}
     return build(table, scene.file, path.parent)
 
@@ -152,9 +153,10 @@ def _scene_of_section(scene: SingleTrackScene, ends: list[float]) -> SingleTrack
 def identified_simpler(
     first_scene: SingleTrackScene, second_scene: SingleTrackScene, options: Options, name: str, progress: Progress
 ) -> Identified:
-    """Identify and predict with a simpler vehicle: some of its parameters are fixed, and fewer are identified."""
+    """Identification and prediction with a simpler vehicle, of which some parameters are fixed and fewer are
+    identified."""
     holds, kept_words = SIMPLER_VEHICLES[name]
-    parameters = [text for text in options.asked() if any(word in text for word in kept_words)]
+    parameters = [text for text in options.identified_keys() if any(word in text for word in kept_words)]
     simpler_search = Search(parameters, list(AIMED_ERRORS), options.low_pass, blocks=2)
 
     def tell(text: str, share: float) -> None:
@@ -163,26 +165,26 @@ def identified_simpler(
     return identified_vehicle(_with_values(first_scene, holds), _with_values(second_scene, holds), simpler_search, tell)
 
 
-def _with_values(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrackScene:
+def _with_values(scene: SingleTrackScene, new_values: dict[str, float]) -> SingleTrackScene:
     from models.core.scene_file import set_key
 
     table = scene.table()
     for axle in ("front", "rear"):
         set_key(table, f"{axle}.sharpness", 2.0)
-    for key, value in holds.items():
+    for key, value in new_values.items():
         set_key(table, key, value)
     return build(table, scene.file, Path(scene.folder))
 
 
-def error_ratios(identified: Identified) -> dict[str, Any]:
+def error_ratios(identification: Identified) -> dict[str, Any]:
     """For each channel, ratios of: rms prediction error to rms of the measurement; samples inside the bands to all
-    samples; half-width of the bands to the error."""
-    sizes = np.array([channel.size for channel in identified.uncertainty.fit.problem.channels])
-    crossed = np.sqrt(np.mean(identified.cross_validation_errors**2, axis=1)) / sizes
+    samples; half-width of the bands to the error; rms cross-validation error to rms of the measurement."""
+    sizes = np.array([channel.size for channel in identification.uncertainty.fit.problem.channels])
+    crossed = np.sqrt(np.mean(identification.cross_validation_errors**2, axis=1)) / sizes
     share_inside, width, relative = (
-        identified.bands.share_inside(),
-        identified.bands.width(),
-        identified.bands.relative_error(),
+        identification.bands.share_inside(),
+        identification.bands.width(),
+        identification.bands.relative_error(),
     )
     return {
         name: {
@@ -195,14 +197,14 @@ def error_ratios(identified: Identified) -> dict[str, Any]:
     }
 
 
-def _result_lines(identified_full: Identified, identified: dict[str, Identified]) -> list[str]:
+def _result_lines(full_identification: Identified, identifications: dict[str, Identified]) -> list[str]:
     table = [f"  {'prediction':<26}{'error':>9}{'aim':>8}{'inside 95 %':>13}{'half-width':>12}{'parts':>9}"]
-    for name, identified_one in error_ratios(identified_full).items():
+    for name, identified_one in error_ratios(full_identification).items():
         table.append(
             f"  {name:<26}{identified_one['error']:>9.1%}{AIMED_ERRORS[name]:>8.0%}{identified_one['inside']:>13.1%}"
             f"{identified_one['half-width by error']:>12.2f}{identified_one['error between parts']:>9.1%}"
         )
-    for name, identified_one in identified.items():
+    for name, identified_one in identifications.items():
         errors = ", ".join(
             f"{n} {e:.1%}" for n, e in zip(AIMED_ERRORS, identified_one.bands.relative_error(), strict=True)
         )
@@ -210,11 +212,11 @@ def _result_lines(identified_full: Identified, identified: dict[str, Identified]
     return table
 
 
-def residual_correlations(identified: Identified) -> dict[str, dict[str, float]]:
-    """For each channel, correlations of the residual and of its magnitude with accelerations, speed and braking of the
-    car."""
-    problem = identified.uncertainty.fit.problem
-    model = problem.model.result(identified.uncertainty.fit.values)  # type: ignore[attr-defined]
+def residual_correlations(identification: Identified) -> dict[str, dict[str, float]]:
+    """For each channel, correlations of the cross-validation error, or of its magnitude, with accelerations, speed and
+    braking of the car."""
+    problem = identification.uncertainty.fit.problem
+    model = problem.model.result(identification.uncertainty.fit.values)  # type: ignore[attr-defined]
     clock = problem.clock.times
     lateral, forward_acceleration = (
         np.interp(clock, model.times, model[n]) for n in ("lateral acceleration", "forward acceleration")
@@ -231,11 +233,11 @@ def residual_correlations(identified: Identified) -> dict[str, dict[str, float]]
     }
     return {
         name: {cause: float(np.corrcoef(transform(row), values)[0, 1]) for cause, (transform, values) in causes.items()}
-        for name, row in zip(AIMED_ERRORS, identified.cross_validation_errors, strict=True)
+        for name, row in zip(AIMED_ERRORS, identification.cross_validation_errors, strict=True)
     }
 
 
-def _unmet_aims(residuals: dict[str, dict[str, float]]) -> list[str]:
+def _residual_lines(residuals: dict[str, dict[str, float]]) -> list[str]:
     def causes_text(causes: dict[str, float]) -> str:
         strongest = sorted(causes, key=lambda cause: -abs(causes[cause]))[:2]
         return ", ".join(f"{cause} {causes[cause]:+.2f}" for cause in strongest)

@@ -1,4 +1,4 @@
-"""Figure of the race car: what was predicted with bands beside what was measured, and what simpler vehicles lose."""
+"""Figure of the race car: predicted channels with bands beside measured ones, and errors of simpler vehicles."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,17 +11,18 @@ if TYPE_CHECKING:
     from studies.race_car import Identified
 
 SECONDS_SHOWN = 60.0
-"""s of the prediction that are shown."""
+"""Length (s) of the shown part of the prediction."""
 
 
-def draw(identified_full: "Identified", identified: dict[str, "Identified"], title: str, path: Path) -> Path:
-    """Plot channels over time with their prediction bands, and below them the errors of all vehicles."""
-    problem = identified_full.bands.problem
+def draw(full_identification: "Identified", identifications: dict[str, "Identified"], title: str, path: Path) -> Path:
+    """Save a figure of the channels over time with their prediction bands, and of the errors of all vehicles; returns
+    its path."""
+    problem = full_identification.bands.problem
     clock_times = problem.clock.times
     shown = clock_times <= clock_times[0] + SECONDS_SHOWN
     figure, axes = subplots(len(problem.channels) + 1, 1, figsize=(8.0, 9.6))
     for axis, channel, row, half in zip(
-        axes, problem.channels, identified_full.bands.predicted, identified_full.bands.half_width, strict=False
+        axes, problem.channels, full_identification.bands.predicted, full_identification.bands.half_width, strict=False
     ):
         low, high = row - half, row + half
         axis.fill_between(
@@ -32,7 +33,7 @@ def draw(identified_full: "Identified", identified: dict[str, "Identified"], tit
         unit = channel.unit.replace("^2", "²")
         axis.set(title=channel.name.capitalize(), ylabel=f"[{unit}]", xlabel="time [s]")
     names = [channel.name for channel in problem.channels]
-    vehicles = {"chosen": identified_full, **identified}
+    vehicles = {"chosen": full_identification, **identifications}
     for i, (name, identified_vehicle) in enumerate(vehicles.items()):
         bar_positions = np.arange(len(names)) + 0.25 * i
         axes[-1].bar(

@@ -1,4 +1,5 @@
-"""From an engineer's measurement files to section forces: read, checked, predicted, run, judged, handed on, a page."""
+"""From an engineer's measurement files to section forces: files are read, checked, run and judged; results and a page
+are saved."""
 
 from pathlib import Path
 from typing import Any
@@ -17,16 +18,17 @@ SYSTEM, BLOCKS_FOLDER = "measured", WORK_FOLDER
 
 
 class Options(Strict):
-    """[options] of this study: none."""
+    """Keys of the table [options] of this study: none."""
 
 
 def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
-    """Refuse options: there are none."""
+    """Raise InputError for any option, as this study has none."""
     read(Options, scene.options, scene.file, "options")
 
 
 def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: Any) -> dict[str, Any]:
-    """Check, run and judge the recording; the page is written even where errors in the recording stop the run."""
+    """Check, run and judge the recording; saves the result and the page, the page even if errors in the recording
+    prevent the run; returns the summary."""
     from studies.recording_page import write
 
     result = run_scene(scene, engines[-1], folder, progress, whole_run=True, error=scene.error)
@@ -49,8 +51,8 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
 
 
 def _failure_reasons(examination: Examination) -> dict[str, str]:
-    """Reasons why the command ends with code 1: errors in the recording, or the failure of the run whose results were
-    to be saved."""
+    """Reasons for which the command ends with code 1: errors in the recording, or the failure of the run whose results
+    were to be saved."""
     if examination.is_stopped:
         count = sum(finding.weight == "error" for finding in examination.findings)
         return {"checks": f"{count} error(s) in the recording: nothing was run"}
@@ -58,7 +60,7 @@ def _failure_reasons(examination: Examination) -> dict[str, str]:
 
 
 def _force_sizes(examination: Examination) -> dict[str, Any]:
-    """Largest magnitude and rms of each section force, as the numbers that a sweep plots."""
+    """Unit, largest magnitude and rms of each section force, for the summary."""
     sizes = dict[str, Any]()
     for answer, counted in examination.counted.items():
         assert examination.outcome is not None
@@ -72,7 +74,7 @@ def _force_sizes(examination: Examination) -> dict[str, Any]:
 
 
 def _lines_of_findings(examination: Examination) -> list[str]:
-    """Lines for the terminal: findings above a note, how each run ended, and the verdict on it."""
+    """Lines for the screen: findings above a note, how each run ended, and the verdicts on the runs."""
     lines = [
         f"  {finding.weight}: {finding.text}"
         for finding in merged_findings(examination.findings)

@@ -1,4 +1,4 @@
-"""Figures of a recording: one for each finding of its checks, what drives the vehicle, how it drifts, its forces."""
+"""Figures of a recording: for each finding of its checks, its hub forces, the drift of the runs, section forces."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,13 +33,13 @@ from models.systems.measured.verdict import ChannelComparison, paired_channels
 from models.vehicles.cut_vehicle import ANGLES, GRAVITY
 
 MARKED_SECONDS, UNMARKED_SECONDS, MOST_SAMPLES = 0.6, 15.0, 20_000
-"""s drawn beside a marked time; s drawn where none is marked; samples drawn at the most."""
+"""Time (s) drawn before and after a marked span; time (s) drawn without a mark; largest number of drawn samples."""
 SHOWN_SIGNALS = 4
-"""Signals drawn at the most."""
+"""Largest number of signals in a figure."""
 TITLE_LETTERS = 60
-"""Letters of a place in a title."""
+"""Longest text (letters) of a finding's place in a figure's title."""
 CURVE_COLUMNS = 1200
-"""Columns of a curve: of each the least and the greatest value are drawn, so that no peak is lost."""
+"""Number of columns of a long curve; least and largest value of each column are drawn, so that no peak is lost."""
 LOUD_COLOUR, QUIET_COLOUR, MARK_COLOUR = VERMILION, TRUTH_COLOUR, YELLOW
 RUN_STYLES = {
     "measured": ("measured", MEASURED_COLOUR),
@@ -48,14 +48,14 @@ RUN_STYLES = {
     "kalman": ("held by the Kalman filter", BLUE),
     "prescribed": ("held to the measured angles", BLUE),
 }
-"""Label and colour of each run, and of what it is drawn beside."""
+"""Label and colour of each run, of the measurement, and of the true motion."""
 WHEEL_COLOURS = CURVE_COLOURS[:6]
 CHECKS_OF_FAULT = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swapped": ("swapped",)}
-"""Checks that tell a kind of fault."""
+"""Names of the checks that detect each kind of measurement fault."""
 
 
-def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
-    """Draw the figure that illustrates a finding into ``path``; None where there is nothing to draw."""
+def figure_of_finding(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
+    """Save the figure that illustrates a finding; returns its path, or None if there is nothing to draw."""
     telling = (f for f in evidence.faults if finding.check in CHECKS_OF_FAULT.get(f.kind, ()))
     fault = next((f for f in telling if set(f.names) == set(finding.signals)), None)
     signals = tuple(s for s in evidence.recording.signals if s.name in finding.signals)
@@ -75,18 +75,18 @@ def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
 
 
 def _save_titled(
-    drawn: Any, title: str, path: Path, legend: Any = None, legend_position: str = "outside upper right"
+    figure: Any, title: str, path: Path, legend_axis: Any = None, legend_position: str = "outside upper right"
 ) -> Path:
-    """Add a title and the legend of one axis to a figure, and save it."""
-    if legend is not None:
+    """Add a title, and the legend of an axis if one is given, to a figure, and save it; returns its path."""
+    if legend_axis is not None:
         columns = 3 if "lower" in legend_position else 2
-        drawn.legend(*legend.get_legend_handles_labels(), loc=legend_position, ncols=columns)
-    add_heading(drawn, title)
-    return save(drawn, path)
+        figure.legend(*legend_axis.get_legend_handles_labels(), loc=legend_position, ncols=columns)
+    add_heading(figure, title)
+    return save(figure, path)
 
 
 def _plot_signals(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
-    """Plot the signals of a finding over time, with the time span that the finding is about marked."""
+    """Save a figure of the signals of a finding over time, with the time span of the finding marked."""
     recording, marked, shown = evidence.recording, finding.times, signals[:SHOWN_SIGNALS]
     begin = max(marked[0] - MARKED_SECONDS, 0.0) if marked else 0.0
     end = min(marked[1] + MARKED_SECONDS if marked else UNMARKED_SECONDS, recording.duration)
@@ -116,7 +116,7 @@ def _plot_signals(finding: Finding, evidence: Evidence, signals: tuple[Signal, .
 
 
 def _plot_mean_forces(evidence: Evidence, path: Path) -> Path:
-    """Bar chart of each hub's mean measured vertical force next to its static load by the vehicle file."""
+    """Save a bar chart of each hub's mean measured vertical force beside its static load by the vehicle file."""
     assert evidence.vehicle is not None
     hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical()
     means = np.array([evidence.mean(vertical[hub]) for hub in hubs])
@@ -137,8 +137,8 @@ def _plot_mean_forces(evidence: Evidence, path: Path) -> Path:
 
 
 def _plot_ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
-    """Plot the ratio of a channel's reading to its true value over frequency. A delay shows as a slope of the phase, a
-    wrong factor as a constant magnitude."""
+    """Save a figure of the ratio of a channel's reading to its expected value over frequency; a delay shows as a slope
+    of the phase, a wrong factor as a constant magnitude."""
     agreement = evidence.agreement
     assert agreement is not None
     for earlier_fault in evidence.faults[: evidence.faults.index(fault)]:  # the agreement in which this one was found
@@ -170,8 +170,8 @@ def _plot_ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path
 
 
 def _plot_exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
-    """Bar chart of the share of each reading that the hub forces do not explain, with the hubs as mapped and
-    exchanged."""
+    """Save a bar chart of the share of each reading that the hub forces do not explain, with the hubs as mapped and
+    with two of them exchanged."""
     agreement = evidence.agreement
     assert agreement is not None
     names = [s.name for s in agreement.outputs]
@@ -192,7 +192,7 @@ def _plot_exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> P
 
 
 def _plot_spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
-    """Plot the power spectral density of signals and the noise density that is stated for them."""
+    """Save a figure of the spectral density of signals, and of the noise density that is stated for them."""
     from scipy.signal import welch
 
     recording = evidence.recording
@@ -214,8 +214,8 @@ def _plot_spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) 
 
 
 def thinned_curve(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values (m,) thinned for plotting: only the least and the greatest value of each short stretch of
-    samples stay."""
+    """Times and values (m,) of a curve (n,), thinned for plotting to the least and the largest value of each short
+    section of samples."""
     width = len(times) // CURVE_COLUMNS
     if width < 3:
         return times, values
@@ -228,16 +228,16 @@ def thinned_curve(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
     return np.repeat(times[: rows * width : width], 2), extremes.ravel()
 
 
-def _panels_over_time(rows: int, height: float, **options_of_panels: Any) -> tuple[Any, np.ndarray]:
-    """Figure with rows of panels over time."""
-    drawn, panels = subplots(rows, figsize=(COLUMN_WIDTH, height), squeeze=False, **options_of_panels)
+def _panels_over_time(row_count: int, height: float, **options_of_panels: Any) -> tuple[Any, np.ndarray]:
+    """Figure and axes of rows of panels over time."""
+    drawn, panels = subplots(row_count, figsize=(COLUMN_WIDTH, height), squeeze=False, **options_of_panels)
     for panel in panels[-1] if options_of_panels.get("sharex") else panels.flat:
         panel.set_xlabel("time [s]")
     return drawn, panels
 
 
 def inputs_figure(examination: Examination, path: Path) -> Path:
-    """Plot the forces at all hubs along each axis over time."""
+    """Save a figure of the measured forces at all hubs along each axis over time."""
     recording, axes = examination.recording, [a for a in "zxy" if examination.recording.find("force", component=a)]
     drawn, panels = _panels_over_time(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
     sample_times = recording.period * np.arange(recording.count)
@@ -256,8 +256,8 @@ def inputs_figure(examination: Examination, path: Path) -> Path:
 
 
 def drift_figure(examination: Examination, path: Path) -> Path:
-    """Plot roll and pitch of every run together with the measured angles and, for a virtual measurement, the true
-    ones."""
+    """Save a figure of roll and pitch of every run, with the measured angles and, for a virtual measurement, the true
+    angles."""
     angles = examination.rig.angles
     drawn, panels = _panels_over_time(len(angles), 2.0 * len(angles) + 0.6, sharex=True)
     for panel, angle in zip(panels[:, 0], angles, strict=True):
@@ -279,7 +279,7 @@ def drift_figure(examination: Examination, path: Path) -> Path:
 
 
 def _angles_of_runs(examination: Examination, angle: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Times (s) and values (rad) of an angle: as measured, in every run, and, for a virtual measurement, true."""
+    """Times (s) and values (rad) of an angle by name: measured, of every run, and true for a virtual measurement."""
     recording, chassis = examination.recording, examination.rig.chassis
     curves = dict[str, tuple[np.ndarray, np.ndarray]]()
     for signal in recording.find("angle", chassis, angle)[:1]:
@@ -292,7 +292,7 @@ def _angles_of_runs(examination: Examination, angle: str) -> dict[str, tuple[np.
 
 
 def forces_figure(run: SectionOutcome, section_channels: Sequence[SectionChannel], path: Path, name: str = "") -> Path:
-    """Plot up to six section forces over the complete recording, and each for two seconds about its largest range."""
+    """Save a figure of section forces over the complete recording, and of two seconds about the peak of each."""
     sample_times, colour = run.period * np.arange(run.done), RUN_STYLES.get(name, RUN_STYLES["kalman"])[1]
     drawn, panels = _panels_over_time(
         len(section_channels), 1.7 * len(section_channels) + 0.5, columns=2, width_ratios=(2.4, 1)
@@ -309,10 +309,10 @@ def forces_figure(run: SectionOutcome, section_channels: Sequence[SectionChannel
     return save(drawn, path)
 
 
-def counting_figure(counted: dict[SectionChannel, CountedLoad], path: Path) -> Path:
-    """Plot level crossings and range pairs of some section forces."""
+def counting_figure(counted_loads: dict[SectionChannel, CountedLoad], path: Path) -> Path:
+    """Save a figure of the level crossings and range pairs of some section forces."""
     drawn, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
-    for colour, (answer, counts) in zip(WHEEL_COLOURS, counted.items(), strict=False):
+    for colour, (answer, counts) in zip(WHEEL_COLOURS, counted_loads.items(), strict=False):
         left.plot(np.maximum(counts.crossings, 0.5), 1e-3 * counts.levels, drawstyle="steps-mid", color=colour)
         right.plot(np.maximum(counts.pairs_of_range, 0.25), 1e-3 * counts.ranges, color=colour, label=answer.name)
     for panel, title, quantity_name in (
@@ -328,12 +328,14 @@ def counting_figure(counted: dict[SectionChannel, CountedLoad], path: Path) -> P
 
 
 def overlay_figure(
-    examination: Examination, run: SectionOutcome, compared: Sequence[ChannelComparison], path: Path
+    examination: Examination, run: SectionOutcome, channel_comparisons: Sequence[ChannelComparison], path: Path
 ) -> Path:
-    """Plot measured channels that were not inputs of the run against the computed ones: over the whole time, and for
-    two seconds about the largest error."""
-    drawn, panels = _panels_over_time(len(compared), 1.7 * len(compared) + 0.7, columns=2, width_ratios=(2.4, 1))
-    for (left, right), comparison in zip(panels, compared, strict=True):
+    """Save a figure of measured channels that were not inputs of the run, and of the computed ones: over the complete
+    time, and for two seconds about the largest error."""
+    drawn, panels = _panels_over_time(
+        len(channel_comparisons), 1.7 * len(channel_comparisons) + 0.7, columns=2, width_ratios=(2.4, 1)
+    )
+    for (left, right), comparison in zip(panels, channel_comparisons, strict=True):
         common_times, measured, computed = paired_channels(
             examination.recording, run, comparison.signal, comparison.answer
         )

@@ -1,4 +1,4 @@
-"""The page of a recording: one HTML file with everything in it, to be mailed; its words are in the template."""
+"""The page of a recording: a self-contained HTML file; its texts are in the template."""
 
 import base64
 import math
@@ -29,13 +29,13 @@ RUN_NAMES = {
     "prescribed": "Run held to measured angles",
 }
 NEGLIGIBLE_CHANGE = 1e-6
-"""N, N m: what changes by less is rounding."""
-FORCES_DRAWN = 6
-"""Section forces drawn at the most; all of them are in the table and in the files."""
+"""Range (N, N m) below which a section force counts as constant: smaller changes are rounding."""
+DRAWN_FORCES = 6
+"""Largest number of section forces that are drawn; all are in the table and in the files."""
 
 
 def write(examination: Examination, path: Path, result: Result) -> Path:
-    """Write the page of a result, whole or not at all; returns its path."""
+    """Write the page of a recording as a complete file; returns its path."""
     with TemporaryDirectory() as folder:
         text = page_text(examination, Path(folder), result)
     write_whole(path, text)
@@ -43,8 +43,8 @@ def write(examination: Examination, path: Path, result: Result) -> Path:
 
 
 def page_text(examination: Examination, folder: Path, result: Result) -> str:
-    """HTML text of the page, with the result's stated error and assumptions; figures are drawn into ``folder`` and
-    embedded."""
+    """HTML text of a recording's page, with the stated errors and assumptions of the result; figures are drawn into
+    ``folder`` and embedded."""
     environment = environment_of(Path(__file__).parent)
     environment.filters |= {"as": format, "png": lambda path: base64.b64encode(path.read_bytes()).decode()}
     library = examination.engine if examination.engine != "reference" else "numpy"
@@ -65,7 +65,9 @@ def page_text(examination: Examination, folder: Path, result: Result) -> str:
         },
         figures=_page_figures(examination, folder),
         limits={"disagrees": LARGEST_DISAGREEMENT, "force": FORCE_LIMITS, "damage": DAMAGE_LIMITS},
-        forces=_forces(examination, examination.outcome, folder) if examination.outcome is not None else None,
+        forces=_section_force_content(examination, examination.outcome, folder)
+        if examination.outcome is not None
+        else None,
         sizes=[
             math.sqrt(sum(band.measured**2 for band in consequence.bands)) or math.inf
             for consequence in examination.channel_comparisons
@@ -82,11 +84,11 @@ def page_text(examination: Examination, folder: Path, result: Result) -> str:
 
 
 def _page_figures(examination: Examination, folder: Path) -> dict[str, Any]:
-    """Figures of the page: the input forces, every finding above a note that can be drawn, the drift of the runs, and
-    measured channels that were not inputs of the run."""
+    """Figures of the recording's page by name: input forces, findings above a note, drift of the runs, and measured
+    channels that were not inputs of the run."""
     figures: dict[str, Any] = {"inputs": draw.inputs_figure(examination, folder / "inputs.png")}
     figures["findings"] = [
-        (finding, draw.figure(finding, examination.evidence, folder / f"finding_{i}.png"))
+        (finding, draw.figure_of_finding(finding, examination.evidence, folder / f"finding_{i}.png"))
         for i, finding in enumerate(examination.findings)
         if finding.weight != "note"
     ]
@@ -97,20 +99,20 @@ def _page_figures(examination: Examination, folder: Path) -> dict[str, Any]:
             comparison for comparison in examination.channel_comparisons if comparison.signal.check
         ] or examination.channel_comparisons
         figures["checks"] = draw.overlay_figure(
-            examination, examination.outcome, shown[:FORCES_DRAWN], folder / "checks.png"
+            examination, examination.outcome, shown[:DRAWN_FORCES], folder / "checks.png"
         )
     return figures
 
 
-def _forces(examination: Examination, outcome: SectionOutcome, folder: Path) -> dict[str, Any]:
-    """Content of the page's section on section forces: counts of those that change, the number of those that do not,
-    and figures of the first few."""
+def _section_force_content(examination: Examination, outcome: SectionOutcome, folder: Path) -> dict[str, Any]:
+    """Content of the page's part on section forces: load counts of the varying forces, number of the constant ones, and
+    figures of the first few."""
     moving = {
         answer: counts
         for answer, counts in examination.counted.items()
         if counts.largest_load - counts.smallest_load > NEGLIGIBLE_CHANGE
     }
-    first, connectors = list(moving)[:FORCES_DRAWN], set(examination.rig.places.connectors)
+    first, connectors = list(moving)[:DRAWN_FORCES], set(examination.rig.places.connectors)
     return {
         "slope": WOEHLER_SLOPE,
         "true": errors_of_run(outcome, examination.virtual, WOEHLER_SLOPE).damage

@@ -1,4 +1,4 @@
-"""How much a vehicle on a random road moves: standard deviations of all its outputs, over speed, without simulation."""
+"""Motion of a vehicle on a random road: standard deviations of all outputs over speed, in closed form."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -41,35 +41,38 @@ SIMPLER_ROADS = {
     "tracks independent": ("uncorrelated", ""),
     "tracks alike": ("equal", ""),
 }
-"""What is often assumed instead of the scene's own road: left and right, front and rear; empty as in the scene."""
+"""Simpler correlations that are often assumed: between left and right, and between front and rear; "" as in the
+scene."""
 ISOTROPIC_ROAD = "isotropic road"
 ROUNDING_DEVIATION = 1e-13
-"""Deviations below, in SI, are what rounding leaves of zero."""
+"""Standard deviation (SI) below which a value is a zero with rounding."""
 NEGLIGIBLE_OUTPUT = 1e-6
-"""An output this much smaller than on another road is zero but for rounding: no change is given."""
+"""Ratio of an output's deviation to that on another road below which it is zero but for rounding: no change is
+stated."""
 POINTS_ALONG_BODY = 13
-"""Points along the body at which its vertical acceleration is drawn."""
+"""Number of points along the body at which its vertical acceleration is drawn."""
 OVERHANG_LENGTH = 0.2
-"""How far (m) these points reach beyond the axles."""
+"""Distance (m) by which the points along the body reach beyond the axles."""
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     speed: float | None = quantity("m/s", "of tables, spectra and export; the middle one if not given", default=None)
     free_travel: float | None = quantity("m", "free travel of every output that is a travel", default=None)
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
-    """Refuse a varying speed, which is another study's."""
+    """Raise InputError for a varying speed, and for a nonlinear vehicle."""
     if scene.speeds is None:
         raise InputError(scene.file, "study", scene.study, "runs at constant speeds; with a drive use ride_drive")
     check_linear(scene, vehicle_of(scene))
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Sweep speeds and correlations; saves ``deviations.nc`` and ``.csv``, ``system.npz`` and ``.mat``, figures."""
-    from studies.ride_figures import Heading, along_figure, outputs_figure, road_figure, spectra_figure
+    """Compute standard deviations over speeds and road correlations; saves ``deviations.nc`` and ``.csv``, the linear
+    system as ``system.npz`` and ``.mat``, and figures; returns the summary."""
+    from studies.ride_figures import Heading, body_acceleration_figure, outputs_figure, road_figure, spectra_figure
 
     options = read(Options, scene.options, scene.file, "options")
     assert scene.speeds is not None
@@ -93,7 +96,9 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
             plain, "reference", vehicle=vehicle_with_points, points=SweepPoints([speed], roads)
         ).detail
         point_positions = [output.point[0] for output in vehicle_with_points.outputs if isinstance(output, PointOutput)]
-        along_figure(point_positions, sweep_of_points, first, vehicle, speed, top, folder / "body_acceleration.png")
+        body_acceleration_figure(
+            point_positions, sweep_of_points, first, vehicle, speed, top, folder / "body_acceleration.png"
+        )
     kinds = [output.kind for output in vehicle.outputs] + ["acceleration"] * len(scene.weighting)
     panels = list(zip(kinds, first.units, strict=True))
     outputs_figure(first, panels, static_loads(vehicle), top, folder / "over_speed.png")
@@ -108,14 +113,14 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "folder": str(folder),
         "failed": {},
         "results": results,
-        "answer": _answer_of_ride(first),
-        "table": [*_table(scene, vehicle, sweeps, speed, options), *notes],
+        "answer": _summary_of_deviations(first),
+        "table": [*_table_lines(scene, vehicle, sweeps, speed, options), *notes],
     }
 
 
 def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[str, str] | None]:
-    """Cases of road correlation: the scene's own, then simpler ones. Independent tracks are left out for a vehicle with
-    wheels both in the middle and at the sides, as a middle wheel is on neither track."""
+    """Cases of road correlation by name: as in the scene (None), then simpler ones. Independent tracks are left out for
+    a vehicle with wheels both in the middle and at the sides."""
     sided = {wheel.y != 0.0 for wheel in placed_wheels(scene, wheels(vehicle))}
     return {AS_WRITTEN: None} | {
         name: (left_right or scene.road.left_right, front_rear or scene.road.front_rear)
@@ -125,8 +130,8 @@ def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[
 
 
 def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
-    """The vehicle with added outputs: vertical accelerations at points along its heaviest body with pitch, if it has
-    one."""
+    """The vehicle with other outputs, vertical accelerations at points along its heaviest body with pitch; None if it
+    has no such body or only one axle."""
     bodies = [body for body in vehicle.bodies if "ry" in body.freedoms and "z" in body.freedoms]
     if not bodies or len(vehicle.axles) < 2:
         return None
@@ -140,8 +145,8 @@ def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
 
 
 def _save_deviations(results: Mapping[str, Result], folder: Path) -> None:
-    """Save the standard deviations of every engine over case, speed and output; the last speed is that of the
-    tables."""
+    """Save the standard deviations by every engine over case, speed and output, without the last speed, which is only
+    for the tables."""
     joined = join_results(results, "engine")
     saved = derived_result(
         Result(joined.data.isel(speed=slice(-1))), results, "the Lyapunov equation of nudged matrices"
@@ -150,22 +155,22 @@ def _save_deviations(results: Mapping[str, Result], folder: Path) -> None:
     write_whole(folder / "deviations.csv", saved.data["deviation"].drop_vars("unit").to_dataframe().to_csv())
 
 
-def _save_system(scene: RideScene, linear: LinearVehicle, speed: float, folder: Path) -> None:
-    """Save the linear system at one speed for use in other programs."""
+def _save_system(scene: RideScene, linear_vehicle: LinearVehicle, speed: float, folder: Path) -> None:
+    """Save the matrices of the linear system at a speed (m/s), and its covariance, for other programs."""
     from models.ride.covariance import stationary_covariance
     from models.ride.excited import vehicle_with_road
     from models.ride.export import save
     from models.ride.weighting import system_with_weightings
 
     system = system_with_weightings(
-        vehicle_with_road(linear, excitation_of(scene, linear.wheels), speed), scene.weighting
+        vehicle_with_road(linear_vehicle, excitation_of(scene, linear_vehicle.wheels), speed), scene.weighting
     )
     save(system, stationary_covariance(system), folder / "system")
 
 
-def _answer_of_ride(sweep: Sweep) -> dict[str, Any]:
-    """Standard deviation (SI) of each output at all speeds in the scene's own case; None in place of a value that is
-    not finite."""
+def _summary_of_deviations(sweep: Sweep) -> dict[str, Any]:
+    """Summary: standard deviation (SI) of each output at all speeds on the scene's road; None for values that are not
+    finite."""
     return {
         "speed": sweep.speeds[:-1].tolist(),
         "deviation": {
@@ -175,10 +180,10 @@ def _answer_of_ride(sweep: Sweep) -> dict[str, Any]:
     }
 
 
-def _table(
+def _table_lines(
     scene: RideScene, vehicle: SpatialVehicle, sweeps: dict[str, Sweep], speed: float, options: Options
 ) -> list[str]:
-    """Table of each output's standard deviation at one speed, and how much it changes on roads with simpler
+    """Lines for the screen: each output's standard deviation at a speed (m/s), and its change on roads with simpler
     correlation."""
     (name, first), *other_sweeps = sweeps.items()
     width = max(map(len, first.outputs))
@@ -193,11 +198,11 @@ def _table(
         value = _value_without_rounding(deviations_at_speed[:, i])
         changes = (*deviations_at_speed[1:, i], value * (1 + isotropic_changes.get(output, np.nan)))
         columns = "".join(f"{_change_text(other_value, value):>20}" for other_value in changes)
-        lines.append(f"    {output:<{width}}{_text(value, unit, status):>20}{columns}")
+        lines.append(f"    {output:<{width}}{_deviation_text(value, unit, status):>20}{columns}")
     reasons = zip(output_rows, first.reason[0, -1], strict=True)
     lines += [f"  {output} [{unit}]: {reason}" for (output, unit, status), reason in reasons if status != "finite"]
     deviations = dict(zip(first.outputs, deviations_at_speed[0].tolist(), strict=True))
-    lines += _travel_lines(vehicle, deviations, options.free_travel) + _loads(vehicle, deviations)
+    lines += _travel_lines(vehicle, deviations, options.free_travel) + _load_factor_lines(vehicle, deviations)
     for engine, other_value in other_sweeps:
         status_note = "" if (other_value.status == first.status).all() else "; but what is finite differs"
         lines.append(
@@ -208,13 +213,13 @@ def _table(
 
 
 def _value_without_rounding(deviations: np.ndarray) -> float:
-    """The scene's own of the standard deviations (cases,), or 0 if it is rounding of a value that vanishes by
-    symmetry."""
+    """First of the standard deviations (cases,), on the scene's road, or 0 if it is rounding of a value that vanishes
+    by symmetry."""
     largest = np.max(deviations, initial=0.0, where=np.isfinite(deviations))
     return float(deviations[0]) if deviations[0] > max(NEGLIGIBLE_OUTPUT * largest, ROUNDING_DEVIATION) else 0.0
 
 
-def _text(deviation: float, unit: str, status: str) -> str:
+def _deviation_text(deviation: float, unit: str, status: str) -> str:
     """Text of a standard deviation with its unit (mm for lengths), or its status if it is not finite."""
     if status != "finite":
         return status
@@ -230,8 +235,8 @@ def _change_text(other_value: float, deviation: float) -> str:
 
 
 def _travel_lines(vehicle: SpatialVehicle, deviations: Mapping[str, float], free_travel: float | None) -> list[str]:
-    """Lines on the share of time for which each suspension travel exceeds the free travel (m). The number of
-    exceedances per hour is added if the vehicle file has the travel rate as an output."""
+    """Lines for the screen on the share of time for which each suspension travel exceeds the free travel (m), and on
+    the exceedances per hour if the travel rate is an output."""
     parts = [output for output in vehicle.outputs if isinstance(output, PartOutput)]
     rates = {output.part: deviations[output.name] for output in parts if output.kind == "travel rate"}
     lines = []
@@ -246,8 +251,8 @@ def _travel_lines(vehicle: SpatialVehicle, deviations: Mapping[str, float], free
     return lines
 
 
-def _loads(vehicle: SpatialVehicle, deviations: Mapping[str, float]) -> list[str]:
-    """Line of text with the dynamic wheel load factors."""
+def _load_factor_lines(vehicle: SpatialVehicle, deviations: Mapping[str, float]) -> list[str]:
+    """Line for the screen, in a list, with the dynamic wheel load factors; an empty list if there are none."""
     parts = [
         f"{name} {dynamic_load_factor(deviations[name], load):.3f}" if load > 0 else f"{name} has no load to carry"
         for name, load in static_loads(vehicle).items()

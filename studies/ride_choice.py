@@ -1,4 +1,4 @@
-"""Which effects of a ride scene do its quantities call for: chosen within a tolerance, and confirmed."""
+"""Which effects of a ride scene its quantities need within a tolerance: chosen, and confirmed."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -27,19 +27,20 @@ SYSTEM = "ride"
 Progress = Callable[[str, float], None]
 
 LOWEST_CHANGE, HIGHEST_CHANGE = 1e-4, 1e3
-"""Ends of the axis of changes (percent): what is smaller or larger is drawn at the end."""
+"""Ends of the axis of changes (per cent); smaller or larger changes are drawn at the ends."""
 ELEMENTS_DRAWN = 12
-"""Elements whose activity is drawn, the most active first."""
+"""Largest number of elements whose energy activity is drawn, the most active first."""
 
 
 class Options(Samples):
-    """[options] of this study: the copies of a vehicle whose springs are bent; none for a linear one."""
+    """Keys of the table [options] of this study: Monte Carlo copies of a vehicle with nonlinear springs; none for a
+    linear vehicle."""
 
 
 @dataclass(frozen=True)
-class EffectAlone:
-    """One effect that is left out alone: predicted and confirmed changes (quantities,), and the reason why it may not
-    be left out (else empty)."""
+class SingleEffect:
+    """A single effect of a ride scene: predicted and confirmed relative changes (quantities,) if only it is left out,
+    and the reason why it may not be left out, else ""."""
 
     effect: Effect
     predicted_change: np.ndarray
@@ -48,7 +49,7 @@ class EffectAlone:
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
-    """Refuse scenes that ask no question, and options of copies where there are none."""
+    """Raise InputError for scenes without a choice of effects, and for options of copies if the vehicle is linear."""
     read(Options, scene.options, scene.file, "options")
     if goes_in_time(scene):
         opened(scene)
@@ -63,8 +64,8 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choose effects, for nonlinear springs by runs; saves ``choice.nc``, two CSV files, a figure, and files of the
-    reduced scene."""
+    """Choose the effects of a ride scene, by runs for nonlinear springs; saves ``choice.nc``, two CSV files, a figure
+    and files of the reduced scene; returns the summary."""
     check(scene, engines)
     if goes_in_time(scene):
         return save_choices([scene], engines, folder, progress)
@@ -74,43 +75,42 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         choice = chooser.choose()
         progress("single effects", 0.7)
         further = chooser.change_if_left_out_too(frozenset(choice.left_out))
-        single_effects = [_effect_alone(chooser, effect) for effect in chooser.effects]
-        watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
+        single_effects = [_single_effect(chooser, effect) for effect in chooser.effects]
+        activities = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
         write(chooser.reduced_scene_without(frozenset(choice.left_out)), folder)
     progress("what is left", 0.9)
     results = _deviation_results(scene, chooser.reduced_scene_without(frozenset(choice.left_out)))
-    _save_effect_table(scene, single_effects, choice, watts, (results, chooser.counts), folder)
-    choice_figure(scene, single_effects, choice, watts, results, folder / "choice.png")
+    _save_effect_table(scene, single_effects, choice, activities, (results, chooser.counts), folder)
+    choice_figure(scene, single_effects, choice, activities, results, folder / "choice.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
         "results": results,
-        "answer": _answer_of_choice(scene, choice, further),
-        "table": _table(scene, choice, single_effects, further),
+        "answer": _summary_of_choice(scene, choice, further),
+        "table": _table_lines(scene, choice, single_effects, further),
     }
 
 
-def _deviation_results(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
-    """Standard deviations in the complete scene and in the reduced one, as results with their errors and
-    assumptions."""
+def _deviation_results(scene: RideScene, reduced_scene: ReducedScene) -> dict[str, Result]:
+    """Results of the complete scene and of the reduced scene: standard deviations with their errors and assumptions."""
     results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
-    vehicle = replace(reduced.vehicle, limits=reduced.limits)
-    if reduced != ReducedScene.complete(scene):
-        results["what is left"] = run_scene(reduced.ride, "reference", vehicle=vehicle, error=scene.error)
+    vehicle = replace(reduced_scene.vehicle, limits=reduced_scene.limits)
+    if reduced_scene != ReducedScene.complete(scene):
+        results["what is left"] = run_scene(reduced_scene.ride, "reference", vehicle=vehicle, error=scene.error)
     return results
 
 
-def _effect_alone(chooser: Chooser, effect: Effect) -> EffectAlone:
+def _single_effect(chooser: Chooser, effect: Effect) -> SingleEffect:
     single = frozenset([effect])
-    return EffectAlone(
+    return SingleEffect(
         effect, chooser.predicted_changes(single), chooser.changes_by_modes(single), refusal_reason(single)
     )
 
 
-def _answer_of_choice(scene: RideScene, choice: RideChoice, change_by_effect: dict[Effect, float]) -> dict[str, Any]:
-    """Plain values of a ride's choice: its effects, their changes and the saving."""
+def _summary_of_choice(scene: RideScene, choice: RideChoice, change_by_effect: dict[Effect, float]) -> dict[str, Any]:
+    """Summary of a ride's choice as plain values: its effects, their changes and the saving."""
     columns = {
         "predicted": choice.predicted_change,
         "confirmed": choice.confirmed_change,
@@ -137,14 +137,14 @@ def _answer_of_choice(scene: RideScene, choice: RideChoice, change_by_effect: di
 
 def _save_effect_table(
     scene: RideScene,
-    single_effects: list[EffectAlone],
+    single_effects: list[SingleEffect],
     choice: RideChoice,
-    watts: dict[str, float],
+    activities: dict[str, float],
     runs: tuple[dict[str, Result], dict[str, int]],
     folder: Path,
 ) -> None:
-    """Save, for each effect, the predicted and confirmed changes if it alone is left out, and whether it was left out.
-    A result and a CSV file hold these; another CSV file holds the energy activity of every element."""
+    """Save, as netCDF and CSV, each effect's predicted and confirmed changes if only it is left out, and whether it was
+    left out; and as another CSV file the energy activity (W) of every element."""
     import pandas as pd
 
     results, counts = runs
@@ -161,10 +161,10 @@ def _save_effect_table(
     )
     channels = {stage: Channel(("effect", "quantity"), values, "1") for stage, values in changes.items()}
     channels |= {"left_out": Channel("effect", columns["left out"]), "not_alone_because": Channel("effect", why)}
-    axes = {"effect": effects, "quantity": list(scene.quantities), "element": list(watts)}
+    axes = {"effect": effects, "quantity": list(scene.quantities), "element": list(activities)}
     saved = result(
         scene,
-        channels | {"activity": Channel("element", list(watts.values()), "W", "energy activity")},
+        channels | {"activity": Channel("element", list(activities.values()), "W", "energy activity")},
         {name: Channel(name, values) for name, values in axes.items()},
         engine="reference",
         counts={"confirmations": choice.confirmations} | counts,
@@ -177,20 +177,20 @@ def _save_effect_table(
     }
     table = pd.DataFrame(columns | {"not alone because": why}, pd.Index(effects, name="effect"))
     write_whole(folder / "effects.csv", table.to_csv(na_rep="nan"))
-    activities = saved.data["activity"].to_pandas().rename("activity [W]")
-    write_whole(folder / "activity.csv", activities.to_csv(na_rep="nan"))
+    activity_column = saved.data["activity"].to_pandas().rename("activity [W]")
+    write_whole(folder / "activity.csv", activity_column.to_csv(na_rep="nan"))
 
 
 def choice_figure(
     scene: RideScene,
-    single_effects: list[EffectAlone],
+    single_effects: list[SingleEffect],
     choice: RideChoice,
-    watts: dict[str, float],
+    activities: dict[str, float],
     results: dict[str, Result],
     path: Path,
 ) -> None:
-    """Plot the changes by leaving out each effect alone and all together, with the tolerance, and the energy activity
-    of each element."""
+    """Save a figure of the changes if each effect alone, or all chosen effects, are left out, with the tolerance; and
+    of each element's energy activity."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, save, subplots
 
     names = [
@@ -217,35 +217,35 @@ def choice_figure(
         title="What leaving out an effect changes",
     )
     changes_axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    _plot_activity(activity_axis, watts)
+    _plot_activity(activity_axis, activities)
     add_heading(figure, scene.title, results)
     save(figure, path)
 
 
-def _plot_activity(axis: Any, watts: dict[str, float]) -> None:
-    """Bar chart of each element's share of the mean power, from the activities ``watts`` (W). Inertias under white
-    noise are left out, as their activity is not finite."""
+def _plot_activity(axis: Any, activities: dict[str, float]) -> None:
+    """Draw a bar chart of each element's share of the mean power, from the ``activities`` (W); infinite ones, of
+    inertias under white noise, are left out."""
     from models.drawing.figures import BLUE
 
-    finite = {name: value for name, value in watts.items() if np.isfinite(value)}
+    finite = {name: value for name, value in activities.items() if np.isfinite(value)}
     total = sum(finite.values())
     shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS_DRAWN][::-1]
     axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color=BLUE, alpha=0.7)
-    without = [name for name in watts if name not in finite]
+    without = [name for name in activities if name not in finite]
     note = f"\n{len(without)} inertias are unbounded under white noise" if without else ""
     axis.set(title="Energy activity: blind to the question", xlabel=f"share of the mean power [%]{note}")
 
 
 def percent_text(relative_change: float) -> str:
-    """A relative change as text, in per cent."""
+    """Text of a relative change in per cent, with its sign."""
     digits = "+.2g" if abs(relative_change) < 0.1 else "+,.0f"
     return f"{100 * relative_change:{digits}} %" if np.isfinite(relative_change) else "without end"
 
 
-def _table(
-    scene: RideScene, choice: RideChoice, single_effects: list[EffectAlone], change_by_effect: dict[Effect, float]
+def _table_lines(
+    scene: RideScene, choice: RideChoice, single_effects: list[SingleEffect], change_by_effect: dict[Effect, float]
 ) -> list[str]:
-    """Text of the choice."""
+    """Lines for the screen on the choice of effects, their changes and the saving."""
     tolerance = f"{100 * (scene.tolerance or 0):g} %"
     lines = [f"  left out: {', '.join(effect.name for effect in choice.left_out) or 'nothing'}"]
     lines += [f"    {effect.name}: {effect.says}" for effect in choice.left_out]
@@ -281,7 +281,7 @@ def _table(
 
 
 def saving_lines(choice: RideChoice, tolerance: str) -> list[str]:
-    """Text on steps and calls at equal accuracy before and after the choice."""
+    """Lines for the screen on steps and calls at equal accuracy before and after the choice of effects."""
     cost_before, cost_after = choice.cost_before, choice.cost_after
     lines = [
         f"  a run confirms {1e3 * cost_before.step:.3g} ms as the longest step of the classical Runge-Kutta method "

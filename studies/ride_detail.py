@@ -1,4 +1,4 @@
-"""How much vehicle and how much road does a question need: error of every output by model and road, beside its cost."""
+"""Necessary detail of vehicle and road model: error of every output by vehicle and road model, and computing time."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -32,15 +32,15 @@ ROADS_BY_KNOWLEDGE = {
     "two tracks, axles independent": ("modelled", "uncorrelated"),
     "two tracks, delay": ("modelled", "delayed"),
 }
-"""Roads by how much they know: left and right, front and rear."""
+"""Road models by name, from the simplest: correlation of left and right, and of front and rear."""
 TIMING_REPEATS = 5
-"""Timings of a point, interleaved."""
+"""Number of interleaved timings of each vehicle."""
 Errors = dict[tuple[str, str], np.ndarray]
-"""Largest relative error of every output by model and road."""
+"""For each (vehicle model, road model), the largest relative error of every output (outputs,)."""
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     simpler: list[str] = Field(
         ["quarter_car", "half_car", "seven_freedoms"],
@@ -49,7 +49,7 @@ class Options(Strict):
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
-    """Refuse a varying speed and vehicles that share no output with the scene's."""
+    """Raise InputError for a varying speed, and for vehicles that have no output in common with the scene's."""
     if scene.speeds is None:
         raise InputError(scene.file, "study", scene.study, "runs at constant speeds; with a drive use ride_drive")
     full, simpler = vehicle_of(scene), _simpler_vehicles(scene)
@@ -63,7 +63,8 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Compare; saves ``errors.nc`` and ``.csv``, and a figure."""
+    """Compare vehicle and road models with the scene's; saves ``errors.nc`` and ``.csv``, and a figure; returns the
+    summary."""
     from studies.ride_figures import Heading, detail_figure
 
     check(scene, engines)
@@ -71,7 +72,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     models, results = _vehicles_by_name([*_simpler_vehicles(scene), full]), dict[str, Result]()
     for i, (name, vehicle) in enumerate(models.items()):
         progress(name, i / len(models))
-        roads = {road: ROADS_BY_KNOWLEDGE[road] for road in _roads(vehicle)}
+        roads = {road: ROADS_BY_KNOWLEDGE[road] for road in _road_names(vehicle)}
         points = SweepPoints(correlations=roads)
         results[name] = run_scene(plain, "reference", vehicle=vehicle, points=points, error=scene.error)
     sweeps = {name: run.detail for name, run in results.items()}
@@ -98,7 +99,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "failed": {},
         "results": results,
         "answer": answer,
-        "table": _table(errors, costs, full),
+        "table": _table_lines(errors, costs, full),
     }
 
 
@@ -112,7 +113,7 @@ def _simpler_vehicles(scene: RideScene) -> list[SpatialVehicle]:
 
 
 def _vehicles_by_name(vehicles: list[SpatialVehicle]) -> dict[str, SpatialVehicle]:
-    """Vehicles under names such as "7 freedoms"; the file's name is added where two vehicles have the same number of
+    """Vehicles by names such as "7 freedoms"; the file's name is added if several vehicles have the same number of
     freedoms."""
     counts = [len(vehicle.coordinates()) for vehicle in vehicles]
     return {
@@ -121,20 +122,18 @@ def _vehicles_by_name(vehicles: list[SpatialVehicle]) -> dict[str, SpatialVehicl
     }
 
 
-def _roads(vehicle: SpatialVehicle) -> list[str]:
-    """Kinds of road whose effect on a vehicle can differ: all, or "one track" for a vehicle whose wheels all lie in its
-    middle."""
+def _road_names(vehicle: SpatialVehicle) -> list[str]:
+    """Names of the road models that differ for a vehicle: all, or only "one track" if all wheels are in the middle."""
     return list(ROADS_BY_KNOWLEDGE) if any(wheel.y for wheel in wheels(vehicle)) else ["one track"]
 
 
-def _computing_times(scene: RideScene, models: dict[str, SpatialVehicle]) -> dict[str, list[float]]:
-    """Computing times (s), TIMING_REPEATS for each vehicle, to solve for the covariance at one speed. The vehicles take
-    turns."""
+def _computing_times(scene: RideScene, vehicle_models: dict[str, SpatialVehicle]) -> dict[str, list[float]]:
+    """Computing times (s) of the covariance at one speed, TIMING_REPEATS for each vehicle, in turns."""
     assert scene.speeds is not None
     speed = float(scene.speeds.all()[0])
     systems = {
         name: vehicle_with_road(linear_vehicle(vehicle)(speed), excitation_of(scene, wheels(vehicle)), speed)
-        for name, vehicle in models.items()
+        for name, vehicle in vehicle_models.items()
     }
     seconds: dict[str, list[float]] = {name: [] for name in systems}
     for _ in range(TIMING_REPEATS):
@@ -148,7 +147,8 @@ def _computing_times(scene: RideScene, models: dict[str, SpatialVehicle]) -> dic
 def _save_errors(
     scene: RideScene, errors: Errors, names: list[str], results: Mapping[str, Result], folder: Path
 ) -> None:
-    """Save relative errors: a row per output, a column per model and road; empty where a model lacks the output."""
+    """Save relative errors: a row per output, a column per vehicle and road model; empty if a vehicle lacks the
+    output."""
     heads = [f"{model}, {road}" for model, road in errors]
     saved = result(
         scene,
@@ -161,8 +161,9 @@ def _save_errors(
     write_whole(folder / "errors.csv", table.to_csv())
 
 
-def _table(errors: Errors, costs: dict[str, list[float]], full_vehicle: SpatialVehicle) -> list[str]:
-    """Table of the largest error of each vehicle model on each road, with a column per kind of output."""
+def _table_lines(errors: Errors, computing_times: dict[str, list[float]], full_vehicle: SpatialVehicle) -> list[str]:
+    """Lines for the screen: the largest error of each vehicle model on each road model, with a column per kind of
+    output."""
     kinds = np.array([output.kind for output in full_vehicle.outputs])
     shown = list(dict.fromkeys(kinds.tolist()))
     width = max(len(f"{model}, {road}") for model, road in errors) + 2
@@ -174,7 +175,7 @@ def _table(errors: Errors, costs: dict[str, list[float]], full_vehicle: SpatialV
         of_kinds = [values[(kinds == kind) & np.isfinite(values)] for kind in shown]
         worst = [f"{100 * max(of_kind, key=abs):+.1f} %" if len(of_kind) else "-" for of_kind in of_kinds]
         columns = "".join(f"{text:>22}" for text in worst)
-        lines.append(f"    {f'{model}, {road}':<{width}}{cost(costs[model]):>30}{columns}")
+        lines.append(f"    {f'{model}, {road}':<{width}}{cost(computing_times[model]):>30}{columns}")
     return lines
 
 

@@ -1,4 +1,4 @@
-"""How much a vehicle moves while it speeds up, brakes and stands, and how wrong it is to take each speed alone."""
+"""Standard deviations of a vehicle along a drive at varying speed, and the error of the quasi-stationary solution."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -20,13 +20,14 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     outputs: list[str] = Field(default_factory=list, description="outputs to draw; accelerations, tyre forces if none")
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
-    """Refuse constant speeds, which are another study's, a vehicle whose matrices change, unknown outputs."""
+    """Raise InputError for constant speeds, for a vehicle whose matrices change with the speed, and for unknown
+    outputs."""
     if scene.drive is None:
         raise InputError(scene.file, "study", scene.study, "runs along a drive; at constant speeds use ride")
     vehicle = vehicle_of(scene)
@@ -41,7 +42,8 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Follow the drive with the linear vehicle of the first engine; saves ``drive.nc`` and a figure."""
+    """Compute standard deviations along the drive with the linear vehicle of the first engine; saves ``drive.nc`` and a
+    figure, and returns the summary."""
     from studies.ride_figures import Heading, drive_figure
 
     check(scene, engines)
@@ -59,8 +61,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "folder": str(folder),
         "failed": {},
         "results": {engine: result},
-        "answer": _answer_of_drive(drive, quasi_stationary),
-        "table": [f"  linear vehicle of {engine}", *_table(drive, quasi_stationary, units)],
+        "answer": _summary_of_drive(drive, quasi_stationary),
+        "table": [f"  linear vehicle of {engine}", *_table_lines(drive, quasi_stationary, units)],
     }
 
 
@@ -68,7 +70,7 @@ def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _answer_of_drive(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> dict[str, Any]:
+def _summary_of_drive(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> dict[str, Any]:
     gaps = quasi_stationary_gaps(drive, quasi_stationary)
     finite = np.isfinite(drive.deviation).all(axis=0)
     worst = [float(gaps[np.abs(gaps[:, i]).argmax(), i]) if finite[i] else None for i in range(len(finite))]
@@ -78,9 +80,9 @@ def _answer_of_drive(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> dict[
     }
 
 
-def _table(drive: VaryingSpeed, quasi_stationary: np.ndarray, units: list[str]) -> list[str]:
-    """Table with each output's largest standard deviation along the drive, and where the quasi-stationary solution,
-    which takes each speed by itself, is most wrong."""
+def _table_lines(drive: VaryingSpeed, quasi_stationary: np.ndarray, units: list[str]) -> list[str]:
+    """Lines for the screen: each output's largest standard deviation along the drive, and the largest error of the
+    quasi-stationary solution, which takes each speed as constant."""
     heads = [f"{name} [{unit}]" for name, unit in zip(drive.names, units, strict=True)]
     width = max(map(len, heads))
     lines = [f"    {'':<{width}}{'largest':>12}{'at [s]':>8}   each speed by itself is most wrong, % of the largest"]

@@ -1,4 +1,4 @@
-"""Figures of the ride studies."""
+"""Figures of the ride studies: standard deviations over speed, spectra, roads, and drives."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -40,7 +40,7 @@ from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
 CORRELATION_COLOURS = (DARK, BLUE, SKY, VERMILION, PINK)
-"""One colour per correlation: the scene's own, then two of the axles and two of the tracks."""
+"""Colours of the cases of road correlation: as in the scene, then two for the axles and two for the tracks."""
 CORRELATION_STYLES = ("-", "--", ":", "--", ":")
 
 
@@ -51,17 +51,17 @@ class Heading(NamedTuple):
     results: Results
 
 
-def along_figure(
+def body_acceleration_figure(
     point_positions: Sequence[float],
     sweep_of_points: Sweep,
-    over: Sweep,
+    speed_sweep: Sweep,
     vehicle: SpatialVehicle,
     speed: float,
     heading: Heading,
     path: Path,
 ) -> None:
-    """Plot the standard deviation of the body's vertical acceleration in each case of road correlation: left along the
-    body at one speed, right over speed for the output nearest to the middle of the axles."""
+    """Save a figure of the standard deviation of the body's vertical acceleration in each case of road correlation:
+    along the body at a speed (m/s), and over speed for the output nearest to the middle of the axles."""
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     name = _middle_acceleration(vehicle)
     for i, case in enumerate(sweep_of_points.cases):
@@ -73,20 +73,25 @@ def along_figure(
             label=case,
         )
         if name:
-            right.plot(over.speeds[:-1], over.of(case, name)[:-1], CORRELATION_STYLES[i], color=CORRELATION_COLOURS[i])
+            right.plot(
+                speed_sweep.speeds[:-1],
+                speed_sweep.of(case, name)[:-1],
+                CORRELATION_STYLES[i],
+                color=CORRELATION_COLOURS[i],
+            )
     for x in vehicle.axles:
         left.axvline(x, color="0.8", zorder=0)
     left.set(xlabel="x forward [m]  (grey: axles)", title=f"Vertical acceleration along the body, {speed:g} m/s")
     right.set(xlabel="speed [m/s]", title=f"At {name!r} over speed" if name else "")
     for axis in (left, right):
         axis.set(ylabel="standard deviation [m/s²]", ylim=(0, None))
-        _say_where_none(axis)
+        _note_if_no_finite_curve(axis)
     legend_below(figure, left, columns=2)
     _save_figure(figure, heading, ": which correlations of the road matter where", path)
 
 
 def _middle_acceleration(vehicle: SpatialVehicle) -> str:
-    """The vertical acceleration nearest to the middle of the axles."""
+    """Name of the vertical acceleration output nearest to the middle of the axles, "" if there is none."""
     middle = (vehicle.axles[0] + vehicle.axles[-1]) / 2
     points = [o for o in vehicle.outputs if o.kind == "acceleration" and getattr(o, "axis", None) == (0.0, 0.0, 1.0)]
     heaviest = max(vehicle.bodies, key=lambda body: body.mass).name
@@ -98,31 +103,42 @@ NO_FINITE_VARIANCE = "\n(no finite variance)"
 
 
 def outputs_figure(
-    swept: Sweep, kind_and_unit: Sequence[tuple[str, str]], static: Mapping[str, float], heading: Heading, path: Path
+    speed_sweep: Sweep,
+    kind_and_unit: Sequence[tuple[str, str]],
+    static_loads: Mapping[str, float],
+    heading: Heading,
+    path: Path,
 ) -> None:
-    """Plot the standard deviations of the outputs over speed in the scene's own case, with a panel for each kind and
-    unit in ``kind_and_unit``."""
+    """Save a figure of the outputs' standard deviations over speed on the scene's road, with a panel for each kind and
+    unit in ``kind_and_unit``; tyre forces are divided by their ``static_loads`` (N)."""
     groups = list(dict.fromkeys(kind_and_unit))
     figure, axes = panels(len(groups), min(2, len(groups)), 3.4)
     for axis, (kind, si) in zip(axes, groups, strict=True):
         unit, factor = _shown_unit(si)
         axis_label = "deviation / static load [-]" if kind == "tyre force" else f"standard deviation [{unit}]"
-        names = [name for name, unit_of in zip(swept.outputs, kind_and_unit, strict=True) if unit_of == (kind, si)]
-        curves = {name: factor * swept.of(swept.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
+        names = [
+            name for name, unit_of in zip(speed_sweep.outputs, kind_and_unit, strict=True) if unit_of == (kind, si)
+        ]
+        curves = {
+            name: factor * speed_sweep.of(speed_sweep.cases[0], name)[:-1] / static_loads.get(name, 1.0)
+            for name in names
+        }
         for label, values in _distinct_curves(curves).items():
             axis.plot(
-                swept.speeds[:-1], values, label=label if np.isfinite(values).any() else label + NO_FINITE_VARIANCE
+                speed_sweep.speeds[:-1],
+                values,
+                label=label if np.isfinite(values).any() else label + NO_FINITE_VARIANCE,
             )
         if not np.isfinite(list(curves.values())).any():
-            axis.set(xlim=(0, swept.speeds.max()), yticks=[])
+            axis.set(xlim=(0, speed_sweep.speeds.max()), yticks=[])
         axis.set(xlabel="speed [m/s]", ylabel=axis_label, ylim=(0, None), title=kind.capitalize())
-        _say_where_none(axis)
-        _name_below(axis)
+        _note_if_no_finite_curve(axis)
+        _legend_under_panel(axis)
     _save_figure(figure, heading, ": standard deviations over speed", path)
 
 
-def _say_where_none(axis: Axes) -> None:
-    """Write into a panel that no curve in it is finite, as for forces under white noise."""
+def _note_if_no_finite_curve(axis: Axes) -> None:
+    """Write "no finite variance" into a panel in which no curve is finite, as for forces under white noise."""
     if not any(np.isfinite(line.get_ydata()).any() for line in axis.lines if line.get_transform() == axis.transData):
         axis.text(0.5, 0.5, "no finite variance", transform=axis.transAxes, ha="center")
         axis.set_yticks([])
@@ -133,17 +149,17 @@ def _unit_text(unit: str) -> str:
 
 
 def _squared_unit(unit: str) -> str:
-    """The square of a unit as text, with brackets around a unit of several symbols."""
+    """Text of the square of a unit, with brackets around a unit of several symbols."""
     return f"{unit}²" if unit.isalpha() else f"({_unit_text(unit)})²"
 
 
 def _shown_unit(unit: str) -> tuple[str, float]:
-    """Unit in which an SI quantity is plotted (mm for m), and the factor that converts values to it."""
+    """Unit in which an SI quantity is plotted (mm for m), and the factor that converts SI values to it."""
     return ("mm", 1e3) if unit == "m" else (_unit_text(unit), 1.0)
 
 
 def _distinct_curves(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Curves by name; curves that coincide, mostly those of left and right, become one curve with both names."""
+    """Curves by name; coinciding curves, mostly of left and right, become one curve with both names."""
     groups: list[tuple[list[str], np.ndarray]] = []
     for name, values in curves.items():
         for names, known in groups:
@@ -156,43 +172,53 @@ def _distinct_curves(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {"\n= ".join(names): values for names, values in groups}
 
 
-def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, heading: Heading, path: Path) -> None:
-    """One-sided spectra of the accelerations and tyre forces over frequency at one speed; no figure where all is 0."""
+def spectra_figure(
+    linear_vehicle: LinearVehicle, excitation: Excitation, speed: float, heading: Heading, path: Path
+) -> None:
+    """Save a figure of the one-sided spectral densities of accelerations and tyre forces over frequency at a speed
+    (m/s); no figure if all are 0."""
     frequency = np.geomspace(0.1, 100.0, 800)
-    densities = one_sided(linear, excitation, speed, frequency)
-    moving_kinds = {output.kind for i, output in enumerate(linear.outputs) if densities[:, i].any()}
+    densities = one_sided(linear_vehicle, excitation, speed, frequency)
+    moving_kinds = {output.kind for i, output in enumerate(linear_vehicle.outputs) if densities[:, i].any()}
     shown = [kind for kind in ("acceleration", "tyre force") if kind in moving_kinds]
     if not shown:
         return
     figure, axes = subplots(1, len(shown), figsize=(COLUMN_WIDTH, 4.2), squeeze=False)
     units = {"acceleration": "(m/s²)²/Hz", "tyre force": "N²/Hz"}
     for axis, kind in zip(axes[0], shown, strict=True):
-        curves = {output.name: densities[:, i] for i, output in enumerate(linear.outputs) if output.kind == kind}
+        curves = {
+            output.name: densities[:, i] for i, output in enumerate(linear_vehicle.outputs) if output.kind == kind
+        }
         for label, values in _distinct_curves(curves).items():
             axis.loglog(frequency, values, label=label)
         axis.set(xlabel="frequency [Hz]", ylabel=f"one-sided density [{units[kind]}]", title=kind.capitalize())
         top = max(values.max() for values in curves.values())
         axis.set_ylim(1e-6 * top, 2 * top)
-        _name_below(axis)
+        _legend_under_panel(axis)
     _save_figure(figure, heading, f": spectra at {speed:g} m/s", path)
 
 
-def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading: Heading, path: Path) -> None:
-    """Plot the spectrum of the left track and the coherency of both tracks, measured, fitted, and for an isotropic
-    road."""
+def road_figure(
+    road: TwoTrackRoad, half_track: float, fitted_road: FittedRoad | None, heading: Heading, path: Path
+) -> None:
+    """Save a figure of the spectrum of the left track and the coherency of both tracks: of the road model, measured if
+    ``fitted_road`` is given, and of an isotropic road. half_track : half of the track width (m)."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
-    if fitted is not None:
-        spectra = fitted.spectra
+    if fitted_road is not None:
+        spectra = fitted_road.spectra
         left.loglog(spectra.wavenumber, spectra.left, color=GREY, linewidth=0.8, label="measured")
         right.semilogx(spectra.wavenumber, spectra.coherency, color=GREY, linewidth=0.8, label="measured")
         right.axhline(spectra.chance_coherency(), color=GREY, linestyle=":", label="what chance alone shows (95 %)")
-    left.loglog(wavenumber, road.spectrum(wavenumber, y), "k", label="mean and roll process")
-    right.semilogx(wavenumber, road.coherency(wavenumber, y, -y), "k", label="mean and roll process")
+    left.loglog(wavenumber, road.spectrum(wavenumber, half_track), "k", label="mean and roll process")
+    right.semilogx(wavenumber, road.coherency(wavenumber, half_track, -half_track), "k", label="mean and roll process")
     if road.mean.cutoff is None:
-        isotropic_road = isotropic_like(road, y)
+        isotropic_road = isotropic_like(road, half_track)
         right.semilogx(
-            wavenumber, isotropic_road.coherency(wavenumber, 2 * y), "k--", label="isotropic, same track spectrum"
+            wavenumber,
+            isotropic_road.coherency(wavenumber, 2 * half_track),
+            "k--",
+            label="isotropic, same track spectrum",
         )
     left.set(xlabel="wavenumber [rad/m]", ylabel="two-sided density [m³]", title="Spectrum of the left track")
     right.set(xlabel="wavenumber [rad/m]", ylabel="coherency [-]", ylim=(0, 1.05), title="Left and right track")
@@ -203,13 +229,17 @@ def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading
 def detail_figure(
     errors: Mapping[tuple[str, str], np.ndarray],
     names: Sequence[str],
-    cost: Mapping[str, float],
+    computing_times: Mapping[str, float],
     heading: Heading,
     path: Path,
 ) -> None:
-    """Table of colours with the errors of all outputs by model and road, and the cost of a covariance."""
+    """Save a coloured table of the errors of all outputs by vehicle and road model, with the computing time (s) of a
+    covariance."""
     share = 0.66 * COLUMN_WIDTH / len(errors)
-    heads = [wrapped_text(f"{model}\n{1e3 * cost[model]:.2g} ms\n{road}", share, SMALL_TEXT) for model, road in errors]
+    heads = [
+        wrapped_text(f"{model}\n{1e3 * computing_times[model]:.2g} ms\n{road}", share, SMALL_TEXT)
+        for model, road in errors
+    ]
     values = 100 * np.array(list(errors.values())).T
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 0.3 * len(names) + 2.2))
     picture = axis.imshow(values, cmap="RdBu_r", vmin=-60, vmax=60, aspect="auto")
@@ -234,49 +264,52 @@ def detail_figure(
 
 
 def _signed_text(percent: float) -> str:
-    """Text of a whole number with its sign; no sign for zero."""
+    """Text of a percentage as a whole number with its sign; no sign for zero."""
     return f"{percent:+.0f}" if round(percent) else "0"
 
 
 def drive_figure(
-    varied: VaryingSpeed,
+    varying_speed: VaryingSpeed,
     quasi_stationary: np.ndarray,
     drawn_outputs: Sequence[str],
     kind_and_unit: Mapping[str, tuple[str, str]],
     heading: Heading,
     path: Path,
 ) -> None:
-    """Plot the standard deviations along a drive (dashed: each speed taken by itself), with a panel of the speed below
-    them."""
+    """Save a figure of the standard deviations along a drive (dashed: quasi-stationary), with the speed below them."""
     groups = list(dict.fromkeys(kind_and_unit[name] for name in drawn_outputs))
     heights = [3.0] * len(groups) + [1.3]
     figure, axes = subplots(
         len(heights), 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.8), sharex=True, height_ratios=heights, squeeze=False
     )
     for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
-        columns = {name: varied.names.index(name) for name in drawn_outputs if kind_and_unit[name] == (kind, unit)}
-        pairs = {name: np.concatenate([varied.deviation[:, i], quasi_stationary[:, i]]) for name, i in columns.items()}
+        columns = {
+            name: varying_speed.names.index(name) for name in drawn_outputs if kind_and_unit[name] == (kind, unit)
+        }
+        pairs = {
+            name: np.concatenate([varying_speed.deviation[:, i], quasi_stationary[:, i]]) for name, i in columns.items()
+        }
         for label, both_curves in _distinct_curves(pairs).items():
             exact, quasi = np.split(both_curves, 2)
             if not np.isfinite(exact).all():  # what is left at standstill is rounding
                 axis.plot([], label=label + NO_FINITE_VARIANCE)
                 continue
-            (line,) = axis.plot(varied.time, exact, label=label)
-            axis.plot(varied.time, quasi, "--", color=line.get_color(), linewidth=0.8)
+            (line,) = axis.plot(varying_speed.time, exact, label=label)
+            axis.plot(varying_speed.time, quasi, "--", color=line.get_color(), linewidth=0.8)
         axis.set(ylabel=f"standard deviation [{_unit_text(unit)}]", title=kind.capitalize(), ylim=(0, None))
-        _name_below(axis, 0.03)
-    axes[-1, 0].plot(varied.time, varied.speed, color="0.3")
+        _legend_under_panel(axis, 0.03)
+    axes[-1, 0].plot(varying_speed.time, varying_speed.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
     _save_figure(figure, heading, "\nSolid: exact; dashed: each speed taken by itself", path)
 
 
 MOST_OUTPUTS = 12
-"""Outputs that a figure shows."""
+"""Largest number of outputs in a figure."""
 
 
 def nonlinear_figure(nonlinear: Nonlinear, heading: Heading, path: Path) -> None:
-    """Plot each output's standard deviation over speed by small motion, statistical linearisation and Monte Carlo. Open
-    marks: statistical linearisation is no longer good by its own measure."""
+    """Save a figure of each output's standard deviation over speed by small motion, statistical linearisation and Monte
+    Carlo copies; open marks show where statistical linearisation states a large error."""
     outputs = nonlinear.shown.vehicle.outputs
     figure, axes = _few_panels(min(len(outputs), MOST_OUTPUTS))
     left = nonlinear.of("left_out")
@@ -323,13 +356,19 @@ def nonlinear_figure(nonlinear: Nonlinear, heading: Heading, path: Path) -> None
 
 
 def engine_spectra_figure(
-    runs: Mapping[str, Ride], linear: LinearVehicle, road: Excitation, speed: float, heading: Heading, path: Path
+    runs: Mapping[str, Ride],
+    linear_vehicle: LinearVehicle,
+    road: Excitation,
+    speed: float,
+    heading: Heading,
+    path: Path,
 ) -> None:
-    """Plot spectra of the engines' runs, by Welch's method, over those of the statistically linearised vehicle."""
+    """Save a figure of the spectra of the engines' runs, by Welch's method, and of the statistically linearised
+    vehicle."""
     frequency = np.geomspace(0.3, 40.0, 300)
-    expected = one_sided(linear, road, speed, frequency)
+    expected = one_sided(linear_vehicle, road, speed, frequency)
     first = next(iter(runs.values()))
-    shown = [i for i in range(len(linear.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST_OUTPUTS]
+    shown = [i for i in range(len(linear_vehicle.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST_OUTPUTS]
     figure, axes = _few_panels(len(shown))
     for axis, i in zip(axes, shown, strict=True):
         for (engine, run), (line, width) in zip(runs.items(), (("-", 2.2), ("--", 1.0)), strict=False):
@@ -337,7 +376,7 @@ def engine_spectra_figure(
             label = f"{LABELS[engine]}, nonlinear in time"
             axis.loglog(f, density[:, i], line, linewidth=width, color=ENGINES[engine], label=label)
         axis.loglog(frequency, expected[:, i], "k", label="statistical linearisation")
-        output, top = linear.outputs[i], expected[:, i].max()
+        output, top = linear_vehicle.outputs[i], expected[:, i].max()
         unit = f"one-sided density [{_squared_unit(output.unit)}/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
     legend_below(figure, axes[0], columns=3)
@@ -345,15 +384,14 @@ def engine_spectra_figure(
 
 
 def _few_panels(panel_count: int) -> tuple[Figure, list[Axes]]:
-    """Figure with two or three small panels side by side."""
+    """Figure and axes of small panels, two or three side by side."""
     figure, axes = panels(panel_count, 2 if panel_count in (1, 2, 4) else 3, 2.6)
     figure.set_figheight(figure.get_figheight() + 0.8)  # for title and legend
     return figure, axes
 
 
-def _name_below(axis: Axes, drop: float = 0.18) -> None:
-    """Put the legend below a panel, lower by the share ``drop`` of the panel's height to leave room for the axis
-    label."""
+def _legend_under_panel(axis: Axes, drop: float = 0.18) -> None:
+    """Put the legend below a panel, ``drop`` times the panel's height lower to leave room for the axis label."""
     axis.legend(fontsize=SMALL_TEXT, loc="upper center", bbox_to_anchor=(0.5, -drop), ncols=2)
 
 

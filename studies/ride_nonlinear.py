@@ -1,6 +1,6 @@
-"""How much a vehicle with bent springs moves on a random road, and when its covariance is no longer good.
+"""Motion of a vehicle with nonlinear springs on a random road: standard deviations, and the error of linearisation.
 
-Where tyres may lift, the answer is that of the copies: what stands for the vehicle over speed keeps them on the road.
+If tyres may lift off, results are those of Monte Carlo copies: the linearised vehicle keeps its tyres on the road.
 """
 
 from collections.abc import Callable
@@ -27,11 +27,11 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Sampling):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
-    """Refuse a varying speed, a vehicle that is linear, weightings, and damped tyres on a road without rates."""
+    """Raise InputError for a varying speed, a linear vehicle, weightings, and damped tyres on a road without rates."""
     if scene.speeds is None:
         raise InputError(scene.file, "study", scene.study, "runs at constant speeds; with a drive use ride_drive")
     vehicle = vehicle_of(scene)
@@ -51,7 +51,8 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Sweep the speeds, run copies and engines in time; saves ``nonlinear.nc`` and two figures."""
+    """Compute standard deviations over speed by statistical linearisation, Monte Carlo copies and engines' runs; saves
+    ``nonlinear.nc`` and two figures, and returns the summary."""
     from studies.ride_figures import Heading, engine_spectra_figure, nonlinear_figure
 
     check(scene, engines)
@@ -78,8 +79,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "folder": str(folder),
         "failed": failed,
         "results": results,
-        "answer": _answer_of_ride(answer),
-        "table": _table(answer, speed)
+        "answer": _summary_of_deviations(answer),
+        "table": _table_lines(answer, speed)
         + _lift_off_shares(vehicle, answer, runs)
         + _time_table(runs, answer, road, speed),
     }
@@ -89,9 +90,9 @@ def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _answer_of_ride(nonlinear: Nonlinear) -> dict[str, Any]:
-    """Standard deviation and mean (SI) of each output at all speeds; None in place of a value that is not finite. For
-    tyres that lift they are those of the Monte Carlo copies, at the copies' speeds."""
+def _summary_of_deviations(nonlinear: Nonlinear) -> dict[str, Any]:
+    """Summary: standard deviation and mean (SI) of each output at all speeds, None for values that are not finite; for
+    tyres that may lift off, those of the Monte Carlo copies at the copies' speeds."""
     copies = list(nonlinear.copies.values())
     table: dict[str, Any] = {"speed": list(nonlinear.copies) if nonlinear.tyres_may_lift else nonlinear.speeds.tolist()}
     for key, on_road in (("deviation", nonlinear.deviation), ("mean", nonlinear.of("mean"))):
@@ -107,9 +108,9 @@ def _answer_of_ride(nonlinear: Nonlinear) -> dict[str, Any]:
     return table
 
 
-def _table(nonlinear: Nonlinear, speed: float) -> list[str]:
-    """Text on the equivalent gains of the springs at one speed, and on the Monte Carlo copies with the errors of both
-    linear vehicles relative to them."""
+def _table_lines(nonlinear: Nonlinear, speed: float) -> list[str]:
+    """Lines for the screen: the springs' equivalent gains at a speed (m/s), and the Monte Carlo copies with the errors
+    of both linear vehicles relative to them."""
     lines, shown = [f"  at {speed:g} m/s"], nonlinear.shown
     for name, spring in shown.springs.items():
         k, c = spring.equivalent_gains
@@ -133,21 +134,23 @@ def _table(nonlinear: Nonlinear, speed: float) -> list[str]:
     return lines
 
 
-def _errors_at_speed(nonlinear: Nonlinear, speed: float, i: int) -> str:
-    """Text on the errors of small motion and of statistical linearisation, if the speed is one of the sweep's."""
+def _errors_at_speed(nonlinear: Nonlinear, speed: float, output_number: int) -> str:
+    """Text on the errors of small motion and of statistical linearisation of an output at a speed (m/s); ""
+    if the sweep does not have the speed."""
     matching = np.flatnonzero(np.isclose(nonlinear.speeds, speed))
     if not len(matching):
         return ""
-    true = nonlinear.copies[speed].deviation[i]
+    true = nonlinear.copies[speed].deviation[output_number]
     small, replaced = (
-        100 * (values[matching[0], i] / true - 1) for values in (nonlinear.small_motion, nonlinear.deviation)
+        100 * (values[matching[0], output_number] / true - 1)
+        for values in (nonlinear.small_motion, nonlinear.deviation)
     )
     return f"   small motion {small:+.1f} %, statistical linearisation {replaced:+.1f} %"
 
 
 def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: Nonlinear, runs: dict[str, Ride]) -> list[str]:
-    """Lines on two shares of time for each tyre. One is for how long a tyre bound to the road would pull, by a Gaussian
-    law; the other for how long it is in the air in the engines' runs. Empty if no tyre lifts."""
+    """Lines for the screen on two shares of time for each tyre: for which a tyre that cannot lift off would pull, by a
+    Gaussian law, and for which it is in the air in the engines' runs. Empty if no tyre may lift off."""
     from scipy.special import ndtr
 
     if not vehicle.lifts:
@@ -175,7 +178,7 @@ def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: Nonlinear, runs: dict[s
 
 
 def _time_table(runs: dict[str, Ride], nonlinear: Nonlinear, road: Excitation, speed: float) -> list[str]:
-    """Table of the engines' standard deviations next to those of statistical linearisation, and of the difference
+    """Lines for the screen: the engines' standard deviations beside statistical linearisation, and the difference
     between the engines."""
     if not runs:
         return []

@@ -1,4 +1,4 @@
-"""One scene in one or all implementations: results, a figure, and how far the implementations agree."""
+"""A scene in one or all implementations: results, a figure, and differences between the implementations."""
 
 from collections.abc import Callable
 from itertools import combinations
@@ -19,7 +19,8 @@ Progress = Callable[[str, float], None]
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Run the scene, save ``ENGINE.nc`` and ``states.png``; a run that fails is reported, the others go on."""
+    """Run the scene in each engine; saves ``ENGINE.nc`` and ``states.png``, and returns the summary. A failed run is
+    reported, and the others are run."""
     results: dict[str, Result] = {}
     failed: dict[str, str] = {}
     for i, engine in enumerate(engines):
@@ -41,7 +42,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     return {
         "scene": scene.title,
         "folder": str(folder),
-        "runs": {engine: _line(result) for engine, result in results.items()},
+        "runs": {engine: _run_summary(result) for engine, result in results.items()},
         "failed": failed,
         "results": results,
         "largest difference of states": differences_of_engines(results),
@@ -50,30 +51,35 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     }
 
 
-def _line(result: Result) -> dict[str, Any]:
+def _run_summary(result: Result) -> dict[str, Any]:
     attributes = {name: result.data.attrs[name] for name in ("integrator", "step", "seconds")}
     return {**attributes, "counts": result.counts(), "channels": channel_summary(result)}
 
 
 def differences_of_engines(results: dict[str, Result]) -> dict[str, float]:
-    """Largest difference of any state (m, rad, m/s, rad/s) between each two results, on their common grid."""
+    """Largest difference of any state (m, rad, m/s, rad/s) between each two engines' results, at the same times."""
     return {f"{a} - {b}": largest_state_difference(results[a], results[b]) for a, b in combinations(results, 2)}
 
 
-def largest_state_difference(first: Result, other_result: Result) -> float:
-    """Largest difference of any state; where the rows lie elsewhere, the denser run is read by a cubic spline."""
-    if same_times(first, other_result):
-        return float(np.abs(first.states - other_result.states).max())
+def largest_state_difference(first_result: Result, other_result: Result) -> float:
+    """Largest difference of any state between two runs; if their times differ, the denser run is interpolated by a
+    cubic spline."""
+    if have_same_times(first_result, other_result):
+        return float(np.abs(first_result.states - other_result.states).max())
     from scipy.interpolate import CubicSpline
 
-    fine, coarse = (first, other_result) if len(first.times) > len(other_result.times) else (other_result, first)
+    fine, coarse = (
+        (first_result, other_result)
+        if len(first_result.times) > len(other_result.times)
+        else (other_result, first_result)
+    )
     return float(np.abs(CubicSpline(fine.times, fine.states)(coarse.times) - coarse.states).max())
 
 
-def same_times(first: Result, other_result: Result) -> bool:
-    """True if the rows of both runs lie at the same times."""
-    return len(first.times) == len(other_result.times) and bool(
-        np.allclose(first.times, other_result.times, rtol=0, atol=1e-9)
+def have_same_times(first_result: Result, other_result: Result) -> bool:
+    """Whether the rows of both runs are at the same times."""
+    return len(first_result.times) == len(other_result.times) and bool(
+        np.allclose(first_result.times, other_result.times, rtol=0, atol=1e-9)
     )
 
 
@@ -95,20 +101,20 @@ def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
             axis.plot(result.times, scale * result[channel], **style)
         axis.set_title(label)
     if len(results) > 1:
-        _differences(axes[-1], results)
+        _plot_differences(axes[-1], results)
     axes[-1].set_xlabel("time [s]")
     legend_below(figure, axes[0])
     add_heading(figure, scene.title, results)
     save(figure, path)
 
 
-def _differences(axis: Any, results: dict[str, Result]) -> None:
-    """Plot the difference of each run from the first one over time, on a logarithmic scale."""
+def _plot_differences(axis: Any, results: dict[str, Result]) -> None:
+    """Plot the largest state difference of each run from the first run over time, on a logarithmic scale."""
     from models.drawing.figures import COLOURS, LABELS
 
     (base, first), *other_results = results.items()
     for engine, result in other_results:
-        if same_times(result, first):
+        if have_same_times(result, first):
             gap = np.abs(result.states - first.states).max(axis=1)
             axis.semilogy(
                 result.times, np.maximum(gap, 1e-18), color=COLOURS[engine], label=f"{LABELS[engine]} - {LABELS[base]}"

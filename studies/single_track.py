@@ -1,4 +1,4 @@
-"""A car of two axles along a measured drive: what its sensors would show, beside what they did where a file says it."""
+"""A single-track car along a measured drive: computed sensor channels, beside the measured ones if there are any."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,11 +16,11 @@ SYSTEM = "single-track"
 Progress = Callable[[str, float], None]
 SHOWN_CHANNELS = {"yaw rate": "rad/s", "lateral acceleration": "m/s²", "side slip": "rad"}
 PANEL_TITLES = {"wheels steer": "Steer angle of the wheels"}
-"""Titles of panels whose channel's name is none."""
+"""Titles of panels for channels whose names are no titles."""
 
 
 def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Drive it: saves drive.nc and drive.png."""
+    """Run the car along the drive; saves ``drive.nc`` and ``drive.png``, and returns the summary."""
     progress("the drive", 0.0)
     driven = run_scene(scene, error=scene.error)
     driven.save(folder / "drive.nc")
@@ -45,27 +45,29 @@ AXLE_NAMES = ("front", "rear")
 
 
 def measured_channels(scene: SingleTrackScene, computed_drive: Result) -> dict[str, np.ndarray]:
-    """Measured values (n,) of the channels that the file of the drive contains, at the times of the computed drive and
-    in its units."""
+    """Measured values (n,) of the shown channels that the drive's file contains, by name, at the times and in the units
+    of the computed drive."""
     source = open_source(scene.path(scene.drive.file, "drive.file"))
     known = [name for name in SHOWN_CHANNELS if name in {channel.name for channel in source.channels}]
     curves = {name: channel_curve(source, name, computed_drive.data[name].attrs["units"]) for name in known}
     return {name: np.interp(computed_drive.times, *time_and_values) for name, time_and_values in curves.items()}
 
 
-def figure(computed_drive: Result, beside: Mapping[str, np.ndarray], title: str, path: Path) -> Path:
-    """Plot the steer angle and three channels over time. For each axle, plot its slip angle over time, and the ratio of
-    side force to load over slip angle.
+def figure(computed_drive: Result, measured_values: Mapping[str, np.ndarray], title: str, path: Path) -> Path:
+    """Save a figure of the steer angle and three channels over time, of each axle's slip angle over time, and of its
+    ratio of side force to load over slip angle.
 
-    beside : values (n,) that were measured, drawn beside the channels of their names.
+    measured_values : measured values (n,), drawn beside the computed channels of their names.
     """
     from models.drawing.figures import BLUE, DARK, MEASURED_COLOUR, VERMILION, add_heading, legend_below, panels, save
 
     drawing, axes = panels(6, 2, 2.15)
     curves = {"wheels steer": "rad", **SHOWN_CHANNELS}
     for axis, (name, unit) in zip(axes, curves.items(), strict=False):
-        if name in beside:
-            axis.plot(computed_drive.times, beside[name], color=MEASURED_COLOUR, linewidth=2.0, label="measured")
+        if name in measured_values:
+            axis.plot(
+                computed_drive.times, measured_values[name], color=MEASURED_COLOUR, linewidth=2.0, label="measured"
+            )
         axis.plot(computed_drive.times, computed_drive[name], color=DARK, linewidth=0.8, label="computed")
         axis.set(ylabel=f"[{unit}]", title=PANEL_TITLES.get(name, name.capitalize()), xlabel="time [s]")
     used = {axle: computed_drive[f"side force {axle}"] / computed_drive[f"load {axle}"] for axle in AXLE_NAMES}

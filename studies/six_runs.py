@@ -1,4 +1,4 @@
-"""Why a force-excited vehicle runs away: the six runs of the paper, Section 4.
+"""Drift of a force-excited vehicle: the six runs of the paper, Section 4.
 
 A virtual measurement on a road gives wheel forces and pitch. Each run on them is a scene of its own
 (models/systems/pitch_plane/six_runs.py), in every engine.
@@ -27,12 +27,12 @@ from models.systems.pitch_plane.six_runs import (
 Progress = Callable[[str, float], None]
 
 SAVED_SPACING = 0.01
-"""Spacing (s) of the saved runs; the table is made from every step."""
+"""Row spacing (s) of the saved runs; the table is computed from every step."""
 check = options_of
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """All six runs in each engine; saves every result, five figures and ``table.txt``."""
+    """Run all six runs in each engine; saves every result, five figures and ``table.txt``, and returns the summary."""
     options = check(scene, engines)
     measured, deviation, scenes = measurement_and_runs(scene, folder, scene.error)
     measured.save(folder / "measurement.nc")
@@ -50,7 +50,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     rows = [
         figures_of_run(engine, name, measured, result) for engine in engines for name, result in runs[engine].items()
     ]
-    table = text(rows, engines, options, deviation)
+    table = summary_lines(rows, engines, options, deviation)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     progress("figures", 1.0)
     if not failed:
@@ -75,11 +75,14 @@ PUBLISHED_DRIFT = {
     "guided, undisturbed": "about 70 N m",
     "guided, both": "+-800 N m; inertia term about 15 kN m",
 }
-"""What the paper prints. Its "85 kN m" cannot be: |I beta''| <= b|f3| + a|f4|, and 5 % of it is the moment."""
+"""Published figures of the paper by run. Its "85 kN m" is impossible, as |I beta''| <= b|f3| + a|f4|, and 5 % of it is
+the moment."""
 
 
-def text(rows: list[dict[str, Any]], engines: tuple[str, ...], options: Options, deviation: float) -> list[str]:
-    """The table as lines of text: a line per run, a column per engine."""
+def summary_lines(
+    rows: list[dict[str, Any]], engines: tuple[str, ...], options: Options, deviation: float
+) -> list[str]:
+    """Lines for the screen: a table with a line per run and a column per engine."""
     runs: dict[str, list[dict[str, Any]]] = {}
     for line in rows:
         runs.setdefault(line["run"], []).append(line)
@@ -108,7 +111,7 @@ def text(rows: list[dict[str, Any]], engines: tuple[str, ...], options: Options,
 
 
 def _draw_figures(measured_run: Result, runs: dict[str, Result], folder: Path) -> None:
-    """Draw figures like 4 to 8 of the paper."""
+    """Save figures like Figs 4 to 8 of the paper."""
     from models.drawing.figures import save
 
     save(_figure_measurement(measured_run), folder / "fig4_measurement.png")
@@ -154,7 +157,7 @@ def _figure_measurement(measured_run: Result) -> Any:
 
 
 def _figure_drift(results: dict[str, Result], title: str) -> Any:
-    """Plot each run's heave error on a logarithmic scale, and its pitch; the first of the results is the
+    """Figure of each run's heave error on a logarithmic scale, and of its pitch; the first of the results is the
     measurement."""
     from models.drawing.figures import COLUMN_WIDTH, TRUTH_COLOUR, add_heading, legend_below, subplots
 

@@ -1,4 +1,4 @@
-"""Which stabiliser can be trusted: all of them on the same wrong model and noisy forces, scored by damage.
+"""Comparison of all stabilisers on the same perturbed model and noisy forces, by the damage of section forces.
 
 The runs are those of models/systems/pitch_plane/stabilised.py, on the road as it is and on the same road with a grade,
 where whatever keeps the pitch near zero is wrong. The first engine runs all methods, the others those that it accepts.
@@ -23,28 +23,29 @@ check = options_of
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """All methods on both roads; saves every road's files, ``score.csv``, ``score.nc``, ``table.txt``, two figures."""
+    """Run all methods on both roads; saves every road's files, ``score.csv``, ``score.nc``, ``table.txt`` and two
+    figures, and returns the summary."""
     from models.drawing.drift import decision_figure, stiffness
     from models.drawing.figures import save
 
-    benches, rows, failed = compare(scene, engines, folder, progress)
-    options = benches[0].options
-    progress("sweep of stiffness and cut-off", len(benches) / (len(benches) + 1))
-    sweep = {bench.road: bench.sweep() for bench in benches}
-    table = text(rows, benches, options)
+    benches_of_roads, rows, failed = compare(scene, engines, folder, progress)
+    options = benches_of_roads[0].options
+    progress("sweep of stiffness and cut-off", len(benches_of_roads) / (len(benches_of_roads) + 1))
+    sweep = {bench.road: bench.sweep() for bench in benches_of_roads}
+    table = summary_lines(rows, benches_of_roads, options)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     with whole_file(folder / "score.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
-    results = {name: result for bench in benches for name, result in bench.results.items()}
+    results = {name: result for bench in benches_of_roads for name, result in bench.results.items()}
     saved = result_from_table(scene, rows, "run")
-    saved.data.attrs["error"] = _step_error_text(benches[0].results)
+    saved.data.attrs["error"] = _step_error_text(benches_of_roads[0].results)
     saved.save(folder / "score.nc")
     progress("figures", 1.0)
     of_first = [row for row in rows if row["engine"] == engines[0]]
     save(decision_figure(of_first, options.limits, options.grade, results), folder / "decide.png")
-    save(stiffness(sweep, benches[0], options.limits, options.grade), folder / "stiffness.png")
+    save(stiffness(sweep, benches_of_roads[0], options.limits, options.grade), folder / "stiffness.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -57,15 +58,15 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def _step_error_text(results: Results) -> str:
-    """Step error of the score as JSON text: that of the measurement, because all runs use its steps."""
+    """JSON text of the step error of the score, which is that of the measurement, because all runs use its steps."""
     error = json.loads(next(iter(results.values())).data.attrs["error"])
     return json.dumps(
         error | {"how": f"{error['how']}, of the measurement, whose steps all runs share"} if error else {}
     )
 
 
-def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
-    """The table as lines of text, with a block for each engine and road."""
+def summary_lines(rows: list[Row], benches_of_roads: list[Bench], options: Options) -> list[str]:
+    """Lines for the screen: a table of all methods, with a block for each engine and road."""
     lines = [
         f"  Damage ratios: {COUNTING_CONVENTION}, exponent {options.slope:g}. Accepted: all four "
         "body-frame ratios within "
@@ -76,7 +77,7 @@ def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
     ]
     for engine, road in dict.fromkeys((row["engine"], row["road"]) for row in rows):
         of_engine = [row for row in rows if (row["engine"], row["road"]) == (engine, road)]
-        bench = next(bench for bench in benches if bench.road == road)
+        bench = next(bench for bench in benches_of_roads if bench.road == road)
         road_text = "the road" if road == "road" else f"a grade of {options.grade:g} rad"
         free = next(row["seconds"] for row in of_engine if row["method"] == "free")
         lines += [
@@ -85,7 +86,7 @@ def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
             f"can be trusted for {bench.trusted:.1f} s, springs hold from {bench.holding:.0f} N m/rad on",
         ]
         lines += [HEADING_LINE, UNITS_LINE]
-        lines += [_line(row, free) for row in of_engine]
+        lines += [_score_line(row, free) for row in of_engine]
     return lines
 
 
@@ -99,12 +100,12 @@ UNITS_LINE = (
 )
 
 
-def _line(row: Row, free: float) -> str:
+def _score_line(row: Row, free_seconds: float) -> str:
     ratios = "".join(f"{_ratio_text(row[f'damage {channel}']):>7}" for channel in SECTION_FORCE_CHANNELS)
     return (
         f"  {row['method']:<25}{ratios}{_ratio_text(row['vertical damage f3']):>9}{row['pitch error max [rad]']:>9.4f}"
         f"{row['pitch error rms [rad]']:>7.4f}{row['moment rms [N m]']:>7.0f}{row['moment max [N m]']:>8.0f}"
-        f"{row['moment share to 15 Hz']:>6.0%}{row['seconds'] / free:>8.1f}{row['verdict']:>11}"
+        f"{row['moment share to 15 Hz']:>6.0%}{row['seconds'] / free_seconds:>8.1f}{row['verdict']:>11}"
         f"{row['without truth']:>11}"
     )
 

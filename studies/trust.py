@@ -1,4 +1,4 @@
-"""How long can this force-excited run be trusted, and what would it take for longer?
+"""Time for which a force-excited run can be trusted, and the data that a longer time would require.
 
 Each source of error is predicted before any run, from the forces and the vehicle alone, and then measured: noise by
 an ensemble of paths, the error between the samples and that of a wrong inertia by a run each. With a road in its
@@ -49,13 +49,13 @@ from models.systems.pitch_plane.virtual_measurement import (
 Progress = Callable[[str, float], None]
 Row = dict[str, Any]
 ROW_SPACING = 0.1
-"""Of the paths' rows in the figure, s."""
-ORDER_OF_RULE = {"held": 2, "linear": 2, "smooth": 4}
-"""Power of the sampling period with which each rule between the samples errs."""
+"""Row spacing (s) of the noise paths in the figure."""
+ORDER_OF_INTERPOLATION = {"held": 2, "linear": 2, "smooth": 4}
+"""Order of each interpolation rule between samples: its error falls with this power of the sampling period."""
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     sampling_rate: float | None = quantity("Hz", "rate of the virtual measurement on a road", default=None)
     noise_fraction: float = quantity("", "standard deviation of the force noise by the largest force", default=0.002)
@@ -67,9 +67,10 @@ class Options(Strict):
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Predictions, an ensemble and two runs in the first engine; saves ``table.txt``, ``trust.nc``, a figure."""
+    """Predict the growth of errors, and measure it by an ensemble and two runs in the first engine; saves
+    ``table.txt``, ``trust.nc`` and a figure, and returns the summary."""
     options = check(scene, engines)
-    base, measured, largest = _forces(scene, options, folder)
+    base, measured, largest = _scene_under_forces(scene, options, folder)
     deviation, assembly = options.noise_fraction * largest, assembly_of_scene(base)
     other_parameters = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
     progress("predictions", 0.1)
@@ -86,12 +87,15 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         wrong = run_away(
             changed_scene(base, vehicle={"override": {**base.vehicle.override, "I": other_parameters.I}}), engines[0]
         )
-        runs = {"interpolation": _error(clean, measured["pitch"]), "inertia": _error(wrong, clean["pitch"])}
+        runs = {
+            "interpolation": _pitch_difference(clean, measured["pitch"]),
+            "inertia": _pitch_difference(wrong, clean["pitch"]),
+        }
     progress("noise paths", 0.4)
     quiet = run_away(base, "reference", scene.error)
     spread = _ensemble_of_paths(base, quiet, deviation, options, engines[0], Crew.of(scene, default_workers=1))
     rows = _drift_off_rows(curves, runs, spread, options)
-    table = _text(rows, options, deviation, pitch_error_growth(assembly).rate, base, curves)
+    table = _table_lines(rows, options, deviation, pitch_error_growth(assembly).rate, base, curves)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     saved = _with_errors(_saved_paths(scene, rows, spread), quiet, spread, options)
     saved.save(folder / "trust.nc")
@@ -103,7 +107,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def check(scene: Scene, engines: tuple[str, ...]) -> Options:
-    """Options of the scene; refuses, before any file is written, a scene that is neither a road nor a free run on wheel
+    """Options of the scene; raises InputError for a scene that is neither a run on a road nor a free run under wheel
     forces."""
     options = read(Options, scene.options, scene.file, "options")
     check_steps(scene, engines)
@@ -120,9 +124,9 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
     return options
 
 
-def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, Result | None, float]:
-    """The scene driven by forces; the run on the road from which they come, if there is one; and the largest force
-    (N)."""
+def _scene_under_forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, Result | None, float]:
+    """The scene under wheel forces; the run on the road that gave the forces, None if they are from a file; and the
+    largest force (N)."""
     if "road" not in scene.effects:
         return scene, None, float(np.abs(assembly_of_scene(scene).input.values).max())  # type: ignore[union-attr]
     assert options.sampling_rate is not None
@@ -131,17 +135,17 @@ def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, Result
     return follower_builder(scene, folder)({}, {}), measured, largest
 
 
-def _error(run: Result, pitch: np.ndarray) -> GrowthCurve:
-    """Magnitude of the difference between a run's pitch and the pitch (rad) of another run that lacks one source of
+def _pitch_difference(run: Result, undisturbed_pitch: np.ndarray) -> GrowthCurve:
+    """Magnitude of the difference between a run's pitch and the pitch (n,) in rad of a run without one source of
     error."""
-    return GrowthCurve(run.times, np.abs(run["pitch"] - pitch))
+    return GrowthCurve(run.times, np.abs(run["pitch"] - undisturbed_pitch))
 
 
 def _ensemble_of_paths(
     base_scene: Scene, quiet_run: Result, deviation: float, options: Options, engine: str, worker_crew: Crew
 ) -> dict[str, np.ndarray]:
-    """Run the noise paths; return their drift-off times (paths,) and their pitch errors (paths, rows) relative to the
-    run without noise, ``quiet_run``.
+    """Run the noise paths; returns their row times (rows,) in s, drift-off times (paths,) in s and pitch errors (paths,
+    rows) in rad relative to the run without noise, ``quiet_run``.
 
     The errors are nan from where a path left all bounds.
     """
@@ -155,8 +159,8 @@ def _ensemble_of_paths(
 
 
 def _with_errors(result: Result, quiet_run: Result, drift_off_times: dict[str, np.ndarray], options: Options) -> Result:
-    """The result with two errors: the step error, estimated on the run without noise, and the standard error of the
-    median."""
+    """The result with two stated errors: the step error, estimated on the run without noise, and the standard error of
+    the median drift-off time."""
     result.data.attrs["error"] = quiet_run.data.attrs["error"]
     with_assumptions(result, [small_errors(options.angle)])
     middle, low, high = quantile_with_interval(drift_off_times["drift_off"], 0.5)
@@ -167,7 +171,8 @@ def _with_errors(result: Result, quiet_run: Result, drift_off_times: dict[str, n
 
 
 def _saved_paths(scene: Scene, rows: list[Row], drift_off_times: dict[str, np.ndarray]) -> Result:
-    """Channels of the drift-off times by source, and of the noise paths."""
+    """Result with the drift-off times (s) by source of error, and the drift-off times and pitch errors of the noise
+    paths."""
     drift_off = {
         name: Channel("source", [np.nan if row[name] is None else row[name] for row in rows], "s", f"drift-off, {name}")
         for name in ("predicted", "measured")
@@ -189,14 +194,16 @@ SOURCE_NAMES = {
 
 
 def _drift_off_rows(
-    curves: dict[str, GrowthCurve], runs: dict[str, GrowthCurve], spread: dict[str, np.ndarray], options: Options
+    curves: dict[str, GrowthCurve], runs: dict[str, GrowthCurve], path_results: dict[str, np.ndarray], options: Options
 ) -> list[Row]:
-    """Predicted and measured drift-off times (s) by source; None if they lie beyond the run."""
+    """Predicted and measured drift-off times (s) for each source of error; None if they lie beyond the run."""
     rows = list[Row]()
     for name, curve in curves.items():
         measured, quartiles = runs[name].passing_time(options.angle) if name in runs else None, None
         if name == "noise":
-            drift_off_times = [quantile_with_interval(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
+            drift_off_times = [
+                quantile_with_interval(path_results["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)
+            ]
             measured, *quartiles = [time if math.isfinite(time) else None for time in drift_off_times]
         rows.append(
             {
@@ -209,11 +216,11 @@ def _drift_off_rows(
     return rows
 
 
-def _text(
+def _table_lines(
     rows: list[Row], options: Options, deviation: float, rate: float, base_scene: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
-    """Lines for the terminal: predicted and measured drift-off times, and what a longer trustworthy run would
-    require."""
+    """Lines for the screen: predicted and measured drift-off times, and the requirements of a longer trustworthy
+    run."""
     lines = [
         f"  pitch {options.angle:g} rad off after [s]     predicted   measured",
         *(
@@ -247,14 +254,14 @@ def _measured_text(row: Row) -> str:
 def _remedy_lines(
     options: Options, deviation: float, rate: float, base_scene: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
-    """Lines on what noise, sampling rate and known inertia a trustworthy run of the wanted length would need,
-    extrapolated by the growth rate of errors."""
+    """Lines for the screen on the noise, sampling rate and accuracy of the inertia that a trustworthy run of the wanted
+    length would require, extrapolated by the growth rate of errors."""
     forces = assembly_of_scene(base_scene).input
     assert forces is not None and forces.period is not None
     lines = [f"  for {options.wanted:g} s it would take:"]
     for name in ("noise", "interpolation", "inertia"):
-        excess = _size_at_time(curves[name], options, rate)
-        order = ORDER_OF_RULE[base_scene.effects["wheel_forces"].interpolation]
+        excess = _error_at_wanted_time(curves[name], options, rate)
+        order = ORDER_OF_INTERPOLATION[base_scene.effects["wheel_forces"].interpolation]
         takes = {
             "noise": f"noise of {deviation / excess:.2g} N instead of {deviation:.3g} N on each sample",
             "interpolation": f"samples at {excess ** (1 / order) / forces.period:.3g} Hz instead of "
@@ -266,9 +273,9 @@ def _remedy_lines(
     return [*lines, "  or a stabiliser: see the effects prescribed_pitch, pitch_spring, kalman_filter"]
 
 
-def _size_at_time(curve: GrowthCurve, options: Options, rate: float) -> float:
-    """Ratio of the pitch error at a time to the allowed angle; beyond drift-off or the end of the run, extrapolated by
-    the growth law of noise.
+def _error_at_wanted_time(curve: GrowthCurve, options: Options, rate: float) -> float:
+    """Ratio of the pitch error at the wanted time to the allowed angle; beyond drift-off or the end of the run it is
+    extrapolated by the growth law of noise.
 
     Its deviation grows as t^1.5 at first and exponentially where the rate has had its time: what follows the run is
     taken for as rough as the run.
@@ -288,8 +295,8 @@ def _figure(
     results: Results,
     path: Path,
 ) -> None:
-    """Plot the growth of the pitch error by source on a logarithmic scale: predicted laws dashed, computed runs
-    solid."""
+    """Save a figure of the growth of the pitch error by source of error on a logarithmic scale: predictions dashed,
+    runs solid."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, GREEN, GREY, VERMILION, add_heading, save, subplots
 
     colours = {"noise": BLUE, "interpolation": VERMILION, "inertia": GREEN, "rounding": GREY}

@@ -1,4 +1,4 @@
-"""The page of a user's own model: one HTML file with everything in it, to be mailed; its words are in the template."""
+"""The page of a user's model file: a self-contained HTML file; its texts are in the template."""
 
 import platform
 import sys
@@ -16,13 +16,13 @@ PAGE_TEMPLATE = "twin.html.jinja"
 
 
 def write(twins: Twins, path: Path) -> Path:
-    """Write the page, whole or not at all; returns its path."""
+    """Write the page on examined model files as a complete file; returns its path."""
     write_whole(path, page_text(twins))
     return path
 
 
 def page_text(twins: Twins) -> str:
-    """The page as text."""
+    """HTML text of the page on examined model files."""
     environment = environment_of(Path(__file__).parent)
     environment.filters |= {"short": two_digit_text, "g": lambda number: f"{number:.6g}"}
     return environment.get_template(PAGE_TEMPLATE).render(
@@ -41,7 +41,7 @@ def page_text(twins: Twins) -> str:
 
 
 def _element_rows(elements: list[Element]) -> list[dict[str, Any]]:
-    """Nonzero elements, with their values as text."""
+    """Kind, owner, unit and value text of each nonzero element of a model file, for the page's table."""
     return [
         {"kind": element.kind, "owner": element.owner, "unit": element.unit, "value": value_text(element.value)}
         for element in elements

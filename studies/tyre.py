@@ -1,4 +1,4 @@
-"""What a tyre does on the surfaces of a scene of braking: friction along and across over slip, slip angle and load."""
+"""Friction of a tyre on the surfaces of a braking scene: longitudinal and lateral, over slip, slip angle and load."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -24,14 +24,14 @@ Progress = Callable[[str, float], None]
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] of this study."""
 
     slip_angles: list[float] = Field([0.0, 2.0, 4.0, 8.0, 16.0], min_length=1, description="slip angles in deg")
     load: float = Field(15e3, gt=0, le=1e6, description="load of the figure in N")
 
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Refuse options and tyres that cannot be."""
+    """Raise InputError for impossible slip angles and tyres."""
     check_reference(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     if not all(0.0 <= angle <= 90.0 for angle in options.slip_angles):
@@ -40,8 +40,8 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Every tyre of the scene: saves tyre.png, and of each a netCDF and a CSV that can be read as a tyre
-    again."""
+    """Tabulate every tyre of the scene; saves ``tyre.png``, and for each tyre a netCDF and a CSV file that can be read
+    as a tyre again; returns the summary."""
     from studies.tyre_figure import tyre_figure
 
     options = read(Options, scene.options, scene.file, "options")
@@ -63,7 +63,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def friction_lines(figures_by_tyre: dict[str, dict[str, float]], load: float) -> list[str]:
-    """Table of the friction figures under a load (N), with a column per tyre."""
+    """Lines for the screen: a table of the friction figures under a load (N), with a column per tyre."""
     width = max(12, *(len(name) + 2 for name in figures_by_tyre))
     rows = [
         f"  {'mu under ' + format(load / 1e3, '.4g') + ' kN':<22}"
@@ -76,7 +76,8 @@ def friction_lines(figures_by_tyre: dict[str, dict[str, float]], load: float) ->
 
 
 def save(scene: BrakingScene, table: TyreTable, options: Options, path: Path) -> Result:
-    """Friction at the slip angles of the figure and at none, at all slips of the table: as netCDF, and as a CSV."""
+    """Save a tyre's friction at zero and the options' slip angles, at all slips of its table, as netCDF and CSV;
+    returns the result."""
     angles, axes = np.unique([0.0, *options.slip_angles]), ("slip_angle", "slip")
     x, y = table.friction(np.deg2rad(angles), table.slips, options.load)
     channels = {"mu_x": Channel(axes, x, "-", "along the wheel"), "mu_y": Channel(axes, y, "-", "across it")}

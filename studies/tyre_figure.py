@@ -1,4 +1,4 @@
-"""Figure of a tyre's friction: along and across the wheel over slip, for several slip angles and loads."""
+"""Figure of tyre friction: along and across the wheel over slip, for several slip angles."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,17 +15,17 @@ COLOUR_MAP = colormaps["viridis"]
 
 
 def tyre_figure(
-    tables: Mapping[str, TyreTable],
-    slip_angles: tuple[Sequence[float], float],
+    tyre_tables: Mapping[str, TyreTable],
+    angles_and_load: tuple[Sequence[float], float],
     title: str,
     path: Path,
     results: Results,
 ) -> None:
-    """Plot each table in a row: mu_x over slip, mu_y over slip, and mu_y over mu_x. slip_angles: slip angles (deg) of
-    the curves, and the load (N)."""
-    angles, load = slip_angles
-    figure, axes = subplots(len(tables), 3, figsize=(COLUMN_WIDTH, 2.9 * len(tables) + 0.5), squeeze=False)
-    for row, (name, table) in zip(axes, tables.items(), strict=True):
+    """Save a figure with a row per tyre table: mu_x over slip, mu_y over slip, and mu_y over mu_x. angles_and_load :
+    slip angles (deg) of the curves, and the load (N)."""
+    angles, load = angles_and_load
+    figure, axes = subplots(len(tyre_tables), 3, figsize=(COLUMN_WIDTH, 2.9 * len(tyre_tables) + 0.5), squeeze=False)
+    for row, (name, table) in zip(axes, tyre_tables.items(), strict=True):
         x, y = table.friction(np.deg2rad(angles), DRAWN_SLIPS, load)
         top = 1.08 * max(x.max(), y.max())
         for i, angle in enumerate(angles):

@@ -1,4 +1,4 @@
-"""A wheelset on straight track: Klingel's wave, where it becomes unstable, and how it moves below and above."""
+"""A wheelset on straight track: Klingel's wavelength, critical speed, and motion below and above it."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -25,11 +25,12 @@ from models.systems.wheelset.scene import WheelsetScene
 SYSTEM = "wheelset"
 Progress = Callable[[str, float], None]
 Paths = dict[str, dict[float, Result]]
-"""By engine and speed (m/s)."""
+"""Result of each run, by engine and speed (m/s)."""
 
 
 def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Linearise over the speeds, run the paths; saves ``eigenvalues.nc``, ``paths.nc``, ``over_speed.csv``, figures."""
+    """Compute eigenvalues over speed, and runs at the scene's speeds; saves ``eigenvalues.nc``, ``paths.nc``,
+    ``over_speed.csv`` and figures, and returns the summary."""
     from studies.wheelset_figures import creep_figure, paths_figure, stability_figure
 
     wheelset, failed, eigenvalues, paths = wheelset_of(scene), dict[str, str](), dict[str, Result](), Paths()
@@ -57,10 +58,10 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
         "scene": scene.title,
         "folder": str(folder),
         "failed": failed,
-        "answer": _answer_of_paths(wheelset, linear, paths)
+        "answer": _summary_of_paths(wheelset, linear, paths)
         | (conicity.conicity_numbers(conicities) if conicities else {}),
         "results": {
-            **_results(paths),
+            **_results_by_name(paths),
             **{f"{engine}, eigenvalues": linear_run for engine, linear_run in eigenvalues.items()},
             **({"conicity": conicities} if conicities else {}),
         },
@@ -73,8 +74,8 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     }
 
 
-def _results(paths: Paths) -> dict[str, Result]:
-    """Results of all paths, named by engine and speed."""
+def _results_by_name(paths: Paths) -> dict[str, Result]:
+    """Results of all runs, by a name of engine and speed."""
     return {
         f"{engine}, {speed_text}": path
         for engine, paths_of_engine in paths.items()
@@ -82,22 +83,23 @@ def _results(paths: Paths) -> dict[str, Result]:
     }
 
 
-def _save_table(linear: dict[str, Linear], folder: Path) -> None:
-    """Save a CSV table of damping and frequency over speed."""
-    columns = {"speed": ("m/s", next(iter(linear.values())).speeds)}
-    for engine, linear_run in linear.items():
+def _save_table(linear_results: dict[str, Linear], folder: Path) -> None:
+    """Save a CSV table of growth rate (1/s), and damping and frequency of hunting, over speed."""
+    columns = {"speed": ("m/s", next(iter(linear_results.values())).speeds)}
+    for engine, linear_run in linear_results.items():
         columns[f"{engine} growth"] = ("1/s", linear_run.values.real.max(axis=1))
         columns[f"{engine} hunting damping"] = ("1/s", -linear_run.hunting.real)
         columns[f"{engine} hunting frequency"] = ("Hz", linear_run.hunting.imag / (2.0 * np.pi))
     write_table(folder / "over_speed.csv", columns)
 
 
-def _answer_of_paths(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict[str, Any]:
-    """Critical speed (None if there is none) and figures of the paths, as plain numbers in SI."""
+def _summary_of_paths(wheelset: Wheelset, linear_results: dict[str, Linear], paths: Paths) -> dict[str, Any]:
+    """Summary in SI units: wavelengths, critical speed by engine (None if there is none), and largest power of the
+    creep forces."""
     return {
         "klingel": klingel_wavelength(wheelset),
-        "wavelength": {engine: linear_run.wavelength for engine, linear_run in linear.items()},
-        "critical_speed": {engine: linear_run.critical_speed for engine, linear_run in linear.items()},
+        "wavelength": {engine: linear_run.wavelength for engine, linear_run in linear_results.items()},
+        "critical_speed": {engine: linear_run.critical_speed for engine, linear_run in linear_results.items()},
         "largest_power": {
             engine: max(float(path["power"].max()) for path in paths_of_engine.values())
             for engine, paths_of_engine in paths.items()
@@ -105,17 +107,20 @@ def _answer_of_paths(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths
     }
 
 
-def _wavelength_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
-    """Lines on the wavelength of the free wheelset: Klingel's closed form, and the deviation of each engine's
-    eigenvalues from it."""
+def _wavelength_lines(wheelset: Wheelset, linear_results: dict[str, Linear]) -> list[str]:
+    """Lines for the screen on the wavelength of the free wheelset: Klingel's closed form, and the deviation of each
+    engine's eigenvalues from it."""
     closed_form = "closed form of the cones, no slip" if wheelset.profiles else "closed form, no slip"
-    closed, first = klingel_wavelength(wheelset), next((linear_run.wavelength for linear_run in linear.values()), 0.0)
+    closed, first = (
+        klingel_wavelength(wheelset),
+        next((linear_run.wavelength for linear_run in linear_results.values()), 0.0),
+    )
     lines = [
         "  wavelength of the free wheelset",
         f"    {closed_form:<34}{closed:>14.9g} m",
         f"    {'creep forces alone':<34}{kinematic_wavelength(wheelset):>14.9g} m",
     ]
-    for engine, linear_run in linear.items():
+    for engine, linear_run in linear_results.items():
         lines.append(
             f"    {f'eigenvalues of {engine}':<34}{linear_run.wavelength:>14.9g} m   "
             f"{linear_run.wavelength / closed - 1:+.1e} from the closed form, "
@@ -124,28 +129,30 @@ def _wavelength_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str
     return lines
 
 
-def _stability_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
-    """Lines on the critical speed and frequency in every engine, or that there is no critical speed."""
+def _stability_lines(wheelset: Wheelset, linear_results: dict[str, Linear]) -> list[str]:
+    """Lines for the screen on the critical speed in every engine, or the reason why there is none."""
     lines = [
         "  critical speed with linear creep",
-        f"    {'lateral and yaw motion alone':<34}" + _speed(*critical_or_why(wheelset)),
+        f"    {'lateral and yaw motion alone':<34}" + _critical_speed_text(*critical_or_why(wheelset)),
     ]
-    first = next((linear_run.critical_speed for linear_run in linear.values()), None)
+    first = next((linear_run.critical_speed for linear_run in linear_results.values()), None)
     return lines + [
         f"    {f'eigenvalues of {engine}':<34}"
-        + _speed(linear_run.critical_speed, linear_run.no_critical_reason, first if k else None)
-        for k, (engine, linear_run) in enumerate(linear.items())
+        + _critical_speed_text(linear_run.critical_speed, linear_run.no_critical_reason, first if k else None)
+        for k, (engine, linear_run) in enumerate(linear_results.items())
     ]
 
 
-def _speed(critical: float | None, reason: str, first: float | None = None) -> str:
-    if critical is None:
+def _critical_speed_text(critical_speed: float | None, reason: str, first_critical_speed: float | None = None) -> str:
+    if critical_speed is None:
         return f"none: the wheelset {reason}"
-    return f"{critical:>14.9g} m/s" + (f" {critical / first - 1:+.0e} from the first" if first else "")
+    return f"{critical_speed:>14.9g} m/s" + (
+        f" {critical_speed / first_critical_speed - 1:+.0e} from the first" if first_critical_speed else ""
+    )
 
 
 def _path_lines(scene: WheelsetScene, paths: Paths) -> list[str]:
-    """Lines on how each path ends, how far the engines' paths differ, and the energy balance."""
+    """Lines for the screen on the end of each run, the differences between the engines, and the energy balance."""
     if not paths:
         return []
     (name, first), *other_paths = paths.items()
@@ -169,7 +176,7 @@ def _path_lines(scene: WheelsetScene, paths: Paths) -> list[str]:
 
 
 def _ending_text(motion: Motion) -> str:
-    """Text on a path's last amplitude, and by how much it changed in the last cycle."""
+    """Text on a run's last lateral amplitude, and its change in the last cycle."""
     y = motion.states[:, Y]
     tops = y[positive_maxima(y)]
     if tops.size < 2:

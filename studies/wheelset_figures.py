@@ -1,4 +1,4 @@
-"""Figures of a wheelset on straight track: eigenvalues over speed, paths, creep forces and their power."""
+"""Figures of a wheelset on straight track: eigenvalues over speed, runs in time, creep forces and their power."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -29,28 +29,29 @@ from models.systems.wheelset.conicity import Conicities
 from models.systems.wheelset.run import Linear, at_speeds
 
 ENGINE_MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}
-"""The reference as a line, both engines as marks upon it."""
+"""Line or mark of each implementation: the reference is a line, the engines are marks on it."""
 SHOWN_SECONDS = 1.0
-"""Seconds of creep forces that are drawn, the last ones."""
+"""Time (s) at the end of a run for which creep forces are drawn."""
 
 
-def _note(axis: Axes, text: str, point: tuple[float, float], text_offset: tuple[float, float], **style: Any) -> None:
-    """Write text beside a point of the plot; the text's right end is shifted from the point by ``text_offset``
-    (printer's points).
+def _write_note(
+    axis: Axes, text: str, point: tuple[float, float], text_offset: tuple[float, float], **style: Any
+) -> None:
+    """Write text beside a point of a plot; the text's right end is shifted from the point by ``text_offset`` (printer's
+    points).
     """
     axis.annotate(text, point, text_offset, textcoords="offset points", ha="right", **style)
 
 
-def _wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[np.ndarray]]]:
-    """For each wheel: its name, its colour, and a sum (n,) over its contact patches for each of the named
-    quantities."""
+def _patch_sums_of_wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[np.ndarray]]]:
+    """Yield for each wheel its name, its colour, and sums (n,) over its contact patches of the named quantities."""
     patches_per_wheel = contacts.shape[1] // 2
     yield "right wheel", BLUE, [contacts[name][:, :patches_per_wheel].sum(axis=1) for name in names]
     yield "left wheel", VERMILION, [contacts[name][:, patches_per_wheel:].sum(axis=1) for name in names]
 
 
 def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
-    """Plot growth rate and wavelength of the hunting motion over speed, and the root locus of its eigenvalue."""
+    """Save a figure of growth rate and wavelength of the hunting motion over speed, and of its root locus."""
     linear: dict[str, Linear] = {engine: result.detail for engine, result in eigenvalues.items()}
     figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     for engine, linear_run in linear.items():
@@ -65,9 +66,9 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
         line(0.0, color="0.6", linewidth=0.8)
     if first.critical_speed is not None:
         left.axvline(first.critical_speed, color="0.6", linestyle=":")
-        _note(left, f"{first.critical_speed:.4g} m/s", (first.critical_speed, 0.0), (-4, 8))
+        _write_note(left, f"{first.critical_speed:.4g} m/s", (first.critical_speed, 0.0), (-4, 8))
     middle.axhline(klingel_wavelength(wheelset), color="0.6", linestyle=":")
-    _note(
+    _write_note(
         middle,
         "Klingel's, without suspension",
         (first.speeds[-1], klingel_wavelength(wheelset)),
@@ -79,7 +80,7 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
         if np.isfinite(eigenvalue):
             mark_position = eigenvalue.real, eigenvalue.imag / (2.0 * np.pi)
             clear = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
-            _note(
+            _write_note(
                 right,
                 f"{first.speeds[i]:g} m/s",
                 mark_position,
@@ -100,8 +101,8 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
 
 
 def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path: Path) -> None:
-    """Plot lateral displacement over time, with a panel per speed, and below it the difference of each engine from the
-    first one."""
+    """Save a figure of the lateral displacement over time, with a panel per speed, and below it the difference of each
+    engine from the first."""
     paths: dict[str, dict[float, Motion]] = {
         engine: {speed: result.detail for speed, result in path_then.items()} for engine, path_then in results.items()
     }
@@ -134,12 +135,12 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
 
 
 def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> None:
-    """Plot creep forces on each wheel, and their power, over the last second of every path."""
+    """Save a figure of the creep forces on each wheel, and of their power, over the last second of every run."""
     paths: dict[float, Motion] = {speed: result.detail for speed, result in results.items()}
     figure, axes = subplots(3, len(paths), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharex="col")
     for k, (speed, course) in enumerate(paths.items()):
         is_last_second = course.times >= course.times[-1] - SHOWN_SECONDS
-        for side, colour, sums in _wheels(course.contacts[is_last_second], "fx", "fy", "power"):
+        for side, colour, sums in _patch_sums_of_wheels(course.contacts[is_last_second], "fx", "fy", "power"):
             for axis, values in zip(axes[:, k], sums, strict=True):
                 axis.plot(course.times[is_last_second], values, color=colour, label=side)
         axes[0, k].set(ylabel="along the track [N]", title=f"{speed:g} m/s")
@@ -154,7 +155,8 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
 
 
 def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) -> None:
-    """Plot amplitude and frequency of the limit cycles over speed: stable ones filled, unstable ones open."""
+    """Save a figure of amplitude and frequency of the limit cycles over speed: stable ones filled, unstable ones
+    open."""
     orbits: Sequence[Orbit] = branch.detail
     figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     speeds, amplitudes, frequencies = (
@@ -174,7 +176,7 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
     begins = speeds[amplitudes <= 1.02e-3 * clearance] if (amplitudes <= 1e-3 * clearance).any() else speeds[:1]
     margin = 0.2 * np.ptp(begins) + 0.05
     middle.set(xlim=(begins.min() - margin, begins.max() + margin), ylim=(0, 1.1 * clearance), title="Where it begins")
-    _note(left, "flanges touch", (speeds.max(), clearance), (0, -11), fontsize=SMALL_TEXT)
+    _write_note(left, "flanges touch", (speeds.max(), clearance), (0, -11), fontsize=SMALL_TEXT)
     ends = np.array([speeds.min(), speeds.max()])
     right.plot(
         ends, ends / klingel_wavelength(wheelset), color="0.6", linestyle=":", label="speed by Klingel's wavelength"
@@ -187,7 +189,8 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
 
 
 def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
-    """Plot the limit cycle as yaw over lateral displacement in every engine, and its creep forces over one period."""
+    """Save a figure of the limit cycle as yaw over lateral displacement in every engine, and of its creep forces over a
+    period."""
     cycles: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     for engine, orbit in cycles.items():
@@ -197,7 +200,7 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
         )
     first = next(iter(cycles.values()))
     around = first.path()
-    for side, colour, (force_along, across) in _wheels(around.contacts, "fx", "fy"):
+    for side, colour, (force_along, across) in _patch_sums_of_wheels(around.contacts, "fx", "fy"):
         for force, name, line in ((force_along, "along", "-"), (across, "across", "--")):
             right.plot(around.times, 1e-3 * force, line, color=colour, label=f"{side}, {name}")
     left.set(
@@ -213,7 +216,8 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
 
 
 def conicity_figure(run: Result, title: str, path: Path) -> None:
-    """Plot the rolling radius difference with the amplitudes of the waves, and both conicities over the amplitude."""
+    """Save a figure of the rolling radius difference over lateral displacement, with the amplitudes of the waves, and
+    of both equivalent conicities over the amplitude."""
     conicities: Conicities = run.detail
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6))
     table, rows = conicities.table, conicities.rows

@@ -10,7 +10,7 @@ from models.systems.braking.adhesion import utilisation
 from models.systems.braking.of_scene import plane_of
 from models.systems.braking.scene import build
 from models.systems.braking.stop_report import Stop
-from studies.braking_figures import on_ground, unit_outlines
+from studies.braking_figures import positions_on_road, unit_outlines
 
 TABLE = {
     "title": "t",
@@ -41,13 +41,13 @@ def test_the_train_is_drawn_where_its_hinges_are():
     (_, truck), (drawbar, line), (body, box) = unit_outlines(scene)
     positions = np.array([10.0, 5.0, 0.0, np.pi / 2.0, 0.0])  # the drawbar across
     plane = plane_of(scene)
-    hook, hinge = on_ground(drawbar, line, positions, plane)
+    hook, hinge = positions_on_road(drawbar, line, positions, plane)
     assert hook == pytest.approx([10.0 + CHOSEN_TRAILER.hook, 5.0]) and hinge == pytest.approx(
         hook - [0.0, CHOSEN_TRAILER.drawbar]
     )
-    ahead = on_ground(body, box, positions, plane)
+    ahead = positions_on_road(body, box, positions, plane)
     assert ahead[:2].mean(axis=0) - hinge == pytest.approx([1.2, 0.0])
-    assert on_ground(0, truck, positions, plane).max(axis=0) == pytest.approx([10.0 + 1.42 + 1.2, 6.1])
+    assert positions_on_road(0, truck, positions, plane).max(axis=0) == pytest.approx([10.0 + 1.42 + 1.2, 6.1])
 
 
 @pytest.mark.full

@@ -11,9 +11,9 @@ from validation.braking.quarter_stops import FRONT_WHEEL
 from validation.price.problems import braking_stop
 from validation.price.problems.braking_stop import (
     EULER,
-    FULL_STEPS,
+    EXACT_WHEEL_METHOD,
+    FULL_SUBSTEPS,
     LITERAL,
-    OWN_METHOD,
     QUICK_SUBSTEPS,
     RK4,
     BrakingStop,
@@ -27,11 +27,11 @@ def short():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(braking_stop, "SPEED", 4.0)
         patch.setattr(braking_stop, "SURFACE_CHANGE", 1.2)
-        patch.setattr(braking_stop, "SOLVERS", {True: (("DOP853", 1e-8), ("LSODA", 1e-8))})
+        patch.setattr(braking_stop, "REFERENCE_SOLVERS", {True: (("DOP853", 1e-8), ("LSODA", 1e-8))})
         yield BrakingStop(True)
 
 
-@pytest.mark.parametrize(("method", "bound"), [(OWN_METHOD, 1e-6), (RK4, 1e-6), (EULER, 1e-4), (LITERAL, 1e-3)])
+@pytest.mark.parametrize(("method", "bound"), [(EXACT_WHEEL_METHOD, 1e-6), (RK4, 1e-6), (EULER, 1e-4), (LITERAL, 1e-3)])
 def test_every_scheme_comes_to_the_reference(short, method, bound):
     """At 64 steps to a sample, of a distance of 1 m or so."""
     found = cost.attempt(short, short.setting("reference", method, 5.5e-3 / 64))
@@ -65,5 +65,5 @@ def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(
 
 
 def test_a_step_is_the_longest_that_divides_a_sample(short):
-    assert short.setting("reference", OWN_METHOD, 1.2e-3).value == pytest.approx(5.5e-3 / 5)
-    assert all(set(QUICK_SUBSTEPS[method]) <= set(FULL_STEPS[method]) for method in FULL_STEPS)
+    assert short.setting("reference", EXACT_WHEEL_METHOD, 1.2e-3).value == pytest.approx(5.5e-3 / 5)
+    assert all(set(QUICK_SUBSTEPS[method]) <= set(FULL_SUBSTEPS[method]) for method in FULL_SUBSTEPS)

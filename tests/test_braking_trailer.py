@@ -26,7 +26,7 @@ from models.vehicles.vehicle_file import SHIPPED
 from validation.braking import plain_sprung as whole
 from validation.braking import sprung_train as closed
 from validation.braking.sprung_box import braked_vehicle, car, remaining_speed, steady_torques
-from validation.spatial.towing import keep_to_the_car, loads_and_lengths
+from validation.spatial.towing import give_towed_wheels_car_heading, static_loads
 from validation.spatial.trains import caravan, train
 
 
@@ -53,7 +53,7 @@ def scene(**tables: Any) -> Any:
 
 def test_loads_are_those_of_levers_and_a_locked_train_stops_by_friction_alone():
     train_of_two = whole.towing_car()
-    front, rear, axle, _ = loads_and_lengths(train_of_two.handling)
+    front, rear, axle, _ = static_loads(train_of_two.handling)
     assert train_of_two.in_plane().static.reshape(3, 2).sum(axis=1) == pytest.approx([front, rear, axle], rel=1e-9)
     way, wanted = closed.locked_stop()
     assert way == pytest.approx(wanted, rel=1e-3)  # the car leans ahead by less than a millimetre
@@ -74,7 +74,7 @@ def test_accelerations_are_those_of_plain_code_and_wheels_that_keep_to_the_car_a
     for engine in ("mujoco", "exudyn"):
         assert whole.relative_difference(whole.accelerations(whole.TRAINS[name](), engine, 5), plain) < 1e-12
     wrong = whole.TRAINS[name].__wrapped__()
-    keep_to_the_car(wrong.handling)
+    give_towed_wheels_car_heading(wrong.handling)
     assert whole.relative_difference(whole.accelerations(wrong, "exudyn", 5), plain) > 1e-6
 
 

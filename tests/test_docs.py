@@ -12,7 +12,7 @@ from markdown_it import MarkdownIt
 
 import twinrig
 from docs import scene_keys, validation_cases
-from docs.pages import ROOT, blocks, pages
+from docs.pages import ROOT, example_blocks, pages
 from models.core.errors import InputError
 from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, of_table
 from models.vehicles.vehicle_file import build_vehicle
@@ -77,7 +77,7 @@ def test_the_reference_of_scene_keys_is_what_the_models_read():
 
 def test_every_scene_key_has_a_meaning():
     for system in SYSTEMS:
-        assert [key.name for key in scene_keys.keys_of(scene_keys.scene_model(system)) if not key.meaning] == []
+        assert [key.name for key in scene_keys.keys_of(scene_keys.scene_class(system)) if not key.meaning] == []
 
 
 @pytest.mark.parametrize("scene", sorted(path.stem for path in SCENES_FOLDER.glob("*.toml")))
@@ -96,7 +96,7 @@ def test_the_reference_of_cases_is_that_of_the_report():
 
 
 def toml_blocks():
-    found = [(name, block) for name, page in PAGES.items() for block in blocks(page.read_text())]
+    found = [(name, block) for name, page in PAGES.items() for block in example_blocks(page.read_text())]
     return [pytest.param(name, each.text, id=f"{name}:{each.first}") for name, each in found if each.language == "toml"]
 
 
@@ -144,7 +144,7 @@ def test_every_name_of_code_is_there(name):
 @each_page
 def test_every_name_that_an_example_imports_is_there(name):
     """Names that ``from MODULE import ...`` takes from the project."""
-    for block in blocks(PAGES[name].read_text()):
+    for block in example_blocks(PAGES[name].read_text()):
         for node in ast.walk(ast.parse(block.text)) if block.language == "python" else ():
             if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in TOP:
                 missing = [each.name for each in node.names if not _is_there(node.module, each.name)]

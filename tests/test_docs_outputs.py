@@ -3,8 +3,8 @@
 import pytest
 
 from docs.alike import alike
-from docs.outputs import ExampleFailed, commands, rewritten
-from docs.pages import blocks
+from docs.outputs import ExampleFailed, console_commands, page_with_outputs
+from docs.pages import example_blocks
 
 PAGE = """# A page
 
@@ -56,42 +56,42 @@ def page(tmp_path):
 
 
 def test_outputs_are_written_where_they_differ(page):
-    text, changes = rewritten(page(PAGE), draw=False)
+    text, changes = page_with_outputs(page(PAGE), draw=False)
     assert len(changes) == 2 and "13\n" in changes[0] and "12\n" in changes[0]
-    assert [block.text for block in blocks(text) if block.mark == "output"] == ["12\n", "3\n", "3 4\nwrong\n"]
-    assert rewritten(page(text), draw=False) == (text, [])
+    assert [block.text for block in example_blocks(text) if block.mark == "output"] == ["12\n", "3\n", "3 4\nwrong\n"]
+    assert page_with_outputs(page(text), draw=False) == (text, [])
 
 
 @pytest.mark.parametrize("line", ["print(1 / 0)", "print(unknown)"])
 def test_an_example_that_stops_is_told(page, line):
     with pytest.raises(ExampleFailed, match="Error"):
-        rewritten(page(f"<!-- run -->\n```python\n{line}\n```\n"), draw=False)
+        page_with_outputs(page(f"<!-- run -->\n```python\n{line}\n```\n"), draw=False)
 
 
 @pytest.mark.parametrize(("mark", "command"), [("run", "false"), ("run: fails", "true")])
 def test_a_command_that_ends_otherwise_than_the_page_says_is_told(page, mark, command):
     with pytest.raises(ExampleFailed, match="ended with code"):
-        rewritten(page(f"<!-- {mark} -->\n```console\n$ {command}\n```\n"), draw=False)
+        page_with_outputs(page(f"<!-- {mark} -->\n```console\n$ {command}\n```\n"), draw=False)
 
 
 def test_an_output_without_an_example_is_told(page):
     with pytest.raises(ExampleFailed, match="without an example"):
-        rewritten(page("<!-- output -->\n```text\n```\n"), draw=False)
+        page_with_outputs(page("<!-- output -->\n```text\n```\n"), draw=False)
 
 
 def test_pictures_are_drawn_where_the_page_shows_them(page, tmp_path):
     shown = "<!-- picture: a.png -->\n![what it shows](pictures/a.png)\n"
     text = f"<!-- run -->\n```console\n$ echo x > a.png\n```\n\n{shown}"
-    rewritten(page(text), draw=False)
+    page_with_outputs(page(text), draw=False)
     assert not (tmp_path / "pictures").exists()
-    rewritten(page(text), draw=True)
+    page_with_outputs(page(text), draw=True)
     assert (tmp_path / "pictures" / "a.png").read_text() == "x\n"
     with pytest.raises(ExampleFailed, match="draw no"):
-        rewritten(page(text.replace("echo x > a.png", "true")), draw=False)
+        page_with_outputs(page(text.replace("echo x > a.png", "true")), draw=False)
 
 
 def test_commands_go_on_in_lines_without_a_dollar():
-    assert commands("$ a \\\n  b\n$ c\n") == ["a \\\n  b", "c"]
+    assert console_commands("$ a \\\n  b\n$ c\n") == ["a \\\n  b", "c"]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import yaml
 
 from docs.mathml import on_page_content
 from docs.pages import ROOT, pages
-from docs.validation_cases import counts, newest_report, rows
+from docs.validation_cases import counts_table, newest_report, rows_table
 from docs.website import copy_pages
 
 ROW = {
@@ -39,8 +39,10 @@ def test_the_rows_are_those_of_the_newest_report(tmp_path):
         os.utime(path, (1e9 - age, 1e9 - age))
     report = newest_report(tmp_path)
     assert report == tmp_path / "new" / "results.json"
-    assert rows(report).splitlines()[-1] == "| `audit.one` | a \\| b \\[1\\] \\[2\\] | 0 | 1e-12 | native | passed |"
-    assert counts(report).splitlines()[-1] == "| wheelset | 1 | 0 | 0 | 0 | 0 | 0 | 0 |"
+    assert (
+        rows_table(report).splitlines()[-1] == "| `audit.one` | a \\| b \\[1\\] \\[2\\] | 0 | 1e-12 | native | passed |"
+    )
+    assert counts_table(report).splitlines()[-1] == "| wheelset | 1 | 0 | 0 | 0 | 0 | 0 | 0 |"
 
 
 def entries(nav):

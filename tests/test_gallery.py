@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from docs.gallery import WIDTH, add_pictures, listed
+from docs.gallery import PICTURE_WIDTH, add_pictures, listed_figures
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "gallery.md"
-FIGURES = listed(PAGE.read_text(encoding="utf-8"))
+FIGURES = listed_figures(PAGE.read_text(encoding="utf-8"))
 SCENES = ROOT / "studies" / "scenes"
 
 
@@ -45,4 +45,4 @@ def test_small_pictures_are_shown_and_the_others_stay_names(tmp_path: Path) -> N
     text = page.read_text(encoding="utf-8")
     assert "| ![a/b.png](gallery/a_b.png)<br>`a/b.png` | there |" in text and "| `a/c.png` | not there |" in text
     with Image.open(page.parent / "gallery" / "a_b.png") as small:
-        assert small.size == (WIDTH, WIDTH // 2)
+        assert small.size == (PICTURE_WIDTH, PICTURE_WIDTH // 2)

@@ -18,7 +18,14 @@ from models.systems.hub_forces.run import measure, run
 from models.systems.hub_forces.scene import build
 from validation.absence.hub_forces import BARE_SCENE, write
 from validation.spatial.cars import r19, random_wrenches, static_forces
-from validation.spatial.hub_inputs import SOLVER_TOLERANCE, centre_gap, instants_gap, path_gap, samples, settings
+from validation.spatial.hub_inputs import (
+    SOLVER_TOLERANCE,
+    acceleration_difference_between_rows,
+    centre_of_mass_error,
+    samples,
+    settings,
+    trajectory_gap,
+)
 
 ON_ROAD = {"title": "t", "system": "hub-forces", "vehicle": {"file": "r19_free"}, "road": {}, "run": {"duration": 0.04}}
 OWN_STEPS = {"engines": {"exudyn": {"integrator": "DOPRI5", "tolerance": 1e-9}}}
@@ -30,11 +37,11 @@ def scene(**more):
 
 @pytest.mark.grounds("closed form")
 def test_held_forces_move_the_centre_of_mass_along_parabolas():
-    sizes = {engine: centre_gap(r19(), engine, "held") for engine in (*ENGINES, PLAIN)}
+    sizes = {engine: centre_of_mass_error(r19(), engine, "held") for engine in (*ENGINES, PLAIN)}
     assert max(sizes.values()) < 1e-10  # Runge-Kutta 4 in joint coordinates leaves 5e-12 m
     real = HubForces.hub_inputs
     with patch.object(HubForces, "hub_inputs", lambda *given: replace(real(*given), held=False)):
-        assert centre_gap(r19(), "reference", "held") > 1e-6  # the last stage of a step reads the next sample
+        assert centre_of_mass_error(r19(), "reference", "held") > 1e-6  # the last stage of a step reads the next sample
 
 
 def test_spans_end_where_samples_change_and_the_guide_goes_on():
@@ -48,13 +55,13 @@ def test_spans_end_where_samples_change_and_the_guide_goes_on():
 @pytest.mark.grounds("closed form")
 @pytest.mark.parametrize(("engine", "integrator"), [("exudyn", "DOPRI5"), ("reference", "LSODA")])
 def test_methods_that_pick_their_steps_read_forces_at_their_times(engine, integrator):
-    assert max(centre_gap(r19(), engine, how, integrator) for how in ("held", "linear")) < 1e-12
-    assert path_gap(r19(), engine, integrator) < 1e-7  # the error of Runge-Kutta 4 beside it, 3e-9
+    assert max(centre_of_mass_error(r19(), engine, how, integrator) for how in ("held", "linear")) < 1e-12
+    assert trajectory_gap(r19(), engine, integrator) < 1e-7  # the error of Runge-Kutta 4 beside it, 3e-9
 
 
 @pytest.mark.grounds("plain counterpart")
 def test_between_rows_compiled_forces_are_those_of_the_plain_equations():
-    assert instants_gap(r19(), 6) < 1e-12
+    assert acceleration_difference_between_rows(r19(), 6) < 1e-12
     nearest = HubModel.__init__
 
     def blunt(self, *given):
@@ -63,7 +70,7 @@ def test_between_rows_compiled_forces_are_those_of_the_plain_equations():
             self.model.numbers[cut_kernel.ANY_TIME] = 0.0
 
     with patch.object(HubModel, "__init__", blunt):
-        assert instants_gap(r19(), 1) > 1e-3
+        assert acceleration_difference_between_rows(r19(), 1) > 1e-3
 
 
 def test_a_run_is_the_same_by_every_route_and_says_what_it_took():

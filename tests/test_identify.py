@@ -21,7 +21,7 @@ from models.systems.single_track import run as single_track
 from models.systems.single_track.run import run
 from models.systems.single_track.scene import SingleTrackScene, build
 from models.systems.wheelset import run as wheelset_run
-from studies.command.identify import identification_lines, identify, late_clock
+from studies.command.identify import clock_delay, identification_lines, identify
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
 NOISE = {"yaw rate": 0.004, "lateral acceleration": 0.2, "side slip": 0.0008}
@@ -149,7 +149,7 @@ def test_a_clock_that_is_late_is_told(scene: SingleTrackScene, late: float) -> N
     columns = {name: (UNITS[name], np.interp(TIMES - late, TIMES, driven[name])) for name in NOISE}
     write_table(Path(scene.folder) / "late.csv", {"time": ("s", TIMES), **columns})
     known = uncertainty(fit(problem_of(begun(scene), Path(scene.folder) / "late.csv", ["vehicle.yaw_inertia"])))
-    assert late_clock(known) == pytest.approx(late, abs=0.1)  # the start has other tyres, which move the phase
+    assert clock_delay(known) == pytest.approx(late, abs=0.1)  # the start has other tyres, which move the phase
     assert any("the measurement's clock seems" in line for line in identification_lines(known)) == (late > 0.0)
 
 

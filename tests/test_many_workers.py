@@ -9,10 +9,10 @@ from validation.price.many_workers import (
     COMMAND_TIMES,
     DISK_RATE,
     LINK_RATE,
-    PER_BYTE,
+    SECONDS_PER_BYTE,
     Ensemble,
+    shares_table,
     simulated_shares,
-    table,
 )
 from validation.price.two_workers import Sender, cost_of_blocks
 
@@ -22,10 +22,10 @@ PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "cluster.md"
 def test_few_workers_compute_all_the_time_and_many_wait_for_the_slowest_station():
     """Throughput is the least of what workers compute and of what the command takes, to 3 % of filling and emptying."""
     ensemble = Ensemble()
-    slowest = COMMAND_TIMES + PER_BYTE * ensemble.bytes
-    assert ensemble.most_workers == pytest.approx(ensemble.seconds / slowest)
+    slowest = COMMAND_TIMES + SECONDS_PER_BYTE * ensemble.result_bytes
+    assert ensemble.most_workers == pytest.approx(ensemble.block_seconds / slowest)
     few, many = simulated_shares(ensemble, 10, 1000), simulated_shares(ensemble, 500, 10_000)
-    assert few.rate == pytest.approx(10 / ensemble.seconds, rel=0.03) and few.bottleneck == "workers"
+    assert few.rate == pytest.approx(10 / ensemble.block_seconds, rel=0.03) and few.bottleneck == "workers"
     assert many.rate == pytest.approx(1.0 / slowest, rel=0.03) and many.bottleneck == "command"
     assert many.workers == pytest.approx(ensemble.most_workers / 500, rel=0.05)
 
@@ -33,7 +33,7 @@ def test_few_workers_compute_all_the_time_and_many_wait_for_the_slowest_station(
 def test_the_disk_is_the_bottleneck_where_it_is_slow(monkeypatch):
     monkeypatch.setattr(many_workers, "DISK_RATE", 1e7)
     outcome = simulated_shares(Ensemble(), 100, 2000)
-    assert outcome.bottleneck == "disk" and outcome.rate == pytest.approx(1e7 / Ensemble().bytes, rel=0.03)
+    assert outcome.bottleneck == "disk" and outcome.rate == pytest.approx(1e7 / Ensemble().result_bytes, rel=0.03)
     assert DISK_RATE < LINK_RATE
 
 
@@ -48,7 +48,7 @@ def test_a_block_that_comes_late_holds_up_the_others(monkeypatch):
 
 def test_the_docs_have_the_simulated_table():
     page = PAGE.read_text()
-    rows = list(table())
+    rows = list(shares_table())
     assert len(rows) == 4 and all(row in page for row in rows), "\n".join(rows)
 
 

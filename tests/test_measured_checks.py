@@ -328,7 +328,7 @@ def test_a_ratio_says_what_is_wrong(ratio, kind):
 
 def test_findings_of_means_of_times_and_of_motion_have_their_figures(ridden, tmp_path):
     pytest.importorskip("matplotlib")
-    from studies.recording_figures import figure
+    from studies.recording_figures import figure_of_finding
 
     samples = ridden.samples(Faults(noise=bench.NOISE, delay={"fl_fz": 3e-3}), 1)
     samples[:, bench.column_numbers(ridden, "rr_fz")] *= 1e-3
@@ -337,7 +337,7 @@ def test_findings_of_means_of_times_and_of_motion_have_their_figures(ridden, tmp
     drawn = {
         one.check
         for i, one in enumerate(findings_of_all_checks(evidence))
-        if one.weight != "note" and figure(one, evidence, tmp_path / f"{i}.png")
+        if one.weight != "note" and figure_of_finding(one, evidence, tmp_path / f"{i}.png")
     }
     assert drawn == {"unit", "clipped", "shift"}
     assert len(list(tmp_path.glob("*.png"))) == 3

@@ -19,11 +19,11 @@ from validation.faults.native import CAMPAIGN
 from validation.spatial.cars import r19, rough_car, static_forces, twin
 from validation.spatial.native_builds import (
     NATIVE_ENGINES,
-    acceleration_error,
-    equations_error,
+    difference_from_equations,
     hub_model,
-    path_error,
+    native_acceleration_difference,
     random_states,
+    trajectory_difference,
 )
 
 
@@ -58,10 +58,10 @@ def test_every_spring_mount_bar_and_joint_is_the_engines_own(engine):
 def test_native_compiled_and_written_forces_agree(car):
     """Accelerations at random states to 1e-12 of each coordinate's largest: rounding of stiff bushes leaves 6e-14."""
     states = random_states(car, 6)
-    assert equations_error(car, states) < 1e-12
+    assert difference_from_equations(car, states) < 1e-12
     for engine in NATIVE_ENGINES:
-        assert acceleration_error(engine, car, states) < 1e-12
-        assert path_error(engine, car, 30) < 1e-12
+        assert native_acceleration_difference(engine, car, states) < 1e-12
+        assert trajectory_difference(engine, car, 30) < 1e-12
 
 
 def test_the_first_evaluation_reads_no_stale_law():
@@ -86,7 +86,7 @@ def test_a_spring_that_nothing_strains_is_no_element():
     across = replace(car, elements=(*car.elements[:-3], replace(car.elements[-3], axis=np.array([1.0, 0.0, 0.0]))))
     assert car.elements[-3].name == "right seat"
     assert divide(across.tree, across.elements, "mujoco").reasons == {"right seat": NO_TRAVEL}
-    assert acceleration_error("mujoco", across, random_states(across, 2)) < 1e-12
+    assert native_acceleration_difference("mujoco", across, random_states(across, 2)) < 1e-12
 
 
 def test_guides_feel_the_couple_of_an_axis_that_their_body_keeps():

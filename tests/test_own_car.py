@@ -32,7 +32,7 @@ from models.vehicles.spatial import JointElement, SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import build_vehicle, load_vehicle
 from validation.braking.sprung_box import braked_vehicle, steady_torques
-from validation.own_model.car_energy import energies_apart
+from validation.own_model.car_energy import largest_energy_difference
 from validation.own_model.cars import SALOON
 
 ROOT = Path(__file__).parents[1]
@@ -80,11 +80,11 @@ def test_parts_of_the_file_are_those_of_the_vehicle(saloon):
 def test_the_car_has_the_energy_of_the_file_as_mujoco_parsed_it(saloon):
     """Equal energies at all states are equal equations of motion; a rotor weighs 1e-9 kg more."""
     handling = Handling(saloon)
-    assert energies_apart(handling, 20) < 1e-11
+    assert largest_energy_difference(handling, 20) < 1e-11
     arm = handling.vehicle.body("rl arm")
     bodies = tuple(replace(b, mass=b.mass + 1e-3) if b is arm else b for b in handling.vehicle.bodies)
     object.__setattr__(handling, "vehicle", replace(handling.vehicle, bodies=bodies))
-    assert energies_apart(handling, 20) > 1e-7  # the fault: a gram
+    assert largest_energy_difference(handling, 20) > 1e-7  # the fault: a gram
 
 
 def test_it_drives_a_lane_change_in_both_engines(drives):

@@ -35,20 +35,20 @@ from models.own_model.states import random_states
 from models.own_model.urdf import misread_numbers
 from validation.own_model.files import (
     ARM_URDF,
+    BOX_ON_GROUND_POINT,
+    BOX_WELDED_TO_CRANK,
     CART,
     GEARED,
-    HELD,
-    HUNG,
     JOINTED,
     LINKED,
-    LOOP,
-    PLANTED,
+    LOOP_CONSTRAINT,
+    PLANTED_DIFFERENCES,
     TIED,
-    chain,
-    changed,
-    tree,
+    model_with_change,
+    random_chain,
+    random_tree,
 )
-from validation.own_model.soft_couplings import softly_coupled
+from validation.own_model.soft_couplings import soft_constraint_equations
 
 
 def _file(folder: Path, text: str, name: str = "a.xml") -> Path:
@@ -61,13 +61,13 @@ def _read(folder: Path, text: str, name: str = "a.xml", without: tuple[str, ...]
     return read(_file(folder, text, name), without)
 
 
-REPELLED = changed(TIED, "rope", 'springlength=".7"', 'springlength="-.01"')
+REPELLED = model_with_change(TIED, "rope", 'springlength=".7"', 'springlength="-.01"')
 """With a rest length below 0, which no connector of Exudyn takes: a preload of another code may leave that."""
 
 
 @pytest.mark.parametrize(
     "text",
-    [JOINTED, CART, TIED, REPELLED, chain(8), tree(9, 4)],
+    [JOINTED, CART, TIED, REPELLED, random_chain(8), random_tree(9, 4)],
     ids=["jointed", "cart", "tied", "repelled", "chain", "tree"],
 )
 def test_every_build_moves_as_the_file_does(tmp_path, text):
@@ -105,14 +105,14 @@ def test_what_couplings_give_way_in_mujoco_is_the_law_of_its_documentation(geare
     states = states_of(geared, 10)
     assert softness_difference(geared, 10) > 1e-3
     soft = reference_of_file(geared, states, SOFT_BUILD)
-    assert agreement_of_build("", soft, moved_at(softly_coupled(geared), states)).acceleration < 1e-8
+    assert agreement_of_build("", soft, moved_at(soft_constraint_equations(geared), states)).acceleration < 1e-8
     ties = tuple(replace(tie, solimp=(0.91, *tie.solimp[1:])) for tie in geared.driven.couplings)
     other = replace(geared, driven=replace(geared.driven, couplings=ties))
-    assert agreement_of_build("", soft, moved_at(softly_coupled(other), states)).acceleration > 1e-4
+    assert agreement_of_build("", soft, moved_at(soft_constraint_equations(other), states)).acceleration > 1e-4
 
 
-SPRUNG = changed(
-    changed(JOINTED, "ball", 'pos=".1 .2 .3"', 'pos=".1 .2 .3" stiffness="4" damping=".3"'),
+SPRUNG = model_with_change(
+    model_with_change(JOINTED, "ball", 'pos=".1 .2 .3"', 'pos=".1 .2 .3" stiffness="4" damping=".3"'),
     "free",
     '<freejoint name="root"/>',
     '<joint name="root" type="free" stiffness="6" damping=".7"/>',
@@ -161,7 +161,7 @@ def test_actuators_that_push_sites_are_those_of_the_file(tmp_path):
     for wrong in (replace(jet, force=1.01 * jet.force), replace(jet, moment=jet.moment[[1, 0, 2]])):
         driven = replace(twin.driven, body_loads=(wrong, prop))
         assert all(row.acceleration > 1e-5 for row in certificate(replace(twin, driven=driven), 20))
-    other = _read(tmp_path, changed(PUSHED, "prop", "0 0 3 0 0 .4", "0 0 3 0 0 .5"), "b.xml").twin
+    other = _read(tmp_path, model_with_change(PUSHED, "prop", "0 0 3 0 0 .4", "0 0 3 0 0 .5"), "b.xml").twin
     comparison = compare(twin, other, 3)
     assert [(each.kind, each.owner) for each in comparison.influential] == [("gear", "actuator 'prop'")]
 
@@ -184,7 +184,7 @@ def test_a_tendon_without_length_is_not_damped_in_mujoco(tmp_path, height):
         assert abs(speed - exact - error) < 5e-8  # the next order, g h^3 k / 24; Runge-Kutta's own is 2e-11 m/s
 
 
-@pytest.mark.parametrize("text", [LINKED, HELD, HUNG], ids=["linked", "held", "hung"])
+@pytest.mark.parametrize("text", [LINKED, BOX_WELDED_TO_CRANK, BOX_ON_GROUND_POINT], ids=["linked", "held", "hung"])
 def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
     """To rounding, rigid in two builds; what gives way in MuJoCo is its law; ends that are 1 mm off are seen in all."""
     twin = _read(tmp_path, text).twin
@@ -193,7 +193,7 @@ def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
         assert max(row.mass, row.acceleration) < 1e-11, row  # rounding, MuJoCo's solver included
     soft = reference_of_file(twin, states, SOFT_BUILD)
     assert softness_difference(twin, 5) > 1e-3
-    assert agreement_of_build("", soft, moved_at(softly_coupled(twin), states)).acceleration < 1e-8
+    assert agreement_of_build("", soft, moved_at(soft_constraint_equations(twin), states)).acceleration < 1e-8
     ties = twin.driven.connections
     for i, tie in enumerate(ties):
         body, (x, y, z) = tie.ends[0]
@@ -202,7 +202,7 @@ def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
         assert all(row.acceleration > 1e-6 for row in certificate(wrong, 5))
         other = (*ties[:i], replace(tie, solimp=(tie.solimp[0] + 0.01, *tie.solimp[1:])), *ties[i + 1 :])
         yielding = replace(twin, driven=replace(twin.driven, connections=other))
-        assert agreement_of_build("", soft, moved_at(softly_coupled(yielding), states)).acceleration > 1e-5
+        assert agreement_of_build("", soft, moved_at(soft_constraint_equations(yielding), states)).acceleration > 1e-5
 
 
 def test_welds_hold_both_bodies_as_they_lie(tmp_path, monkeypatch):
@@ -218,20 +218,20 @@ def test_welds_hold_both_bodies_as_they_lie(tmp_path, monkeypatch):
 
 
 def test_inertia_of_rotors_is_in_what_gives_way(tmp_path):
-    twin = _read(tmp_path, changed(GEARED, "turn", 'axis="0 1 .3"', 'axis="0 1 .3" armature=".3"')).twin
+    twin = _read(tmp_path, model_with_change(GEARED, "turn", 'axis="0 1 .3"', 'axis="0 1 .3" armature=".3"')).twin
     assert all(row.acceleration < 1e-11 for row in certificate(twin, 5))
 
 
 def test_a_path_of_a_body_hung_by_a_point_and_of_a_loop_of_bars(tmp_path):
     """The step is coarse, since Exudyn's constraints are asked four times in each."""
-    report = compare_paths(_read(tmp_path, HUNG).twin, 0.02)
+    report = compare_paths(_read(tmp_path, BOX_ON_GROUND_POINT).twin, 0.02)
     assert report.alike and report.has_soft_constraints and not report.failed and report.distances["mujoco"] > 1e-6
     assert report.energy < 1e-3  # of the largest, by steps of 20 ms
 
 
 def test_constraints_that_contradict_each_other_are_told(tmp_path):
     far = LINKED.replace("<worldbody>", '<worldbody><site name="far" pos="0 0 9"/>')
-    twin = _read(tmp_path, far.replace(LOOP, f'<connect site1="tip" site2="far"/>{LOOP}')).twin
+    twin = _read(tmp_path, far.replace(LOOP_CONSTRAINT, f'<connect site1="tip" site2="far"/>{LOOP_CONSTRAINT}')).twin
     with pytest.raises(RunFailed, match="cannot be satisfied all at once"):
         certificate(twin, 2)
 
@@ -245,8 +245,8 @@ def test_couplings_that_contradict_each_other_are_told_by_name(tmp_path):
 
 def test_where_a_joint_between_bodies_lies_is_told(tmp_path):
     first = _read(tmp_path, LINKED).twin
-    second = _read(tmp_path, changed(LINKED, "loop", '"rod"', '"crank"'), "b.xml").twin
-    other = _read(tmp_path, changed(LINKED, "grip", 'solimp=".92', 'solimp=".93'), "c.xml").twin
+    second = _read(tmp_path, model_with_change(LINKED, "loop", '"rod"', '"crank"'), "b.xml").twin
+    other = _read(tmp_path, model_with_change(LINKED, "grip", 'solimp=".92', 'solimp=".93'), "c.xml").twin
     moved = _read(tmp_path, LINKED.replace('name="tip" pos="0 .3 .1"', 'name="tip" pos="0 .3 .11"'), "d.xml").twin
     assert not compare(first, second, 3).alike
     comparison = compare(first, moved, 3)
@@ -272,13 +272,13 @@ def test_paths_with_couplings_agree_as_long_as_dry_friction_slides(geared):
     ],
 )
 def test_differences_of_couplings_and_friction_are_named(tmp_path, geared, name, old, new, kind, owner):
-    comparison = compare(geared, _read(tmp_path, changed(GEARED, name, old, new), "b.xml").twin, 5)
+    comparison = compare(geared, _read(tmp_path, model_with_change(GEARED, name, old, new), "b.xml").twin, 5)
     assert not comparison.alike and comparison.unexplained < 1e-10
     assert [(each.kind, each.owner) for each in comparison.influential] == [(kind, owner)]
 
 
 def test_softness_of_couplings_is_listed_and_not_compared(tmp_path, geared):
-    second = _read(tmp_path, changed(GEARED, "shut", ".95 .99", ".9 .99"), "b.xml").twin
+    second = _read(tmp_path, model_with_change(GEARED, "shut", ".95 .99", ".9 .99"), "b.xml").twin
     comparison = compare(geared, second, 5)
     assert comparison.alike and [each.owner for each in comparison.not_compared] == ["equality 'shut'"]
 
@@ -343,9 +343,9 @@ def original(tmp_path_factory):
     return _read(tmp_path_factory.mktemp("original"), JOINTED)
 
 
-@pytest.mark.parametrize("name,old,new,kind,owner,size", PLANTED)
+@pytest.mark.parametrize("name,old,new,kind,owner,size", PLANTED_DIFFERENCES)
 def test_planted_difference_is_named_with_its_size(tmp_path, original, name, old, new, kind, owner, size):
-    other = _read(tmp_path, changed(JOINTED, name, old, new), "b.xml")
+    other = _read(tmp_path, model_with_change(JOINTED, name, old, new), "b.xml")
     comparison = compare(original.twin, other.twin, 3)
     assert not comparison.alike
     first = comparison.influential[0]
@@ -414,7 +414,7 @@ def test_a_build_with_another_path_is_told(tmp_path, monkeypatch):
     assert not report.alike and report.comparison_horizon > 0.9 and report.distances["mujoco"] > 1e-7
 
 
-LIMITED = changed(CART, "tilt", 'axis="0 1 0"', 'axis="0 1 0" range="-20 20" margin=".02"').replace(
+LIMITED = model_with_change(CART, "tilt", 'axis="0 1 0"', 'axis="0 1 0" range="-20 20" margin=".02"').replace(
     "<worldbody>", '<compiler autolimits="true"/><worldbody>'
 )
 
@@ -464,7 +464,7 @@ def test_path_with_quaternions_differs_by_the_error_of_the_step(tmp_path):
 
 
 def test_thirty_joints_are_certified(tmp_path):
-    assert all(row.alike for row in certificate(_read(tmp_path, chain(30)).twin, 100))
+    assert all(row.alike for row in certificate(_read(tmp_path, random_chain(30)).twin, 100))
 
 
 DAMPED = '<actuator><general name="damp" site="s" biastype="affine" biasprm="0 0 -1"/></actuator>'

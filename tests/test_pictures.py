@@ -24,18 +24,18 @@ TIMES = np.array([0.0, 0.02, 0.05])
 
 @pytest.fixture(scope="module")
 def hunting():
-    return import_module("studies.pictures.wheelset").filmed(0.05, TIMES, ("exudyn", "mujoco"))
+    return import_module("studies.pictures.wheelset").stage_and_motions(0.05, TIMES, ("exudyn", "mujoco"))
 
 
 @pytest.mark.parametrize("vehicle", ["wheelset", "pitch_plane", "r19_free"])
 def test_both_engines_report_the_same_poses(vehicle, hunting):
     found = import_module(f"studies.pictures.{vehicle}")
-    _, motions = hunting if vehicle == "wheelset" else found.filmed(0.05, TIMES, ("exudyn", "mujoco"))
-    places, turns, _ = largest_differences(*motions)
-    assert places < 1e-9 and turns < 1e-9
+    _, motions = hunting if vehicle == "wheelset" else found.stage_and_motions(0.05, TIMES, ("exudyn", "mujoco"))
+    places, rotations, _ = largest_differences(*motions)
+    assert places < 1e-9 and rotations < 1e-9
     for motion in motions:  # they move, and a hundred times further than that: the slowest on a road that fades in
         assert max(np.ptp(place, axis=0).max() for place in motion.positions.values()) > 1e-7
-        for turn in motion.turns.values():
+        for turn in motion.rotations.values():
             np.testing.assert_allclose(turn @ turn.swapaxes(1, 2), np.broadcast_to(np.eye(3), turn.shape), atol=1e-12)
 
 
@@ -72,7 +72,7 @@ def test_what_is_magnified_leans_more_and_spins_as_it_does(hunting):
     lean, spin = Rotation.from_euler("x", 0.01), Rotation.from_euler("y", 2.0)
     turned = replace(
         motion,
-        turns={"wheelset": np.array([(lean * spin).as_matrix()])},
+        rotations={"wheelset": np.array([(lean * spin).as_matrix()])},
         positions={"wheelset": np.array([[0.0, 2e-3, 0.0]])},
     )
     place, turn = drawn_pose(turned, replace(stage, magnification=5.0), "wheelset", 0)
@@ -118,7 +118,7 @@ def changed(*changes):
 def test_without_the_extra_the_stills_are_kept_and_one_sentence_names_it(hunting, monkeypatch, tmp_path):
     monkeypatch.setattr(video, "VIDEO_PACKAGES", ("no_such_package",))
     own = import_module("studies.pictures.wheelset")
-    monkeypatch.setattr(own, "filmed", lambda *given: hunting)
+    monkeypatch.setattr(own, "stage_and_motions", lambda *given: hunting)
     summary = animation.run(changed("film.duration=0.05"), ("exudyn", "mujoco"), tmp_path, lambda text, part: None)
     assert {path.name for path in tmp_path.iterdir()} == {"page.png", "exudyn.png", "mujoco.png"}
     assert "twinrig[video]" in summary["table"][-1] and "twinrig[video]" not in "".join(summary["table"][:-1])

@@ -17,7 +17,7 @@ from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import mass, preloads
 from models.vehicles.vehicle_file import load_vehicle
 from validation.spatial.cars import twin
-from validation.spatial.spatial_twin import vehicle as spatial_twin
+from validation.spatial.spatial_twin import asymmetric_vehicle as spatial_twin
 
 ROUNDING = 1e-12
 """Of the largest: sums of some hundred products each, and one linear system."""

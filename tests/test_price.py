@@ -13,7 +13,7 @@ from models.advice.price.problem import Setting
 from models.core.errors import Refused, RunFailed
 from models.machine.timing import describe, interleave, paired_ratio
 from validation.price.rows import rows_of
-from validation.price.tables import rounds_of, tables
+from validation.price.tables import rounds_sentence, tables
 
 STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)
 
@@ -193,7 +193,7 @@ def test_parts_of_a_step_from_three_runs():
     from validation.price import split
 
     noise, seconds = np.array([1.3, 1.0, 1.1]), 1e-6 * split.STEPS["road"]
-    runs = zip(split.RUNS, (4, 5, 10), strict=True)
+    runs = zip(split.FORCE_VARIANTS, (4, 5, 10), strict=True)
     saved = {
         "problem": "road",
         "engine": "mujoco",
@@ -300,8 +300,8 @@ def test_a_job_that_has_not_been_is_timed_in_its_first_round():
 
 def test_rounds_are_told():
     points = [replace(p, changed=None, seconds=p.seconds[:1]) if p.setting.method == "first" else p for p in timed()]
-    assert rounds_of(points).startswith("Seconds are medians of 15 interleaved rounds for 6 settings")
-    assert "one run for 6" in rounds_of(points)
+    assert rounds_sentence(points).startswith("Seconds are medians of 15 interleaved rounds for 6 settings")
+    assert "one run for 6" in rounds_sentence(points)
 
 
 def test_tables_come_from_saved_points():
@@ -372,14 +372,14 @@ def test_force_calls_seen_from_outside():
 
 def test_every_integrator_of_the_catalogue_is_tried():
     from models.engines.catalogue import CATALOGUE
-    from validation.price.problems.road_excited import DEFAULTS, FULL_STEPS, QUICK
+    from validation.price.problems.road_excited import DEFAULT_SETTING_OWNERS, FULL_STEPS, QUICK_STEPS
 
     tried = {(engine, method.split()[0]) for engine, method in FULL_STEPS}
     assert tried == {(engine, name) for engine, names in CATALOGUE.items() for name in names}
-    for engine, method, value in DEFAULTS:
+    for engine, method, value in DEFAULT_SETTING_OWNERS:
         assert value in FULL_STEPS[engine, method], "a default is left out of the full sweep"
-        assert value in QUICK[engine, method], "a default is left out of the quick one"
-    assert all(set(values) <= set(FULL_STEPS[curve]) for curve, values in QUICK.items())
+        assert value in QUICK_STEPS[engine, method], "a default is left out of the quick one"
+    assert all(set(values) <= set(FULL_STEPS[curve]) for curve, values in QUICK_STEPS.items())
 
 
 def test_defaults_are_those_of_the_installed_engines():
@@ -387,12 +387,12 @@ def test_defaults_are_those_of_the_installed_engines():
     import mujoco
 
     from models.advice.price.systems.pitch_plane import SPECTRAL_RADII
-    from validation.price.problems.road_excited import DEFAULTS
+    from validation.price.problems.road_excited import DEFAULT_SETTING_OWNERS
 
     ti, option = exudyn.SimulationSettings().timeIntegration, mujoco.MjOption()
-    assert DEFAULTS["exudyn", "GeneralizedAlpha 0.9", ti.endTime / ti.numberOfSteps] == "Exudyn"
+    assert DEFAULT_SETTING_OWNERS["exudyn", "GeneralizedAlpha 0.9", ti.endTime / ti.numberOfSteps] == "Exudyn"
     assert SPECTRAL_RADII["GeneralizedAlpha 0.9"] == ti.generalizedAlpha.spectralRadius
-    assert DEFAULTS["mujoco", "Euler", option.timestep] == "MuJoCo"
+    assert DEFAULT_SETTING_OWNERS["mujoco", "Euler", option.timestep] == "MuJoCo"
     assert option.integrator == mujoco.mjtIntegrator.mjINT_EULER
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from models.advice.price import runner as cost
 from validation.price.problems import inertial_unit
-from validation.price.problems.inertial_unit import FULL_RATES, QUICK, InertialUnit, attitude, gyro
+from validation.price.problems.inertial_unit import FULL_RATES, QUICK_RATES, InertialUnit, car_attitude, gyro
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def test_the_closed_form_is_what_its_own_rates_turn(short):
     assert short.uncertainty["attitude"] < 1e-12
     off = np.abs(gyro(np.array([0.3])) - gyro(np.array([0.3 + 1e-6])))
     assert off.max() > 1e-8, "a rate that a wrong formula could keep constant would show nothing"
-    assert np.linalg.norm(attitude(np.array([0.0, 7.0])), axis=1) == pytest.approx(1.0, abs=1e-15)
+    assert np.linalg.norm(car_attitude(np.array([0.0, 7.0])), axis=1) == pytest.approx(1.0, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -44,5 +44,5 @@ def test_every_way_has_its_order(short, engine, method, order):
 
 def test_adaptive_steps_are_refused_and_the_quick_share_is_one(short):
     assert cost.attempt(short, short.setting("exudyn", "DOPRI5", 0.01)).status == "refused"
-    assert all(set(rates) <= set(FULL_RATES[curve]) for curve, rates in QUICK.items())
+    assert all(set(rates) <= set(FULL_RATES[curve]) for curve, rates in QUICK_RATES.items())
     assert short.setting("mujoco", "Euler", 2e-3).default == "MuJoCo"

@@ -23,7 +23,7 @@ def values(folder, writer):
 
 @pytest.mark.full
 def test_the_sheet_of_noisy_forces_is_solved_by_scipy_alone(tmp_path):
-    rows = values(tmp_path, lambda folder: pitch_plane.by_forces(force_excited.noisy(False), folder))
+    rows = values(tmp_path, lambda folder: pitch_plane.write_force_sheet(force_excited.noisy_problem(False), folder))
     k, d, m, inertia, g = 1e5, 1e4, (15.0, 15.0, 750.0), 500.0, 9.81
     t, front, rear = np.loadtxt(tmp_path / "noise.csv", delimiter=",", skiprows=1).T
 

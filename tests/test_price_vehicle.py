@@ -6,17 +6,17 @@ import pytest
 from models.advice.price import runner as cost
 from models.engines.spatial_protocol import METHODS
 from validation.price.problems import free_vehicle
-from validation.price.problems.free_vehicle import COMPARED_GRID, FULL_STEPS, FreeVehicle, heights
+from validation.price.problems.free_vehicle import COMPARED_GRID, FULL_STEPS, FreeVehicle, track_heights
 
 
 def test_the_road_is_smooth_and_has_the_slope_that_it_says():
     """Central differences at 1 mm: their error is (2 pi / 2 m)^2 1e-6 / 6, some 2e-6 of the slope."""
     place = np.linspace(-2.0, 12.0, 57)
     for track in (0, 1):
-        apart = heights(place + 1e-3, track)[0] - heights(place - 1e-3, track)[0]
-        assert apart / 2e-3 == pytest.approx(heights(place, track)[1], abs=2e-6)
-    assert abs(heights(place, 0)[0] - heights(place, 1)[0]).max() > 0.01
-    assert abs(heights(-1.5, 0)[0]) < 1e-5, "the rear axle begins on the plane"
+        apart = track_heights(place + 1e-3, track)[0] - track_heights(place - 1e-3, track)[0]
+        assert apart / 2e-3 == pytest.approx(track_heights(place, track)[1], abs=2e-6)
+    assert abs(track_heights(place, 0)[0] - track_heights(place, 1)[0]).max() > 0.01
+    assert abs(track_heights(-1.5, 0)[0]) < 1e-5, "the rear axle begins on the plane"
 
 
 def test_every_method_of_both_engines_is_tried():
@@ -29,7 +29,7 @@ def test_every_method_of_both_engines_is_tried():
 @pytest.mark.full
 def test_engines_come_to_the_equations_by_hand(monkeypatch):
     """RK4 at 5 ms, whose error is 0.2 N of some 970 N; at 2.5 ms a sixteenth of that."""
-    monkeypatch.setattr(free_vehicle, "REFERENCES", (("DOP853", 1e-8, "by hand"), ("LSODA", 1e-9, "engine")))
+    monkeypatch.setattr(free_vehicle, "REFERENCE_SOLVERS", (("DOP853", 1e-8, "by hand"), ("LSODA", 1e-9, "engine")))
     problem = FreeVehicle(False)
     assert problem.uncertainty["wheel load"] < 1e-3
     errors = [

@@ -26,7 +26,7 @@ def stack(*calls):
         ([("run", "models/engines/exudyn.py"), ("_SolveDynamic", "exudyn/solver.py")], "marching in exudyn"),
         ([("run", "models/engines/exudyn.py"), ("force", "models/engines/exudyn.py")], "forces asked for by exudyn"),
         ([("__init__", "models/engines/free_vehicle_mujoco.py")], "building in mujoco"),
-        ([("run", "models/systems/braking/march.py")], profile.BESIDE_ENGINES),
+        ([("run", "models/systems/braking/march.py")], profile.OUTSIDE_ENGINES),
         ([("run", "models/systems/braking/march.py"), ("_moved", "models/engines/exudyn.py")], "marching in exudyn"),
         ([("run", "models/engines/exudyn.py"), ("compile", "numba/core/dispatcher.py")], profile.KERNELS_KIND),
         ([("compile", "numba/core/dispatcher.py"), ("<module>", "llvmlite/ir.py")], profile.IMPORTS_KIND),
@@ -35,23 +35,23 @@ def stack(*calls):
     ],
 )
 def test_the_innermost_call_that_tells_decides(calls, part):
-    assert profile.part_of_run(stack(*calls)) == part
+    assert profile.kind_of_work(stack(*calls)) == part
 
 
 def test_all_the_time_of_the_work_is_told_and_no_more():
     begun = time.perf_counter()
-    summary = profile.Watch().told(lambda progress: time.sleep(0.3) or {"table": ["first"]}, None)
-    taken, told = time.perf_counter() - begun, summary["profile"]
-    told.pop(profile.PYTHON_START_KIND)
-    assert 0.25 < sum(told.values()) <= taken and summary["table"][0] == "first"
+    summary = profile.Profiler().run_profiled(lambda progress: time.sleep(0.3) or {"table": ["first"]}, None)
+    taken, run_profiled = time.perf_counter() - begun, summary["profile"]
+    run_profiled.pop(profile.PYTHON_START_KIND)
+    assert 0.25 < sum(run_profiled.values()) <= taken and summary["table"][0] == "first"
 
 
 def test_a_run_tells_it_when_it_is_asked_to(twinrig, empty_folder, capsys):
     asked = ("run", "release", "--set", "run.duration=0.05", "--engine", "reference", "--json")
     assert twinrig(*asked, "--profile") == 0
-    told = json.loads(capsys.readouterr().out)
-    assert {profile.PYTHON_START_KIND, profile.FIGURES_KIND} <= told["profile"].keys() and min(
-        told["profile"].values()
+    run_profiled = json.loads(capsys.readouterr().out)
+    assert {profile.PYTHON_START_KIND, profile.FIGURES_KIND} <= run_profiled["profile"].keys() and min(
+        run_profiled["profile"].values()
     ) > 0.0
     assert twinrig(*asked) == 0
     assert "profile" not in json.loads(capsys.readouterr().out)

@@ -2,20 +2,20 @@
 
 import re
 
-from docs.pages import ROOT, blocks
+from docs.pages import ROOT, example_blocks
 from studies.command.asked import study_names
 
 README = (ROOT / "README.md").read_text()
 
 
 def commands():
-    return [block.text.strip() for block in blocks(README) if not block.mark and not block.language]
+    return [block.text.strip() for block in example_blocks(README) if not block.mark and not block.language]
 
 
 def of_page(name, language, word=""):
     """The first block of a language in a page of ``docs`` in which a word stands."""
     text = (ROOT / "docs" / name).read_text()
-    return next(block.text for block in blocks(text) if block.language == language and word in block.text)
+    return next(block.text for block in example_blocks(text) if block.language == language and word in block.text)
 
 
 def test_both_commands_are_what_ci_runs_tests_first():

@@ -59,8 +59,8 @@ def refusing(monkeypatch):
             raise InputError("--tolerance", "", 1e-9, "is finer than can be known")
         return [GOOD]
 
-    monkeypatch.setattr(case, "drawn", lambda number, folder: number)
-    monkeypatch.setattr(case, "judge", judge)
+    monkeypatch.setattr(case, "random_scene", lambda number, folder: number)
+    monkeypatch.setattr(case, "verdicts_on_pitch_plane", judge)
     return asked
 
 

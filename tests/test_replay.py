@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validation.replay import __main__ as replay
-from validation.replay.answers import CommandAnswer, answer_difference, answer_of_job, load, save
+from validation.replay.answers import CommandOutput, load_output, output_difference, output_of_job, save_output
 from validation.replay.jobs import ReplayJob, replay_jobs
 
 COMMAND = """#!{python}
@@ -53,16 +53,19 @@ def test_a_recording_that_was_begun_goes_on(tmp_path, capsys):
     (tmp_path / "kept" / "shipped-alone.npz").write_bytes(b"cut")
     capsys.readouterr()
     replay.main(words)
-    assert "shipped-alone" in capsys.readouterr().out and load(tmp_path / "kept", "shipped-alone").codes == [0, 0]
+    assert "shipped-alone" in capsys.readouterr().out and load_output(tmp_path / "kept", "shipped-alone").codes == [
+        0,
+        0,
+    ]
 
 
 def test_channels_that_vanish_move_or_are_renamed():
-    before = CommandAnswer([0], "", 1.0, {"a.nc: x": np.ones(3), "b.csv: y": np.ones(3)})
-    moved = CommandAnswer([0], "", 1.0, {"c.nc: x": np.ones(3)})
-    told = answer_difference(before, moved, 0.0, {})
+    before = CommandOutput([0], "", 1.0, {"a.nc: x": np.ones(3), "b.csv: y": np.ones(3)})
+    moved = CommandOutput([0], "", 1.0, {"c.nc: x": np.ones(3)})
+    told = output_difference(before, moved, 0.0, {})
     assert told.wrong == ["b.csv: y is gone"] and not told.tolerated
-    named = CommandAnswer([0], "", 1.0, {"c.nc: x": np.ones(3), "c.nc: z": np.ones(3)})
-    assert not answer_difference(before, named, 0.0, {"b.csv: y": "c.nc: z"}).wrong
+    named = CommandOutput([0], "", 1.0, {"c.nc: x": np.ones(3), "c.nc: z": np.ones(3)})
+    assert not output_difference(before, named, 0.0, {"b.csv: y": "c.nc: z"}).wrong
 
 
 @pytest.mark.parametrize(
@@ -79,24 +82,24 @@ def test_channels_that_vanish_move_or_are_renamed():
 def test_every_bit_counts(tmp_path, now):
     """Signs of zeros, kinds of numbers, and what no number is, after a way through the files, too."""
     array = np.array([0.0, 1.0, np.inf, np.nan])
-    save(tmp_path, "a", CommandAnswer([0], "", 1.0, {"a.nc: x": array}))
-    kept = load(tmp_path, "a")
-    assert not answer_difference(kept, CommandAnswer([0], "", 1.0, {"a.nc: x": array}), 0.0, {}).wrong
-    assert answer_difference(kept, CommandAnswer([0], "", 1.0, {"a.nc: x": now}), 0.0, {}).wrong
+    save_output(tmp_path, "a", CommandOutput([0], "", 1.0, {"a.nc: x": array}))
+    kept = load_output(tmp_path, "a")
+    assert not output_difference(kept, CommandOutput([0], "", 1.0, {"a.nc: x": array}), 0.0, {}).wrong
+    assert output_difference(kept, CommandOutput([0], "", 1.0, {"a.nc: x": now}), 0.0, {}).wrong
 
 
 def test_a_bound_is_of_the_largest_number_and_of_every_number():
     large = np.linspace(0.0, 1e3, 60_001)
     nudged = large.copy()
     nudged[12_345] += 1e-8
-    before, now = (CommandAnswer([0], "", 1.0, {"a.nc: x": values}) for values in (large, nudged))
-    assert answer_difference(before, now, 1e-12, {}).wrong and not answer_difference(before, now, 2e-11, {}).wrong
-    none = CommandAnswer([0], "", 1.0, {"a.nc: x": np.where(large == 0.0, np.nan, large)})
-    assert answer_difference(before, none, 1.0, {}).wrong and answer_difference(none, before, 1.0, {}).wrong
+    before, now = (CommandOutput([0], "", 1.0, {"a.nc: x": values}) for values in (large, nudged))
+    assert output_difference(before, now, 1e-12, {}).wrong and not output_difference(before, now, 2e-11, {}).wrong
+    none = CommandOutput([0], "", 1.0, {"a.nc: x": np.where(large == 0.0, np.nan, large)})
+    assert output_difference(before, none, 1.0, {}).wrong and output_difference(none, before, 1.0, {}).wrong
 
 
 def test_what_a_machine_decides_is_no_part_of_an_answer(tmp_path):
-    now = answer_of_job(ReplayJob("both", (("show", "alone"), ("run",))), str(stub(tmp_path)), tmp_path / "work")
+    now = output_of_job(ReplayJob("both", (("show", "alone"), ("run",))), str(stub(tmp_path)), tmp_path / "work")
     assert now.message == "a plan, made in SECONDS\n" and now.codes == [0, 0]
     assert set(now.arrays) == {"out/path.csv: time [s]", "out/path.csv: x [m]", ": 1/scene", ": 1/answer/largest x [m]"}
 

@@ -19,9 +19,16 @@ from validation.common.changes import read_results as read_earlier
 from validation.common.rows import STATUSES, Observed, Row, behaviour_row, not_run
 from validation.report import page as report
 from validation.report import shares
-from validation.report.numbers import error, margin_of_row, number_markup, numeric_columns, powers_markup, share_markup
+from validation.report.numbers import (
+    error_markup,
+    margin_of_row,
+    number_markup,
+    numeric_columns,
+    powers_markup,
+    share_markup,
+)
+from validation.run import print_summary
 from validation.run import save as _save
-from validation.run import say
 
 ODD = '<script>alert("1")</script> & "quotes" µ'
 FAILED = Observed(
@@ -163,19 +170,19 @@ def test_drawn_again_elsewhere_by_a_new_process_from_saved_files_it_is_the_same_
 def test_a_quick_report_tells_its_share_of_the_last_full_one(folder, tmp_path, monkeypatch):
     kept = tmp_path / "full_report.json"
     kept.write_text('{"order": {"rows": {"pitch-plane": 7}, "seconds": 30.0, "commit": "abc"}}')
-    monkeypatch.setattr(shares, "KEPT_REPORT", kept)
+    monkeypatch.setattr(shares, "FULL_REPORT_FILE", kept)
     with pytest.raises(InputError, match="full report"):
-        shares.keep(folder)
+        shares.save_full_report(folder)
     results = report.read(folder / "results.json")
     results["rows"] = results["rows"][:3]
     results["provenance"]["quick"] = False
     shares.full_report_data.cache_clear()
-    line = shares.shares_of_systems(results)[0]
+    line = shares.report_sizes_of_systems(results)[0]
     assert (line["rows"], line["seconds"], line["full_rows"], line["full_seconds"]) == (3, 400.0, None, None)
     (folder / "results.json").write_text(json.dumps(results))
-    shares.keep(folder)
+    shares.save_full_report(folder)
     shares.full_report_data.cache_clear()
-    line = shares.shares_of_systems(results)[0]
+    line = shares.report_sizes_of_systems(results)[0]
     assert (line["full_rows"], line["full_seconds"]) == (3, 400.0), "audit has two of the rows, order one and not seven"
     shares.full_report_data.cache_clear()
 
@@ -256,7 +263,7 @@ def test_numbers_read_as_an_engineer_writes_them(value, text):
     ("value", "text"), [(8.88e-16, "8.9e-16"), (1e-12, "1e-12"), (0.012345, "0.01235"), (0.0, "0"), (None, "–")]
 )
 def test_errors_beyond_plain_numbers_are_told_by_their_size(value, text):
-    assert error(value) == text
+    assert error_markup(value) == text
 
 
 def test_margin_needs_numbers_and_a_tolerance():
@@ -302,7 +309,7 @@ def test_missed_aims_are_counted_and_told_in_the_verdict_and_fail_nothing(tmp_pa
     own = [rows()[0], Observed("fastsim.speed", "contact", "one call", 7.25, "us").aim(5.0, "asked")]
     top = report.write(save(tmp_path, own)).read_text(encoding="utf-8").partition("What is not covered</h2>")[0]
     assert "No row failed; 1 stated aim was missed." in top and "7.25 us; the aim is at most 5" in top
-    assert say(own, None, tmp_path) == 0
+    assert print_summary(own, None, tmp_path) == 0
     assert "1 passed, 0 reported, 0 not run, 1 missed, 0 failed" in capsys.readouterr().out
 
 

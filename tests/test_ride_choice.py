@@ -27,7 +27,7 @@ from models.vehicles.vehicle_file import load_vehicle
 from studies.command.asked import SCENES_FOLDER
 from validation.choice.judged import measured_step, worst_nearby
 from validation.choice.sampled import Sampled
-from validation.ride.drawn_rides import drawn_ride
+from validation.ride.drawn_rides import random_linear_ride
 
 SPEED = 20.0
 
@@ -76,7 +76,9 @@ def test_wheels_without_mass_are_the_limit_of_light_ones(name, small):
 
 
 def test_rigid_springs_and_locked_freedoms_are_limits():
-    drew = drawn_ride(2)  # a car with bushings; undamped tyres, for white noise never lets a stiff spring come to rest
+    drew = random_linear_ride(
+        2
+    )  # a car with bushings; undamped tyres, for white noise never lets a stiff spring come to rest
     tyres = tuple(replace(tyre, damping=0.0) for tyre in drew.scene.vehicle.tyres)
     one = replace(drew, scene=replace(drew.scene, vehicle=replace(drew.scene.vehicle, tyres=tyres)))
     own = named(one.scene)
@@ -217,7 +219,7 @@ def test_a_quantity_that_is_none(twinrig, capsys):
 
 def test_rounding_is_not_taken_for_white_noise():
     """Wheels without mass on rigid bushings: no noise of the road reaches the body, but 1e-18 of it by rounding."""
-    drew = drawn_ride(38, 0.02)
+    drew = random_linear_ride(38, 0.02)
     own = Chooser(drew.scene, [drew.speed], drew.quantities, drew.tolerance)
     choice = own.choose()
     assert {"mass of all wheels", "bushings: fl bush"} <= {effect.name for effect in choice.left_out}
@@ -239,7 +241,7 @@ def test_a_tolerance_that_nothing_keeps_leaves_everything_and_says_what_would_ch
 
 def test_a_choice_whose_identity_is_not_exact_is_not_taken(monkeypatch):
     """Neither what a sound certificate lets go nor any other set is reported as left out."""
-    drew, exact = drawn_ride(38, 0.02), Screen.certificate_sides
+    drew, exact = random_linear_ride(38, 0.02), Screen.certificate_sides
 
     def chooser():
         return Chooser(drew.scene, [drew.speed], drew.quantities, drew.tolerance)
@@ -255,7 +257,7 @@ def test_a_choice_whose_identity_is_not_exact_is_not_taken(monkeypatch):
 
 def drawn_speeds(seed):
     """A scene of a detailed vehicle, with what its choice leaves out as far as the tolerance of 2 % allows."""
-    drew = drawn_ride(seed, 0.02)
+    drew = random_linear_ride(seed, 0.02)
     chooser = Chooser(drew.scene, [0.7 * drew.speed, drew.speed, 1.3 * drew.speed], drew.quantities, drew.tolerance)
     return chooser, chooser.choose()
 
@@ -276,7 +278,7 @@ def test_the_tolerance_holds_between_speeds_and_with_parameters_off():
 
 
 def test_spectra_near_a_scene_are_those_of_the_exact_solve():
-    drew = drawn_ride(2)
+    drew = random_linear_ride(2)
     rest = reduced_without(drew.scene, [named(drew.scene)["springs of part on body"]])
     rows = [[output.name for output in drew.scene.vehicle.outputs].index(name) for name in drew.quantities]
     near = Neighbourhood(drew.scene, np.array([10.0, 30.0]), [(row, "") for row in rows])

@@ -21,7 +21,7 @@ from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.ride.drawn_rides import drawn_bent
+from validation.ride.drawn_rides import random_nonlinear_ride
 
 LAWS = ("curves over rate", "curves over travel", "friction")
 
@@ -122,9 +122,9 @@ def test_what_a_search_may_take_is_shown_beforehand(twinrig, capsys):
 
 
 def test_a_choice_that_chance_alone_could_break_is_refused():
-    asked = drawn_bent(4)
+    asked = random_nonlinear_ride(4)
     with pytest.raises(InputError, match="times as many samples would tell"):
-        Chooser(asked.opened(FEWEST_COPIES), "reference", list(asked.quantities), 0.005).choose()
+        Chooser(asked.prepared_in_time(FEWEST_COPIES), "reference", list(asked.quantities), 0.005).choose()
 
 
 def test_a_quantity_that_one_sample_makes_up_is_refused():

@@ -8,7 +8,7 @@ from validation.price import ride
 
 @pytest.fixture(scope="module")
 def measured():
-    return ride.measure(True, 1, 0.0)
+    return ride.measure_routes(True, 1, 0.0)
 
 
 def test_all_rows_pass_and_table_and_figure_come_from_saved_data(measured):

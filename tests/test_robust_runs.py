@@ -18,7 +18,7 @@ from models.core.errors import RunFailed
 from models.ensemble import runner
 from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.workers import process_pool
-from studies.command.sweep import Points
+from studies.command.sweep import SweepJob
 
 
 class Suicide:
@@ -181,7 +181,7 @@ def test_a_sweep_knows_its_scene_its_files_its_values_and_its_engine(tmp_path):
 
     def facts(**changes):
         whole = {"scene": str(scene), "changes": (), "key": "k", "values": (1, 2), "engine": None, "folder": tmp_path}
-        return Points(**whole | changes).facts()
+        return SweepJob(**whole | changes).facts()
 
     first = facts()
     assert facts(folder=Path("elsewhere")) == first

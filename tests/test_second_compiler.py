@@ -7,19 +7,19 @@ import pytest
 from test_waiting import ROOT, on_terminal
 
 from studies.command import second_compiler
-from studies.command.second_compiler import SecondCompiler, compiled_beside, load_scene, run_for_kernels
+from studies.command.second_compiler import SecondCompiler, load_scene, run_for_kernels, second_process_compiles
 
 COUNTED = """
 import time
 from pathlib import Path
 from studies.command import second_compiler
 second_compiler.__name__ = "seen"
-second_compiler.MISSING = {missing}
+second_compiler.COMPILATION_SECONDS = {missing}
 import numba
 from numba.core import event
 changes = ["run.duration=1"]
 scene = second_compiler.load_scene("release", changes)
-with second_compiler.compiled_beside("release", changes, scene, ("exudyn", "mujoco")):
+with second_compiler.second_process_compiles("release", changes, scene, ("exudyn", "mujoco")):
     for _ in range(2):
         with event.trigger_event("numba:compiler_lock"):
             pass
@@ -45,12 +45,12 @@ def test_the_second_process_begins_once_kernels_are_missing(missing, tmp_path):
 def test_no_process_begins_where_nobody_waits(monkeypatch):
     monkeypatch.setattr(second_compiler, "SecondCompiler", None)
     scene = load_scene("release", [])
-    with compiled_beside("release", [], scene, ("exudyn", "mujoco")):
+    with second_process_compiles("release", [], scene, ("exudyn", "mujoco")):
         pass
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    with compiled_beside("release", [], scene, ("exudyn",)):
+    with second_process_compiles("release", [], scene, ("exudyn",)):
         pass
-    with compiled_beside("ensemble", [], load_scene("ensemble", []), ("exudyn", "mujoco")):  # which has workers
+    with second_process_compiles("ensemble", [], load_scene("ensemble", []), ("exudyn", "mujoco")):  # which has workers
         pass
 
 

@@ -168,7 +168,7 @@ def test_points_of_work_precision_curves_are_marked():
         {"q": "N"},
         1.0,
     )
-    problem.errors = lambda run: (road_excited.judge(problem.assembly, run), {"q": 0.1})[1]
+    problem.errors = lambda run: (road_excited.result_with_assumptions(problem.assembly, run), {"q": 0.1})[1]
     point = attempt(problem, road_excited.setting("reference", "RK4", 2e-3))
     assert point.status == "ok" and "linear tyres stay on the road" in point.broken
 

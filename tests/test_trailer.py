@@ -21,9 +21,9 @@ from models.systems.handling.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
 from validation.common.checks import largest_relative_difference
-from validation.spatial.towing import keep_to_the_car, levers_error, towed_turn
+from validation.spatial.towing import give_towed_wheels_car_heading, static_load_error, towed_turn
 from validation.spatial.trains import BOX, WHEELS, caravan, train
-from validation.spatial.written_equations import TURN_CONTROLS, rolling_cars, rolling_gap
+from validation.spatial.written_equations import TURN_CONTROLS, rolling_acceleration_difference, rolling_cars
 
 BOUND = 3e-3
 """Of the closed form of a settled turn: what is left of its settling after 3 s."""
@@ -51,14 +51,17 @@ def file_with(**changes: Any) -> dict[str, Any]:
 
 @pytest.mark.grounds("closed form")
 def test_loads_on_ball_and_axles_are_those_of_levers():
-    assert levers_error() < 1e-9
+    assert static_load_error() < 1e-9
 
 
 @pytest.mark.grounds("closed form")
 def test_a_steady_turn_is_that_of_the_closed_form_and_wheels_that_keep_to_the_car_are_seen():
-    right, wrong = towed_turn(caravan(), 10.0, None, 3.0), towed_turn(caravan(), 10.0, keep_to_the_car, 1.5)
-    assert abs(right.yaw) < BOUND and np.abs(right.headings).max() < BOUND
-    assert np.abs(wrong.headings).max() > 0.1
+    right, wrong = (
+        towed_turn(caravan(), 10.0, None, 3.0),
+        towed_turn(caravan(), 10.0, give_towed_wheels_car_heading, 1.5),
+    )
+    assert abs(right.yaw_rate) < BOUND and np.abs(right.towed_headings).max() < BOUND
+    assert np.abs(wrong.towed_headings).max() > 0.1
 
 
 def test_energy_is_accounted_for():
@@ -100,7 +103,10 @@ def test_springs_of_a_trailer_are_the_engines_own_and_bear_it(engine):
     wanted = {spring.name for spring in car.given.springs if spring.frame in car.given.towed} | {"trailer's bar"}
     assert set(names) == wanted
     assert all("friction" in why for why in division.reasons.values()) and len(division.reasons) == 4
-    assert rolling_gap(car, engine, 3) < 1e-12 and rolling_gap(car.changed(forces="compiled"), engine, 3) < 1e-12
+    assert (
+        rolling_acceleration_difference(car, engine, 3) < 1e-12
+        and rolling_acceleration_difference(car.changed(forces="compiled"), engine, 3) < 1e-12
+    )
     q, v = car.straight(20.0)
     without = free_model(engine, replace(driven_by_both, parts=division.native[:-1])).acceleration(0.0, q + 0.01, v)
     assert largest_relative_difference(without, build_model(engine, car).acceleration(0.0, q + 0.01, v)) > 1e-6

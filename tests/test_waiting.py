@@ -14,7 +14,7 @@ from models.core.waiting import SHARES_OF_MARCHES, marching
 from models.engines.assembly import Settings
 from models.engines.protocol import build
 from models.systems.pitch_plane.scene import assembly_of_scene
-from studies.command.waiting import COMPILE_SECONDS, Waiting
+from studies.command.waiting import COMPILE_SECONDS, ProgressState
 from validation.common.scenes import road_scene
 
 ROOT = Path(__file__).parents[1]
@@ -127,7 +127,7 @@ def test_a_march_tells_how_far_it_is(engine, monkeypatch):
 def test_time_left_follows_the_share_and_leaves_out_compiling(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    shown = Waiting("six runs", "pitch-plane", start_time=now[0])
+    shown = ProgressState("six runs", "pitch-plane", start_time=now[0])
     shown.tell("six runs", 0.25)
     now[0] += 10.0
     assert shown.state() == ("six runs", 0.25, "30 s left")

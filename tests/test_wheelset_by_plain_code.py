@@ -46,7 +46,7 @@ def test_rates_and_contacts_are_those_of_plain_vectors(speed, law, lean):
     expected = np.array([plain.rates(state) for state in drawn])
     # the penetration is a difference of metres: 1e-16 m of 1e-4 m, to the power 3/2; FASTSIM has its corners
     assert rates == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
-    patches = [[each.told for each in plain.patches(state)] for state in drawn]
+    patches = [[each.contact_quantities for each in plain.patches(state)] for state in drawn]
     for name in patches[0][0]:
         wanted = np.array([[each[name] for each in pair] for pair in patches])
         assert contacts[name] == pytest.approx(wanted, abs=1e-9 * np.abs(wanted).max()), name
@@ -59,7 +59,7 @@ def test_joint_forces_of_the_engines_are_the_rails_by_virtual_work():
     for state in states(CHOSEN_WHEELSET, 25.0, 6):
         block = np.concatenate((np.full(JOINTS, 7.0), to_joints(state), numbers))
         set_joint_forces(block.ctypes.data, 0.0, JOINTS)
-        expected = plain.on_joints(state)
+        expected = plain.rail_forces_on_coordinates(state)
         assert block[:JOINTS] == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
 
 

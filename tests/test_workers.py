@@ -18,7 +18,7 @@ from models.identification.uncertainty import likelihood_profile, uncertainty
 from models.systems.braking.stops import Stops
 from models.systems.ride.nonlinear import CopiesBySpeed, Sampling
 from studies.command.asked import load_scene
-from studies.command.crew import given_crew
+from studies.command.crew import crew_changes_by_options
 from validation.ride.in_engines import vehicle_and_road
 
 
@@ -94,7 +94,7 @@ def test_a_scene_asks_for_its_crew_and_no_result_depends_on_it(asked, crew):
 
 def test_workers_and_a_cluster_are_not_asked_for_together():
     with pytest.raises(InputError, match=r"^--workers = 3: .*leave one out"):
-        given_crew(3, "tcp://a:1")
+        crew_changes_by_options(3, "tcp://a:1")
     with pytest.raises(InputError, match=r"workers = 0"):
         load_scene("study_road", ["workers=0"])
 

@@ -21,16 +21,16 @@ from validation.faults.campaign import seeing_checks
 from validation.faults.written import CAMPAIGN
 from validation.spatial.cars import static_forces
 from validation.spatial.written_equations import (
-    bristles_gap,
-    curved_vehicle,
+    brush_force_difference,
+    cut_car_acceleration_difference,
+    cut_car_path_difference,
     cut_cars,
-    hub_gap,
-    hub_path_gap,
-    inside_gap,
-    report_gap,
+    inner_force_difference,
+    nonlinear_spring_car,
+    report_difference,
+    rolling_acceleration_difference,
     rolling_cars,
-    rolling_gap,
-    rolling_path_gap,
+    rolling_path_difference,
 )
 
 INSTANT, PATH = 1e-12, 1e-10
@@ -40,32 +40,32 @@ INSTANT, PATH = 1e-12, 1e-10
 @pytest.mark.parametrize("name", ["r19_free", "twin"])
 def test_a_cut_car_moves_as_in_mujoco(name):
     vehicle = cut_cars()[name]
-    assert hub_gap(vehicle, "mujoco", 18) < INSTANT
-    assert hub_path_gap(vehicle, "mujoco", 0.01, rough=True) < PATH
-    assert hub_path_gap(vehicle, "mujoco", 0.01, rough=False) < PATH
+    assert cut_car_acceleration_difference(vehicle, "mujoco", 18) < INSTANT
+    assert cut_car_path_difference(vehicle, "mujoco", 0.01, rough_road=True) < PATH
+    assert cut_car_path_difference(vehicle, "mujoco", 0.01, rough_road=False) < PATH
 
 
 def test_what_is_felt_inside_is_that_of_its_own_state():
     """Section forces, wrenches and the moments that enforce angles, of several states in one report."""
-    assert inside_gap(cut_cars()["twin"], 3) < INSTANT
+    assert inner_force_difference(cut_cars()["twin"], 3) < INSTANT
 
 
 @pytest.mark.parametrize("name", ["r19_free", "twin", "curved", "caravan", "train"])
 def test_a_car_on_tyres_moves_as_in_mujoco(name):
     car = rolling_cars()[name]
-    assert rolling_gap(car, "mujoco", 9) < INSTANT
-    assert report_gap(car, 9) < INSTANT
-    assert rolling_path_gap(car, "mujoco", 0.01) < PATH
+    assert rolling_acceleration_difference(car, "mujoco", 9) < INSTANT
+    assert report_difference(car, 9) < INSTANT
+    assert rolling_path_difference(car, "mujoco", 0.01) < PATH
 
 
 @pytest.mark.grounds("plain counterpart")
 def test_a_car_on_tyres_accelerates_as_in_exudyn():
     """Whose compiled forces lie in one block of numbers."""
-    assert rolling_gap(rolling_cars()["twin"], "exudyn", 3) < INSTANT
+    assert rolling_acceleration_difference(rolling_cars()["twin"], "exudyn", 3) < INSTANT
 
 
 def test_bristles_are_those_of_the_kernel():
-    assert bristles_gap(20) < INSTANT
+    assert brush_force_difference(20) < INSTANT
 
 
 def test_roads_and_controls_are_those_of_the_kernel():
@@ -119,7 +119,7 @@ def test_a_run_that_blows_up_fails():
 def test_curves_of_the_description_press():
     """A car with curves is not the car without: the comparison of the curved one compares them."""
     car = rolling_cars()["curved"]
-    without = car.changed(given=replace(curved_vehicle(), springs=rolling_cars()["r19_free"].given.springs))
+    without = car.changed(given=replace(nonlinear_spring_car(), springs=rolling_cars()["r19_free"].given.springs))
     q, v = car.straight(10.0)
     v[5:] += 0.3
     ours, others = (build("reference", each).acceleration(0.0, q, v) for each in (car, without))

@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 _CLASSES = {"Report": "twinrig.report", "Result": "twinrig.result", "Scene": "twinrig.scene"}
-"""Classes by their modules, imported where they are used: with what tells the version, they take the most time."""
+"""Module of each public class, imported at its first use, because these imports take most of the time."""
 
 
 def __getattr__(name: str) -> Any:

@@ -1,4 +1,5 @@
-"""Functions for users: load, run, compare, price, choose, export, validate; thin layers on what the command line uses.
+"""Functions of the library: load, run, compare, price, choose, export, validate; thin layers on the command line's
+code.
 
 Heavy packages are imported by the functions that use them.
 """
@@ -21,15 +22,16 @@ if TYPE_CHECKING:
     from twinrig.scene import Scene
 
 AnyScene: TypeAlias = "str | Path | Mapping[str, Any] | Scene"
-"""A shipped scene's name, a file, a table, or a loaded scene."""
+"""Type of an argument that is a scene: the name of a shipped scene, a file, a table, or a loaded scene."""
 Changes: TypeAlias = "Mapping[str, Any] | None"
-"""Values by dotted keys, as ``{"run.step": 5e-4}``."""
-PARTS = {
+"""Type of changes of a scene: values by dotted keys, as ``{"run.step": 5e-4}``."""
+MANOEUVRE_OPTIONS = {
     "braking": ("procedure", "procedures"),
     "handling": ("manoeuvre", "manoeuvres"),
     "wheel-rail": ("case", "cases"),
 }
-"""By system: the option of its run that names one of several drives, and the table of the scene that has them."""
+"""For each system with several manoeuvres in a scene, the option of ``run`` that selects one, and the scene's table of
+them."""
 
 
 def load(scene: AnyScene, set: Changes = None) -> "Scene":
@@ -69,10 +71,10 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     from twinrig.result import Result
 
     loaded = load(scene, set).checked
-    options = _options(loaded)
-    _check_how(loaded, how, options)
+    options = _run_parameters(loaded)
+    _check_run_options(loaded, how, options)
     chosen, checked = _engines(loaded, engine, options["engine"].default == "")
-    with _as_library(loaded):
+    with _library_messages(loaded):
         plan_of(loaded).check(loaded, checked)
         doubtful = findings_as_dicts(merged_findings(findings_of(loaded)))
         with progress_bar(f"{loaded.title}: {chosen or loaded.system}", loaded.system):
@@ -81,8 +83,8 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     return Result(answer.data, answer.detail)
 
 
-def _options(scene: Any) -> Mapping[str, Any]:
-    """Parameters of the run of a scene's system; InputError where the system has none."""
+def _run_parameters(scene: Any) -> Mapping[str, Any]:
+    """Parameters of the function that runs a scene of the system; raises InputError for a system without one."""
     from importlib import import_module
 
     from models.core.systems import SYSTEMS
@@ -94,20 +96,20 @@ def _options(scene: Any) -> Mapping[str, Any]:
     return signature(import_module(f"{SYSTEMS[scene.system].package}.run").run).parameters
 
 
-def _check_how(scene: Any, run_options: Mapping[str, Any], options: Mapping[str, Any]) -> None:
-    """Refuse options that the run of this system does not have, and drives that the scene does not have."""
+def _check_run_options(scene: Any, run_options: Mapping[str, Any], options: Mapping[str, Any]) -> None:
+    """Raise InputError for options that the system's run does not have, and for manoeuvres that the scene does not
+    have."""
     names = (*(name for name in options if name not in ("scene", "engine", "error")), "engine", "error", "set")
     for name in run_options:
         if name not in names:
             raise InputError("run", name, None, f"is no option of a run of {scene.system}", names)
-    option, table = PARTS.get(scene.system, ("", ""))
+    option, table = MANOEUVRE_OPTIONS.get(scene.system, ("", ""))
     if run_options.get(option) is not None and run_options[option] not in getattr(scene, table):
         raise InputError(scene.file, option, run_options[option], f"is not among {table}", tuple(getattr(scene, table)))
 
 
 def _engines(scene: Any, requested_engine: str, optional: bool) -> tuple[str, tuple[str, ...]]:
-    """The engine of a run ("" where the system chooses its engine itself), and the engines for which the scene is
-    checked."""
+    """The engine of a run ("" if the system chooses it), and the engines for which the scene is checked."""
     from studies.command.asked import engines_of
 
     named = requested_engine or getattr(getattr(scene, "run", None), "engine", None) or None
@@ -124,13 +126,13 @@ def _engines(scene: Any, requested_engine: str, optional: bool) -> tuple[str, tu
 
 
 @contextmanager
-def _as_library(scene: Any = None, **names: str) -> "Iterator[None]":
+def _library_messages(scene: Any = None, **names: str) -> "Iterator[None]":
     """Context in which error messages name the argument of the library's function in place of the command line's
     option. ``names`` maps options to arguments; an option that is not in it keeps its name.
 
     What is unlikely about the vehicle of a scene that is refused is a note of the error: it may be the cause.
     """
-    from studies.command.asked import query_lines
+    from studies.command.asked import doubt_lines
 
     try:
         yield
@@ -139,7 +141,7 @@ def _as_library(scene: Any = None, **names: str) -> "Iterator[None]":
             option = error.file.lstrip("-")
             renamed = InputError(names.get(option, option), error.place, error.value, error.allowed, error.choices)
             raise renamed from None
-        for line in query_lines(scene) if scene is not None else ():
+        for line in doubt_lines(scene) if scene is not None else ():
             error.add_note(line)
         raise
 
@@ -171,16 +173,16 @@ def compare(first: "Result | str | Path", second: "Result | str | Path", shift: 
     if isinstance(second, str | Path) and Path(second).suffix != ".nc" and is_measurement(Path(second)):
         from studies.command.against_measurement import overlay_of_run
 
-        laid = overlay_of_run(_result(first), second, shift)
+        laid = overlay_of_run(_loaded_result(first), second, shift)
         values = {
             "shift": laid.shift.seconds,
             "channels": {compared.name: compared.values() for compared in laid.matches},
         }
-        return Report((f"{second} over {_name(first, 'the run')}", *laid.lines()), values, laid)
+        return Report((f"{second} over {_result_name(first, 'the run')}", *laid.lines()), values, laid)
     if shift is not None:
         raise InputError("compare", "shift", shift, "belongs to a comparison of a run with a measurement")
-    names = (_name(first, "the first"), _name(second, "the second"))
-    differences, notes = compare_runs(_result(first), _result(second), names)
+    names = (_result_name(first, "the first"), _result_name(second, "the second"))
+    differences, notes = compare_runs(_loaded_result(first), _loaded_result(second), names)
     values = {
         compared.name: {key: getattr(compared, key) for key in ("largest", "rms", "at", "share")}
         for compared in differences
@@ -188,7 +190,7 @@ def compare(first: "Result | str | Path", second: "Result | str | Path", shift: 
     return Report((f"{names[1]} less {names[0]}", *comparison_lines(differences, notes)), values, differences)
 
 
-def _result(run_or_path: Any) -> "Result":
+def _loaded_result(run_or_path: Any) -> "Result":
     from models.core.result import Result as SavedResult
 
     if isinstance(run_or_path, SavedResult):
@@ -200,7 +202,7 @@ def _result(run_or_path: Any) -> "Result":
     )
 
 
-def _name(run_or_path: Any, otherwise: str) -> str:
+def _result_name(run_or_path: Any, otherwise: str) -> str:
     if isinstance(run_or_path, str | Path):
         return str(run_or_path)
     engine = getattr(run_or_path, "data", None) is not None and run_or_path.data.attrs.get("engine")
@@ -228,7 +230,7 @@ def price(
     from twinrig.report import Report
 
     loaded = load(scene, set).checked
-    with _as_library(loaded):
+    with _library_messages(loaded):
         engines = engines_of(engine, loaded.system, "engine")
         with progress_bar("runs of every engine in ever finer steps", loaded.system):
             answer = recommended(loaded, tolerance, _channels_in_words(quantity), engines)
@@ -236,7 +238,7 @@ def price(
 
 
 def _channels_in_words(quantity: "str | list[str] | None") -> str | None:
-    """Channels as the command line takes them, separated by commas."""
+    """Names of channels as one text, separated by commas, as the command line takes them."""
     if quantity is None or isinstance(quantity, str):
         return quantity
     if not isinstance(quantity, list | tuple) or not all(isinstance(name, str) for name in quantity):
@@ -266,9 +268,9 @@ def choose(
     from studies.command.waiting import progress_bar
     from twinrig.report import Report
 
-    loaded = _choosing(load(scene, set), quantities, tolerance).checked
+    loaded = _scene_for_choice(load(scene, set), quantities, tolerance).checked
     engines = engines_of(engine, loaded.system, "engine")
-    with _as_library(loaded), TemporaryDirectory() as temporary:
+    with _library_messages(loaded), TemporaryDirectory() as temporary:
         study = checked_study(loaded, engines)
         result_folder = _new_folder(folder, "choice") if folder is not None else Path(temporary)
         with progress_bar(loaded.title, loaded.system) as progress:
@@ -276,9 +278,8 @@ def choose(
     return Report((loaded.title, *summary["table"]), summary)
 
 
-def _choosing(scene: "Scene", quantities: "list[str] | None", tolerance: float | None) -> "Scene":
-    """The scene with its study changed to the one that makes a choice of effects, and with these quantities and
-    tolerance."""
+def _scene_for_choice(scene: "Scene", quantities: "list[str] | None", tolerance: float | None) -> "Scene":
+    """The scene with the study that chooses effects, and with the given quantities and tolerance."""
     choice_keys = {"quantities": quantities, "tolerance": tolerance}
     changes: dict[str, Any] = {key: value for key, value in choice_keys.items() if value is not None}
     study = scene.checked.CHOOSING
@@ -303,7 +304,7 @@ def export(scene: AnyScene, engine: str, file: str | Path | None = None, *, set:
     from twinrig.report import Report
 
     loaded = load(scene, set).checked
-    with _as_library(loaded, out="file"), progress_bar("building the vehicle", loaded.system):
+    with _library_messages(loaded, out="file"), progress_bar("building the vehicle", loaded.system):
         exported = write(loaded, engine, None if file is None else Path(file))
     return Report(tuple(export_lines(loaded.title, exported)), exported)
 
@@ -327,5 +328,5 @@ def validate(quick: bool = False, folder: str | Path | None = None) -> "Report":
 def _new_folder(requested_folder: str | Path | None, name: str) -> Path:
     from models.core.result_folders import new_folder
 
-    with _as_library(out="folder"):
+    with _library_messages(out="folder"):
         return new_folder(None if requested_folder is None else Path(requested_folder), name)

@@ -1,4 +1,5 @@
-"""The console command: that of ``studies``, once ``twinrig`` has seen that nothing hides its packages."""
+"""Console command ``twinrig``: the command of ``studies``, after the check that no user file hides twinrig's
+packages."""
 
 from studies.command_line import main
 

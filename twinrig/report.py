@@ -1,4 +1,4 @@
-"""An answer that is text for people and values for programs."""
+"""Report of a library function: text for readers, and values for programs."""
 
 from dataclasses import dataclass
 from html import escape
@@ -7,7 +7,8 @@ from typing import Any
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """Report that ``compare``, ``price``, ``choose``, ``export``, ``validate`` return: printed lines, values, detail.
+    """Report that ``compare``, ``price``, ``choose``, ``export`` and ``validate`` return: lines to print, values,
+    detail.
 
     lines : as the command line prints them; values : plain values, those of ``--json``; detail : in the types of the
     module that computed it.

@@ -1,4 +1,4 @@
-"""The result of a run as users meet it: it prints itself, shows itself in a notebook, plots, and becomes a table."""
+"""Result of a run for users of the library: printing, display in notebooks, plots, and conversion to tables."""
 
 import json
 from dataclasses import dataclass
@@ -18,18 +18,19 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-SHOWN = 20
-"""Channels with a row of their own in a summary; further ones are named."""
-WRAPPED = 90
-"""Characters in a line of a plot's title."""
+SUMMARY_CHANNELS = 20
+"""Largest number of channels with a row in a result's summary; further channels are only named."""
+TITLE_WIDTH = 90
+"""Largest number of characters in a line of a plot's title."""
 
 
 @dataclass(frozen=True, repr=False)
 class Result(saved.Result):
-    """One run; ``result["f1"]`` is a channel's array, ``result.data`` the xarray Dataset with units and meanings."""
+    """Result of a run; ``result["f1"]`` is a channel's array, ``result.data`` the xarray Dataset with units and
+    meanings."""
 
     def __getitem__(self, channel: str) -> np.ndarray:
-        """Values of a channel or of an axis; raises InputError that offers the nearest name."""
+        """Values of a channel or of an axis; raises InputError with the most similar name for an unknown channel."""
         self._check(channel)
         return super().__getitem__(channel)
 
@@ -41,17 +42,17 @@ class Result(saved.Result):
 
     @property
     def errors(self) -> dict[str, Estimate]:
-        """Estimated error of each channel, with its unit; empty where the run estimated no errors."""
+        """Estimated error of each channel, with its unit; empty if no errors were estimated."""
         return errors_of(self)
 
     @property
     def broken(self) -> list[BrokenAssumption]:
-        """Assumptions that the run broke, each with where, how long, how far, and the remedy."""
+        """Assumptions that the run broke, each with place, duration, size, and remedy."""
         return broken_of(self)
 
     @property
     def assumed(self) -> list[str]:
-        """All assumptions that were checked in this run, broken or not."""
+        """Sentences of all assumptions that were checked in the run, broken or not."""
         return assumed_of(self)
 
     @property
@@ -59,7 +60,7 @@ class Result(saved.Result):
         return str(self.data.attrs.get("engine") or self.data.attrs.get("system", "result"))
 
     def _state_lines(self) -> list[str]:
-        """Status, counts, doubts about the run and its input, error and broken assumptions."""
+        """Lines of a result's summary: status, counts, doubts about run and input, errors and broken assumptions."""
         attributes = self.data.attrs
         counts = ", ".join(f"{count} {name}" for name, count in json.loads(attributes.get("counts", "{}")).items())
         seconds = f"{attributes['seconds']:.3f} s" if attributes.get("seconds") else ""
@@ -73,11 +74,11 @@ class Result(saved.Result):
         return [f"  {' '.join(filter(None, system_and_engine))}: {parts}", *doubts, *message_lines({self._label: self})]
 
     def _rows(self) -> list[tuple[str, str, str, str, str, str]]:
-        """Name, unit, axes, least, largest and meaning of each channel."""
+        """Texts of name, unit, axes, least value, largest value and meaning of each channel."""
         rows = []
         for name, channel in self.data.data_vars.items():
             axes = " x ".join(f"{axis} {size}" for axis, size in channel.sizes.items())
-            limits = _limits(channel.values)
+            limits = _limit_texts(channel.values)
             unit, meaning = (str(channel.attrs.get(key, "")) for key in ("units", "long_name"))
             rows.append((str(name), unit or "-", axes or "-", *limits, meaning))
         return rows
@@ -85,9 +86,9 @@ class Result(saved.Result):
     def __repr__(self) -> str:
         heads = ("channel", "unit", "axes", "least", "largest", "meaning")
         rows = [heads, *self._rows()]
-        widths = [max(len(row[i]) for row in rows[: SHOWN + 1]) for i in range(len(heads))]
-        table = ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows[: SHOWN + 1]]
-        names_not_shown = [row[0] for row in rows[SHOWN + 1 :]]
+        widths = [max(len(row[i]) for row in rows[: SUMMARY_CHANNELS + 1]) for i in range(len(heads))]
+        table = ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows[: SUMMARY_CHANNELS + 1]]
+        names_not_shown = [row[0] for row in rows[SUMMARY_CHANNELS + 1 :]]
         omitted_line = [f"  and {len(names_not_shown)} more: {', '.join(names_not_shown)}"] if names_not_shown else []
         return "\n".join([str(self.data.attrs.get("title", "")), *self._state_lines(), *table, *omitted_line])
 
@@ -99,7 +100,8 @@ class Result(saved.Result):
         return f"<p><b>{title}</b><br>{state_html}</p><table><tr>{heads}</tr>{rows}</table>"
 
     def plot(self, *channels: str, axes: "Axes | None" = None) -> "Axes":
-        """Draw channels of one unit over their axis, a line for each row of what has several; returns the axes.
+        """Plot channels of one unit over their axis, with a line for each row of a channel with several; returns the
+        axes.
 
         axes : of matplotlib, into which lines are drawn; new ones if there are none. What the run broke stands in the
         title. Raises InputError for unknown channels, for text, and for channels of several units.
@@ -123,20 +125,20 @@ class Result(saved.Result):
         ((unit, axis_name),) = kinds
         meaning = str(self.data[channels[0]].attrs.get("long_name", "")) if len(channels) == 1 else ""
         axes.set(xlabel=axis_name, ylabel=f"{meaning or ', '.join(channels)} [{unit or '-'}]")
-        self._head(axes)
+        self._set_title(axes)
         if len(curves) > 1:
             axes.legend()
         return axes
 
-    def _head(self, axes: "Axes") -> None:
-        """Title the plot with the scene's title, the engine and the warnings about the result."""
+    def _set_title(self, axes: "Axes") -> None:
+        """Set the plot's title: the scene's title, the engine, and warnings about the result."""
         from textwrap import fill
 
         texts = (f"{self.data.attrs.get('title', '')}, {self._label}", *figure_remarks({self._label: self}))
-        axes.set_title("\n".join(fill(text, WRAPPED) for text in texts), fontsize="small")
+        axes.set_title("\n".join(fill(text, TITLE_WIDTH) for text in texts), fontsize="small")
 
     def to_pandas(self, *channels: str) -> "pd.DataFrame":
-        """Channels that lie over the same axes as columns of a table, all of them if none is named.
+        """Table with channels over the same axes as columns; all channels if none is named.
 
         The index holds the axes; units stand in ``frame.attrs["units"]``. Raises InputError for channels over different
         axes.
@@ -156,13 +158,13 @@ class Result(saved.Result):
         return frame
 
     def to_xarray(self) -> "xr.Dataset":
-        """A copy of all channels with their axes, units and meanings."""
+        """Copy of all channels with their axes, units and meanings."""
         return self.data.copy(deep=True)
 
 
-def _limits(values: np.ndarray) -> tuple[str, str]:
-    """Least and largest finite number of a channel, as text."""
-    if values.dtype.kind not in "fiub":
+def _limit_texts(channel_values: np.ndarray) -> tuple[str, str]:
+    """Texts of the least and the largest finite number of a channel."""
+    if channel_values.dtype.kind not in "fiub":
         return "text", ""
-    finite = values[np.isfinite(values)]
+    finite = channel_values[np.isfinite(channel_values)]
     return (f"{finite.min():.5g}", f"{finite.max():.5g}") if finite.size else ("none", "none")

@@ -1,4 +1,4 @@
-"""A scene as it was written, with what was checked of it; changes give a new scene, which is checked again."""
+"""A scene for users of the library: its table and the checked scene; changes give a new, checked scene."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from typing import Any
 
 from models.core.errors import InputError
 
-CHANGED = " with changes"
-"""Behind the name of a scene that is not as its file has it, which results keep."""
+CHANGED_SUFFIX = " with changes"
+"""Suffix of the file name, in messages and results, of a scene that was changed."""
 
 
 @dataclass(frozen=True, repr=False)
 class Scene:
-    """A checked scene.
+    """A checked scene of any system.
 
     table : nested dictionaries as the user wrote them; file : name for messages; folder : where files that the scene
     names lie; checked : the scene of its system, with defaults, in the system's own type.
@@ -31,19 +31,19 @@ class Scene:
 
     @property
     def system(self) -> str:
-        """Name of the system."""
+        """Name of the scene's system."""
         return str(self.checked.system)
 
     def with_(self, changes: Mapping[str, Any]) -> "Scene":
-        """A scene with other values, as ``{"run.step": 5e-4}``: keys are dotted, entries of lists are numbered from 0.
+        """The scene with changed values, as ``{"run.step": 5e-4}``: keys are dotted, entries of lists are numbered from
+        0.
 
         A value may be a table; None takes a key out. Raises InputError for what the scene does not understand.
         """
         return of_table(self.table, self.file, self.folder, changes)
 
     def plan(self) -> str:
-        """Text of what the scene will compute: bodies, effects, channels, what each engine builds, what all that
-        assumes."""
+        """Text on what the scene will compute: bodies, effects, channels, the model of each engine, and assumptions."""
         from studies.command.asked import plan_of
 
         return str(plan_of(self.checked).describe(self.checked))
@@ -56,33 +56,33 @@ class Scene:
 
 
 def of_table(table: Mapping[str, Any], file: str, folder: Path, changes: Mapping[str, Any]) -> Scene:
-    """The checked scene of a table with changes of dotted keys; the table itself stays as it is."""
+    """The checked scene of a table with values changed by dotted keys; the table itself is unchanged."""
     from models.core.scene_file import set_key
     from models.core.systems import of_table as checked
     from studies.command.asked import KNOWN_SYSTEMS
 
     if not isinstance(changes, Mapping):
         raise InputError("set", "", changes, 'must be a table of dotted keys, for example {"run.step": 5e-4}')
-    changed = plain(table)
-    file = file + CHANGED if changes and not file.endswith(CHANGED) else file
+    changed = plain_value(table)
+    file = file + CHANGED_SUFFIX if changes and not file.endswith(CHANGED_SUFFIX) else file
     for key, value in changes.items():
-        set_key(changed, str(key), plain(value))
-    return Scene(changed, file, folder, checked(plain(changed), file, folder, KNOWN_SYSTEMS))
+        set_key(changed, str(key), plain_value(value))
+    return Scene(changed, file, folder, checked(plain_value(changed), file, folder, KNOWN_SYSTEMS))
 
 
-def plain(value: Any) -> Any:
+def plain_value(value: Any) -> Any:
     """A value as a scene file would hold it: arrays and tuples as lists, numpy's numbers as Python's, paths as text."""
     if isinstance(value, Mapping):
-        return {str(key): plain(inner) for key, inner in value.items()}
+        return {str(key): plain_value(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(inner) for inner in value]
+        return [plain_value(inner) for inner in value]
     if isinstance(value, Path):
         return str(value)
     return value.tolist() if hasattr(value, "tolist") else value
 
 
 def _dotted_values(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Values of a nested table by their dotted keys."""
+    """Yield the values of a nested table with their dotted keys."""
     for key, value in table.items():
         if isinstance(value, Mapping) and value:
             yield from _dotted_values(value, f"{prefix}{key}.")

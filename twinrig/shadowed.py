@@ -1,15 +1,15 @@
-"""Notice files of the user's that stand in the way of twinrig's packages of the same name."""
+"""Check for user files that hide twinrig's packages of the same name."""
 
 import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 PACKAGES = ("models", "studies", "validation")
-"""What lies beside this package."""
+"""Names of the packages beside ``twinrig``."""
 
 
 def check() -> None:
-    """Raise ImportError where Python would import another ``models``, ``studies`` or ``validation`` than twinrig's.
+    """Raise ImportError if Python would import another ``models``, ``studies`` or ``validation`` than twinrig's.
 
     The console command ends with the message alone.
     """

@@ -1,7 +1,7 @@
 """Conformity of an engine or an integrator from outside the tree: the checks that the built-in ones pass.
 
-The same functions judge it (``checks``, the hard cases of the pitch plane), so a row means what it means in the
-report. A check in which it raises, or gives something that is no answer, is a failed row with the reason.
+The same functions judge it (``checks``, the hard cases of the pitch plane), so a row means the same as in the
+report. A check in which the engine raises, or returns something unusable, is a failed row with the reason.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,7 +26,7 @@ from validation.common import checks
 from validation.common.rows import Independence, Observed, Row, System, behaviour_row, not_run
 from validation.common.scenes import VEHICLE_SETS, force_scene, road_scene
 from validation.hard_cases.case import CaseOutcome, judge
-from validation.run import save, say
+from validation.run import print_summary, save
 
 SYSTEM: System = "pitch-plane"
 HARD_CASE_FAMILIES = (
@@ -38,21 +38,21 @@ HARD_CASE_FAMILIES = (
     "invariants",
     "extremes",
 )
-"""Families of hard cases that any engine of the pitch plane can be put through."""
+"""Families of hard cases, by module, that any engine of the pitch-plane vehicle can run."""
 STEP, DURATION = 1e-3, 0.5
 ORDER_STEPS = (5e-4, 2.5e-4)
 """Steps (s) between which the order is measured, as in the report: RK4 is not asymptotic at 1 ms yet."""
 TOLERANCE = 1e-9
-"""Asked of a method that keeps one."""
+"""Relative tolerance of a run by an adaptive method."""
 LOOSE_TOLERANCE = 1e-4
 """Largest state error (m, rad, m/s, rad/s) of a method of order 4 or more at 1 ms; RK4 has 1e-6."""
 ROUNDING_ERROR = 1e-11
-"""Errors below this are rounding, in which no order shows."""
+"""Errors below this are rounding; the observed order is not computed from them."""
 
 EXACT_BOUND = 1e3 * TOLERANCE
-"""Bound, in SI or as a share, of what is exact to rounding in fixed steps, for a method that keeps a tolerance."""
-BY_STEPS = ("of the error at the double step", "orders lost")
-"""Units of hard cases that compare two steps: they say nothing of a method that keeps a tolerance, or of low order."""
+"""Bound for an adaptive method, in SI units or relative, of errors that are mere rounding with fixed steps."""
+STEP_COMPARISON_UNITS = ("of the error at the double step", "orders lost")
+"""Units of hard cases that compare two step sizes, which are not run for adaptive methods and methods of low order."""
 OTHER_SYSTEMS_NOTE = (
     "only the pitch-plane vehicle is built for engines from outside: this table says nothing of other systems"
 )
@@ -61,7 +61,8 @@ Check = tuple[str, str, str, float, str, Callable[[], float]]
 
 
 def conformity(name: str, folder: Path, command: str) -> int:
-    """Run the suite on ``module:Class``; writes report.html, results.json and results.csv, prints the table.
+    """Run all conformity checks on the engine or integrator ``module:Class``; writes report.html, results.json and
+    results.csv, and prints the table.
 
     Returns the number of failed rows; raises InputError if there is no such class.
     """
@@ -83,7 +84,7 @@ def conformity(name: str, folder: Path, command: str) -> int:
     )
     from validation.report.page import write
 
-    return say(rows, None, write(folder))
+    return print_summary(rows, None, write(folder))
 
 
 def _printed_rows(rows: Iterator[Row]) -> Iterator[Row]:
@@ -99,9 +100,9 @@ def _value_text(row: Row) -> str:
 
 def _conformity_rows(name: str, folder: Path) -> Iterator[Row]:
     second: Independence = "shared kernel" if hasattr(OUTSIDE[name], "integrate") else "native"
-    for id, quantity, unit, bound, why, error in _checks_of_engine(name, folder):
+    for id, quantity, unit, bound, why, error in _checks_on_engine(name, folder):
         yield _error_row(f"conformity.{id}", quantity, unit, bound, why, error, second)
-    yield _order(name, second)
+    yield _order_row(name, second)
     yield _guard_row(name, folder)
     yield from _hard_cases(name, folder)
     yield not_run(
@@ -115,12 +116,13 @@ def _error_row(
     unit: str,
     bound: float,
     tolerance_reason: str,
-    error: Callable[[], float],
+    compute_error: Callable[[], float],
     independence: Independence,
 ) -> Row:
-    """Row of an error. If the check cannot be carried out, the row is failed and holds the message of the exception."""
+    """Row that compares the value of ``error`` with its bound; if the check raises, the row is failed and holds the
+    message of the exception."""
     try:
-        return Observed(id, SYSTEM, quantity, error(), unit).at_most(bound, tolerance_reason, independence)
+        return Observed(id, SYSTEM, quantity, compute_error(), unit).at_most(bound, tolerance_reason, independence)
     except (InputError, RunFailed) as reason:
         return Row(id, SYSTEM, quantity, None, unit, 0.0, bound, tolerance_reason, independence, "failed", str(reason))
 
@@ -130,10 +132,10 @@ def _settings_of_engine(name: str, step: float = STEP) -> Settings:
 
 
 def _run(name: str, assembly: Assembly, settings: Settings) -> Any:
-    """Trajectory of an integrator. Exceptions pass through, so that their message is reported (the checks alone would
-    count an infinite error).
+    """Trajectory of the engine or integrator called ``name``. Its exceptions pass through, so that their message is
+    reported.
 
-    Raises RunFailed too if its times are not the ends of the steps, at which it is compared.
+    Raises RunFailed, too, if the times of its rows are not the ends of the steps.
     """
     path = checks.engine(name)(assembly, settings).run()
     if not np.array_equal(np.rint(path.times / settings.step), np.arange(settings.steps + 1)):
@@ -144,7 +146,7 @@ def _run(name: str, assembly: Assembly, settings: Settings) -> Any:
     return path
 
 
-def _checks_of_engine(name: str, folder: Path) -> Iterator[Check]:
+def _checks_on_engine(name: str, folder: Path) -> Iterator[Check]:
     make, settings = checks.engine(name), _settings_of_engine(name)
     for vehicle in VEHICLE_SETS:
         for geometry in ("exact", "linear"):
@@ -154,7 +156,7 @@ def _checks_of_engine(name: str, folder: Path) -> Iterator[Check]:
                 "of the largest",
                 1e-12,
                 "both sides are a dozen products of doubles",
-                partial(checks.acceleration_gap, make, _road(vehicle, geometry), settings),
+                partial(checks.acceleration_gap, make, _audit_assembly(vehicle, geometry), settings),
             )
     yield (
         "equilibrium",
@@ -162,9 +164,9 @@ def _checks_of_engine(name: str, folder: Path) -> Iterator[Check]:
         "m, rad, m/s, rad/s",
         EXACT_BOUND if _is_adaptive(name) else 1e-9,
         "nothing moves what is at rest, beyond a kept tolerance",
-        partial(_at_rest, name, settings),
+        partial(_equilibrium_error, name, settings),
     )
-    for kind, scene in _scenes_of_paths(folder).items():
+    for kind, scene in _compared_scenes(folder).items():
         yield (
             f"path.{kind}",
             f"largest state error, {kind}, against the reference by DOP853 at 1e-13",
@@ -179,11 +181,11 @@ def _checks_of_engine(name: str, folder: Path) -> Iterator[Check]:
         "of weight times time",
         _momentum_bound(name),
         "an invariant of any vehicle, exact from order 2 on for forces linear over each step",
-        partial(_momentum_error, name, assembly_of_scene(_scenes_of_paths(folder)["wheel forces, linear"]), settings),
+        partial(_momentum_error, name, assembly_of_scene(_compared_scenes(folder)["wheel forces, linear"]), settings),
     )
 
 
-def _road(vehicle: str, geometry: str) -> Assembly:
+def _audit_assembly(vehicle: str, geometry: str) -> Assembly:
     audit = import_module("validation.cases.audit")
     return assembly_of_scene(audit.scene(vehicle, geometry))
 
@@ -193,8 +195,8 @@ def _is_adaptive(name: str) -> bool:
 
 
 def _difference_bound(name: str) -> float:
-    """Tolerance of the difference from the reference: loose for methods of low order, whose order has a row of its
-    own."""
+    """Largest allowed state difference (m, rad, m/s, rad/s) from the reference run: wide for methods of low order,
+    whose observed order is judged in another row."""
     order = CATALOGUE[name][name].order
     return 1e-5 if _is_adaptive(name) else LOOSE_TOLERANCE if order >= 4 else 0.5
 
@@ -203,8 +205,8 @@ def _momentum_bound(name: str) -> float:
     return 1e-7 if _is_adaptive(name) else 1e-9 if CATALOGUE[name][name].order > 1 else 1e-2
 
 
-def _scenes_of_paths(folder: Path) -> dict[str, Any]:
-    """Scenes whose paths are compared: a road, and wheel forces read in two ways."""
+def _compared_scenes(folder: Path) -> dict[str, Any]:
+    """Scenes, by name, whose trajectories are compared: a road, and wheel forces with linear interpolation and held."""
     if not (folder / "wheel_forces.csv").exists():
         write_measurement(simulate(road_scene(duration=DURATION), "reference"), folder, STEP)
     return {
@@ -222,7 +224,7 @@ def _state_error(name: str, assembly: Assembly, settings: Settings) -> float:
     return checks.state_gap(_run(name, assembly, settings), _reference_run(assembly))
 
 
-def _at_rest(name: str, settings: Settings) -> float:
+def _equilibrium_error(name: str, settings: Settings) -> float:
     from models.systems.pitch_plane.scene import build
 
     flat = assembly_of_scene(build({"title": "at rest", "run": {"duration": DURATION, "step": STEP}}))
@@ -235,9 +237,9 @@ def _momentum_error(name: str, assembly: Assembly, settings: Settings) -> float:
     return checks.momentum_gap(checks.engine(name), assembly, settings)
 
 
-def _order(name: str, independence: Independence) -> Row:
-    """Row: observed order of a fixed-step method; for an adaptive one, that a tighter tolerance gives a smaller
-    error."""
+def _order_row(name: str, independence: Independence) -> Row:
+    """Row: observed order of a fixed-step method; for an adaptive method, ratio of its errors at a tight and a loose
+    tolerance."""
     road = assembly_of_scene(road_scene(duration=DURATION))
     if _is_adaptive(name):
         return _error_row(
@@ -246,7 +248,7 @@ def _order(name: str, independence: Independence) -> Row:
             "ratio",
             0.1,
             "a method that keeps a tolerance is the more exact the tighter it is",
-            partial(_tightened_error, name, road),
+            partial(_ratio_of_tolerance_errors, name, road),
             independence,
         )
     declared, why = CATALOGUE[name][name].order, "one halving; the band leaves room for the next term of the error"
@@ -261,17 +263,17 @@ def _order(name: str, independence: Independence) -> Row:
     )
 
 
-def _tightened_error(name: str, road: Assembly) -> float:
+def _ratio_of_tolerance_errors(name: str, road_assembly: Assembly) -> float:
     loose = Settings(name, STEP, DURATION, 1e-5)
     errors = [
-        checks.state_gap(_run(name, road, settings), _reference_run(road))
+        checks.state_gap(_run(name, road_assembly, settings), _reference_run(road_assembly))
         for settings in (loose, _settings_of_engine(name))
     ]
     return errors[1] / errors[0] if errors[0] > ROUNDING_ERROR else 0.0
 
 
 def _guard_row(name: str, folder: Path) -> Row:
-    """Row: wheel forces of a million times the weight throw the vehicle out of all bounds, which must raise an
+    """Row: with wheel forces of a million times the weight the vehicle leaves all bounds, and the engine must raise an
     error."""
     throw = folder / "throw"
     throw.mkdir(exist_ok=True)
@@ -305,7 +307,7 @@ def _hard_cases(name: str, folder: Path) -> Iterator[Row]:
             id = f"conformity.hard.{case.name.replace(',', '').replace(' ', '-')}"
             quantity, case_folder = f"hard case: {case.name}: {case.check}", folder / id
             case_folder.mkdir()
-            if case.unit in BY_STEPS and (_is_adaptive(name) or CATALOGUE[name][name].order < 4):
+            if case.unit in STEP_COMPARISON_UNITS and (_is_adaptive(name) or CATALOGUE[name][name].order < 4):
                 yield not_run(id, SYSTEM, quantity, "compares steps of a method of order 4")
                 continue
             if _is_adaptive(name):

@@ -1,4 +1,4 @@
-"""Measure the cases and save what they found; the report is then written from the saved files alone.
+"""Measure all validation cases and save their rows and data; the report is then written from the saved files.
 
 Cases are an ensemble (``models.ensemble.runner``) of which path i is case i: each is kept as it ends, so that a report
 that was killed goes on with the others. The blocks lie in ``cases`` of the report's folder until the report is written,
@@ -43,36 +43,36 @@ SEEDED_MODULES = (
     "validation.price.unseen_systems",
     "validation.ride.fitted_roads",
 )
-"""Modules beside the cases that draw at random by a seed of their own."""
+"""Modules other than the cases that have a SEED of random numbers."""
 CASES_ALONE = {
     True: ("recommendation",),
     False: ("effect_prices", "price", "recommendation", "ensemble", "contact_bridges", "stated_errors"),
 }
-"""Cases that begin when all others have ended, and have the machine alone, by ``quick``: those that tell seconds first
-of all, and, in full, those that take all processors themselves. Seconds of the processor alone do not spare a case
-that: of small steps, beside others that empty the caches, a ratio rises by a quarter."""
+"""Cases, by ``quick``, that run after all others and alone on the machine, because they measure seconds or, in the full
+report, use all processors. Processor seconds need this too: other running cases empty the caches, which raises a ratio
+of the times of small steps by a quarter."""
 FINISHED_CASES = "cases"
-"""Folder of finished cases."""
+"""Name of the folder of finished cases in the report's folder."""
 
 Outcomes = dict[str, tuple[list[Row], float]]
-"""Rows and seconds of cases by their names."""
+"""For the name of each case, its rows and its computing time (s)."""
 
 
 @dataclass(frozen=True)
 class Cases:
-    """Job (see ``models.ensemble.runner``) that measures cases: path i is the case ``names[i]``, whose data are written
-    to ``folder``."""
+    """Ensemble job (see ``models.ensemble.runner``) that measures validation cases: path i is the case ``names[i]``,
+    whose data are written to ``folder``."""
 
     names: tuple[str, ...]
     quick: bool
     folder: Path
 
     def __call__(self, paths: range) -> Arrays:
-        """``record`` (n,): rows and seconds of each case as JSON."""
-        return _array_of_record([self.record(self.names[i]) for i in paths])
+        """Array "record" (n,): rows and seconds of each of the n cases as JSON text."""
+        return _json_array([self.record(self.names[i]) for i in paths])
 
     def record(self, name: str) -> Saved:
-        """Measure one case; exceptions of the case pass through."""
+        """Measure one case and save its data; returns its rows and seconds. Exceptions of the case pass through."""
         start = time.perf_counter()
         case = import_module(f"validation.cases.{name}")
         with TemporaryDirectory(
@@ -83,7 +83,7 @@ class Cases:
         return {"rows": [row.as_dict() for row in rows], "seconds": time.perf_counter() - start}
 
     def facts(self) -> Saved:
-        """Facts on which rows depend: the cases, quick or full share, code version, and the available measured
+        """Facts on which the rows depend: the cases, quick or full report, code version, and the available measured
         files."""
         root, validation_folder = data_folder(), Path(__file__).parent
         sizes = (
@@ -100,7 +100,7 @@ class Cases:
         }
 
 
-def _array_of_record(records: list[Saved]) -> Arrays:
+def _json_array(records: list[Saved]) -> Arrays:
     return {"record": np.array([json.dumps(record) for record in records])}
 
 
@@ -110,14 +110,14 @@ def measured_cases(
     """Rows and computing times (s) of all cases; cases that an earlier, interrupted run finished are read, not measured
     again.
 
-    runs_alone : one after the other; progress : told how many are done. A case that breaks, or whose process dies
-    again and again, is a failed row and is measured again by the next go. Raises InputError for a folder of another
-    version or share, RunFailed for a full disk.
+    runs_alone : one after the other; progress : called with the number of finished cases. A case that raises, or whose
+    process dies repeatedly, is a failed row and is measured again in the next run. Raises InputError for a folder of
+    another version or share, RunFailed for a full disk.
     """
 
-    def lost(cases: range, reason: str) -> Arrays:
-        return _array_of_record(
-            [{"rows": [_row_of_failed_case(job.names[i], reason).as_dict()], "seconds": 0.0} for i in cases]
+    def lost(case_numbers: range, reason: str) -> Arrays:
+        return _json_array(
+            [{"rows": [_row_of_failed_case(job.names[i], reason).as_dict()], "seconds": 0.0} for i in case_numbers]
         )
 
     store, blocks = (
@@ -135,7 +135,7 @@ def measured_cases(
 
 
 def _row_of_failed_case(name: str, reason: str) -> Row:
-    """Failed row of a case that gave no rows."""
+    """Failed row for a case that gave no rows, with the reason."""
     return failed_row(f"{name}.broken", f"case {name}", reason)
 
 
@@ -147,10 +147,10 @@ def validate(
     resumed: bool = False,
     crew: Crew | None = None,
 ) -> int:
-    """Measure all cases into ``folder``; returns the number of failed rows.
+    """Measure all validation cases, save results and report in ``folder``; returns the number of failed rows.
 
-    crew : measures the cases that need not be alone; its workers see the folder, too. earlier : ``changes.read`` of a
-    report. resumed : the folder may hold cases that have ended; the time of them all together is then not known.
+    crew : measures the cases that need not be alone; its workers see the folder, too. earlier_report : ``changes.read``
+    of a report. resumed : the folder may hold cases that have ended; the time of them all together is then not known.
     """
     start, start_date = time.perf_counter(), datetime.now(UTC)
     (folder / "data").mkdir(exist_ok=True)
@@ -173,11 +173,11 @@ def validate(
             earlier_report,
         )
         path = _write_report(pool, folder)
-    return say(rows, time.perf_counter() - start, path)
+    return print_summary(rows, time.perf_counter() - start, path)
 
 
 def _data_text() -> str:
-    """Text on the number and size of the measured files that are available."""
+    """Text for the report on the number and size of the available measured files."""
     folder = data_folder()
     if folder is None:
         return "no measured files: TWINRIG_DATA names no folder; the rows that need some are not run"
@@ -186,8 +186,8 @@ def _data_text() -> str:
 
 
 def _outcomes_of_cases(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
-    """Rows and computing time of every case; cases that may run in parallel come first, then those that need the
-    machine alone."""
+    """Rows and computing time (s) of every case; cases that may run in parallel are measured first, then those that
+    need the machine alone."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -210,14 +210,13 @@ def _outcomes_of_cases(pool: Executor | None, quick: bool, folder: Path) -> Outc
 
 
 def _last_duration(name: str) -> float:
-    """Computing time (s) of a case in the last full report, infinite if unknown; cases that take longest are started
-    first."""
+    """Computing time (s) of a case in the last full report, by which cases are ordered; infinite if unknown."""
     return float(full_report_data()[name]["seconds"]) if name in full_report_data() else math.inf
 
 
 def _value_from_pool(pool: Executor | None, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Value of a function that a process of the pool computes; if a process of the pool has died, this process computes
-    it."""
+    """Value of function(*arguments), computed in a process of the pool, or in this process if one of the pool has
+    died."""
     if pool is None:
         return function(*arguments)
     try:
@@ -227,7 +226,8 @@ def _value_from_pool(pool: Executor | None, function: Callable[..., Any], *argum
 
 
 def _write_report(pool: Executor | None, folder: Path) -> Path:
-    """Write the report. Its figures are drawn by the pool, or by this process if one of the pool has died."""
+    """Write the report's page and return its path; figures are drawn by the pool, or by this process if one of the pool
+    has died."""
     from validation.report.page import write
 
     if pool is None:
@@ -239,14 +239,16 @@ def _write_report(pool: Executor | None, folder: Path) -> Path:
 
 
 def seeds_of_rows() -> dict[str, int]:
-    """All seeds on which rows depend; with equal seeds and versions all counts and states repeat exactly."""
+    """Seeds of random numbers on which rows depend, by the name of the module; equal seeds and versions give equal
+    counts and states."""
     modules = {name: import_module(name) for name in (*(f"validation.cases.{case}" for case in CASES), *SEEDED_MODULES)}
     drawn = {name.rpartition(".")[2].replace("_", " "): module for name, module in modules.items()}
     return {name: module.SEED for name, module in drawn.items() if hasattr(module, "SEED")}
 
 
 def save(folder: Path, rows: list[Row], report_source: Saved, earlier_report: Saved | None = None) -> None:
-    """Write results.json and results.csv, and print what changed since an earlier report."""
+    """Write the rows and their provenance to results.json and results.csv, and print changes since an earlier
+    report."""
     table = [row.as_dict() for row in rows]
     content: Saved = {"provenance": report_source, "rows": table}
     if earlier_report is not None:
@@ -259,7 +261,7 @@ def save(folder: Path, rows: list[Row], report_source: Saved, earlier_report: Sa
         writer.writerows(table)
 
 
-def say(rows: list[Row], seconds: float | None, page: Path) -> int:
+def print_summary(rows: list[Row], seconds: float | None, page: Path) -> int:
     """Print the number of rows by status, and each row that failed, missed its aim or was not run; returns the number
     of failed rows."""
     rows_of_status = {status: [row for row in rows if row.status == status] for status in STATUSES}

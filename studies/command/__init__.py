@@ -1,1 +1,1 @@
-"""Commands beside studies: find what was asked for, sweep a key, compare results."""
+"""Parts of the command line: loading of scenes and studies, sweeps of a key, comparison of results."""

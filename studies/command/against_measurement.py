@@ -1,4 +1,4 @@
-"""A measurement laid over a run: channels by name and unit, the time shift, the error of each channel, a figure."""
+"""Comparison of a measurement with a run: time shift, errors of the channels with equal names, and a figure."""
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,18 +23,18 @@ from studies.command.differences import Quantity
 
 TIME_AXIS = "time [s]"
 DOUBTFUL_CORRELATION = 0.5
-"""Correlation below which a time shift is in doubt."""
+"""Correlation of run and measurement below which a time shift is in doubt."""
 SHOWN_CHANNELS = 4
-"""Channels in the figure, those of the largest relative error."""
+"""Number of channels in the figure, those with the largest relative errors."""
 TABLE_HEADINGS = ("channel", "unit", "rms error", "relative", "peak error", "at [s]", "stated error")
 
 
 @dataclass(frozen=True)
-class Match:
-    """One channel that was both computed and measured: values of both (n,) at the same times (n,) of the run (s), in
-    the run's unit.
+class ChannelComparison:
+    """A channel that was computed and measured: values (n,) of both in the run's unit, at the same times (n,) in s of
+    the run.
 
-    stated : error that the run states for it, NaN where it states none.
+    stated : error that the run states for the channel, NaN if it states none.
     """
 
     name: str
@@ -46,52 +46,58 @@ class Match:
 
     @property
     def error(self) -> np.ndarray:
-        """Error (n,): value of the run minus measured value."""
+        """Error (n,) of the channel: value of the run minus measured value."""
         return self.run - self.measured
 
     @property
     def rms(self) -> float:
-        """Root of the mean square of the error."""
+        """Root mean square of the channel's error."""
         return float(np.sqrt(np.mean(self.error**2)))
 
     @property
     def relative(self) -> float:
-        """Error divided by the standard deviation of the measurement; infinite where the measurement is constant."""
+        """Rms error divided by the standard deviation of the measurement; infinite if the measurement is constant."""
         size = float(np.std(self.measured))
         return self.rms / size if size > 0.0 else (0.0 if self.rms == 0.0 else np.inf)
 
     @property
     def row(self) -> int:
-        """Index of the sample at which the error is largest."""
+        """Index of the sample at which the channel's error is largest."""
         return int(np.abs(self.error).argmax())
 
     @property
     def peak(self) -> float:
-        """The error of the largest magnitude, with its sign."""
+        """Error of the largest magnitude, with its sign."""
         return float(self.error[self.row])
 
     @property
-    def at(self) -> float:
-        """Time (s) of the run at which the error is largest."""
+    def time_of_peak(self) -> float:
+        """Time (s) of the run at which the channel's error is largest."""
         return float(self.times[self.row])
 
     def values(self) -> dict[str, float | None]:
-        """The comparison as plain values for JSON; None in place of not-a-number."""
-        plain = {"rms": self.rms, "relative": self.relative, "peak": self.peak, "at": self.at, "stated": self.stated}
+        """Errors of the channel as plain values for JSON; None for numbers that are not finite."""
+        plain = {
+            "rms": self.rms,
+            "relative": self.relative,
+            "peak": self.peak,
+            "at": self.time_of_peak,
+            "stated": self.stated,
+        }
         return {key: value if np.isfinite(value) else None for key, value in plain.items()}
 
 
 @dataclass(frozen=True)
 class Overlay:
-    """Comparison of a measurement with one run: the time shift, the common channels, and notes on what could not be
-    compared."""
+    """Comparison of a measurement with a run: the time shift, the common channels, and notes on channels that could not
+    be compared."""
 
     shift: TimeShift
-    matches: list[Match]
+    matches: list[ChannelComparison]
     notes: list[str]
 
     def lines(self) -> list[str]:
-        """Lines of the comparison for the screen."""
+        """Lines for the screen: time shift, table of the channels' errors, and notes."""
         head = (
             f"  {TABLE_HEADINGS[0]:<28} {TABLE_HEADINGS[2]:>11} {'unit':<8} {TABLE_HEADINGS[3]:>9} "
             f"{TABLE_HEADINGS[4]:>11}  at"
@@ -99,13 +105,13 @@ class Overlay:
         rows = [
             f"  {channel_match.name:<28} {channel_match.rms:>11.4g} {channel_match.unit or '-':<8} "
             f"{_share_text(channel_match.relative):>9} {channel_match.peak:>11.4g}  "
-            f"{channel_match.at:.6g} s{_within_error_text(channel_match)}"
+            f"{channel_match.time_of_peak:.6g} s{_within_error_text(channel_match)}"
             for channel_match in self.matches
         ]
-        return [f"  {self.told()}", head, *rows, *(f"  {note}" for note in self.notes)]
+        return [f"  {self.shift_sentence()}", head, *rows, *(f"  {note}" for note in self.notes)]
 
-    def told(self) -> str:
-        """Sentence for the screen about the time shift between measurement and run."""
+    def shift_sentence(self) -> str:
+        """Sentence for the screen on the time shift between measurement and run."""
         shift, correlation = self.shift.seconds, self.shift.correlation
         if np.isnan(correlation):
             return f"time shift {shift:.6g} s: as given, or nothing moves by which one could be told"
@@ -116,12 +122,11 @@ class Overlay:
 
 
 def _share_text(relative: float) -> str:
-    """Relative error of a channel as a percentage in text; "-" where it is not finite, as for a constant
-    measurement."""
+    """Text of a relative error in per cent; "-" if it is not finite, as for a constant measurement."""
     return f"{100.0 * relative:.3g} %" if np.isfinite(relative) else "-"
 
 
-def _within_error_text(channel_match: Match) -> str:
+def _within_error_text(channel_match: ChannelComparison) -> str:
     return (
         f"; rms within the run's own error of {channel_match.stated:.2g}"
         if channel_match.rms <= channel_match.stated
@@ -156,7 +161,7 @@ def overlay_of_run(run: Result, file: str | Path, time_shift_seconds: float | No
         raise InputError("compare", "", None, "the run has no channels over time: a measurement cannot lie over it")
     source = open_source(file)
     engines = [str(engine) for engine in run.data.coords["engine"].values] if "engine" in run.data.coords else []
-    named = {name: channel for channel in source.channels for name in _by_engine(channel.name, engines, ours)}
+    named = {name: channel for channel in source.channels for name in _channels_by_engine(channel.name, engines, ours)}
     if not named:
         theirs = [channel.name for channel in source.channels]
         name = next((other for other in theirs if suggestion_phrase(other, tuple(ours))), theirs[0] if theirs else None)
@@ -172,9 +177,9 @@ def overlay_of_run(run: Result, file: str | Path, time_shift_seconds: float | No
     return Overlay(moved_by, sorted(complete, key=lambda channel_match: -channel_match.relative), notes)
 
 
-def _by_engine(name: str, engines: list[str], run_quantities: Mapping[str, Quantity]) -> list[str]:
-    """Names of the run's channels to compare with a measured channel: the same name, or this name followed by each
-    engine's."""
+def _channels_by_engine(name: str, engines: list[str], run_quantities: Mapping[str, Quantity]) -> list[str]:
+    """Names of the run's channels to compare with a measured channel: its own name, or this name followed by the name
+    of an engine."""
     if name in run_quantities:
         return [name]
     return [
@@ -185,9 +190,9 @@ def _by_engine(name: str, engines: list[str], run_quantities: Mapping[str, Quant
 def _missing_channel_notes(
     measurement_source: Source, run_quantities: Mapping[str, Quantity], engines: list[str]
 ) -> Iterator[str]:
-    """Channels of the file that the run does not have, each with the nearest name."""
+    """Yield a note on each measured channel that the run does not have, with the most similar name of the run."""
     for channel in measurement_source.channels:
-        if not _by_engine(channel.name, engines, run_quantities):
+        if not _channels_by_engine(channel.name, engines, run_quantities):
             yield (
                 f"not compared: {channel.name!r} is no channel of the "
                 f"run{suggestion_phrase(channel.name, tuple(run_quantities))}"
@@ -197,8 +202,8 @@ def _missing_channel_notes(
 def _channel_pair(
     measurement_source: Source, channel: Channel, run_quantity: Quantity, doubts: list[str]
 ) -> ChannelPair:
-    """Times and values of one channel in the run and in the measurement, both in the run's unit; ``doubts`` gets what
-    its times make doubtful.
+    """Times and values of a channel in the run and in the measurement, both in the run's unit; doubts about the
+    measured times are appended to ``doubts``.
     """
     if not channel.unit and run_quantity.unit not in ("", "-"):
         allowed = f"has no unit: write {channel.name} [{run_quantity.unit}] in the header, or its unit there"
@@ -222,9 +227,9 @@ def _channel_pair(
 
 def _channel_match(
     name: str, channel_pair: ChannelPair, unit: str, time_shift_seconds: float, run: Result
-) -> Match | None:
-    """Compare one channel at those measured times that lie within the run; None if no measured time does. The run is
-    interpolated by a cubic spline."""
+) -> ChannelComparison | None:
+    """Comparison of a channel at the measured times within the run, at which the run is interpolated by a cubic spline;
+    None if no measured time lies within it."""
     from scipy.interpolate import CubicSpline
 
     times = channel_pair.times - time_shift_seconds
@@ -238,13 +243,13 @@ def _channel_match(
         return None
     read = CubicSpline(channel_pair.run_times, channel_pair.run)(times[is_within])
     stated = errors_of(run).get(name.partition(", ")[0])
-    return Match(
+    return ChannelComparison(
         name, unit, times[is_within], read, channel_pair.values[is_within], np.nan if stated is None else stated.error
     )
 
 
 def saved_results(file_or_folder: Path) -> dict[str, Result]:
-    """All saved results in a file or folder, by name; raises InputError if there are none."""
+    """All saved results in a file or folder, by the name of the file; raises InputError if there are none."""
     if not file_or_folder.exists():
         raise InputError(file_or_folder, "", None, "no such file or folder")
     files = [file_or_folder] if file_or_folder.is_file() else sorted(file_or_folder.rglob("*.nc"))
@@ -254,8 +259,8 @@ def saved_results(file_or_folder: Path) -> dict[str, Result]:
 
 
 def report(run_path: Path, measurement: Path, folder: Path, time_shift_seconds: float | None = None) -> dict[str, Any]:
-    """Compare a measurement with a run, or with the runs in a folder; saves ``compare.csv`` and figures, and returns
-    the lines to print."""
+    """Compare a measurement with a run, or with all runs in a folder; saves ``compare.csv`` and figures, and returns
+    the summary."""
     overlays = {
         name: overlay_of_run(run, measurement, time_shift_seconds) for name, run in saved_results(run_path).items()
     }
@@ -264,7 +269,7 @@ def report(run_path: Path, measurement: Path, folder: Path, time_shift_seconds: 
         writer.writerow(("run", *TABLE_HEADINGS))
         for name, overlay in overlays.items():
             for m in overlay.matches:
-                writer.writerow((name, m.name, m.unit, m.rms, m.relative, m.peak, m.at, m.stated))
+                writer.writerow((name, m.name, m.unit, m.rms, m.relative, m.peak, m.time_of_peak, m.stated))
     for name, overlay in overlays.items():
         draw_overlay(
             overlay,
@@ -290,7 +295,8 @@ def _overlay_lines(name: str, overlay: Overlay, overlay_count: int) -> Sequence[
 
 
 def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
-    """Plot the channels with the largest relative errors: measurement and run, and their difference below."""
+    """Save a figure of the channels with the largest relative errors: measurement and run, and below it their
+    difference."""
     from models.drawing.figures import BLUE, DARK, VERMILION, add_heading, save, subplots
 
     shown = overlay.matches[:SHOWN_CHANNELS]
@@ -301,12 +307,12 @@ def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
         top.plot(match.times, match.run, color=VERMILION, linewidth=1.0, label="run")
         top.set(title=match.name, ylabel=f"{match.name} [{unit}]")
         error_axis.plot(match.times, match.error, color=BLUE)
-        error_axis.plot(match.at, match.peak, "o", color=BLUE, markersize=5)
+        error_axis.plot(match.time_of_peak, match.peak, "o", color=BLUE, markersize=5)
         error_axis.set(
             title=f"rms error {match.rms:.3g} {unit}, {_share_text(match.relative)} of its deviation",
             xlabel="time of the run [s]",
         )
         error_axis.set_ylabel(f"run less measurement [{unit}]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    add_heading(figure, f"{title}: {overlay.told().partition(';')[0]}", {})
+    add_heading(figure, f"{title}: {overlay.shift_sentence().partition(';')[0]}", {})
     save(figure, path)

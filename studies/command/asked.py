@@ -1,4 +1,4 @@
-"""The scene, its study and the engines that the user named on the command line."""
+"""The scene, its study and the engines that the user requests on the command line."""
 
 import os
 import re
@@ -17,26 +17,26 @@ from models.measured.file_kinds import is_measurement
 STUDIES_FOLDER = Path(__file__).parents[1]
 SCENES_FOLDER = STUDIES_FOLDER / "scenes"
 KNOWN_SYSTEMS = SYSTEMS | systems_in_folder(STUDIES_FOLDER, STUDIES_FOLDER.name)
-"""Systems of scenes: those of the models, and studies that have scenes of their own (folders with a ``scene``)."""
+"""Systems that a scene can have: those of the models, and folders of studies with a module ``scene``."""
 ANY_SYSTEM = "any"
-"""System of a study that runs scenes of all systems."""
+"""Value of a study's SYSTEM if it runs scenes of all systems."""
 
 
 @cache
 def study_names() -> tuple[str, ...]:
-    """Names of all studies, read and not imported: files of ``study_names`` that have ``run(scene, engines, folder,
-    progress)``."""
+    """Names of all studies: files of the studies' folder that define ``run(scene, engines, folder, progress)``; they
+    are read, not imported."""
     files = sorted(STUDIES_FOLDER.glob("*.py"))
     return tuple(file.stem for file in files if re.search(r"^def run\(\s*scene", file.read_text(), re.MULTILINE))
 
 
 def load_scene(name: str, changes: list[str] | None) -> Any:
-    """Load a scene by name from those that come with twinrig, or from a file whose name ends in .toml."""
+    """Load a scene, with changes KEY=VALUE, by the name of a shipped scene or from a file whose name ends in .toml."""
     return load(scene_path(name), changes or (), KNOWN_SYSTEMS)
 
 
 def scene_path(name: str) -> Path:
-    """Path of a scene's file; raises InputError if there is no such scene."""
+    """Path of a scene's file, by the name of a shipped scene or of a file; raises InputError if there is none."""
     names = tuple(sorted(path.stem for path in SCENES_FOLDER.glob("*.toml")))
     if name in names:
         return SCENES_FOLDER / f"{name}.toml"
@@ -53,7 +53,7 @@ def scene_path(name: str) -> Path:
 
 
 def checked_study(scene: Any, engines: tuple[str, ...]) -> Any:
-    """The module of a scene's study, after everything was checked that can be checked before a run."""
+    """The module of a scene's study, after all checks that are possible before a run; raises InputError."""
     module = study_of(scene)
     plan_of(scene).check(scene, engines)
     if hasattr(module, "check"):
@@ -62,7 +62,7 @@ def checked_study(scene: Any, engines: tuple[str, ...]) -> Any:
 
 
 def check_by_any(scene: Any, engines: tuple[str, ...]) -> None:
-    """Raise InputError if no engine can run the scene. If only some engines refuse it, the scene's plan says so."""
+    """Raise InputError if no engine can run the scene. If only some engines refuse it, nothing is raised."""
     try:
         checked_study(scene, engines)
     except InputError:
@@ -78,20 +78,20 @@ def _is_runnable(scene: Any, engine: str) -> bool:
     return True
 
 
-def plain_arrays(scene: Any, engines: tuple[str, ...], module: Any) -> bool:
-    """Whether a study can run with numpy alone: it uses no workers, no unit conversion, and no user's code."""
+def needs_no_extras(scene: Any, engines: tuple[str, ...], module: Any) -> bool:
+    """Whether a study runs without workers, unit conversion and code of the user."""
     code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)
     shared = hasattr(module, "BLOCKS_FOLDER") or scene.system == "measured"
     return not (code or shared or any(":" in engine for engine in engines))
 
 
 def plan_of(scene: Any) -> Any:
-    """The module that describes and checks scenes of this scene's system."""
+    """The module that describes and checks the scenes of the scene's system."""
     return import_module(KNOWN_SYSTEMS[scene.system].plan)
 
 
 def findings_of(scene: Any) -> tuple[Finding, ...]:
-    """Doubts about the input of a scene, before anything is run; raises InputError for impossible input."""
+    """Findings of doubtful input of a scene, before any run; raises InputError for impossible input."""
     look = getattr(plan_of(scene), "findings", None)
     unended = (
         () if scene.system == "measured" else _unfinished_file_notes(scene)
@@ -99,8 +99,8 @@ def findings_of(scene: Any) -> tuple[Finding, ...]:
     return (*(look(scene) if look else ()), *unended)
 
 
-def query_lines(scene: Any) -> list[str]:
-    """Lines of the queries about a scene's vehicle and channels, which may be why it is refused."""
+def doubt_lines(scene: Any) -> list[str]:
+    """Lines for the screen on doubtful values of a scene's vehicle and channels, which may be why it is refused."""
     from models.core.strict import Query
 
     checks = (*get_args(Query), "exchanged", "shift")
@@ -110,7 +110,7 @@ def query_lines(scene: Any) -> list[str]:
 
 
 def _unfinished_file_notes(scene: Any) -> Iterator[Finding]:
-    """Notes on CSV files of a scene whose last line lacks its line end."""
+    """Yield a note for each CSV file of a scene whose last line has no line end."""
     from models.core.tables import has_line_end
 
     for name in dict.fromkeys(_csv_files_of_table(scene.table())):
@@ -128,7 +128,7 @@ def _unfinished_file_notes(scene: Any) -> Iterator[Finding]:
 
 
 def _csv_files_of_table(table: Any) -> Iterator[str]:
-    """Names of CSV files anywhere in nested tables."""
+    """Yield the names of CSV files anywhere in nested tables."""
     if isinstance(table, dict | list):
         for value in table.values() if isinstance(table, dict) else table:
             yield from _csv_files_of_table(value)
@@ -137,7 +137,8 @@ def _csv_files_of_table(table: Any) -> Iterator[str]:
 
 
 def engines_of(name: str | None, system: str, option: str = "--engine") -> tuple[str, ...]:
-    """The requested engines; none for a system that runs without an engine. option : the option that names them."""
+    """The engines for a value of ``--engine`` and a system; none for a system without engines. option : the name of the
+    option, for messages."""
     engines = KNOWN_SYSTEMS[system].engines
     if name not in (None, "all") and not engines:
         raise InputError(option, "", name, f"has no meaning for {system}, which no engine computes: leave it out")
@@ -152,7 +153,7 @@ def engines_of(name: str | None, system: str, option: str = "--engine") -> tuple
 
 
 def _registered_outside(name: str, system: str, option: str) -> tuple[str, ...]:
-    """An engine or an integrator from outside the tree, once it is registered."""
+    """Register an engine or integrator of the user, ``module:Class``; returns its name."""
     if system != DEFAULT_SYSTEM:
         raise InputError(option, "", name, f"can run scenes of {DEFAULT_SYSTEM} only, and this one is of {system}")
     from models.engines.outside import register
@@ -162,7 +163,8 @@ def _registered_outside(name: str, system: str, option: str) -> tuple[str, ...]:
 
 
 def study_of(scene: Any) -> Any:
-    """The study's module, once the scene's options are known to be its own."""
+    """The module of a scene's study; raises InputError for an unknown study, another system, and options that the study
+    does not have."""
     from models.core.strict import read
 
     if scene.study not in study_names():

@@ -1,4 +1,4 @@
-"""What ``twinrig validate`` does beside the report: the suite for an engine from outside, and the blind-spot audit."""
+"""Further tasks of ``twinrig validate``: conformity checks for an engine of the user, and the blind-spot audit."""
 
 import sys
 from pathlib import Path
@@ -9,7 +9,8 @@ from studies.command.waiting import progress_bar
 
 
 def conformity_report(engine: str, has_other_options: bool, requested_folder: Path | None) -> None:
-    """Put an engine from outside the tree through the suite."""
+    """Run the conformity checks on an engine of the user, write their report, and end the process with the exit
+    code."""
     from models.core.result_folders import new_folder
     from models.engines.outside import register
     from validation.conformity import conformity
@@ -22,19 +23,21 @@ def conformity_report(engine: str, has_other_options: bool, requested_folder: Pa
 
 
 def blind_spot_audit(
-    has_other_options: bool, only: str | None, requested_folder: Path | None, resume: Path | None
+    has_other_options: bool, function_pattern: str | None, requested_folder: Path | None, resume: Path | None
 ) -> None:
-    """Audit all shared functions, or those whose name is like ``only``; raises InputError for options that go with a
-    report."""
+    """Audit which rows and tests detect faults in shared functions, all or those that match ``function_pattern``;
+    raises InputError for options of a report."""
     if has_other_options:
         raise InputError("--blind-spots", "", True, "goes without --quick and --against")
     from validation.blind_spots.audit import TRACE, audit, audit_of, audit_summary
 
-    command = "twinrig validate --blind-spots" + ("" if only is None else f" --only '{only}'")
+    command = "twinrig validate --blind-spots" + ("" if function_pattern is None else f" --only '{function_pattern}'")
     folder = folder_of("blind-spots", TRACE, "", requested_folder, resume)
     try:
         with progress_bar("blind spots") as progress:
-            lines = audit(folder, progress) if only is None else audit_of(only, folder, progress)
+            lines = (
+                audit(folder, progress) if function_pattern is None else audit_of(function_pattern, folder, progress)
+            )
     except KeyboardInterrupt:
         exit_with_message(f"interrupted; finished functions are kept: {command} --resume {folder}", 130)
     print("\n".join(audit_summary(lines, folder)))

@@ -1,4 +1,4 @@
-"""Two results of one study beside each other: every quantity's largest and rms difference, and where it is largest."""
+"""Comparison of two results of one study: the largest and the rms difference of every quantity, and where it is."""
 
 import csv
 from collections import Counter
@@ -17,17 +17,17 @@ from models.core.whole_files import whole_file
 from studies.command.differences import Quantity, QuantityDifference
 
 RESULT_SUFFIXES = (".nc", ".csv")
-SHOWN_QUANTITIES = 20
-"""Quantities that are printed, those that differ most; ``compare.csv`` has them all."""
+PRINTED_QUANTITIES = 20
+"""Number of quantities that are printed, those that differ most; ``compare.csv`` has all."""
 KIND_ATTRIBUTES = ("system", "mode")
-"""Attributes of a result that must be the same."""
-EQUAL_PLACES = 1e-9
-"""Places so near, by the largest of them, are the same."""
+"""Attributes of a result that must be equal in both results."""
+EQUAL_POSITIONS = 1e-9
+"""Difference of two grid positions, divided by the largest position, below which they are equal."""
 
 
 def compare(first_path: Path, second_path: Path) -> tuple[list[QuantityDifference], list[str]]:
-    """Differences of all quantities that occur in both results, largest relative one first, and notes on quantities
-    that occur in only one.
+    """Differences of all quantities that occur in both results, the largest relative difference first, and notes on
+    quantities that occur in only one result.
 
     Raises InputError for what is no result, and for two results that have nothing to compare.
     """
@@ -38,22 +38,23 @@ def compare(first_path: Path, second_path: Path) -> tuple[list[QuantityDifferenc
         a, b = (dict(_quantities_of_file(file)) for file in files)
         notes += _notes_on_missing(prefix, (files[0], a), (files[1], b))
         differences += [_quantity_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
-    return _by_share(differences, first_path, second_path), notes
+    return _sorted_by_share(differences, first_path, second_path), notes
 
 
 def compare_runs(
     first_run: Result, second_run: Result, names: tuple[str, str]
 ) -> tuple[list[QuantityDifference], list[str]]:
-    """Differences between two results in memory; ``names`` are their names in messages and notes."""
+    """Differences of all quantities of two results in memory, and notes on quantities that occur in only one; ``names``
+    are the results' names in messages."""
     a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first_run, second_run))
     differences = [_quantity_difference(key, a[key], b[key], names[1]) for key in a if key in b]
-    return _by_share(differences, *names), _notes_on_missing("", (names[0], a), (names[1], b))
+    return _sorted_by_share(differences, *names), _notes_on_missing("", (names[0], a), (names[1], b))
 
 
-def _by_share(
+def _sorted_by_share(
     differences: list[QuantityDifference], first_name: object, second_name: object
 ) -> list[QuantityDifference]:
-    """Differences sorted by their share of the quantity, largest first; raises InputError if there are none."""
+    """Differences sorted by their size relative to the quantity, largest first; raises InputError if there are none."""
     if not differences:
         raise InputError(
             second_name, "", None, f"has no quantity in common with {first_name}: compare two results of one study"
@@ -62,7 +63,7 @@ def _by_share(
 
 
 def _notes_on_missing(prefix: str, *sides: tuple[object, Collection[str]]) -> list[str]:
-    """Notes on names that occur in only one of the two results."""
+    """Notes on quantities or files that occur in only one of the two results."""
     return [
         f"{prefix}only in {path}: {', '.join(only_here)}"
         for (path, names), (_, names_of_other) in (sides, sides[::-1])
@@ -71,8 +72,8 @@ def _notes_on_missing(prefix: str, *sides: tuple[object, Collection[str]]) -> li
 
 
 def _file_pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
-    """Pairs of files to compare: the two given files, or files of equal name in both folders; and notes on files
-    without a partner."""
+    """Pairs of files to compare, with their name: the two given files, or the files of equal name in both folders; and
+    notes on files that occur in only one folder."""
     for path in (earlier, later):
         if not path.exists():
             raise InputError(path, "", None, "no such file or folder")
@@ -100,8 +101,8 @@ def _file_pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]
 
 
 def _result_files(folder: Path) -> dict[str, Path]:
-    """Result files of a folder by name: netCDF files, except for those whose table is in a CSV file, too. If there are
-    none, the CSV files."""
+    """Result files of a folder by name: netCDF files, except for those whose table is in a CSV file, too; the CSV files
+    if there are no such netCDF files."""
     files = [
         path
         for path in sorted(folder.rglob("*"))
@@ -114,15 +115,16 @@ def _result_files(folder: Path) -> dict[str, Path]:
 
 
 def _holds_same_table(path: Path) -> bool:
-    """Whether a netCDF file and the CSV file of the same name hold the same table: all channels have one common
+    """Whether the CSV file of the same name as a netCDF file holds the same table: all channels have one common
     axis."""
     return path.with_suffix(".csv").exists() and len(load(path).data.sizes) < 2
 
 
 def results_of(first_path: Path, second_path: Path) -> dict[str, Result]:
-    """Results to compare, by file; for a CSV table beside a netCDF file, the netCDF file is read."""
+    """Results of both files or folders by file, whose stated errors and assumptions are known; for a CSV table beside a
+    netCDF file, the netCDF file is read."""
     files = [file for _, *pair in _file_pairs(first_path, second_path)[0] for file in pair]
-    results = ((str(file), _result(file)) for file in files)
+    results = ((str(file), _result_of_file(file)) for file in files)
     return {
         name: run
         for name, run in results
@@ -130,19 +132,22 @@ def results_of(first_path: Path, second_path: Path) -> dict[str, Result]:
     }
 
 
-def _result(path: Path) -> Result | None:
-    """The saved result of a file, or of the netCDF file that belongs to a CSV table; None if there is none."""
+def _result_of_file(path: Path) -> Result | None:
+    """The saved result of a netCDF file, or of the netCDF file beside a CSV table; None if there is none."""
     netcdf_path = path.with_suffix(".nc")
     return load(netcdf_path) if netcdf_path.is_file() else None
 
 
 def _quantities_of_file(path: Path) -> Iterator[tuple[str, Quantity]]:
-    """Quantities of a file by their names, with the errors that its result states."""
-    yield from _with_errors(_result(path), channels_of(load(path).data) if path.suffix == ".nc" else _table(path))
+    """Yield name and values of each quantity of a file, with the error that its result states."""
+    yield from _with_errors(
+        _result_of_file(path), channels_of(load(path).data) if path.suffix == ".nc" else _quantities_of_table(path)
+    )
 
 
 def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]]) -> Iterator[tuple[str, Quantity]]:
-    """Quantities of a result, each with the error that the result states for its channel, if it states one."""
+    """Yield name and values of each quantity of a result, with the error that the result states for the channel, if
+    any."""
     errors = {} if run is None else errors_of(run)
     for name, quantity in quantities:
         stated = errors.get(name.partition(", ")[0])
@@ -150,8 +155,8 @@ def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]])
 
 
 def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
-    """Numeric channels of a dataset as quantities over time or another axis. A channel with further axes gives one
-    quantity for each entry of these."""
+    """Yield name and values of the numeric channels of a dataset over time or another axis. A channel with further axes
+    gives one quantity for each entry of these."""
     kinds = ", ".join(str(data.attrs[kind]) for kind in KIND_ATTRIBUTES if kind in data.attrs)
     for name, channel in data.data_vars.items():
         if channel.dtype.kind not in "fiu" or channel.size == 0:
@@ -171,22 +176,22 @@ def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
 
 
 def _dimension_along(channel: Any) -> Any:
-    """Dimension along which a channel is compared: time, or else the longest one that has numbers, or no names, as
+    """Dimension along which a channel is compared: time, or else the longest dimension with numbers, or nothing, as
     coordinates."""
     numbered = [dim for dim in channel.dims if dim not in channel.coords or channel[dim].dtype.kind in "fiu"]
     return "time" if "time" in numbered else max(numbered, key=channel.sizes.get, default=None)
 
 
 def _grid_of_dimension(channel: Any, dimension: Any) -> tuple[str, np.ndarray]:
-    """Name and values of the coordinate along a dimension; row numbers if it has none."""
+    """Name and values of the coordinate along a dimension of a channel; row numbers if it has no coordinate."""
     if dimension not in channel.coords:
         return "entry", np.arange(channel.sizes.get(dimension, 1), dtype=float)
     unit = channel[dimension].attrs.get("units", "s" if dimension == "time" else "")
     return f"{dimension} [{unit}]" if unit else str(dimension), channel[dimension].values.astype(float)
 
 
-def _table(path: Path) -> Iterator[tuple[str, Quantity]]:
-    """Columns of numbers of a CSV file; an empty cell is not a number."""
+def _quantities_of_table(path: Path) -> Iterator[tuple[str, Quantity]]:
+    """Yield name and values of each numeric column of a CSV file over its first column; an empty cell is NaN."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             heads, *rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
@@ -219,7 +224,7 @@ def _numeric_cells(cells: tuple[str, ...]) -> np.ndarray | None:
 def _quantity_difference(
     name: str, first_quantity: Quantity, second_quantity: Quantity, file: object
 ) -> QuantityDifference:
-    """Difference of one quantity in two results; raises InputError if their kinds, units or rows do not match."""
+    """Difference of a quantity in two results; raises InputError if kinds, units or rows do not match."""
     if first_quantity.kind != second_quantity.kind:
         raise InputError(
             file, name, second_quantity.kind, f"the other run is of {first_quantity.kind}: compare two runs of one kind"
@@ -234,7 +239,7 @@ def _quantity_difference(
     for label, other in zip(first_quantity.labels, second_quantity.labels, strict=False):
         if label != other:
             raise InputError(file, name, other, f"has other rows than the first, which has {label!r} there")
-    near = EQUAL_PLACES * np.abs(first_quantity.grid).max(initial=0.0)
+    near = EQUAL_POSITIONS * np.abs(first_quantity.grid).max(initial=0.0)
     if first_quantity.grid.shape == second_quantity.grid.shape and np.allclose(
         first_quantity.grid, second_quantity.grid, rtol=0.0, atol=near
     ):
@@ -262,8 +267,8 @@ def _quantity_difference(
 def _difference_in_time(
     name: str, first_quantity: Quantity, second_quantity: Quantity, file: object
 ) -> QuantityDifference:
-    """Difference of two runs with rows at different times; the denser run is interpolated at the other's rows by a
-    cubic spline."""
+    """Difference of a quantity in two runs with rows at different times; the denser run is interpolated at the rows of
+    the other by a cubic spline."""
     from scipy.interpolate import CubicSpline
 
     fine, coarse = (
@@ -296,7 +301,7 @@ def _difference_in_time(
 
 
 def _common_extent(common_times: np.ndarray, *grids: np.ndarray) -> str:
-    """Phrase on the times (s) that were compared, where one run begins later or ends earlier than the other."""
+    """Phrase on the compared times (s) if one run begins later or ends earlier than the other; else ""."""
     begin, end = (float(extreme(np.concatenate(grids))) for extreme in (np.min, np.max))
     spacing = min(float(np.diff(grid).max()) for grid in grids)
     first, last = common_times[0], common_times[-1]
@@ -306,7 +311,7 @@ def _common_extent(common_times: np.ndarray, *grids: np.ndarray) -> str:
 
 
 def report(first_path: Path, second_path: Path, folder: Path) -> dict[str, Any]:
-    """Compare two results; saves ``compare.csv`` and ``compare.png``, and returns the lines to print."""
+    """Compare two results; saves ``compare.csv`` and ``compare.png``, and returns the summary."""
     differences, notes = compare(first_path, second_path)
     with whole_file(folder / "compare.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.writer(file)
@@ -334,7 +339,7 @@ def report(first_path: Path, second_path: Path, folder: Path) -> dict[str, Any]:
 
 
 def comparison_lines(differences: list[QuantityDifference], notes: list[str]) -> list[str]:
-    """Lines for the screen: the quantities with the largest differences, and the notes."""
+    """Lines for the screen: the quantities with the largest differences, and notes."""
     return [*_file_lines(differences), *(f"  {note}" for note in notes)]
 
 
@@ -343,7 +348,7 @@ def _file_lines(differences: list[QuantityDifference]) -> list[str]:
     notes = [f"  {note}" for note in dict.fromkeys(difference.note for difference in differences if difference.note)]
     if not differ:
         return [f"  all {len(differences)} quantities are the same to the last bit", *notes]
-    shown = [difference for difference in differences[:SHOWN_QUANTITIES] if difference.largest > 0.0]
+    shown = [difference for difference in differences[:PRINTED_QUANTITIES] if difference.largest > 0.0]
     equal_count, not_shown = len(differences) - len(differ), len(differ) - len(shown)
     return [
         f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest",
@@ -358,7 +363,7 @@ def _file_lines(differences: list[QuantityDifference]) -> list[str]:
 
 
 def _difference_text(difference: QuantityDifference) -> str:
-    """Text on where a difference is largest; it adds if the difference lies within the stated errors."""
+    """Text on where a difference is largest, and on whether it lies within the stated errors."""
     return (
         f"{difference.where}; rms within the stated error of {difference.stated:.2g}"
         if difference.within
@@ -369,8 +374,8 @@ def _difference_text(difference: QuantityDifference) -> str:
 def _figure(
     first_path: Path, second_path: Path, differences: list[QuantityDifference], results: Results, path: Path
 ) -> None:
-    """Draw both results and, below, their difference, of the three quantities that differ most, or one that is
-    equal."""
+    """Save a figure of both results and, below, their difference, for the three quantities that differ most; of one
+    quantity if all are equal."""
     from models.drawing.figures import (
         BLUE,
         COLUMN_WIDTH,

@@ -1,4 +1,4 @@
-"""Who computes what repeats, as the command's options ``--workers`` and ``--cluster`` ask for it."""
+"""Workers of a scene, as the options ``--workers`` and ``--cluster`` request them."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -8,8 +8,8 @@ if TYPE_CHECKING:  # the command line imports this file before it knows whether 
     from models.ensemble.workers import Crew
 
 
-def given_crew(workers: int | None, cluster: str | None) -> dict[str, Any]:
-    """What the options change of a scene; InputError where they ask for both."""
+def crew_changes_by_options(workers: int | None, cluster: str | None) -> dict[str, Any]:
+    """Changes of a scene's keys "workers" and "cluster" by the options; raises InputError if both options are given."""
     if workers is not None and cluster is not None:
         allowed = "is for this machine, and the workers of a cluster are those that have joined it: leave one out"
         raise InputError("--workers", "", workers, allowed)
@@ -18,7 +18,7 @@ def given_crew(workers: int | None, cluster: str | None) -> dict[str, Any]:
 
 
 def crew_of(scene: Any, workers: int | None, cluster: str | None) -> "Crew":
-    """The workers of a scene, with these options in place of the scene's own."""
+    """The workers of a scene, with the options ``--workers`` and ``--cluster`` in place of the scene's keys."""
     from models.ensemble.workers import Crew
 
-    return Crew.of(scene.model_copy(update=given_crew(workers, cluster)))
+    return Crew.of(scene.model_copy(update=crew_changes_by_options(workers, cluster)))

@@ -1,4 +1,4 @@
-"""A quantity of a result, and its difference from that of another one: how large, and where."""
+"""A quantity of a result, and its difference from the same quantity of another result: how large, and where."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,11 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Quantity:
-    """Values (n,) of one quantity over ``grid`` (n,): times, another coordinate, the first column of a table, or row
-    numbers.
+    """Values (n,) of a quantity of a result over ``grid`` (n,): times, another coordinate, the first column of a table,
+    or row numbers.
 
-    kind : system and mode of the run, where the file says them; labels (n,) : what names the rows of a table, if it is
-    no number; error : that the result states for its channel, in its unit, nan where it states none.
+    kind : system and mode of the run, if the file states them; labels (n,) : names of a table's rows, if these are no
+    numbers; error : stated by the result for the channel, in its unit, nan if it states none.
     """
 
     unit: str
@@ -25,7 +25,8 @@ class Quantity:
 
 @dataclass(frozen=True)
 class QuantityDifference:
-    """Difference ``second`` minus ``first`` over ``grid`` (n,); ``note`` : how both were brought to the same rows.
+    """Difference of a quantity in two results, ``second`` minus ``first`` (n,), over ``grid`` (n,); ``note`` : how both
+    were brought to the same rows.
 
     stated : errors that both results state for the channel, together, root mean squares; nan where one states none.
     """
@@ -42,13 +43,14 @@ class QuantityDifference:
 
     @property
     def within(self) -> bool:
-        """Whether the rms difference of both results is within the errors that they state: then it has no
+        """Whether the rms difference of both results is within the errors that they state, and thus has no
         significance."""
         return 0.0 < self.rms <= self.stated
 
     @property
     def gap(self) -> np.ndarray:
-        """Difference (n,); 0 where both are NaN, infinite where only one is a number or the infinities differ."""
+        """Difference (n,) of both results; 0 where both are NaN, infinite where only one is a number or infinities
+        differ."""
         with np.errstate(invalid="ignore"):
             gap = self.second - self.first
         are_equal = (self.first == self.second) | (np.isnan(self.first) & np.isnan(self.second))
@@ -56,27 +58,27 @@ class QuantityDifference:
 
     @property
     def row(self) -> int:
-        """Index of the row at which the difference is largest."""
+        """Index of the row at which the difference of both results is largest."""
         return int(np.abs(self.gap).argmax())
 
     @property
     def largest(self) -> float:
-        """Largest magnitude of the difference."""
+        """Largest magnitude of the difference of both results."""
         return float(abs(self.gap[self.row]))
 
     @property
     def rms(self) -> float:
-        """Root of the mean square of the difference."""
+        """Root mean square of the difference of both results."""
         return float(np.sqrt(np.mean(self.gap**2)))
 
     @property
     def at(self) -> float:
-        """Position on the grid at which the difference is largest."""
+        """Time, or other coordinate, at which the difference of both results is largest."""
         return float(self.grid[self.row])
 
     @property
     def where(self) -> str:
-        """Text on where the difference is largest."""
+        """Text on where the difference of both results is largest."""
         return f"{self.over.partition(' [')[0]} = {self.labels[self.row] if self.labels else f'{self.at:.9g}'}"
 
     @property

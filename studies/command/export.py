@@ -1,4 +1,4 @@
-"""The native part of a scene's vehicle, written as a file of an engine: ``twinrig export``."""
+"""Export of a scene's vehicle as a file of an engine: ``twinrig export``."""
 
 from importlib import import_module
 from importlib.util import find_spec
@@ -12,8 +12,8 @@ from models.engines.export import SUFFIXES, Exported
 
 
 def exported_text(scene: Any, engine: str) -> Exported:
-    """Text of the exported file, and a list of what it leaves out. Raises InputError for an engine without a file
-    format and for a system without an exportable vehicle."""
+    """Export of a scene's vehicle: text of the file, and lists of its contents and omissions. Raises InputError for an
+    engine without a file format and for a system without an exportable vehicle."""
     if engine not in SUFFIXES:
         raise InputError("--engine", "", engine, "no engine that has files of its own", tuple(SUFFIXES))
     if scene.system not in _exportable_systems():
@@ -29,7 +29,7 @@ def _exportable_systems() -> tuple[str, ...]:
 
 
 def target_file(scene: Any, engine: str, output_path: Path | None) -> Path:
-    """Path of the file to write; raises InputError if it exists, has the wrong extension, or its folder does not
+    """Path of the exported file; raises InputError if it exists, has the wrong extension, or its folder does not
     exist."""
     suffix = SUFFIXES.get(engine, "")
     path = output_path or Path(f"{Path(scene.file).stem}_{engine}{suffix}")
@@ -43,8 +43,8 @@ def target_file(scene: Any, engine: str, output_path: Path | None) -> Path:
 
 
 def export(scene: Any, engine: str, output_path: Path | None) -> dict[str, Any]:
-    """Write the file; returns its path ("file"), and sentences on its contents ("has") and on omissions ("left
-    out")."""
+    """Write the exported file of a scene's vehicle; returns its path ("file"), and sentences on its contents ("has")
+    and omissions ("left out")."""
     answer = exported_text(scene, engine)
     path = target_file(scene, engine, output_path)
     write_whole(path, answer.text)
@@ -52,7 +52,7 @@ def export(scene: Any, engine: str, output_path: Path | None) -> dict[str, Any]:
 
 
 def export_lines(title: str, export_record: dict[str, Any]) -> list[str]:
-    """Lines that the command prints: the scene's title, and the contents and omissions of the exported file."""
+    """Lines for the screen: the scene's title, and the contents and omissions of the exported file."""
     path, left_out = export_record["file"], [f"    {text}" for text in export_record["left out"]]
     head = "  left out:" if left_out else "  leaves nothing out"
     opened = f"python -m mujoco.viewer --mjcf={path}" if path.endswith(SUFFIXES["mujoco"]) else f"python {path}"

@@ -1,4 +1,4 @@
-"""How a command ends: in a folder of its results, with a summary on the terminal, or with one message and a code."""
+"""End of a command: a folder of results and a summary on the terminal, or a message and an exit code."""
 
 import json
 import sys
@@ -12,31 +12,37 @@ from models.core.finding import Finding, finding_lines, findings_as_dicts
 from models.core.whole_files import write_whole
 from studies.command.waiting import progress_bar
 
-Work = Callable[[Any], dict[str, Any]]
-"""A study, which is given what it tells its progress to, and returns its summary."""
+StudyRun = Callable[[Any], dict[str, Any]]
+"""Function that runs a study: its argument reports progress, and it returns the summary."""
 
 
 def exit_with_message(message: str, code: int) -> NoReturn:
-    """End with a message on stderr and an exit code: 1 for a failed run, 2 for a user's mistake, 130 for Ctrl-C."""
+    """End the process with a message on stderr and an exit code: 1 for a failed run, 2 for a user's mistake, 130 for
+    Ctrl-C."""
     print(f"twinrig: {message}", file=sys.stderr)
     sys.exit(code)
 
 
-def profile_lines(profile: bool) -> Callable[[Work], Work]:
-    """A wrapper for the work: with ``profile``, the work also reports where its computing time went; else it is
-    unchanged."""
+def profiled_work(profile: bool) -> Callable[[StudyRun], StudyRun]:
+    """Wrapper for the function that runs a study: with ``profile``, its summary also states where computing time was
+    spent; without, the function is unchanged."""
     if not profile:
         return lambda work: work
-    from studies.command.profile import Watch
+    from studies.command.profile import Profiler
 
-    watch = Watch()
-    return lambda work: partial(watch.told, work)
+    profiler = Profiler()
+    return lambda work: partial(profiler.run_profiled, work)
 
 
 def finish(
-    work: Work, folder: Path, as_json: bool, doubts: tuple[Finding, ...] = (), strict: bool = False, system: str = ""
+    work: StudyRun,
+    folder: Path,
+    as_json: bool,
+    doubts: tuple[Finding, ...] = (),
+    strict: bool = False,
+    system: str = "",
 ) -> None:
-    """Do the work, whose results go into ``folder``, with a progress bar, and print its summary.
+    """Run a study, whose results are saved in ``folder``, with a progress bar, and print its summary.
 
     doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results; strict : whether
     a broken assumption ends with code 1; system : of the scene.
@@ -66,7 +72,7 @@ def finish(
 
 
 def folder_of(name: str, blocks: str | None, study: str, output_folder: Path | None, resume: Path | None) -> Path:
-    """Folder for the results: a new one, or that of an interrupted run, whose finished parts are in ``blocks``."""
+    """Folder for the results: a new folder, or the folder of an interrupted run, with finished parts in ``blocks``."""
     from models.core.result_folders import new_folder, resumed_folder
 
     if resume is None:
@@ -78,14 +84,13 @@ def folder_of(name: str, blocks: str | None, study: str, output_folder: Path | N
     return resumed_folder(resume, blocks)
 
 
-def untold_findings(findings: tuple[Finding, ...], printed_text: str) -> list[str]:
-    """Lines of the findings whose text does not occur in ``printed_text``, which is what a plan or a study has printed
-    already."""
+def unprinted_finding_lines(findings: tuple[Finding, ...], printed_text: str) -> list[str]:
+    """Lines for the screen on findings whose text does not occur in ``printed_text``, the lines already printed."""
     return finding_lines(finding for finding in findings if finding.text not in printed_text)
 
 
 def _print_summary(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
-    """Print a summary for a human reader."""
+    """Print the summary of a study, with doubts about its input, as text."""
     print(summary["scene"])
     for engine, line in summary.get("runs", {}).items():
         steps, calls = line["counts"].get("steps", 0), line["counts"].get("force calls", 0)
@@ -98,7 +103,7 @@ def _print_summary(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None
     for pair, gap in summary.get("largest difference of states", {}).items():
         print(f"  {pair}: states differ by at most {gap:.1e}")
     table = summary.get("table", [])
-    for line in (*untold_findings(doubts, "\n".join(table)), *table):
+    for line in (*unprinted_finding_lines(doubts, "\n".join(table)), *table):
         print(line)
     has_folder = Path(summary["folder"]).exists()
     print(f"  results in {summary['folder']}" if has_folder else "  nothing was saved")

@@ -1,4 +1,4 @@
-"""``twinrig identify``: keys of a scene from a measurement, with their errors and what the data do not determine."""
+"""``twinrig identify``: estimates of a scene's keys from a measurement, with standard errors and their determinacy."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -19,12 +19,12 @@ from models.identification.uncertainty import LikelihoodProfile, Uncertainty, li
 from models.measured.time_shift import ChannelPair, time_shift
 
 STAGES_FOLDER = "stages"
-"""Folder of finished stages, from which ``--resume`` goes on."""
-NAMED_SHARE = 0.3
-"""Share of a combination from which on a parameter is named in it."""
+"""Name of the folder of finished stages, from which ``--resume`` continues."""
+LEAST_NAMED_COMPONENT = 0.3
+"""Least component of a unit vector of a parameter combination for which the parameter is named."""
 SHIFT_IMPROVEMENT = 2.0
-"""Times as near as they are must run and measurement come by a shift of the clock for it to be told."""
-Tell = Callable[[str, float], None]
+"""Factor by which a time shift must reduce the difference of run and measurement for it to be reported."""
+ReportProgress = Callable[[str, float], None]
 
 
 def identify(
@@ -35,9 +35,9 @@ def identify(
     engine: str = "",
     low_pass: float = 0.0,
     folder: Path | None = None,
-    report_progress: Tell = lambda text, share: None,
+    report_progress: ReportProgress = lambda text, share: None,
 ) -> Uncertainty:
-    """Estimates of keys of any scene whose run has channels over time, with their uncertainty.
+    """Estimates of a scene's keys from a measurement, with their uncertainty; the run must have channels over time.
 
     scene : as ``load_scene`` gives it; measurement : its channels have the names of the run's; parameters : KEY or
     KEY=LOW:HIGH; engine : "" for the usual one; low_pass : Hz, on both, 0 for none; folder : keeps finished stages.
@@ -53,10 +53,13 @@ def identify(
 
 
 def profiles_of(
-    scene: Any, uncertainty: Uncertainty, all_profiles: bool = False, report_progress: Tell = lambda text, share: None
+    scene: Any,
+    uncertainty: Uncertainty,
+    all_profiles: bool = False,
+    report_progress: ReportProgress = lambda text, share: None,
 ) -> Iterator[LikelihoodProfile]:
-    """Likelihood profiles of all parameters, or only of those that the data do not determine, computed by the scene's
-    workers."""
+    """Yield the likelihood profiles of all parameters, or only of those that the data do not determine; the scene's
+    workers compute them."""
     wanted = [
         k for k in range(len(uncertainty.fit.problem.parameters)) if all_profiles or not uncertainty.is_determined[k]
     ]
@@ -73,7 +76,7 @@ def profiles_of(
 def _facts_of_stages(
     scene: Any, measurement: str | Path, problem: Problem, engine: str, low_pass: float
 ) -> dict[str, Any]:
-    """Inputs on which saved stages of an identification depend: if one of them changes, the stages are computed
+    """Inputs on which the saved stages of an identification depend; if one of them changes, the stages are computed
     anew."""
     table = scene.table()
     return {
@@ -93,15 +96,15 @@ def report(
     measurement: Path,
     parameters: Sequence[str],
     folder: Path,
-    report_progress: Tell,
+    report_progress: ReportProgress,
     all_profiles: bool,
     **identify_options: Any,
 ) -> dict[str, Any]:
-    """Identify parameters; saves ``identify.json`` and ``identify.png``, and returns the lines to print. all_profiles :
-    profiles of all parameters."""
+    """Identify parameters; saves ``identify.json`` and ``identify.png``, and returns the summary. all_profiles :
+    likelihood profiles of all parameters, not only of undetermined ones."""
     known = identify(scene, measurement, parameters, folder=folder, report_progress=report_progress, **identify_options)
     drawn = list(profiles_of(scene, known, all_profiles, report_progress))
-    answer = as_dict(known, drawn)
+    answer = identification_record(known, drawn)
     write_whole(folder / "identify.json", json.dumps(answer, indent=1) + "\n")
     draw_fit(known, f"{measurement.name} by {scene.title}", folder / "identify.png")
     return {
@@ -114,8 +117,8 @@ def report(
     }
 
 
-def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> dict[str, Any]:
-    """Uncertainty and profiles as plain values; None where a standard error does not exist."""
+def identification_record(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> dict[str, Any]:
+    """Estimates, uncertainty and likelihood profiles as plain values for JSON; None for a missing standard error."""
     solved, names = uncertainty.fit, [parameter.name for parameter in uncertainty.fit.problem.parameters]
     return {
         "estimates": {
@@ -151,7 +154,7 @@ def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()
 
 
 def correlation(uncertainty: Uncertainty) -> np.ndarray:
-    """Correlation matrix (p, p) of the estimates; 0 for estimates at a bound."""
+    """Correlation matrix (p, p) of the parameter estimates; 0 for estimates at a bound."""
     size = np.sqrt(np.clip(np.diag(uncertainty.covariance), 0.0, None))
     outer = np.outer(size, size)
     return np.divide(uncertainty.covariance, outer, out=np.zeros_like(outer), where=outer > 0.0)
@@ -162,7 +165,7 @@ def _finite_number(number: float) -> float | None:
 
 
 def relative_errors(fit: Fit) -> dict[str, float]:
-    """For each channel, ratio of the rms error to the rms of the channel."""
+    """For each channel, ratio of the rms error of the fitted model to the rms of the measured channel."""
     weights = fit.problem.weights > 0.0
     return {
         channel.name: float(np.sqrt(np.mean(row[used] ** 2)))
@@ -171,7 +174,7 @@ def relative_errors(fit: Fit) -> dict[str, float]:
 
 
 def identification_lines(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> list[str]:
-    """Lines for the screen."""
+    """Lines for the screen on the estimates, their uncertainty, and the fit of the channels."""
     solved = uncertainty.fit
     table = [f"  {'parameter':<32}{'estimate':>13}{'standard error':>16}"]
     for k, parameter in enumerate(solved.problem.parameters):
@@ -190,7 +193,7 @@ def identification_lines(uncertainty: Uncertainty, profiles: Sequence[Likelihood
     table.append("  left out as spikes or not measured: " + ", ".join(f"{n} of {name}" for name, n in left.items()))
     if not solved.converged:
         table.append("  the search has not settled: resume it, or start nearer")
-    if late := late_clock(uncertainty):
+    if late := clock_delay(uncertainty):
         table.append(
             f"  DOUBT: the measurement's clock seems {late:.4g} s later than the run's: take that off its times"
         )
@@ -201,8 +204,8 @@ def identification_lines(uncertainty: Uncertainty, profiles: Sequence[Likelihood
     return table
 
 
-def late_clock(uncertainty: Uncertainty) -> float:
-    """Delay (s) of the measurement relative to the model; 0 unless shifting by it makes the mismatch
+def clock_delay(uncertainty: Uncertainty) -> float:
+    """Delay (s) of the measurement's clock relative to the model; 0 unless a shift by it makes the difference
     ``SHIFT_IMPROVEMENT`` times smaller.
 
     The model is that of the start: estimates take up a part of the delay.
@@ -219,8 +222,8 @@ def late_clock(uncertainty: Uncertainty) -> float:
 
 
 def _mean_distance(channel_pairs: Sequence[ChannelPair], time_shift_seconds: float) -> float:
-    """Mean over channels of rms difference / standard deviation of the measurement, with the measurement shifted
-    earlier by a time (s)."""
+    """Mean over channels of the rms difference of run and measurement divided by the measurement's standard deviation,
+    with the measurement shifted earlier by a time (s)."""
     shares = []
     for pair in channel_pairs:
         shifted_times = pair.times - time_shift_seconds
@@ -240,7 +243,7 @@ def _combination_lines(uncertainty: Uncertainty) -> list[str]:
 
     def vector_text(vector: np.ndarray) -> str:
         order = np.argsort(-np.abs(vector))
-        return " ".join(f"{vector[k]:+.2f} {names[k]}" for k in order if abs(vector[k]) >= NAMED_SHARE)
+        return " ".join(f"{vector[k]:+.2f} {names[k]}" for k in order if abs(vector[k]) >= LEAST_NAMED_COMPONENT)
 
     (best, first_direction), (worst, last_direction) = combinations[0], combinations[-1]
     return [
@@ -251,7 +254,7 @@ def _combination_lines(uncertainty: Uncertainty) -> list[str]:
 
 
 def draw_fit(uncertainty: Uncertainty, title: str, path: Path) -> None:
-    """Plot every measured channel with the model at the estimates, and the error below it."""
+    """Save a figure of every measured channel with the fitted model, and below it their difference."""
     from models.drawing.figures import BLUE, DARK, VERMILION, add_heading, save, subplots
 
     problem = uncertainty.fit.problem

@@ -1,4 +1,4 @@
-"""What ``twinrig list`` prints: shipped scenes, effects, parameter sets, engines with their integrators."""
+"""Lists that ``twinrig list`` prints: shipped scenes, effects, parameter sets, engines with their integrators."""
 
 from importlib import import_module
 
@@ -11,7 +11,7 @@ from studies.command.asked import SCENES_FOLDER
 
 
 def print_lists() -> None:
-    """Print all lists, each with its title."""
+    """Print the lists of scenes, effects, parameter sets and engines, each with its title."""
     scenes = {path.stem: parse(path)["title"] for path in sorted(SCENES_FOLDER.glob("*.toml"))}
     sets = {name: import_module(f"models.vehicles.parameters.{name}").SOURCE for name in parameter_sets()}
     _print_list("scenes (twinrig run NAME, or a file of your own)", scenes)

@@ -1,4 +1,4 @@
-"""Where the time of a run goes: a thread looks every few milliseconds at what the main thread does.
+"""Profile of a run's computing time: a thread samples the call stack of the main thread every few milliseconds.
 
 Nothing is built into the models for it, so a run without it costs what it did. Forces that are compiled into a march
 belong to that march; those that an engine asks Python for have a line of their own.
@@ -14,11 +14,11 @@ from types import FrameType
 from typing import Any
 
 SAMPLING_PERIOD = 0.004
-"""s between two looks."""
+"""Time (s) between two samples of the call stack."""
 PYTHON_START_KIND, IMPORTS_KIND, KERNELS_KIND = "start of Python", "imports", "compiling and loading kernels"
-FIGURES_KIND, SAVING_KIND, EVERYTHING_ELSE = "figures", "saving", "everything else"
-BESIDE_ENGINES = "marching beside the engines"
-"""A controller, wheels in steps of their own, or equations that belong to no engine."""
+FIGURES_KIND, SAVING_KIND, OTHER_KIND = "figures", "saving", "everything else"
+OUTSIDE_ENGINES = "marching beside the engines"
+"""Label of time spent in a controller, in wheels with their own steps, or in equations that belong to no engine."""
 KIND_OF_LIBRARY = {
     "numba": KERNELS_KIND,
     "llvmlite": KERNELS_KIND,
@@ -31,18 +31,19 @@ KIND_OF_LIBRARY = {
     "h5py": SAVING_KIND,
     "backends": SAVING_KIND,
 }
-"""What is done within a library or a folder of ours."""
+"""Kind of work that a call within a library or a source folder belongs to."""
 ENGINES = ("exudyn", "mujoco", "reference")
 MARCH_FUNCTIONS = frozenset(
     ("march", "march_adaptively", "solve", "ended", "run", "rollout", "SolveDynamic", "_marched", "_fixed", "_adaptive")
 )
-"""Functions in which an engine marches; in all others it is being built, or answers for a single state."""
+"""Names of the functions in which an engine integrates in time; in all others it is built or evaluates one state."""
 FORCE_FUNCTIONS = frozenset(("force", "forces", "law"))
-"""Functions that an engine asks for forces."""
+"""Names of the functions that an engine calls for forces."""
 
 
-class Watch:
-    """Profile of the main thread: seconds spent in each kind of work, from creation of the watch until ``told``."""
+class Profiler:
+    """Profiler of the main thread: seconds spent in each kind of work, from its creation until the end of
+    ``run_profiled``."""
 
     def __init__(self) -> None:
         self.seconds = defaultdict[str, float](float, {PYTHON_START_KIND: time.process_time()})
@@ -51,17 +52,17 @@ class Watch:
         self._thread.start()
 
     def _sample_stack(self) -> None:
-        """Attribute the time since the last sample to the present call stack; a call that holds the interpreter's lock
-        ends before the sample."""
+        """Repeatedly add the time since the last sample to the kind of work of the current call stack; a call that
+        holds the interpreter's lock ends before the sample."""
         last_time = time.perf_counter()
         while not self._over.wait(SAMPLING_PERIOD):
             current_time = time.perf_counter()
             frame = sys._current_frames().get(self._main or 0)
-            self.seconds[EVERYTHING_ELSE if frame is None else part_of_run(frame)] += current_time - last_time
+            self.seconds[OTHER_KIND if frame is None else kind_of_work(frame)] += current_time - last_time
             last_time = current_time
 
-    def told(self, work: Callable[[Any], dict[str, Any]], progress: Any) -> dict[str, Any]:
-        """Do the work, stop the watch, and add its lines to the summary."""
+    def run_profiled(self, work: Callable[[Any], dict[str, Any]], progress: Any) -> dict[str, Any]:
+        """Run a study, stop the profiler, and return the study's summary with the profile's lines."""
         summary = work(progress)
         self._over.set()
         self._thread.join()
@@ -69,8 +70,8 @@ class Watch:
         return summary | {"profile": spent, "table": [*summary.get("table", []), *profile_lines(spent)]}
 
 
-def part_of_run(frame: FrameType) -> str:
-    """Kind of work that a call stack is doing, from the innermost call that can be classified."""
+def kind_of_work(frame: FrameType) -> str:
+    """Kind of work of a call stack, by its innermost call that can be classified."""
     engine, forces = "", False
     for name, path in _calls_of_stack(frame):
         if name == "<module>" or path.parts[:1] == ("<frozen importlib._bootstrap>",):
@@ -86,21 +87,20 @@ def part_of_run(frame: FrameType) -> str:
         within = _engine(path)
         engine = engine or within
         if name in MARCH_FUNCTIONS and (within or path.stem == "march"):
-            work_part = f"marching in {engine}" if engine else BESIDE_ENGINES
+            work_part = f"marching in {engine}" if engine else OUTSIDE_ENGINES
             return f"forces asked for by {engine}" if engine and forces else work_part
-    return f"building in {engine}" if engine else EVERYTHING_ELSE
+    return f"building in {engine}" if engine else OTHER_KIND
 
 
 def _calls_of_stack(frame: FrameType | None) -> Iterator[tuple[str, PurePath]]:
-    """Names and files of the functions of a stack, the innermost first, down to the script itself."""
+    """Yield name and file of each function of a call stack, the innermost first, down to the script itself."""
     while frame is not None and frame.f_globals.get("__name__") != "__main__":
         yield frame.f_code.co_name, PurePath(frame.f_code.co_filename)
         frame = frame.f_back
 
 
 def _engine(path: PurePath) -> str:
-    """Name of the engine to which a source file belongs, either in its own package or in ``models/engines``; else
-    empty."""
+    """Name of the engine that a source file belongs to, in its own package or in ``models/engines``; else ""."""
     if path.parent.name in ENGINES:
         return path.parent.name
     named = (engine for engine in ENGINES if engine in path.stem)
@@ -108,7 +108,7 @@ def _engine(path: PurePath) -> str:
 
 
 def profile_lines(spent: dict[str, float]) -> list[str]:
-    """Table to print with the seconds and shares of each kind of work, largest first."""
+    """Lines for the screen: seconds and share of each kind of work, in the order of ``spent``."""
     total_seconds = sum(spent.values())
     rows = [
         f"    {work_part:<30} {seconds:8.2f} s {seconds / total_seconds:6.1%}" for work_part, seconds in spent.items()

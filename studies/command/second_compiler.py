@@ -1,7 +1,7 @@
-"""A second process that compiles the kernels of a scene's last engine while the first engines are at work.
+"""A second process that compiles the kernels of a scene's last engine while the first engines run.
 
-It does what compiles them: it runs the scene in that engine, into a folder that is thrown away. It begins when kernels
-turn out to be missing, which happens once after an installation, where a user waits at a terminal and a core is idle.
+It runs the scene in that engine, with results in a temporary folder. It starts when kernels are missing, once after an
+installation, if a user waits at a terminal and a core is idle.
 """
 
 import json
@@ -14,15 +14,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from studies.command.asked import load_scene, plain_arrays, study_of
-from studies.command.waiting import Kernels
+from studies.command.asked import load_scene, needs_no_extras, study_of
+from studies.command.waiting import CompilationTimer
 
-MISSING = 1.0
-"""s of compilation from which on kernels are taken to be missing: loading those of a scene takes less."""
+COMPILATION_SECONDS = 1.0
+"""Compilation time (s) above which kernels are taken to be missing: loading a scene's compiled kernels takes less."""
 
 
-class SecondCompiler(Kernels):
-    """Starts a command once, as soon as this process has compiled for MISSING seconds."""
+class SecondCompiler(CompilationTimer):
+    """Observer of compilation that starts a command once, when this process has compiled for COMPILATION_SECONDS."""
 
     def __init__(self, command: list[str]) -> None:
         super().__init__()
@@ -31,12 +31,12 @@ class SecondCompiler(Kernels):
 
     def _start(self, *event: Any) -> None:
         super()._start(*event)
-        if self.process is None and self.spent() > MISSING:
+        if self.process is None and self.compilation_seconds() > COMPILATION_SECONDS:
             nowhere = subprocess.DEVNULL
             self.process = subprocess.Popen(self.command, stdin=nowhere, stdout=nowhere, stderr=nowhere)
 
     def end(self) -> None:
-        """Stop the command, if it still runs, and wait until it is gone."""
+        """Stop observing, and end the started command if it still runs."""
         self.detach()
         if self.process is not None:
             self.process.kill()
@@ -44,14 +44,14 @@ class SecondCompiler(Kernels):
 
 
 @contextmanager
-def compiled_beside(name: str, changes: list[str], scene: Any, engines: tuple[str, ...]) -> Iterator[None]:
-    """Context in which a second process compiles the kernels of the scene's last engine, where they are missing.
+def second_process_compiles(name: str, changes: list[str], scene: Any, engines: tuple[str, ...]) -> Iterator[None]:
+    """Context in which a second process compiles the kernels of the scene's last engine if they are missing.
 
     name, changes : which scene this is, as the user gave them. Nothing is run twice that has workers of its own, or
     code of the user's.
     """
     idle = len(engines) > 1 and (os.cpu_count() or 1) > 1 and sys.stderr.isatty()
-    if not idle or not plain_arrays(scene, engines, study_of(scene)):
+    if not idle or not needs_no_extras(scene, engines, study_of(scene)):
         yield
         return
     with TemporaryDirectory() as folder:
@@ -65,8 +65,8 @@ def compiled_beside(name: str, changes: list[str], scene: Any, engines: tuple[st
 
 
 def run_for_kernels(name: str, changes: list[str], engine: str, error: bool, folder: str) -> None:
-    """Run a scene in one engine, into a folder, for the sake of the kernels that this compiles. The first process
-    checks the scene, which compiles others.
+    """Run a scene in one engine, which compiles its kernels; results are saved in ``folder``. The scene is checked by
+    the first process.
     """
     scene = load_scene(name, changes).model_copy(update={"error": error})
     study_of(scene).run(scene, (engine,), Path(folder), lambda text, share: None)

@@ -1,4 +1,4 @@
-"""The numbers that a study's summary gives, by names that say what they are; and columns of them over many runs."""
+"""Numbers of a study's summary by descriptive names, and columns of these numbers over many runs."""
 
 import math
 from collections.abc import Iterator
@@ -6,17 +6,18 @@ from itertools import takewhile
 from typing import Any
 
 LONGEST_LIST = 8
-"""A list of more entries is a curve: of that, the largest magnitude and the rms are taken."""
+"""Longest list whose entries are numbers of their own; of a longer list, largest magnitude and rms are taken."""
 SKIPPED_KEYS = ("seconds", "folder", "scene", "table", "failed", "results")
-"""What is no answer: how long it took, text, and what the numbers are of."""
+"""Keys of a summary that hold no results of the study: computing times, texts, and names."""
 FRAME_KEYS = ("answer", "runs", "rows", "channels")
-"""Keys that only say that what follows is the answer."""
+"""Keys of a summary that are left out of the numbers' names, since they only mark the results."""
 Columns = dict[str, list[Any]]
-"""Numbers of all points by their names, None where there is none."""
+"""For the name of each number, its values at all points of a sweep; None where it is missing."""
 
 
 def summary_scalars(summary: dict[str, Any]) -> dict[str, float]:
-    """Every scalar of a summary: names joined with ", ", the unit in [ ] at the end where the study gives one.
+    """Every finite number of a study's summary: keys joined with ", ", and the unit in [ ] at the end if the study
+    gives one.
 
     Lists of tables are named by the texts with which each table begins, if that tells them apart, or else counted.
     What is not finite is left out.
@@ -80,10 +81,10 @@ def _joined_name(name: str, key: str) -> str:
 
 
 def present_numbers(column: list[Any]) -> list[Any]:
-    """Numbers of a column without those that are missing."""
+    """Values of a column without missing ones."""
     return [value for value in column if value is not None]
 
 
 def has_several_values(column: list[Any]) -> bool:
-    """Whether a column has more than one value."""
+    """Whether a column has different values."""
     return len(set(present_numbers(column))) > 1

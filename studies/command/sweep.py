@@ -1,4 +1,4 @@
-"""A scene at many values of one key: every point a run of its own, kept as soon as it is finished, and drawn.
+"""Sweep of a scene over the values of one key: a run for every point, saved as soon as it is finished, and figures.
 
 ``twinrig run SCENE --sweep vehicle.override.k3=8e4:1.2e5:9`` leaves a folder ``runs/0003`` per point, as the run of
 that scene alone would, and ``sweep.csv``, ``sweep.json`` and figures of every number that its study gives. A sweep is
@@ -39,16 +39,16 @@ if TYPE_CHECKING:
     from studies.command.sweep_figure import SweepResults
 
 RECORDS_FOLDER, RUNS_FOLDER = "points", "runs"
-"""Folders of the records of finished points, and of what each of them left."""
+"""Names of the folders of the records of finished points, and of the points' results."""
 MOST_POINTS = 10_000
-"""Points of a sweep."""
+"""Largest number of points of a sweep."""
 
 Record = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Points:
-    """Job (see ``models.ensemble.runner``): point i is the scene with the i-th value of the key.
+class SweepJob:
+    """Ensemble job (see ``models.ensemble.runner``) of a sweep: point i is the scene with the i-th value of the key.
 
     error : whether the error of each point is estimated.
     """
@@ -62,20 +62,20 @@ class Points:
     error: bool = True
 
     def __call__(self, paths: range) -> Arrays:
-        """``record`` (n,): the record of each point as JSON."""
-        return _array_of_record(map(self.record, paths))
+        """Array "record" (n,): the record of each of the n points as JSON text."""
+        return _json_array(map(self.record, paths))
 
-    def prepared_point(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
-        """Scene, engines and study of a point of the sweep; InputError if the point cannot be run."""
-        scene = load_scene(self.scene, [*self.changes, f"{self.key}={_value_text(self.values[i])}"])
+    def prepared_point(self, point_number: int) -> tuple[Any, tuple[str, ...], Any]:
+        """Scene, engines and study of a point of the sweep; raises InputError if the point cannot be run."""
+        scene = load_scene(self.scene, [*self.changes, f"{self.key}={_value_text(self.values[point_number])}"])
         scene = scene.model_copy(update={"error": scene.error and self.error})
         engine = self.engine or getattr(getattr(scene, "run", None), "engine", None)
         engines = engines_of(engine, scene.system)
         return scene, engines, checked_study(scene, engines)
 
     def check(self) -> Any:
-        """The scene of the first point that can be run; the InputError of the first one if every point is refused: then
-        it is not one value that is wrong."""
+        """The scene of the first point that can be run; if every point is refused, the InputError of the first is
+        raised."""
         first: InputError | None = None
         for i in range(len(self.values)):
             try:
@@ -85,13 +85,13 @@ class Points:
         assert first is not None
         raise first
 
-    def record(self, i: int) -> Record:
-        """Record of one point: its numbers by name, the failures (by engine, where the study gives them), and the
-        errors and assumptions that its results state."""
+    def record(self, point_number: int) -> Record:
+        """Run a point of the sweep; returns its record: its numbers by name, its failures (by engine, if the study
+        gives them), and the errors and assumptions that its results state."""
         try:
-            scene, engines, study = self.prepared_point(i)
+            scene, engines, study = self.prepared_point(point_number)
             scene = scene.model_copy(update={"workers": 1, "cluster": None})
-            with whole_folder(self.folder / RUNS_FOLDER / f"{i:04d}") as run_folder:
+            with complete_folder(self.folder / RUNS_FOLDER / f"{point_number:04d}") as run_folder:
                 summary = study.run(scene, engines, run_folder, lambda text, part: None)
         except (InputError, RunFailed) as error:
             return _failed_record(error)
@@ -99,7 +99,7 @@ class Points:
         return {"numbers": summary_scalars(summary), "failed": summary.get("failed", {}), "results": attributes}
 
     def facts(self) -> dict[str, Any]:
-        """Everything on which the points depend: the scene as written, the files that it names, and the code."""
+        """Facts on which the results of all points depend: the scene's table, the files that it names, and the code."""
         path = scene_path(self.scene)
         table = changed_tables(path, self.changes)
         return {
@@ -113,7 +113,7 @@ class Points:
         }
 
 
-def _array_of_record(records: Iterable[Record]) -> Arrays:
+def _json_array(records: Iterable[Record]) -> Arrays:
     return {"record": np.array(list(map(json.dumps, records)))}
 
 
@@ -122,8 +122,8 @@ def _failed_record(reason: object) -> Record:
 
 
 @contextmanager
-def whole_folder(folder: Path) -> Iterator[Path]:
-    """Context with a folder to write into. It gets its final name only when it is complete, and replaces an older
+def complete_folder(folder: Path) -> Iterator[Path]:
+    """Context that yields a temporary folder to write into; at the end it gets its final name, and replaces an older
     folder of this name."""
     partial_folder = folder.with_name(f".{folder.name}.{os.getpid()}.part")
     partial_folder.mkdir(parents=True)
@@ -139,7 +139,8 @@ _RANGE_PATTERN = re.compile(r"([^:,]+):([^:,]+):([^:,]+)")
 
 
 def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
-    """Key and values of KEY=FROM:TO:N, evenly spaced, or of KEY=a,b,c; raises InputError."""
+    """Key and values of a sweep from the text KEY=FROM:TO:N, with N evenly spaced values, or KEY=a,b,c; raises
+    InputError."""
     key, equals, value_text = (text_part.strip() for text_part in text.partition("="))
     if not equals or not key or not value_text:
         raise InputError("--sweep", "", text, "must read KEY=FROM:TO:N or KEY=a,b,c, for example run.step=1e-4,2e-4")
@@ -156,16 +157,17 @@ def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
     return key, values
 
 
-def sweep_points(text: str, scene: str, changes: Sequence[str], engine: str | None, error: bool = True) -> Points:
-    """The job of the sweep in ``text``, without its folder; raises InputError if none of its points can be run."""
+def sweep_points(text: str, scene: str, changes: Sequence[str], engine: str | None, error: bool = True) -> SweepJob:
+    """The job of the sweep that ``text`` describes, without its folder; raises InputError if none of its points can be
+    run."""
     key, values = parse_range(text)
-    job = Points(scene, tuple(changes), key, values, engine, Path(), error)
+    job = SweepJob(scene, tuple(changes), key, values, engine, Path(), error)
     job.check()
     return job
 
 
 def _spaced_values(text: str, first_text: str, last_text: str, count_text: str) -> tuple[Any, ...]:
-    """Evenly spaced values; integers if both ends and the spacing are integers."""
+    """Evenly spaced values of a sweep from the texts of both ends and of their number; integers if all are integers."""
     try:
         ends, n = (float(first_text), float(last_text)), int(count_text)
     except ValueError:
@@ -180,7 +182,7 @@ def _spaced_values(text: str, first_text: str, last_text: str, count_text: str) 
 
 
 def _listed_values(list_text: str) -> tuple[Any, ...]:
-    """Values of a list in a scene file's notation; words may lack quotes."""
+    """Values of a sweep from a list in the notation of scene files; words may lack quotes."""
     try:
         return tuple(tomllib.loads(f"x = [{list_text}]")["x"])
     except ValueError:
@@ -188,20 +190,20 @@ def _listed_values(list_text: str) -> tuple[Any, ...]:
 
 
 def _value_text(summary_value: Any) -> str:
-    """The value as a scene file would hold it."""
+    """Text of a value in the notation of scene files."""
     return json.dumps(summary_value, ensure_ascii=False, default=str)
 
 
 def _is_writable(summary_value: Any) -> bool:
-    """Whether a scene file can represent this value exactly."""
+    """Whether a scene file can represent a value exactly."""
     try:
         return bool(tomllib.loads(f"x = {_value_text(summary_value)}")["x"] == summary_value)
     except ValueError:
         return False
 
 
-def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict[str, Any]:
-    """All points that are not finished yet, computed by a crew, then table and figures."""
+def run(job: SweepJob, progress: Callable[[str, float], None], crew: Crew) -> dict[str, Any]:
+    """Run all unfinished points of a sweep by workers, then save its table and figures; returns the summary."""
     from studies.command.sweep_figure import draw_sweep  # workers, which import this file, draw nothing
 
     with exclusive_folder(job.folder):
@@ -222,7 +224,7 @@ def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict
         "folder": str(job.folder),
         "values": list(job.values),
         "numbers": swept.columns,
-        "table": _table(swept.columns, pages),
+        "table": _table_lines(swept.columns, pages),
         "results": {
             f"{job.key}={value} {name}".rstrip(): run
             for value, results in zip(job.values, swept.results, strict=True)
@@ -231,20 +233,20 @@ def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict
     }
 
 
-def _sweep_columns(job: Points, records: list[Record]) -> "SweepResults":
-    """The records of all points as one column per quantity, with the failures and with the errors and assumptions of
-    the results."""
+def _sweep_columns(job: SweepJob, records: list[Record]) -> "SweepResults":
+    """Results of a sweep from the records of all points: a column per quantity, failures, and the errors and
+    assumptions of the results."""
     from studies.command.sweep_figure import SweepResults
 
     quantities = list(dict.fromkeys(name for record in records for name in record["numbers"]))
     columns = {name: [record["numbers"].get(name) for record in records] for name in quantities}
     failures = [record["failed"] for record in records]
     results: list[told.Results] = [told.results_with_attributes(record["results"]) for record in records]
-    return SweepResults(job.scene, job.key, job.values, columns, failures, results, _unit(job))
+    return SweepResults(job.scene, job.key, job.values, columns, failures, results, _unit_of_key(job))
 
 
-def _unit(job: Points) -> str:
-    """Unit of the key that is swept: "-" if its table gives it none, "SI" if no table describes the key."""
+def _unit_of_key(job: SweepJob) -> str:
+    """Unit of the swept key; "-" if the key has no unit, "SI" if no table describes it."""
     owner: Any = load_scene(job.scene, list(job.changes))
     *tables, name = job.key.split(".")
     for table in tables:
@@ -254,14 +256,15 @@ def _unit(job: Points) -> str:
     return str(extra["unit"]) or "-" if isinstance(extra, dict) and "unit" in extra else "SI"
 
 
-def _records_of_points(job: Points, progress: Callable[[str, float], None], crew: Crew) -> list[Record]:
-    """Compute the records of all points; InputError if no point failed and yet none has a number to show."""
+def _records_of_points(job: SweepJob, progress: Callable[[str, float], None], crew: Crew) -> list[Record]:
+    """Records of all points of a sweep, computed by workers; raises InputError if no point failed but none has a number
+    to show."""
 
     def tell(finished: Done) -> None:
         progress(f"{finished.done} of {finished.paths} points", finished.done / finished.paths)
 
     def lost(points: range, reason: str) -> Arrays:
-        return _array_of_record(_failed_record(reason) for _ in points)
+        return _json_array(_failed_record(reason) for _ in points)
 
     if crew.cluster is not None:  # whose workers compute in folders of their own
         job = replace(job, folder=job.folder.resolve(), scene=_absolute_path(job.scene))
@@ -276,44 +279,52 @@ def _records_of_points(job: Points, progress: Callable[[str, float], None], crew
 
 
 def _absolute_path(scene: str) -> str:
-    """The path of a scene file, from any folder; the name of a scene that comes with twinrig."""
+    """Absolute path of a scene file; the name of a shipped scene is unchanged."""
     return str(Path(scene).resolve()) if Path(scene).is_file() else scene
 
 
-def _save_sweep(folder: Path, swept: "SweepResults") -> None:
-    """Save ``sweep.csv`` and ``sweep.json``; equal points give equal bytes."""
+def _save_sweep(folder: Path, sweep_results: "SweepResults") -> None:
+    """Save the results of a sweep as ``sweep.csv`` and ``sweep.json``; equal points give equal bytes."""
     errors, broken = (
-        [_largest_error(results) for results in swept.results],
-        [_broken_assumptions_text(results) for results in swept.results],
+        [_largest_error(results) for results in sweep_results.results],
+        [_broken_assumptions_text(results) for results in sweep_results.results],
     )
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([swept.key, *swept.columns, "failed", "largest error [-]", "broken assumptions"])
-    for i, value in enumerate(swept.values):
+    writer.writerow([sweep_results.key, *sweep_results.columns, "failed", "largest error [-]", "broken assumptions"])
+    for i, value in enumerate(sweep_results.values):
         failed = "; ".join(
-            f"{engine_name}: {reason}" if engine_name else reason for engine_name, reason in swept.failures[i].items()
+            f"{engine_name}: {reason}" if engine_name else reason
+            for engine_name, reason in sweep_results.failures[i].items()
         )
-        writer.writerow([value, *(column[i] for column in swept.columns.values()), failed, errors[i], broken[i]])
+        writer.writerow(
+            [value, *(column[i] for column in sweep_results.columns.values()), failed, errors[i], broken[i]]
+        )
     write_whole(folder / "sweep.csv", text.getvalue().encode())
-    content = {"key": swept.key, "values": list(swept.values), "numbers": swept.columns, "failed": swept.failures}
-    content |= {"results": [told.as_json(results) for results in swept.results]}
+    content = {
+        "key": sweep_results.key,
+        "values": list(sweep_results.values),
+        "numbers": sweep_results.columns,
+        "failed": sweep_results.failures,
+    }
+    content |= {"results": [told.as_json(results) for results in sweep_results.results]}
     write_whole(folder / "sweep.json", json.dumps(content, indent=1).encode())
 
 
 def _largest_error(results: told.Results) -> float | None:
-    """Largest relative error among a point's results, each error divided by the standard deviation of its channel; None
-    where no error was estimated."""
+    """Largest stated relative error of a point's results (error divided by the channel's standard deviation); None if
+    no error was estimated."""
     return max((error.share for run in results.values() if (error := worst_of(run)) is not None), default=None)
 
 
 def _broken_assumptions_text(results: told.Results) -> str:
-    """Text on assumptions that a point's results broke, each with the share of the time for which it was broken."""
+    """Text on assumptions that a point's results broke, each with the share of time for which it was broken."""
     breaches = [(name, breach) for name, run in results.items() for breach in broken_of(run)]
     return "; ".join(f"{name}: {breach.name} ({100.0 * breach.share:.2g} %)" for name, breach in breaches)
 
 
-def _table(columns: Columns, pages: list[str]) -> list[str]:
-    """Table of the quantities that change in the sweep, at most 12: first, last, least and largest value."""
+def _table_lines(columns: Columns, pages: list[str]) -> list[str]:
+    """Lines for the screen on at most 12 quantities that change in the sweep: first, last, least and largest value."""
     moving = {name: present_numbers(column) for name, column in columns.items() if has_several_values(column)}
     lines = [
         f"    {name:<58} {values[0]:>12.5g} at first {values[-1]:>12.5g} at last "

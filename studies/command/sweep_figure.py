@@ -1,4 +1,4 @@
-"""Figures of a sweep: every number that changes over the key, with marks where a result must be doubted."""
+"""Figures of a sweep: every number that changes over the key, with marks at doubtful results."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,9 +26,9 @@ from models.drawing.figures import (
 from studies.command.summary_numbers import Columns, has_several_values, present_numbers
 
 PANELS_ACROSS, PANELS_DOWN, MOST_PAGES = 2, 5, 5
-"""Panels of a page, and the most pages; all numbers are in ``sweep.csv``."""
+"""Numbers of panels in the width and height of a page, and most pages; all numbers are in ``sweep.csv``."""
 LOGARITHMIC_RATIO = 30.0
-"""Ratio of the largest to the least value from which on an axis is logarithmic."""
+"""Ratio of the largest to the least value above which an axis is logarithmic."""
 FAILED_MARK = {"marker": "x", "color": REJECTED_COLOUR, "markersize": 8, "markeredgewidth": 2, "label": "failed"}
 BROKEN_MARK = {
     "marker": "o",
@@ -44,15 +44,15 @@ WARNING_MARK = {
     "markeredgewidth": 1.5,
     "label": f"error above {100.0 * WARNED_SHARE:g} %",
 }
-"""Marks of points, open but for the cross."""
+"""Mark of a point with a large error; like that of a broken assumption it is drawn open around the point."""
 
 
 @dataclass(frozen=True)
 class SweepResults:
-    """Results at the points of a sweep of ``scene`` over ``key``.
+    """Results of a sweep of ``scene`` over ``key``, with a value, a failure record and results for each point.
 
-    failures : what failed at each point, by engine; results : of each point, without channels, by their names; unit :
-    of the key's values.
+    columns : numbers over the points, by name; failures : reasons of failed runs at each point, by engine; results : of
+    each point, without channels, by name; unit : of the key's values.
     """
 
     scene: str
@@ -64,7 +64,7 @@ class SweepResults:
     unit: str = "SI"
 
     def broken_points(self, engine: str) -> list[int]:
-        """Points at which a result of an engine, or any one for "", broke an assumption."""
+        """Indices of the points at which a result of an engine, or of any engine for "", broke an assumption."""
         return [
             i
             for i, results in enumerate(self.results)
@@ -72,31 +72,35 @@ class SweepResults:
         ]
 
     def warned_points(self, engine: str) -> list[int]:
-        """Points at which a result of an engine, or any one for "", has an error that is a warning."""
+        """Indices of the points at which a result of an engine, or of any engine for "", states an error large enough
+        for a warning."""
         shown = (map(worst_of, _results_of_engine(results, engine).values()) for results in self.results)
         return [i for i, worst in enumerate(shown) if any(error is not None and error.warned for error in worst)]
 
 
 def _results_of_engine(results: Results, engine: str) -> Results:
-    """Results on which an engine's curve is based: those of this engine, and those that belong to no engine."""
+    """Results that an engine's curve is based on: results of this engine, and results that belong to no engine."""
     other_engines = set(LABELS) - {engine} if engine else set()
     return {name: run for name, run in results.items() if run.data.attrs["engine"] not in other_engines}
 
 
-def draw_sweep(swept: SweepResults, folder: Path) -> list[str]:
-    """Write ``sweep.png``, ``sweep-2.png``, ... and return their names; none where no number changes."""
-    changing = _changing_quantities(swept.columns)
+def draw_sweep(sweep_results: SweepResults, folder: Path) -> list[str]:
+    """Save the figures ``sweep.png``, ``sweep-2.png``, ... of a sweep, and return their names; none if no number
+    changes."""
+    changing = _changing_quantities(sweep_results.columns)
     size, names = PANELS_ACROSS * PANELS_DOWN, list[str]()
     shown = list(changing.items())[: size * MOST_PAGES]
     for first in range(0, len(shown), size):
         name = f"sweep-{first // size + 1}.png" if first else "sweep.png"
-        _draw_page(swept, shown[first : first + size], folder / name, f"the {len(changing)} quantities that change")
+        _draw_page(
+            sweep_results, shown[first : first + size], folder / name, f"the {len(changing)} quantities that change"
+        )
         names.append(name)
     return names
 
 
 def _changing_quantities(columns: Columns) -> dict[str, dict[str, list[Any]]]:
-    """Quantities that change in the sweep, each with a curve per engine; the engine's name is "" for numbers without
+    """Columns of the quantities that change in the sweep, by quantity and engine; the engine is "" for numbers without
     one."""
     panels: dict[str, dict[str, list[Any]]] = {}
     for name, column in columns.items():
@@ -111,33 +115,38 @@ def _changing_quantities(columns: Columns) -> dict[str, dict[str, list[Any]]]:
 
 
 def _draw_page(
-    swept: SweepResults, shown_curves: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str
+    sweep_results: SweepResults, shown_curves: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str
 ) -> None:
     figure, axes = panels(len(shown_curves), min(PANELS_ACROSS, len(shown_curves)), 2.3)
-    sweep_positions, ticks = _axis_places(swept.values)
+    sweep_positions, ticks = _axis_positions(sweep_results.values)
     for axis, (quantity_name, curves) in zip(axes, shown_curves, strict=True):
-        _draw_panel(axis, sweep_positions, quantity_name, curves, swept, "o" if ticks else "o-")
+        _draw_panel(axis, sweep_positions, quantity_name, curves, sweep_results, "o" if ticks else "o-")
         if ticks:
             axis.set_xticks(sweep_positions, ticks)
         elif _wants_log_axis(sweep_positions):
             axis.set_xscale("log")
         else:
             axis.locator_params(axis="x", nbins=6)
-        axis.set_xlabel(swept.key if ticks else f"{swept.key} [{swept.unit}]")
+        axis.set_xlabel(sweep_results.key if ticks else f"{sweep_results.key} [{sweep_results.unit}]")
     legend_below(figure, *axes)
-    add_heading(figure, f"{swept.scene.rpartition('/')[2]} over {swept.key}: {note}")
+    add_heading(figure, f"{sweep_results.scene.rpartition('/')[2]} over {sweep_results.key}: {note}")
     save(figure, path)
 
 
-def _axis_places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
-    """Positions on the axis; for values that are not numbers also the labels to write there."""
-    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-        return np.array(values, float), []
-    return np.arange(float(len(values))), [str(value)[:18] for value in values]
+def _axis_positions(key_values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
+    """Positions of the sweep's values on the axis, and tick labels; these are empty if the values are numbers."""
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in key_values):
+        return np.array(key_values, float), []
+    return np.arange(float(len(key_values))), [str(value)[:18] for value in key_values]
 
 
 def _draw_panel(
-    axis: Any, sweep_positions: np.ndarray, quantity: str, curves: dict[str, list[Any]], swept: SweepResults, style: str
+    axis: Any,
+    sweep_positions: np.ndarray,
+    quantity: str,
+    curves: dict[str, list[Any]],
+    sweep_results: SweepResults,
+    style: str,
 ) -> None:
     order = np.argsort(sweep_positions)
     for i, (engine, column) in enumerate(curves.items()):
@@ -150,29 +159,40 @@ def _draw_panel(
             linewidth=2.2 - 0.6 * min(i, 2),
             label=LABELS[engine] or None,
         )
-        _draw_marks(axis, sweep_positions, np.array(column, float), swept, engine)
+        _draw_marks(axis, sweep_positions, np.array(column, float), sweep_results, engine)
     if all(_wants_log_axis(np.array(present_numbers(column), float)) for column in curves.values()):
         axis.set_yscale("log")
     else:
         axis.ticklabel_format(axis="y", useOffset=False)
-    lost = [i for i, failed in enumerate(swept.failures) if failed and any(col[i] is None for col in curves.values())]
+    lost = [
+        i
+        for i, failed in enumerate(sweep_results.failures)
+        if failed and any(col[i] is None for col in curves.values())
+    ]
     if lost:
         foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "linestyle": "none"}
         axis.plot(sweep_positions[lost], np.full(len(lost), 0.04), **FAILED_MARK, **foot)
     axis.set_title(wrapped_text(_with_unit(quantity), 0.47 * COLUMN_WIDTH, 9), fontsize=9)
 
 
-def _draw_marks(axis: Any, sweep_positions: np.ndarray, values: np.ndarray, swept: SweepResults, engine: str) -> None:
-    """Draw open marks around the points of a curve at which a result broke an assumption or has an error that is a
-    warning."""
-    for points, look in ((swept.broken_points(engine), BROKEN_MARK), (swept.warned_points(engine), WARNING_MARK)):
-        shown = [i for i in points if np.isfinite(values[i])]
+def _draw_marks(
+    axis: Any, sweep_positions: np.ndarray, curve_values: np.ndarray, sweep_results: SweepResults, engine: str
+) -> None:
+    """Draw open marks around the points of a curve at which a result broke an assumption or states a large error."""
+    for points, look in (
+        (sweep_results.broken_points(engine), BROKEN_MARK),
+        (sweep_results.warned_points(engine), WARNING_MARK),
+    ):
+        shown = [i for i in points if np.isfinite(curve_values[i])]
         if shown:
-            axis.plot(sweep_positions[shown], values[shown], linestyle="none", markerfacecolor="none", zorder=4, **look)
+            axis.plot(
+                sweep_positions[shown], curve_values[shown], linestyle="none", markerfacecolor="none", zorder=4, **look
+            )
 
 
 def _with_unit(quantity: str) -> str:
-    """Label of a quantity with a unit. Where the name holds no unit, it is "-" for counts and "SI" for all others."""
+    """Label of a quantity with its unit. If the name holds no unit, the unit is "-" for counts and "SI" for all
+    others."""
     return quantity if "[" in quantity else f"{quantity} [{'-' if quantity.startswith('counts') else 'SI'}]"
 
 

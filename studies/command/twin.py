@@ -1,4 +1,4 @@
-"""``twinrig twin``: a user's own model in every build, or two files beside one another."""
+"""``twinrig twin``: a user's model file compared with twinrig's builds of it, or two model files compared."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -27,20 +27,20 @@ from models.own_model.states import STATE_COUNT
 from models.own_model.two_paths import PathGap, paths_apart
 from models.own_model.urdf import Misread, misread_numbers
 
-Tell = Callable[[str, float], None]
-"""Told what is done now, and which part of all (0 to 1)."""
+ReportProgress = Callable[[str, float], None]
+"""Function that reports progress: the current task as text, and the finished share (0 to 1) of all work."""
 
 
-def _tell_nobody(activity: str, share: float) -> None:
-    """Tell nobody."""
+def _ignore_progress(activity: str, share: float) -> None:
+    """Report no progress."""
 
 
 @dataclass(frozen=True)
 class TwinOptions:
-    """Options of the command. states: number of random states at which accelerations are compared; compare_paths:
-    whether paths are compared, too; tolerance (rad, m) and quantity of the price, None for no price and for all joints;
-    controls: file of the controls on the paths; folder: in which all files must lie that a model names, its own if
-    None."""
+    """Options of the command ``twin``. states : number of random states at which accelerations are compared;
+    compare_paths : whether runs in time are compared, too; tolerance (rad, m) and quantity for which the cheapest
+    settings are sought, None for no search and for all joints; controls : file of the controls in these runs; folder :
+    in which all files that a model names must lie, the model's own if None."""
 
     states: int = STATE_COUNT
     compare_paths: bool = True
@@ -52,10 +52,10 @@ class TwinOptions:
 
 @dataclass(frozen=True, eq=False)
 class ExaminedFile:
-    """Results for one model file: the file as read and how well each build agrees with it. explanations: for a build
-    that disagrees, the elements that cause it; misread: what MuJoCo's parser changed of a URDF; path: comparison of
-    paths, None if not wanted; price_lines: lines on the cost of accuracy; constraint_lines: lines on dry friction and
-    constraints.
+    """Results for a model file: the file as read, and the agreement of each build with it. explanations : for a build
+    that disagrees, the elements that cause it; misread : numbers of a URDF that MuJoCo's parser changed; path :
+    comparison of runs in time, None if not requested; price_lines : lines on the cost of accuracy; constraint_lines :
+    lines on dry friction and constraints.
     """
 
     file: ModelFile
@@ -73,14 +73,14 @@ class ExaminedFile:
 
     @property
     def is_certified(self) -> bool:
-        """Whether all builds agree with the file, and MuJoCo's parser lost nothing."""
+        """Whether all builds agree with the file, and MuJoCo's parser changed nothing."""
         return all(agreement.alike for agreement in self.agreements) and not self.misread
 
 
 @dataclass(frozen=True, eq=False)
 class Twins:
-    """Results of the command for one file or two. comparison: that of the two files; path_gap: how far their paths are
-    apart, None if paths were not wanted or the files have different coordinates."""
+    """Results of the command ``twin`` for one file or two. comparison : of the two files; path_gap : difference of
+    their runs in time, None if not requested or if the files have different coordinates."""
 
     examined: tuple[ExaminedFile, ...]
     comparison: Comparison | None
@@ -98,8 +98,8 @@ class Twins:
         return files and (self.comparison is None or self.comparison.alike)
 
 
-def check_asked(files: Sequence[Path], page: Path | None) -> None:
-    """Raise InputError for too many files, or for a page that cannot be written."""
+def check_arguments(files: Sequence[Path], page: Path | None) -> None:
+    """Raise InputError for more than two files, or for a page that cannot be written."""
     if len(files) > 2:
         raise InputError("FILES", "", len(files), "files: one, or two to be compared")
     if page is None:
@@ -110,17 +110,21 @@ def check_asked(files: Sequence[Path], page: Path | None) -> None:
         raise InputError("--page", "", str(page), "lies in a folder that does not exist")
 
 
-def content_kinds(text: str) -> tuple[str, ...]:
-    """The kinds of content that an option lists, separated by commas."""
+def listed_content_kinds(text: str) -> tuple[str, ...]:
+    """Names of kinds of model content in an option's text, separated by commas."""
     return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
 
 
 def examine(
-    files: Sequence[Path], without: Sequence[str], twin_options: TwinOptions, report_progress: Tell = _tell_nobody
+    files: Sequence[Path],
+    without: Sequence[str],
+    twin_options: TwinOptions,
+    report_progress: ReportProgress = _ignore_progress,
 ) -> Twins:
-    """Certify each file, and compare both if there are two; raises InputError if a file cannot be read or built.
+    """Compare each model file with its builds, and both files if there are two; raises InputError if a file cannot be
+    read or built.
 
-    report_progress : told what is done now, and which part of all.
+    report_progress : called with the current task and the finished share of all work.
     """
     if twin_options.states < 1:
         raise InputError("--states", "", twin_options.states, "must be 1 or more")
@@ -158,16 +162,18 @@ def examine(
     return Twins(tuple(examined), comparison, gap)
 
 
-def _report_progress(report_progress: Tell, file_number: int, file_count: int, activity: str, share: float) -> None:
-    """Report the progress within one file as a share of that of all files."""
+def _report_progress(
+    report_progress: ReportProgress, file_number: int, file_count: int, activity: str, share: float
+) -> None:
+    """Report the progress within one model file as a share of the progress of all files."""
     report_progress(activity, (file_number + share) / file_count)
 
 
 def _examine_file(
-    file: ModelFile, table: ControlTable | None, twin_options: TwinOptions, report_progress: Tell
+    file: ModelFile, table: ControlTable | None, twin_options: TwinOptions, report_progress: ReportProgress
 ) -> ExaminedFile:
-    """Certify one file, then compare its paths and price its accuracy if wanted. Each of these counts as a third of the
-    progress."""
+    """Compare a model file with its builds, then its runs in time, and find its cheapest settings if requested. Each
+    task counts as a third of the progress."""
     agreements = certificate(
         file.twin, twin_options.states, lambda share: report_progress("comparing accelerations", share / 3)
     )
@@ -190,13 +196,13 @@ def _examine_file(
         report_progress("pricing", 2 / 3)
         price = tuple(price_lines(recommended_settings(file.twin, twin_options.tolerance, twin_options.quantity)))
     return ExaminedFile(
-        file, agreements, explained, tuple(lost), report, price, tuple(_constraints(file, twin_options.states))
+        file, agreements, explained, tuple(lost), report, price, tuple(_constraint_lines(file, twin_options.states))
     )
 
 
-def _constraints(file: ModelFile, state_count: int) -> Iterator[str]:
-    """Lines on joint limits that are exceeded in the test states, on dry friction, and on constraints that are soft in
-    MuJoCo, with the difference that the softness makes to accelerations."""
+def _constraint_lines(file: ModelFile, state_count: int) -> Iterator[str]:
+    """Yield lines on joint limits that test states exceed, on dry friction, and on constraints, which are soft in
+    MuJoCo, with the effect of the softness on accelerations."""
     twin = file.twin
     beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, state_count)] if file.ignored_limits else []
     if any(beyond):
@@ -215,11 +221,10 @@ def _constraints(file: ModelFile, state_count: int) -> Iterator[str]:
 
 
 def _friction_line(twin: TwinModel, count: int) -> str:
-    """Line on dry friction: at how many states builds are compared, and to what each is held."""
+    """Line on dry friction: the number of states at which builds are compared, and the law that each build is compared
+    with."""
     states = states_of(twin, count)
-    head = (
-        f"dry friction of {counted(len(twin.driven.frictions), 'joint')}: compared at {len(states)} of {count} states"
-    )
+    head = f"dry friction of {plural(len(twin.driven.frictions), 'joint')}: compared at {len(states)} of {count} states"
     if sliding_states(twin, states):
         return (
             f"{head}, at which all of it slides, with faster rates where it would not; where it sticks, MuJoCo's gives "
@@ -231,20 +236,20 @@ def _friction_line(twin: TwinModel, count: int) -> str:
     )
 
 
-def counted(number: int, noun: str) -> str:
-    """A number with its noun, in the plural unless it is 1."""
+def plural(number: int, noun: str) -> str:
+    """Text of a number with its noun, in the plural unless the number is 1."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def limited_text(names: Sequence[str]) -> str:
-    """How many joints and tendons have limits that are not built; names : theirs, each with what it is."""
+def limits_sentence(names: Sequence[str]) -> str:
+    """Sentence on the number of joints and tendons whose limits are not built; names : such as "joint hinge"."""
     sorts = {sort: sum(name.startswith(sort) for name in names) for sort in ("joint", "tendon")}
-    told = " and ".join(counted(number, sort) for sort, number in sorts.items() if number)
+    told = " and ".join(plural(number, sort) for sort, number in sorts.items() if number)
     return f"limits of {told} are not built; states are drawn inside the ranges of joints"
 
 
 def twin_lines(twins: Twins) -> list[str]:
-    """Lines for the terminal."""
+    """Lines for the screen on all examined model files, and on their comparison."""
     rows = list[str]()
     for examined_file in twins.examined:
         rows += _file_lines(examined_file)
@@ -253,10 +258,10 @@ def twin_lines(twins: Twins) -> list[str]:
 
 
 def verdict_sentence(examined_file: ExaminedFile) -> str:
-    """Sentence with the verdict on a file."""
+    """Sentence with the verdict on a model file: whether its builds move as it does."""
     worst = max(row.acceleration for row in examined_file.agreements)
     if examined_file.misread:
-        return f"MuJoCo's parser made something else of {counted(len(examined_file.misread), 'number')} of the file"
+        return f"MuJoCo's parser made something else of {plural(len(examined_file.misread), 'number')} of the file"
     if examined_file.is_certified:
         bound = max(row.bound for row in examined_file.agreements)
         said = f"; up to {bound:.0e} may be rounding" if bound > EQUAL_ACCELERATION_SHARE else ""
@@ -269,7 +274,7 @@ def _file_lines(examined_file: ExaminedFile) -> list[str]:
     model, twin = examined_file.file.twin.model, examined_file.file.twin
     rows = [
         f"{examined_file.name}: {examined_file.file.document.kind}, {model.nbody - 1} bodies, "
-        f"{counted(twin.size, 'coordinate')}, {counted(model.ntendon, 'tendon')}, {counted(model.nu, 'actuator')}",
+        f"{plural(twin.size, 'coordinate')}, {plural(model.ntendon, 'tendon')}, {plural(model.nu, 'actuator')}",
         f"  {verdict_sentence(examined_file)}",
     ]
     for row in examined_file.agreements:
@@ -286,14 +291,14 @@ def _file_lines(examined_file: ExaminedFile) -> list[str]:
     rows += [f"  {lost.sentence()}" for lost in examined_file.misread]
     rows += [f"  left out: {content.line()}" for content in examined_file.file.left_out]
     if examined_file.file.ignored_limits:
-        rows.append(f"  {limited_text(examined_file.file.ignored_limits)}")
+        rows.append(f"  {limits_sentence(examined_file.file.ignored_limits)}")
     rows += [f"  {note}" for note in (*examined_file.constraint_lines, *examined_file.file.notes)]
     rows += [f"  {line}" for line in examined_file.path.lines()] if examined_file.path is not None else []
     return rows + [f"  {line}".rstrip() for line in examined_file.price_lines]
 
 
 def _at_which_controls(difference: Difference) -> str:
-    """Phrase on the controls at which an actuator's element has no influence; empty for all other elements."""
+    """Phrase on the controls at which an actuator's difference has no influence; "" for all other elements."""
     return " at controls of 0, or the nearest in range" if difference.owner.startswith("actuator ") else ""
 
 

@@ -1,4 +1,4 @@
-"""The bar of a command that takes longer than a second: what is being done and the time left, on a terminal alone.
+"""Progress bar of a command that takes longer than a second: current task and remaining time, on a terminal only.
 
 A thread draws it on stderr, so that results on stdout stay as they are. It knows three things: what a study tells, the
 share of the march that an engine is at, and that numba compiles, which happens once after an installation.
@@ -15,11 +15,11 @@ from typing import Any
 from models.core.waiting import SHARES_OF_MARCHES
 
 BAR_DELAY, BAR_PERIOD = 1.0, 0.1
-"""s until a bar is shown, and between two looks."""
+"""Time (s) until the bar is shown, and between two updates."""
 SLOW_COMPILATION = 0.4
-"""s of one compilation from which on it is told: loading what was compiled before takes less."""
-KNOWN_SHARE = 0.01
-"""Share of a work from which on its time left is told."""
+"""Time (s) of a compilation from which the bar shows it; loading a compiled kernel takes less."""
+LEAST_SHARE = 0.01
+"""Finished share of the work from which the bar shows the remaining time."""
 COMPILE_SECONDS = {
     "pitch-plane": 5.0,
     "ride": 5.0,
@@ -29,23 +29,23 @@ COMPILE_SECONDS = {
     "handling": 30.0,
     "braking": 40.0,
 }
-"""s of processor that the kernels of a system's scenes take to compile; an upper bound, as some may be there."""
+"""Processor time (s) for the compilation of the kernels of a system's scenes; an upper bound, as some may exist."""
 COMPILER_LOCK_EVENT = "numba:compiler_lock"
-"""Numba's event from the beginning to the end of each compilation."""
-Tell = Callable[[str, float], None]
-"""Told what is done now, and which part of all (0 to 1)."""
+"""Name of numba's event that lasts from the beginning to the end of each compilation."""
+ReportProgress = Callable[[str, float], None]
+"""Function that reports progress: the current task as text, and the finished share (0 to 1) of all work."""
 
 
-class Kernels:
-    """Timer of numba's compilations: their total time, and since when one is running. Numba calls ``on_start`` and
-    ``on_end``."""
+class CompilationTimer:
+    """Timer of numba's compilations: their total time (s), and the start time of a running one; numba's events call
+    ``_start`` and ``_end_compilation``."""
 
     def __init__(self) -> None:
         self.depth, self.total, self.since, self.attached = 0, 0.0, 0.0, False
         self._remove: Callable[[], None] = lambda: None
 
     def attach(self) -> None:
-        """Register for numba's compilation events if numba has been imported already; this call does not import it."""
+        """Register for numba's compilation events if numba is imported already; numba is not imported for this."""
         if self.attached or "numba.core.compiler_lock" not in sys.modules:  # which has imported the events
             return
         event: Any = sys.modules["numba.core.event"]
@@ -67,18 +67,18 @@ class Kernels:
         if self.depth == 0:
             self.total += time.monotonic() - self.since
 
-    def spent(self) -> float:
-        """Time (s) spent in all compilations so far, the running one included."""
+    def compilation_seconds(self) -> float:
+        """Time (s) spent in all compilations so far, including a running one."""
         return self.total + (time.monotonic() - self.since if self.depth else 0.0)
 
     def is_compiling(self) -> bool:
-        """Whether a compilation has been running long enough for the progress bar to show it."""
+        """Whether a compilation is running and has taken longer than SLOW_COMPILATION."""
         return self.depth > 0 and time.monotonic() - self.since > SLOW_COMPILATION
 
 
 @dataclass
-class Waiting:
-    """State of a progress bar: text and share of the work, the march that runs, numba's compiling.
+class ProgressState:
+    """State of the progress bar: current task, finished share, the running time integration, and numba's compilations.
 
     system : of the scene, for the time that its kernels take.
     """
@@ -87,20 +87,28 @@ class Waiting:
     system: str = ""
     share: float = 0.0
     start_time: float = field(default_factory=time.monotonic)
-    compilations: Kernels = field(default_factory=Kernels)
+    compilations: CompilationTimer = field(default_factory=CompilationTimer)
     _march: tuple[Any, float] = (None, 0.0)
 
     def tell(self, text: str, share: float) -> None:
-        """Set the text of the bar to the task that begins, and its share to the finished part."""
+        """Set the bar's text to the task that begins, and its finished share (0 to 1)."""
         self.text, self.share = text, min(max(share, 0.0), 1.0)
 
     def state(self) -> tuple[str, float | None, str]:
-        """Text, finished share and remaining time to show now; the share is None where it is unknown."""
+        """Current task, finished share and text of the remaining time for the bar; the share is None if it is
+        unknown."""
         if self.compilations.is_compiling():
-            spent, expected_seconds = self.compilations.spent(), COMPILE_SECONDS.get(self.system, 0.0)
-            share = spent / expected_seconds if expected_seconds > spent else None
-            return "compiling kernels, once", share, _time_left_text(expected_seconds - spent if share else None, spent)
-        worked = time.monotonic() - self.start_time - self.compilations.spent()
+            compilation_seconds, expected_seconds = (
+                self.compilations.compilation_seconds(),
+                COMPILE_SECONDS.get(self.system, 0.0),
+            )
+            share = compilation_seconds / expected_seconds if expected_seconds > compilation_seconds else None
+            return (
+                "compiling kernels, once",
+                share,
+                _time_left_text(expected_seconds - compilation_seconds if share else None, compilation_seconds),
+            )
+        worked = time.monotonic() - self.start_time - self.compilations.compilation_seconds()
         march = SHARES_OF_MARCHES[-1] if SHARES_OF_MARCHES else None
         if march is None:
             return self.text, self.share or None, _time_left_text(_remaining_seconds(self.share, worked), worked)
@@ -113,13 +121,13 @@ class Waiting:
 
 
 def _remaining_seconds(share: float, seconds: float) -> float | None:
-    """Remaining seconds of a task of which ``share`` took ``seconds``; None while the share is too small to tell."""
-    return seconds * (1.0 - share) / share if share > KNOWN_SHARE else None
+    """Remaining time (s) of a task of which ``share`` took ``seconds``; None while the share is too small."""
+    return seconds * (1.0 - share) / share if share > LEAST_SHARE else None
 
 
-def _time_left_text(seconds: float | None, spent: float) -> str:
+def _time_left_text(seconds: float | None, elapsed_seconds: float) -> str:
     """Text of the remaining time or, if it is unknown, of the elapsed time."""
-    return f"{_duration_text(spent)} so far" if seconds is None else f"{_duration_text(seconds)} left"
+    return f"{_duration_text(elapsed_seconds)} so far" if seconds is None else f"{_duration_text(seconds)} left"
 
 
 def _duration_text(seconds: float) -> str:
@@ -127,17 +135,17 @@ def _duration_text(seconds: float) -> str:
 
 
 @contextmanager
-def progress_bar(text: str, system: str = "") -> Iterator[Tell]:
-    """Context that shows a progress bar on the terminal if the block takes longer than BAR_DELAY. It yields the
-    function to which the block reports its progress.
+def progress_bar(text: str, system: str = "") -> Iterator[ReportProgress]:
+    """Context that shows a progress bar on the terminal if its block takes longer than BAR_DELAY; it yields the
+    function that reports progress.
 
     Nothing is written, and no thread runs, where stderr is no terminal.
     """
     if not sys.stderr.isatty():
         yield lambda text, share: None
         return
-    waiting, is_over = Waiting(text, system), threading.Event()
-    thread = threading.Thread(target=_draw, args=(waiting, is_over), daemon=True)
+    waiting, is_over = ProgressState(text, system), threading.Event()
+    thread = threading.Thread(target=_draw_bar, args=(waiting, is_over), daemon=True)
     thread.start()
     try:
         yield waiting.tell
@@ -147,12 +155,12 @@ def progress_bar(text: str, system: str = "") -> Iterator[Tell]:
         waiting.compilations.detach()
 
 
-def _draw(waiting: Waiting, finished: threading.Event) -> None:
-    """Draw the bar until the work is over, from BAR_DELAY on."""
+def _draw_bar(progress_state: ProgressState, finished: threading.Event) -> None:
+    """Draw the progress bar from BAR_DELAY on until ``finished`` is set."""
     while not finished.wait(BAR_PERIOD):
-        waiting.compilations.attach()
-        waiting.state()  # which sees when a march begins
-        if time.monotonic() - waiting.start_time > BAR_DELAY:
+        progress_state.compilations.attach()
+        progress_state.state()  # which sees when a march begins
+        if time.monotonic() - progress_state.start_time > BAR_DELAY:
             break
     else:
         return
@@ -162,10 +170,10 @@ def _draw(waiting: Waiting, finished: threading.Event) -> None:
     columns = TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.fields[left]}")
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False) as bar:
-        task = bar.add_task(waiting.text, total=None, left="")
+        task = bar.add_task(progress_state.text, total=None, left="")
         while True:
-            waiting.compilations.attach()
-            text, share, left = waiting.state()
+            progress_state.compilations.attach()
+            text, share, left = progress_state.state()
             total = None if share is None else 1.0
             bar.update(task, description=text, total=total, completed=share or 0.0, left=left)
             if finished.wait(BAR_PERIOD):

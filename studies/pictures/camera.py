@@ -1,4 +1,4 @@
-"""Where the spectator stands, and what a surface looks like from there: triangles to pixels.
+"""Camera of a picture, and drawing of shaded triangles into pixels.
 
 The nearest surface wins at every pixel; colours run straight between corners.
 """
@@ -13,83 +13,85 @@ from models.machine.compiled import njit
 from studies.pictures.shapes import PaintedSurface
 
 NEAREST_DRAWN = 0.05
-"""m: what is nearer to the eye, or behind it, is not drawn."""
+"""Least distance (m) from the camera at which surfaces are drawn."""
 LIGHT_DIRECTION = np.array([0.35, 0.5, 0.8])
-"""Towards the lamp: to the spectator's right, back to him, up."""
+"""Direction towards the lamp in the camera's axes: right, up, back."""
 HAZE_DISTANCE = 70.0
-"""m: how far one sees until the sky's lower colour hides two thirds."""
+"""Distance (m) at which haze in the colour of the horizon covers 63 % of a surface's colour."""
 SHADED_BRIGHTNESS = 0.4
-"""Brightness of a surface that looks away from the lamp."""
+"""Brightness of a surface that faces away from the lamp, relative to one that faces it."""
 
 
 @dataclass(frozen=True)
 class Camera:
     """A camera at ``eye`` that looks at ``target`` (both in m); ``up``: vector that points upward in the picture;
-    opening: vertical angle of view (rad)."""
+    angle_of_view: vertical angle of view (rad)."""
 
     eye: tuple[float, float, float]
     target: tuple[float, float, float]
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    opening: float = 0.5
+    angle_of_view: float = 0.5
 
     @cached_property
     def axes(self) -> np.ndarray:
-        """Unit vectors (3, 3) of the camera as rows: right, up, and from the target back to the camera."""
+        """Unit vectors (3, 3) of the camera's axes as rows: right, up, and from the target back to the camera."""
         back = np.subtract(self.eye, self.target)
         back /= np.linalg.norm(back)
         right = np.cross(self.up, back)
         right /= np.linalg.norm(right)
         return np.array([right, np.cross(back, right), back])
 
-    def pixels(self, height: int) -> float:
-        """Pixels per metre at the target, in a picture of this height."""
-        return height / (2.0 * np.tan(self.opening / 2.0) * float(np.linalg.norm(np.subtract(self.eye, self.target))))
+    def pixels(self, picture_height: int) -> float:
+        """Pixels per metre at the camera's target, in a picture of a height in pixels."""
+        return picture_height / (
+            2.0 * np.tan(self.angle_of_view / 2.0) * float(np.linalg.norm(np.subtract(self.eye, self.target)))
+        )
 
-    def horizon(self, height: int) -> float:
-        """Row (pixels from the top) of the horizon in a picture of this height; negative where it lies above the
+    def horizon(self, picture_height: int) -> float:
+        """Row (pixels from the top) of the horizon in a picture of a height in pixels; negative if it lies above the
         picture."""
         _, upright, back = self.axes
         level = float(np.dot(back, self.up) / np.dot(upright, self.up))
-        return height / 2.0 * (1.0 - level / np.tan(self.opening / 2.0))
+        return picture_height / 2.0 * (1.0 - level / np.tan(self.angle_of_view / 2.0))
 
     def projected(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-        """Pixels (..., 2) at which points (..., 3) appear, and their inverse distances (...) along the line of sight;
-        the inverse distance of a point behind the camera is negative."""
+        """Pixels (..., 2) of points (..., 3) in m, and inverse distances (...) in 1/m along the camera's axis; these
+        are negative for points behind the camera."""
         in_camera_axes = (points - self.eye) @ self.axes.T
         near = -1.0 / in_camera_axes[..., 2]
-        scale = height / (2.0 * np.tan(self.opening / 2.0)) * near
+        scale = height / (2.0 * np.tan(self.angle_of_view / 2.0)) * near
         return np.stack(
             [width / 2.0 + scale * in_camera_axes[..., 0], height / 2.0 - scale * in_camera_axes[..., 1]], -1
         ), near
 
 
 def painted_picture(
-    camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky: np.ndarray
+    camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky_colours: np.ndarray
 ) -> np.ndarray:
-    """Image (h, w, 3) of surfaces in front of a sky, with the sky's two colours at the picture's top and at the
-    horizon.
+    """Image (height, width, 3) of surfaces in front of a sky; sky_colours (2, 3) : its colours at the top of the
+    picture and at the horizon.
 
     A later layer lies over all earlier ones, as arrows over bodies do.
     """
     height_share = np.clip(np.arange(2 * height) / max(1.0, 2.0 * camera.horizon(height)), 0.0, 1.0)[:, None]
-    shade = (sky[0] + height_share * (sky[1] - sky[0])).astype(np.float32)
+    shade = (sky_colours[0] + height_share * (sky_colours[1] - sky_colours[0])).astype(np.float32)
     image = np.broadcast_to(shade[:, None], (2 * height, 2 * width, 3)).copy()
     for layer in layers:
-        nearest = np.zeros(image.shape[:2], np.float32)
+        inverse_depths = np.zeros(image.shape[:2], np.float32)
         solid = [surface for surface in layer if surface.alpha == 1.0]
         if solid:
-            paint(*_shaded_triangles(camera, solid, width, height, sky[1]), image, nearest)
+            paint(*_shaded_triangles(camera, solid, width, height, sky_colours[1]), image, inverse_depths)
         for surface in (surface for surface in layer if surface.alpha < 1.0):
-            veil, front = image.copy(), nearest.copy()
-            paint(*_shaded_triangles(camera, [surface], width, height, sky[1]), veil, front)
+            veil, front = image.copy(), inverse_depths.copy()
+            paint(*_shaded_triangles(camera, [surface], width, height, sky_colours[1]), veil, front)
             image += np.float32(surface.alpha) * (veil - image)
     return (image[::2, ::2] + image[1::2, ::2] + image[::2, 1::2] + image[1::2, 1::2]) / 4.0  # smooth edges
 
 
 def _shaded_triangles(
-    camera: Camera, surfaces: list[PaintedSurface], width: int, height: int, haze: np.ndarray
+    camera: Camera, surfaces: list[PaintedSurface], width: int, height: int, haze_colour: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, depths and colours, for ``paint``, of the triangles in front of the camera."""
+    """Corners, inverse distances and colours, as ``paint`` takes them, of the triangles in front of the camera."""
     corners, near = camera.projected(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
     normals = np.concatenate([surface.normals for surface in surfaces])
     sizes = [len(surface.corners) for surface in surfaces]
@@ -98,13 +100,17 @@ def _shaded_triangles(
     towards = LIGHT_DIRECTION @ camera.axes / np.linalg.norm(LIGHT_DIRECTION)
     light = SHADED_BRIGHTNESS + (1.0 - SHADED_BRIGHTNESS) * (0.5 + 0.5 * normals[in_front] @ towards)
     clear = np.exp(-1.0 / (HAZE_DISTANCE * near[in_front]))[..., None]
-    return corners[in_front], near[in_front], clear * light[..., None] * colours[in_front, None] + (1.0 - clear) * haze
+    return (
+        corners[in_front],
+        near[in_front],
+        clear * light[..., None] * colours[in_front, None] + (1.0 - clear) * haze_colour,
+    )
 
 
 @njit(cache=True, error_model="numpy")
 def columns_within(start_value, growth, left_column, right_column):
-    """First and last column between ``left_column`` and ``right_column`` for which start + column * growth is not
-    negative; the first is greater than the last where there is no such column.
+    """First and last column between ``left_column`` and ``right_column`` for which start_value + column * growth is not
+    negative; the first is greater than the last if there is no such column.
     """
     if growth > 0.0:
         return max(left_column, -start_value / growth), right_column
@@ -114,14 +120,14 @@ def columns_within(start_value, growth, left_column, right_column):
 
 
 @njit(cache=True, error_model="numpy")
-def paint(corners, near, colours, image, nearest):
-    """Paint triangles into ``image`` (h, w, 3). A pixel is painted if the triangle is nearer to the camera than what
-    ``nearest`` (h, w), inverse distances (1/m), records there.
+def paint(corners, inverse_distances, colours, image, inverse_depths):
+    """Paint triangles into ``image`` (h, w, 3), at pixels where the triangle is nearer to the camera than the surface
+    recorded in ``inverse_depths`` (h, w), in 1/m.
 
-    corners (m, 3, 2) : pixels, x to the right, y down; near (m, 3) : inverse distances (1/m), which are linear in
-    pixels; colours (m, 3, 3) : red, green, blue from 0 to 1 at each corner.
+    corners (m, 3, 2) : pixels, x to the right, y down; inverse_distances (m, 3) : from the camera (1/m), which are
+    linear in pixels; colours (m, 3, 3) : red, green, blue from 0 to 1 at each corner.
     """
-    height, width = nearest.shape
+    height, width = inverse_depths.shape
     for k in range(len(corners)):
         x0, y0 = corners[k, 0]
         x1, y1 = corners[k, 1]
@@ -140,8 +146,8 @@ def paint(corners, near, colours, image, nearest):
             for column in range(math.ceil(left), math.floor(right) + 1):
                 b, c = first + column * one_on, weight_of_second + column * two_on
                 a = 1.0 - b - c
-                inverse_depth = a * near[k, 0] + b * near[k, 1] + c * near[k, 2]
-                if inverse_depth > nearest[row, column]:
-                    nearest[row, column] = inverse_depth
+                inverse_depth = a * inverse_distances[k, 0] + b * inverse_distances[k, 1] + c * inverse_distances[k, 2]
+                if inverse_depth > inverse_depths[row, column]:
+                    inverse_depths[row, column] = inverse_depth
                     for i in range(3):
                         image[row, column, i] = a * colours[k, 0, i] + b * colours[k, 1, i] + c * colours[k, 2, i]

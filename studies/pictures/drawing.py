@@ -1,4 +1,4 @@
-"""One picture of a motion on its stage."""
+"""Drawing of one frame of a filmed motion on its stage."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -8,17 +8,17 @@ from studies.pictures.film import FilmedMotion, Stage
 from studies.pictures.shapes import arrow, rod
 
 SKY_COLOURS = np.array([[0.80, 0.87, 0.94], [0.985, 0.99, 1.0]])
-"""Colour at the top of a picture and at the horizon."""
+"""Colours (red, green, blue) of the sky at the top of a picture and at the horizon."""
 ARROW_HALF_WIDTH = 0.024
-"""Half width of an arrow's head, by the height that the picture shows at its target."""
+"""Half width of an arrow's head divided by the height (m) that the picture shows at the camera's target."""
 GREY_COLOUR = (0.35, 0.37, 0.4)
 
 
-def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: int) -> np.ndarray:
-    """Image (height, width, 3), colours from 0 to 1, of frame ``k``."""
-    poses = {name: drawn_pose(motion, stage, name, k) for name in stage.shapes}
+def draw_frame(motion: FilmedMotion, stage: Stage, frame_number: int, width: int, height: int) -> np.ndarray:
+    """Image (height, width, 3), with colours from 0 to 1, of frame number ``frame_number`` of a motion."""
+    poses = {name: drawn_pose(motion, stage, name, frame_number) for name in stage.shapes}
     bodies = [surface.moved(*poses[name]) for name, shapes in stage.shapes.items() for surface in shapes]
-    around = stage.scenery(float(motion.times[k]))
+    around = stage.scenery(float(motion.times[frame_number]))
 
     def end(body: str, point: tuple[float, float, float]) -> np.ndarray:
         position, turn = poses[body]
@@ -31,29 +31,31 @@ def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: i
     thick = ARROW_HALF_WIDTH * height / stage.camera.pixels(height)
     arrows = [
         arrow(*line, thick, stage.arrow_styles[force.kind].colour)
-        for force, line in zip(motion.arrows, arrow_lines(motion, stage, k), strict=True)
+        for force, line in zip(motion.arrows, arrow_lines(motion, stage, frame_number), strict=True)
     ]
     arrow_surfaces = [surface for surface in arrows if surface]
     return painted_picture(stage.camera, [around + struts + bodies, arrow_surfaces], width, height, SKY_COLOURS)
 
 
-def arrow_lines(motion: FilmedMotion, stage: Stage, k: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """For each arrow of frame ``k``, its start and its vector (3,), in m of the picture."""
+def arrow_lines(motion: FilmedMotion, stage: Stage, frame_number: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Start point (3,) and vector (3,) in m, as drawn, of each force arrow in frame number ``frame_number``."""
     spans = []
     for force in motion.arrows:
-        position, turn = drawn_pose(motion, stage, force.body, k)
-        on_body = motion.turns[force.body][k].T @ (force.points[k] - motion.positions[force.body][k])
-        spans.append((position + turn @ on_body, stage.arrow_styles[force.kind].scale * force.vectors[k]))
+        position, turn = drawn_pose(motion, stage, force.body, frame_number)
+        on_body = motion.rotations[force.body][frame_number].T @ (
+            force.points[frame_number] - motion.positions[force.body][frame_number]
+        )
+        spans.append((position + turn @ on_body, stage.arrow_styles[force.kind].scale * force.vectors[frame_number]))
     return spans
 
 
-def drawn_pose(motion: FilmedMotion, stage: Stage, body: str, k: int) -> tuple[np.ndarray, np.ndarray]:
-    """Position (3,) and rotation (3, 3) with which a body is drawn in frame ``k``. Its displacement and rotation from
-    rest are magnified, except for a wheel's spin."""
+def drawn_pose(motion: FilmedMotion, stage: Stage, body: str, frame_number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Position (3,) in m and rotation (3, 3) with which a body is drawn in frame number ``frame_number``. Displacement
+    and rotation from rest are magnified, except for a wheel's spin."""
     rest_position = np.array(stage.rest_positions[body])
     position, turn = (
-        rest_position + stage.magnification * (motion.positions[body][k] - rest_position),
-        motion.turns[body][k],
+        rest_position + stage.magnification * (motion.positions[body][frame_number] - rest_position),
+        motion.rotations[body][frame_number],
     )
     if body in stage.wheels:
         # the smallest rotation that takes the y axis to the axle

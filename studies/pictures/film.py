@@ -1,4 +1,4 @@
-"""Films of a motion that an engine reports, as it computes poses itself, and their stage.
+"""Filmed motions, with poses computed by an engine, and the stage on which they are drawn.
 
 Axes are those of the run, whatever they are; the camera's ``up`` says where up is. Lengths in m, forces in N.
 """
@@ -17,7 +17,8 @@ from studies.pictures.shapes import Colour, PaintedSurface
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
-    """A force over time: points (f, 3) in space, on ``body``, vectors (f, 3); ``kind``: its scale and colour."""
+    """Arrow of a force over f frames: points (f, 3) in m in space, on ``body``, and vectors (f, 3) in N; ``kind`` gives
+    its scale and colour."""
 
     name: str
     kind: str
@@ -28,23 +29,23 @@ class Arrow:
 
 @dataclass(frozen=True, eq=False)
 class FilmedMotion:
-    """Motion from one engine at times (f,) in s: positions (f, 3) and rotations (f, 3, 3) of each body, from body to
-    space axes.
+    """Motion by one engine at the times (f,) in s of f frames: positions (f, 3) in m and rotations (f, 3, 3) of each
+    body, from body to space axes.
 
-    run : the result that is drawn, where its system has one.
+    run : the drawn result, if the system has one.
     """
 
     engine: str
     times: np.ndarray
     positions: dict[str, np.ndarray]
-    turns: dict[str, np.ndarray]
+    rotations: dict[str, np.ndarray]
     arrows: tuple[Arrow, ...] = ()
     run: Result | None = None
 
 
 @dataclass(frozen=True)
 class ArrowStyle:
-    """How arrows of one kind look: colour, metres per newton, and a round force (N) for the legend."""
+    """Style of the force arrows of one kind: colour, scale (m/N), and the force (N) shown in the legend."""
 
     colour: Colour
     scale: float
@@ -53,7 +54,8 @@ class ArrowStyle:
 
 @dataclass(frozen=True)
 class ForceCurve:
-    """A curve plotted below the pictures: forces of one kind along a direction, and their name."""
+    """Force that is plotted over time below the pictures: forces of one kind along a direction, and a name of the
+    direction."""
 
     kind: str
     direction: tuple[float, float, float]
@@ -62,7 +64,7 @@ class ForceCurve:
 
 @dataclass(frozen=True)
 class Strut:
-    """A rod between points fixed to two bodies, in the bodies' axes."""
+    """Drawn rod between two points (m), each fixed to a body, in the body's axes."""
 
     first_body: str
     first_point: tuple[float, float, float]
@@ -74,10 +76,9 @@ class Strut:
 class Stage:
     """Shapes of the bodies and of their surroundings, with the camera and the settings of the picture.
 
-    shapes : surfaces of each body in its own axes; rest_positions : its place when nothing moves; magnification : how
-    many times as large displacements and turns from there are drawn (turning about the y of ``wheels`` apart, which is
-    drawn as it is); arrow_styles : of the arrows; curve : plotted below; scenery : surfaces around at a time (s), in
-    space.
+    shapes : surfaces of each body in its axes; rest_positions : position (m) of each body at rest; magnification :
+    factor on displacements and rotations from rest (except for the spin of ``wheels`` about y); arrow_styles : by the
+    kind of force; curve : plotted below; scenery : surfaces of the surroundings at a time (s), in space.
     """
 
     title: str
@@ -94,24 +95,25 @@ class Stage:
 
 
 def largest_differences(first_motion: FilmedMotion, second_motion: FilmedMotion) -> tuple[float, float, float]:
-    """Largest differences between two filmed motions: of positions (m), of elements of the rotation matrices, and of
-    forces (N)."""
+    """Largest differences between two filmed motions: of positions (m), of elements of rotation matrices, and of forces
+    (N)."""
     position_pairs = [(position, second_motion.positions[name]) for name, position in first_motion.positions.items()]
-    turns = [(turn, second_motion.turns[name]) for name, turn in first_motion.turns.items()]
+    rotations = [(turn, second_motion.rotations[name]) for name, turn in first_motion.rotations.items()]
     forces = [(a.vectors, b.vectors) for a, b in zip(first_motion.arrows, second_motion.arrows, strict=True)]
     largest = (
-        max((float(np.abs(a - b).max()) for a, b in pairs), default=0.0) for pairs in (position_pairs, turns, forces)
+        max((float(np.abs(a - b).max()) for a, b in pairs), default=0.0)
+        for pairs in (position_pairs, rotations, forces)
     )
     return next(largest), next(largest), next(largest)
 
 
 Poses = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
-"""Places (f, 3) in m and turns (f, 3, 3), space from body, of each body by its name."""
+"""Positions (f, 3) in m and rotations (f, 3, 3), from body to space axes, of each body by its name, over f frames."""
 
 
-def of_mujoco(model: Any, bodies: Mapping[str, int], coordinates: np.ndarray) -> Poses:
-    """Poses of bodies at MuJoCo's coordinates ``qpos`` (f, nq), by ``mj_kinematics``; ``bodies`` : MuJoCo's body
-    numbers."""
+def mujoco_poses(model: Any, bodies: Mapping[str, int], coordinates: np.ndarray) -> Poses:
+    """Poses of bodies by MuJoCo's ``mj_kinematics`` at its coordinates ``qpos`` (f, nq) of f frames; ``bodies`` :
+    MuJoCo's body number for each name."""
     import mujoco
 
     data, frames = mujoco.MjData(model), []
@@ -121,9 +123,9 @@ def of_mujoco(model: Any, bodies: Mapping[str, int], coordinates: np.ndarray) ->
     return _poses_of_frames(frames, bodies)
 
 
-def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates: np.ndarray) -> Poses:
-    """Poses of bodies at Exudyn's coordinates (f, n), in Exudyn's own order; each function in ``bodies`` returns a
-    body's value of an output variable of Exudyn."""
+def exudyn_poses(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates: np.ndarray) -> Poses:
+    """Poses of bodies by Exudyn at its coordinates (f, n) of f frames, in Exudyn's order; each function in ``bodies``
+    returns the body's value of an output variable."""
     import exudyn as exu
 
     kinds, frames = exu.OutputVariableType, []
@@ -134,7 +136,7 @@ def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates:
 
 
 def _poses_of_frames(frames: list[list[tuple[Any, Any]]], bodies: Iterable[str]) -> Poses:
-    """Position and rotation of every body over all frames."""
+    """Poses of every body from its (position, rotation) in every frame."""
     by_body = {
         name: list(zip(*path, strict=True)) for name, path in zip(bodies, zip(*frames, strict=True), strict=True)
     }

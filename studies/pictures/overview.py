@@ -1,4 +1,4 @@
-"""The first picture of the README: one vehicle, three implementations, how far they agree, and what accuracy costs.
+"""Overview picture of the README: one vehicle, three implementations, their agreement, and the cost of accuracy.
 
 ``python -m studies.pictures.overview FILE`` runs 2 s of a rough road in both engines and the reference and draws it
 anew; nothing in it depends on the machine, as work is counted in force calls.
@@ -29,7 +29,7 @@ from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import build
 
 DURATION, COMPARED_FORCE = 2.0, "f1"
-"""Length of a run (s), and the front wheel's force, which is compared."""
+"""Duration of a run (s), and the compared channel, the force on the front wheel."""
 SCENE: dict[str, Any] = {
     "title": "A vehicle on a rough road",
     "vehicle": {"parameters": "asymmetric_twin"},
@@ -38,24 +38,24 @@ SCENE: dict[str, Any] = {
 }
 STEPS_TRIED = (1e-2, 5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4)
 STABLE_STEPS = {"exudyn": STEPS_TRIED, "mujoco": STEPS_TRIED[2:], "reference": STEPS_TRIED[2:]}
-"""Steps, s, which all divide ``COMPARISON_SPACING``; and of each curve those at which its method is stable."""
+"""Steps (s) of each curve at which its method is stable; all divide ``COMPARISON_SPACING``."""
 COMPARISON_SPACING, REFERENCE_STEP = 1e-2, 5e-5
-"""s: spacing of the times at which forces are compared, and step of what is taken for the truth."""
+"""Spacing (s) of the times at which forces are compared, and step (s) of the reference solution."""
 RUNGE_KUTTA = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
 ENGINE_DEFAULTS = {"exudyn": ("GeneralizedAlpha", "usual solver", 1e-2), "mujoco": ("Euler", "usual solver", 2e-3)}
-"""What an engine does if not told otherwise: method, name, step (s)."""
+"""Default of each engine: method, label in the figure, step (s)."""
 CURVE_STYLES = {"reference": ("-", 3.2), "exudyn": ("-", 1.5), "mujoco": (":", 1.5)}
-"""Line and width of each curve, so that all are seen where they lie on one another."""
+"""Line style and width of each engine's curve, by which coinciding curves are seen."""
 
 
 def draw(path: Path) -> Path:
-    """Run, draw, save ``path`` and return it."""
+    """Run the scene in all implementations and save the overview picture; returns its path."""
     runs = {engine: _run(engine, method, 1e-3) for engine, method in RUNGE_KUTTA.items()}
     figure, axes = subplot_mosaic(
         [["idea", "idea", "idea"], ["force", "gap", "price"]], figsize=(COLUMN_WIDTH, 4.5), height_ratios=(1, 1.5)
     )
     _draw_overview(axes["idea"])
-    _forces(axes["force"], runs)
+    _plot_forces(axes["force"], runs)
     _plot_differences(axes["gap"], runs)
     _plot_prices(axes["price"])
     add_heading(figure, "twinrig: one vehicle in two engines and by hand, each result with its error and its price")
@@ -63,12 +63,12 @@ def draw(path: Path) -> Path:
 
 
 def _run(engine: str, method: str, step: float) -> Result:
-    """A run by one method with one step."""
+    """Result of the scene in an engine by a method with a step (s)."""
     scene = build(SCENE | {"engines": {engine: {"integrator": method, "step": step}}})
     return run(scene, engine)
 
 
-def _forces(axis: Any, runs: dict[str, Result]) -> None:
+def _plot_forces(axis: Any, runs: dict[str, Result]) -> None:
     for engine, result in runs.items():
         line, width = CURVE_STYLES[engine]
         axis.plot(
@@ -99,8 +99,8 @@ def _plot_differences(axis: Any, runs: dict[str, Result]) -> None:
 
 
 def _plot_prices(axis: Any) -> None:
-    """Plot the relative error of the force over the number of force calls, for the classical Runge-Kutta method and for
-    each engine's usual solver."""
+    """Plot the relative error of the force over the number of force calls: of the classical Runge-Kutta method, and of
+    each engine's default solver."""
     truth = _run("reference", "RK4", REFERENCE_STEP)
     curves = {engine: (method, f"{LABELS[engine]}, {name}") for engine, (method, name, _) in ENGINE_DEFAULTS.items()}
     curves |= {"reference": ("RK4", "Runge-Kutta, all three")}
@@ -116,8 +116,7 @@ def _plot_prices(axis: Any) -> None:
 
 
 def _calls_and_error(result: Result, truth: Result, step: float) -> tuple[float, float]:
-    """Number of force calls of a run, and the largest error of its force at common times, divided by the largest
-    force."""
+    """Number of force calls of a run, and largest error of its force at common times divided by the largest force."""
     rows, fine = round(COMPARISON_SPACING / step), round(COMPARISON_SPACING / REFERENCE_STEP)
     error = (
         np.abs(result[COMPARED_FORCE][::rows] - truth[COMPARED_FORCE][::fine]).max()
@@ -127,7 +126,7 @@ def _calls_and_error(result: Result, truth: Result, step: float) -> tuple[float,
 
 
 def _draw_overview(axis: Any) -> None:
-    """Draw the vehicle on its road, and how one scene file is run by three engines whose results are compared."""
+    """Draw a sketch of the vehicle on its road, and of one scene file that three implementations run and compare."""
     axis.set(xlim=(0, 24), ylim=(0, 4.2), aspect="equal")
     axis.axis("off")
     x = np.linspace(0.0, 8.2, 300)

@@ -1,4 +1,4 @@
-"""The page of a film: each engine's picture, the forces' scale, their course, and how far the engines differ."""
+"""Page of a film: each engine's picture, scale of the forces, forces over time, and differences of the engines."""
 
 from collections.abc import Iterator
 from itertools import cycle
@@ -18,7 +18,7 @@ from studies.pictures.film import FilmedMotion, Stage, largest_differences
 
 PAGE_WIDTH, PAGE_HEIGHT = 1280, 720
 PAGE_MARGIN, TITLE_HEIGHT, PICTURE_HEIGHT = 12, 66, 400
-"""Pixels: margin, height of the title, height of the pictures."""
+"""Margin, height of the title, and height of the pictures, in pixels."""
 
 
 FONT_SIZES: dict[Any, Any] = {
@@ -26,11 +26,11 @@ FONT_SIZES: dict[Any, Any] = {
     **dict.fromkeys(("axes.labelsize", "xtick.labelsize", "ytick.labelsize", "legend.fontsize"), 11.5),
     "axes.titlesize": 12.5,
 }
-"""Sizes (points) that are still read where a page is shown as wide as other figures."""
+"""Font sizes (points) that are readable if the page is shown as wide as other figures."""
 
 
 class Page:
-    """A page of 1280 x 720 pixels on which one frame after the other is drawn."""
+    """Page of 1280 x 720 pixels on which the frames of filmed motions are drawn one after the other."""
 
     def __init__(self, stage: Stage, motions: list[FilmedMotion]) -> None:
         self.stage, self.motions = stage, motions
@@ -45,7 +45,7 @@ class Page:
         self._still = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def _draw(self) -> None:
-        """Draw everything that is the same in all frames."""
+        """Draw all parts of the page that are the same in all frames."""
         stage, motions = self.stage, self.motions
         no_layout: Any = "none"  # overrides the style of figures; the type hints do not know it
         self._figure = Figure(figsize=(PAGE_WIDTH / 100, PAGE_HEIGHT / 100), dpi=100, layout=no_layout)
@@ -65,12 +65,12 @@ class Page:
         self._canvas.draw()
 
     def frames(self) -> Iterator[np.ndarray]:
-        """All pages (720, 1280, 3), 8 bits a colour."""
+        """Yield the page (720, 1280, 3) of every frame, with 8 bits per colour."""
         return (self.frame(k) for k in range(len(self.motions[0].times)))
 
-    def frame(self, k: int) -> np.ndarray:
-        """One page."""
-        time, canvas = float(self.motions[0].times[k]), self._canvas
+    def frame(self, frame_number: int) -> np.ndarray:
+        """The page (720, 1280, 3) of frame number ``frame_number``, with 8 bits per colour."""
+        time, canvas = float(self.motions[0].times[frame_number]), self._canvas
         canvas.restore_region(self._still)
         self._clock.set_text(f"t = {time:.3f} s")
         self._cursor.set_xdata([time, time])
@@ -78,17 +78,17 @@ class Page:
             self._figure.draw_artist(artist)
         page = np.asarray(canvas.buffer_rgba())[..., :3].copy()
         for left, motion in zip(self._lefts, self.motions, strict=True):
-            image = draw_frame(motion, self.stage, k, self._wide, PICTURE_HEIGHT)
+            image = draw_frame(motion, self.stage, frame_number, self._wide, PICTURE_HEIGHT)
             page[TITLE_HEIGHT : TITLE_HEIGHT + PICTURE_HEIGHT, left : left + self._wide] = eight_bits(image)
         return page
 
     def frame_of_largest_force(self) -> int:
-        """Number of the frame in which the plotted forces are largest."""
+        """Number of the frame in which the sum of the plotted forces' magnitudes is largest."""
         return int(np.abs(np.column_stack(self._forces[0])).sum(axis=1).argmax())
 
     def _draw_legend(self) -> None:
-        """Draw the legend: an arrow for each kind of force with the length that its legend force (N) has at the
-        camera's target, and the stage's caption."""
+        """Draw the legend: an arrow for each kind of force with its legend force (N) to scale at the camera's target,
+        and the stage's caption."""
         row, left = 1 - (TITLE_HEIGHT + PICTURE_HEIGHT + 20) / PAGE_HEIGHT, float(PAGE_MARGIN)
         for name, kind in self.stage.arrow_styles.items():
             length = kind.scale * kind.legend * self.stage.camera.pixels(PICTURE_HEIGHT)
@@ -113,7 +113,7 @@ class Page:
         self._figure.text(1 - PAGE_MARGIN / PAGE_WIDTH, row, self.stage.caption, ha="right", va="center")
 
     def _draw_curves(self) -> Axes:
-        """Draw the plotted forces (kN) over time: lines for the first engine, dots for the others."""
+        """Draw the plotted forces (kN) over time: lines for the first engine, dots for the others; returns the axes."""
         axes = self._figure.add_axes((70 / PAGE_WIDTH, 62 / PAGE_HEIGHT, 1 - 82 / PAGE_WIDTH, 128 / PAGE_HEIGHT))
         first, curve = self.motions[0], self.stage.curve
         names = [arrow.name.rpartition(", ")[2] for arrow in first.arrows if arrow.kind == curve.kind]
@@ -135,12 +135,11 @@ class Page:
 
 
 CURVE_COLOURS = (DARK, PINK, ORANGE, SKY, GREY)
-"""Colours of curves, none of them that of an engine, which stands above its picture."""
+"""Colours of the force curves, which differ from the engines' colours."""
 
 
 def difference_sentence(motions: list[FilmedMotion]) -> str:
-    """Sentence on the largest differences between two engines over the film; with a single engine, on which engine it
-    is."""
+    """Sentence on the largest differences between two engines over the film; with a single engine, its name."""
     if len(motions) == 1:
         return f"poses as {LABELS[motions[0].engine]} reports them"
     position_gap, turns, forces = largest_differences(*motions)
@@ -151,5 +150,5 @@ def difference_sentence(motions: list[FilmedMotion]) -> str:
 
 
 def eight_bits(image: np.ndarray) -> np.ndarray:
-    """Colours from 0 to 1 converted to bytes."""
+    """Image with colours from 0 to 1, converted to bytes from 0 to 255."""
     return (255.0 * image.clip(0.0, 1.0) + 0.5).astype(np.uint8)

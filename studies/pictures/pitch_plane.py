@@ -1,4 +1,4 @@
-"""The pitch-plane vehicle on a random road: shapes, camera, wheel and suspension forces."""
+"""Film of the pitch-plane vehicle on a random road: shapes, camera, and wheel and suspension forces."""
 
 from functools import partial
 from typing import Any
@@ -12,25 +12,35 @@ from models.systems.pitch_plane.scene import assembly_of_scene, settings_of
 from models.systems.pitch_plane.scene import build as scene_of
 from models.vehicles.pitch_plane import equilibrium
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Poses, Stage, Strut, of_exudyn, of_mujoco
+from studies.pictures.film import (
+    Arrow,
+    ArrowStyle,
+    FilmedMotion,
+    ForceCurve,
+    Poses,
+    Stage,
+    Strut,
+    exudyn_poses,
+    mujoco_poses,
+)
 from studies.pictures.road import DRAWN_ROAD, PassingRoad
 from studies.pictures.shapes import PAINT_COLOUR, PaintedSurface, box, tyred_wheel
 
 SPEED, SEED = 15.0, 1
 MAGNIFICATION = 3.0
 WHEEL_RADIUS, CHASSIS_HEIGHT = 0.33, 0.95
-"""m: of the wheels and of the chassis' centre above the road; the model has neither."""
+"""Drawn wheel radius (m) and height (m) of the chassis' centre above the road, which the model does not have."""
 ARROW_STYLES = {
     "wheel force": ArrowStyle((0.0, 0.62, 0.45), 1.2e-4, 4e3),
     "suspension force": ArrowStyle((0.84, 0.2, 0.0), 1.2e-4, 4e3),
 }
 FORCE_CURVE = ForceCurve("wheel force", (0.0, 0.0, -1.0), "upwards")
 EXUDYN_AXES = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
-"""Exudyn's axes as columns: backward, down, to the right."""
+"""Directions of Exudyn's axes as columns: backward, down, to the right."""
 
 
-def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
-    """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
+def stage_and_motions(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
+    """Stage of the film, and the motion by each engine, with frames at the steps nearest to ``times`` (s)."""
     run = {"duration": float(np.ceil(duration + DRAWN_ROAD / SPEED)), "step": 1e-3}
     scene = scene_of(
         {
@@ -56,13 +66,13 @@ def _motion_of_engine(engine: str, assembly: Assembly, times: np.ndarray) -> tup
 
 def _mujoco_poses(model: Any, states: np.ndarray) -> Poses:
     names = [body.name for body in model.assembly.vehicle.bodies]
-    positions, turns = of_mujoco(model.model, {name: model.model.body(name).id for name in names}, states)
+    positions, turns = mujoco_poses(model.model, {name: model.model.body(name).id for name in names}, states)
     return {name: position * [0.0, 1.0, 1.0] for name, position in positions.items()}, turns
 
 
 def _exudyn_poses(model: Any, states: np.ndarray) -> Poses:
-    """Poses of the bodies from the coordinates of Exudyn's nodes in the plane. Wheels are point masses, which do not
-    rotate."""
+    """Poses of the bodies by Exudyn, from the coordinates (f, 4) of the states in f frames; wheels are point masses
+    without rotation."""
     import exudyn as exu
 
     mbs, nodes = model.built.mbs, model.built.nodes
@@ -74,7 +84,7 @@ def _exudyn_poses(model: Any, states: np.ndarray) -> Poses:
 
     coordinates = np.zeros((len(states), 7))
     coordinates[:, [1, 3, 5, 6]] = states
-    positions, turns = of_exudyn(mbs, {name: partial(ask, node) for name, node in nodes.items()}, coordinates)
+    positions, turns = exudyn_poses(mbs, {name: partial(ask, node) for name, node in nodes.items()}, coordinates)
     return (
         {name: position @ EXUDYN_AXES.T for name, position in positions.items()},
         {name: EXUDYN_AXES @ turn @ EXUDYN_AXES.T for name, turn in turns.items()},
@@ -82,14 +92,14 @@ def _exudyn_poses(model: Any, states: np.ndarray) -> Poses:
 
 
 def _body_offset(assembly: Assembly, body: str) -> np.ndarray:
-    """Position (3,) in m at which a body is drawn when its coordinates are zero. The model has no longitudinal
-    positions, and its heights count from here."""
+    """Position (3,) in m at which a body is drawn if its coordinates are zero; the model has neither longitudinal
+    positions nor heights."""
     x = {axle.wheel: axle.x for axle in assembly.vehicle.axles}.get(body)
     return np.array([0.0, 0.0, -CHASSIS_HEIGHT]) if x is None else np.array([x, 0.0, -WHEEL_RADIUS])
 
 
 def arrows(assembly: Assembly, channels: Channels, rows: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
-    """Arrows of the road's forces on the wheels and of the suspension's forces on the chassis."""
+    """Force arrows of the road on the wheels and of the suspension on the chassis, in the frames ``rows`` of a run."""
     upward, (positions, turns), arrows_drawn = np.array([0.0, 0.0, -1.0]), poses, []
     for axle, wheel, strut in zip(assembly.vehicle.axles, ("f1", "f2"), ("f3", "f4"), strict=True):
         road, mount = np.array([0.0, 0.0, WHEEL_RADIUS]), np.array([axle.x, 0.0, 0.0])
@@ -103,7 +113,7 @@ def arrows(assembly: Assembly, channels: Channels, rows: np.ndarray, poses: Pose
 
 
 def stage(assembly: Assembly, channels: Channels) -> Stage:
-    """The vehicle, seen from its right, on a road that passes by; z down."""
+    """Stage of the film: the vehicle, seen from its right, on a passing road; z down."""
     height = channels["zeta1"][2]
     distances = assembly.vehicle.axles[0].x + SPEED * np.linspace(0.0, assembly.scene.run.duration, len(height))
     road = PassingRoad(distances, np.column_stack([height, height]), (-1.0, 1.0), SPEED, -1.0, MAGNIFICATION, 1.0)
@@ -130,7 +140,7 @@ def stage(assembly: Assembly, channels: Channels) -> Stage:
 
 
 def shapes(assembly: Assembly) -> dict[str, list[PaintedSurface]]:
-    """A beam for the chassis and two wheels."""
+    """Drawn shapes by body: a beam for the chassis, and two wheels."""
     p = assembly.parameters
     beam = box(p.a + p.b + 0.5, 0.5, 0.14, PAINT_COLOUR).at((p.b - p.a) / 2.0, 0.0, -0.07)
     return {axle.wheel: tyred_wheel(WHEEL_RADIUS) for axle in assembly.vehicle.axles} | {"chassis": [beam]}

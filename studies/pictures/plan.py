@@ -1,15 +1,15 @@
-"""The plan of a scene of pictures: printed by ``twinrig show``, checked before any run."""
+"""Description of a scene of pictures for ``twinrig show``, and its check before a run."""
 
 from studies.pictures.scene import PictureScene
 from studies.pictures.video import missing_extra
 
 
 def check(scene: PictureScene, engines: tuple[str, ...]) -> None:
-    """Refuse nothing: the scene's tables say it all."""
+    """Accept every scene of pictures: its tables were checked when it was read."""
 
 
 def describe(scene: PictureScene) -> str:
-    """The scene's plan as text."""
+    """Text for ``twinrig show``: vehicle, film and format of a scene of pictures."""
     film = scene.film
     long = film.frames / film.frames_per_second
     shown = f"{film.duration:g} s of the run in {film.frames} frames, {long:g} s of film"

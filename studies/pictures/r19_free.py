@@ -1,4 +1,4 @@
-"""The car of 19 freedoms on a random road: shapes, camera and the forces of the road on its tyres."""
+"""Film of the car of 19 freedoms on a random road: shapes, camera, and the road's forces on the tyres."""
 
 from dataclasses import replace
 from functools import partial
@@ -15,12 +15,12 @@ from models.systems.ride.scene import build as ride_scene
 from models.vehicles.spatial import PointOutput, SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Poses, Stage, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Poses, Stage, exudyn_poses, mujoco_poses
 from studies.pictures.road import DRAWN_ROAD, PassingRoad
 from studies.pictures.shapes import PAINT_COLOUR, Colour, PaintedSurface, ball, box, extruded_outline, tyred_wheel
 
 SPEED, STEP, SEED, LATERAL_START_SPEED = 20.0, 1e-3, 3, 0.5
-"""m/s, largest step (s), seed of the road, lateral speed of the body at the start (m/s)."""
+"""Speed (m/s), largest step (s), seed of the road, and initial lateral speed of the body (m/s)."""
 MAGNIFICATION = 4.0
 SCENE = {
     "title": "",
@@ -38,8 +38,8 @@ ENGINE_COLOUR: Colour = (0.75, 0.45, 0.15)
 PERSON_COLOUR: Colour = (0.93, 0.76, 0.55)
 
 
-def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
-    """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
+def stage_and_motions(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
+    """Stage of the film, and the motion by each engine, with frames at the steps nearest to ``times`` (s)."""
     scene = ride_scene(SCENE)
     vehicle = vehicle_with_road_forces(vehicle_of(scene))
     road = road_path(excitation_of(scene, wheels(vehicle)), SPEED, STEP)
@@ -51,7 +51,7 @@ def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tupl
 
 
 def vehicle_with_road_forces(vehicle: SpatialVehicle) -> SpatialVehicle:
-    """The vehicle with the outputs of its road forces: tyre forces, then lateral speeds where side forces act."""
+    """The vehicle with other outputs: tyre forces, then lateral velocities at the points of side forces."""
     tyres = tuple(TyreOutput(tyre.name, "tyre force", tyre.name) for tyre in vehicle.tyres)
     across = tuple(PointOutput(f.name, "velocity", f.body, f.point, (0.0, 1.0, 0.0)) for f in vehicle.side_forces)
     return replace(vehicle, outputs=(*tyres, *across))
@@ -71,7 +71,7 @@ def _motion_of_engine(
     else:
         joints = np.empty_like(kept_run.positions)
         joints[:, model.numbers.columns] = kept_run.positions
-        poses = of_mujoco(model.model, model.numbers.bodies, joints)
+        poses = mujoco_poses(model.model, model.numbers.bodies, joints)
     return FilmedMotion(engine, kept_run.times, *poses, arrows(vehicle, kept_run, table[2 * rows], poses))
 
 
@@ -79,7 +79,7 @@ def _exudyn_poses(model: Any, positions: np.ndarray) -> Poses:
     markers = {body.name: model.built.marker(body.name, body.position, True) for body in model.vehicle.bodies}
     model.mbs.Assemble()
     marker_output = {name: partial(model.mbs.GetMarkerOutput, marker) for name, marker in markers.items()}
-    body_positions, turns = of_exudyn(
+    body_positions, turns = exudyn_poses(
         model.mbs, marker_output, np.array([model._values_in_exudyn_order(row) for row in positions])
     )
     axes = {name: np.transpose([model.built.in_body_axes(name, axis) for axis in np.eye(3)]) for name in markers}
@@ -89,7 +89,8 @@ def _exudyn_poses(model: Any, positions: np.ndarray) -> Poses:
 
 
 def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
-    """Wheel loads, static ones included, and side forces, both at the road, from the states of a run (small motion)."""
+    """Force arrows of the wheel loads, with their static part, and of the side forces, both at the road, from a run's
+    states."""
     forces = [
         run.rates @ output.rate_factors
         + run.positions @ output.displacement_factors
@@ -111,22 +112,22 @@ def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Po
 def _road_force_arrow(
     arrow_kind: str, vehicle: SpatialVehicle, tyre_or_force: Any, force: np.ndarray, axis: int, poses: Poses
 ) -> Arrow:
-    """Arrow of a tyre force or side force (f,) along one axis of space. It starts on the road below the force's point
-    on its body."""
+    """Arrow of a tyre force or side force (f,) in N along an axis of space (0 to 2), from the road below the force's
+    point on its body."""
     (x, y, _), body = tyre_or_force.point, tyre_or_force.body
     points = poses[0][body] + poses[1][body] @ np.subtract((x, y, 0.0), vehicle.body(body).position)
     return Arrow(f"{arrow_kind}, {tyre_or_force.name}", arrow_kind, body, points, force[:, None] * np.eye(3)[axis])
 
 
 def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
-    """The car, seen from ahead and to its left, on a road that passes by."""
+    """Stage of the film: the car, seen from ahead and to its left, on a passing road."""
     front = [tyre for tyre in vehicle.tyres if tyre.axle == 0]
     columns = [vehicle.tyres.index(tyre) for tyre in front]
     distances = front[0].point[0] + SPEED * road.half * np.arange(len(table))
     tracks = front[0].point[1], front[1].point[1]
     passing = PassingRoad(distances, table[:, columns], tracks, SPEED, magnification=MAGNIFICATION)
     rest_positions = {body.name: body.position for body in vehicle.bodies}
-    camera = Camera((5.6, 4.6, 2.3), (-0.1, 0.1, 0.5), opening=0.5)
+    camera = Camera((5.6, 4.6, 2.3), (-0.1, 0.1, 0.5), angle_of_view=0.5)
     caption = f"displacements and road drawn {MAGNIFICATION:g} times as large; forces of the road on the tyres"
     title = f"Car of {len(vehicle.coordinates())} freedoms at {SPEED:g} m/s on a road of class C, after a gust"
     return Stage(
@@ -135,7 +136,7 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
 
 
 def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
-    """Surfaces of wheels at the tyres, a car around the chassis, and the engine and occupants inside."""
+    """Drawn shapes by body: wheels, a car around the chassis, engine and occupants."""
     person = [ball(0.13, PERSON_COLOUR).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON_COLOUR).at(0.0, 0.0, 0.02)]
     return {
         **{tyre.body: tyred_wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres},
@@ -147,7 +148,7 @@ def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
 
 
 def _car_body(vehicle: SpatialVehicle) -> list[PaintedSurface]:
-    """Transparent car body of two convex outlines, about the chassis' centre of mass."""
+    """Transparent car body of two convex outlines, in axes at the chassis' centre of mass."""
     x, _, z = vehicle.body("body").position
     front, rear = max(t.point[0] for t in vehicle.tyres), min(t.point[0] for t in vehicle.tyres)
     lower = [

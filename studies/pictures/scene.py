@@ -1,4 +1,4 @@
-"""Scenes of pictures: which vehicle is drawn, of which run, and how the film runs."""
+"""Scenes of pictures: the drawn vehicle, the duration of its run, and the speed and format of the film."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,9 +12,9 @@ from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict
 
 MOST_FRAMES = 3000
-"""Two minutes of film; each frame takes a fifth of a second to draw."""
+"""Largest number of frames: two minutes of film; drawing a frame takes a fifth of a second."""
 LONGEST_RUN = 120.0
-"""s of a run: however few frames show it, all its steps are computed."""
+"""Longest run (s): all its steps are computed, however few frames show it."""
 
 
 class Film(Strict):
@@ -31,12 +31,12 @@ class Film(Strict):
 
     @property
     def frames(self) -> int:
-        """Number of frames: one per interval of the film."""
+        """Number of frames of the film."""
         return max(1, round(self.duration * self.slow_motion * self.frames_per_second))
 
 
 class PictureScene(SceneFile):
-    """One scene of pictures."""
+    """Scene of pictures: a vehicle and a film of it."""
 
     system: Literal["pictures"] = "pictures"
     study: str = Field(default="animation", description="the study that runs the scene")
@@ -45,7 +45,7 @@ class PictureScene(SceneFile):
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> PictureScene:
-    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    """Checked scene of pictures from nested tables; raises InputError for anything that is not understood."""
     scene = checked(PictureScene, table, file, folder)
     if scene.film.frames > MOST_FRAMES:
         allowed = (

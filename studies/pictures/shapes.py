@@ -1,4 +1,4 @@
-"""Surfaces of simple bodies as triangles, in the body's own axes (m)."""
+"""Drawn surfaces of simple bodies as triangles, in the body's axes (m)."""
 
 from dataclasses import dataclass, replace
 
@@ -10,14 +10,15 @@ PAINT_COLOUR: Colour = (0.16, 0.42, 0.72)
 RUBBER_COLOUR: Colour = (0.16, 0.16, 0.17)
 RIM_COLOUR: Colour = (0.78, 0.79, 0.8)
 FLOOR_DISTANCE = 150.0
-"""m to the edges of a floor."""
+"""Distance (m) from the middle of a drawn floor to its edges."""
 
 
 @dataclass(frozen=True, eq=False)
 class PaintedSurface:
-    """Triangles (m, 3, 3) and the outward normals at their corners (m, 3, 3); colour from 0 to 1.
+    """Surface of m triangles: corners (m, 3, 3) in m, outward unit normals at the corners (m, 3, 3), and colour (red,
+    green, blue from 0 to 1).
 
-    alpha : below 1, what lies behind shines through.
+    alpha : opacity from 0 to 1.
     """
 
     corners: np.ndarray
@@ -26,16 +27,16 @@ class PaintedSurface:
     alpha: float = 1.0
 
     def moved(self, shift: np.ndarray, rotation: np.ndarray) -> "PaintedSurface":
-        """The surface after turning by ``rotation`` (3, 3) and shifting by ``shift`` (3,)."""
+        """The surface rotated by ``rotation`` (3, 3) and then shifted by ``shift`` (3,) in m."""
         return replace(self, corners=self.corners @ rotation.T + shift, normals=self.normals @ rotation.T)
 
     def at(self, *shift: float) -> "PaintedSurface":
-        """The surface shifted."""
+        """The surface shifted by x, y, z (m)."""
         return replace(self, corners=self.corners + np.array(shift))
 
 
-def faceted_surface(corners: np.ndarray, colour: Colour) -> PaintedSurface:
-    """Triangles (m, 3, 3) with flat faces; counter-clockwise seen from outside."""
+def flat_surface(corners: np.ndarray, colour: Colour) -> PaintedSurface:
+    """Surface of flat triangles with corners (m, 3, 3) in m, counter-clockwise seen from outside."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals /= np.where(length > 0, length, 1.0)
@@ -43,7 +44,7 @@ def faceted_surface(corners: np.ndarray, colour: Colour) -> PaintedSurface:
 
 
 def net_triangles(points: np.ndarray) -> np.ndarray:
-    """Triangles of a net of points (a, b, 3)."""
+    """Triangles (2 (a - 1)(b - 1), 3, 3) of a net of points (a, b, 3)."""
     first, second_corner, three, four = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     return np.concatenate(
         [
@@ -54,8 +55,8 @@ def net_triangles(points: np.ndarray) -> np.ndarray:
 
 
 def surface_of_revolution(axial: ArrayLike, radii: ArrayLike, colour: Colour, piece_count: int = 48) -> PaintedSurface:
-    """Solid of revolution about y from the outline (axial, radii), given from left to right. It is shaded smoothly
-    around the axis, with sharp edges at the outline's corners."""
+    """Surface of revolution about y from an outline of positions along y and radii (m), from left to right; it is
+    shaded smoothly around the axis, with sharp edges at the outline's corners."""
     angles = np.linspace(0.0, 2.0 * np.pi, piece_count + 1)
     y, r = np.array(axial, float), np.array(radii, float)
     ring = np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], 1)
@@ -69,7 +70,7 @@ def surface_of_revolution(axial: ArrayLike, radii: ArrayLike, colour: Colour, pi
 
 
 def tyred_wheel(radius: float) -> list[PaintedSurface]:
-    """A tyre and its rim."""
+    """Surfaces of a wheel of a radius (m) about the y axis: tyre and rim."""
     tyre = surface_of_revolution(
         [-0.1, -0.1, -0.07, 0.07, 0.1, 0.1], np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * radius, RUBBER_COLOUR
     )
@@ -80,35 +81,36 @@ def tyred_wheel(radius: float) -> list[PaintedSurface]:
 
 
 def box(x: float, y: float, z: float, colour: Colour) -> PaintedSurface:
-    """A box about the origin with these edges."""
+    """Surface of a box about the origin with edge lengths x, y, z (m)."""
     half = np.array([x, y, z]) / 2.0
     return extruded_outline(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half[[0, 2]], 2.0 * half[1], colour)
 
 
 def extruded_outline(outline: np.ndarray, width: float, colour: Colour) -> PaintedSurface:
-    """A convex outline (n, 2) in x and z, counter-clockwise from x to z, drawn out along y about the origin."""
+    """Surface of a convex outline (n, 2) in x and z (m), counter-clockwise from x to z, extruded along y to a width (m)
+    about the origin."""
     front = np.insert(outline, 1, -width / 2.0, axis=1)
     back = np.insert(outline, 1, width / 2.0, axis=1)
     fan = [
         np.stack([np.broadcast_to(side[:1], side[2:].shape), side[1:-1], side[2:]], 1) for side in (front, back[::-1])
     ]
     closed = np.stack([np.vstack([front, front[:1]]), np.vstack([back, back[:1]])])
-    return faceted_surface(np.concatenate([*fan, net_triangles(closed)]), colour)
+    return flat_surface(np.concatenate([*fan, net_triangles(closed)]), colour)
 
 
 def floor(z: float, colour: Colour, up: float) -> PaintedSurface:
-    """A horizontal square about the origin, made of tiles that are small near the origin, because tiles that reach
-    behind the camera are not drawn.
+    """Surface of a horizontal square about the origin at height z (m); its tiles are small near the origin, because
+    tiles that reach behind the camera are not drawn.
 
-    up : 1 where z is up, -1 where it is down.
+    up : 1 if z is up, -1 if it is down.
     """
     lines = FLOOR_DISTANCE * np.sinh(np.linspace(-6.0, 6.0, 57)) / np.sinh(6.0)
     x, y = np.meshgrid(up * lines, lines, indexing="ij")
-    return faceted_surface(net_triangles(np.stack([x, y, np.full_like(x, z)], -1)), colour)
+    return flat_surface(net_triangles(np.stack([x, y, np.full_like(x, z)], -1)), colour)
 
 
 def ball(radius: float, colour: Colour) -> PaintedSurface:
-    """A sphere about the origin."""
+    """Surface of a sphere of a radius (m) about the origin."""
     angle = np.linspace(0.0, np.pi, 17)
     round_about = surface_of_revolution(-radius * np.cos(angle), radius * np.sin(angle), colour, 32)
     return replace(round_about, normals=round_about.corners / radius)
@@ -117,8 +119,8 @@ def ball(radius: float, colour: Colour) -> PaintedSurface:
 def line_solid(
     tail_point: np.ndarray, head_point: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour
 ) -> PaintedSurface:
-    """A solid of revolution whose axis runs from one point (tail) to another (head); ``axial`` : positions from the
-    tail (m)."""
+    """Surface of revolution about the axis from a point (tail) to another (head); ``axial`` : positions (m) along the
+    axis from the tail; ``radii`` : radii (m) there."""
     direction = (head_point - tail_point) / np.linalg.norm(head_point - tail_point)
     perpendicular = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
     perpendicular /= np.linalg.norm(perpendicular)
@@ -127,7 +129,7 @@ def line_solid(
 
 
 def rod(tail_point: np.ndarray, head_point: np.ndarray, radius: float, colour: Colour) -> PaintedSurface:
-    """A round rod from one point to another."""
+    """Surface of a round rod of a radius (m) from one point to another."""
     length = float(np.linalg.norm(head_point - tail_point))
     return line_solid(
         tail_point, head_point, np.array([0.0, 0.0, length, length]), radius * np.array([0.0, 1.0, 1.0, 0.0]), colour
@@ -135,7 +137,7 @@ def rod(tail_point: np.ndarray, head_point: np.ndarray, radius: float, colour: C
 
 
 def arrow(tail_point: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> PaintedSurface | None:
-    """An arrow as long as the vector (m); None if it is shorter than a tenth of its thickness."""
+    """Surface of an arrow as long as the vector (3,) in m; None if it is shorter than a tenth of its thickness (m)."""
     length = float(np.linalg.norm(vector))
     if length < 0.1 * thickness:
         return None

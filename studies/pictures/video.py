@@ -1,4 +1,4 @@
-"""Frames to a file: MP4 or GIF by the extra ``video``; stills always."""
+"""Films as files: MP4 or GIF, with twinrig's extra ``video``; and stills as PNG, without it."""
 
 from collections.abc import Iterable
 from importlib.util import find_spec
@@ -14,7 +14,7 @@ VIDEO_PACKAGES = ("imageio", "imageio_ffmpeg")
 
 
 def missing_extra(format_name: str) -> str:
-    """Sentence that names the extra to install if a film format needs one that is missing; else empty."""
+    """Sentence on the extra to install if a film format needs missing packages; else ""."""
     if format_name == "png" or all(find_spec(name) for name in VIDEO_PACKAGES):
         return ""
     return (
@@ -22,12 +22,13 @@ def missing_extra(format_name: str) -> str:
     )
 
 
-def write(path: Path, frames: Iterable[np.ndarray], per_second: int) -> Path:
-    """Write frames (h, w, 3) of 8 bits a colour to ``path``, .mp4 or .gif, one at a time."""
+def write(path: Path, frames: Iterable[np.ndarray], frames_per_second: int) -> Path:
+    """Write frames (h, w, 3) with 8 bits per colour to a film file, .mp4 or .gif; returns its path.
+    frames_per_second : frames per second of film."""
     import imageio.v2 as imageio
 
-    gif: dict[str, Any] = {"duration": 1000.0 / per_second, "loop": 0}
-    mp4: dict[str, Any] = {"fps": per_second, "codec": "libx264", "quality": 7}
+    gif: dict[str, Any] = {"duration": 1000.0 / frames_per_second, "loop": 0}
+    mp4: dict[str, Any] = {"fps": frames_per_second, "codec": "libx264", "quality": 7}
     writer: Any
     with (
         whole_file(path) as partial_path,
@@ -39,7 +40,7 @@ def write(path: Path, frames: Iterable[np.ndarray], per_second: int) -> Path:
 
 
 def write_png(path: Path, image: np.ndarray) -> Path:
-    """Write one image (h, w, 3) to a PNG file, the same bytes from the same image."""
+    """Write an image (h, w, 3) to a PNG file, with equal bytes for equal images; returns its path."""
     metadata: Any = {"Software": None}
     with whole_file(path) as partial_path:
         imsave(partial_path, np.ascontiguousarray(image), metadata=metadata)

@@ -1,4 +1,4 @@
-"""A wheelset that hunts on its rails: shapes, camera and the forces at its contacts."""
+"""Film of a wheelset that hunts on its rails: shapes, camera, and contact forces."""
 
 from functools import partial
 from typing import Any
@@ -15,14 +15,14 @@ from models.systems.wheelset.of_scene import equations_and_start
 from models.systems.wheelset.run import run as simulate
 from models.systems.wheelset.scene import build
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Stage, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Stage, exudyn_poses, mujoco_poses
 from studies.pictures.shapes import Colour, PaintedSurface, box, extruded_outline, floor, surface_of_revolution
 
 SPEED, START_SHIFT, CELLS, STEP = 75.0, 6e-3, 11, 5e-4
-"""Speed of travel (m/s), first lateral displacement (m), cells of FASTSIM, step (s)."""
+"""Speed of travel (m/s), initial lateral displacement (m), number of cells of FASTSIM, and step (s)."""
 MAGNIFICATION = 5.0
 SLEEPER_SPACING = 0.6
-"""m from one sleeper to the next."""
+"""Distance (m) from one sleeper to the next."""
 STEEL_COLOUR: Colour = (0.62, 0.66, 0.71)
 DARK_COLOUR: Colour = (0.42, 0.45, 0.5)
 RUST_COLOUR: Colour = (0.45, 0.27, 0.16)
@@ -37,8 +37,8 @@ FORCE_CURVE = ForceCurve("creep force", (0.0, 1.0, 0.0), "across the track, to t
 SIDE_SIGNS = {"right": RIGHT, "left": LEFT}
 
 
-def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
-    """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
+def stage_and_motions(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
+    """Stage of the film, and the motion by each engine, with frames at the steps nearest to ``times`` (s)."""
     return stage(CHOSEN_WHEELSET), [_motion_of_engine(engine, duration, times) for engine in engines]
 
 
@@ -59,7 +59,7 @@ def _motion_of_engine(engine: str, duration: float, times: np.ndarray) -> Filmed
     path_of_frames = WheelsetPath(path.times[rows], path.states[rows], contacts=path.contacts[rows])
     joints = to_joints(path_of_frames.states)[:, :JOINTS]
     if engine == "mujoco":
-        poses = of_mujoco(equations.model.model, {"wheelset": 1}, joints)
+        poses = mujoco_poses(equations.model.model, {"wheelset": 1}, joints)
     else:  # by a marker in the middle of the axle: the last link of its tree
         from models.engines.exudyn_system import items
 
@@ -69,15 +69,15 @@ def _motion_of_engine(engine: str, duration: float, times: np.ndarray) -> Filmed
         )
         middle = mbs.AddMarker(link)
         mbs.Assemble()
-        poses = of_exudyn(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
+        poses = exudyn_poses(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
     return FilmedMotion(engine, path_of_frames.times, *poses, arrows(CHOSEN_WHEELSET, path_of_frames), run)
 
 
-def arrows(w: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
-    """Arrows of the normal force and of the creep force on both wheels, at the contact points along a path."""
+def arrows(wheelset: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
+    """Force arrows of the normal force and the creep force on both wheels, at the contact points along a run."""
     drawn_arrows = []
     for k, (name, side) in enumerate(SIDE_SIGNS.items()):
-        cone = Cone(w.radius, w.half_gauge, w.conicity, w.head_radius)
+        cone = Cone(wheelset.radius, wheelset.half_gauge, wheelset.conicity, wheelset.head_radius)
         touched = [cone_on_rail(side, Pose(*state[[Y, Z, ROLL, YAW]].tolist()), cone) for state in path.states]
         points = np.array(touched)[:, -3:] + path.states[:, [Y, Z]] @ np.eye(3)[1:]  # in the track's axes
         contact = path.contacts[:, k]
@@ -92,7 +92,7 @@ def arrows(w: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
 
 
 def stage(wheelset: Wheelset) -> Stage:
-    """Wheelset, rails and sleepers, seen from ahead and to the right; z down."""
+    """Stage of the film: wheelset, rails and sleepers, seen from ahead and to the right; z down."""
     camera = Camera((2.75, 1.75, -0.95), (0.0, 0.12, 0.06), (0.0, 0.0, -1.0), 0.54)
     return Stage(
         f"Wheelset that hunts at {SPEED:g} m/s, creep forces by FASTSIM",
@@ -108,27 +108,33 @@ def stage(wheelset: Wheelset) -> Stage:
     )
 
 
-def shapes(w: Wheelset) -> list[PaintedSurface]:
-    """Surfaces of an axle and two wheels with the model's conical treads. The flange clearance is drawn magnified."""
-    end = w.half_spacing + 0.12
+def shapes(wheelset: Wheelset) -> list[PaintedSurface]:
+    """Surfaces of an axle and two wheels with the model's conical treads; the flange clearance is drawn magnified."""
+    end = wheelset.half_spacing + 0.12
     surfaces = [surface_of_revolution([-end, -end, end, end], [0.0, 0.085, 0.085, 0.0], DARK_COLOUR)]
-    inner, outer = 0.036 + MAGNIFICATION * w.flange_clearance + 0.004, 0.075
-    across = np.array([-inner - 0.03, -inner - 0.025, -inner, outer, outer, 0.02, 0.02, 0.05, 0.05]) + w.half_gauge
-    tread = [w.radius + 0.028, w.radius + w.conicity * inner, w.radius - w.conicity * outer]
+    inner, outer = 0.036 + MAGNIFICATION * wheelset.flange_clearance + 0.004, 0.075
+    across = (
+        np.array([-inner - 0.03, -inner - 0.025, -inner, outer, outer, 0.02, 0.02, 0.05, 0.05]) + wheelset.half_gauge
+    )
+    tread = [
+        wheelset.radius + 0.028,
+        wheelset.radius + wheelset.conicity * inner,
+        wheelset.radius - wheelset.conicity * outer,
+    ]
     radii = np.array([0.0, *tread, 0.39, 0.37, 0.19, 0.16, 0.0])
     for side, order in ((1.0, slice(None)), (-1.0, slice(None, None, -1))):
         surfaces.append(surface_of_revolution(side * across[order], radii[order], STEEL_COLOUR, piece_count=72))
         surfaces += [
-            box(0.09, 0.03, 0.09, RUST_COLOUR).at(0.28 * np.cos(a), side * (w.half_gauge + y), 0.28 * np.sin(a))
+            box(0.09, 0.03, 0.09, RUST_COLOUR).at(0.28 * np.cos(a), side * (wheelset.half_gauge + y), 0.28 * np.sin(a))
             for a in np.arange(6) * np.pi / 3.0
             for y in (0.016, -inner - 0.02)
         ]
     return surfaces
 
 
-def track(w: Wheelset, distance: float) -> list[PaintedSurface]:
+def track(wheelset: Wheelset, distance: float) -> list[PaintedSurface]:
     """Surfaces of rails, sleepers and ballast after the wheelset has travelled a distance (m)."""
-    first, rail_end, top = -24.0, 2.4, w.radius
+    first, rail_end, top = -24.0, 2.4, wheelset.radius
     head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
     rotation = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # the outline lies in y and z
     rail = [
@@ -136,7 +142,7 @@ def track(w: Wheelset, distance: float) -> list[PaintedSurface]:
         box(rail_end - first, 0.02, 0.1, RAIL_COLOUR).at(0.0, 0.0, 0.1),
         box(rail_end - first, 0.14, 0.02, RAIL_COLOUR).at(0.0, 0.0, 0.16),
     ]
-    sides = w.half_gauge, -w.half_gauge
+    sides = wheelset.half_gauge, -wheelset.half_gauge
     surfaces = [surface.at((first + rail_end) / 2.0, y, top) for y in sides for surface in rail]
     phase = distance % SLEEPER_SPACING
     for i in range(int(np.ceil(first / SLEEPER_SPACING)), int(np.floor(rail_end / SLEEPER_SPACING)) + 1):

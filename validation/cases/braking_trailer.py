@@ -13,7 +13,7 @@ from validation.braking import plain_sprung as whole
 from validation.braking import sprung_train as train
 from validation.braking.sprung_box import braked_vehicle, constant_friction, steady_torques
 from validation.common.rows import Observed, Row, System, behaviour_row
-from validation.spatial.towing import keep_to_the_car, loads_and_lengths
+from validation.spatial.towing import give_towed_wheels_car_heading, static_loads
 
 TITLE = "Braking with a trailer on the suspension"
 SYSTEM: System = "anti-lock"
@@ -45,7 +45,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _axle_loads_row() -> Row:
     car = whole.towing_car()
     path = braked_vehicle(car, constant_friction(0.1)).run(steady_torques(*6 * (0.0,)), 2.0, 0.05)
-    front, rear, axle, _ = loads_and_lengths(car.handling)
+    front, rear, axle, _ = static_loads(car.handling)
     loads = path.reports.load[-1].reshape(3, 2).sum(axis=1)
     return Observed(
         "braking_trailer.loads",
@@ -139,7 +139,7 @@ def _fault_rows() -> list[Row]:
     """Rows: faults planted in the force table that Exudyn and MuJoCo share must be caught."""
     pulled = train.relative_difference(train.pulled_caravan(train.hold_on_to_the_car), train.pulled_by_levers())
     turned = whole.towing_car.__wrapped__()
-    keep_to_the_car(turned.handling)
+    give_towed_wheels_car_heading(turned.handling)
     apart = whole.relative_difference(whole.accelerations(turned, "exudyn", 5), whole.plain_accelerations("caravan", 5))
     seen = {
         "brakes": (

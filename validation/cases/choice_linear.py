@@ -15,7 +15,7 @@ from models.systems.ride.reduced_scene import Effect, reduced_without
 from validation.choice.judged import asked_speeds, changes_by_frequency, measured_step, worst_nearby
 from validation.choice.price_of_choice import whole_car
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
-from validation.ride.drawn_rides import DrawnRide, drawn_ride
+from validation.ride.drawn_rides import LinearRide, random_linear_ride
 
 HALF_CAR_SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "ride_choice.toml"
 """Scene file of the published half car."""
@@ -45,7 +45,7 @@ class JudgedChoice:
     sampled_saving : saving by the covariance of sampled runs.
     """
 
-    scene: DrawnRide
+    scene: LinearRide
     choice: RideChoice
     identity_error: float
     frequency_changes: np.ndarray | None
@@ -65,7 +65,7 @@ class JudgedChoice:
         return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
-def judged_choice_of(scene: DrawnRide, by_frequency: bool) -> JudgedChoice:
+def judged_choice_of(scene: LinearRide, by_frequency: bool) -> JudgedChoice:
     """Choose effects for a scene, then check the choice by the identity of covariance and adjoint and, if
     ``by_frequency``, by frequency responses."""
     chooser = asked_speeds(scene)
@@ -89,7 +89,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     seeds = QUICK_SEEDS if quick else range(SCENE_COUNT)
     choices = [
         judged_choice_of(
-            drawn_ride(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0),
+            random_linear_ride(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0),
             quick or seed < FREQUENCY_JUDGED_COUNT,
         )
         for seed in seeds

@@ -13,7 +13,7 @@ from validation.choice.drawn_scenes import draw_scene
 from validation.choice.judged import JudgedByRuns, judged_of
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row
-from validation.ride.drawn_rides import COPIES, BentRide, drawn_bent
+from validation.ride.drawn_rides import COPIES, NonlinearRide, random_nonlinear_ride
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
@@ -42,16 +42,16 @@ JUDGED_RANGE = (1e-4, 0.05)
 def judge_choice(system: str, seed: int) -> JudgedByRuns:
     """Choose effects for the random scene of a seed, and judge the choice."""
     if system == "ride":
-        return judge_ride(drawn_bent(seed))
+        return judge_ride(random_nonlinear_ride(seed))
     return judged_of(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
-def judge_ride(bent_ride: BentRide) -> JudgedByRuns:
+def judge_ride(bent_ride: NonlinearRide) -> JudgedByRuns:
     """Choose effects for a ride with nonlinear springs, then compare the complete and the reduced vehicle on new roads
     that the choice did not use."""
     engine = ENGINES["ride"][0]
-    choice = Chooser(bent_ride.opened(), engine, list(bent_ride.quantities), bent_ride.tolerance).choose()
-    fresh = Variants(bent_ride.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
+    choice = Chooser(bent_ride.prepared_in_time(), engine, list(bent_ride.quantities), bent_ride.tolerance).choose()
+    fresh = Variants(bent_ride.prepared_in_time(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
     full_scene, rest = fresh.quantities_of_run(), fresh.quantities_of_run(choice.left_out, choice.step_factor)
     if full_scene is None or rest is None:
         return JudgedByRuns("ride", engine, bent_ride, choice, np.full(len(bent_ride.quantities), np.inf))
@@ -111,9 +111,11 @@ def _kept_tolerance_rows(choices: list[JudgedByRuns]) -> list[Row]:
 def _refusal_row() -> Row:
     """Row: a choice is refused for a ride with few copies and a fine tolerance, since random scatter could exceed the
     tolerance."""
-    asked, outcome = drawn_bent(UNDERSAMPLED_SEED), "a choice"
+    asked, outcome = random_nonlinear_ride(UNDERSAMPLED_SEED), "a choice"
     try:
-        Chooser(asked.opened(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE).choose()
+        Chooser(
+            asked.prepared_in_time(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE
+        ).choose()
     except InputError as error:
         outcome = "refused" if "samples would tell" in error.allowed else error.allowed
     return behaviour_row(

@@ -26,7 +26,7 @@ from models.vehicles.spatial import SpringDamper
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.spatial import hub_inputs
-from validation.spatial.cars import by_jacobians, r19, random_states, random_wrenches, static_forces, twin
+from validation.spatial.cars import hub_forces_by_jacobians, r19, random_states, random_wrenches, static_forces, twin
 
 TITLE = "A car of 19 freedoms on noisy hub forces"
 SYSTEM: System = "drift"
@@ -107,7 +107,7 @@ def _wrench_row(vehicle: CutVehicle) -> Row:
             build("mujoco", vehicle, replace(hub_inputs, hubs=force_factor * hub_inputs.hubs), STEP, STEP)
             for force_factor in (1.0, 0.0)
         )
-        expected = by_jacobians(built, q, hub_inputs.hubs[0], frame)
+        expected = hub_forces_by_jacobians(built, q, hub_inputs.hubs[0], frame)
         off = np.abs(built.forces_at_rest(q) - bare.forces_at_rest(q) - expected).max()
         worst = max(worst, float(off / np.abs(expected).max()))
     return Observed(

@@ -96,7 +96,7 @@ def _instruction_counts(folder: Path) -> np.ndarray:
         "valgrind",
         "--tool=callgrind",
         "--instr-atstart=no",
-        f"--dump-before={instructions_run.MARK}",
+        f"--dump-before={instructions_run.MARKING_SYSTEM_CALL}",
         f"--callgrind-out-file={folder}/count.%p",
         sys.executable,
         instructions_run.__file__,

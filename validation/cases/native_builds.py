@@ -10,11 +10,11 @@ from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.spatial.cars import r19, rough_car, twin
 from validation.spatial.native_builds import (
     NATIVE_ENGINES,
-    acceleration_error,
-    equations_error,
+    difference_from_equations,
     hub_model,
-    path_error,
+    native_acceleration_difference,
     random_states,
+    trajectory_difference,
 )
 
 TITLE = "Springs, mounts and bars of the engines' own under hub forces"
@@ -45,7 +45,7 @@ def _agreement_rows(car_name: str, car: CutVehicle, quick: bool) -> list[Row]:
             SYSTEM,
             "largest difference of the accelerations by compiled forces from written-out equations, "
             f"no hub forces, {where}",
-            equations_error(car, states),
+            difference_from_equations(car, states),
             "1",
         ).at_most(1e-12, "of each coordinate's largest; rounding of stiff bushes leaves 6e-14", "native")
     ]
@@ -55,7 +55,7 @@ def _agreement_rows(car_name: str, car: CutVehicle, quick: bool) -> list[Row]:
                 f"native_builds.accelerations_{car_name}_{engine}",
                 SYSTEM,
                 f"largest difference of the accelerations with {engine}'s springs from compiled forces, {where}",
-                acceleration_error(engine, car, states),
+                native_acceleration_difference(engine, car, states),
                 "1",
             ).at_most(1e-12, "of each coordinate's largest; the hub forces alone are shared", "native"),
             Observed(
@@ -63,7 +63,7 @@ def _agreement_rows(car_name: str, car: CutVehicle, quick: bool) -> list[Row]:
                 SYSTEM,
                 f"largest difference of the states with {engine}'s springs from compiled forces, "
                 f"{steps} steps of 1 ms, {car_name}",
-                path_error(engine, car, steps),
+                trajectory_difference(engine, car, steps),
                 "m, rad, 1/s",
             ).at_most(1e-10, "same tableau, same step", "native"),
             _native_count_row(car_name, car, engine),

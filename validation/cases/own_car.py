@@ -9,7 +9,7 @@ from models.multibody.numbers import Controls, Handling
 from models.own_model.car import vehicle_of_file
 from models.systems.handling.run import REFERENCE, build, drive_run
 from validation.common.rows import CaseAnswer, Observed, Row, System
-from validation.own_model.car_energy import energies_apart
+from validation.own_model.car_energy import largest_energy_difference
 from validation.own_model.cars import SALOON
 
 TITLE = "A user's own car: MJCF as the vehicle of a scene"
@@ -36,7 +36,7 @@ def _energy_row(handling: Handling, quick: bool) -> Row:
         "own_car.energy",
         SYSTEM,
         "largest difference of kinetic and potential energy from MuJoCo's own model of the file, at random states",
-        energies_apart(handling, STATE_COUNTS[quick]),
+        largest_energy_difference(handling, STATE_COUNTS[quick]),
         "of the largest",
     ).at_most(1e-11, "rounding, and rotors that weigh 1e-9 kg more; equal energies make equal equations", "native")
 

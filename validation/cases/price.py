@@ -43,8 +43,8 @@ PROBLEMS: tuple[MakeProblem, ...] = (
     inertial_unit.problem,
 )
 FULL_RUN_PROBLEMS: tuple[MakeProblem, ...] = (
-    force_excited.noisy,
-    force_excited.guided,
+    force_excited.noisy_problem,
+    force_excited.prescribed_pitch_problem,
     free_vehicle.problem,
     partial(wheelset.problem, speed=5.0),
     partial(wheelset.problem, speed=1.0),
@@ -89,13 +89,13 @@ def _further_cases(quick: bool, round_count: int) -> CaseAnswer:
     """Rows and data of costs that the common runner does not measure: ride, parts of a step, force calls, claims about
     speed."""
     road = assembly_of_scene(road_excited.scene())
-    rows, prices = ride.measure(quick, round_count, SHORTEST_TIMED_RUN[True])
+    rows, prices = ride.measure_routes(quick, round_count, SHORTEST_TIMED_RUN[True])
     twice, least, duration = 2 * round_count, 2 * SHORTEST_TIMED_RUN[quick], road_excited.DURATION
     data: Saved = {
         "ride": prices,
         "split": [] if quick else split.measure(round_count, SHORTEST_TIMED_RUN[quick]),
         "callback": {name: speed.callback_cost(road, duration, name, twice, least) for name in ("RK4", "Euler")},
-        "real time": speed.real_time(road, duration, twice, least),
+        "real time": speed.real_time_factors(road, duration, twice, least),
     }
     settings = dict.fromkeys(
         _setting_at_1_ms(problem_rows)

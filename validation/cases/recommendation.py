@@ -13,7 +13,7 @@ from models.core.errors import InputError, RunFailed
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 from validation.price import unseen_systems
-from validation.price.unseen import ENGINES, Verdict, drawn, judge
+from validation.price.unseen import ENGINES, Verdict, random_scene, verdicts_on_pitch_plane
 
 SceneVerdicts = tuple[list[Verdict], list[str]]
 
@@ -74,9 +74,9 @@ def scene_verdicts(system: str, scene_number: int, folder: Path, engines: tuple[
     for n in range(scene_number, scene_number + (REDRAWS + 1) * REDRAW_STRIDE, REDRAW_STRIDE):
         try:
             reasons = (
-                judge(drawn(n, folder), engines)
+                verdicts_on_pitch_plane(random_scene(n, folder), engines)
                 if system == "pitch-plane"
-                else unseen_systems.judge(unseen_systems.drawn_scene_of_system(system, n))
+                else unseen_systems.verdicts_on_system(unseen_systems.drawn_scene_of_system(system, n))
             )
         except (InputError, RunFailed) as error:
             refused.append(f"{system} {n}: {error}")
@@ -89,8 +89,8 @@ def _promise_rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row
     """Rows on the promises of a recommendation: tolerance, predicted error, and cost. A scene counts as met if every
     recommended setting keeps the scene's tolerance."""
     every = [verdict for of_scene in verdicts for verdict in of_scene]
-    kept_scenes = sum(bool(of_scene) and all(verdict.meets for verdict in of_scene) for of_scene in verdicts)
-    factors = [verdict.factor for verdict in every]
+    kept_scenes = sum(bool(of_scene) and all(verdict.keeps_tolerance for verdict in of_scene) for of_scene in verdicts)
+    factors = [verdict.error_ratio for verdict in every]
     scenes, why = f"{len(verdicts)} scenes drawn at random", "judged by another solver than the search's, DOP853"
     return [
         Observed(

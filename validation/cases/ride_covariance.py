@@ -26,11 +26,11 @@ from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
-from validation.ride.no_variance import CORNER, weighting_rows, without_variance
+from validation.ride.no_variance import QUARTER_CAR, no_variance_rows, weighting_rows
 from validation.ride.rides import (
     ROAD_INTENSITY,
     changed_vehicle,
-    five_cases,
+    five_correlation_cases,
     largest_relative_error,
     one_track,
     paper_road,
@@ -53,7 +53,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows: covariance compared with quadrature, closed forms and limits, and the fast method for many speeds. A quick
     run leaves out the engines' own linearisations, and compares two vehicles at one speed each."""
     routes = [_quadrature_comparison(*job) for job in _comparisons(quick)]
-    rows = [*_closed_form_rows(), *_quadrature_rows(routes), *_limit_rows(), *weighting_rows(SEED), *without_variance()]
+    rows = [*_closed_form_rows(), *_quadrature_rows(routes), *_limit_rows(), *weighting_rows(SEED), *no_variance_rows()]
     engines = () if quick else ("exudyn", "mujoco")
     rows += [_engine_row(engine) for engine in engines]
     speeds = SPEEDS[::20] if quick else SPEEDS
@@ -95,7 +95,7 @@ def _quadrature_comparison(vehicle_name: str, seed: int, road: TwoTrackRoad | No
     vehicle = linearise(_ride_vehicle(vehicle_name, seed), speed)
     compared = [
         _covariance_difference(vehicle, vehicle, excitation, speed)
-        for excitation in five_cases(vehicle.wheels, road).values()
+        for excitation in five_correlation_cases(vehicle.wheels, road).values()
     ]
     worst, by_covariance, by_quadrature, counts = zip(*compared, strict=True)
     return {
@@ -126,13 +126,13 @@ def _closed_form_rows() -> list[Row]:
     worst = {"acceleration": 0.0, "travel": 0.0, "deflection": 0.0}
     for corner in (0.0, 1e-6, 1e-3, 0.3, 3.0):
         variance = stationary_covariance(
-            vehicle_with_road(quarter_car_vehicle([(0.0, CORNER)]), one_track((0.0,), corner), 20.0)
+            vehicle_with_road(quarter_car_vehicle([(0.0, QUARTER_CAR)]), one_track((0.0,), corner), 20.0)
         ).variance
         q, w = 20.0 * ROAD_INTENSITY, 20.0 * corner
         exact = [
-            CORNER.body_acceleration_variance(q, w),
-            CORNER.suspension_travel_variance(q, w),
-            CORNER.tyre_deflection_variance(q),
+            QUARTER_CAR.body_acceleration_variance(q, w),
+            QUARTER_CAR.suspension_travel_variance(q, w),
+            QUARTER_CAR.tyre_deflection_variance(q),
         ]
         for key, value, expected in zip(worst, variance[:3], exact if corner == 0.0 else exact[:2], strict=False):
             worst[key] = max(worst[key], largest_relative_error(value, expected))
@@ -147,10 +147,10 @@ def _closed_form_rows() -> list[Row]:
         for key, value in worst.items()
     ]
     a, b, speeds = 1.2, 1.5, (3.0, 17.0, 50.0)
-    front, rear, inertia = split_half_car(CORNER, a, b)
+    front, rear, inertia = split_half_car(QUARTER_CAR, a, b)
     vehicle = quarter_car_vehicle([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
     half = [stationary_covariance(vehicle_with_road(vehicle, one_track((a, -b)), v)).variance[0] for v in speeds]
-    formula = [half_car_acceleration(CORNER, v * ROAD_INTENSITY, a, b, v) for v in speeds]
+    formula = [half_car_acceleration(QUARTER_CAR, v * ROAD_INTENSITY, a, b, v) for v in speeds]
     what = "error of the variance at the centre of a half car that splits into quarter cars, delay exact, 3 to 50 m/s"
     worst_half = largest_relative_error(np.array(half), np.array(formula))
     return [
@@ -206,7 +206,9 @@ def _inputs_row() -> Row:
     """Row: covariance of the road heights under the wheels in the stationary solution, compared with its law."""
     vehicle = linearise(_ride_vehicle("three_axle_truck", SEED))
     road, worst = road_of_level(1.0), 0.0
-    for met, case in zip(five_cases(vehicle.wheels, road).values(), CORRELATION_CASES.values(), strict=True):
+    for met, case in zip(
+        five_correlation_cases(vehicle.wheels, road).values(), CORRELATION_CASES.values(), strict=True
+    ):
         H = np.hstack([np.zeros((len(vehicle.wheels), 2 * len(vehicle.mass))), *met.heights])
         heights = H @ stationary_covariance(vehicle_with_road(vehicle, met, 13.0)).P @ H.T
         expected = input_covariance(road, vehicle.wheels, *case)
@@ -228,7 +230,7 @@ def _engine_row(engine: str) -> Row:
     for name, speed in (("r19_ride", 20.0), ("r19_free", 33.0), ("three_axle_truck", 9.0)):
         vehicle = _ride_vehicle(name, SEED)
         linear, analytic = build(engine, vehicle, speed=speed).linearise(), linearise(vehicle, speed)
-        roads = five_cases(analytic.wheels).values()
+        roads = five_correlation_cases(analytic.wheels).values()
         worst = max(worst, *(_covariance_difference(linear, analytic, road, speed)[0] for road in roads))
     return Observed(
         f"ride_covariance.engine.{engine}",
@@ -245,7 +247,7 @@ def _speed_sweep_rows(speeds: np.ndarray, engine: str) -> tuple[list[Row], dict[
     the direct method, with processor times."""
     vehicle = _ride_vehicle("r19_ride")
     linear = linear_vehicle(vehicle, engine)
-    roads = five_cases(linear(20.0).wheels)
+    roads = five_correlation_cases(linear(20.0).wheels)
     variance_sweep(
         linear, roads, speeds[:1], WEIGHTED_OUTPUTS
     )  # what is loaded and linearised once is no part of the sweep

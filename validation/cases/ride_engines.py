@@ -59,7 +59,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def vehicle_of_name(name: str, gravity: float = 0.0) -> SpatialVehicle:
     """A shipped vehicle, or the asymmetric twin, with a given gravity (m/s^2)."""
-    return spatial_twin.vehicle(gravity) if name == "spatial twin" else replace(load_vehicle(name), gravity=gravity)
+    return (
+        spatial_twin.asymmetric_vehicle(gravity)
+        if name == "spatial twin"
+        else replace(load_vehicle(name), gravity=gravity)
+    )
 
 
 def with_nonlinear_springs(vehicle: SpatialVehicle) -> SpatialVehicle:

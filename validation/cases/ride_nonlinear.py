@@ -20,9 +20,9 @@ from validation.ride.in_engines import (
     NONLINEAR_VEHICLE,
     SEED,
     SPEED,
-    bent_in_engines,
     draw,
-    linear_in_engines,
+    linear_engine_rows,
+    nonlinear_engine_rows,
     vehicle_and_road,
 )
 from validation.ride.rides import largest_relative_error
@@ -47,11 +47,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         level_rows, line = _level_rows(level, quick)
         rows += level_rows
         table.append(line)
-    rows += bent_in_engines(quick)
+    rows += nonlinear_engine_rows(quick)
     if quick:
         return rows, {"levels": table, "spectra": {}}
     rows += [_linear_springs_row(), *_single_law_rows()]
-    level_rows, shown = linear_in_engines()
+    level_rows, shown = linear_engine_rows()
     return rows + level_rows, {"levels": table, "spectra": shown}
 
 

@@ -26,7 +26,13 @@ from models.vehicles.linear_vehicle import LinearVehicle, WheelPosition
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Observed, Row, System, Table
-from validation.ride.fitted_roads import HALF_TRACK, coherency_figure, fits_table, fitted_made_road, measured_road_rows
+from validation.ride.fitted_roads import (
+    HALF_TRACK,
+    coherency_figure,
+    fits_table,
+    generated_road_rows,
+    measured_road_rows,
+)
 from validation.ride.rides import STANDARD_WEIGHTINGS, largest_relative_error
 
 TITLE = "Ride: roads under two tracks"
@@ -51,7 +57,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of closed forms by second methods, frequency weightings, and fits to an artificial road; a full run also has
     fits to measured roads."""
     rows = [*_paper_rows(), *_input_rows(), *_isotropic_rows(), *_weighting_rows()]
-    of_made, road = fitted_made_road(1_000.0 if quick else 20_000.0)
+    of_made, road = generated_road_rows(1_000.0 if quick else 20_000.0)
     of_measured, roads = ([], []) if quick else measured_road_rows()
     return [*rows, *of_made, *of_measured], {"made": road, "measured": roads}
 

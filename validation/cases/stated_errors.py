@@ -75,11 +75,11 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
         "cost": sample.extra_calls / sample.calls,
         "ratio": None,
     }
-    if not sample.told:
+    if not sample.stated_errors:
         return sample_table
-    stated, true = sample.told[sample.printed], sample.true[sample.printed]
+    stated, true = sample.stated_errors[sample.printed_channel], sample.true_errors[sample.printed_channel]
     return sample_table | {
-        "channel": sample.printed,
+        "channel": sample.printed_channel,
         "stated": stated.error,
         "true": true,
         "unit": stated.unit,

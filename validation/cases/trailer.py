@@ -11,7 +11,7 @@ from models.systems.handling.energy import drive_energy, unaccounted
 from models.systems.handling.run import Drive, drive_run
 from models.vehicles.spatial import SpatialVehicle
 from validation.common.rows import CaseAnswer, Observed, Row, System, behaviour_row
-from validation.spatial.towing import circle_error, keep_to_the_car, levers_error, towed_turn
+from validation.spatial.towing import circle_error, give_towed_wheels_car_heading, static_load_error, towed_turn
 from validation.spatial.trains import caravan, train, train_without_tie
 from validation.spatial.written_equations import TURN_CONTROLS
 
@@ -42,7 +42,7 @@ def _static_loads_row() -> Row:
         "trailer.loads",
         SYSTEM,
         "static loads on the caravan's ball and on all three axles, over those by their levers, less 1",
-        levers_error(),
+        static_load_error(),
         "",
     ).at_most(1e-9, "statics of two bodies on a ball and three axles; rounding of a linear system", "closed form")
 
@@ -68,14 +68,14 @@ def _turn_rows(train_name: str) -> list[Row]:
             SYSTEM,
             f"yaw gain of a steady turn of small slip of the {train_name} at {TURN_SPEED:g} m/s, "
             "over the closed form's, less 1",
-            errors.yaw,
+            errors.yaw_rate,
             "",
         ).at_most(TURN_TOLERANCE, why, "closed form"),
         Observed(
             f"trailer.heading.{train_name}",
             SYSTEM,
             f"headings of what is towed in it beside the car, less the closed form's, per rad of steer ({train_name})",
-            float(np.abs(errors.headings).max()),
+            float(np.abs(errors.towed_headings).max()),
             "rad/rad",
         ).at_most(TURN_TOLERANCE, why, "closed form"),
     ]
@@ -103,8 +103,8 @@ def _energy_row() -> Row:
 
 
 def _fault_row() -> Row:
-    errors = towed_turn(caravan(), TURN_SPEED, keep_to_the_car)
-    seen = abs(errors.yaw) > TURN_TOLERANCE or np.abs(errors.headings).max() > TURN_TOLERANCE
+    errors = towed_turn(caravan(), TURN_SPEED, give_towed_wheels_car_heading)
+    seen = abs(errors.yaw_rate) > TURN_TOLERANCE or np.abs(errors.towed_headings).max() > TURN_TOLERANCE
     return behaviour_row(
         "trailer.fault",
         SYSTEM,

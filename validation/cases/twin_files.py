@@ -22,18 +22,18 @@ from models.own_model.path import EQUAL_PATH_SHARE, compare_paths
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.own_model.files import (
     ARM_URDF,
+    BOX_WELDED_TO_CRANK,
     CART,
     GEARED,
-    HELD,
     JOINTED,
     LINKED,
-    PLANTED,
+    PLANTED_DIFFERENCES,
     TIED,
-    chain,
-    changed,
-    tree,
+    model_with_change,
+    random_chain,
+    random_tree,
 )
-from validation.own_model.soft_couplings import softly_coupled
+from validation.own_model.soft_couplings import soft_constraint_equations
 
 TITLE = "A user's own model: MJCF and URDF in every build"
 SYSTEM: System = "rolling-vehicle"
@@ -50,10 +50,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of 24 models, eight of them exported, and of 30 planted differences; a quick run has seven models, five
     states and six planted differences."""
     texts = {"jointed": JOINTED, "cart": CART, "arm": ARM_URDF, "tied": TIED, "geared": GEARED}
-    texts |= {"linked": LINKED, "held": HELD}
+    texts |= {"linked": LINKED, "held": BOX_WELDED_TO_CRANK}
     if not quick:
-        texts |= {f"chain_{count}": chain(count) for count in (8, 30)}
-        texts |= {f"tree_{seed}": tree(4 + 2 * seed, seed) for seed in range(1, 8)}
+        texts |= {f"chain_{count}": random_chain(count) for count in (8, 30)}
+        texts |= {f"tree_{seed}": random_tree(4 + 2 * seed, seed) for seed in range(1, 8)}
     rows = [_agreement_row(name, _file_of_text(folder, name, text), quick) for name, text in texts.items()]
     rows += [] if quick else [_agreement_row(name, _exported_file(folder, name), quick) for name in EXPORTED_SCENES]
     return [
@@ -96,7 +96,9 @@ def _soft_constraint_row(folder: Path, model_name: str, text: str) -> Row:
     independently written equations."""
     twin = _file_of_text(folder, model_name, text).twin
     states = states_of(twin, QUICK_STATE_COUNT)
-    apart = agreement_of_build("", reference_of_file(twin, states, SOFT_BUILD), moved_at(softly_coupled(twin), states))
+    apart = agreement_of_build(
+        "", reference_of_file(twin, states, SOFT_BUILD), moved_at(soft_constraint_equations(twin), states)
+    )
     return Observed(
         f"twin_files.soft_{model_name}",
         SYSTEM,
@@ -132,9 +134,9 @@ def _cart_rows(folder: Path) -> list[Row]:
 def _planted_differences_row(folder: Path, quick: bool) -> Row:
     """Row: number of planted differences that the comparison names first, with their right size."""
     first, named = _file_of_text(folder, "original", JOINTED).twin, 0
-    chosen = PLANTED[::5] if quick else PLANTED
+    chosen = PLANTED_DIFFERENCES[::5] if quick else PLANTED_DIFFERENCES
     for name, old, new, kind, owner, size in chosen:
-        second = _file_of_text(folder, "planted", changed(JOINTED, name, old, new)).twin
+        second = _file_of_text(folder, "planted", model_with_change(JOINTED, name, old, new)).twin
         influential = compare(first, second, 3).influential
         sentence = influential[0].sentence(("original", "planted")) if influential else ""
         named += sentence.startswith(f"{kind} of {owner}: ") and size.replace("b.xml", "planted") in sentence

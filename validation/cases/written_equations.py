@@ -9,15 +9,15 @@ from models.vehicles.spatial_linear import preloads
 from validation.common.checks import largest_relative_difference
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.spatial.written_equations import (
-    bristles_gap,
+    brush_force_difference,
+    cut_car_acceleration_difference,
+    cut_car_path_difference,
     cut_cars,
-    hub_gap,
-    hub_path_gap,
-    inside_gap,
-    report_gap,
+    inner_force_difference,
+    report_difference,
+    rolling_acceleration_difference,
     rolling_cars,
-    rolling_gap,
-    rolling_path_gap,
+    rolling_path_difference,
 )
 
 TITLE = "Cars by plain equations that share no force with the engines"
@@ -53,7 +53,7 @@ def _law_rows(state_count: int) -> list[Row]:
         _plain_equations_row(
             "bristles",
             f"largest difference of the creep forces of {state_count} random patches, over the load",
-            bristles_gap(state_count),
+            brush_force_difference(state_count),
             "1",
             LAW_TOLERANCE,
         )
@@ -90,7 +90,7 @@ def _hub_rows(state_count: int, duration: float) -> list[Row]:
                 _plain_equations_row(
                     f"hubs.{engine}.{name}",
                     what,
-                    hub_gap(car, engine, state_count),
+                    cut_car_acceleration_difference(car, engine, state_count),
                     "of the largest",
                     ACCELERATION_TOLERANCE,
                 )
@@ -98,7 +98,7 @@ def _hub_rows(state_count: int, duration: float) -> list[Row]:
         what = f"largest difference of {name}'s section forces, wrenches and holding moments at random states"
         rows.append(
             _plain_equations_row(
-                f"hubs.inside.{name}", what, inside_gap(car, 4), "of the largest", ACCELERATION_TOLERANCE
+                f"hubs.inside.{name}", what, inner_force_difference(car, 4), "of the largest", ACCELERATION_TOLERANCE
             )
         )
         for kind, rough in (("road", True), ("noise", False)):
@@ -107,7 +107,7 @@ def _hub_rows(state_count: int, duration: float) -> list[Row]:
                 _plain_equations_row(
                     f"hubs.{kind}.{name}",
                     what,
-                    hub_path_gap(car, "mujoco", duration, rough),
+                    cut_car_path_difference(car, "mujoco", duration, rough),
                     "m, rad, 1/s",
                     PATH_TOLERANCE,
                 )
@@ -121,7 +121,7 @@ def _rolling_rows(state_count: int, duration: float) -> list[Row]:
     for name, car in rolling_cars().items():
         for engine in ENGINES:
             what = f"largest difference of {name}'s accelerations on tyres in {engine}, {state_count} random states"
-            gap = rolling_gap(car, engine, state_count)
+            gap = rolling_acceleration_difference(car, engine, state_count)
             rows.append(
                 _plain_equations_row(f"tyres.{engine}.{name}", what, gap, "of the largest", ACCELERATION_TOLERANCE)
             )
@@ -130,10 +130,10 @@ def _rolling_rows(state_count: int, duration: float) -> list[Row]:
         )
         rows.append(
             _plain_equations_row(
-                f"tyres.reports.{name}", what, report_gap(car, state_count), "1", ACCELERATION_TOLERANCE
+                f"tyres.reports.{name}", what, report_difference(car, state_count), "1", ACCELERATION_TOLERANCE
             )
         )
         what = f"largest difference of {name}'s positions and rates in MuJoCo, {duration:g} s of a turn on a rough road"
-        gap = rolling_path_gap(car, "mujoco", duration)
+        gap = rolling_path_difference(car, "mujoco", duration)
         rows.append(_plain_equations_row(f"tyres.path.{name}", what, gap, "m, rad, 1/s", PATH_TOLERANCE))
     return rows

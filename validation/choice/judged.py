@@ -20,7 +20,7 @@ from models.ride.frequency import spectral_densities
 from models.systems.ride.reduced_scene import ReducedScene, reduced_without
 from validation.choice.drawn_scenes import ChoiceQuestion
 from validation.choice.sampled import Sampled
-from validation.ride.drawn_rides import BentRide, DrawnRide
+from validation.ride.drawn_rides import LinearRide, NonlinearRide
 
 SPEED_SHARES = (0.7, 1.0, 1.3)
 """Speeds of a scene by the one that is drawn."""
@@ -28,7 +28,7 @@ ANGULAR_FREQUENCIES = np.geomspace(1e-2, 3e5, 3000)
 """rad/s of the frequency route: its sums are good to 1e-3 of a change, being the same grid for both."""
 
 
-def asked_speeds(drawn_scene: DrawnRide) -> Chooser:
+def asked_speeds(drawn_scene: LinearRide) -> Chooser:
     """A chooser for a range of speeds about the scene's speed."""
     return Chooser(
         drawn_scene.scene,
@@ -88,7 +88,7 @@ class JudgedByRuns:
 
     system: str
     engine: str
-    asked: ChoiceQuestion | BentRide
+    asked: ChoiceQuestion | NonlinearRide
     choice: ChoiceByRuns
     repeated_changes: np.ndarray
 

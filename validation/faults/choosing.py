@@ -21,7 +21,7 @@ from validation.choice.drawn_scenes import draw_scene as drawn_run
 from validation.choice.judged import JudgedByRuns, asked_speeds, changes_by_frequency, judged_of, worst_nearby
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import attribute_patch
-from validation.ride.drawn_rides import DrawnRide, drawn_ride
+from validation.ride.drawn_rides import LinearRide, random_linear_ride
 
 SEED, HALF_CAR_SEED = 61, 4
 """Of the linear scene, and of the half car that is run."""
@@ -33,8 +33,8 @@ TOLERANCE = 1e-3
 
 
 @cache
-def _linear_ride() -> DrawnRide:
-    return drawn_ride(SEED)
+def _linear_ride() -> LinearRide:
+    return random_linear_ride(SEED)
 
 
 @cache

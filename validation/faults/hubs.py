@@ -13,7 +13,7 @@ from models.vehicles.cut_vehicle import CutVehicle
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
-from validation.spatial.cars import by_jacobians, r19, static_forces
+from validation.spatial.cars import hub_forces_by_jacobians, r19, static_forces
 
 
 def _driven_model(hubs: np.ndarray) -> HubModel:
@@ -29,7 +29,7 @@ def _jacobian_difference() -> float:
     q[3:6] = 1.0, 0.1, -0.2
     built, bare = _driven_model(rows), _driven_model(0.0 * rows)
     return largest_relative_difference(
-        built.forces_at_rest(q) - bare.forces_at_rest(q), by_jacobians(built, q, rows[0])
+        built.forces_at_rest(q) - bare.forces_at_rest(q), hub_forces_by_jacobians(built, q, rows[0])
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
 from validation.spatial.cars import rough_car
-from validation.spatial.native_builds import acceleration_error, random_states
+from validation.spatial.native_builds import native_acceleration_difference, random_states
 
 STATE_COUNT = 3
 EXUDYN_MODULE = "models.engines.native_exudyn"
@@ -21,7 +21,7 @@ EXUDYN_MODULE = "models.engines.native_exudyn"
 
 def _beside_compiled(engine: str) -> Callable[[], float]:
     """Largest difference of an engine's accelerations from those by compiled forces."""
-    return lambda: acceleration_error(engine, rough_car(), random_states(rough_car(), STATE_COUNT))
+    return lambda: native_acceleration_difference(engine, rough_car(), random_states(rough_car(), STATE_COUNT))
 
 
 CHECK_TITLE = "accelerations of {} beside compiled forces"

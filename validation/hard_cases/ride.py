@@ -26,12 +26,12 @@ from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 from validation.ride.hard_rides import (
     QUARTER_CAR_NUMBERS,
     SPEED,
-    after_hours,
-    closed_form,
-    linear,
+    closed_form_error,
+    linear_equations,
     quarter_car,
     roll_steered_vehicle,
     single_body,
+    variances_after_hours,
 )
 from validation.ride.rides import ROAD_INTENSITY, largest_relative_error, one_track, paper_road
 
@@ -41,7 +41,10 @@ Change = Callable[[dict[str, Any]], object]
 def damped_tyre(implementation: str, folder: Path) -> float:
     """Error of the body acceleration with a damped tyre, against quadrature; the tyre's force alone must be reported as
     infinite."""
-    vehicle, road = linear(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), implementation), one_track((0.0,), 0.3)
+    vehicle, road = (
+        linear_equations(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), implementation),
+        one_track((0.0,), 0.3),
+    )
     covariance = stationary_covariance(vehicle_with_road(vehicle, road, SPEED))
     if [status == INFINITE for status in covariance.status] != [False, False, True]:
         return np.inf
@@ -52,7 +55,7 @@ def damped_tyre_naive(folder: Path) -> str:
     """Without the guard: variances by the Lyapunov equation if the white noise that reaches outputs directly is
     ignored."""
     system = vehicle_with_road(
-        linear(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), "reference"), one_track((0.0,), 0.3), SPEED
+        linear_equations(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), "reference"), one_track((0.0,), 0.3), SPEED
     )
     silent = replace(system, D=tuple(0.0 * D for D in system.D))
     return f"C P C' gives the tyre force a standard deviation of {stationary_covariance(silent).deviation[2]:.0f} N"
@@ -61,22 +64,22 @@ def damped_tyre_naive(folder: Path) -> str:
 def free_accelerations(implementation: str, folder: Path) -> float:
     """Relative error of R19-free's accelerations against the exact covariance one hour after rest, with independent
     axles."""
-    vehicle = linear(load_vehicle("r19_free"), implementation)
+    vehicle = linear_equations(load_vehicle("r19_free"), implementation)
     system = vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     rows = [i for i, output in enumerate(vehicle.outputs) if "acceleration" in output.kind]
-    covariance, wanted = stationary_covariance(system), after_hours(system)[0]
+    covariance, wanted = stationary_covariance(system), variances_after_hours(system)[0]
     return largest_relative_error(covariance.variance[rows], wanted[rows])
 
 
 def drifting(implementation: str, folder: Path) -> float:
     """Errors of the growth rates of heading variance (as t) and lateral position variance (as t^3) against the exact
     covariance after 1 and 2 hours, with independent axles."""
-    vehicle = linear(roll_steered_vehicle(), implementation)
+    vehicle = linear_equations(roll_steered_vehicle(), implementation)
     system = vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     covariance = stationary_covariance(system)
     if covariance.status != (DIFFUSING, DIFFUSING) or covariance.power.tolist() != [1, 3]:
         return np.inf
-    after_1, after_2 = after_hours(system)
+    after_1, after_2 = variances_after_hours(system)
     grown = (after_2 - after_1) / (2.0**covariance.power - 1.0) / 3600.0**covariance.power
     return largest_relative_error(grown, covariance.rate)
 
@@ -87,7 +90,7 @@ def undamped(corner: float) -> Callable[..., float]:
     def error(implementation: str, folder: Path) -> float:
         undamped_car = replace(single_body(300.0, 2e5, 0.0), springs=())
         covariance = stationary_covariance(
-            vehicle_with_road(linear(undamped_car, implementation), one_track((0.0,), corner), SPEED)
+            vehicle_with_road(linear_equations(undamped_car, implementation), one_track((0.0,), corner), SPEED)
         )
         if covariance.status != (DIFFUSING, DIFFUSING):
             return np.inf
@@ -104,7 +107,9 @@ def triple(implementation: str, folder: Path) -> float:
     w = 6.0
     covariance = stationary_covariance(
         vehicle_with_road(
-            linear(single_body(300.0, 300.0 * w**2, 600.0 * w), implementation), one_track((0.0,), w / SPEED), SPEED
+            linear_equations(single_body(300.0, 300.0 * w**2, 600.0 * w), implementation),
+            one_track((0.0,), w / SPEED),
+            SPEED,
         )
     )
     return largest_relative_error(covariance.variance, 3.0 * ROAD_INTENSITY * SPEED / 16.0 * np.array([w**3, 1.0 / w]))
@@ -112,7 +117,9 @@ def triple(implementation: str, folder: Path) -> float:
 
 def triple_naive(folder: Path) -> str:
     """Without the remedy: condition number of the eigenvectors in this case."""
-    system = vehicle_with_road(linear(single_body(300.0, 10800.0, 3600.0), "reference"), one_track((0.0,), 0.3), SPEED)
+    system = vehicle_with_road(
+        linear_equations(single_body(300.0, 10800.0, 3600.0), "reference"), one_track((0.0,), 0.3), SPEED
+    )
     with np.errstate(all="ignore"):
         condition = np.linalg.cond(np.linalg.eig(system.A)[1])
     return f"sums over eigenvectors have a condition of {condition:.0e} there"
@@ -120,7 +127,7 @@ def triple_naive(folder: Path) -> str:
 
 def unstable(implementation: str, folder: Path) -> float:
     """Case: a damper with the wrong sign must be refused, with the growth rate of the fastest motion."""
-    return _refused_by_growth(linear(quarter_car(300.0, 40.0, 2e4, -1500.0, 2e5), implementation))
+    return _refused_by_growth(linear_equations(quarter_car(300.0, 40.0, 2e4, -1500.0, 2e5), implementation))
 
 
 def toppling(implementation: str, folder: Path) -> float:
@@ -128,7 +135,7 @@ def toppling(implementation: str, folder: Path) -> float:
     car = load_vehicle("seven_freedoms")
     x, y, _ = car.bodies[0].position
     tall = replace(car, gravity=9.81, bodies=(replace(car.bodies[0], position=(x, y, 30.0)), *car.bodies[1:]))
-    return _refused_by_growth(linear(tall, implementation))
+    return _refused_by_growth(linear_equations(tall, implementation))
 
 
 def _refused_by_growth(vehicle: LinearVehicle) -> float:
@@ -150,14 +157,14 @@ def _refused_by_growth(vehicle: LinearVehicle) -> float:
 
 def crawling(implementation: str, folder: Path) -> float:
     """Case: a delay of 26,000 s between the axles. Error: relative difference from independent axles."""
-    vehicle = linear(load_vehicle("half_car"), implementation)
+    vehicle = linear_equations(load_vehicle("half_car"), implementation)
     late, independent = (_deviations_of_ride(vehicle, 1e-4, word) for word in ("delayed", "uncorrelated"))
     return largest_relative_error(late, independent)
 
 
 def axles_at_one_place(implementation: str, folder: Path) -> float:
     """Case: two axles at the same x, without delay. Error: relative difference from one common input."""
-    vehicle = linear(load_vehicle("half_car"), implementation)
+    vehicle = linear_equations(load_vehicle("half_car"), implementation)
     at_one_place = replace(vehicle, wheels=tuple(replace(wheel, x=0.0) for wheel in vehicle.wheels))
     delayed, equal = (_deviations_of_ride(at_one_place, SPEED, word) for word in ("delayed", "equal"))
     return largest_relative_error(delayed, equal)
@@ -178,7 +185,7 @@ def mirrored(implementation: str, folder: Path) -> float:
         springs = tuple(
             replace(s, stiffness=s.stiffness * (2.0 if side * s.first_point[1] > 0 else 1.0)) for s in car.springs
         )
-        vehicle = linear(replace(car, springs=springs), implementation)
+        vehicle = linear_equations(replace(car, springs=springs), implementation)
         rows = [o.name == "body centre" or "angular" in o.kind for o in vehicle.outputs]
         deviations.append(_deviations_of_ride(vehicle)[rows])
     return largest_relative_error(deviations[0], deviations[1])
@@ -186,7 +193,7 @@ def mirrored(implementation: str, folder: Path) -> float:
 
 def slow_weighting(implementation: str, folder: Path) -> float:
     """Relative error of the body acceleration weighted by Wk at 1 mm/s, against quadrature."""
-    vehicle = linear(quarter_car(*QUARTER_CAR_NUMBERS), implementation)
+    vehicle = linear_equations(quarter_car(*QUARTER_CAR_NUMBERS), implementation)
     road, name = one_track((0.0,), 0.3), vehicle.outputs[0].name
     variance = stationary_covariance(
         system_with_weightings(vehicle_with_road(vehicle, road, 1e-3), {name: "Wk"})
@@ -198,7 +205,7 @@ def slow_weighting(implementation: str, folder: Path) -> float:
 def standstill(implementation: str, folder: Path) -> float:
     """Case: a drive that starts and ends with a stop. Error: largest relative change of the road height's variance
     under each wheel."""
-    vehicle = linear(load_vehicle("half_car"), implementation)
+    vehicle = linear_equations(load_vehicle("half_car"), implementation)
     drive = SpeedProfile((0.0, 0.1, 1.1, 1.6, 2.0), (0.0, 0.0, 10.0, 0.0, 0.0))
     height = varying_speed(vehicle, paper_road(vehicle.wheels), drive).height
     return largest_relative_error((height / height[0]) ** 2, 1.0)
@@ -206,7 +213,7 @@ def standstill(implementation: str, folder: Path) -> float:
 
 def no_speed(implementation: str, folder: Path) -> float:
     """Case: speeds of -1, NaN, infinity and 0 must each be refused."""
-    vehicle = linear(load_vehicle("half_car"), implementation)
+    vehicle = linear_equations(load_vehicle("half_car"), implementation)
     for speed in (-1.0, float("nan"), float("inf"), 0.0):
         try:
             _deviations_of_ride(vehicle, speed)
@@ -229,7 +236,7 @@ def bad(change: Change, expected_place: str) -> Callable[..., float]:
             if expected_place not in refusal.place:
                 return np.inf
             raise
-        return float(np.isfinite(_deviations_of_ride(linear(vehicle, implementation))).all()) + 1.0
+        return float(np.isfinite(_deviations_of_ride(linear_equations(vehicle, implementation))).all()) + 1.0
 
     return error
 
@@ -258,7 +265,7 @@ CASES = (
         "",
         1e-10,
         ROUNDED,
-        closed_form(corner=0.0),
+        closed_form_error(corner=0.0),
     ),
     Case(
         "road that next to walks at random",
@@ -267,7 +274,7 @@ CASES = (
         "",
         1e-6,
         "counts as none: 2e-8 1/s beside 3 1/s",
-        closed_form(corner=1e-9),
+        closed_form_error(corner=1e-9),
     ),
     Case(
         "car that is free on the road",
@@ -306,7 +313,13 @@ CASES = (
         undamped(1e-9),
     ),
     Case(
-        "next to no damping", "a damper of 0.1 mN s/m: ratio 2e-8", CLOSED, "", 1e-6, "asked for", closed_form(c=1e-4)
+        "next to no damping",
+        "a damper of 0.1 mN s/m: ratio 2e-8",
+        CLOSED,
+        "",
+        1e-6,
+        "asked for",
+        closed_form_error(c=1e-4),
     ),
     Case(
         "threefold eigenvalue",
@@ -325,7 +338,7 @@ CASES = (
         "",
         1e-6,
         "asked for",
-        closed_form(k_t=2e13),
+        closed_form_error(k_t=2e13),
     ),
     Case(
         "wheel of a milligram",
@@ -334,7 +347,7 @@ CASES = (
         "",
         1e-6,
         "asked for",
-        closed_form(m_u=1e-6),
+        closed_form_error(m_u=1e-6),
     ),
     Case(
         "speeds of 1 mm/s and 300 m/s",
@@ -343,7 +356,7 @@ CASES = (
         "",
         1e-10,
         ROUNDED,
-        closed_form(speeds=(1e-3, 300.0)),
+        closed_form_error(speeds=(1e-3, 300.0)),
     ),
     Case(
         "weighting at 1 mm/s",

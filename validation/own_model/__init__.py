@@ -1,1 +1,1 @@
-"""Models in MJCF and URDF of ours, and what is planted in them."""
+"""Model files in MJCF and URDF that the validation of ``twinrig twin`` reads, and faults to plant in them."""

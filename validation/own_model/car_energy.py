@@ -1,4 +1,4 @@
-"""The saloon of ``cars`` beside MuJoCo's own model of its file: energies at states, by no equation of a system."""
+"""Energies of the saloon car of ``cars`` at random states, beside those of MuJoCo's own model of the same file."""
 
 import mujoco
 import numpy as np
@@ -9,24 +9,24 @@ from models.systems.handling.energy import bodies_energy
 from models.vehicles.free_vehicle import rotor
 from validation.own_model.cars import CORNERS, SALOON
 
-BACKWARDS = ("rl swing", "rr swing", "rl spin", "rr spin")
+REVERSED_JOINTS = ("rl swing", "rr swing", "rl spin", "rr spin")
 """Joints of the file whose axes point along -y."""
 
 
-def energies_apart(handling: Handling, count: int) -> float:
-    """Largest difference between MuJoCo's energies and those by the description (kinetic, gravity, springs) at random
-    states, divided by the largest energy.
+def largest_energy_difference(handling: Handling, state_count: int) -> float:
+    """Largest difference between MuJoCo's energies and twinrig's (kinetic, gravity and springs) at ``state_count``
+    random states, divided by the largest energy.
 
     Equal energies at all states are equal equations of motion, but for dampers and tyres.
     """
     draw, n = np.random.default_rng(1), len(handling.vehicle.coordinates())
-    states = [(draw.uniform(-0.3, 0.3, n), draw.uniform(-3.0, 3.0, n)) for _ in range(count)]
-    pairs = np.array([(_of_mujoco(handling, *each), _energy_by_description(handling, *each)) for each in states])
+    states = [(draw.uniform(-0.3, 0.3, n), draw.uniform(-3.0, 3.0, n)) for _ in range(state_count)]
+    pairs = np.array([(_energy_by_mujoco(handling, *each), _energy_by_description(handling, *each)) for each in states])
     return float(np.abs(np.diff(pairs, axis=1)).max() / np.abs(pairs).max())
 
 
 def _coordinate_names() -> dict[str, tuple[str, str]]:
-    """For each coordinate of the description, the joint of the file that stands for it."""
+    """For the name of each joint of the file, the (body, freedom) of the vehicle's coordinate that it stands for."""
     places = {"engine roll": ("engine joint 1", "rx"), "engine bounce": ("engine", "z")}
     for name in CORNERS:
         front = name.startswith("f")
@@ -37,8 +37,9 @@ def _coordinate_names() -> dict[str, tuple[str, str]]:
     return places
 
 
-def _of_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
-    """Energies (J) by MuJoCo's own model of the file, in the car's state."""
+def _energy_by_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
+    """Energy (J), kinetic, of gravity and of springs, by MuJoCo's own model of the file, at coordinates and rates
+    (n,)."""
     model = mujoco.MjModel.from_xml_string(SALOON)
     data, coordinates = mujoco.MjData(model), handling.vehicle.coordinates()
     motion = SpatialReference(handling.vehicle).motions_of(q, v)["body"]
@@ -47,7 +48,7 @@ def _of_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
     mujoco.mju_mat2Quat(data.qpos[3:7], motion.rotation.ravel())
     data.qvel[3:6] = motion.rotation.T @ turning
     for name, place in _coordinate_names().items():
-        joint, sign = model.joint(name), -1.0 if name in BACKWARDS else 1.0
+        joint, sign = model.joint(name), -1.0 if name in REVERSED_JOINTS else 1.0
         i = [*coordinates].index(place)  # type: ignore[arg-type]
         data.qpos[joint.qposadr], data.qvel[joint.dofadr] = sign * q[i], sign * v[i]
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
@@ -58,7 +59,8 @@ def _of_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
 
 
 def _energy_by_description(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
-    """Energy (J) of bodies and springs by the description; springs have no preload, as in MuJoCo's file."""
+    """Energy (J) of bodies and springs by twinrig's description of the vehicle, at coordinates and rates (n,); springs
+    have no preload, as in MuJoCo's file."""
     places, springs = handling.vehicle.coordinates(), 0.0
     for e in handling.vehicle.joint_elements:
         travel = sum(k * q[places.index(at)] for at, k in zip(e.coordinates, e.factors, strict=True))

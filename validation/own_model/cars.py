@@ -1,34 +1,35 @@
 """Cars in MJCF: struts, uprights that steer and wheels that spin in front, trailing arms behind, an engine."""
 
 CORNERS = {"fl": (1.2, 0.75), "fr": (1.2, -0.75), "rl": (-1.4, 0.74), "rr": (-1.4, -0.74)}
-"""Places of the wheels, m."""
+"""Position (m) of each wheel's centre: x forward and y to the left, from the middle of the car."""
 RADIUS = 0.31
-"""m: height of the wheels' centres."""
+"""Height of the wheels' centres above the road, m."""
 
 
-def _front_strut_text(name: str, sign: int) -> str:
-    """Text of a front strut with an upright that steers, and a spinning wheel on it."""
+def _front_strut_text(name: str, side_sign: int) -> str:
+    """MJCF text of a front strut with a steered upright and a spinning wheel; ``side_sign`` is 1 left and -1 right."""
     x, y = CORNERS[name]
     return f"""
   <body name="{name} strut" pos="{x} {y} {RADIUS - 0.55}">
    <joint name="{name} travel" type="slide" axis="0 0 1" stiffness="24000" damping="1700" range="-.09 .1"/>
-   <inertial pos="0 {-0.1 * sign} .03" mass="14" diaginertia=".2 .3 .25"/>
+   <inertial pos="0 {-0.1 * side_sign} .03" mass="14" diaginertia=".2 .3 .25"/>
    <body name="{name} upright"><joint name="{name} steer" axis="0 0 1" damping="5" armature=".1"/>
-    <inertial pos="0 {-0.05 * sign} 0" mass="5" diaginertia=".05 .04 .05"/>
+    <inertial pos="0 {-0.05 * side_sign} 0" mass="5" diaginertia=".05 .04 .05"/>
     <body name="{name} wheel"><joint name="{name} spin" axis="0 1 0"/>
-     <inertial pos="0 {0.02 * sign} 0" mass="17" diaginertia=".6 1.1 .6"/>
+     <inertial pos="0 {0.02 * side_sign} 0" mass="17" diaginertia=".6 1.1 .6"/>
      <geom name="{name} rim" type="cylinder" size="{RADIUS} .1" euler="90 0 0" mass="0"/>
      <site name="tyre {name}" user="190000 150 62000"/></body></body></body>"""
 
 
-def _rear_arm_text(name: str, sign: int) -> str:
-    """Text of a trailing arm on a hinge with a spring, and a spinning wheel at its end."""
+def _rear_arm_text(name: str, side_sign: int) -> str:
+    """MJCF text of a rear trailing arm with a sprung hinge and a spinning wheel; ``side_sign`` is 1 left and -1
+    right."""
     x, y = CORNERS[name]
     return f"""
-  <body name="{name} arm" pos="{x + 0.4} {y - 0.1 * sign} {RADIUS + 0.02 - 0.55}">
+  <body name="{name} arm" pos="{x + 0.4} {y - 0.1 * side_sign} {RADIUS + 0.02 - 0.55}">
    <joint name="{name} swing" axis="0 -1 0" stiffness="3900" damping="260" armature=".4" range="-.3 .3"/>
-   <inertial pos="-.2 {0.03 * sign} 0" mass="11" fullinertia=".1 .3 .32 .01 0 .004"/>
-   <body name="{name} wheel" pos="-.4 {0.1 * sign} -.02"><joint name="{name} spin" axis="0 -1 0"/>
+   <inertial pos="-.2 {0.03 * side_sign} 0" mass="11" fullinertia=".1 .3 .32 .01 0 .004"/>
+   <body name="{name} wheel" pos="-.4 {0.1 * side_sign} -.02"><joint name="{name} spin" axis="0 -1 0"/>
     <inertial pos="0 0 0" mass="18" diaginertia=".6 1.2 .6"/>
     <site name="hub_{name}" user="185000 150 58000"/></body></body>"""
 

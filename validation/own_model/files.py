@@ -1,4 +1,4 @@
-"""Models of this project in MJCF and URDF, from a cart to a chain of 30 joints, and differences to be planted in them.
+"""Model files in MJCF and URDF, from a cart to a chain of 30 joints, and differences to be planted in them.
 
 ``twinrig twin`` is held to them by the case ``twin_files`` and by the tests.
 """
@@ -66,7 +66,7 @@ TIED = """<mujoco model="tied"><worldbody><site name="hook" pos="0 .3 1"/>
  <spatial name="rope" stiffness="40" damping="2" springlength=".7"><site site="hook"/><site site="tip"/></spatial>
  <spatial name="rubber" stiffness="25" springlength="0"><site site="elbow"/><site site="ring"/></spatial>
  <spatial name="seen"><site site="hook"/><site site="ring"/></spatial></tendon></mujoco>"""
-"""Springs along lines: from the ground, and between two bodies; one has no length, one no force."""
+"""Model with spatial tendons: a spring from the ground, a spring of zero length between bodies, one without force."""
 
 
 GEARED = """<mujoco model="geared"><worldbody>
@@ -82,7 +82,7 @@ GEARED = """<mujoco model="geared"><worldbody>
   <inertial pos="0 0 .2" mass=".2" diaginertia=".01 .01 .02"/></body></body></worldbody>
 <equality><joint name="gear" joint1="slide" joint2="turn" polycoef=".1 .25 0 0 0"/>
  <joint name="shut" joint1="cover" polycoef=".3 0 0 0 0" solimp=".95 .99 .001"/></equality></mujoco>"""
-"""Dry friction of a hinge and a slide, a rack that follows a crank, and a lid that stays shut."""
+"""Model with dry friction in joints, a rack that a joint equality couples to a crank, and a lid that is held shut."""
 
 
 LINKED = """<mujoco model="linked"><worldbody>
@@ -101,29 +101,32 @@ LINKED = """<mujoco model="linked"><worldbody>
 </worldbody><equality>
  <connect name="loop" body1="rod" body2="rocker" anchor=".6 0 0" solimp=".95 .99 .001"/>
  <weld name="grip" site1="lug" site2="tip" solimp=".92 .95 .001" torquescale="2"/></equality></mujoco>"""
-"""Four bars in a loop, whose joint repeats what the plane of their hinges asks, and a box held by an arm."""
+"""Model with a plane four-bar loop, whose closing joint has redundant constraints, and a box welded to an arm."""
 
-LOOP, GRIP = (
+LOOP_CONSTRAINT, GRIP_CONSTRAINT = (
     '<connect name="loop" body1="rod" body2="rocker" anchor=".6 0 0"',
     '<weld name="grip" site1="lug" site2="tip"',
 )
-HELD = LINKED.replace(
-    GRIP, '<weld name="grip" body1="box" body2="crank" relpose=".1 .4 .1 .9 .1 .2 .1" anchor=".05 0 0"'
+BOX_WELDED_TO_CRANK = LINKED.replace(
+    GRIP_CONSTRAINT, '<weld name="grip" body1="box" body2="crank" relpose=".1 .4 .1 .9 .1 .2 .1" anchor=".05 0 0"'
 )
-"""The box held by the crank, at a place and with a turn that are not those of the file."""
-HUNG = LINKED.replace(GRIP, '<connect name="grip" body1="box" anchor=".1 .2 .1"').replace('torquescale="2"', "")
-"""The box hung by a point on the ground."""
+"""``LINKED`` with the box welded to the crank instead, at a relative pose that differs from the one in the file."""
+BOX_ON_GROUND_POINT = LINKED.replace(GRIP_CONSTRAINT, '<connect name="grip" body1="box" anchor=".1 .2 .1"').replace(
+    'torquescale="2"', ""
+)
+"""``LINKED`` with a point of the box fixed to the ground instead."""
 
 
-def chain(count: int, seed: int = 1) -> str:
-    """A model file of a chain of hinges and slides with springs, dampers and armatures; all numbers are random."""
+def random_chain(body_count: int, seed: int = 1) -> str:
+    """MJCF text of a chain of ``body_count`` bodies on hinges and slides with springs, dampers and armatures, all
+    random."""
     draw = np.random.default_rng(seed)
 
     def row(low: float, high: float, value_count: int) -> str:
         return " ".join(f"{number:.4g}" for number in draw.uniform(low, high, value_count))
 
     text = ""
-    for i in range(count):
+    for i in range(body_count):
         kind = "slide" if i % 5 == 4 else "hinge"
         text += (
             f'<body name="b{i}" pos="{row(-0.3, 0.3, 3)}" euler="{row(-90, 90, 3)}">'
@@ -133,14 +136,15 @@ def chain(count: int, seed: int = 1) -> str:
             f'<inertial pos="{row(-0.1, 0.1, 3)}" quat="{row(-1, 1, 4)}" mass="{row(0.5, 2, 1)}" '
             f'diaginertia="{row(0.1, 0.15, 3)}"/>'
         )
-    return f'<mujoco model="chain"><worldbody>{text}{"</body>" * count}</worldbody></mujoco>'
+    return f'<mujoco model="chain"><worldbody>{text}{"</body>" * body_count}</worldbody></mujoco>'
 
 
-def tree(count: int, seed: int) -> str:
-    """A model file of free bodies with branches of hinges, slides and balls; all numbers are random."""
+def random_tree(body_count: int, seed: int) -> str:
+    """MJCF text of ``body_count`` bodies: free ones with branches on hinges, slides and ball joints; all numbers
+    random."""
     draw = np.random.default_rng(seed)
     children = dict[int, list[int]]()
-    for i in range(1, count):
+    for i in range(1, body_count):
         children.setdefault(int(draw.integers(i)), []).append(i)
 
     def row(low: float, high: float, value_count: int) -> str:
@@ -159,13 +163,13 @@ def tree(count: int, seed: int) -> str:
     return f'<mujoco model="tree"><worldbody>{body(0)}</worldbody></mujoco>'
 
 
-def changed(text: str, name: str, old: str, new: str) -> str:
-    """A model's text in which ``old`` is replaced by ``new`` where it follows a name."""
-    there = text.index(old, text.index(f'"{name}"'))
-    return text[:there] + new + text[there + len(old) :]
+def model_with_change(text: str, name: str, old_text: str, new_text: str) -> str:
+    """Text of a model file in which the first ``old_text`` after the name of an element is replaced by ``new_text``."""
+    there = text.index(old_text, text.index(f'"{name}"'))
+    return text[:there] + new_text + text[there + len(old_text) :]
 
 
-PLANTED = [
+PLANTED_DIFFERENCES = [
     ("hinge", 'damping=".3"', 'damping=".31"', "damping", "joint 'hinge'", "0.3 N m s/rad"),
     ("hinge", 'armature=".02"', 'armature=".03"', "armature", "joint 'hinge'", "0.02 kg m^2"),
     ("hinge", 'armature=".02"', "", "armature", "joint 'hinge'", "none in b.xml"),
@@ -197,5 +201,5 @@ PLANTED = [
     ("push", 'gear="3"', 'gear="4"', "gear", "actuator 'push'", "4"),
     ("jointed", 'gravity="1 2 -9"', 'gravity="1 2 -9.1"', "gravity", "the model", "-9.1"),
 ]
-"""Differences to be planted in ``JOINTED``: the name that the changed part follows, the part, its new text; the kind
-and owner of the element that must be named, and a piece of the size that must be said."""
+"""Differences to be planted in ``JOINTED``: the name after which the text is changed, the old text and the new one;
+then what the comparison must report: the quantity, its element, and a piece of the text on its size."""

@@ -1,7 +1,7 @@
-"""Accelerations with the soft constraints of MuJoCo, by the law of its documentation about the plain equations.
+"""Accelerations with MuJoCo's soft constraints, by the law in its documentation, applied to the plain equations.
 
-At a state that satisfies a constraint, in place and in speed, its reference acceleration is 0. What is left of the law:
-accelerations a minimise (a - a0) M (a - a0) + c c / R with c = J a + J' q', where a0 are those without it, J its rows,
+At a state that satisfies a constraint, in place and in speed, its reference acceleration is 0. Then the accelerations a
+minimise (a - a0) M (a - a0) + c c / R with c = J a + J' q', where a0 are those without the constraint, J its rows,
 d the first number of solimp, and R = (1 - d) / d times what the documentation calls the diagonal approximation: the sum
 of the joints' entries in the inverse of the mass matrix in the design position; between bodies, the sum of both
 bodies' means over three directions, of their centres' shifts or of their turns.
@@ -16,13 +16,13 @@ from models.own_model.constraints import plain_constraints
 from models.own_model.equalities import tie_rows
 from models.own_model.reading import TwinModel
 
-QUATERNION = 0.5
-"""Rate of a small rotation's quaternion to its angular velocity: MuJoCo's welds are constraints on the former."""
+QUATERNION_RATE = 0.5
+"""Ratio of a quaternion's rate to the angular velocity for small rotations; MuJoCo's welds constrain the quaternion."""
 
 
-def softly_coupled(twin: TwinModel) -> Equations:
-    """Equations of a model whose constraints are soft, by the law of MuJoCo's documentation; nothing else may be soft
-    in it."""
+def soft_constraint_equations(twin: TwinModel) -> Equations:
+    """Equations of motion of a model with soft constraints, by the law of MuJoCo's documentation; nothing but the
+    constraints may be soft."""
     tree, constraints = plain_tree(twin), plain_constraints(twin)
     give, scale = _row_compliance(twin), _row_factors(twin)
 
@@ -37,14 +37,14 @@ def softly_coupled(twin: TwinModel) -> Equations:
 
 
 def _row_factors(twin: TwinModel) -> np.ndarray:
-    """Factors (c,) of the constraint rows: first those of couplings and points, then those of rotations."""
+    """Factors (c,) of the constraint rows: 1 for joint couplings and points, then one for each row of a rotation."""
     driven = twin.driven
-    welds = [QUATERNION * each.torque_scale for each in driven.connections if each.axes is not None]
+    welds = [QUATERNION_RATE * each.torque_scale for each in driven.connections if each.axes is not None]
     return np.concatenate((np.ones(len(driven.couplings) + 3 * len(driven.connections)), np.repeat(welds, 3)))
 
 
 def _row_compliance(twin: TwinModel) -> np.ndarray:
-    """Regularisation R (c,) of every constraint row."""
+    """Regularisation R (c,) of every constraint row, which makes the constraint soft."""
     driven, tree = twin.driven, plain_tree(twin)
     mass, _ = tree.mass_and_force(0.0, *np.zeros((2, twin.size)))
     inverse = np.linalg.inv(mass)
@@ -62,7 +62,7 @@ def _impedance_share(solimp: tuple[float, ...]) -> float:
     return (1.0 - solimp[0]) / solimp[0]
 
 
-def _mean_inverse_inertia(twin: TwinModel, inverse: np.ndarray, ends: tuple) -> np.ndarray:
+def _mean_inverse_inertia(twin: TwinModel, inverse_mass: np.ndarray, ends: tuple) -> np.ndarray:
     """Mean inverse inertias (2,) of a connection, summed over both bodies: for translation (1/kg) and for rotation
     (1/(kg m^2))."""
     bodies, total = plain_tree(twin).bodies, np.zeros(2)
@@ -70,5 +70,5 @@ def _mean_inverse_inertia(twin: TwinModel, inverse: np.ndarray, ends: tuple) -> 
     for name in (name for name, _ in ends if name is not None):
         (shift,) = motion.at(bodies.points([(name, bodies.position[name])]))
         for i, rows in enumerate((shift[FIRST:].T, turning_rows(motion.axes(bodies.row[name])))):
-            total[i] += np.trace(rows @ inverse @ rows.T) / 3.0
+            total[i] += np.trace(rows @ inverse_mass @ rows.T) / 3.0
     return total

@@ -1,5 +1,5 @@
-"""Work-precision runner: what accuracy costs.
+"""Work-precision measurements: the computing cost of accuracy for every integrator.
 
-``problems/`` holds one file per problem; ``runner`` measures settings, ``curves`` reads them, ``rows``,
-``tables`` and ``figure`` show them, ``force_calls`` counts from outside, ``speed`` times callbacks.
+``problems/`` holds one file per test problem; ``rows``, ``tables`` and ``figure`` show the measured points,
+``force_calls`` counts force evaluations independently, ``speed`` times callbacks.
 """

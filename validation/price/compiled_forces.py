@@ -1,6 +1,6 @@
-"""The vehicle in MuJoCo with every force in one compiled callback, compared with native springs.
+"""The pitch-plane vehicle in MuJoCo with all its forces in one compiled callback, for comparison with native springs.
 
-Written once more from eqs (35) and (36): an independent route, and the price of compiled callbacks.
+The forces are written anew from eqs (35) and (36): an independent check, and the cost of a compiled callback.
 """
 
 from dataclasses import replace
@@ -18,21 +18,21 @@ from models.engines.mujoco_layout import offsets
 from models.engines.mujoco_quiet import installed
 from models.machine.stack import array_at, double_at
 
-PARAMETERS = 17
-"""Rows per second and number of rows, before the vehicle's fifteen parameters."""
+HEADER_LENGTH = 17
+"""Length of the header: rows per second, number of rows, and the vehicle's fifteen parameters."""
 
 
-def _compile_law(numeric, passive, time, position, velocity):
+def _compiled_callback(numeric_offset, passive_force_offset, time_offset, position_offset, velocity_offset):
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
-    def law(model, case_data):
-        header = carray(array_at(model, numeric), (PARAMETERS,))
-        row = int(np.rint(carray(double_at(case_data, time), (1,))[0] * header[0]))
+    def force_callback(model, case_data):
+        header = carray(array_at(model, numeric_offset), (HEADER_LENGTH,))
+        row = int(np.rint(carray(double_at(case_data, time_offset), (1,))[0] * header[0]))
         if not 0 <= row < int(header[1]):
             return
-        road = carray(array_at(model, numeric), (PARAMETERS + 4 * int(header[1]),))
-        q, v = carray(array_at(case_data, position), (4,)), carray(array_at(case_data, velocity), (4,))
-        force = carray(array_at(case_data, passive), (4,))
-        road_index = PARAMETERS + 4 * row
+        road = carray(array_at(model, numeric_offset), (HEADER_LENGTH + 4 * int(header[1]),))
+        q, v = carray(array_at(case_data, position_offset), (4,)), carray(array_at(case_data, velocity_offset), (4,))
+        force = carray(array_at(case_data, passive_force_offset), (4,))
+        road_index = HEADER_LENGTH + 4 * row
         a, b = header[2], header[3]
         sine, cosine = np.sin(q[3]), np.cos(q[3])
         f1 = header[8] * (q[0] - road[road_index]) + header[12] * (v[0] - road[road_index + 2])
@@ -44,17 +44,17 @@ def _compile_law(numeric, passive, time, position, velocity):
         force[2] -= f3 + f4
         force[3] += cosine * (b * f3 - a * f4)
 
-    return law
+    return force_callback
 
 
 @cache
-def law() -> Any:
-    """The callback, compiled at its first use."""
-    return _compile_law(*offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
+def force_callback() -> Any:
+    """The MuJoCo callback that adds all forces of the vehicle, compiled at its first use."""
+    return _compiled_callback(*offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
 
 
 class CompiledForces:
-    """A vehicle on a road as a MuJoCo model of mere bodies, whose forces are all computed by one compiled callback."""
+    """A vehicle on a road as a MuJoCo model of bodies without springs; one compiled callback computes all forces."""
 
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings
@@ -70,12 +70,13 @@ class CompiledForces:
         self.data = mujoco.MjData(self.model)
 
     def run(self) -> np.ndarray:
-        """States (n + 1, 8) of a run, without guards, for comparison and timing only."""
-        with installed(law()):
-            return self.coast()
+        """States (n + 1, 8) of a run with the forces, without the checks of an engine: for comparison and timing
+        only."""
+        with installed(force_callback()):
+            return self.run_with_installed_callback()
 
-    def coast(self) -> np.ndarray:
-        """A copy of the model with no forces except weight."""
+    def run_with_installed_callback(self) -> np.ndarray:
+        """States (n + 1, 8) of a run with whatever callback is installed; without any, weight alone acts."""
         start = np.concatenate(([0.0], self.assembly.initial))
         path, _ = rollout.rollout(self.model, self.data, start[None, :], nstep=self.settings.steps)
         return np.vstack([self.assembly.initial, path[0, :, 1:9]])

@@ -1,7 +1,7 @@
-"""Memory of a long table of contacts, which is answered as a stream.
+"""Peak memory of the computation of a long table of contacts, which is read and written as a stream.
 
-``python -m validation.price.contact_stream [ROWS ...]`` answers tables of so many rows, each in a fresh process, and
-prints what memory and time that takes; 10,000,000 rows need 2 GB of disk.
+``python -m validation.price.contact_stream [ROWS ...]`` computes tables of so many rows, each in a fresh process,
+and prints memory and time; 10,000,000 rows need 2 GB of disk.
 """
 
 import sys
@@ -19,48 +19,50 @@ from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
 from validation.common.peak_memory import peak_memory
 
-ROWS = (100_000, 1_000_000)
+ROW_COUNTS = (100_000, 1_000_000)
 REPEATED_ROWS = 1000
-"""Rows after which a table repeats itself."""
+"""Number of rows after which the contents of a table repeat."""
 HEADER = "a [m],b [m],load [N],friction [-],xi_x [-],xi_y [-],spin [1/m]\n"
 
 
 class ProcessCost(NamedTuple):
-    """Peak memory (bytes) and computing time (s) of a process that computed a table of contacts."""
+    """Cost of a process that computed a table of contacts: peak memory (bytes) and computing time (s)."""
 
     memory: int
     seconds: float
 
 
-def write(path: Path, rows: int) -> None:
-    """Write a table of creepages from rolling to sliding; rows : a multiple of PERIOD."""
+def write_table(path: Path, row_count: int) -> None:
+    """Write a table (CSV) of contacts with creepages from rolling to sliding; row_count : a multiple of
+    REPEATED_ROWS."""
     lines = (f"5e-3,4e-3,{8e4 + i},0.3,{1e-5 * i:.6g},1e-4,{1e-3 * i:.4g}\n" for i in range(REPEATED_ROWS))
     text = "".join(lines)
     with path.open("w") as file:
         file.write(HEADER)
-        file.writelines(text for _ in range(rows // REPEATED_ROWS))
+        file.writelines(text for _ in range(row_count // REPEATED_ROWS))
 
 
-def answered(folder: Path, rows: int) -> ProcessCost:
-    """Compute a table of ``rows`` contacts into ``forces.csv``, without errors and with few cells."""
-    write(folder / "cases.csv", rows)
+def cost_of_table(folder: Path, row_count: int) -> ProcessCost:
+    """Compute a table of ``row_count`` contacts into ``forces.csv``, with few cells and without error estimates;
+    returns the cost."""
+    write_table(folder / "cases.csv", row_count)
     start_time = time.perf_counter()
     counts = answer_table(
         folder / "cases.csv", folder / "forces.csv", partial(Built, MaterialPair()), Method(cells=5), errors=False
     )
-    if counts != {"rows": rows, "wrong": 0}:
-        raise AssertionError(f"{counts} in place of {rows} sound rows")
+    if counts != {"rows": row_count, "wrong": 0}:
+        raise AssertionError(f"{counts} in place of {row_count} sound rows")
     return ProcessCost(peak_memory(), time.perf_counter() - start_time)
 
 
-def in_fresh_process(function: Callable[[Path, int], ProcessCost], rows: int) -> ProcessCost:
-    """Result of function(folder, rows) in a process of its own."""
+def in_fresh_process(function: Callable[[Path, int], ProcessCost], row_count: int) -> ProcessCost:
+    """Cost that function(folder, row_count) returns, computed in a new process."""
     with TemporaryDirectory() as name, process_pool(1) as executor:
-        process_cost: ProcessCost = executor.submit(function, Path(name), rows).result()
+        process_cost: ProcessCost = executor.submit(function, Path(name), row_count).result()
         return process_cost
 
 
 if __name__ == "__main__":
-    for rows in map(int, sys.argv[1:]) if sys.argv[1:] else ROWS:
-        taken = in_fresh_process(answered, rows)
+    for rows in map(int, sys.argv[1:]) if sys.argv[1:] else ROW_COUNTS:
+        taken = in_fresh_process(cost_of_table, rows)
         print(f"{rows:>12,} rows: {taken.memory / 1e6:.0f} MB, {taken.seconds:.0f} s", flush=True)

@@ -1,4 +1,4 @@
-"""The work-precision figure: error over what work is counted in and over seconds, a curve per integrator."""
+"""The work-precision figure: error over counted work and over seconds, with a curve for each integrator."""
 
 from collections import defaultdict
 from itertools import pairwise
@@ -32,18 +32,18 @@ from validation.price.tables import curve_name
 
 Style = dict[str, Any]
 SHARED_MARKERS = {"RK4": "o", "RK44": "o", "Euler": "D", "ExplicitEuler": "D"}
-"""Markers of methods that several engines have."""
+"""Markers of integration methods that several engines have."""
 OTHER_MARKERS = "s^v<>PXhp*d"
-"""Markers of the others, in turn within each engine."""
+"""Markers of all further methods, in turn within each engine."""
 ORDER_STYLES = {1: ":", 2: "--", 3: "-.", 4: "-"}
 FAMILY_COLOURS = (GREY, BLUE, GREEN, PINK, VERMILION, SKY)
-"""Colours of families that are no implementation."""
+"""Colours of curve families that are not engines, such as contact theories."""
 LONGEST_LABEL = 27
-"""Letters of a curve's name of which four stand beside each other."""
+"""Longest curve name (letters) with which the legend has four columns."""
 MARKER_SIZES = {"reference": 6.5, "exudyn": 5.0, "mujoco": 3.5}
-"""Coinciding curves show as rings within each other."""
+"""Marker sizes by engine, so that coinciding curves show as rings within each other."""
 SINGLE_RUN_MARKER = 0.5
-"""Size of a marker whose seconds are those of one run, divided by that of the others."""
+"""Size of a marker for a setting timed once, divided by the size of one timed in several rounds."""
 FRONT_STYLE: Style = {"color": "#f0c808", "linewidth": 7, "alpha": 0.45}
 BROKEN_STYLE: Style = {
     "marker": "o",
@@ -54,13 +54,13 @@ BROKEN_STYLE: Style = {
     "markeredgewidth": 0.8,
 }
 LABEL_SIZE = np.array([0.37, 0.1])
-"""Width and height of a default's name, in fractions of the panel."""
-LABEL_PLACES = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y in np.linspace(0.2, 0.87, 17)])
-"""Where a name may stand: the middle of its left side, clear of the bands below and of what is told above."""
+"""Width and height of the label of an engine's default setting, in fractions of the panel."""
+LABEL_POSITIONS = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y in np.linspace(0.2, 0.87, 17)])
+"""Allowed positions of a label's left middle, in fractions of the panel, clear of the bands and texts at its edges."""
 
 
 def draw(measured_points: MeasuredPoints) -> Figure:
-    """Figure of error over force calls and over time, side by side. Failed settings are marked above the first
+    """Figure of error over force calls and over time, side by side; failed settings are marked at the top of the first
     panel."""
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 7.6), sharey=True)
     styles = _curve_styles(measured_points)
@@ -115,7 +115,7 @@ def _curve_styles(measured_points: MeasuredPoints) -> dict[str, Style]:
 
 
 def _engine_colour(point: Point, measured_points: MeasuredPoints) -> str:
-    """Colour of the engine of a point; engines without a colour of their own get one of FAMILY_COLOURS."""
+    """Colour of the engine of a measured point; engines that are not in COLOURS get one of FAMILY_COLOURS."""
     engine = point.setting.engine
     other_engines = [
         name for name in dict.fromkeys(p.setting.engine for p in measured_points.points) if name not in COLOURS
@@ -124,7 +124,8 @@ def _engine_colour(point: Point, measured_points: MeasuredPoints) -> str:
 
 
 def _plot_curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], cost_kind: str, style: Style) -> None:
-    """Plot one curve. Points below the accuracy of the reference are hollow, and points timed once are small."""
+    """Plot one curve. Points with errors below the accuracy of the reference are hollow; points timed once are
+    small."""
     point_positions = [(p.cost(cost_kind), measured_points.error(p)) for p in points]
     ax.plot(*zip(*point_positions, strict=True), **{**style, "marker": "none"}, alpha=0.75)
     points_by_look = defaultdict(list)
@@ -142,7 +143,7 @@ def _plot_curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], 
 
 
 def _shade_floor(ax: Axes, measured_points: MeasuredPoints) -> None:
-    """Shade the errors that are below the accuracy of the reference."""
+    """Shade the range of errors below the accuracy of the reference solution."""
     known = measured_points.uncertainty[measured_points.quantity]
     for low, high, alpha in ((1e-30, known, 0.6), (known, measured_points.judging_floor(), 0.25)):
         ax.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
@@ -151,14 +152,14 @@ def _shade_floor(ax: Axes, measured_points: MeasuredPoints) -> None:
 
 
 def _plot_front(ax: Axes, measured_points: MeasuredPoints, cost_kind: str) -> None:
-    """Plot the Pareto front, the settings that no other one beats, as a broad pale line behind the curves."""
+    """Plot the Pareto front of error and cost as a broad pale line behind the curves."""
     front = measured_points.front(cost_kind)
     costs = [p.cost(cost_kind) for p in front]
     ax.plot(costs, list(map(measured_points.error, front)), **FRONT_STYLE, solid_capstyle="round", zorder=1)
 
 
 def _mark_defaults(ax: Axes, measured_points: MeasuredPoints, cost_kind: str) -> None:
-    """Mark each engine's default setting with a ring, and write its name where the panel has most space."""
+    """Mark each engine's default setting with a ring, and label it where the panel has most space."""
     taken_positions, names = _line_points(ax), list[np.ndarray]()
     ring: Style = {"markersize": 11, "markerfacecolor": "none", "markeredgecolor": DARK, "markeredgewidth": 1.2}
     for owner, p in measured_points.defaults.items():
@@ -192,7 +193,7 @@ def _fractions_of_panel(ax: Axes, data_positions: Any) -> np.ndarray:
 
 
 def _line_points(ax: Axes) -> np.ndarray:
-    """Points along all lines of a panel, as fractions (n, 2) of the panel."""
+    """Points (n, 2) along all lines of a panel, as fractions of the panel."""
     points = [np.empty((0, 2))]
     for line in ax.get_lines():
         ends = _fractions_of_panel(ax, line.get_xydata())
@@ -201,17 +202,17 @@ def _line_points(ax: Axes) -> np.ndarray:
 
 
 def _emptiest_corner(taken_positions: np.ndarray, setting_position: np.ndarray, names: list[np.ndarray]) -> np.ndarray:
-    """The corner of LABEL_PLACES at which a name covers no line; if several are free, the one near its setting.
+    """Position (2,) of LABEL_POSITIONS at which a label covers no line; if several are free, one near its setting.
 
-    names : middles of names that stand already, through which no line to this one shall lead.
+    names : middles of labels already placed, which the leader line of this label shall not cross.
     """
-    middles = LABEL_PLACES + LABEL_SIZE * np.array([0.5, 0.0])
+    middles = LABEL_POSITIONS + LABEL_SIZE * np.array([0.5, 0.0])
     distances = np.abs(middles[:, None] - taken_positions) / (0.5 * LABEL_SIZE)
     clear = np.minimum(distances.max(axis=2).min(axis=1), 1.8)
     far = np.hypot(*(middles - setting_position).T)
     leader_lines = setting_position + np.linspace(0.0, 1.0, 17)[:, None, None] * (middles - setting_position)
     crossed = [(np.abs(leader_lines - name) < 0.55 * LABEL_SIZE).all(axis=2).any(axis=0) for name in names]
-    return np.asarray(LABEL_PLACES[np.argmax(clear - 0.3 * far - 2.0 * np.sum(crossed, axis=0))])
+    return np.asarray(LABEL_POSITIONS[np.argmax(clear - 0.3 * far - 2.0 * np.sum(crossed, axis=0))])
 
 
 def _mark_failures(ax: Axes, measured_points: MeasuredPoints, top: float) -> None:
@@ -230,17 +231,21 @@ def _mark_failures(ax: Axes, measured_points: MeasuredPoints, top: float) -> Non
         ax.annotate(text, (0.995, 0.995), xycoords="axes fraction", ha="right", va="top", fontsize=SMALL_TEXT)
 
 
-def _expected_calls(p: Point, measured_points: MeasuredPoints) -> float:
-    """Force calls that a failed setting made, or would need by extrapolation from its curve; 0 if unknown."""
+def _expected_calls(failed_point: Point, measured_points: MeasuredPoints) -> float:
+    """Number of force calls that a failed setting made, or would need by extrapolation from its curve; 0 if unknown."""
     work = measured_points.costs[0]
-    if p.counts:
-        return p.cost(work)
-    first = next(iter(measured_points.curves().get(p.setting.curve, ())), None)
-    return 0.0 if first is None or p.setting.adaptive else first.cost(work) * first.setting.value / p.setting.value
+    if failed_point.counts:
+        return failed_point.cost(work)
+    first = next(iter(measured_points.curves().get(failed_point.setting.curve, ())), None)
+    return (
+        0.0
+        if first is None or failed_point.setting.adaptive
+        else first.cost(work) * first.setting.value / failed_point.setting.value
+    )
 
 
 def _methods_text(failed: list[Point], status: str) -> str:
-    """Text that names the methods with failed settings; methods without any answer are marked."""
+    """Text for the figure that names the methods whose settings failed with a status."""
     failed_alike = [p for p in failed if p.status == status]
     if status == "flagged":
         return ", ".join(dict.fromkeys(f"{p.setting.curve} (cross, see table)" for p in failed_alike))
@@ -256,7 +261,7 @@ def _methods_text(failed: list[Point], status: str) -> str:
 
 
 def _legend_handles(measured_points: MeasuredPoints, styles: dict[str, Style]) -> list[Line2D]:
-    """Handles of the legend: the curves, then the other marks."""
+    """Handles of the legend: the curves, then the Pareto front and the marks of failed settings."""
     names = sorted(styles, key=curve_name)
     handles = [Line2D([], [], **styles[curve], label=curve_name(curve)) for curve in names]
     handles.append(Line2D([], [], **FRONT_STYLE, label="no other setting is better (Pareto)"))

@@ -1,6 +1,6 @@
-"""Force evaluations counted from outside: by Exudyn's own calls of a load, and by MuJoCo's own timers.
+"""Independent counts of force evaluations: by calls of a load function in Exudyn, and by MuJoCo's timers.
 
-What an adapter says about its cost would otherwise be checked against itself.
+They check the number of force calls that twinrig reports for a run.
 """
 
 from collections.abc import Iterator
@@ -11,13 +11,14 @@ from unittest.mock import patch
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
 
-AT_START = {"VelocityVerlet": 1, "GeneralizedAlpha": 1, "TrapezoidalIndex2": 1}
-"""Evaluations before the first step, for the accelerations that a method starts from; not in the reports."""
+START_FORCE_CALLS = {"VelocityVerlet": 1, "GeneralizedAlpha": 1, "TrapezoidalIndex2": 1}
+"""Force evaluations before the first step, for the start accelerations of a method; twinrig does not report them."""
 
 
 @contextmanager
-def _counted_loads() -> Iterator[list[int]]:
-    """Context in which the calls of the first load are counted in every Exudyn model that is built."""
+def _counting_load_calls() -> Iterator[list[int]]:
+    """Context that counts the calls of the first load in every Exudyn model built within it; yields the count in a
+    list."""
     from models.engines import exudyn
 
     calls = [0]
@@ -39,18 +40,18 @@ def _counted_loads() -> Iterator[list[int]]:
 
 
 def _mujoco_calls(model: Any) -> int:
-    """Number of force evaluations, from MuJoCo's timers."""
+    """Number of force evaluations of a run, from MuJoCo's timers."""
     import mujoco
 
     return int(model.data.timer[mujoco.mjtTimer.mjTIMER_ACTUATION].number)
 
 
 def counted_calls(engine: str, assembly: Assembly, settings: Settings) -> tuple[int, int]:
-    """Force calls of one run in Exudyn or MuJoCo: as counted from outside, and as twinrig reports them."""
+    """Number of force calls of one run in Exudyn or MuJoCo: counted independently, and as twinrig reports it."""
     if engine == "mujoco":
         model: Any = build(engine, assembly, settings)
         reported_calls = model.run().counts["force calls"]
         return _mujoco_calls(model), reported_calls
-    with _counted_loads() as calls:
+    with _counting_load_calls() as calls:
         reported_calls = build(engine, assembly, settings).run().counts["force calls"]
-    return calls[0] - AT_START.get(settings.integrator, 0), reported_calls
+    return calls[0] - START_FORCE_CALLS.get(settings.integrator, 0), reported_calls

@@ -1,4 +1,4 @@
-"""A process that only marches, so that valgrind counts the instructions of a march without any compilation.
+"""A process that only integrates in time, so that valgrind counts instructions of time steps and not of compilation.
 
 The linear pitch-plane vehicle with all forces from one Python function, in both engines, method after method. Once
 everything is loaded, two copies of the process march, one after the other: to load it all twice would take most of the
@@ -14,12 +14,14 @@ from collections.abc import Callable
 from typing import Any
 
 STEP = 1e-3
-MARK = "getpgid"
-"""Function of the C library that no engine calls."""
+MARKING_SYSTEM_CALL = "getpgid"
+"""System call that separates valgrind's counts: a function of the C library that no engine calls."""
 
 
-def law_of(damping: list[list[float]], stiffness: list[list[float]]) -> Callable[[Any, Any], list[float]]:
-    """Function that computes the forces -K q - D q' with lists."""
+def linear_force_function(
+    damping: list[list[float]], stiffness: list[list[float]]
+) -> Callable[[Any, Any], list[float]]:
+    """Python function of lists q and q' that returns the forces -K q - D q', for damping D and stiffness K (4, 4)."""
     rows = [(*k, *d) for k, d in zip(stiffness, damping, strict=True)]
 
     def law(q: Any, v: Any) -> list[float]:
@@ -30,8 +32,10 @@ def law_of(damping: list[list[float]], stiffness: list[list[float]]) -> Callable
     return law
 
 
-def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], methods: list[str]) -> list[Any]:
-    """For each method in Exudyn, a function that marches a number of steps."""
+def exudyn_marches(
+    masses: list[float], force_function: Callable[[Any, Any], list[float]], methods: list[str]
+) -> list[Any]:
+    """For each integration method of Exudyn, a function that integrates a number of steps."""
     import exudyn as exu
     import exudyn.itemInterface as items
     import numpy as np
@@ -47,7 +51,7 @@ def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
             initialCoordinates_t=[0.0] * 4,
         )
     )
-    user: Any = lambda mbs, t, item, q, v: law(q, v)  # noqa: E731
+    user: Any = lambda mbs, t, item, q, v: force_function(q, v)  # noqa: E731
     mbs.AddObject(items.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.diag(masses), forceUserFunction=user))
     mbs.Assemble()
     options = exu.SimulationSettings()
@@ -63,8 +67,10 @@ def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
     return [lambda steps, method=method: march(method, steps) for method in methods]
 
 
-def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], methods: list[str]) -> list[Any]:
-    """For each method in MuJoCo, a function that marches a number of steps in MuJoCo's own loop."""
+def mujoco_marches(
+    masses: list[float], force_function: Callable[[Any, Any], list[float]], methods: list[str]
+) -> list[Any]:
+    """For each integration method of MuJoCo, a function that integrates a number of steps in MuJoCo's own loop."""
     import mujoco
 
     bodies = "".join(
@@ -78,7 +84,7 @@ def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
     data = mujoco.MjData(model)
 
     def passive(model: Any, case_data: Any) -> None:
-        case_data.qfrc_passive[:] = law(case_data.qpos.tolist(), case_data.qvel.tolist())
+        case_data.qfrc_passive[:] = force_function(case_data.qpos.tolist(), case_data.qvel.tolist())
 
     def march(method: str, steps: int) -> None:
         model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{method.upper()}")
@@ -90,8 +96,9 @@ def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
 
 
 def main(settings: dict[str, Any]) -> None:
-    """Run every march once to warm up, then count all of them in two copies of the process."""
-    law = law_of(settings["damping"], settings["stiffness"])
+    """Run the time integration of every method once to warm up, then count its instructions in two copies of the
+    process."""
+    law = linear_force_function(settings["damping"], settings["stiffness"])
     marches = [
         march
         for engine, make in (("exudyn", exudyn_marches), ("mujoco", mujoco_marches))
@@ -102,11 +109,12 @@ def main(settings: dict[str, Any]) -> None:
         march(settings["steps"][0])
     start_counting()
     for _ in range(2):
-        copied(marches, settings["steps"])
+        run_in_forked_copy(marches, settings["steps"])
 
 
 def start_counting() -> None:
-    """Make valgrind count instructions from here on; what runs before is not counted and several times as fast."""
+    """Make valgrind count instructions from here on; earlier code is not run_marked_marches and runs several times as
+    fast."""
     asking = subprocess.Popen(
         ["vgdb", f"--pid={os.getpid()}", "instrumentation", "on"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
@@ -116,18 +124,18 @@ def start_counting() -> None:
         raise SystemExit("valgrind could not be told to begin")
 
 
-def copied(marches: list[Callable[[int], None]], step_counts: list[int]) -> None:
-    """Run ``counted`` in a forked copy of the process, so that nothing changes in this one."""
+def run_in_forked_copy(marches: list[Callable[[int], None]], step_counts: list[int]) -> None:
+    """Run ``run_marked_marches`` in a forked copy of the process, so that nothing changes in this process."""
     copy = os.fork()
     if copy == 0:
-        counted(marches, step_counts)
+        run_marked_marches(marches, step_counts)
     if os.waitpid(copy, 0)[1] != 0:
         raise SystemExit("a copy failed")
 
 
-def counted(marches: list[Callable[[int], None]], step_counts: list[int]) -> None:
-    """Run every march for each number of steps, with a system call as mark before each and at the end; then exit the
-    process."""
+def run_marked_marches(marches: list[Callable[[int], None]], step_counts: list[int]) -> None:
+    """Run every time integration for each number of steps, with the system call MARKING_SYSTEM_CALL before each and at
+    the end; then exit the process."""
     for march in marches:
         for steps in step_counts:
             os.getpgid(0)

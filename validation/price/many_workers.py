@@ -1,4 +1,4 @@
-"""What a thousand workers would do: blocks of an ensemble in a simulated cluster, event by event.
+"""Efficiency of up to a thousand workers: an event simulation of an ensemble's blocks on a cluster.
 
     command --(block's number)--> a free worker --(arrays)--> link --> command and its disk
 
@@ -18,53 +18,54 @@ import numpy as np
 from models.ensemble.runner import BLOCKS_AHEAD
 
 PATH_SECONDS, PATH_BYTES = 0.8 / 50, 0.4e6 / 50
-"""A path of 60 s in a worker (s), and its states at 121 rows (bytes)."""
-COMMAND_TIMES, PER_BYTE = 12e-3, 2e-3 / 0.4e6
-"""Processor time of command and scheduler for a block of any size (s), and for each byte of it."""
+"""Computing time (s) of a path of 60 s on a worker, and size (bytes) of its states at 121 rows."""
+COMMAND_TIMES, SECONDS_PER_BYTE = 12e-3, 2e-3 / 0.4e6
+"""Processor time of command and scheduler for a block of any size (s), and for each of its bytes (s)."""
 LINK_RATE, DISK_RATE = 1.25e9, 500e6
-"""Bytes per second into the command, by 10 Gbit/s, and onto its disk: assumed."""
+"""Assumed rates (bytes/s) of the network link into the command (10 Gbit/s), and of its disk."""
 TIME_SCATTER = 0.1
-"""Standard deviation of a block's time, by its mean."""
+"""Standard deviation of a block's computing time divided by the mean."""
 SEED = 25
 WORKERS = (2, 10, 100, 1000)
 
 
 @dataclass(frozen=True)
 class Ensemble:
-    """An ensemble that is computed in blocks. block: number of paths in each; thinned: factor by which the time rows
-    that workers send back are thinned."""
+    """An ensemble that is computed in blocks. block: number of paths in each; thinning_factor: factor by which workers
+    thin the time rows that they send back."""
 
     block: int = 50
-    thinned: int = 1
+    thinning_factor: int = 1
 
     @property
-    def seconds(self) -> float:
+    def block_seconds(self) -> float:
         """Computing time (s) of a block on a worker."""
         return self.block * PATH_SECONDS
 
     @property
-    def bytes(self) -> float:
+    def result_bytes(self) -> float:
         """Size (bytes) of the result that a worker sends back for a block."""
-        return self.block * PATH_BYTES / self.thinned
+        return self.block * PATH_BYTES / self.thinning_factor
 
     @property
-    def stations(self) -> dict[str, float]:
+    def station_times(self) -> dict[str, float]:
         """Time (s) that each station (command, link, disk), which serves one block at a time, needs for a block."""
         return {
-            "command": COMMAND_TIMES + PER_BYTE * self.bytes,
-            "link": self.bytes / LINK_RATE,
-            "disk": self.bytes / DISK_RATE,
+            "command": COMMAND_TIMES + SECONDS_PER_BYTE * self.result_bytes,
+            "link": self.result_bytes / LINK_RATE,
+            "disk": self.result_bytes / DISK_RATE,
         }
 
     @property
     def most_workers(self) -> float:
         """Number of workers that the slowest station can keep busy."""
-        return self.seconds / max(self.stations.values())
+        return self.block_seconds / max(self.station_times.values())
 
 
 @dataclass(frozen=True)
 class WorkerShares:
-    """Shares of time for which the workers compute and for which each station is busy, and blocks per second."""
+    """Shares of time for which the workers compute and for which each station is busy, and ``rate`` in blocks per
+    second."""
 
     workers: float
     stations: dict[str, float]
@@ -78,17 +79,18 @@ class WorkerShares:
 
 
 def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerShares:
-    """Simulate a run of ``blocks`` blocks by a number of workers, from sending the first block to saving the last."""
-    seconds = ensemble.seconds * np.random.default_rng(SEED).normal(1.0, TIME_SCATTER, blocks).clip(0.5, 1.5)
-    half, waiting, free = ensemble.stations["command"] / 2.0, list[int](), workers
+    """Busy shares in a simulated run of ``blocks`` blocks by ``workers`` workers, from sending the first block to
+    saving the last."""
+    seconds = ensemble.block_seconds * np.random.default_rng(SEED).normal(1.0, TIME_SCATTER, blocks).clip(0.5, 1.5)
+    half, waiting, free = ensemble.station_times["command"] / 2.0, list[int](), workers
     idle, events, order = dict.fromkeys(("command", "link", "disk"), 0.0), list[tuple[float, int, str, int]](), count()
     saved_blocks, first, sent, current_time = set[int](), 0, 0, 0.0
     blocks_ahead = max(BLOCKS_AHEAD, 2 * workers)
 
-    def serve(station_name: str, takes: float, then: str, block: int) -> None:
+    def serve(station_name: str, service_seconds: float, next_station: str, block: int) -> None:
         """Let a station serve a block as soon as it is idle."""
-        idle[station_name] = max(idle[station_name], current_time) + takes
-        heappush(events, (idle[station_name], next(order), then, block))
+        idle[station_name] = max(idle[station_name], current_time) + service_seconds
+        heappush(events, (idle[station_name], next(order), next_station, block))
 
     while len(saved_blocks) < blocks:
         while sent < min(blocks, first + blocks_ahead) and sent - len(saved_blocks) < blocks_ahead:
@@ -99,11 +101,11 @@ def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerSha
             waiting.append(block)
         elif event == "computed":
             free += 1
-            serve("link", ensemble.stations["link"], "here", block)
+            serve("link", ensemble.station_times["link"], "here", block)
         elif event == "here":
             serve("command", half, "taken", block)
         elif event == "taken":
-            serve("disk", ensemble.stations["disk"], "kept", block)
+            serve("disk", ensemble.station_times["disk"], "kept", block)
         else:
             saved_blocks.add(block)
             while first in saved_blocks:
@@ -112,7 +114,7 @@ def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerSha
             free -= 1
             start_time = waiting.pop(0)
             heappush(events, (current_time + float(seconds[start_time]), next(order), "computed", start_time))
-    busy = {name: blocks * takes / current_time for name, takes in ensemble.stations.items()}
+    busy = {name: blocks * takes / current_time for name, takes in ensemble.station_times.items()}
     return WorkerShares(float(seconds.sum()) / (workers * current_time), busy, blocks / current_time)
 
 
@@ -122,18 +124,18 @@ SETTINGS = {
     "`options.block=1000`, `options.rows=5`": Ensemble(1000, 10),
     "`options.block=2000`, `options.rows=5`": Ensemble(2000, 10),
 }
-"""Ensembles of the table, by what a user types."""
+"""Ensembles of the table, by the options that a user types."""
 
 
-def table(round_count: int = 20) -> Iterator[str]:
-    """Rows of the table in the docs: share of time for which workers compute, and the busiest station with the most
-    workers. round_count : number of blocks per worker."""
+def shares_table(round_count: int = 20) -> Iterator[str]:
+    """Lines of the table in the docs: share of time for which workers compute, and the busiest station with the largest
+    number of workers. round_count : number of blocks per worker."""
     for name, ensemble in SETTINGS.items():
         outcomes = [simulated_shares(ensemble, workers, round_count * workers) for workers in WORKERS]
         shares = " | ".join(f"{100.0 * outcome.workers:.0f} %" for outcome in outcomes)
-        sent = outcomes[-1].rate * ensemble.bytes / 1e6
+        sent = outcomes[-1].rate * ensemble.result_bytes / 1e6
         yield f"| {name} | {shares} | {outcomes[-1].bottleneck} | {sent:.0f} MB/s | {ensemble.most_workers:.0f} |"
 
 
 if __name__ == "__main__":
-    print("\n".join(table()))
+    print("\n".join(shares_table()))

@@ -1,4 +1,4 @@
-"""Ride and the pitch plane by the free vehicles' one builder: the same accelerations, and the seconds of a step.
+"""The ride and pitch-plane vehicles built by the builder of free vehicles: equal accelerations, and time of a step.
 
 That builder has one kinematic tree of all bodies, and one callback of compiled forces. The compiled forces of hub
 forces read an axis that is fixed in space, too; springs and tyres are their elements here. Anti-roll bars are left out
@@ -48,16 +48,16 @@ Acceleration = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class TwoBuilds:
-    """A vehicle built twice: by its system's builder, and by the builder of free vehicles. ``sign`` : sign of the
-    latter's coordinates relative to the former's."""
+    """A vehicle built twice: by its system's builder, and by the builder of free vehicles. ``sign`` : sign of the free
+    vehicle's coordinates relative to those of the system."""
 
     system: Any
     free: FreeModel
     sign: float = 1.0
 
     def gap(self, state_count: int) -> float:
-        """Largest difference of the accelerations at random states, divided by the largest acceleration of the
-        state."""
+        """Largest difference of the accelerations of both builds at random states, divided by the largest acceleration
+        of the state."""
         rng, worst = np.random.default_rng(SEED), 0.0
         for _ in range(state_count):
             q, v = rng.uniform(-0.05, 0.05, self.free.size), rng.uniform(-0.5, 0.5, self.free.size)
@@ -72,15 +72,15 @@ def ride_vehicle() -> SpatialVehicle:
     return replace(load_vehicle("r19_ride"), bars=())
 
 
-def built_ride(engine: str) -> TwoBuilds:
-    """The ride vehicle in an engine, built by both builders."""
+def ride_builds(engine: str) -> TwoBuilds:
+    """The ride vehicle in an engine, built by the builder of ride and by that of free vehicles."""
     vehicle, settings = ride_vehicle(), Settings(INTEGRATORS[engine], STEP, STEPS * STEP)
     return TwoBuilds(in_space(engine, vehicle, settings), free_model(engine, driven_vehicle(vehicle), settings))
 
 
-def pitch_plane(engine: str) -> TwoBuilds:
-    """The pitch-plane vehicle on its tyres in an engine, built by both builders. Its coordinates count downward, those
-    of the free vehicle upward."""
+def pitch_plane_builds(engine: str) -> TwoBuilds:
+    """The pitch-plane vehicle on its tyres in an engine, built by its system's builder and by that of free vehicles.
+    Its coordinates are positive down, those of the free vehicle up."""
     settings = Settings(INTEGRATORS[engine], STEP, STEPS * STEP)
     scene = pitch_plane_scene({"title": "free", "run": {"duration": STEPS * STEP, "step": STEP}})
     assembly = replace(assembly_of_scene(scene), mode="free", input=None, initial=np.zeros(8))
@@ -89,7 +89,7 @@ def pitch_plane(engine: str) -> TwoBuilds:
 
 
 def _vehicle_in_space(plane_vehicle: Vehicle) -> SpatialVehicle:
-    """A pitch-plane vehicle described as a vehicle in space."""
+    """Description in space of a pitch-plane vehicle."""
     bodies = tuple(
         Body(body.name, body.mass, (0.0, 0.0, 0.0), ("z",))
         if body.pitch_inertia is None
@@ -120,14 +120,14 @@ def _vehicle_in_space(plane_vehicle: Vehicle) -> SpatialVehicle:
 
 
 def driven_vehicle(vehicle: SpatialVehicle, gravity: float = 0.0) -> Driven:
-    """A vehicle on a flat road for the builder of free vehicles, with all its forces compiled."""
+    """A vehicle on a flat road with its compiled forces, as the builder of free vehicles takes it."""
     tree = replace(vehicle, springs=(), bars=(), tyres=(), side_forces=(), drags=(), outputs=())
     numbers = _force_table(tree, vehicle)
     return Driven(tree, np.array([0.0, 0.0, -gravity]), numbers, joint_forces, set_joint_forces)
 
 
 def _force_table(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
-    """Table of numbers for the compiled forces: all axes are fixed in space, and tyres act against the ground."""
+    """Parameter table for the compiled forces; all spring axes are fixed in space, and tyres act against the ground."""
     springs = [
         _spring_element(s.name, s.first_body, str(s.second_body), s, s.first_point, s.second_point, s.axis)
         for s in vehicle.springs
@@ -146,32 +146,35 @@ def _spring_element(
     name: str,
     first_body: str,
     second_body: str,
-    law: SpringDamper | Tyre,
+    spring_or_tyre: SpringDamper | Tyre,
     start_point: Vector,
     end_point: Vector,
     axis: Vector,
 ) -> Element:
     vectors = (np.array(start_point, float), np.array(end_point, float), np.array(axis, float))
-    return Element(name, first_body, second_body, *vectors, law.stiffness, law.damping, 0.0, second_body)
+    return Element(
+        name, first_body, second_body, *vectors, spring_or_tyre.stiffness, spring_or_tyre.damping, 0.0, second_body
+    )
 
 
 @contextmanager
-def one_tree() -> Iterator[None]:
-    """Context in which the ride builder in Exudyn makes a single tree of all bodies, with unchanged springs and
-    callbacks."""
+def single_tree_context() -> Iterator[None]:
+    """Context in which the builder of ride in Exudyn makes a single kinematic tree of all bodies; springs and callbacks
+    are unchanged."""
     with mock.patch.object(spatial_exudyn_build, "_trees", lambda vehicle: [list(vehicle.bodies)]):
         yield
 
 
 def time_ratios(round_count: int, minimum_seconds: float) -> dict[str, tuple[float, float, float]]:
-    """Ratios of a run's processor time with another builder to that with the present one, each with its interval."""
+    """Ratios of the processor time of a run with another builder to that with the system's builder, each with its
+    interval (ratio, low, high)."""
     jobs, names = list[Callable[[], Any]](), list[str]()
     for engine in INTEGRATORS:
-        for system, sides in (("ride", built_ride(engine)), ("pitch plane", pitch_plane(engine))):
+        for system, sides in (("ride", ride_builds(engine)), ("pitch plane", pitch_plane_builds(engine))):
             jobs += [sides.system.run, sides.free.run]
             names.append(f"{system}, {engine}: the free builder to today's")
-    with one_tree():
-        jobs += [built_ride("exudyn").system.run]
+    with single_tree_context():
+        jobs += [ride_builds("exudyn").system.run]
     seconds = interleave(jobs, round_count, minimum_seconds, clock=time.process_time)
     ratios = {name: paired_ratio(seconds[2 * i + 1], seconds[2 * i]) for i, name in enumerate(names)}
     return ratios | {"ride, exudyn: one tree, springs of today, to today's": paired_ratio(seconds[-1], seconds[0])}
@@ -179,7 +182,7 @@ def time_ratios(round_count: int, minimum_seconds: float) -> dict[str, tuple[flo
 
 if __name__ == "__main__":
     for each_engine in INTEGRATORS:
-        for each in (built_ride, pitch_plane):
+        for each in (ride_builds, pitch_plane_builds):
             print(f"{each.__name__}, {each_engine}: accelerations apart by {each(each_engine).gap(100):.1e}")
     for each_name, (middle, low, high) in time_ratios(15, 0.1).items():
         print(f"{each_name}: {middle:.2f} ({low:.2f} to {high:.2f})")

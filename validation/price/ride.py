@@ -1,4 +1,4 @@
-"""Cost of accuracy in ride: standard deviations of R19-ride by every method, their errors over counts and seconds.
+"""Cost of accuracy in ride: errors of standard deviations of the vehicle R19-ride by every method, over work and time.
 
 All routes take the same linear vehicle on the paper's road at one speed. The reference is the quadrature that halves
 its panels until nothing changes, an integral over frequencies with the delay in closed form; it knows its own error.
@@ -26,27 +26,28 @@ from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Observed, Row, System, Table
-from validation.ride.rides import five_cases
+from validation.ride.rides import five_correlation_cases
 
 SYSTEM: System = "cost"
-SPEED, LOWEST = 20.0, 1e-2
-"""m/s; first frequency of the grids, Hz."""
+SPEED, LOWEST_FREQUENCY = 20.0, 1e-2
+"""Speed (m/s), and lowest frequency (Hz) of the logarithmic grids."""
 SEED = 5
 SWEPT_SPEEDS = 60
-"""Speeds of the sweep, in five cases of correlation each: its cost is that of one point."""
+"""Number of speeds of the sweep, each with five cases of road correlation; its cost is stated per point."""
 FREQUENCY_GRIDS = {True: ((200, 100.0), (2000, 1000.0)), False: ((200, 100.0), (2000, 1000.0), (20_000, 10_000.0))}
-"""Frequencies, evenly spaced in their logarithm, and the last of them in Hz, by ``quick``."""
+"""Number and highest frequency (Hz) of logarithmic frequency grids, by ``quick``."""
 UNIFORM_GRID = (500, 50.0)
-COPIES = {True: ((16, 4.0),), False: ((2, 100.0), (20, 100.0), (100, 100.0))}
-"""Copies and how long each runs (s)."""
-KINDS = {"accelerations": "acceleration", "tyre forces": "tyre force"}
+COPY_COUNTS = {True: ((16, 4.0),), False: ((2, 100.0), (20, 100.0), (100, 100.0))}
+"""Number of Monte Carlo copies and duration (s) of each, by ``quick``."""
+OUTPUT_KINDS = {"accelerations": "acceleration", "tyre forces": "tyre force"}
 
 
 @dataclass(frozen=True)
 class RoutePoint:
-    """One way to compute standard deviations. count, unit : amount of work (solves, points, frequencies or copies);
-    errors : largest relative error for each of KINDS; z : largest deviation of a random method's variances in standard
-    errors; seconds : median time, or that of a single run if it is long."""
+    """Cost and error of one method to compute standard deviations. count, unit : amount of work (solves,
+    decompositions, frequencies or copies); errors : largest relative error for each of OUTPUT_KINDS; z : largest
+    deviation of a random method's variances in standard errors; seconds : median time, or that of a single run if it is
+    long."""
 
     name: str
     unit: str
@@ -58,7 +59,8 @@ class RoutePoint:
 
 @dataclass(frozen=True)
 class PricedRide:
-    """The vehicle, the road in the paper's five cases of correlation, and the true standard deviations in case 3."""
+    """Problem of the cost of accuracy in ride: the vehicle, the road in the paper's five cases of correlation by their
+    numbers, and the true standard deviations (p,) in case 3 with their relative uncertainty."""
 
     vehicle: LinearVehicle
     roads: dict[str, Excitation]
@@ -67,65 +69,65 @@ class PricedRide:
 
     @property
     def road(self) -> Excitation:
-        """The road of case 3: two tracks as modelled, with a delay for the rear axle."""
+        """The road in the paper's third case of correlation: two tracks, with a delay at the rear axle."""
         return self.roads["3"]
 
     def errors(self, deviations: np.ndarray) -> dict[str, float]:
-        """Largest relative error of the standard deviations (p,), by kind of output."""
+        """Largest relative error of computed standard deviations (p,), by kind of output."""
         relative_errors = np.abs(deviations / self.truth - 1.0)
         return {
             name: float(max(e for e, o in zip(relative_errors, self.vehicle.outputs, strict=True) if o.kind == kind))
-            for name, kind in KINDS.items()
+            for name, kind in OUTPUT_KINDS.items()
         }
 
 
 def problem() -> PricedRide:
-    """The priced problem: the vehicle R19-ride at 20 m/s."""
+    """Problem of the cost of accuracy in ride, for the vehicle R19-ride at 20 m/s."""
     vehicle = linearise(load_vehicle("r19_ride"))
-    roads = five_cases(vehicle.wheels)
+    roads = five_correlation_cases(vehicle.wheels)
     true = variances_by_quadrature(vehicle, roads["3"], SPEED)
     return PricedRide(vehicle, roads, np.sqrt(true.variance), float(true.error.max()))
 
 
-def direct_deviations(ride: PricedRide) -> np.ndarray:
-    """Standard deviations by a Lyapunov equation."""
+def lyapunov_deviations(ride: PricedRide) -> np.ndarray:
+    """Standard deviations (p,) of the outputs by a Lyapunov equation."""
     return stationary_covariance(vehicle_with_road(ride.vehicle, ride.road, SPEED)).deviation
 
 
 def swept_deviations(ride: PricedRide, speed_count: int) -> np.ndarray:
-    """Standard deviations at SPEED, from a sweep by eigenvectors over five cases of correlation and ``speed_count``
-    speeds."""
+    """Standard deviations (p,) of the outputs at SPEED, from a sweep by eigenvectors over five cases of road
+    correlation and ``speed_count`` speeds."""
     speeds = [*np.linspace(5.0, 50.0, speed_count - 1), SPEED]
     return variance_sweep(lambda speed: ride.vehicle, ride.roads, speeds).deviation[list(ride.roads).index("3"), -1]
 
 
 def deviations_on_grid(
-    ride: PricedRide, frequency_count: int, highest_frequency: float, even: bool = False
+    ride: PricedRide, frequency_count: int, highest_frequency: float, evenly_spaced: bool = False
 ) -> np.ndarray:
-    """Standard deviations by the trapezoidal rule on a frequency grid up to ``highest_frequency`` (Hz), evenly spaced
-    in frequency or in its logarithm."""
+    """Standard deviations (p,) of the outputs by the trapezoidal rule on a frequency grid up to ``highest_frequency``
+    (Hz), evenly spaced in frequency if ``even``, else in its logarithm."""
     frequency = (
         np.linspace(highest_frequency / frequency_count, highest_frequency, frequency_count)
-        if even
-        else np.geomspace(LOWEST, highest_frequency, frequency_count)
+        if evenly_spaced
+        else np.geomspace(LOWEST_FREQUENCY, highest_frequency, frequency_count)
     )
     omega = 2 * np.pi * frequency
     return np.sqrt(2 * np.trapezoid(spectral_densities(ride.vehicle, ride.road, SPEED, omega), omega, axis=0))
 
 
-def measure(quick: bool, round_count: int, minimum_seconds: float) -> tuple[list[Row], dict[str, Any]]:
-    """Rows and data of all routes; counts and errors are judged, times are not."""
+def measure_routes(quick: bool, round_count: int, minimum_seconds: float) -> tuple[list[Row], dict[str, Any]]:
+    """Rows and saved data of all methods; counts and errors are judged, times are not."""
     ride = problem()
     swept = 3 if quick else SWEPT_SPEEDS
     points = [_lyapunov_point(ride), _route_point_of_sweep(ride, swept)]
-    jobs: list[Callable[[], Any]] = [partial(direct_deviations, ride), partial(swept_deviations, ride, swept)]
+    jobs: list[Callable[[], Any]] = [partial(lyapunov_deviations, ride), partial(swept_deviations, ride, swept)]
     for count, highest_frequency, even in (*((*net, False) for net in FREQUENCY_GRIDS[quick]), (*UNIFORM_GRID, True)):
         name = f"{'uniform' if even else 'logarithmic'} grid to {highest_frequency:g} Hz"
         start_time = time.perf_counter()
         errors = ride.errors(deviations_on_grid(ride, count, highest_frequency, even))
         points.append(RoutePoint(name, "frequencies", count, errors, time.perf_counter() - start_time))
         jobs.append(partial(deviations_on_grid, ride, count, highest_frequency, even))
-    for copies, lasting in COPIES[quick]:
+    for copies, lasting in COPY_COUNTS[quick]:
         jobs.append(partial(at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED))
         start_time = time.perf_counter()
         estimate: VarianceEstimate = jobs[-1]()
@@ -145,7 +147,7 @@ def _lyapunov_point(ride: PricedRide) -> RoutePoint:
     import control
 
     with mock.patch.object(control, "lyap", wraps=control.lyap) as solve:
-        deviations = direct_deviations(ride)
+        deviations = lyapunov_deviations(ride)
     return RoutePoint("Lyapunov, delay exact", "solves", solve.call_count, ride.errors(deviations), 0.0)
 
 
@@ -160,7 +162,7 @@ def _route_point_of_sweep(ride: PricedRide, speeds: int) -> RoutePoint:
 
 
 def judging_rows(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
-    """Rows that judge errors and counts of the routes."""
+    """Rows that judge the errors and the counts of work of all methods."""
     exact = points[:2]
     grids = [p for p in points if p.name.startswith("logarithmic")]
     rows = [
@@ -196,7 +198,7 @@ def judging_rows(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
             "none",
         ),
     ]
-    falls = [a.errors[kind] / b.errors[kind] for kind in KINDS for a, b in pairwise(grids)]
+    falls = [a.errors[kind] / b.errors[kind] for kind in OUTPUT_KINDS for a, b in pairwise(grids)]
     rows.append(
         Observed(
             "price.ride.grids",
@@ -225,12 +227,12 @@ def judging_rows(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
 
 
 def table(case_data: dict[str, Any]) -> Table:
-    """Table of all routes with errors, counts and times."""
+    """Table of all methods with errors, counts of work and times."""
     lines = tuple(
         (
             p["name"],
             f"{p['count']:,} {p['unit']}",
-            *(f"{p['errors'][kind]:.1e}" for kind in KINDS),
+            *(f"{p['errors'][kind]:.1e}" for kind in OUTPUT_KINDS),
             f"{1e3 * p['seconds']:.3g}",
         )
         for p in case_data["points"]
@@ -240,16 +242,18 @@ def table(case_data: dict[str, Any]) -> Table:
         "the tyre forces is what lies beyond its last frequency, which some users do not want. Monte Carlo is one "
         "draw. Milliseconds are those of one run on this machine, and wander."
     )
-    return Table(f"Standard deviations of R19-ride at {SPEED:g} m/s", note, ("route", "count", *KINDS, "ms"), lines)
+    return Table(
+        f"Standard deviations of R19-ride at {SPEED:g} m/s", note, ("route", "count", *OUTPUT_KINDS, "ms"), lines
+    )
 
 
 def draw(case_data: dict[str, Any]) -> tuple[str, Figure]:
     """Plot error over computing time (ms), with a panel per kind of output."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
-    figure, axes = subplots(1, len(KINDS), figsize=(COLUMN_WIDTH, 4.4), sharey=True)
+    figure, axes = subplots(1, len(OUTPUT_KINDS), figsize=(COLUMN_WIDTH, 4.4), sharey=True)
     markers = {"solves": "*", "decompositions": "D", "frequencies": "o", "copies": "s"}
-    for ax, kind in zip(axes, KINDS, strict=True):
+    for ax, kind in zip(axes, OUTPUT_KINDS, strict=True):
         for p in case_data["points"]:
             x, y = 1e3 * p["seconds"], max(p["errors"][kind], np.finfo(float).eps)
             ax.plot(x, y, markers[p["unit"]], markersize=8, label=f"{p['name']}, {p['count']:,} {p['unit']}")

@@ -1,4 +1,4 @@
-"""Rows that every work-precision problem answers for."""
+"""Rows of the report that judge every work-precision problem."""
 
 from models.advice.price.curves import ToleranceCost
 from models.advice.price.problem import Problem, Setting
@@ -8,61 +8,62 @@ from validation.price.tables import curve_name
 
 SYSTEM: System = "cost"
 ORDER_TOLERANCE = {1: 0.1, 2: 0.1, 3: 0.2, 4: 0.2, 6: 0.5}
-"""Allowed distance of the observed from the declared order: at these steps the next power still shows,
+"""Allowed difference of the observed from the declared order, by order: at these steps the next power still shows,
 the more the higher the order (RK4 between 1 and 0.25 ms: 4.17)."""
 REFERENCE_SHARE = 1e-4
-"""Share of the finest tolerance that a reference may leave uncertain, where a problem has no ``uncertain_share``."""
-SETTLED_RATIO = 0.9
-"""Of the last but one error: a curve that falls no further has come down to its theory's own."""
+"""Largest uncertainty of a reference divided by the finest tolerance, for problems without ``uncertain_share``."""
+SETTLED_ERROR_RATIO = 0.9
+"""Ratio of a curve's last error to the one before from which it no longer falls: it has reached the theory's error."""
 INTERPOLATION_FACTOR = 1.25
-"""Allowed error at an interpolated cheapest setting, by its tolerance: curves bend between two settings."""
+"""Allowed error of an interpolated cheapest setting divided by the tolerance: curves bend between two settings."""
 
 
 def rows_of(problem: Problem, measured_points: MeasuredPoints, quick: bool) -> list[Row]:
-    """All rows of one problem; the row on the width of the sweep is part of the full run only."""
+    """All rows of one work-precision problem; the row on the number of tried settings is part of the full report
+    only."""
     points, repeated = measured_points.points, [p for p in measured_points.points if p.changed is not None]
     return [
         _reference_row(problem, measured_points),
         *_order_rows(measured_points),
-        _none_of(
+        _offenders_row(
             f"price.{problem.key}.silent",
             f"wrong answers without a word, of {len(points)} settings",
-            [_label(p) for p in points if p.status == "SILENT"],
+            [_setting_text(p) for p in points if p.status == "SILENT"],
             f"an error that is not finite, or beyond {problem.bound:.3g} {measured_points.unit}, "
             "must come with an exception",
         ),
-        _none_of(
+        _offenders_row(
             f"price.{problem.key}.counts.said",
             "settings whose force calls are not stages times steps",
             measured_points.miscounted_methods(),
             "exact: stages from the methods' tableaux",
         ),
-        _none_of(
+        _offenders_row(
             f"price.{problem.key}.counts.repeat",
             f"settings that count or err otherwise in the last round, of {len(repeated)} that have rounds",
-            [_label(p) for p in repeated if p.changed],
+            [_setting_text(p) for p in repeated if p.changed],
             "exact: all counts, and errors to the last digit",
         ),
-        _rows_of_promises(problem, measured_points),
+        _cheapest_settings_row(problem, measured_points),
         *([] if quick else [_sweep_row(measured_points)]),
         *_loss_rows(measured_points),
     ]
 
 
-def _label(p: Point) -> str:
+def _setting_text(p: Point) -> str:
     return f"{p.setting.curve} {p.setting.label()}"
 
 
-def _none_of(name: str, offence: str, offending: list[str], tolerance_reason: str) -> Row:
-    """Row that passes if a list of offending settings is empty; it names them otherwise."""
-    offenders = f": {', '.join(offending)}" if offending else ""
-    return Observed(name, SYSTEM, offence + offenders, len(offending), "settings").within(
+def _offenders_row(name: str, offence_text: str, offending_settings: list[str], tolerance_reason: str) -> Row:
+    """Row that passes if the list of offending settings is empty; otherwise it names them."""
+    offenders = f": {', '.join(offending_settings)}" if offending_settings else ""
+    return Observed(name, SYSTEM, offence_text + offenders, len(offending_settings), "settings").within(
         0, 0, tolerance_reason, "closed form"
     )
 
 
 def _reference_row(problem: Problem, measured_points: MeasuredPoints) -> Row:
-    """Row: the reference is more accurate than the finest tolerance requires."""
+    """Row: uncertainty of the reference solution, compared with a share of the finest tolerance."""
     quantity, share = measured_points.quantity, getattr(problem, "uncertain_share", REFERENCE_SHARE)
     return Observed(
         f"price.{problem.key}.reference",
@@ -101,8 +102,9 @@ def _order_rows(measured_points: MeasuredPoints) -> list[Row]:
     ]
 
 
-def _rows_of_promises(problem: Problem, measured_points: MeasuredPoints) -> Row:
-    """Row: the settings in the table of cheapest settings are run, and must keep their tolerances."""
+def _cheapest_settings_row(problem: Problem, measured_points: MeasuredPoints) -> Row:
+    """Row: largest ratio of error to tolerance of the settings in the table of cheapest settings, which are run for
+    it."""
     worst = 0.0
     for target in problem.tolerances:
         best = cheapest_curve(measured_points.reaches(target, measured_points.costs[0]))
@@ -126,22 +128,23 @@ def _rows_of_promises(problem: Problem, measured_points: MeasuredPoints) -> Row:
 def _runnable_setting(
     problem: Problem, measured_points: MeasuredPoints, curve: str, cheapest: ToleranceCost
 ) -> Setting:
-    """The setting that the table names; a fixed step is changed to the nearest one that divides the run."""
+    """The setting of a curve that the table of cheapest settings names; a fixed step is changed to the nearest one that
+    divides the run."""
     like = measured_points.curves()[curve][0].setting
     value = cheapest.value if like.adaptive else problem.duration / round(problem.duration / cheapest.value)
     return problem.setting(like.engine, like.method, value)
 
 
 def _sweep_row(measured_points: MeasuredPoints) -> Row:
-    """Row: each method was tried widely enough, with at least six settings. From order 4 up they span four decades of
-    the setting or the error, unless the curve ends at a failure or at its smallest error."""
+    """Row: methods that were tried with too few settings. At least six are required; from order 4 up they must span
+    four decades of the setting or the error, unless the curve ends at a failure or at its smallest error."""
     tried, short = measured_points.curves(None), []
     for curve, points in measured_points.curves().items():
         errors, setting = list(map(measured_points.error, points)), points[0].setting
         wide = errors[0] >= 1e4 * errors[-1] or setting.value >= 1e4 * points[-1].setting.value
         ended = tried[curve][0].status != "ok" or setting.cells
         reaches_tolerance = ended and errors[-1] <= min(measured_points.tolerances)
-        settled = len(points) > 1 and errors[-1] >= SETTLED_RATIO * errors[-2]
+        settled = len(points) > 1 and errors[-1] >= SETTLED_ERROR_RATIO * errors[-2]
         low = 0 < (setting.order or setting.nominal) < 4
         if len(points) < 6 or not (wide or reaches_tolerance or settled or low):
             short.append(curve)
@@ -149,11 +152,12 @@ def _sweep_row(measured_points: MeasuredPoints) -> Row:
         "methods with fewer than 6 settings that answered, or from order 4 up with fewer than 4 decades of them or "
         "of error although coarser settings answer, or the finest tolerance is not met and the error still falls"
     )
-    return _none_of(f"price.{measured_points.key}.sweep", requirement, short, "what the study was asked to cover")
+    return _offenders_row(f"price.{measured_points.key}.sweep", requirement, short, "what the study was asked to cover")
 
 
 def _loss_rows(measured_points: MeasuredPoints) -> list[Row]:
-    """Rows: loss of each engine's default setting relative to the cheapest one, at the middle tolerance."""
+    """Rows: cost of each engine's default method divided by the cost of the cheapest setting, at the middle
+    tolerance."""
     return [
         row
         for owner, p in measured_points.defaults.items()

@@ -1,4 +1,4 @@
-"""Two claims about seconds: what a compiled callback costs in MuJoCo, and how fast the reference runs."""
+"""Computing times: what a compiled callback costs in MuJoCo, and how fast the reference implementation runs."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,22 +17,22 @@ STEP = 1e-3
 
 
 def callback_cost(
-    driven_assembly: Assembly, duration: float, integrator: str, round_count: int, minimum_seconds: float
+    road_assembly: Assembly, duration: float, integrator: str, round_count: int, minimum_seconds: float
 ) -> dict[str, Any]:
     """Ratios of computing time between variants of a MuJoCo model: bare; with native springs and dampers; on a road;
     with all forces in one callback.
 
-    driven_assembly : a vehicle on a road, whose input enters through a compiled callback.
+    road_assembly : a vehicle on a road, whose input enters through a compiled callback.
     Values are (ratio, low, high) with a bootstrap 95 % interval, and medians in s. ``gap`` is the largest
     difference of states between the native route and the one with every force in the callback.
     """
     flat = assembly_of_scene(build_scene({"title": "no input", "run": {"duration": duration, "step": STEP}}))
     bare = replace(flat, vehicle=replace(flat.vehicle, struts=()))
     settings = Settings(integrator, STEP, duration)
-    models = [build("mujoco", assembly, settings) for assembly in (bare, flat, driven_assembly)]
-    compiled = CompiledForces(driven_assembly, settings)
+    models = [build("mujoco", assembly, settings) for assembly in (bare, flat, road_assembly)]
+    compiled = CompiledForces(road_assembly, settings)
     runs: list[Callable[[], Any]] = [model.run for model in models]
-    seconds = interleave([*runs, compiled.coast, compiled.run], round_count, minimum_seconds)
+    seconds = interleave([*runs, compiled.run_with_installed_callback, compiled.run], round_count, minimum_seconds)
     names = ("without forces", "springs and dampers", "with callback", "bare", "all in the callback")
     return {
         "gap": float(np.abs(compiled.run() - models[2].run().states).max()),
@@ -46,14 +46,17 @@ def callback_cost(
     }
 
 
-def real_time(driven_assembly: Assembly, duration: float, round_count: int, minimum_seconds: float) -> dict[str, Any]:
-    """Ratio of simulated time to computing time of the reference at 1 ms, with and without making its road table.
+def real_time_factors(
+    road_assembly: Assembly, duration: float, round_count: int, minimum_seconds: float
+) -> dict[str, Any]:
+    """Ratio of simulated time to computing time of the reference with steps of 1 ms, with and without the computation
+    of its road table.
 
     The road is timed by itself beside the run and subtracted within each round.
     """
-    signal, steps = driven_assembly.input, round(duration / STEP)
+    signal, steps = road_assembly.input, round(duration / STEP)
     assert signal is not None
-    model = build("reference", driven_assembly, Settings("RK4", STEP, duration))
+    model = build("reference", road_assembly, Settings("RK4", STEP, duration))
     run, table = interleave(
         [model.run, lambda: signal.sample(0.0, STEP / 2, 2 * steps + 1)], round_count, minimum_seconds
     )

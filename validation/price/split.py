@@ -1,7 +1,7 @@
-"""Parts of a step's time in an engine: the engine, the bridge to the forces, and the forces' own kernel.
+"""Parts of the computing time of a step: the engine, the bridge to the compiled forces, and the force kernel.
 
-Three runs tell, which differ in the callback alone: an empty one (the engine), a cheap one, which is handed all
-positions and rates and hands back a damper's forces (more than that by the bridge), and the real one (the kernel).
+Three runs differ in the callback alone: an empty one gives the engine's part; a cheap one, which is handed all
+positions and rates and returns a damper's forces, adds the bridge; and the real one adds the kernel.
 """
 
 from collections.abc import Callable
@@ -25,52 +25,55 @@ from models.machine.stack import at, beyond
 from models.machine.timing import interleave, median
 from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.common.rows import Observed, Row, Saved, System, Table
-from validation.price.compiled_forces import CompiledForces, law
+from validation.price.compiled_forces import CompiledForces, force_callback
 from validation.price.instructions_run import exudyn_marches
 from validation.price.problems import road_excited, wheelset
-from validation.price.problems.road_excited import STAGES
+from validation.price.problems.road_excited import STAGES_OF_METHOD
 
 SYSTEM: System = "cost"
-RUNS = ("empty", "cheap", "real")
+FORCE_VARIANTS = ("empty", "cheap", "real")
 STEPS = {"road": 1000, "wheel-20": 400}
-"""Steps of a run, by the problem's key."""
+"""Number of steps of a run, by the problem's key."""
 STEP = {"road": 1e-3, "wheel-20": 2.5e-4}
-"""s"""
+"""Step (s) of a run, by the problem's key."""
 WEAK_DAMPING = 1e-3
-"""N s/m of the cheap law, which moves next to nothing."""
+"""Damping (N s/m) of the cheap force law, which hardly changes the motion."""
 METHODS = {"exudyn": "RK44", "mujoco": "RK4"}
-Of = Callable[[Any, Any], Any]
+ForceFunction = Callable[[Any, Any], Any]
 
 
 @njit(cache=True, error_model="numpy")
 def add_weak_damper(numbers, t, q, v, force_pointer):
-    """Add a weak damper's forces on four coordinates to ``force_pointer``; all but the time are pointers to doubles."""
+    """Add the forces of a weak damper on four coordinates to ``force_pointer``; all arguments but the time ``t`` are
+    pointers to doubles."""
     rate, force = carray(v, (4,)), carray(force_pointer, (4,))
     for i in range(4):
         force[i] -= WEAK_DAMPING * rate[i]
 
 
 @njit(cache=True, error_model="numpy")
-def handed_damper(block, t, n):
-    """Compute the damper's forces in one block of doubles at an address: f, q and v, (n,) each."""
+def weak_damper_in_block(block, t, n):
+    """Compute the forces of the weak damper in a block of doubles at an address: forces, coordinates and rates, (n,)
+    each."""
     f = at(block)
     carray(f, (n,))[:] = 0.0
     add_weak_damper(f, t, beyond(f, n), beyond(f, 2 * n), f)
 
 
-ZEROS = [0.0] * 4
+ZERO_FORCES = [0.0] * 4
 
 
 def zero_forces(positions: Any, rates: Any) -> Any:
     """Force function that returns zero forces at every state."""
-    return ZEROS
+    return ZERO_FORCES
 
 
 Runs = list[Callable[[], Any]]
 
 
-def _road_exudyn() -> Runs:
-    """Exudyn's model of the vehicle on a flat road, whose forces the reference's own right-hand side computes."""
+def _road_runs_in_exudyn() -> Runs:
+    """Runs of the pitch-plane vehicle in Exudyn with empty, cheap and real forces; the real ones are computed by the
+    right-hand side of the reference implementation."""
     assembly = assembly_of_scene(road_excited.scene())
     p, y, road = assembly.parameters.array(), np.empty(8), np.zeros(4)
     masses = [assembly.parameters.m1, assembly.parameters.m2, assembly.parameters.m3, assembly.parameters.I]
@@ -82,29 +85,29 @@ def _road_exudyn() -> Runs:
 
     return [
         partial(exudyn_marches(masses, law, [METHODS["exudyn"]])[0], STEPS["road"])
-        for law in (zero_forces, listed(4, np.zeros(0), handed_damper), forces_of)
+        for law in (zero_forces, listed(4, np.zeros(0), weak_damper_in_block), forces_of)
     ]
 
 
-def _road_mujoco() -> Runs:
+def _road_runs_in_mujoco() -> Runs:
     settings = Settings(METHODS["mujoco"], STEP["road"], STEPS["road"] * STEP["road"])
     compiled = CompiledForces(assembly_of_scene(road_excited.scene()), settings)
     return [
-        partial(_run_with_callback, counted, compiled.coast)
-        for counted in (empty_law(), kernel_law(add_weak_damper), law())
+        partial(_run_with_callback, counted, compiled.run_with_installed_callback)
+        for counted in (empty_law(), kernel_law(add_weak_damper), force_callback())
     ]
 
 
-def _wheel_exudyn() -> Runs:
-    wheels, steps, step = _wheels()
+def _wheel_runs_in_exudyn() -> Runs:
+    wheels, steps, step = _wheels_steps_and_step()
     return [
         partial(Rolling(wheels, force_function).run, *wheels.state(), steps, step, METHODS["exudyn"])
-        for force_function in (zero_forces, listed(4, np.zeros(0), handed_damper), Forces(wheels).of)
+        for force_function in (zero_forces, listed(4, np.zeros(0), weak_damper_in_block), Forces(wheels).of)
     ]
 
 
-def _wheel_mujoco() -> Runs:
-    wheels, steps, step = _wheels()
+def _wheel_runs_in_mujoco() -> Runs:
+    wheels, steps, step = _wheels_steps_and_step()
     marcher, start = Marcher(model(wheels, step, METHODS["mujoco"])), np.concatenate(wheels.state())[None]
     return [
         partial(_run_with_callback, law, partial(marcher.run, start, steps))
@@ -112,8 +115,8 @@ def _wheel_mujoco() -> Runs:
     ]
 
 
-def _wheels() -> tuple[Wheels, int, float]:
-    return Wheels(1, cells=wheelset.CELLS, speed=20.0), STEPS["wheel-20"], STEP["wheel-20"]
+def _wheels_steps_and_step() -> tuple[Wheels, int, float]:
+    return Wheels(1, cells=wheelset.CONTACT_CELLS, speed=20.0), STEPS["wheel-20"], STEP["wheel-20"]
 
 
 def _run_with_callback(callback: Any, run: Callable[[], Any]) -> None:
@@ -122,19 +125,19 @@ def _run_with_callback(callback: Any, run: Callable[[], Any]) -> None:
 
 
 MARCHES_OF_PROBLEM = {
-    ("road", "exudyn"): _road_exudyn,
-    ("road", "mujoco"): _road_mujoco,
-    ("wheel-20", "exudyn"): _wheel_exudyn,
-    ("wheel-20", "mujoco"): _wheel_mujoco,
+    ("road", "exudyn"): _road_runs_in_exudyn,
+    ("road", "mujoco"): _road_runs_in_mujoco,
+    ("wheel-20", "exudyn"): _wheel_runs_in_exudyn,
+    ("wheel-20", "mujoco"): _wheel_runs_in_mujoco,
 }
-"""What makes the three runs, by problem and engine."""
+"""Function that makes the three runs with empty, cheap and real forces, by problem and engine."""
 
 
 def measure(round_count: int, minimum_seconds: float) -> list[Saved]:
-    """Times (s) of the three runs (empty, cheap and real forces) in every round, by problem and engine."""
+    """Times (s) of the three runs with empty, cheap and real forces in every round, by problem and engine."""
     seconds = interleave([job for make in MARCHES_OF_PROBLEM.values() for job in make()], round_count, minimum_seconds)
     return [
-        {"problem": problem, "engine": engine, "seconds": dict(zip(RUNS, rows.tolist(), strict=True))}
+        {"problem": problem, "engine": engine, "seconds": dict(zip(FORCE_VARIANTS, rows.tolist(), strict=True))}
         for (problem, engine), rows in zip(
             MARCHES_OF_PROBLEM, seconds.reshape(len(MARCHES_OF_PROBLEM), 3, -1), strict=True
         )
@@ -142,21 +145,22 @@ def measure(round_count: int, minimum_seconds: float) -> list[Saved]:
 
 
 def step_parts(timed_march: Saved) -> np.ndarray:
-    """Time per step in microseconds of engine, bridge and kernel (3,), from the medians of the rounds."""
+    """Times per step (3,) in microseconds of engine, bridge and force kernel, from the medians of the rounds."""
     empty, cheap, real = (
-        1e6 * float(np.median(timed_march["seconds"][run])) / STEPS[timed_march["problem"]] for run in RUNS
+        1e6 * float(np.median(timed_march["seconds"][run])) / STEPS[timed_march["problem"]] for run in FORCE_VARIANTS
     )
     return np.array([empty, cheap - empty, real - cheap])
 
 
 def bridge_share(timed_march: Saved) -> tuple[float, float, float]:
-    """Share of the bridge in the time of a step, in % with its 95 % interval, from medians over resampled rounds."""
-    empty, cheap, real = (np.array(timed_march["seconds"][run]) for run in RUNS)
+    """Share of the bridge between engine and forces in the time of a step, in %, with its 95 % interval (share, low,
+    high)."""
+    empty, cheap, real = (np.array(timed_march["seconds"][run]) for run in FORCE_VARIANTS)
     return median(100.0 * (cheap - empty) / real)
 
 
 def rows(case_data: list[Saved]) -> list[Row]:
-    """Rows on the share of the bridge, without a verdict."""
+    """Rows on the share of the bridge in the time of a step, which are not judged."""
     return [
         Observed(
             f"price.{saved['problem']}.split.{saved['engine']}",
@@ -175,14 +179,19 @@ def _engine_text(timed_march: Saved) -> str:
 
 
 def table(case_data: list[Saved], problem: str) -> list[Table]:
-    """Table of the parts of a step's time of a problem; none where the step was not split."""
+    """Table of the parts of a step's time for a problem, in a list; an empty list if the step was not split."""
     lines = []
     for saved in case_data:
         if saved["problem"] == problem:
             _, low, high = bridge_share(saved)
             values = (f"{value:.2f}" for value in step_parts(saved))
             lines.append(
-                (_engine_text(saved), str(STAGES[METHODS[saved["engine"]]]), *values, f"{low:.0f} to {high:.0f}")
+                (
+                    _engine_text(saved),
+                    str(STAGES_OF_METHOD[METHODS[saved["engine"]]]),
+                    *values,
+                    f"{low:.0f} to {high:.0f}",
+                )
             )
     note = (
         f"Microseconds a step, median of all rounds, over {STEPS.get(problem, 0):,} steps; all forces in one "

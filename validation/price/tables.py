@@ -1,4 +1,4 @@
-"""Tables of a work-precision run: cheapest settings, what defaults lose, all curves, and what failed."""
+"""Tables of a work-precision measurement: cheapest settings, loss by defaults, all curves, and failed settings."""
 
 import math
 from collections import Counter, defaultdict
@@ -17,12 +17,12 @@ STATUS_WORDS = {"ok": "fine", "raised": "raised", "refused": "refused", "flagged
 
 
 def tables(measured_points: MeasuredPoints) -> list[Table]:
-    """All tables of one problem from its saved data."""
-    return [make(measured_points) for make in (cheapest_table, loss_table, every_curve, outcome_table, failure_table)]
+    """All tables of one work-precision problem, from its measured points."""
+    return [make(measured_points) for make in (cheapest_table, loss_table, curve_table, outcome_table, failure_table)]
 
 
 def curve_name(curve: str, groups: list[tuple[str, ...]] | None = None) -> str:
-    """Name of a curve for readers, followed by the names of curves that coincide with it."""
+    """Name of a curve for readers, followed by the names of the curves in ``groups`` that coincide with it."""
     coinciding = next((group for group in groups or [] if curve in group), (curve,))
     return " = ".join(map(_plain_name, sorted(coinciding, key=lambda curve_key: curve_key != curve)))
 
@@ -33,7 +33,7 @@ def _plain_name(curve: str) -> str:
 
 
 def cheapest_table(measured_points: MeasuredPoints) -> Table:
-    """Table of the cheapest setting that keeps each tolerance."""
+    """Table of the cheapest settings for each tolerance."""
     work, groups = measured_points.costs[0], measured_points.coinciding_curves()
     rivals = [
         engine for engine in runner.COMPARED_ENGINES if any(p.setting.engine == engine for p in measured_points.points)
@@ -47,7 +47,7 @@ def cheapest_table(measured_points: MeasuredPoints) -> Table:
         "Fixed steps are interpolated log-log between neighbouring settings; methods without one order count at "
         "the loosest setting tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. "
         f"{work.capitalize()} are exact and the same on every machine; seconds are those of this processor, "
-        f"everything built anew. {rounds_of(measured_points.points)}"
+        f"everything built anew. {rounds_sentence(measured_points.points)}"
     )
     heads = (
         f"{measured_points.quantity} error at most [{measured_points.unit}]",
@@ -58,7 +58,7 @@ def cheapest_table(measured_points: MeasuredPoints) -> Table:
     return Table("Cheapest setting that meets the tolerance", note, heads, tuple(rows))
 
 
-def rounds_of(points: list[Point]) -> str:
+def rounds_sentence(points: list[Point]) -> str:
     """Sentence on how many settings were timed in how many rounds, and how much the times scatter."""
     answered = [p for p in points if p.status == "ok"]
     in_rounds = [p.seconds for p in answered if p.changed is not None]
@@ -81,12 +81,12 @@ def rounds_of(points: list[Point]) -> str:
 
 def _text_of_winner(
     measured_points: MeasuredPoints,
-    reaches: CostsAtTolerance,
+    costs_at_tolerance: CostsAtTolerance,
     engine: str,
     unit: str,
     groups: list[tuple[str, ...]] | None = None,
 ) -> str:
-    best = runner.cheapest_curve(reaches, engine)
+    best = runner.cheapest_curve(costs_at_tolerance, engine)
     if best is None:
         return "none of those tried"
     curve, cheapest = best
@@ -100,7 +100,8 @@ def _coarsest_text(cheapest_reach: ToleranceCost) -> str:
 
 
 def loss_table(measured_points: MeasuredPoints) -> Table:
-    """Table of the cost of each engine's default method divided by the cheapest's, for the same error."""
+    """Table of the cost of each engine's default method divided by the cost of the cheapest setting with the same
+    error."""
     owners = measured_points.defaults
     rows = tuple(
         (
@@ -149,8 +150,8 @@ def _text_of_loss(loss: Loss | None) -> str:
     return f"{factor}{mark}{interval_text}"
 
 
-def every_curve(measured_points: MeasuredPoints) -> Table:
-    """Table with a row per curve: settings, errors, observed order, and cost extrapolated to an error of 1."""
+def curve_table(measured_points: MeasuredPoints) -> Table:
+    """Table with a row per curve: settings, errors, observed order, and cost at the middle tolerance."""
     groups, orders, work = (
         measured_points.coinciding_curves(),
         measured_points.observed_orders(measured_points.quantity),
@@ -193,7 +194,7 @@ def every_curve(measured_points: MeasuredPoints) -> Table:
 
 
 def _mark_of_single_runs(points: list[Point], cheapest_reach: ToleranceCost | None) -> str:
-    """The mark "~" if a result depends on a setting that was timed only once, else ""."""
+    """Text "~" if an interpolated cost depends on a setting that was timed only once, else ""."""
     return (
         "~"
         if cheapest_reach is not None
@@ -202,16 +203,16 @@ def _mark_of_single_runs(points: list[Point], cheapest_reach: ToleranceCost | No
     )
 
 
-def _cost_text(cheapest_reach: ToleranceCost | None, unit_scale: float, form: str) -> str:
+def _cost_text(cheapest_reach: ToleranceCost | None, unit_scale: float, number_format: str) -> str:
     return (
         "not met"
         if cheapest_reach is None
-        else format(unit_scale * cheapest_reach.cost, form) + _coarsest_text(cheapest_reach)
+        else format(unit_scale * cheapest_reach.cost, number_format) + _coarsest_text(cheapest_reach)
     )
 
 
 def outcome_table(measured_points: MeasuredPoints) -> Table:
-    """Table of how many settings of each engine ended in which way."""
+    """Table of the number of settings of each engine by status."""
     ended = Counter((p.setting.engine, status) for p in measured_points.points for status in ("", p.status))
     engines = dict.fromkeys(p.setting.engine for p in measured_points.points)
     rows = tuple(
@@ -226,7 +227,7 @@ def outcome_table(measured_points: MeasuredPoints) -> Table:
 
 
 def failure_table(measured_points: MeasuredPoints) -> Table:
-    """Table of the settings without a reliable answer, with their messages."""
+    """Table of the settings without a reliable result, with their messages."""
     labels_of = defaultdict(list)
     for p in measured_points.points:
         if p.status != "ok":

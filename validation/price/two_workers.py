@@ -1,12 +1,12 @@
-"""Two workers beside two lone processes: efficiency of the layer that shares blocks, and what a block costs it.
+"""Efficiency of two workers that share the blocks of an ensemble, compared with two separate processes.
 
 Rounds alternate, in a random order: two processes that each take half of the blocks in one go and send nothing back,
 then the same blocks by two workers through ``models.ensemble.runner``, and through a Dask cluster of this machine where
 the extra ``cluster`` is installed. The efficiency is the ratio of the first's seconds to the others', with its 95 %
 interval. It says nothing on a machine with fewer than two idle cores.
 
-``python -m validation.price.two_workers [ROUNDS]`` prints it, with the seconds of the processor that a block costs the
-command, by the size of what a block sends.
+``python -m validation.price.two_workers [ROUNDS]`` prints it, with the seconds of the processor that a block
+costs the command, by the size of what a block sends.
 """
 
 import os
@@ -31,17 +31,18 @@ from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.scenes import force_scene, road_scene
 
-ROUNDS = 9
-PATHS_PER_TURN, BLOCKS_OF_TURN = 400, Blocks(25)
-"""Paths of a turn and their blocks: about 3 s by two workers, and 8 blocks each."""
-NUMBERS_SENT = (1_000, 50_000, 500_000)
-"""Numbers that a block sends back, where its cost is told."""
+TIMING_ROUNDS = 9
+PATHS_PER_RUN, BLOCKS_OF_RUN = 400, Blocks(25)
+"""Number of paths of a timed run, and their blocks: about 3 s by two workers, and 8 blocks each."""
+SENT_COUNTS = (1_000, 50_000, 500_000)
+"""Numbers of values that a block sends back, for which its cost is measured."""
 EMPTY_BLOCKS = 100
-"""Blocks that do nothing but send."""
+"""Number of blocks that compute nothing and only send values, over which a block's cost is averaged."""
 
 
 def ensemble_job(duration: float = 60.0) -> Any:
-    """Noise paths of 60 s at 1 kHz of the half car on the road of the study, as ``run ensemble`` computes them."""
+    """Ensemble job: noise paths, of 60 s at 1 kHz by default, of the half car on the study road, as ``run ensemble``
+    computes them."""
     with TemporaryDirectory() as name:
         write_measurement(run(road_scene(duration=duration), "reference"), Path(name), 1e-3)
         scene = force_scene(Path(name), duration=duration, effects={"force_noise": {"deviation": 30.0, "seed": 3}})
@@ -49,36 +50,36 @@ def ensemble_job(duration: float = 60.0) -> Any:
 
 
 def compute_blocks(job: Any, block_numbers: list[int]) -> None:
-    """Compute some blocks of an ensemble one after the other in a single process."""
+    """Compute the blocks with the given numbers of an ensemble one after the other in this process."""
     for number in block_numbers:
-        job(BLOCKS_OF_TURN.block(number, PATHS_PER_TURN))
+        job(BLOCKS_OF_RUN.block(number, PATHS_PER_RUN))
 
 
 def compute_in_two_processes(pools: list[Executor], job: Any) -> None:
     """Compute an ensemble in two separate processes, each of which computes half of the blocks."""
-    count = BLOCKS_OF_TURN.count(PATHS_PER_TURN)
+    count = BLOCKS_OF_RUN.count(PATHS_PER_RUN)
     wait([pool.submit(compute_blocks, job, list(range(i, count, 2))) for i, pool in enumerate(pools)])
 
 
 @dataclass(frozen=True)
 class Sender:
-    """A job whose blocks compute nothing and send back ``numbers`` numbers per path."""
+    """Ensemble job that computes nothing and sends back ``numbers`` zeros per path."""
 
     numbers: int
 
     def __call__(self, paths: range) -> dict[str, np.ndarray]:
-        """Rows of zeros."""
+        """Array "x" (paths, numbers) of zeros."""
         return {"x": np.zeros((len(paths), self.numbers))}
 
     def facts(self) -> dict[str, Any]:
-        """Settings on which a block depends."""
+        """Settings on which the result of a block depends."""
         return {"numbers": self.numbers}
 
 
 def cost_of_blocks(executor: Executor) -> dict[int, float]:
-    """Processor time (s) of this process for a block, as a function of the numbers that the block sends back."""
+    """Processor time (s) of this process per block, for each number of values that a block sends back."""
     costs = {}
-    for numbers in NUMBERS_SENT:
+    for numbers in SENT_COUNTS:
         run_paths(Sender(numbers), 4, executor=executor, blocks=Blocks(1))
         start_time = time.process_time()
         run_paths(Sender(numbers), EMPTY_BLOCKS, executor=executor, blocks=Blocks(1))
@@ -88,7 +89,7 @@ def cost_of_blocks(executor: Executor) -> dict[int, float]:
 
 @contextmanager
 def worker_pools() -> Iterator[dict[str, Executor]]:
-    """Context with crews of two workers: on this machine and, if it is installed, in a local Dask cluster."""
+    """Context that yields pools of two workers by name: processes and, if it is installed, a local Dask cluster."""
     with ExitStack() as stack:
         pools: dict[str, Executor] = {"processes": stack.enter_context(process_pool(2))}
         with suppress(ImportError):
@@ -100,15 +101,15 @@ def worker_pools() -> Iterator[dict[str, Executor]]:
         yield pools
 
 
-def measured_pools(round_count: int = ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]:
-    """Measurement of each crew: ``efficiency`` relative to two separate processes and ``seconds`` of a run, both with
-    intervals; ``cost`` of a block (s)."""
+def measured_pools(round_count: int = TIMING_ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]:
+    """Measurement of each pool of workers: ``efficiency`` relative to two separate processes and ``seconds`` of a run,
+    both with intervals; ``cost`` of a block (s)."""
     job = ensemble_job() if job is None else job
     with ExitStack() as stack, worker_pools() as pools:
         single_pools: list[Executor] = [stack.enter_context(process_pool(1)) for _ in range(2)]
         turns: list[Callable[[], Any]] = [partial(compute_in_two_processes, single_pools, job)]
         turns += [
-            partial(run_paths, job, PATHS_PER_TURN, executor=pool, blocks=BLOCKS_OF_TURN) for pool in pools.values()
+            partial(run_paths, job, PATHS_PER_RUN, executor=pool, blocks=BLOCKS_OF_RUN) for pool in pools.values()
         ]
         seconds = interleave(turns, round_count)
         return {
@@ -122,7 +123,7 @@ def measured_pools(round_count: int = ROUNDS, job: Any = None) -> dict[str, dict
 
 
 def measurement_lines(measurement: dict[str, dict[str, Any]]) -> list[str]:
-    """Text of the measurement."""
+    """Lines of text on the measured efficiency and block costs of each pool of workers."""
     answer = []
     for name, crew in measurement.items():
         ratio, low, high = crew["efficiency"]
@@ -138,4 +139,4 @@ def measurement_lines(measurement: dict[str, dict[str, Any]]) -> list[str]:
 
 if __name__ == "__main__":
     print(f"{os.cpu_count()} cores; load before: {os.getloadavg()[0]:.2f}")
-    print("\n".join(measurement_lines(measured_pools(int(sys.argv[1]) if sys.argv[1:] else ROUNDS))))
+    print("\n".join(measurement_lines(measured_pools(int(sys.argv[1]) if sys.argv[1:] else TIMING_ROUNDS))))

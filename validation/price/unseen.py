@@ -1,4 +1,4 @@
-"""Scenes that the price of accuracy has never seen, drawn at random, and a verdict on what it recommends for them.
+"""Random pitch-plane scenes for ``twinrig price``, and verdicts on the settings that it recommends for them.
 
 The verdict's truth is of another kind than the search's: scipy's DOP853 at a tolerance of 1e-11, restarted wherever
 the input has a kink, on the instants of the setting that was recommended.
@@ -37,11 +37,11 @@ SEED = 907
 ENGINES = ("reference", "exudyn", "mujoco")
 TRUTH_TOLERANCE = 1e-11
 COARSE_SPACING, FINE_SPACING = 5e-5, 2e-5
-"""Spacing (s) of the verdict's truth."""
-ROUNDS = 9, 25
-"""Interleaved rounds of a contest, and of the one that must say the same again; turns are as long as in the race."""
-CONTEST_RATIO = 3.0
-"""A default that took so many times the seconds is not timed again: that is beyond what seconds wander."""
+"""Largest row spacing (s) of the true solution, and least one at which all settings are compared at common times."""
+TIMING_ROUNDS = 9, 25
+"""Numbers of interleaved timing rounds of a first comparison, and of a second that must confirm it."""
+LARGEST_TIMED_RATIO = 3.0
+"""Ratio of seconds from which a default setting is not timed again, as times do not scatter that much."""
 QUANTITY_SCALES = {
     "f1,f2": 1e3,
     "pitch": 1e-2,
@@ -50,16 +50,16 @@ QUANTITY_SCALES = {
     "suspension_moment": 1e3,
     "enforced_moment": 1e3,
 }
-"""Usual size of a quantity, of which tolerances are parts."""
+"""Usual magnitude of a quantity in its unit, of which tolerances are fractions."""
 TOLERANCE_POWERS = (-5.0, -1.5)
-"""Tolerances by that size, powers of ten."""
+"""Range of the logarithm (base 10) of a tolerance divided by the quantity's usual magnitude."""
 CHANGED_PARAMETERS = ("m1", "m3", "I", "k1", "k2", "k3", "k4", "d1", "d3", "d4", "a")
-"""Parameters of which four are changed, by up to e to the half."""
+"""Vehicle parameters, of which four are multiplied by random factors from e^-0.5 to e^0.5."""
 
 
 @dataclass(frozen=True)
 class DrawnScene:
-    """A random scene with a quantity and a tolerance, for which a setting is to be recommended."""
+    """A random scene with the quantity and the tolerance for which a setting is to be recommended."""
 
     scene: Scene
     quantity: str
@@ -68,9 +68,9 @@ class DrawnScene:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict on a recommended setting. Errors are in the quantity's unit; floor : accuracy of the search's truth;
-    slower : whether the engine's default that keeps the tolerance is cheaper, in force calls or significantly in
-    seconds, depending on ``kind``."""
+    """Verdict on a recommended setting. predicted, true : errors in the quantity's unit; floor : accuracy of the
+    reference that the recommendation used; slower : whether the engine's default that keeps the tolerance is cheaper,
+    in force calls or significantly in seconds, depending on ``kind``."""
 
     title: str
     curve: str
@@ -83,22 +83,22 @@ class Verdict:
     kind: str = "calls"
 
     @property
-    def meets(self) -> bool:
-        """Whether the true error is within the tolerance."""
+    def keeps_tolerance(self) -> bool:
+        """Whether the true error of the recommended setting is within the tolerance."""
         return self.true <= self.tolerance
 
     @property
-    def factor(self) -> float:
-        """Ratio of predicted to true error, or its inverse if this is above 1; errors below the floor are replaced by
-        the floor."""
+    def error_ratio(self) -> float:
+        """Ratio of the larger to the smaller of predicted and true error; errors below the floor are replaced by the
+        floor."""
         first, larger_true = max(self.predicted, self.floor), max(self.true, self.floor)
         if first == larger_true:
             return 1.0
         return max(first, larger_true) / min(first, larger_true) if min(first, larger_true) > 0.0 else math.inf
 
 
-def drawn(scene_number: int, folder: Path) -> DrawnScene:
-    """The random scene with this number; its files are written to ``folder``."""
+def random_scene(scene_number: int, folder: Path) -> DrawnScene:
+    """The random scene with a number, which seeds it; its files are written to ``folder``."""
     rng = np.random.Generator(np.random.Philox(key=[SEED, scene_number]))
     kind = SCENE_KINDS[scene_number % len(SCENE_KINDS)]
     name, effects, further_tables = kind(rng, folder, scene_number)
@@ -123,10 +123,10 @@ def drawn(scene_number: int, folder: Path) -> DrawnScene:
 
 Random = np.random.Generator
 Kind = tuple[str, dict[str, Any], dict[str, Any]]
-"""Name, effects, and further tables of a scene."""
+"""Name, effects, and further tables of a random scene."""
 
 
-def _iso_road(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_iso_road(generator: Random, folder: Path, scene_number: int) -> Kind:
     road = {
         "source": "iso8608",
         "road_class": str(generator.choice(list("ABCDE"))),
@@ -136,18 +136,18 @@ def _iso_road(generator: Random, folder: Path, scene_number: int) -> Kind:
     return "rough road", {"road": road}, {}
 
 
-def _study_road(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_study_road(generator: Random, folder: Path, scene_number: int) -> Kind:
     source = str(generator.choice(["study", "hills"]))
     return f"{source} road", {"road": {"source": source, "speed": float(round(generator.uniform(5.0, 35.0), 1))}}, {}
 
 
 def _random_release(generator: Random, folder: Path, scene_number: int) -> Kind:
     start = {"z1": 2e-2, "z3": 5e-2, "pitch": 5e-2, "pitch_rate": 0.3, "z2_rate": 0.3}
-    drawn = {key: float(size * generator.uniform(-1, 1)) for key, size in start.items()}
-    return "release", {}, {"start": drawn, "duration": float(generator.choice([0.2, 0.4, 2.5]))}
+    start_values = {key: float(size * generator.uniform(-1, 1)) for key, size in start.items()}
+    return "release", {}, {"start": start_values, "duration": float(generator.choice([0.2, 0.4, 2.5]))}
 
 
-def _forces(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_measured_forces(generator: Random, folder: Path, scene_number: int) -> Kind:
     interpolation, period = (
         str(generator.choice(["linear", "held", "smooth"])),
         float(generator.choice([1e-2, 5e-3, 2e-3])),
@@ -160,7 +160,7 @@ def _forces(generator: Random, folder: Path, scene_number: int) -> Kind:
     )
 
 
-def _random_guided(generator: Random, folder: Path, scene_number: int) -> Kind:
+def _random_guided_vehicle(generator: Random, folder: Path, scene_number: int) -> Kind:
     file, pitch = _write_wheel_forces(generator, folder, scene_number, 5e-3), f"pitch{scene_number}.csv"
     sample_times = 5e-3 * np.arange(101)
     wave = generator.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * generator.uniform(0.5, 3.0) * sample_times))
@@ -170,21 +170,22 @@ def _random_guided(generator: Random, folder: Path, scene_number: int) -> Kind:
 
 
 SCENE_KINDS: tuple[Callable[[Random, Path, int], Kind], ...] = (
-    _iso_road,
-    _forces,
+    _random_iso_road,
+    _random_measured_forces,
     _random_release,
-    _iso_road,
-    _random_guided,
-    _study_road,
-    _forces,
-    _iso_road,
+    _random_iso_road,
+    _random_guided_vehicle,
+    _random_study_road,
+    _random_measured_forces,
+    _random_iso_road,
     _random_release,
-    _forces,
+    _random_measured_forces,
 )
 
 
 def _write_wheel_forces(generator: Random, folder: Path, scene_number: int, sample_period: float) -> str:
-    """Write a file of wheel forces: weight, two sine waves, and noise on each sample."""
+    """Write a random file of wheel forces: static load, a sine wave for each wheel, and noise on each sample; returns
+    its name."""
     sample_times, name = sample_period * np.arange(round(0.5 / sample_period) + 1), f"forces{scene_number}.csv"
     forces = {
         wheel: (
@@ -199,8 +200,8 @@ def _write_wheel_forces(generator: Random, folder: Path, scene_number: int, samp
     return name
 
 
-def judge(drawn_scene: DrawnScene, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
-    """Verdicts on all settings recommended for a scene: among all these engines, and for each alone."""
+def verdicts_on_pitch_plane(drawn_scene: DrawnScene, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
+    """Verdicts on all settings recommended for a scene: the best of all engines, and the best of each engine."""
     return verdicts_on_scene(
         drawn_scene, engines, lambda recommendation, settings: true_errors(recommendation.scene, settings)
     )
@@ -209,12 +210,12 @@ def judge(drawn_scene: DrawnScene, engines: tuple[str, ...] = ENGINES) -> list[V
 def verdicts_on_scene(
     drawn_scene: DrawnScene,
     engines: tuple[str, ...],
-    true: Callable[[Recommendation, list[Setting]], dict[Setting, float]],
+    compute_true_errors: Callable[[Recommendation, list[Setting]], dict[Setting, float]],
 ) -> list[Verdict]:
-    """Verdicts on the recommendations for a scene; the function ``true`` gives the true error of each recommended
-    setting."""
+    """Verdicts on the settings recommended for a scene; the function ``compute_true_errors`` returns the true error of
+    each recommended setting."""
     recommendation = recommend(priced_scene(drawn_scene.scene, drawn_scene.quantity, engines), drawn_scene.tolerance)
-    errors = true(
+    errors = compute_true_errors(
         recommendation, list(dict.fromkeys(choice.tried.setting for choice in recommendation.winners.values()))
     )
     return [
@@ -234,8 +235,8 @@ def verdicts_on_scene(
 
 
 def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
-    """Largest error of each setting over the complete run, against DOP853. All settings are compared at common instants
-    where their steps have such."""
+    """Largest error of each setting over the complete run, against DOP853. All settings are compared at common times
+    if their steps allow it."""
     runs = {setting: scene.priced_run(scene.solve(setting, scene.full_duration)) for setting in settings}
     parts = {setting: 1 if setting.adaptive else round(scene.base / setting.value) for setting in runs}
     common = _fine_multiple(scene, math.lcm(*parts.values()))
@@ -244,24 +245,24 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
     else:
         parts = dict.fromkeys(runs, common)
     exact = {
-        n: ReferenceTruth(_exact_answer(scene, scene.base / n), 0.0, "", 0, scene.kink_period)
+        n: ReferenceTruth(_accurate_solution(scene, scene.base / n), 0.0, "", 0, scene.kink_period)
         for n in set(parts.values())
     }
     return {setting: exact[parts[setting]].error(run) for setting, run in runs.items()}
 
 
 def _fine_multiple(scene: PricedPitchPlane, part_count: int) -> int:
-    """A multiple of ``part_count`` for which rows are no further apart than COARSE_SPACING."""
+    """Least multiple of ``part_count`` that divides ``scene.base`` (s) into parts of COARSE_SPACING (s) at most."""
     return part_count * math.ceil(scene.base / part_count / COARSE_SPACING * (1 - 1e-9))
 
 
-def _exact_answer(scene: PricedPitchPlane, spacing: float) -> PricedRun:
+def _accurate_solution(scene: PricedPitchPlane, spacing: float) -> PricedRun:
     return scene.priced_run(scene.run("reference", Settings("DOP853", spacing, scene.full_duration, TRUTH_TOLERANCE)))
 
 
-def default_is_cheaper(recommendation: Recommendation, key: tuple[str, str], choice: SettingChoice) -> bool:
-    """Whether a default setting that keeps the tolerance would have been cheaper than the recommended one."""
-    engine, kind = key
+def default_is_cheaper(recommendation: Recommendation, engine_and_kind: tuple[str, str], choice: SettingChoice) -> bool:
+    """Whether an engine's default setting keeps the tolerance and is cheaper than the recommended setting."""
+    engine, kind = engine_and_kind
     rivals = [attempt for attempt in _coarsest_defaults(recommendation) if attempt.setting.engine.startswith(engine)]
     if kind == "calls":
         return any(rival.calls < choice.calls for rival in rivals)
@@ -285,14 +286,14 @@ def _coarsest_defaults(recommendation: Recommendation) -> list[TriedSetting]:
     return list({tried.setting.curve: tried for tried in able}.values())
 
 
-def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, rival: TriedSetting) -> bool:
-    if rival.setting == choice.tried.setting or rival.seconds > CONTEST_RATIO * choice.seconds:
+def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, rival_setting: TriedSetting) -> bool:
+    if rival_setting.setting == choice.tried.setting or rival_setting.seconds > LARGEST_TIMED_RATIO * choice.seconds:
         return False
     jobs = [
         partial(recommendation.scene.solve, attempt.setting, recommendation.scene.searched_duration)
-        for attempt in (choice.tried, rival)
+        for attempt in (choice.tried, rival_setting)
     ]
     return all(
         paired_ratio(*interleave(jobs, rounds, SHORTEST_TURN, clock=time.process_time))[1] > SLOWER_RATIO
-        for rounds in ROUNDS
+        for rounds in TIMING_ROUNDS
     )

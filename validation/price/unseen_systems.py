@@ -1,4 +1,4 @@
-"""Scenes of a wheelset, of handling and of braking that the price of accuracy has never seen, and a verdict on each.
+"""Random scenes of a wheelset, of handling and of braking for ``twinrig price``, and verdicts on its recommendations.
 
 The verdict's truth has four times the cells that were recommended, or more, and steps of DOP853's own. A stop with
 valves in the loop has one method alone: its truth has thrice the steps of the search's.
@@ -20,11 +20,11 @@ from validation.price.unseen import DrawnScene, Random, Verdict, verdicts_on_sce
 
 SEED = 908
 ENGINES = {"wheelset": ("reference", "mujoco"), "handling": ("mujoco",), "braking": ("reference",)}
-"""Engines that are asked about."""
+"""Engines for which settings are recommended, by system."""
 TRUTH_CELLS_RATIO, FEWEST_CELLS, MOST_CELLS = 4, 60, 200
-"""Times the cells recommended, and the fewest and most cells of a contact."""
+"""Ratio of the true solution's cells to the recommended number, and the fewest and most cells of its contacts."""
 TRUTH_STEPS_RATIO = 3
-"""Times the steps of the search's own truth."""
+"""Ratio of the number of steps of the true solution to that of the recommendation's reference."""
 TOLERANCE_RANGES = {
     "y": (1e-6, 1e-4),
     "fy": (20.0, 500.0),
@@ -35,12 +35,12 @@ TOLERANCE_RANGES = {
 }
 
 
-Asked = tuple[dict[str, Any], list[str]]
-"""Tables of a scene, and the quantities that may be asked about."""
+TablesAndQuantities = tuple[dict[str, Any], list[str]]
+"""Tables of a random scene, and the quantities that a tolerance may be set on."""
 
 
 def drawn_scene_of_system(system: str, scene_number: int) -> DrawnScene:
-    """A random scene of a system for a number, with a quantity and a tolerance."""
+    """The random scene of a system with a number, which seeds it, with a quantity and a tolerance."""
     rng = np.random.Generator(np.random.Philox(key=[SEED, scene_number]))
     table, quantities = {"wheelset": _random_wheelset, "handling": _random_handling, "braking": _random_braking}[
         system
@@ -52,7 +52,7 @@ def drawn_scene_of_system(system: str, scene_number: int) -> DrawnScene:
     return DrawnScene(scene, quantity, float(np.exp(rng.uniform(low, high))))
 
 
-def _random_wheelset(generator: Random) -> Asked:
+def _random_wheelset(generator: Random) -> TablesAndQuantities:
     override = {
         "conicity": float(generator.uniform(0.02, 0.2)),
         "stiffness_x": float(generator.uniform(1e5, 1e6)),
@@ -69,7 +69,7 @@ def _random_wheelset(generator: Random) -> Asked:
     return {"wheelset": {"override": override}, "contact": {"law": law}, "run": run, "speeds": speeds}, ["y", "fy"]
 
 
-def _random_handling(generator: Random) -> Asked:
+def _random_handling(generator: Random) -> TablesAndQuantities:
     manoeuvre = {
         "speed": float(generator.uniform(12.0, 30.0)),
         "duration": 0.5,
@@ -80,7 +80,7 @@ def _random_handling(generator: Random) -> Asked:
     return {"tyres": tyres, "manoeuvres": {"drawn": manoeuvre}}, ["yaw_rate", "load"]
 
 
-def _random_braking(generator: Random) -> Asked:
+def _random_braking(generator: Random) -> TablesAndQuantities:
     kind, surface = (
         str(generator.choice(["straight", "j_turn", "split"])),
         str(generator.choice(["snow", "wet", "ice"])),
@@ -101,14 +101,14 @@ def _random_braking(generator: Random) -> Asked:
     }, quantities
 
 
-def judge(drawn_scene: DrawnScene) -> list[Verdict]:
+def verdicts_on_system(drawn_scene: DrawnScene) -> list[Verdict]:
     """Verdicts on all settings recommended for a scene."""
     return verdicts_on_scene(drawn_scene, ENGINES[drawn_scene.scene.system], true_errors)
 
 
 def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict[Setting, float]:
-    """Largest error of each setting over the complete run, against a truth that is computed in another way than the
-    search's."""
+    """Largest error of each setting over the complete run, against a solution that is computed differently from the
+    recommendation's reference."""
     scene: Any = recommendation.scene
     ladder = scene.reference()
     finer = Setting(
@@ -117,7 +117,7 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
 
     def error(setting: Setting) -> float:
         exact = (
-            _exact_answer(scene, setting)
+            _accurate_solution(scene, setting)
             if isinstance(scene, MeshedScene)
             else scene.priced_run(scene.solve(finer, scene.full_duration))
         )
@@ -126,7 +126,7 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
     return {setting: error(setting) for setting in settings}
 
 
-def _exact_answer(scene: MeshedScene, setting: Setting) -> PricedRun:
+def _accurate_solution(scene: MeshedScene, setting: Setting) -> PricedRun:
     cells = min(MOST_CELLS, max(FEWEST_CELLS, TRUTH_CELLS_RATIO * round(1.0 / setting.value))) if scene.cells else 0
     step = min(scene.steps.values()) if scene.cells else setting.value
     return scene.priced_run((cells, scene.exact(cells, step, scene.full_duration)))

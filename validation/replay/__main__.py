@@ -1,4 +1,4 @@
-"""``python -m validation.replay``: record what the command line answers, or check a later version against that."""
+"""``python -m validation.replay``: record the outputs of the command line, or check a later version against them."""
 
 import argparse
 import fnmatch
@@ -13,18 +13,19 @@ from pathlib import Path
 from validation.replay import jobs as asked
 from validation.replay.answers import (
     JOBS_FILE,
-    CommandAnswer,
-    answer_difference,
-    answer_of_job,
-    load,
+    CommandOutput,
+    load_output,
+    output_difference,
+    output_of_job,
     read_jobs,
-    save,
+    save_output,
     write_jobs,
 )
 
 
 def main(command_words: list[str]) -> int:
-    """Record or check answers of all jobs. The exit code is 1 if a value, an exit code or a channel differs."""
+    """Record or check the outputs of all jobs; returns the exit code, which is 1 if a value, an exit code or a channel
+    differs from the recording."""
     parser = argparse.ArgumentParser(prog="python -m validation.replay", description=__doc__)
     parser.add_argument("what", choices=("record", "check"))
     parser.add_argument("folder", type=Path, help="of the recording; one that was begun is gone on with")
@@ -36,17 +37,17 @@ def main(command_words: list[str]) -> int:
     parser.add_argument("--renamed", type=Path, help="TOML of earlier names of channels and later ones")
     arguments = parser.parse_args(command_words)
     if arguments.what == "record":
-        return _record_answers(arguments)
-    return _check_answers(arguments)
+        return _record_outputs(arguments)
+    return _check_outputs(arguments)
 
 
-def _record_answers(arguments: argparse.Namespace) -> int:
+def _record_outputs(arguments: argparse.Namespace) -> int:
     arguments.folder.mkdir(parents=True, exist_ok=True)
     if not (arguments.folder / JOBS_FILE).exists():
         write_jobs(arguments.folder, asked.replay_jobs(arguments.command))
-    left = [job for job in _chosen_jobs(arguments) if load(arguments.folder, job.name) is None]
-    for job, current_answer in _answers_of_jobs(left, arguments):
-        save(arguments.folder, job.name, current_answer)
+    left = [job for job in _selected_jobs(arguments) if load_output(arguments.folder, job.name) is None]
+    for job, current_answer in _outputs_of_jobs(left, arguments):
+        save_output(arguments.folder, job.name, current_answer)
         codes = ", ".join(map(str, current_answer.codes))
         print(
             f"{current_answer.seconds:7.1f} s  {len(current_answer.arrays):4} arrays  {job.name}: {codes}", flush=True
@@ -54,15 +55,15 @@ def _record_answers(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _check_answers(arguments: argparse.Namespace) -> int:
+def _check_outputs(arguments: argparse.Namespace) -> int:
     renamed = tomllib.loads(arguments.renamed.read_text()) if arguments.renamed else {}
     counts = {"same": 0, "differ": 0, "other words": 0}
-    for job, current_answer in _answers_of_jobs(_chosen_jobs(arguments), arguments):
-        recorded_answer = load(arguments.folder, job.name)
+    for job, current_answer in _outputs_of_jobs(_selected_jobs(arguments), arguments):
+        recorded_answer = load_output(arguments.folder, job.name)
         if recorded_answer is None:
             print(f"{job.name}: was not recorded")
             continue
-        difference = answer_difference(recorded_answer, current_answer, arguments.bound, renamed)
+        difference = output_difference(recorded_answer, current_answer, arguments.bound, renamed)
         counts["differ" if difference.wrong else "other words" if difference.tolerated else "same"] += 1
         for text in (difference.wrong or difference.tolerated)[:5]:
             print(f"{job.name}: {'DIFFERS: ' if difference.wrong else ''}{text}", flush=True)
@@ -70,20 +71,20 @@ def _check_answers(arguments: argparse.Namespace) -> int:
     return 1 if counts["differ"] else 0
 
 
-def _chosen_jobs(arguments: argparse.Namespace) -> list[asked.ReplayJob]:
+def _selected_jobs(arguments: argparse.Namespace) -> list[asked.ReplayJob]:
     return [job for job in read_jobs(arguments.folder)[:: arguments.every] if fnmatch.fnmatch(job.name, arguments.only)]
 
 
-def _answers_of_jobs(
+def _outputs_of_jobs(
     jobs: list[asked.ReplayJob], arguments: argparse.Namespace
-) -> Iterator[tuple[asked.ReplayJob, CommandAnswer]]:
-    """Answers in the order of the jobs; several jobs run at a time."""
+) -> Iterator[tuple[asked.ReplayJob, CommandOutput]]:
+    """Yield each job with the outputs of its commands, in the order of the jobs; several jobs run at a time."""
     folder = Path(tempfile.mkdtemp(prefix="replay-"))
 
     try:
         with ThreadPoolExecutor(arguments.workers) as pool:
             yield from zip(
-                jobs, pool.map(lambda job: answer_of_job(job, arguments.command, folder / job.name), jobs), strict=True
+                jobs, pool.map(lambda job: output_of_job(job, arguments.command, folder / job.name), jobs), strict=True
             )
     finally:
         shutil.rmtree(folder, ignore_errors=True)

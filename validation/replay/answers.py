@@ -1,4 +1,4 @@
-"""Answers of a job's commands: exit codes, messages, every array that they save or print; kept, and compared."""
+"""Outputs of a job's commands: exit codes, messages, every array that they save or print; saved, and compared."""
 
 import csv
 import json
@@ -18,21 +18,21 @@ import numpy as np
 from validation.replay.jobs import BASE_SCENES, ReplayJob
 
 COMMAND_SECONDS = 900.0
-"""Seconds after which a command is ended."""
+"""Time (s) after which a running command is stopped."""
 MESSAGE_MASKS = (
     (r"\d+(\.\d+)?(e[-+]\d+)? (s|ms|us)\b( once)?", "SECONDS"),
     (r"/[\w./-]*/", "PATH/"),
     (r"[\d.]+ times (as long|the)", "RATIO"),
 )
-"""What a machine decides in messages, and what stands in its place."""
+"""Patterns of machine-dependent text in messages, and the words that replace it."""
 JOBS_FILE = "jobs.json"
 UNWATCHED_KEYS = ("seconds", "folder", "command", "price", "range")
-"""Keys of printed tables, and columns, that a machine decides."""
+"""Machine-dependent keys of printed tables and names of columns, which are not compared."""
 
 
 @dataclass
-class CommandAnswer:
-    """Recorded result of a job: exit codes, messages, seconds, and arrays by "file: channel"; channels of printed
+class CommandOutput:
+    """Output of a job's commands: exit codes, messages, seconds, and arrays by "file: channel"; channels of printed
     tables have no file name."""
 
     codes: list[int]
@@ -41,39 +41,39 @@ class CommandAnswer:
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
 
 
-def answer_of_job(job: ReplayJob, command: str, folder: Path) -> CommandAnswer:
-    """Run the commands of a job in a new folder that is deleted afterwards."""
+def output_of_job(job: ReplayJob, command: str, folder: Path) -> CommandOutput:
+    """Output of a job's commands, which run in a new folder that is deleted afterwards."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for file in BASE_SCENES.glob("*.[!t]*"):
         shutil.copy(file, folder)
     (folder / "scene.toml").write_text(job.scene)
-    given_files = {path.name for path in folder.iterdir()}
-    job_answer = CommandAnswer([], "", 0.0)
+    input_files = {path.name for path in folder.iterdir()}
+    job_answer = CommandOutput([], "", 0.0)
     for words in job.commands:
         _run_command([command, *words], folder, job_answer)
-    job_answer.arrays |= dict(_arrays_of_files(folder, given_files))
+    job_answer.arrays |= dict(_arrays_of_files(folder, input_files))
     shutil.rmtree(folder)
     return job_answer
 
 
-def _run_command(command_words: list[str], folder: Path, job_answer: CommandAnswer) -> None:
-    """Run one command, and add its exit code, message and printed tables to the answer."""
+def _run_command(command_words: list[str], folder: Path, job_answer: CommandOutput) -> None:
+    """Run one command, and add its exit code, message and printed tables to the job's output."""
     start_time = time.monotonic()
-    code, printed_output, wrong = _run(command_words, folder)
+    code, printed_output, wrong = _process_output(command_words, folder)
     job_answer.seconds += time.monotonic() - start_time
     printed = _parsed_json(printed_output)
     if printed is not None:
         job_answer.arrays |= {
             f": {len(job_answer.codes)}{path_in_table}": np.array(value)
-            for path_in_table, value in _values_with_places(printed)
+            for path_in_table, value in _values_with_paths(printed)
         }
         printed_output = ""
     job_answer.codes.append(code)
     job_answer.message += _masked_message(printed_output + wrong)
 
 
-def _run(command_words: list[str], folder: Path) -> tuple[int, str, str]:
+def _process_output(command_words: list[str], folder: Path) -> tuple[int, str, str]:
     surroundings = os.environ | {"COLUMNS": "200", "NO_COLOR": "1", "MPLBACKEND": "agg"}
     try:
         completed_process = subprocess.run(
@@ -98,12 +98,12 @@ def _parsed_json(text: str) -> Any:
         return None
 
 
-def _values_with_places(nested_value: Any, path_in_table: str = "") -> Iterator[tuple[str, float | str]]:
-    """Numbers and texts of a nested table, each with its place in the table."""
+def _values_with_paths(nested_value: Any, path_in_table: str = "") -> Iterator[tuple[str, float | str]]:
+    """Yield the numbers and texts of a nested table, each with its path (keys joined by /) in the table."""
     if isinstance(nested_value, dict | list):
         for key, inner in nested_value.items() if isinstance(nested_value, dict) else enumerate(nested_value):
             if key not in UNWATCHED_KEYS:
-                yield from _values_with_places(inner, f"{path_in_table}/{key}")
+                yield from _values_with_paths(inner, f"{path_in_table}/{key}")
     elif isinstance(nested_value, bool | int | float):
         yield path_in_table, float(nested_value)
     elif nested_value is not None:
@@ -116,11 +116,12 @@ def _masked_message(text: str) -> str:
     return text
 
 
-def _arrays_of_files(folder: Path, given_files: set[str]) -> Iterator[tuple[str, np.ndarray]]:
-    """Arrays of all files in the folder, except files that were there before."""
+def _arrays_of_files(folder: Path, input_files: set[str]) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield name ("file: channel") and values of each array in the files that a job's commands wrote into the
+    folder."""
     for path in sorted(folder.rglob("*")):
         read = {".nc": _netcdf_channels, ".csv": _csv_columns}.get(path.suffix)
-        if read is not None and path.name not in given_files:
+        if read is not None and path.name not in input_files:
             yield from ((f"{path.relative_to(folder)}: {name}", array) for name, array in read(path))
 
 
@@ -152,20 +153,20 @@ def _column_values(cells: list[str]) -> np.ndarray:
 
 
 def write_jobs(folder: Path, jobs: list[ReplayJob]) -> None:
-    """Save the jobs in the recording, so that a later version runs the same ones."""
+    """Save the jobs in the folder of a recording, so that a later version runs the same jobs."""
     (folder / JOBS_FILE).write_text(json.dumps([asdict(job) for job in jobs], indent=1))
 
 
 def read_jobs(folder: Path) -> list[ReplayJob]:
-    """The jobs that are saved in a recording."""
+    """The jobs that are saved in the folder of a recording."""
     return [
         ReplayJob(job_table["name"], tuple(map(tuple, job_table["commands"])), job_table["scene"])
         for job_table in json.loads((folder / JOBS_FILE).read_text())
     ]
 
 
-def save(folder: Path, name: str, job_answer: CommandAnswer) -> None:
-    """Save an answer; its summary is written last, as a mark that it is complete."""
+def save_output(folder: Path, name: str, job_answer: CommandOutput) -> None:
+    """Save the output of a job; its summary file is written last, as a mark that the output is complete."""
     arrays = {str(i): array for i, array in enumerate(job_answer.arrays.values())}
     np.savez_compressed(folder / f"{name}.npz", allow_pickle=False, **arrays)
     note = {
@@ -177,48 +178,48 @@ def save(folder: Path, name: str, job_answer: CommandAnswer) -> None:
     (folder / f"{name}.json").write_text(json.dumps(note, indent=1))
 
 
-def load(folder: Path, name: str) -> CommandAnswer | None:
-    """A saved answer; None if it is missing or incomplete."""
+def load_output(folder: Path, name: str) -> CommandOutput | None:
+    """The saved output of a job; None if it is missing or incomplete."""
     try:
         note = json.loads((folder / f"{name}.json").read_text())
         with np.load(folder / f"{name}.npz") as file:
             arrays = {key: file[str(i)] for i, key in enumerate(note["arrays"])}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         return None
-    return CommandAnswer(note["codes"], note["message"], note["seconds"], arrays)
+    return CommandOutput(note["codes"], note["message"], note["seconds"], arrays)
 
 
 @dataclass
-class AnswerDifference:
-    """Differences between two answers, as sentences: those in ``wrong`` fail a replay, those in ``tolerated``
-    (messages, new channels) are reported only."""
+class OutputDifference:
+    """Differences between two outputs of a job, as sentences: those in ``wrong`` fail a replay, those in ``tolerated``
+    (messages, new channels) are only reported."""
 
     wrong: list[str] = field(default_factory=list)
     tolerated: list[str] = field(default_factory=list)
 
 
-def answer_difference(
-    recorded: CommandAnswer, current_answer: CommandAnswer, bound: float, renamed: Mapping[str, str]
-) -> AnswerDifference:
-    """Differences of an answer from the recorded one.
+def output_difference(
+    recorded_output: CommandOutput, current_answer: CommandOutput, bound: float, renamed_channels: Mapping[str, str]
+) -> OutputDifference:
+    """Differences of a job's output from the recorded output.
 
-    bound : largest change of a number by the largest one of its channel; 0 asks for the same bits. renamed : earlier
-    names of channels to later ones; a channel that is in another file now is looked for by its name.
+    bound : largest change of a number by the largest one of its channel; 0 asks for the same bits. renamed_channels :
+    earlier names of channels to later ones; a channel that is in another file now is looked for by its name.
     """
-    difference = AnswerDifference()
-    if recorded.codes != current_answer.codes:
+    difference = OutputDifference()
+    if recorded_output.codes != current_answer.codes:
         difference.wrong.append(
-            f"exit codes {recorded.codes} are {current_answer.codes}: {current_answer.message.strip()[-200:]}"
+            f"exit codes {recorded_output.codes} are {current_answer.codes}: {current_answer.message.strip()[-200:]}"
         )
-    if recorded.message != current_answer.message:
+    if recorded_output.message != current_answer.message:
         difference.tolerated.append(
-            f"message {recorded.message.strip()[:200]!r} is {current_answer.message.strip()[:200]!r}"
+            f"message {recorded_output.message.strip()[:200]!r} is {current_answer.message.strip()[:200]!r}"
         )
     matched = set()
-    for name, array in recorded.arrays.items():
+    for name, array in recorded_output.arrays.items():
         if not {*re.split(r"[:/ ]+", name)}.isdisjoint(UNWATCHED_KEYS):
             continue
-        if (later := _renamed_channel(name, current_answer.arrays, renamed)) is None:
+        if (later := _renamed_channel(name, current_answer.arrays, renamed_channels)) is None:
             difference.wrong.append(f"{name} is gone")
             continue
         matched.add(later)
@@ -228,31 +229,36 @@ def answer_difference(
     return difference
 
 
-def _renamed_channel(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, str]) -> str | None:
-    """Name under which a channel occurs in later arrays: unchanged, renamed, or in another file if that is the only one
-    with this channel."""
-    if (name_then := renamed.get(name, name)) in arrays:
+def _renamed_channel(name: str, arrays: Mapping[str, np.ndarray], renamed_channels: Mapping[str, str]) -> str | None:
+    """Name of a recorded channel in later arrays: unchanged, renamed, or in another file if only one file has this
+    channel; None if it is missing."""
+    if (name_then := renamed_channels.get(name, name)) in arrays:
         return name_then
     channel = name_then.partition(": ")[2]
     other_names = [other_name for other_name in arrays if other_name.partition(": ")[2] == channel]
     return other_names[0] if len(other_names) == 1 else None
 
 
-def _change_text(recorded: np.ndarray, current_values: np.ndarray, bound: float) -> str:
-    """Text on how an array changed; "" if no change exceeds the bound."""
-    if recorded.dtype.kind == current_values.dtype.kind == "U" and recorded.size == current_values.size == 1:
-        return "" if recorded == current_values else f"{recorded} is {current_values}"
-    if recorded.shape != current_values.shape or recorded.dtype != current_values.dtype:
-        return f"{recorded.dtype} {recorded.shape} is {current_values.dtype} {current_values.shape}"
-    if recorded.tobytes() == current_values.tobytes():
-        return ""
-    if recorded.dtype.kind != "f" or not bound:
-        return "other values" if recorded.size > 1 else f"{recorded} is {current_values}"
-    known = np.isfinite(recorded)
+def _change_text(recorded_values: np.ndarray, current_values: np.ndarray, bound: float) -> str:
+    """Sentence part on how an array changed; "" if no change exceeds the bound, relative to its largest number."""
     if (
-        not np.array_equal(recorded[~known], current_values[~known], equal_nan=True)
+        recorded_values.dtype.kind == current_values.dtype.kind == "U"
+        and recorded_values.size == current_values.size == 1
+    ):
+        return "" if recorded_values == current_values else f"{recorded_values} is {current_values}"
+    if recorded_values.shape != current_values.shape or recorded_values.dtype != current_values.dtype:
+        return f"{recorded_values.dtype} {recorded_values.shape} is {current_values.dtype} {current_values.shape}"
+    if recorded_values.tobytes() == current_values.tobytes():
+        return ""
+    if recorded_values.dtype.kind != "f" or not bound:
+        return "other values" if recorded_values.size > 1 else f"{recorded_values} is {current_values}"
+    known = np.isfinite(recorded_values)
+    if (
+        not np.array_equal(recorded_values[~known], current_values[~known], equal_nan=True)
         or not np.isfinite(current_values[known]).all()
     ):
         return "numbers are finite elsewhere"
-    share = abs(recorded - current_values)[known].max(initial=0.0) / max(abs(recorded)[known].max(initial=0.0), 1e-300)
+    share = abs(recorded_values - current_values)[known].max(initial=0.0) / max(
+        abs(recorded_values)[known].max(initial=0.0), 1e-300
+    )
     return "" if share <= bound else f"a number changed by {share:.2g} of the largest"

@@ -1,4 +1,4 @@
-"""Jobs to record: shipped scenes, jobs written out, base scenes, and scenes drawn from these by a seed."""
+"""Jobs of a replay: shipped scenes, jobs listed in a file, base scenes, and seeded random variants of base scenes."""
 
 import copy
 import subprocess
@@ -11,26 +11,26 @@ from typing import Any
 import numpy as np
 
 BASE_SCENES = Path(__file__).with_name("scenes")
-"""Base scenes: each names as many tables as go together, short to run, and the files that they read."""
+"""Folder of base scenes, which are short to run and have as many tables as go together, and of the files they read."""
 SHORT_RUN_SETTINGS = Path(__file__).with_name("shipped.toml")
-"""By shipped scene what makes it short to run, as arguments of --set."""
+"""File that lists, for each shipped scene, the arguments of --set that make it short to run."""
 COMMANDS_FILE = Path(__file__).with_name("commands.toml")
-"""Jobs of several commands each."""
+"""File that lists jobs of several commands each."""
 VARIED_JOBS, SEED = 300, 20
 DROPPED_CHANCE, CHANGED_CHANCE, MISTAKE_CHANCE = 0.25, 0.6, 0.2
-"""Chances that a table goes, that numbers change, that the scene has a mistake."""
+"""Probabilities that a table is removed, that numbers are changed, and that the scene gets a mistake."""
 FACTOR_RANGE = (0.7, 1.4)
-"""By which a number that changes is multiplied, at random between them."""
+"""Limits of the random factor by which a number of a scene is multiplied."""
 ENGINES = ("reference", "exudyn", "mujoco", "all")
-KEPT_KEYS = ("title", "system", "study", "vehicle", "run", "options", "quantities", "tolerance")
-"""Keys that never go by chance."""
+NEVER_DROPPED_KEYS = ("title", "system", "study", "vehicle", "run", "options", "quantities", "tolerance")
+"""Keys of a scene that are never removed at random."""
 
 Table = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class ReplayJob:
-    """Commands to run in one folder: the words of each after ``twinrig``, and the scene (TOML) that they read as
+    """Commands that run in one folder: the words of each after ``twinrig``, and the scene (TOML text) that they read as
     ``scene.toml``, if any."""
 
     name: str
@@ -40,11 +40,11 @@ class ReplayJob:
 
 def replay_jobs(command: str) -> list[ReplayJob]:
     """All jobs of a replay; ``command``: the twinrig executable that lists the shipped scenes."""
-    return [ReplayJob("list", (("list",),)), *_shipped_jobs(command), *_written_jobs(), *_base_jobs(), *_varied_jobs()]
+    return [ReplayJob("list", (("list",),)), *_shipped_jobs(command), *_listed_jobs(), *_base_jobs(), *_varied_jobs()]
 
 
 def _shipped_jobs(command: str) -> Iterator[ReplayJob]:
-    """Jobs for every listed scene: one shows it, one runs it."""
+    """Yield a job for every shipped scene, which shows the scene and runs it in a shortened form."""
     shorter = tomllib.loads(SHORT_RUN_SETTINGS.read_text())
     listing = subprocess.run([command, "list"], capture_output=True, text=True, check=True).stdout
     for line in listing.splitlines()[1:]:
@@ -55,13 +55,13 @@ def _shipped_jobs(command: str) -> Iterator[ReplayJob]:
         yield ReplayJob(f"shipped-{name}", (("show", name), ("run", name, *shortening, "--json", "--out", "out")))
 
 
-def _written_jobs() -> Iterator[ReplayJob]:
+def _listed_jobs() -> Iterator[ReplayJob]:
     for job in tomllib.loads(COMMANDS_FILE.read_text())["jobs"]:
         yield ReplayJob(f"commands-{job['name']}", tuple(tuple(words) for words in job["commands"]))
 
 
 def _base_jobs() -> Iterator[ReplayJob]:
-    """Jobs for every base scene without changes: one shows it, and one runs it in each of its engines."""
+    """Yield a job for every base scene and each of its engines, which shows the unchanged scene and runs it."""
     from tomli_w import dumps
 
     for base in sorted(BASE_SCENES.glob("*.toml")):
@@ -81,39 +81,43 @@ def _varied_jobs() -> Iterator[ReplayJob]:
     bases = sorted(BASE_SCENES.glob("*.toml"))
     for i in range(VARIED_JOBS):
         base = bases[i % len(bases)]
-        random = np.random.default_rng([SEED, i])
-        yield _draw_scene(f"{base.stem}-{i:03d}", tomllib.loads(base.read_text()), random)
+        generator = np.random.default_rng([SEED, i])
+        yield _random_job(f"{base.stem}-{i:03d}", tomllib.loads(base.read_text()), generator)
 
 
-def _draw_scene(name: str, scene: Table, random: np.random.Generator) -> ReplayJob:
-    """Job with a random variant of a base scene: some tables removed, numbers changed, another engine, and sometimes a
+def _random_job(name: str, scene: Table, generator: np.random.Generator) -> ReplayJob:
+    """Job that runs a random variant of a base scene: tables removed, numbers changed, a random engine, and sometimes a
     mistake."""
     from tomli_w import dumps
 
     engines = scene.pop("engines_asked", ENGINES)
-    engine = str(random.choice(engines)) if engines else ""
-    _drop_key(scene, random)
-    if random.random() < CHANGED_CHANCE:
-        for number_path in random.permutation(list(_places_of_numbers(scene)))[:3]:
-            _change_number(scene, str(number_path), float(random.uniform(*FACTOR_RANGE)))
-    if random.random() < MISTAKE_CHANCE:
-        engine = _make_mistake(scene, engine, random)
+    engine = str(generator.choice(engines)) if engines else ""
+    _drop_random_tables(scene, generator)
+    if generator.random() < CHANGED_CHANCE:
+        for number_path in generator.permutation(list(_paths_of_numbers(scene)))[:3]:
+            _change_number(scene, str(number_path), float(generator.uniform(*FACTOR_RANGE)))
+    if generator.random() < MISTAKE_CHANCE:
+        engine = _make_mistake(scene, engine, generator)
     return ReplayJob(name, (_run_command(engine),), dumps(scene))
 
 
-def _drop_key(scene: Table, random: np.random.Generator) -> None:
+def _drop_random_tables(scene: Table, generator: np.random.Generator) -> None:
     effects = scene.get("effects")
     for table in (scene, effects if isinstance(effects, dict) else {}):
         for key in list(table):
-            if isinstance(table[key], dict) and key not in (*KEPT_KEYS, "effects") and random.random() < DROPPED_CHANCE:
+            if (
+                isinstance(table[key], dict)
+                and key not in (*NEVER_DROPPED_KEYS, "effects")
+                and generator.random() < DROPPED_CHANCE
+            ):
                 del table[key]
 
 
-def _places_of_numbers(table: Table, path_prefix: str = "") -> Iterator[str]:
-    """Paths (keys joined by /) of all numbers that are not integers."""
+def _paths_of_numbers(table: Table, path_prefix: str = "") -> Iterator[str]:
+    """Yield the paths (keys joined by /) of all floating-point numbers of a table."""
     for key, value in table.items():
         if isinstance(value, dict):
-            yield from _places_of_numbers(value, f"{path_prefix}{key}/")
+            yield from _paths_of_numbers(value, f"{path_prefix}{key}/")
         elif isinstance(value, float):
             yield f"{path_prefix}{key}"
 
@@ -130,16 +134,16 @@ def _change_number(scene: Table, number_path: str, factor: float) -> None:
     table[key] = float(f"{factor * table[key]:.4g}")
 
 
-def _make_mistake(scene: Table, engine: str, random: np.random.Generator) -> str:
-    """Put a typical user's mistake into a scene; returns the engine to ask for, which may be the mistake."""
+def _make_mistake(scene: Table, engine: str, generator: np.random.Generator) -> str:
+    """Put a typical user's mistake into a scene; returns the name of the engine to run, which may be the mistake."""
     original_scene = copy.deepcopy(scene)
-    number_paths = sorted(_places_of_numbers(original_scene))
-    kind = int(random.integers(5))
+    number_paths = sorted(_paths_of_numbers(original_scene))
+    kind = int(generator.integers(5))
     if kind == 0 or not number_paths:
         scene["vehicel"] = {}
     elif kind == 4:
         return "exodyn"
     else:
-        table, key = _table_and_key(scene, str(random.choice(number_paths)))
+        table, key = _table_and_key(scene, str(generator.choice(number_paths)))
         table[key] = {1: "a text", 2: -abs(table[key]) - 1.0, 3: float("nan")}[kind]
     return engine

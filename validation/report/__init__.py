@@ -1,1 +1,1 @@
-"""The report: one self-contained page, from saved results alone; it never simulates."""
+"""The validation report: one self-contained HTML page, written from saved results without any simulation."""

@@ -1,4 +1,4 @@
-"""``python -m validation.report FOLDER``: draw the report again from its saved results."""
+"""``python -m validation.report FOLDER``: write the report's page again from its saved results."""
 
 import sys
 from pathlib import Path

@@ -1,5 +1,5 @@
-"""Part of the report on the saved blind-spot audit: the rows and tests that notice a fault of each shared function, and
-functions that none notices."""
+"""The report's section on the blind-spot audit: which rows and tests detect a fault planted in each shared function,
+and the functions whose faults none detects."""
 
 from collections import Counter
 from pathlib import Path
@@ -9,12 +9,12 @@ from validation.blind_spots.table import LIST_SEPARATOR, TABLE_FILE, Line, read,
 from validation.common.rows import Saved
 
 SHOWN_IDS = 3
-"""Ids of rows and of tests that a line names; of the others it tells how many they are."""
+"""Number of row ids and of tests that a line of the section names; further ones are only counted."""
 
 
 def blind_spots(path: Path = TABLE_FILE) -> Saved:
-    """Content of the report's page: lines of the saved table, counts by module, commits, and functions that no
-    independent check covers, by the reason.
+    """Content of the report's section on blind spots: lines of the saved table, counts by module, commits, and
+    functions that no independent check covers, by the reason.
 
     A compiled function that the sources share now and that has no line is not covered: it was not audited.
     """
@@ -43,10 +43,11 @@ def _function_record(audit_line: Line) -> Saved:
     }
 
 
-def _counts_by_module(lines: list[Line]) -> list[tuple[str, int, int, int]]:
-    """Counts for each module: functions, those covered by an independent check, and those covered by any check."""
+def _counts_by_module(audit_lines: list[Line]) -> list[tuple[str, int, int, int]]:
+    """For each module, its name and the numbers of functions: all, covered by an independent check, and covered by any
+    check."""
     of: dict[str, list[Line]] = {}
-    for line in lines:
+    for line in audit_lines:
         of.setdefault(line.function.partition(":")[0], []).append(line)
     return [
         (module, len(same), sum(line.is_covered for line in same), sum(line.noticed > 0 for line in same))

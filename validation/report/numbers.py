@@ -1,4 +1,4 @@
-"""How the report writes numbers and text: four significant digits, powers of ten as ``e-16``, margins as shares."""
+"""Format of numbers and text in the report: four significant digits, powers of ten as ``e-16``, margins in per cent."""
 
 import math
 import re
@@ -9,7 +9,7 @@ from typing import Any
 from markupsafe import Markup, escape
 
 PLAIN_MAGNITUDES = (1e-3, 1e5)
-"""Magnitudes that are written without a power of ten."""
+"""Range of magnitudes that are written without a power of ten."""
 
 
 def number_markup(table_value: Any, digits: int = 4) -> Markup:
@@ -32,27 +32,27 @@ def number_markup(table_value: Any, digits: int = 4) -> Markup:
     return Markup(_scientific_text(table_value, digits))
 
 
-def error(table_value: Any) -> Markup:
-    """Text of an error or tolerance, with four significant digits in fixed notation, and two in powers of ten."""
+def error_markup(table_value: Any) -> Markup:
+    """Text of an error or tolerance: four significant digits in fixed notation, two with a power of ten."""
     plain = isinstance(table_value, int | float) and PLAIN_MAGNITUDES[0] <= abs(table_value) < PLAIN_MAGNITUDES[1]
     return number_markup(table_value, 4 if plain else 2)
 
 
 def _scientific_text(number: float, digits: int) -> str:
-    """Text in scientific notation such as ``8.9e-16``, without leading zeros in the exponent."""
+    """Text of a number in scientific notation such as ``8.9e-16``, without leading zeros in the exponent."""
     mantissa, power = f"{number:.{digits - 1}e}".split("e")
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(power)}"
 
 
 def _significant(number: float, digits: int) -> str:
-    """Text in fixed notation with ``digits`` significant digits, without trailing zeros."""
+    """Text of a number in fixed notation with ``digits`` significant digits, without trailing zeros."""
     decimals = max(0, digits - 1 - math.floor(math.log10(abs(number)))) if number else 0
     text = f"{number:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def margin_of_row(row: dict[str, Any]) -> float | None:
-    """Ratio of |value - expected| to the tolerance; None if there is no tolerance or it is zero."""
+    """Ratio of |value - expected| of a row to its tolerance; None if a number is missing or the tolerance is zero."""
     value, expected, tolerance = row["value"], row["expected"], row["tolerance"]
     numeric = all(isinstance(x, int | float) and not isinstance(x, bool) for x in (value, expected, tolerance))
     if not numeric or tolerance <= 0:
@@ -61,7 +61,7 @@ def margin_of_row(row: dict[str, Any]) -> float | None:
 
 
 def share_markup(tolerance_share: float | None) -> Markup:
-    """Text of a margin: per cent of the tolerance, or how many times it is exceeded."""
+    """Text of an error relative to its tolerance: in per cent, or as a multiple if it is above ten."""
     if tolerance_share is None or math.isnan(tolerance_share):
         return Markup("–")
     if tolerance_share > 10:
@@ -72,7 +72,7 @@ def share_markup(tolerance_share: float | None) -> Markup:
 
 
 def duration(seconds: float) -> str:
-    """Text of a duration: in seconds, or in minutes from two minutes on."""
+    """Text of a duration (s): in seconds, or in minutes from two minutes on."""
     whole = round(seconds)
     return f"{seconds:.1f} s" if seconds < 10 else f"{whole} s" if whole < 120 else f"{round(whole / 60)} min"
 
@@ -82,11 +82,12 @@ NUMERIC_PATTERN = re.compile(
     r"[-−+±<>≤≥~ ]*\d[\d,]*(\.\d+)?(e[+-]?\d+)?\*?( ?(%|s|ms|x))?( (±|\+/-) [\d.]+)?"
     r"|[-–]?|never|refused|not met"
 )
-"""A cell of a table that reads as a number, or as the absence of one."""
+"""Pattern of a table cell that holds a number, or a word for a missing number."""
 
 
 def powers_markup(cell: Any) -> Markup:
-    """Text with numbers such as 2e-06 written ``2e-6``, and those up to a thousand without a power of ten."""
+    """Text in which numbers such as 2e-06 are written ``2e-6``, and numbers up to a few thousand without a power of
+    ten."""
 
     def written(match: re.Match[str]) -> str:
         power = int(match[2])
@@ -96,8 +97,8 @@ def powers_markup(cell: Any) -> Markup:
 
 
 def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> list[bool]:
-    """Flags for the columns of a table, ``count`` or more, that hold numbers and go to the right; the first one never
-    does."""
+    """For each column of a table, at least ``count``, whether it holds numbers and is aligned right; False for the
+    first column."""
     columns = [[str(cell).strip() for cell in column] for column in zip_longest([""] * count, *rows, fillvalue="")]
     right = [
         all(map(NUMERIC_PATTERN.fullmatch, column)) and any(cell[-1:].isdigit() for cell in column)
@@ -107,6 +108,6 @@ def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> list[bool]:
 
 
 def docstring_markup(text: str) -> Markup:
-    """Text of a docstring: **strong** and ``code``."""
+    """HTML of a docstring, with its **strong** and ``code`` marks."""
     strong = re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", str(escape(text)))
     return Markup(re.sub(r"``(.+?)``", r"<code>\1</code>", strong))

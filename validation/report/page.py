@@ -1,6 +1,6 @@
-"""The report: one self-contained page, from saved results alone; it never simulates.
+"""The report's page: one self-contained HTML file, written from saved results without any simulation.
 
-``python -m validation.report FOLDER`` draws it again, byte for byte the same.
+``python -m validation.report FOLDER`` writes it again, byte for byte the same.
 """
 
 import inspect
@@ -23,19 +23,19 @@ from validation.report.blind_spots import blind_spots
 from validation.report.numbers import (
     docstring_markup,
     duration,
-    error,
+    error_markup,
     margin_of_row,
     number_markup,
     numeric_columns,
     powers_markup,
     share_markup,
 )
-from validation.report.shares import case_of, shares_of_systems
+from validation.report.shares import case_of_row, report_sizes_of_systems
 from validation.report.shown import case_on_page
 
 PAGE_TEMPLATE = "page.html.jinja"
 BLANK_PROVENANCE: Saved = {"quick": False, "command": "", "versions": {}, "seconds": {}, "wall": None}
-"""What a page needs of its provenance, where the results do not hold it."""
+"""Defaults of the provenance entries that the page needs, for results in which they are missing."""
 INDEPENDENCE_TEXTS = {
     "native": "both sides have force laws of their own; what they share is the description of the vehicle",
     "handed over": "the engine is handed M, D and K of the description: what is tested is these and the integrator, no "
@@ -65,31 +65,31 @@ def report_verdict(results: Saved) -> Saved:
 
 
 def _source_lines(provenance: Saved) -> list[tuple[str, str]]:
-    """Version, commit, date, machine and data, as (name, value)."""
+    """Version, commit, date, machine and data of a report, as pairs of name and value."""
     known = {"version": "twinrig", "commit": "commit", "date": "date", "machine": "machine", "data": "data"}
     return [(name, str(provenance.get(key) or "not saved")) for name, key in known.items()]
 
 
 def silent_systems(rows: list[Saved]) -> list[str]:
-    """Systems without any row that was run."""
+    """Names of the systems of which no row was run."""
     run = {row["system"] for row in rows if row["status"] != "not run"}
     return [system for system in get_args(System) if system not in run]
 
 
-def rows_by_system(results: Saved, shown: dict[str, Saved]) -> list[Saved]:
-    """Rows grouped by system and, within it, by case, in the order of the report; shown: tables and figures of each
-    case."""
+def rows_by_system(results: Saved, page_content: dict[str, Saved]) -> list[Saved]:
+    """Rows grouped by system and, within it, by case, in the order of the report; page_content : title, tables and
+    figures of each case."""
     order = list(dict.fromkeys((*get_args(System), *(row["system"] for row in results["rows"]))))
     by_system = sorted(results["rows"], key=lambda row: order.index(row["system"]))
     return [
-        {"name": system, "cases": list(_cases_of_system(list(rows), results["provenance"]["seconds"], shown))}
+        {"name": system, "cases": list(_cases_of_system(list(rows), results["provenance"]["seconds"], page_content))}
         for system, rows in groupby(by_system, key=lambda row: row["system"])
     ]
 
 
-def _cases_of_system(rows: list[Saved], seconds: dict[str, float], shown: dict[str, Saved]) -> Iterator[Saved]:
-    for name in dict.fromkeys(map(case_of, rows)):
-        of_case = [row for row in rows if case_of(row) == name]
+def _cases_of_system(rows: list[Saved], seconds: dict[str, float], page_content: dict[str, Saved]) -> Iterator[Saved]:
+    for name in dict.fromkeys(map(case_of_row, rows)):
+        of_case = [row for row in rows if case_of_row(row) == name]
         groups: dict[str, list[Saved]] = {}
         for row in of_case:
             groups.setdefault(row["why"], []).append(row)
@@ -101,16 +101,19 @@ def _cases_of_system(rows: list[Saved], seconds: dict[str, float], shown: dict[s
             "count": len(of_case),
             "failed": statuses.count("failed"),
             "missed": statuses.count("missed"),
-            **shown[name],
+            **page_content[name],
         }
 
 
-def independence(results: Saved, shown: dict[str, Saved]) -> Saved:
-    """Number of rows of each case for each kind of independent second side; shown: tables and figures of each case."""
+def independence_counts(results: Saved, page_content: dict[str, Saved]) -> Saved:
+    """Number of rows of each case for each kind of independence of the two compared sides; page_content : title, tables
+    and figures of each case."""
     lines = []
-    for name in dict.fromkeys(map(case_of, results["rows"])):
-        kinds = [row["independence"] for row in results["rows"] if case_of(row) == name and row["status"] != "not run"]
-        lines.append((name, shown[name]["title"], [kinds.count(kind) for kind in INDEPENDENCE_TEXTS]))
+    for name in dict.fromkeys(map(case_of_row, results["rows"])):
+        kinds = [
+            row["independence"] for row in results["rows"] if case_of_row(row) == name and row["status"] != "not run"
+        ]
+        lines.append((name, page_content[name]["title"], [kinds.count(kind) for kind in INDEPENDENCE_TEXTS]))
     return {
         "kinds": INDEPENDENCE_TEXTS,
         "lines": lines,
@@ -119,8 +122,8 @@ def independence(results: Saved, shown: dict[str, Saved]) -> Saved:
 
 
 def evidence_counts(rows: list[Saved]) -> list[tuple[str, list[int]]]:
-    """For each system, the number of rows with each kind of independent second side, in the order of
-    INDEPENDENCE_TEXTS; rows not run are left out."""
+    """For each system, its name and the numbers of rows by the independence of the two compared sides, in the order of
+    INDEPENDENCE_TEXTS; rows that were not run are left out."""
     ran = [row for row in rows if row["status"] != "not run"]
     names = dict.fromkeys(row["system"] for row in ran)
     kinds = {name: [row["independence"] for row in ran if row["system"] == name] for name in names}
@@ -128,20 +131,20 @@ def evidence_counts(rows: list[Saved]) -> list[tuple[str, list[int]]]:
 
 
 NUMBERS_AND_RUNS = re.compile(r"\([^()]*\)|[-+\d.e]+")
-"""What differs between the allowed breaches of alike runs of a case."""
+"""Pattern of the text parts in which allowed broken assumptions of similar runs of a case differ."""
 
 
 def allowed_assumptions(rows: list[Saved]) -> list[tuple[str, list[Saved]]]:
-    """Allowed broken assumptions, similar ones grouped, and the rows that rest on them."""
+    """Each allowed broken assumption, similar ones merged, with the rows that rest on it."""
     alike_rows: dict[tuple[str, str], list[Saved]] = {}
     for row in rows:
         if row["allowed"]:
-            alike_rows.setdefault((case_of(row), NUMBERS_AND_RUNS.sub("", row["allowed"])), []).append(row)
+            alike_rows.setdefault((case_of_row(row), NUMBERS_AND_RUNS.sub("", row["allowed"])), []).append(row)
     return [(alike[0]["allowed"], alike) for alike in alike_rows.values()]
 
 
 def conventions() -> list[tuple[str, str]]:
-    """Heading and text of each paragraph on conventions of axes, signs and units."""
+    """Heading and text of each paragraph on twinrig's conventions of axes, signs and units."""
     import models
 
     pairs: list[tuple[str, str]] = []
@@ -154,7 +157,8 @@ def conventions() -> list[tuple[str, str]]:
 
 
 def parameter_tables() -> list[Saved]:
-    """One table per kind of vehicle: fields with unit and meaning, a column per parameter set, and sources."""
+    """One table of parameters per kind of vehicle: fields with unit and meaning, a column per parameter set,
+    sources."""
     tables: dict[type, Saved] = {}
     for name, module in _parameter_modules():
         kind: Any = type(module.PARAMETERS)
@@ -171,7 +175,7 @@ def parameter_tables() -> list[Saved]:
 
 
 def _parameter_modules() -> Iterator[tuple[str, ModuleType]]:
-    """Modules of parameter sets: those with a SOURCE and a pydantic PARAMETERS."""
+    """Yield name and module of each parameter set: modules with a SOURCE and a pydantic model PARAMETERS."""
     import models.vehicles.parameters as package
 
     for name in sorted(named.name for named in pkgutil.iter_modules(package.__path__)):
@@ -180,19 +184,19 @@ def _parameter_modules() -> Iterator[tuple[str, ModuleType]]:
             yield name, module
 
 
-def write(folder: Path, each: Callable[..., Iterable[Any]] = map) -> Path:
-    """Write ``folder/report.html`` from ``results.json`` and ``data/CASE.json``; returns its path.
+def write(folder: Path, map_cases: Callable[..., Iterable[Any]] = map) -> Path:
+    """Write ``folder/report.html`` from ``results.json`` and ``data/CASE.json``; returns the path of the page.
 
-    each : draws the cases, such as the map of a pool of processes.
+    map_cases : maps the function that draws a case over all cases, such as the map of a pool of processes.
     """
     results = read(folder / "results.json")
     path = folder / "report.html"
-    write_whole(path, page_text(results, folder / "data", each))
+    write_whole(path, page_text(results, folder / "data", map_cases))
     return path
 
 
 def read(path: Path) -> Saved:
-    """Saved results; raises InputError if the file is not one."""
+    """Saved results of a validation; raises InputError if the file holds none."""
     try:
         results = json.loads(path.read_text(encoding="utf-8"))
         return {
@@ -206,28 +210,28 @@ def read(path: Path) -> Saved:
         raise InputError(path, "", None, f"not the results of a validation: {error}") from None
 
 
-def page_text(results: Saved, case_data: Path, each: Callable[..., Iterable[Any]] = map) -> str:
-    """The page as text."""
+def page_text(results: Saved, case_data: Path, map_cases: Callable[..., Iterable[Any]] = map) -> str:
+    """HTML text of the report's page."""
     environment = environment_of(Path(__file__).parent)
     environment.filters |= {
         "number": number_markup,
-        "error": error,
+        "error": error_markup,
         "share": share_markup,
         "duration": duration,
         "powers": powers_markup,
         "marked": docstring_markup,
         "numeric_columns": numeric_columns,
     }
-    environment.globals |= {"margin": margin_of_row, "case_of": case_of}
-    names = list(dict.fromkeys(map(case_of, results["rows"])))
-    drawn = dict(zip(names, each(partial(case_on_page, case_data), names), strict=True))
+    environment.globals |= {"margin": margin_of_row, "case_of": case_of_row}
+    names = list(dict.fromkeys(map(case_of_row, results["rows"])))
+    drawn = dict(zip(names, map_cases(partial(case_on_page, case_data), names), strict=True))
     return environment.get_template(PAGE_TEMPLATE).render(
         verdict=report_verdict(results),
         against=results.get("against"),
         systems=rows_by_system(results, drawn),
         silent=silent_systems(results["rows"]),
-        shares=shares_of_systems(results),
-        independence=independence(results, drawn),
+        shares=report_sizes_of_systems(results),
+        independence=independence_counts(results, drawn),
         evidence=evidence_counts(results["rows"]),
         measured_rows=sum(row["independence"] == "measured" and row["status"] != "not run" for row in results["rows"]),
         allowances=allowed_assumptions(results["rows"]),

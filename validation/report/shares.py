@@ -1,7 +1,7 @@
-"""The share of a quick report in the full one, by system: rows and seconds.
+"""Rows and computing times of a quick report compared with the last full report, by system.
 
-``python -m validation.report.shares FOLDER`` keeps what a full report had of each case in ``full_report.json``; quick
-ones tell it beside what they ran, and cases that took long are begun first.
+``python -m validation.report.shares FOLDER`` saves rows and seconds of each case of a full report in
+``full_report.json``; quick reports state them, and cases that took long are started first.
 """
 
 import json
@@ -16,8 +16,8 @@ from models.core.whole_files import write_whole
 from validation.cases import CASES
 from validation.common.rows import Saved, System
 
-KEPT_REPORT = Path(__file__).with_name("full_report.json")
-QUICK_SHARES = {
+FULL_REPORT_FILE = Path(__file__).with_name("full_report.json")
+QUICK_SECONDS = {
     "pitch-plane": 13,
     "drift": 16,
     "contact": 9,
@@ -29,49 +29,52 @@ QUICK_SHARES = {
     "cost": 12,
     "effects": 12,
 }
-"""Seconds of two cores that each system may take of the quick report's minute, once kernels are compiled."""
+"""Processor time (s, summed over two cores) that each system may take of the quick report's minute, once kernels are
+compiled."""
 DRAWING_SECONDS = 20
-"""Seconds of the minute that are left for starting and drawing."""
-assert set(QUICK_SHARES) == set(get_args(System)) and sum(QUICK_SHARES.values()) + DRAWING_SECONDS == 120
+"""Processor time (s, summed over two cores) of that minute for starting and drawing."""
+assert set(QUICK_SECONDS) == set(get_args(System)) and sum(QUICK_SECONDS.values()) + DRAWING_SECONDS == 120
 
 
 @cache
 def full_report_data() -> dict[str, Saved]:
-    """Data of each case in the last full report: number of rows by system, seconds, and commit."""
-    kept: dict[str, Saved] = json.loads(KEPT_REPORT.read_text(encoding="utf-8"))
+    """Saved data of each case of the last full report: number of rows by system, seconds, and commit."""
+    kept: dict[str, Saved] = json.loads(FULL_REPORT_FILE.read_text(encoding="utf-8"))
     return kept
 
 
-def case_of(row: Saved) -> str:
-    """Name of the case of a row: the row's id begins with it, or with a word that stands for it."""
+def case_of_row(row: Saved) -> str:
+    """Name of the case that a row belongs to: the row's id begins with it, or with one of its words."""
     first = row["id"].partition(".")[0]
     return first if first in CASES else next((case for case in CASES if first in case.split("_")), first)
 
 
-def shares_of_systems(results: Saved) -> list[Saved]:
-    """For each system, the numbers of cases and rows that were measured, those of a full report, and the stated
-    computing times.
+def report_sizes_of_systems(results: Saved) -> list[Saved]:
+    """For each system, the numbers of cases and rows that were measured, computing times, and the same for the last
+    full report.
 
     A case counts to the system of most of its rows. What is not known of some case of a system is None.
     """
     counted = _row_counts(results["rows"])
     main = {case: systems.most_common(1)[0][0] for case, systems in counted.items()}
     return [
-        _line(system, counted, main, results["provenance"]["seconds"])
-        for system in QUICK_SHARES
+        _sizes_of_system(system, counted, main, results["provenance"]["seconds"])
+        for system in QUICK_SECONDS
         if any(system in systems for systems in counted.values())
     ]
 
 
-def _line(system: str, counted: dict[str, Counter[str]], main: dict[str, str], seconds: dict[str, float]) -> Saved:
-    main_cases = [case for case in counted if main[case] == system]
-    shared = [case for case in counted if system in counted[case]]
+def _sizes_of_system(
+    system: str, row_counts: dict[str, Counter[str]], main_system_of_case: dict[str, str], seconds: dict[str, float]
+) -> Saved:
+    main_cases = [case for case in row_counts if main_system_of_case[case] == system]
+    shared = [case for case in row_counts if system in row_counts[case]]
     return {
         "name": system,
         "cases": len(main_cases),
-        "rows": sum(counted[case][system] for case in shared),
+        "rows": sum(row_counts[case][system] for case in shared),
         "seconds": sum(seconds.get(case, 0.0) for case in main_cases),
-        "stated": QUICK_SHARES[system],
+        "stated": QUICK_SECONDS[system],
         "full_rows": sum(full_report_data()[case]["rows"].get(system, 0) for case in shared)
         if full_report_data().keys() >= set(shared)
         else None,
@@ -82,15 +85,16 @@ def _line(system: str, counted: dict[str, Counter[str]], main: dict[str, str], s
 
 
 def _row_counts(rows: list[Saved]) -> dict[str, Counter[str]]:
-    """Number of rows for each case, by system."""
+    """Numbers of rows by system, for each case."""
     counted: dict[str, Counter[str]] = {}
     for row in rows:
-        counted.setdefault(case_of(row), Counter())[row["system"]] += 1
+        counted.setdefault(case_of_row(row), Counter())[row["system"]] += 1
     return counted
 
 
-def keep(folder: Path) -> None:
-    """Save the number of rows and the seconds of each case of a full report; raises InputError for a quick report."""
+def save_full_report(folder: Path) -> None:
+    """Save the number of rows and the seconds of each case of a full report in ``full_report.json``; raises InputError
+    for a quick report."""
     from validation.report.page import read
 
     results = read(folder / "results.json")
@@ -102,8 +106,10 @@ def keep(folder: Path) -> None:
         for case, systems in _row_counts(results["rows"]).items()
         if case in source["seconds"]
     }
-    write_whole(KEPT_REPORT, (json.dumps(dict(sorted((full_report_data() | new).items())), indent=1) + "\n").encode())
+    write_whole(
+        FULL_REPORT_FILE, (json.dumps(dict(sorted((full_report_data() | new).items())), indent=1) + "\n").encode()
+    )
 
 
 if __name__ == "__main__":
-    keep(Path(sys.argv[1]))
+    save_full_report(Path(sys.argv[1]))

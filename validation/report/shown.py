@@ -1,4 +1,4 @@
-"""What the report shows of one case beside its rows, from its saved data alone: title, tables and figures.
+"""Title, tables and figures of one case in the report, from the case's saved data.
 
 Figures are SVG where that is small, PNG where it is not; the same bytes from the same data.
 """
@@ -19,11 +19,11 @@ from markupsafe import Markup, escape
 from validation.common.rows import Saved
 
 LARGEST_SVG = 150_000
-"""Bytes; above, the figure is drawn in points of colour."""
+"""Largest size (bytes) of a figure in SVG; larger ones become PNG."""
 
 
 def case_on_page(folder: Path, name: str) -> Saved:
-    """Title, tables and figures of a case, and texts on the case and its share; "notes" say what could not be read.
+    """Title, texts, tables and figures of a case for the report; "notes" state what could not be read.
 
     folder : of the saved data, ``CASE.json`` each. The same data give the same bytes in any process.
     """
@@ -57,7 +57,7 @@ def case_on_page(folder: Path, name: str) -> Saved:
 
 
 def _case_module(name: str) -> ModuleType | None:
-    """The module of a case, None where this checkout has none of that name."""
+    """The module of a case; None if this version has no case of that name."""
     if not name.isidentifier():
         return None
     try:
@@ -66,17 +66,17 @@ def _case_module(name: str) -> ModuleType | None:
         return None
 
 
-def _first_paragraph(documented: Any) -> str:
+def _first_paragraph(documented_object: Any) -> str:
     """First paragraph of the docstring of a module or function."""
-    return "" if documented is None else (inspect.getdoc(documented) or "").partition("\n\n")[0]
+    return "" if documented_object is None else (inspect.getdoc(documented_object) or "").partition("\n\n")[0]
 
 
-def _tables_of_case(module: Any, saved: Any, name: str) -> Iterable[Any]:
-    return module.tables(saved) if hasattr(module, "tables") else ()
+def _tables_of_case(module: Any, saved_data: Any, name: str) -> Iterable[Any]:
+    return module.tables(saved_data) if hasattr(module, "tables") else ()
 
 
-def _figures_of_case(module: Any, saved: Any, name: str) -> Iterator[tuple[str, Any]]:
-    for i, (caption, figure) in enumerate(module.draw(saved) if hasattr(module, "draw") else ()):
+def _figures_of_case(module: Any, saved_data: Any, name: str) -> Iterator[tuple[str, Any]]:
+    for i, (caption, figure) in enumerate(module.draw(saved_data) if hasattr(module, "draw") else ()):
         yield caption, inline_figure(figure, caption, f"{name}-{i}")
 
 
@@ -89,8 +89,8 @@ def inline_figure(figure: Any, caption: str, key: str) -> Markup:
 
 
 def _svg_markup(figure: Any, caption: str, key: str) -> str:
-    """SVG element without prologue, metadata and needless digits; the figure is drawn once, whereas ``savefig`` draws
-    it twice."""
+    """SVG element of a figure without prologue, metadata and needless digits; the figure is drawn once, whereas
+    ``savefig`` draws it twice."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     buffer = io.StringIO()
@@ -111,7 +111,7 @@ def _rounded_svg_path(path: re.Match[str]) -> str:
 
 
 def _png_markup(figure: Any, caption: str) -> str:
-    """PNG with a palette of 256 colours, as data within the page."""
+    """HTML image of a figure: PNG with a palette of 256 colours, as data within the page."""
     from PIL import Image
 
     buffer, small = io.BytesIO(), io.BytesIO()

@@ -1,1 +1,1 @@
-"""Vehicles and roads that cases and tests of ride share."""
+"""Ride vehicles and roads that validation cases and tests share."""

@@ -1,6 +1,6 @@
-"""Ride scenes drawn at random: vehicles, roads, quantities, tolerances.
+"""Random ride scenes: vehicles, roads, quantities and tolerances.
 
-Linear vehicles have stiff and irrelevant parts; bent springs have dampers, stops and friction.
+Linear vehicles have stiff and irrelevant parts; nonlinear ones have dampers with curves, bump stops and friction.
 """
 
 from dataclasses import dataclass, replace
@@ -19,16 +19,16 @@ from models.vehicles.vehicle_file import load_vehicle
 from validation.ride.rides import changed_vehicle
 
 VEHICLES = ("quarter_car", "half_car", "half_car", "seven_freedoms")
-BENT_VEHICLES, TOLERANCES = ("quarter_car", "quarter_car", "half_car"), (0.02, 0.02, 0.05, 0.01)
-"""Drawn scenes with bent springs take these in turn."""
+NONLINEAR_VEHICLES, TOLERANCES = ("quarter_car", "quarter_car", "half_car"), (0.02, 0.02, 0.05, 0.01)
+"""Shipped vehicles, and tolerances, that random scenes with nonlinear springs take in turn."""
 SEED, RUN_DURATION, COPIES = 2211, 8.0, 48
-UP = (0.0, 0.0, 1.0)
+UPWARD = (0.0, 0.0, 1.0)
 _load_vehicle = cache(load_vehicle)
 
 
 @dataclass(frozen=True)
-class DrawnRide:
-    """A random ride scene, its speed (m/s), the outputs that must stay accurate, and the tolerance."""
+class LinearRide:
+    """A random linear ride scene, its speed (m/s), the outputs that must stay accurate, and the relative tolerance."""
 
     scene: ReducedScene
     speed: float
@@ -37,43 +37,43 @@ class DrawnRide:
 
 
 @dataclass(frozen=True)
-class BentRide:
-    """A random ride scene with nonlinear springs, the outputs that must stay accurate, and the tolerance."""
+class NonlinearRide:
+    """A random ride scene with nonlinear springs, the outputs that must stay accurate, and the relative tolerance."""
 
     scene: ReducedScene
     quantities: tuple[str, ...]
     tolerance: float
 
-    def opened(self, copies: int = COPIES, seed: int = 1) -> CopiesInTime:
-        """The scene prepared for runs in time, with ``copies`` Monte Carlo copies."""
+    def prepared_in_time(self, copies: int = COPIES, seed: int = 1) -> CopiesInTime:
+        """The random scene prepared for runs in time, with ``copies`` Monte Carlo copies."""
         options = {"copies": copies, "lasting": RUN_DURATION, "seed": seed}
         return in_time(replace(self.scene, ride=self.scene.ride.model_copy(update={"options": options})))
 
 
-class Draw:
-    """Generator of random numbers for a seed."""
+class RandomNumbers:
+    """Generator of the random numbers of a ride scene, for a seed."""
 
     def __init__(self, seed: int | list[int]) -> None:
         self.random = np.random.default_rng(seed)
 
-    def between(self, low: float, high: float) -> float:
-        """Random number between both limits, uniform in its logarithm."""
+    def log_uniform(self, low: float, high: float) -> float:
+        """Random number between two positive limits, uniform in its logarithm."""
         return float(np.exp(self.random.uniform(np.log(low), np.log(high))))
 
 
-def drawn_ride(seed: int, tolerance: float | None = None, detailed: bool = True) -> DrawnRide:
-    """The random linear scene of a seed; the tolerance is random from 0.5 to 10 % by default.
+def random_linear_ride(seed: int, tolerance: float | None = None, detailed: bool = True) -> LinearRide:
+    """The random linear ride scene of a seed; the tolerance is random from 0.5 to 10 % by default.
 
     detailed : a vehicle as multibody programs hold it, every wheel on a stiff bushing and a light part on stiff mounts;
     else each of them in about half of the scenes, and soft at times.
     """
-    draw = Draw(seed)
+    draw = RandomNumbers(seed)
     rng = draw.random
     name = str(rng.choice(VEHICLES))
-    vehicle = _vehicle(changed_vehicle(_load_vehicle(name), seed), draw, detailed)
-    cutoff = draw.between(20.0, 200.0) if rng.random() < 0.4 else None
+    vehicle = _random_vehicle(changed_vehicle(_load_vehicle(name), seed), draw, detailed)
+    cutoff = draw.log_uniform(20.0, 200.0) if rng.random() < 0.4 else None
     speed = float(rng.uniform(8.0, 40.0))
-    scene = _scene("drawn", name, {} if cutoff is None else {"cutoff": cutoff}, speed, vehicle)
+    scene = _ride_scene("drawn", name, {} if cutoff is None else {"cutoff": cutoff}, speed, vehicle)
     ride = stationary_covariance(FullScene(scene, speed).full.system)
     silent = 1e-9 * max(abs(v) for v in ride.variance if np.isfinite(v))
     finite_names = [
@@ -81,25 +81,25 @@ def drawn_ride(seed: int, tolerance: float | None = None, detailed: bool = True)
     ]
     count = min(len(finite_names), int(rng.integers(1, 3)))
     drawn_quantities = tuple(map(str, rng.choice(finite_names, count, replace=False)))
-    return DrawnRide(scene, speed, drawn_quantities, tolerance or draw.between(0.005, 0.1))
+    return LinearRide(scene, speed, drawn_quantities, tolerance or draw.log_uniform(0.005, 0.1))
 
 
-def _scene(title: str, file: str, road: dict[str, float], speed: float, vehicle: SpatialVehicle) -> ReducedScene:
+def _ride_scene(title: str, file: str, road: dict[str, float], speed: float, vehicle: SpatialVehicle) -> ReducedScene:
     table = {"title": title, "system": "ride", "vehicle": {"file": file}, "road": road, "speeds": {"values": [speed]}}
     return ReducedScene(build(table, "drawn"), vehicle)
 
 
-def _vehicle(vehicle: SpatialVehicle, generator: Draw, detailed: bool) -> SpatialVehicle:
-    """Random variant of a vehicle: light wheels, firm dampers, damped tyres in three of five cases; sometimes a
-    fore-aft bush and a part on mounts."""
-    rng, between, wheels = generator.random, generator.between, wheels_of(vehicle)
-    light, firm = between(0.15, 1.2), between(0.5, 4.0)
-    damping = between(30.0, 400.0) if rng.random() < 0.6 else 0.0
+def _random_vehicle(vehicle: SpatialVehicle, generator: RandomNumbers, detailed: bool) -> SpatialVehicle:
+    """Random variant of a vehicle: changed wheel masses and dampers, damped tyres in three of five variants, sometimes
+    a stiff fore-aft bushing at each wheel and a small body on a mount."""
+    rng, log_uniform, wheels = generator.random, generator.log_uniform, wheels_of(vehicle)
+    light, firm = log_uniform(0.15, 1.2), log_uniform(0.5, 4.0)
+    damping = log_uniform(30.0, 400.0) if rng.random() < 0.6 else 0.0
     bodies = [replace(b, mass=light * b.mass) if b.name in wheels else b for b in vehicle.bodies]
     springs = [replace(s, damping=firm * s.damping) for s in vehicle.springs]
     outputs = list(vehicle.outputs)
     if detailed or rng.random() < 0.4:
-        k, lean = between(1e6 if detailed else 3e5, 2e7), rng.uniform(0.02, 0.15)
+        k, lean = log_uniform(1e6 if detailed else 3e5, 2e7), rng.uniform(0.02, 0.15)
         axis = (float(np.cos(lean)), 0.0, float(np.sin(lean)))
         for i, body in enumerate(bodies):
             if body.name in wheels:
@@ -108,40 +108,40 @@ def _vehicle(vehicle: SpatialVehicle, generator: Draw, detailed: bool) -> Spatia
                 springs.append(SpringDamper(f"{body.name} bush", "body", body.name, position, position, axis, k, c))
     if detailed or rng.random() < 0.6:
         chassis = next(b for b in bodies if b.name == "body")
-        m = chassis.mass * between(0.002, 0.02 if detailed else 0.15)
+        m = chassis.mass * log_uniform(0.002, 0.02 if detailed else 0.15)
         position = (chassis.position[0] + float(rng.uniform(-1, 1)), *chassis.position[1:])
-        k = m * (2 * np.pi * between(20.0 if detailed else 3.0, 200.0)) ** 2
+        k = m * (2 * np.pi * log_uniform(20.0 if detailed else 3.0, 200.0)) ** 2
         bodies.append(Body("part", m, position, ("z",)))
-        springs.append(SpringDamper("part", "part", "body", position, position, UP, k, 0.2 * float(np.sqrt(k * m))))
+        springs.append(SpringDamper("part", "part", "body", position, position, UPWARD, k, 0.2 * float(np.sqrt(k * m))))
         if not detailed:
-            outputs.append(PointOutput("part", "acceleration", "part", position, UP))
+            outputs.append(PointOutput("part", "acceleration", "part", position, UPWARD))
     tyres = tuple(replace(tyre, damping=damping) for tyre in vehicle.tyres)
     return replace(vehicle, bodies=tuple(bodies), springs=tuple(springs), tyres=tyres, outputs=tuple(outputs))
 
 
-def drawn_bent(scene_number: int) -> BentRide:
-    """The random scene with nonlinear springs for a number."""
-    draw = Draw([SEED, scene_number])
-    name = BENT_VEHICLES[scene_number % len(BENT_VEHICLES)]
+def random_nonlinear_ride(scene_number: int) -> NonlinearRide:
+    """The random ride scene with nonlinear springs for a number, which seeds it."""
+    draw = RandomNumbers([SEED, scene_number])
+    name = NONLINEAR_VEHICLES[scene_number % len(NONLINEAR_VEHICLES)]
     vehicle = load_vehicle(name)
-    springs = tuple(_bent_spring(spring, draw) for spring in vehicle.springs)
-    level, speed = draw.between(1e-5, 1.5e-4), float(draw.random.uniform(10.0, 35.0))
+    springs = tuple(_nonlinear_spring(spring, draw) for spring in vehicle.springs)
+    level, speed = draw.log_uniform(1e-5, 1.5e-4), float(draw.random.uniform(10.0, 35.0))
     drawn_quantities = draw.random.choice([output.name for output in vehicle.outputs], 2, replace=False)
-    scene = _scene(f"bent {scene_number}", name, {"level": level}, speed, replace(vehicle, springs=springs))
-    return BentRide(scene, tuple(map(str, drawn_quantities)), TOLERANCES[scene_number % len(TOLERANCES)])
+    scene = _ride_scene(f"bent {scene_number}", name, {"level": level}, speed, replace(vehicle, springs=springs))
+    return NonlinearRide(scene, tuple(map(str, drawn_quantities)), TOLERANCES[scene_number % len(TOLERANCES)])
 
 
-def _bent_spring(spring: SpringDamper, generator: Draw) -> SpringDamper:
-    """A spring made nonlinear: a digressive damper that is harder in rebound, two bump stops, and friction, each with
-    high probability."""
-    c, rebound, digressive = spring.damping, generator.between(1.0, 2.5), generator.between(0.3, 1.0)
+def _nonlinear_spring(spring: SpringDamper, generator: RandomNumbers) -> SpringDamper:
+    """The spring with a digressive damper that is harder in rebound, two bump stops, and friction, each with high
+    probability."""
+    c, rebound, digressive = spring.damping, generator.log_uniform(1.0, 2.5), generator.log_uniform(0.3, 1.0)
     curve = Curve(
         (-1.0, -0.2, 0.0, 0.2, 1.0),
         (-c * rebound * (0.2 + 0.8 * digressive), -0.2 * c * rebound, 0.0, 0.2 * c, c * (0.2 + 0.8 * digressive)),
     )
-    gap, hard = generator.between(0.02, 0.08), generator.between(2e4, 2e5)
+    gap, hard = generator.log_uniform(0.02, 0.08), generator.log_uniform(2e4, 2e5)
     stops = Curve((-gap - 0.05, -gap, gap, gap + 0.05), (-0.05 * hard, 0.0, 0.0, 0.05 * hard))
-    friction = generator.between(5.0, 80.0)
+    friction = generator.log_uniform(5.0, 80.0)
     bent, stopped, dry = generator.random.random(3) < (0.8, 0.7, 0.7)
     bent = bent or not (stopped or dry)
     return replace(

@@ -1,4 +1,4 @@
-"""Roads of which two tracks were measured, and one that was made: the fit of mean and roll process to each, drawn.
+"""Fits of the road model's mean and roll process to measured roads of two tracks and to a generated road.
 
 Spectra and coherency are drawn in the manner of Rill's Fig. 3.
 """
@@ -21,15 +21,15 @@ from validation.common.scenes import COURSE_FILE, data_folder
 
 SYSTEM: System = "ride"
 SEED = 41
-"""Of the road that is made, measured and fitted again."""
+"""Seed of the generated road, which is sampled and fitted again."""
 HALF_TRACK = 0.7
-ROAD_SECTIONS = {"belgian_block.crg": (None, None), COURSE_FILE: (100.0, 404.8), "Horstwalde.crg": (None, None)}
-"""Measured roads and the section (m) of each that is looked at."""
+MEASURED_SECTIONS = {"belgian_block.crg": (None, None), COURSE_FILE: (100.0, 404.8), "Horstwalde.crg": (None, None)}
+"""Files of measured roads, and first and last station (m) of the section that is fitted."""
 
 
-def fitted_made_road(length: float) -> tuple[list[Row], dict[str, Any]]:
-    """Rows and data: a road is generated from the two filters of the model, and the fit must find these filters
-    again."""
+def generated_road_rows(length: float) -> tuple[list[Row], dict[str, Any]]:
+    """Rows and data: parameters of the mean and roll process fitted to a road that is generated from them, divided by
+    their true values; length : of the road, m."""
     road, step = road_of_level(HALF_TRACK), 0.05
     noise = normal_samples(SEED, 0, round(length / step), 2)
     mean, roll = (_first_order_samples(f, noise[:, i], step) for i, f in enumerate((road.mean, road.roll)))
@@ -57,21 +57,21 @@ def fitted_made_road(length: float) -> tuple[list[Row], dict[str, Any]]:
     return rows, _figure_numbers(tracks, fitted)
 
 
-def _first_order_samples(shape_filter: ShapeFilter, noise: np.ndarray, step: float) -> np.ndarray:
-    """Samples of a stationary first-order process from unit noise, exact at the stations."""
+def _first_order_samples(shape_filter: ShapeFilter, unit_noise: np.ndarray, step: float) -> np.ndarray:
+    """Samples (n,) of a stationary first-order process at stations ``step`` m apart, from unit noise (n,); exact."""
     decay = math.exp(-shape_filter.corner * step)
-    driven = noise * math.sqrt((1.0 - decay**2) * shape_filter.intensity / (2.0 * shape_filter.corner))
-    driven[0] = noise[0] * math.sqrt(shape_filter.intensity / (2.0 * shape_filter.corner))
+    driven = unit_noise * math.sqrt((1.0 - decay**2) * shape_filter.intensity / (2.0 * shape_filter.corner))
+    driven[0] = unit_noise[0] * math.sqrt(shape_filter.intensity / (2.0 * shape_filter.corner))
     return lfilter([1.0], [1.0, -decay], driven)
 
 
 def measured_road_rows() -> tuple[list[Row], list[dict[str, Any]]]:
-    """Rows: properties of measured roads, and limits of what a fit can determine."""
+    """Rows and figure data: properties of measured roads, and fits of the road model to them."""
     data = data_folder()
     if data is None:
         return [not_run("ride_road.measured", SYSTEM, "measured two-track roads", "TWINRIG_DATA names no folder")], []
     rows, shown = [], []
-    for name, (first_station, last_station) in ROAD_SECTIONS.items():
+    for name, (first_station, last_station) in MEASURED_SECTIONS.items():
         tracks = read_tracks(data / name, first_station=first_station, last_station=last_station)
         fitted = fit_road(tracks)
         if name == "belgian_block.crg":
@@ -98,9 +98,9 @@ def measured_road_rows() -> tuple[list[Row], list[dict[str, Any]]]:
     return rows, shown
 
 
-def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any]:
-    """Saved numbers for the figure and the table."""
-    spectra = fitted.spectra
+def _figure_numbers(tracks: MeasuredTracks, fitted_road: FittedRoad) -> dict[str, Any]:
+    """Numbers of a fitted road that are saved for the figure and the table."""
+    spectra = fitted_road.spectra
     drawn_rows = np.unique(np.geomspace(1, len(spectra.wavenumber), 160).astype(int)) - 1
     fits = [
         fit
@@ -112,7 +112,7 @@ def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any
             fit.log_residual,
             fit.corner_is_resolved,
         ]
-        for fit in (fitted.mean, fitted.roll)
+        for fit in (fitted_road.mean, fitted_road.roll)
     ]
     return {
         "name": tracks.name,
@@ -121,18 +121,18 @@ def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any
         "fits": fits,
         **{key: getattr(spectra, key)[drawn_rows].tolist() for key in ("wavenumber", "left", "coherency")},
         "chance": spectra.chance_coherency(),
-        "notes": fitted.notes,
+        "notes": fitted_road.notes,
     }
 
 
-def _verdict_text(resolved: bool, residual: float) -> str:
+def _verdict_text(is_resolved: bool, residual: float) -> str:
     if residual > math.log(2.0):
         return "not of first order"
-    return "first order" if resolved else "a level only"
+    return "first order" if is_resolved else "a level only"
 
 
 def fits_table(roads: list[dict[str, Any]]) -> Table:
-    """Table of both fitted processes of every road, with their uncertainty."""
+    """Table of the fitted mean and roll process of every road, with standard errors."""
     rows = []
     for road in roads:
         for process, unit, values in zip(("mean", "roll"), ("m", "1/m"), road["fits"], strict=True):
@@ -155,8 +155,8 @@ def fits_table(roads: list[dict[str, Any]]) -> Table:
 
 
 def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) -> tuple[str, Any]:
-    """Figure with spectra over the wavenumber (left) and coherency of both tracks (right); measured roads as thin
-    lines."""
+    """Figure of road spectra over the wavenumber (left), and of the coherency of both tracks (right); measured roads
+    are thin lines. Returns caption and figure."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     road, k = road_of_level(half_track), np.geomspace(0.02, 100.0, 300)
@@ -177,9 +177,9 @@ def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) ->
     right.semilogx(k, isotropic.coherency(k, 2 * half_track), "k-.", label="isotropic, same track spectrum")
     for i, shown in enumerate(measured_roads):
         thin = {"color": f"C{i}", "lw": 0.8}
-        left.loglog(shown["wavenumber"], shown["left"], label=_label(shown), **thin)
+        left.loglog(shown["wavenumber"], shown["left"], label=_road_label(shown), **thin)
         if shown["fits"][1] is not None:
-            right.semilogx(shown["wavenumber"], shown["coherency"], label=_label(shown), **thin)
+            right.semilogx(shown["wavenumber"], shown["coherency"], label=_road_label(shown), **thin)
             right.axhline(shown["chance"], ls=(0, (1, 3)), **thin)
     left.set(
         title="Left track: two-sided density [m³]", xlabel="wavenumber [rad/m]", xlim=(0.02, 100), ylim=(1e-10, 1e-1)
@@ -197,6 +197,6 @@ def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) ->
     return caption, figure
 
 
-def _label(road: dict[str, Any]) -> str:
+def _road_label(road: dict[str, Any]) -> str:
     name, length = road["name"].removesuffix(".crg").replace("_", " "), road["length"]
     return f"{name}, {length:.3g} m" if length < 999 else f"{name}, {length / 1e3:.3g} km"

@@ -1,4 +1,4 @@
-"""Vehicles and exact answers of ride's hard cases."""
+"""Vehicles and exact solutions for the hard cases of ride."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,26 +20,26 @@ from validation.ride.rides import ROAD_INTENSITY, largest_relative_error, one_tr
 
 SPEED = 20.0
 QUARTER_CAR_NUMBERS = (300.0, 40.0, 2e4, 1500.0, 2e5)
-"""Masses of body and wheel, spring, damper and tyre of a quarter car."""
-BODY_PLACE, BODY_AXIS = (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
-"""Where a body of one freedom lies, and its axis."""
+"""Masses (kg) of body and wheel, spring stiffness (N/m), damping (N s/m) and tyre stiffness (N/m) of a quarter car."""
+BODY_POSITION, BODY_AXIS = (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
+"""Position (m) of a body with a single freedom, and the direction of its motion."""
 
 
-def linear(vehicle: SpatialVehicle, implementation: str, speed: float = SPEED) -> LinearVehicle:
-    """The linear vehicle in an implementation."""
+def linear_equations(vehicle: SpatialVehicle, implementation: str, speed: float = SPEED) -> LinearVehicle:
+    """Linear equations of a vehicle at a speed (m/s), by an implementation."""
     return linear_vehicle(vehicle, implementation)(speed)
 
 
-def closed_form(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car: float) -> Callable[..., float]:
-    """Case: a quarter car with some values changed. Error: relative error of acceleration and travel against the closed
-    form."""
+def closed_form_error(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car: float) -> Callable[..., float]:
+    """Hard case: a quarter car with some parameters changed. Returns its error function: the relative error of the
+    variances of acceleration and travel against the closed form."""
     exact = replace(QuarterCar(*QUARTER_CAR_NUMBERS), **car)
 
     def error(implementation: str, folder: Path) -> float:
         worst, vehicle = 0.0, quarter_car(*vars(exact).values())
         for speed in speeds:
             covariance = stationary_covariance(
-                vehicle_with_road(linear(vehicle, implementation), one_track((0.0,), corner), speed)
+                vehicle_with_road(linear_equations(vehicle, implementation), one_track((0.0,), corner), speed)
             )
             q, w = ROAD_INTENSITY * speed, corner * speed
             worst = max(
@@ -55,7 +55,8 @@ def closed_form(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car
 
 
 def quarter_car(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: float = 0.0) -> SpatialVehicle:
-    """A quarter car; outputs: acceleration of the body, travel, and force of the tyre."""
+    """A quarter car with masses m_s, m_u (kg), spring k, damper c, tyre k_t and tyre damping c_t (N/m, N s/m); outputs:
+    acceleration of the body, suspension travel, and force of the tyre."""
     car = replace(load_vehicle("quarter_car"), name="quarter")
     bodies = tuple(replace(body, mass=m) for body, m in zip(car.bodies, (m_s, m_u), strict=True))
     springs = (replace(car.springs[0], stiffness=k, damping=c),)
@@ -63,14 +64,16 @@ def quarter_car(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: flo
 
 
 def single_body(mass: float, stiffness: float, damping: float) -> SpatialVehicle:
-    """A body on a tyre with a damper to the ground; outputs: acceleration and height of the body."""
-    outputs = tuple(PointOutput(kind, kind, "body", BODY_PLACE, BODY_AXIS) for kind in ("acceleration", "displacement"))
-    damper = SpringDamper("damper", "body", None, BODY_PLACE, BODY_PLACE, BODY_AXIS, 0.0, damping)
+    """A body on a tyre with a damper to the ground (kg, N/m, N s/m); outputs: acceleration and height of the body."""
+    outputs = tuple(
+        PointOutput(kind, kind, "body", BODY_POSITION, BODY_AXIS) for kind in ("acceleration", "displacement")
+    )
+    damper = SpringDamper("damper", "body", None, BODY_POSITION, BODY_POSITION, BODY_AXIS, 0.0, damping)
     return SpatialVehicle(
         "single",
-        (Body("body", mass, BODY_PLACE, ("z",)),),
+        (Body("body", mass, BODY_POSITION, ("z",)),),
         (damper,),
-        (Tyre("tyre", "body", BODY_PLACE, 0, stiffness),),
+        (Tyre("tyre", "body", BODY_POSITION, 0, stiffness),),
         (0.0,),
         outputs=outputs,
     )
@@ -78,7 +81,7 @@ def single_body(mass: float, stiffness: float, damping: float) -> SpatialVehicle
 
 @cache
 def roll_steered_vehicle() -> SpatialVehicle:
-    """R19-free with roll steer at the front axle; outputs: heading and lateral position."""
+    """The vehicle R19-free with roll steer at the front axle; outputs: heading and lateral position."""
     table = parse(SHIPPED / "r19_free.toml")
     table["axles"][0]["roll_steer"] = 0.05
     vehicle = build_vehicle(table, "steered")
@@ -89,9 +92,9 @@ def roll_steered_vehicle() -> SpatialVehicle:
     return replace(vehicle, outputs=outputs)
 
 
-def after_hours(system: DelayedSystem) -> tuple[np.ndarray, np.ndarray]:
-    """Variances (p,) 1 and 2 hours after rest with independent axles, by a van Loan discretisation over 3 ms that is
-    doubled repeatedly."""
+def variances_after_hours(system: DelayedSystem) -> tuple[np.ndarray, np.ndarray]:
+    """Variances (p,) of the outputs 1 and 2 hours after rest on independent axle inputs, by a van Loan discretisation
+    over 3 ms that is doubled repeatedly."""
     n, Q, step = len(system.A), sum(b @ b.T for b in system.B), 3600.0 / 2**20
     block = expm(np.block([[-system.A, Q], [np.zeros((n, n)), system.A.T]]) * step)
     E, P = block[n:, n:].T, block[n:, n:].T @ block[:n, n:]

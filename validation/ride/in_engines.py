@@ -1,4 +1,4 @@
-"""Rides in time through both engines: their paths beside each other, and beside what replaced vehicles say."""
+"""Rides in time in Exudyn and MuJoCo, compared with each other and with linear or linearised vehicles."""
 
 from dataclasses import replace
 from functools import cache
@@ -26,8 +26,8 @@ ENGINES = ("exudyn", "mujoco")
 SEED, GRAVITY, SPEED = 2211, 9.81, 20.0
 NONLINEAR_VEHICLE = "quarter_car_nonlinear"
 STEP, RUN_DURATION, SKIPPED_SECONDS = 2.5e-3, 24.0, 4.0
-"""Of the engines' runs with 19 freedoms (s): longest step, length, and what is left out at the beginning."""
-NONLINEAR_STEP, NONLINEAR_DRIVEN = 2e-3, (1.0, 60.0)
+"""Longest step, duration, and beginning that is left out, of the engines' runs with 19 freedoms (s each)."""
+NONLINEAR_STEP, NONLINEAR_DURATIONS = 2e-3, (1.0, 60.0)
 SHOWN_OUTPUTS = ("body centre", "left occupant", "travel front left", "tyre force front left")
 SAME_LAWS = "the same tableau, road and laws; the sums are taken in another order"
 
@@ -36,16 +36,16 @@ SAME_LAWS = "the same tableau, road and laws; the sums are taken in another orde
 def vehicle_and_road(
     name: str, level_factor: float = 1.0, gravity: float = GRAVITY
 ) -> tuple[SpatialVehicle, Excitation]:
-    """A shipped vehicle and a road of ``level_factor`` times the paper's; a vehicle without a track width has one
-    track.
+    """A shipped vehicle, and a road with ``level_factor`` times the paper's level; a vehicle without a track width has
+    one track.
     """
     vehicle = replace(load_vehicle(name), gravity=gravity)
     return vehicle, paper_road(wheels(vehicle), level_factor=level_factor * TRACK_DENSITY_LEVEL)
 
 
-def bent_in_engines(quick: bool) -> list[Row]:
-    """Rows: the nonlinear quarter car under gravity in both engines, and its mean travel, which the asymmetric damper
-    shifts."""
+def nonlinear_engine_rows(quick: bool) -> list[Row]:
+    """Rows on the nonlinear quarter car under gravity: difference of the engines' trajectories, mean travel, which the
+    asymmetric damper shifts, and mean tyre force."""
     vehicle, excitation_ = vehicle_and_road(NONLINEAR_VEHICLE)
     road = road_path(excitation_, SPEED, NONLINEAR_STEP)
     runs = {
@@ -53,7 +53,7 @@ def bent_in_engines(quick: bool) -> list[Row]:
             engine,
             vehicle,
             road,
-            NONLINEAR_DRIVEN[not quick],
+            NONLINEAR_DURATIONS[not quick],
             seed=SEED,
             skipped=SKIPPED_SECONDS * (not quick),
             stride=5,
@@ -61,14 +61,14 @@ def bent_in_engines(quick: bool) -> list[Row]:
         for engine in ENGINES
     }
     rows = [
-        _engine_difference_row("bent", f"{NONLINEAR_VEHICLE} under gravity, {NONLINEAR_DRIVEN[not quick]:g} s", runs)
+        _engine_difference_row("bent", f"{NONLINEAR_VEHICLE} under gravity, {NONLINEAR_DURATIONS[not quick]:g} s", runs)
     ]
     if quick:
         return rows
     linear = statistically_linear(vehicle, excitation_, SPEED)
     travel, force = (linear.covariance.names.index(f"{kind} front left") for kind in ("travel", "tyre force"))
     size, left = linear.covariance.deviation, linear.left_out
-    error, _ = standard_errors(linear.vehicle, excitation_, SPEED, NONLINEAR_DRIVEN[1] - SKIPPED_SECONDS)
+    error, _ = standard_errors(linear.vehicle, excitation_, SPEED, NONLINEAR_DURATIONS[1] - SKIPPED_SECONDS)
     for engine, run in runs.items():
         shift = abs(run.outputs[:, travel].mean() - linear.mean[travel]) / size[travel]
         rows.append(
@@ -106,9 +106,9 @@ def _engine_difference_row(id: str, run_description: str, runs: dict[str, Ride])
     ).at_most(1e-12, SAME_LAWS, "native")
 
 
-def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
-    """Rows: a vehicle with 19 freedoms under gravity on one random road; variances and means in both engines against
-    the covariance."""
+def linear_engine_rows() -> tuple[list[Row], dict[str, Any]]:
+    """Rows and figure data of a vehicle with 19 freedoms under gravity on one random road: difference of the engines'
+    trajectories, and variances and means of both against the stationary covariance."""
     vehicle, excitation_ = vehicle_and_road("r19_ride")
     road = road_path(excitation_, SPEED, STEP)
     runs = {
@@ -143,23 +143,23 @@ def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
     return rows, _spectral_densities(runs, linear, excitation_)
 
 
-def _spectral_densities(runs: dict[str, Ride], linear: LinearVehicle, excitation: Excitation) -> dict[str, Any]:
-    """One-sided spectral densities over Hz of some outputs: by the covariance's model, and by Welch's method for each
-    engine's run."""
+def _spectral_densities(runs: dict[str, Ride], linear_vehicle: LinearVehicle, excitation: Excitation) -> dict[str, Any]:
+    """One-sided spectral densities (1/Hz) of SHOWN_OUTPUTS: of the linear vehicle in closed form, and by Welch's method
+    of each engine's run."""
     frequency = np.geomspace(0.2, 40.0, 300)
-    sides = {"own": (frequency, one_sided(linear, excitation, SPEED, frequency))}
+    sides = {"own": (frequency, one_sided(linear_vehicle, excitation, SPEED, frequency))}
     sides |= {engine: run.densities(frequency[-1]) for engine, run in runs.items()}
     return {
         side: {
             "frequency": f.tolist(),
-            **{name: density[:, linear.names.index(name)].tolist() for name in SHOWN_OUTPUTS},
+            **{name: density[:, linear_vehicle.names.index(name)].tolist() for name in SHOWN_OUTPUTS},
         }
         for side, (f, density) in sides.items()
     }
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Plot spectra of both engines' runs over the model's own."""
+    """Figure, with its caption, of output spectra: of both engines' runs, and of the linear vehicle in closed form."""
     if not case_data["spectra"]:
         return []
     from models.drawing.figures import COLOURS, COLUMN_WIDTH, DARK, LABELS, add_heading, legend_below, subplots

@@ -1,4 +1,4 @@
-"""Outputs that have no variance, motions that nothing pulls back, and weightings behind a vehicle: rows of a case."""
+"""Rows on outputs without a finite variance, on motions without a restoring force, and on frequency weightings."""
 
 from dataclasses import replace
 
@@ -16,12 +16,12 @@ from validation.common.rows import Observed, Row, System, behaviour_row
 from validation.ride.rides import changed_vehicle, largest_relative_error, one_track, paper_road, quarter_car_vehicle
 
 SYSTEM: System = "ride"
-CORNER = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
+QUARTER_CAR = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
 
 
 def weighting_rows(seed: int) -> list[Row]:
-    """Rows on frequency-weighted seat accelerations of an asymmetric vehicle: by filter states, compared with the
-    frequency response."""
+    """Rows: frequency-weighted seat accelerations of an asymmetric vehicle, by weighting filters as states, compared
+    with their frequency response."""
     vehicle = linearise(changed_vehicle(load_vehicle("r19_ride"), seed))
     road, rows = paper_road(vehicle.wheels), []
     for name in ("Wk", "Wd"):
@@ -43,14 +43,15 @@ def weighting_rows(seed: int) -> list[Row]:
     return rows
 
 
-def without_variance() -> list[Row]:
+def no_variance_rows() -> list[Row]:
     """Rows on outputs without a finite variance: white noise, diffusing positions, and an unstable vehicle."""
     return [*_white_rows(), *_free_rows(), _unstable_row()]
 
 
 def _white_rows() -> list[Row]:
-    """Rows on damped tyres: outputs without finite variance are reported with the reason, and the others are right."""
-    vehicle = quarter_car_vehicle([(0.0, CORNER)], tyre_damping=100.0)
+    """Rows on a quarter car with damped tyres: outputs with infinite variance are reported as such, and the finite
+    variances are compared with quadrature."""
+    vehicle = quarter_car_vehicle([(0.0, QUARTER_CAR)], tyre_damping=100.0)
     covariance = stationary_covariance(vehicle_with_road(vehicle, one_track((0.0,), 0.3), 20.0))
     by_quadrature = variances_by_quadrature(vehicle, one_track((0.0,), 0.3), 20.0)
     rows = [
@@ -81,8 +82,8 @@ def _white_rows() -> list[Row]:
 
 
 def _free_rows() -> list[Row]:
-    """Rows on a free vehicle with three zero eigenvalues. They are found and do not spoil the variances, with slycot or
-    without; with roll steer the heading diffuses."""
+    """Rows on a free vehicle with three zero eigenvalues: their number, finite variances of all outputs, the same with
+    the package slycot, and the diffusing lateral position with roll steer."""
     free = load_vehicle("r19_free")
     vehicle = linearise(free, 20.0)
     road = paper_road(vehicle.wheels)
@@ -145,7 +146,7 @@ def _free_rows() -> list[Row]:
 
 
 def _with_slycot(system: DelayedSystem) -> np.ndarray:
-    """Variances if python-control believes that slycot is installed, but its routines fail when called."""
+    """Variances (p,) computed while python-control takes the package slycot as installed, whose routines would fail."""
     import control.exception as installed
     import control.mateqn as solvers
 
@@ -161,7 +162,7 @@ def _unstable_row() -> Row:
     outcome, why = "answered", "it swings up"
     try:
         stationary_covariance(
-            vehicle_with_road(quarter_car_vehicle([(0.0, replace(CORNER, c=-5.0))]), one_track((0.0,), 0.3), 20.0)
+            vehicle_with_road(quarter_car_vehicle([(0.0, replace(QUARTER_CAR, c=-5.0))]), one_track((0.0,), 0.3), 20.0)
         )
     except Unstable as error:
         why = str(error)

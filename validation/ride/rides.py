@@ -1,8 +1,8 @@
-"""Vehicles and roads that cases and tests of ride share: the paper's road, quarter cars of the closed forms, twins.
+"""Ride vehicles and roads that cases and tests share: the paper's road, quarter-car vehicles, asymmetric vehicles.
 
-Quarter cars, alone or under one body, are written down by hand. A twin has every mass, spring, damper and tyre changed
-by its own share, reproducibly: a symmetric vehicle hides a swap of left and right, and one with alike axles a swap of
-front and rear.
+Quarter-car matrices are written by hand. An asymmetric twin has every mass, spring, damper and tyre of a vehicle
+changed by its own share, reproducibly: a symmetric vehicle hides a swap of left and right, and one with alike axles a
+swap of front and rear.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
 from models.vehicles.spatial import SpatialVehicle
 
 ROAD_INTENSITY = 1e-4
-"""Of the road of one track, m^2 per m."""
+"""White-noise intensity of the road of one track, m^2 per m."""
 R19_FREQUENCIES = (
     1.357622,
     1.47076,
@@ -48,7 +48,7 @@ R19_FREQUENCIES = (
     15.526984,
     15.535278,
 )
-"""|lambda| / 2 pi (Hz) of R19-ride, given with its data."""
+"""Natural frequencies |lambda| / 2 pi (Hz) of the vehicle R19-ride, published with its data."""
 STANDARD_WEIGHTINGS = (
     (0.5, 418, 853),
     (0.63, 459, 944),
@@ -77,14 +77,14 @@ STANDARD_WEIGHTINGS = (
 """ISO 2631-1:1997, Table 3, from two copies of it in print: Hz, 1000 Wk, 1000 Wd. The standard itself was not read."""
 
 
-def largest_relative_error(values: ArrayLike, expected: ArrayLike) -> float:
-    """Largest relative error of values against expected ones."""
-    return float(np.abs(np.asarray(values) / np.asarray(expected) - 1.0).max())
+def largest_relative_error(computed: ArrayLike, expected: ArrayLike) -> float:
+    """Largest relative error of computed values (n,) against expected ones (n,)."""
+    return float(np.abs(np.asarray(computed) / np.asarray(expected) - 1.0).max())
 
 
 def one_track(axle_positions: tuple[float, ...], corner: float = 0.0) -> Excitation:
-    """One track under axles at positions ``axle_positions`` (m); its height obeys z' = -corner z + w with white noise
-    w.
+    """Road of a single track under axles at ``axle_positions`` (m); its height z over the distance obeys
+    z' = -corner z + w with white noise w; corner in 1/m.
     """
     heights = tuple(np.eye(len(axle_positions))[:, [i]] for i in range(len(axle_positions)))
     filter_ = np.array([[-corner]]), np.array([[ROAD_INTENSITY**0.5]])
@@ -97,15 +97,15 @@ def paper_road(
     level_factor: float = TRACK_DENSITY_LEVEL,
     cutoff: float | None = None,
 ) -> Excitation:
-    """The paper's road under wheels, with a case of correlation in words; wheels without a track width have one
-    track."""
+    """The paper's road of two tracks under wheels, with the named kinds of correlation; one track for wheels without a
+    track width."""
     y = half_track(wheels)
     placed = wheels if y else on_track(wheels, 1.0)
     return road_excitation(road_of_level(y or 1.0, level_factor, cutoff=cutoff), placed, *correlation_words)
 
 
-def five_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
-    """The paper's road, or another one, in the paper's five cases of correlation, by their numbers."""
+def five_correlation_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
+    """The paper's road, or a given road, in the paper's five cases of correlation, by the number of the case."""
     road = road or road_of_level(half_track(wheels))
     return {str(number): road_excitation(road, wheels, *case) for number, case in CORRELATION_CASES.items()}
 
@@ -113,8 +113,8 @@ def five_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None
 def quarter_car_vehicle(
     corner_positions: Sequence[tuple[float, QuarterCar]], mass: np.ndarray | None = None, tyre_damping: float = 0.0
 ) -> LinearVehicle:
-    """Linear vehicle of quarter-car corners (x in m, quarter car), one per axle, under a body with a mass matrix of
-    heave, or of heave and pitch.
+    """Linear vehicle of a body on quarter-car corners (x in m, quarter car), one per axle; ``mass`` is the body's mass
+    matrix in heave, or in heave and pitch.
 
     tyre_damping in N s/m. Outputs: body acceleration; travel, tyre deflection, body height; load and acceleration of
     the first wheel.
@@ -146,26 +146,28 @@ def quarter_car_vehicle(
 
 
 LARGEST_CHANGE = 0.2
-"""Largest change of any value."""
+"""Largest relative change of a parameter in an asymmetric twin."""
 
 
 def changed_vehicle(vehicle: SpatialVehicle, seed: int) -> SpatialVehicle:
-    """The vehicle with its masses, stiffnesses and dampings changed by up to LARGEST_CHANGE each, named a twin."""
+    """Asymmetric twin: the vehicle with each mass, stiffness and damping randomly changed by up to LARGEST_CHANGE."""
     rng = np.random.default_rng(seed)
 
-    def changed(parameter_value: float) -> float:
+    def changed_value(parameter_value: float) -> float:
         return parameter_value * (1 + LARGEST_CHANGE * rng.uniform(-1, 1))
 
     bodies = []
     for body in vehicle.bodies:
-        factor = changed(1.0)
+        factor = changed_value(1.0)
         inertia = tuple(tuple(factor * entry for entry in row) for row in body.inertia)
         bodies.append(replace(body, mass=factor * body.mass, inertia=inertia))  # type: ignore[arg-type]
     return replace(
         vehicle,
         name=f"{vehicle.name}, asymmetric twin {seed}",
         bodies=tuple(bodies),
-        springs=tuple(replace(s, stiffness=changed(s.stiffness), damping=changed(s.damping)) for s in vehicle.springs),
-        bars=tuple(replace(bar, stiffness=changed(bar.stiffness)) for bar in vehicle.bars),
-        tyres=tuple(replace(tyre, stiffness=changed(tyre.stiffness)) for tyre in vehicle.tyres),
+        springs=tuple(
+            replace(s, stiffness=changed_value(s.stiffness), damping=changed_value(s.damping)) for s in vehicle.springs
+        ),
+        bars=tuple(replace(bar, stiffness=changed_value(bar.stiffness)) for bar in vehicle.bars),
+        tyres=tuple(replace(tyre, stiffness=changed_value(tyre.stiffness)) for tyre in vehicle.tyres),
     )

@@ -1,1 +1,1 @@
-"""Vehicles and motions in space that several systems are tested on."""
+"""Vehicles and rigid-body motions in space on which several systems are validated."""

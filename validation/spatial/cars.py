@@ -1,4 +1,4 @@
-"""R19-free on its tyres or cut at its wheels, a twin without any symmetry, and what all of them are checked by."""
+"""The car R19-free and an asymmetric car, on tyres or cut at their wheels, and functions that check them."""
 
 from dataclasses import replace
 from functools import cache
@@ -19,17 +19,17 @@ from models.vehicles.spatial import Curve, SpatialVehicle, SpringDamper
 from models.vehicles.vehicle_file import load_vehicle
 
 SEED = 31
-"""Of the wrenches that shake a vehicle."""
+"""Seed of the random forces and moments at the hubs."""
 
 
 @cache
 def r19() -> CutVehicle:
-    """The shipped car, cut at its wheels."""
+    """The shipped car R19-free, cut at its wheels."""
     return cut(load_vehicle("r19_free"), "body")
 
 
 def twin() -> SpatialVehicle:
-    """R19-free without any symmetry: every spring, mount and wheel differs from every other, left from right."""
+    """The car R19-free without any symmetry: every spring, mount and body has other parameters."""
     full_vehicle = load_vehicle("r19_free")
     springs = tuple(
         replace(s, stiffness=s.stiffness * (1 + 0.02 * i), damping=s.damping * (1.3 - 0.02 * i))
@@ -42,7 +42,8 @@ def twin() -> SpatialVehicle:
 
 @cache
 def rough_car() -> CutVehicle:
-    """The twin, cut at its wheels, with bump stops, digressive dampers and dry friction in suspension and mounts.
+    """The asymmetric car, cut at its wheels, with bump stops, digressive dampers and dry friction in suspension and
+    mounts.
 
     One wheel moves in all three directions, on a spring along none of them; one seat has no spring but a curve.
     """
@@ -64,15 +65,16 @@ def rough_car() -> CutVehicle:
     return cut(replace(full_vehicle, bodies=bodies, springs=(*springs, lateral)), "body")
 
 
-def static_forces(vehicle: CutVehicle, rows: int, frame: str = "hub") -> HubInputs:
-    """Hub forces (rows) that carry the vehicle at rest."""
-    forces = np.zeros((rows, WRENCH * len(vehicle.hubs)))
+def static_forces(vehicle: CutVehicle, row_count: int, frame: str = "hub") -> HubInputs:
+    """Hub input of ``row_count`` equal rows: the vertical hub forces that carry the vehicle at rest."""
+    forces = np.zeros((row_count, WRENCH * len(vehicle.hubs)))
     forces[:, 2::WRENCH] = vehicle.loads
     return HubInputs(forces, frame)
 
 
 def random_states(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Random coordinates and rates, with the chassis at any heading and with roll and pitch up to 1 rad."""
+    """Random coordinates (n,) and rates (n,) of a cut vehicle: any heading, roll and pitch of the chassis up to 1
+    rad."""
     rng = np.random.default_rng(seed)
     q, v = rng.uniform(-0.03, 0.03, vehicle.size), rng.uniform(-0.5, 0.5, vehicle.size)
     q[:6] = *rng.uniform(-5, 5, 3), rng.uniform(-3, 3), *rng.uniform(-1, 1, 2)
@@ -80,16 +82,17 @@ def random_states(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarra
 
 
 def random_wrenches(vehicle: CutVehicle, frame: str, has_guide: bool) -> HubInputs:
-    """Random forces and moments on every hub, with or without a prescribed attitude (``has_guide``)."""
+    """Hub input with random forces and moments on every hub; ``has_guide`` : with a prescribed random chassis
+    motion."""
     rng = np.random.default_rng(SEED)
     hub_inputs = static_forces(vehicle, 3, frame)
     hubs = hub_inputs.hubs + rng.normal(0, 500.0, hub_inputs.hubs.shape[1])
     return replace(hub_inputs, hubs=hubs, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if has_guide else None)
 
 
-def by_jacobians(hub_model: HubModel, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
-    """Generalised forces (n,) of wrenches (6 h,) at the hubs by MuJoCo's Jacobians; the wrenches are in the hubs' axes
-    or in "inertial" ones."""
+def hub_forces_by_jacobians(hub_model: HubModel, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
+    """Generalised forces (n,) of forces and moments (6 h,) at h hubs, by MuJoCo's Jacobians; ``frame`` : their axes, of
+    the hubs or "inertial"."""
     assert isinstance(hub_model.model, FreeMujoco)
     model, names = hub_model.model.model, [body.name for body in hub_model.vehicle.tree.bodies]
     data, forces = mujoco.MjData(model), np.zeros(hub_model.size)
@@ -104,8 +107,8 @@ def by_jacobians(hub_model: HubModel, q: np.ndarray, wrenches: np.ndarray, frame
 
 
 def cornering_error(handling: Handling, slip: float = 1e-7) -> float:
-    """Largest relative error of a tyre's cornering stiffness at its static load, computed from the car's table, against
-    the ride vehicle's."""
+    """Largest relative error of the tyres' cornering stiffnesses at their static loads: from the brush tyres of a
+    handling car, against those of the vehicle file."""
     wanted, worst = {force.name: force.stiffness for force in handling.given.side_forces}, 0.0
     for i, tyre in enumerate(handling.vehicle.tyres):
         n = handling.tyre_numbers(i)
@@ -117,14 +120,14 @@ def cornering_error(handling: Handling, slip: float = 1e-7) -> float:
 
 
 def mirrored_coordinates(handling: Handling, values: np.ndarray) -> np.ndarray:
-    """Values (..., n) of a car's coordinates in its mirror image, with left and right exchanged."""
+    """Coordinates, or their rates, (..., n) of the mirror image of a car, with left and right exchanged."""
     coordinates = handling.vehicle.coordinates()
     swap = [coordinates.index((_opposite_body(name), freedom)) for name, freedom in coordinates]
     return np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in coordinates]) * values[..., swap]
 
 
 def _opposite_body(name: str) -> str:
-    """Name of the corresponding body on the other side of the car."""
+    """Name of the corresponding body on the opposite side of the car."""
     for left, right in (("fl", "fr"), ("rl", "rr"), ("left", "right")):
         for side, opposite in ((left, right), (right, left)):
             if name.startswith(side):

@@ -1,4 +1,4 @@
-"""How hub forces are read: held, linear, and by integrators that pick their own steps, against closed forms.
+"""Interpolation of hub forces, held or linear, by fixed steps and adaptive integrators, against closed forms.
 
 Forces in the axes of space move the centre of mass of all bodies as they would a point, whatever springs do inside: a
 force that is held moves it along a parabola, one that is linear along a cubic. All integrators meet both but for
@@ -16,21 +16,21 @@ from models.systems.hub_forces.measurement import HubForces
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from validation.common.rows import Observed, Row, System
 from validation.spatial.cars import random_states, static_forces
-from validation.spatial.written_equations import FRAMES
+from validation.spatial.written_equations import FORCE_FRAMES
 
-SEED, SAMPLES, STEP, STEPS_PER_SAMPLE = 37, 12, 2e-3, 4
-"""Seed and count of the samples, s, and steps from one sample to the next."""
+SEED, SAMPLE_COUNT, STEP, STEPS_PER_SAMPLE = 37, 12, 2e-3, 4
+"""Seed and number of the force samples, step (s), and number of steps from one sample to the next."""
 SOLVER_TOLERANCE = 1e-11
-"""Relative tolerance of methods that pick their own steps."""
-QUICK = {"DOPRI5": "exudyn", "LSODA": "reference"}
-METHODS = QUICK | {"DOP853": "reference"}
-"""Such methods, and the engine of each; ODE23 and Radau take twenty times as long for as much."""
+"""Relative tolerance of the adaptive integrators."""
+QUICK_METHODS = {"DOPRI5": "exudyn", "LSODA": "reference"}
+ADAPTIVE_METHODS = QUICK_METHODS | {"DOP853": "reference"}
+"""Adaptive integrators and the engine of each; ODE23 and Radau would take twenty times as long."""
 SYSTEM: System = "drift"
 
 
 def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
-    """Rows on one vehicle: held forces in every engine, and adaptive integrators."""
-    methods = QUICK if quick else METHODS
+    """Rows on the interpolation of hub forces on a vehicle: held forces in every engine, and adaptive integrators."""
+    methods = QUICK_METHODS if quick else ADAPTIVE_METHODS
     names = " and ".join(methods)
     return [
         Observed(
@@ -38,7 +38,7 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
             SYSTEM,
             "largest distance of the centre of mass from its parabolas, forces held from sample to sample in the axes "
             f"of space, in {len(ENGINES)} implementations",
-            max(centre_gap(vehicle, engine, "held") for engine in ENGINES),
+            max(centre_of_mass_error(vehicle, engine, "held") for engine in ENGINES),
             "m",
         ).at_most(1e-9, "a step in which a stage reads the next sample is 1e-5 m off after 12 samples", "closed form"),
         Observed(
@@ -46,7 +46,7 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
             SYSTEM,
             f"centre of mass by {names}, which pick their own steps: largest distance from its parabolas",
             max(
-                centre_gap(vehicle, m, interpolation_name, name)
+                centre_of_mass_error(vehicle, m, interpolation_name, name)
                 for name, m in methods.items()
                 for interpolation_name in ("held", "linear")
             ),
@@ -57,7 +57,7 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
             SYSTEM,
             f"largest difference of coordinates and rates by {names} from Runge-Kutta 4 in steps of "
             f"{1e3 * STEP / 8:g} ms",
-            max(path_gap(vehicle, engine, name) for name, engine in methods.items()),
+            max(trajectory_gap(vehicle, engine, name) for name, engine in methods.items()),
             "m, rad, 1/s",
         ).at_most(1e-7, "the error of Runge-Kutta 4, which falls 16 times with half the step", "shared kernel"),
         Observed(
@@ -65,26 +65,27 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
             SYSTEM,
             "relative difference of the accelerations at random times between the rows of forces and of angles from "
             "the plain equations",
-            instants_gap(vehicle, 6),
+            acceleration_difference_between_rows(vehicle, 6),
             "1",
         ).at_most(1e-12, "weights of the compiled forces, differences of the plain ones", "native"),
     ]
 
 
 def settings(integrator: str = FIXED) -> Settings:
-    """Settings of a run over all force samples."""
-    return Settings(integrator, STEP, (SAMPLES - 1) * STEPS_PER_SAMPLE * STEP, SOLVER_TOLERANCE)
+    """Settings of a run over all force samples with an integrator."""
+    return Settings(integrator, STEP, (SAMPLE_COUNT - 1) * STEPS_PER_SAMPLE * STEP, SOLVER_TOLERANCE)
 
 
 def samples(vehicle: CutVehicle) -> HubForces:
-    """Hub force samples in axes fixed in space: static loads with random parts of 400 N and 40 N m."""
-    static_inputs = static_forces(vehicle, SAMPLES, "inertial")
+    """Hub force samples in axes fixed in space: static loads, with noise of 400 N and 40 N m."""
+    static_inputs = static_forces(vehicle, SAMPLE_COUNT, "inertial")
     deviations = np.tile([400.0] * 3 + [40.0] * 3, len(vehicle.hubs))
     return HubForces(static_inputs.hubs, STEPS_PER_SAMPLE * STEP, "inertial").noisy(deviations, SEED)
 
 
-def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED) -> float:
-    """Largest error (m) of the centre of mass at the sample times, against the closed form, over all axes."""
+def centre_of_mass_error(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED) -> float:
+    """Largest error (m) of a coordinate of the vehicle's centre of mass at the sample times, against the closed
+    form."""
     forces, run_settings = samples(vehicle), settings(integrator)
     run = HubModel(engine, vehicle, forces.hub_inputs(STEP, run_settings.steps, interpolation), run_settings).run()  # type: ignore[arg-type]
     centre_path = centres_of_mass(vehicle, run.positions[::STEPS_PER_SAMPLE])
@@ -92,7 +93,7 @@ def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator:
 
 
 def centres_of_mass(vehicle: CutVehicle, positions: np.ndarray) -> np.ndarray:
-    """Centre of mass (m, 3) in m of all bodies at coordinates (m, n)."""
+    """Centre of mass of all bodies (m, 3) in m, for m rows of coordinates (m, n)."""
     bodies, tree = vehicle.tree.bodies, Bodies(vehicle.tree)
     points, masses = tree.points([(body.name, body.position) for body in bodies]), [body.mass for body in bodies]
     point_positions = [tree.move(q, 0.0 * q).at(points)[:, PLACE] for q in positions]
@@ -100,10 +101,10 @@ def centres_of_mass(vehicle: CutVehicle, positions: np.ndarray) -> np.ndarray:
 
 
 def _falling_path(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) -> np.ndarray:
-    """Path (samples, 3) of a point mass, with the vehicle's mass, under weight and the sum of all hub forces, from
-    rest."""
+    """Path (samples, 3) in m, from rest, of a point mass with the vehicle's mass under weight and the sum of all hub
+    forces."""
     mass, period = sum(body.mass for body in vehicle.tree.bodies), forces.period
-    hubs = forces.samples.reshape(SAMPLES, -1, WRENCH)[:, :, :3].sum(axis=1)
+    hubs = forces.samples.reshape(SAMPLE_COUNT, -1, WRENCH)[:, :, :3].sum(axis=1)
     begin = hubs[:-1] / mass - [0.0, 0.0, GRAVITY]
     end = begin if hold_samples else hubs[1:] / mass - [0.0, 0.0, GRAVITY]
     speeds = np.vstack([np.zeros(3), np.cumsum(period / 2.0 * (begin + end), axis=0)])
@@ -111,13 +112,13 @@ def _falling_path(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) ->
     return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
 
-def instants_gap(vehicle: CutVehicle, state_count: int) -> float:
-    """Relative difference between compiled and plain accelerations at random states and times, with random hub forces
-    and guides that are interpolated between their rows."""
+def acceleration_difference_between_rows(vehicle: CutVehicle, state_count: int) -> float:
+    """Largest relative difference between accelerations by compiled forces and by the plain equations, at random states
+    and times, with random hub forces and guides that are interpolated between their rows."""
     rng, rows, worst = np.random.default_rng(SEED), 7, 0.0
     for i in range(state_count):
         hubs = static_forces(vehicle, rows).hubs + rng.normal(0.0, 500.0, (rows, WRENCH * len(vehicle.hubs)))
-        hub_inputs = HubInputs(hubs, FRAMES[i % 3], guide=rng.normal(0.0, 0.1, (rows, 6)))
+        hub_inputs = HubInputs(hubs, FORCE_FRAMES[i % 3], guide=rng.normal(0.0, 0.1, (rows, 6)))
         run_settings = Settings("DOP853", STEP, (rows // 2) * STEP)
         compiled, plain = (HubModel(engine, vehicle, hub_inputs, run_settings) for engine in ("reference", PLAIN))
         state, time = random_states(vehicle, i), rng.uniform(0.0, run_settings.duration)
@@ -127,9 +128,9 @@ def instants_gap(vehicle: CutVehicle, state_count: int) -> float:
     return worst
 
 
-def path_gap(vehicle: CutVehicle, engine: str, integrator: str) -> float:
-    """Largest difference of any coordinate or rate between a run by an adaptive integrator and one by Runge-Kutta 4
-    with an eighth of the step; forces are linear between their samples."""
+def trajectory_gap(vehicle: CutVehicle, engine: str, integrator: str) -> float:
+    """Largest difference of any coordinate or rate between a run by an adaptive integrator and a run by Runge-Kutta 4
+    with an eighth of the step; hub forces are linear between their samples."""
     forces, run_settings = samples(vehicle), settings(integrator)
     fine = Settings(FIXED, STEP / 8.0, run_settings.duration)
     hub_inputs, finer = (

@@ -1,4 +1,4 @@
-"""Forces in guides by the engines' own joint forces: MuJoCo's force sensors, Exudyn's constraints.
+"""Joint forces of guided bodies as the engines compute them: by MuJoCo's force sensors and Exudyn's constraints.
 
 Here springs, mounts, bars and hubs are loads at their points, worked out from where MuJoCo says that these are; the
 chassis takes what they leave, so that they are forces inside. In Exudyn the bodies are free and their guides are
@@ -17,29 +17,29 @@ from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.spatial import FREEDOMS
 
 STEP, STEPS = 3e-5, 4
-"""Of Exudyn (s): rounding of positions by the square of a step, and motion in it, cost a millionth each."""
+"""Step (s) and number of steps in Exudyn: rounding and motion within the steps cause relative errors of 1e-6 each."""
 MULTIPLIER_SIGNS = np.array([-1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
-"""Exudyn's multipliers of a generic joint, as forces and moments on its second body."""
+"""Signs that turn Exudyn's multipliers of a generic joint into forces and moments on its second body."""
 
 
 def mujoco_guides(vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
-    """Force and moment (guides, 6) that MuJoCo's sensors measure on each guided body, in its own axes, at coordinates
-    and rates (n,).
+    """Force and moment (guides, 6) on each guided body by MuJoCo's sensors, in the body's axes, at coordinates and
+    rates (n,).
 
     wrenches (h, 6) : at the hubs, in the axes of what they carry.
     """
-    return _Loaded(vehicle, q, v, wrenches).data.sensordata.reshape(-1, 6).copy()
+    return _LoadedModel(vehicle, q, v, wrenches).data.sensordata.reshape(-1, 6).copy()
 
 
 def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
-    """Forces and moments (guides, 6) of guides at rest, from Exudyn's constraints, in the axes of the carrying body;
-    exact if at most one angle is free."""
+    """Force and moment (guides, 6) on each guided body at rest by Exudyn's constraints, in the axes of the carrying
+    body; exact if at most one angle is free."""
     import exudyn as exu
     from exudyn.rigidBodyUtilities import RotationMatrix2EulerParameters
 
     from models.engines.exudyn_system import KINDS, items
 
-    loaded, container = _Loaded(vehicle, q, 0 * q, wrenches), exu.SystemContainer()
+    loaded, container = _LoadedModel(vehicle, q, 0 * q, wrenches), exu.SystemContainer()
     mbs: Any = container.AddSystem()
     objects, centres, sensors = dict[str, Any](), dict[str, Any](), list[Any]()
     for body in vehicle.uncut.bodies:
@@ -78,8 +78,9 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
     return np.hstack([mbs.GetSensorStoredData(sensor)[-1, 1:] for sensor in sensors]).reshape(-1, 6) * MULTIPLIER_SIGNS
 
 
-class _Loaded:
-    """MuJoCo's model of a cut vehicle at a state, with loads on its bodies."""
+class _LoadedModel:
+    """MuJoCo model of a cut vehicle at coordinates and rates (n,), with the forces of hubs and elements as loads on its
+    bodies."""
 
     def __init__(self, vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: np.ndarray) -> None:
         self.vehicle, spec = vehicle, spec_of(vehicle.tree, 1e-3)
@@ -99,16 +100,16 @@ class _Loaded:
             self._load_elements()
             mujoco.mj_forward(self.model, self.data)
 
-    def _point(self, body: str, design: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Position and velocity in space of a point fixed to a body."""
+    def _point(self, body: str, design_position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position (m) and velocity (m/s) in space of a point fixed to a body, given by its design position (m)."""
         number, jacobian = self.ids[body], np.zeros((3, self.model.nv))
-        arm = design - np.array(self.vehicle.tree.body(body).position)
+        arm = design_position - np.array(self.vehicle.tree.body(body).position)
         position = self.data.xpos[number] + self.data.xmat[number].reshape(3, 3) @ arm
         mujoco.mj_jac(self.model, self.data, jacobian, None, position, number)
         return position, jacobian @ self.data.qvel
 
-    def _add(self, body: str, point: np.ndarray, force: np.ndarray, moment: np.ndarray | float = 0.0) -> None:
-        """Add a force at a point and a moment, both in space, to a body."""
+    def _add_load(self, body: str, point: np.ndarray, force: np.ndarray, moment: np.ndarray | float = 0.0) -> None:
+        """Add a force (N) at a point and a moment (N m), both in axes of space, to the loads of a body."""
         number = self.ids[body]
         self.data.xfrc_applied[number, :3] += force
         self.data.xfrc_applied[number, 3:] += moment + np.cross(point - self.data.xpos[number], force)
@@ -117,10 +118,11 @@ class _Loaded:
         for tyre, wrench in zip(self.vehicle.uncut.tyres, wrenches, strict=True):
             turn = self.data.xmat[self.ids[tyre.body]].reshape(3, 3)
             position, _ = self._point(tyre.body, np.array(tyre.point))
-            self._add(tyre.body, position, turn @ wrench[:3], turn @ wrench[3:])
+            self._add_load(tyre.body, position, turn @ wrench[:3], turn @ wrench[3:])
 
     def _load_elements(self) -> None:
-        """Apply the forces of springs, mounts and bars; travel rates are relative to the rotating chassis."""
+        """Apply the forces of springs, mounts and bars to their bodies; travel rates are relative to the rotating
+        chassis."""
         chassis, spin = self.ids[self.vehicle.chassis], np.zeros(6)
         turn = self.data.xmat[chassis].reshape(3, 3)
         mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, chassis, spin, 0)
@@ -138,5 +140,5 @@ class _Loaded:
                 (e.second_body, second_position, -force),
             ):
                 if body != self.vehicle.chassis:
-                    self._add(body, point_position, signed_force)
-                    self._add(self.vehicle.chassis, point_position, -signed_force)
+                    self._add_load(body, point_position, signed_force)
+                    self._add_load(self.vehicle.chassis, point_position, -signed_force)

@@ -1,5 +1,5 @@
-"""A cut vehicle built with the engines' native springs, compared with compiled forces and with the equations of the
-whole tree."""
+"""A cut vehicle built with the engines' native springs, compared with compiled forces and with hand-written
+equations."""
 
 from dataclasses import replace
 
@@ -17,8 +17,8 @@ State = tuple[np.ndarray, np.ndarray]
 
 
 def random_states(vehicle: CutVehicle, state_count: int) -> list[State]:
-    """Random coordinates and rates (n,): any heading, roll and pitch up to 0.3 rad, other rotations up to 0.05 rad,
-    slides up to 0.08 m."""
+    """Random states (coordinates and rates (n,)): any heading, roll and pitch up to 0.3 rad, other rotations up to 0.05
+    rad, slides up to 0.08 m."""
     rng, turns = np.random.default_rng(SEED), np.array([f.startswith("r") for _, f in vehicle.tree.coordinates()])
     ranges = np.where(turns, 0.05, 0.08)
     ranges[:6] = 5.0, 5.0, 5.0, np.pi, 0.3, 0.3
@@ -26,9 +26,10 @@ def random_states(vehicle: CutVehicle, state_count: int) -> list[State]:
     return [(ranges * rng.uniform(-1.0, 1.0, n), rng.uniform(-0.5, 0.5, n)) for _ in range(state_count)]
 
 
-def shaken_drive(vehicle: CutVehicle, rows: int) -> HubInputs:
-    """Input of static wheel loads and a random force and moment on every hub at every half step, in the hubs' axes."""
-    static_inputs = static_forces(vehicle, rows)
+def random_hub_input(vehicle: CutVehicle, row_count: int) -> HubInputs:
+    """Hub input of static wheel loads and a random force and moment on every hub at every half step, in the hubs'
+    axes."""
+    static_inputs = static_forces(vehicle, row_count)
     return replace(
         static_inputs,
         hubs=static_inputs.hubs + np.random.default_rng(SEED).normal(0.0, 300.0, static_inputs.hubs.shape),
@@ -36,20 +37,20 @@ def shaken_drive(vehicle: CutVehicle, rows: int) -> HubInputs:
 
 
 def hub_model(engine: str, vehicle: CutVehicle, route: Route, steps: int = 1) -> HubModel:
-    """The vehicle with random hub forces in an engine, built natively or with compiled forces (``route``)."""
-    return build(engine, vehicle, shaken_drive(vehicle, 2 * steps + 1), STEP, steps * STEP, route)
+    """A cut vehicle with random hub forces in an engine, with native springs or with compiled forces (``route``)."""
+    return build(engine, vehicle, random_hub_input(vehicle, 2 * steps + 1), STEP, steps * STEP, route)
 
 
-def acceleration_error(engine: str, vehicle: CutVehicle, states: list[State]) -> float:
-    """Largest difference between accelerations of a native build and by compiled forces, relative to each coordinate's
-    largest."""
+def native_acceleration_difference(engine: str, vehicle: CutVehicle, states: list[State]) -> float:
+    """Largest difference between the accelerations with native springs and with compiled forces, divided by the largest
+    acceleration of the coordinate."""
     native, compiled = hub_model(engine, vehicle, "native"), hub_model("mujoco", vehicle, "compiled")
     return _relative_difference([[built.acceleration(0.0, *state) for state in states] for built in (native, compiled)])
 
 
-def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
-    """Largest relative difference between accelerations by compiled forces and by ``SpatialReference``, which share no
-    code, without hub forces."""
+def difference_from_equations(vehicle: CutVehicle, states: list[State]) -> float:
+    """Largest relative difference between the accelerations by compiled forces and by hand-written equations, which
+    share no code, without hub forces."""
     still = HubInputs(0.0 * static_forces(vehicle, 3).hubs)
     compiled, equations = build("reference", vehicle, still, STEP, STEP), hand_written_equations(vehicle)
     paths = [
@@ -60,8 +61,8 @@ def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
 
 
 def hand_written_equations(vehicle: CutVehicle) -> SpatialReference:
-    """Hand-written equations of a cut vehicle without hub forces: bodies with springs, anti-roll bars, preloads and
-    weight."""
+    """Hand-written equations of motion of a cut vehicle without hub forces: bodies with springs, anti-roll bars,
+    preloads and weight."""
     full_vehicle = vehicle.uncut
     equations = SpatialReference(
         replace(vehicle.tree, springs=full_vehicle.springs, bars=full_vehicle.bars, gravity=0.0)
@@ -71,8 +72,9 @@ def hand_written_equations(vehicle: CutVehicle) -> SpatialReference:
     return equations
 
 
-def path_error(engine: str, vehicle: CutVehicle, steps: int) -> float:
-    """Largest difference (m, rad, m/s, rad/s) between the states of a native run and of one with compiled forces."""
+def trajectory_difference(engine: str, vehicle: CutVehicle, steps: int) -> float:
+    """Largest difference (m, rad, m/s, rad/s) between the states of runs with native springs and with compiled
+    forces."""
     native = hub_model(engine, vehicle, "native", steps).run()
     compiled = hub_model("mujoco", vehicle, "compiled", steps).run()
     return float(np.abs(native.states - compiled.states).max())

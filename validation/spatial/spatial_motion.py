@@ -1,4 +1,4 @@
-"""A motion in space whose every derivative is known, and what accelerometers on it read: no vehicle, no engine."""
+"""A rigid-body motion in space in closed form, and the readings of accelerometers on it; without vehicle or engine."""
 
 from dataclasses import dataclass
 
@@ -8,13 +8,13 @@ from models.sensors.rigid_body_motion import StartState
 from models.sensors.rotations import from_cardan, rotation_matrix, skew_matrix
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
-Places = dict[str, tuple[float, float, float]]
+SensorPositions = dict[str, tuple[float, float, float]]
 
 
 @dataclass(frozen=True)
-class Path:
-    """Motion of a rigid body. alpha, rates (n, 3): angular acceleration and velocity, local; orientation (n, 4);
-    acceleration, position (n, 3) of the reference point, global; start; period (s)."""
+class RigidBodyMotion:
+    """Sampled motion of a rigid body. alpha, rates (n, 3): angular acceleration and velocity, local; orientation (n,
+    4); acceleration, position (n, 3) of the reference point, global; start; period (s)."""
 
     alpha: np.ndarray
     rates: np.ndarray
@@ -25,9 +25,9 @@ class Path:
     period: float
 
 
-def path(sample_count: int = 2001, sample_period: float = 1e-3) -> Path:
-    """Motion with roll, pitch and yaw of some tenths of a radian at different frequencies, and a moving reference
-    point.
+def rigid_body_motion(sample_count: int = 2001, sample_period: float = 1e-3) -> RigidBodyMotion:
+    """Motion of a rigid body with roll, pitch and yaw of some tenths of a radian at different frequencies, and a moving
+    reference point.
 
     Rates follow from the Cardan angles by the closed form w = E(roll, pitch) (roll', pitch', yaw'), and alpha by its
     derivative: nothing of the algorithm under test is used.
@@ -54,41 +54,42 @@ def path(sample_count: int = 2001, sample_period: float = 1e-3) -> Path:
     orientation = from_cardan(roll, pitch, yaw)
     positions, velocities, accelerations = _sine_waves(t, np.array([[1.0, 1.1, 0.0], [0.5, 1.9, 0.7], [0.1, 5.0, 0.3]]))
     rows = (tuple(values[0].tolist()) for values in (rates, orientation, velocities, positions))
-    return Path(alpha, rates, orientation, accelerations, positions, StartState(*rows), sample_period)
+    return RigidBodyMotion(alpha, rates, orientation, accelerations, positions, StartState(*rows), sample_period)
 
 
 def _sine_waves(t: np.ndarray, wave_shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sine waves (n, 3) and their first two derivatives; shapes: rows of amplitude, angular frequency and phase."""
+    """Three sine waves (n, 3) at times (n,) in s and their first two derivatives; wave_shapes (3, 3) : rows of
+    amplitude, angular frequency (rad/s) and phase (rad)."""
     size, speed, phase = wave_shapes.T
     angle = np.outer(t, speed) + phase
     return size * np.sin(angle), size * speed * np.cos(angle), -size * speed**2 * np.sin(angle)
 
 
-PATH = path()
+PATH = rigid_body_motion()
 
 
-def sensor_readings(sensor_positions: np.ndarray, motion: Path = PATH) -> np.ndarray:
-    """Specific forces (n, sensors, 3) in m/s^2 that sensors at local positions (sensors, 3) in m read, by eqs (16) and
-    (17)."""
+def sensor_readings(sensor_positions: np.ndarray, motion: RigidBodyMotion = PATH) -> np.ndarray:
+    """Specific forces (n, sensors, 3) in m/s^2 that accelerometers at local positions (sensors, 3) in m read, by eqs
+    (16) and (17)."""
     lever = skew_matrix(motion.alpha) + skew_matrix(motion.rates) @ skew_matrix(motion.rates)
     felt = np.einsum("nji,nj->ni", rotation_matrix(motion.orientation), motion.acceleration - GRAVITY)
     return felt[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(sensor_positions))
 
 
-def tilted_sensors(height: float, rotation: np.ndarray) -> Places:
-    """Positions of five sensors, rotated and shifted: four at the corners of a floor of 2 m by 1.2 m, and one above its
-    middle."""
+def tilted_sensors(height: float, rotation: np.ndarray) -> SensorPositions:
+    """Positions (m) of five accelerometers, rotated: four at the corners of a floor of 2 m by 1.2 m, and one ``height``
+    m above its middle."""
     floor = np.array([[1, 0.6, 0], [1, -0.6, 0], [-1, 0.6, 0], [-1, -0.6, 0], [0, 0, -height]])
     return {f"s{i + 1}": (float(x), float(y), float(z)) for i, (x, y, z) in enumerate(floor @ rotation.T)}
 
 
-TURN = rotation_matrix(from_cardan(0.3, 0.4, 0.5))
-SENSOR_ARRANGEMENTS: dict[str, Places] = {
+TILT_ROTATION = rotation_matrix(from_cardan(0.3, 0.4, 0.5))
+SENSOR_ARRANGEMENTS: dict[str, SensorPositions] = {
     "4": {"s1": (1, 0.6, 0), "s2": (1, -0.6, 0.5), "s3": (-1, 0.6, 0), "s4": (-1, -0.6, -0.5)},
     "5, one 1 m up": tilted_sensors(1.0, np.eye(3)),
     "5 in a plane": tilted_sensors(0.0, np.eye(3)),
-    "5 in a tilted plane": tilted_sensors(0.0, TURN),
+    "5 in a tilted plane": tilted_sensors(0.0, TILT_ROTATION),
     "5, one 3 cm up": tilted_sensors(0.03, np.eye(3)),
     "3": {"s1": (1.1, 0, -0.2), "s2": (-0.9, 0.6, -0.2), "s3": (-0.9, -0.6, 0.3)},
 }
-"""Arrangements that the exact rows and tests go through."""
+"""Positions (m) of the accelerometers in each arrangement that rows and tests use, by name."""

@@ -1,4 +1,4 @@
-"""A vehicle in space that no symmetry helps: every pair of a car's equal values is pulled apart.
+"""An asymmetric vehicle in space: all parameters that are equal in pairs on a usual car differ.
 
 Products of inertia everywhere, riders on riders, riders without freedoms, riders far behind what they ride on, springs
 that are inclined between bodies that both turn, anti-roll bars with damping, tyres with damping, a rigid axle with a
@@ -28,11 +28,11 @@ FRONT_LEFT, FRONT_RIGHT = (1.2, 0.7, 0.33), (1.25, -0.72, 0.33)
 UP: Vector = (0.0, 0.0, 1.0)
 STEEP_AXIS, FLAT_AXIS = (np.sin(0.07), 0.0, np.cos(0.07)), (np.cos(0.07), 0.0, -np.sin(0.07))
 SKEW_DIRECTION = tuple(np.array([0.3, -0.2, 0.9]) / np.sqrt(0.94))
-"""A direction along no axis of anything."""
+"""Unit vector that is parallel to no axis of the vehicle."""
 
 
-def vehicle(gravity: float = 0.0) -> SpatialVehicle:
-    """The asymmetric twin, without gravity or under a gravity (m/s^2)."""
+def asymmetric_vehicle(gravity: float = 0.0) -> SpatialVehicle:
+    """The asymmetric vehicle, under a gravity (m/s^2)."""
     return SpatialVehicle(
         "spatial twin",
         _bodies(),
@@ -68,7 +68,8 @@ def _twin_spring(
 
 
 def _twin_springs() -> tuple[SpringDamper, ...]:
-    """Springs of the twin: suspensions; then mounts along three orthogonal skew axes; then seats."""
+    """Springs of the asymmetric vehicle: suspensions and bushings, mounts along three orthogonal skew axes, and springs
+    of the bodies that others carry."""
     suspensions = (
         _twin_spring("spring fl", "body", "fl", FRONT_LEFT, STEEP_AXIS, 2.0e4, 1500.0),
         _twin_spring("spring fr", "body", "fr", FRONT_RIGHT, STEEP_AXIS, 2.2e4, 1400.0),

@@ -1,4 +1,4 @@
-"""Cars with trailers beside closed forms: static loads by levers, small steady turns, circles of wheels that roll."""
+"""Cars with trailers compared with closed forms: static loads, small steady turns, and circles without side slip."""
 
 import math
 from collections.abc import Callable
@@ -15,28 +15,29 @@ from models.vehicles.towing import hitch_load
 from validation.spatial.trains import caravan
 
 SMALL_STEER = 2e-5
-"""rad of steer: slip so small that no bristle slides."""
+"""Steer angle (rad) with so little slip that no bristle of the tyres slides."""
 
 
 @dataclass(frozen=True)
 class TurnErrors:
-    """Errors of a steady turn against its closed form. yaw : relative error of the yaw gain; headings : errors of the
-    towed bodies' angles relative to the car (rad per rad of steer)."""
+    """Errors of a steady turn against its closed form. yaw_rate : relative error of the yaw rate per steer angle;
+    towed_headings : errors of the towed bodies' headings relative to the car (rad per rad of steer)."""
 
-    yaw: float
-    headings: np.ndarray
+    yaw_rate: float
+    towed_headings: np.ndarray
 
 
-def levers_error() -> float:
-    """Largest relative error of the caravan's hitch load and of all axle loads, against the balance of moments."""
+def static_load_error() -> float:
+    """Largest relative error of the hitch load and of all axle loads of a car with caravan, against the balance of
+    moments."""
     car = Handling(caravan())
     free, (towed,) = car.vehicle, car.vehicle.towed
     loads = [sum(car.held.tyres[tyre.name] for tyre in free.tyres if tyre.axle == i) for i in range(3)]
     loads.append(hitch_load(free, car.held, towed))
-    return max(abs(load / lever - 1.0) for load, lever in zip(loads, loads_and_lengths(car), strict=True))
+    return max(abs(load / lever - 1.0) for load, lever in zip(loads, static_loads(car), strict=True))
 
 
-def loads_and_lengths(car: Handling) -> list[float]:
+def static_loads(car: Handling) -> list[float]:
     """Loads (N) of a car's front and rear axle, of the caravan's axle and of the ball, by the balance of moments.
 
     About the ball for the caravan; about the front axle for the car, with the caravan's load on the ball.
@@ -55,19 +56,22 @@ def loads_and_lengths(car: Handling) -> list[float]:
 
 
 def towed_turn(
-    vehicle: SpatialVehicle, speed: float, change: Callable[[Handling], None] | None = None, duration: float = 8.0
+    vehicle: SpatialVehicle,
+    speed: float,
+    change_handling: Callable[[Handling], None] | None = None,
+    duration: float = 8.0,
 ) -> TurnErrors:
-    """Errors of turns with small slip at a speed (m/s) in MuJoCo, against their closed form.
+    """Errors of a steady turn with small slip at a speed (m/s) in MuJoCo, against the closed form.
 
-    One to the left less one to the right: a vehicle without symmetry pulls. change : plants a fault in the table;
-    duration : s.
+    One to the left less one to the right: a vehicle without symmetry pulls. change_handling : plants a fault in the
+    table; duration : s.
     """
     turns = []
     for steer in (SMALL_STEER, -SMALL_STEER):
         car = Handling(replace(vehicle, drags=()), controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
         wanted = steady_turn(car, speed)
-        if change is not None:
-            change(car)
+        if change_handling is not None:
+            change_handling(car)
         turns.append(drive_run("mujoco", car, speed, duration))
     left, right = (np.array([turn.velocity()[-1, 2], *final_headings(turn)]) for turn in turns)
     yaw, *towed = (left - right) / (2.0 * SMALL_STEER)
@@ -75,7 +79,7 @@ def towed_turn(
 
 
 def final_headings(drive: Drive) -> list[float]:
-    """Final heading (rad) of each towed body relative to the car: the sum of the yaw angles of all hitches between
+    """Final heading (rad) of each towed body relative to the car: the sum of the yaw angles of the hitches between
     them."""
     free = drive.handling.vehicle
     yaws = {
@@ -85,7 +89,7 @@ def final_headings(drive: Drive) -> list[float]:
 
 
 def circle_error(steer: float = 0.15, speed: float = 3.0) -> float:
-    """Relative error of the angle between caravan and car in a slow turn, against that of wheels that roll without side
+    """Relative error of the angle between caravan and car in a slow turn, against the angle of wheels without side
     slip.
 
     A rear axle at a wheelbase L behind one that is steered by delta rolls on a circle of R = L / tan(delta); the ball,
@@ -100,7 +104,7 @@ def circle_error(steer: float = 0.15, speed: float = 3.0) -> float:
     return -angle / wanted - 1.0
 
 
-def keep_to_the_car(car: Handling) -> None:
-    """Plant a fault: wheels of towed bodies have the car's heading."""
+def give_towed_wheels_car_heading(car: Handling) -> None:
+    """Plant a fault: the tyres of towed bodies take the heading of the car."""
     for i in range(len(car.vehicle.tyres)):
         car.tyre_numbers(i)[at.TOWED] = 0.0

@@ -1,4 +1,4 @@
-"""Plain equations of a car beside its engines: cars, states at random and the gaps between both.
+"""Differences of the engines from plain equations of motion: test cars, random states, and largest differences.
 
 The plain side (``models.multibody.plain``) reads the description alone and shares no force, no table and no mechanics
 with the engines. What both read is the description, and for paths the tableau and the step.
@@ -32,12 +32,12 @@ from validation.spatial.trains import caravan, train
 
 SEED, STEP, SPEED = 41, 1e-3, 22.0
 ROLLING_STEP = 2e-3
-"""s, of a path on tyres; each evaluation by plain equations takes 5 ms."""
-FRAMES = ("hub", "body", "inertial")
+"""Step (s) of a run on tyres; an evaluation of the plain equations takes 5 ms."""
+FORCE_FRAMES = ("hub", "body", "inertial")
 LARGEST_TILT = 0.3
-"""rad, by which a chassis rolls and pitches at random."""
+"""Largest random roll and pitch angle (rad) of a chassis."""
 LARGEST_FOLD = 1.5
-"""rad, by which a trailer yaws at random."""
+"""Largest random yaw angle (rad) of a trailer's hitch."""
 BUMP_STOP = Curve((-0.1, -0.02, 0.02, 0.1), (-4000.0, 0.0, 0.0, 6000.0))
 NONLINEAR_DAMPER = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-900.0, -300.0, 0.0, 150.0, 400.0))
 TURN_CONTROLS = Controls(
@@ -47,16 +47,16 @@ TURN_CONTROLS = Controls(
 )
 
 
-def curved_vehicle() -> SpatialVehicle:
-    """R19-free with a bump stop, a nonlinear damper and dry friction in each of its first springs."""
+def nonlinear_spring_car() -> SpatialVehicle:
+    """The car R19-free with a bump stop, a nonlinear damper and dry friction in each of its first four springs."""
     car = load_vehicle("r19_free")
     first = (replace(s, travel_force=BUMP_STOP, rate_force=NONLINEAR_DAMPER, friction=120.0) for s in car.springs[:4])
     return replace(car, springs=(*first, *car.springs[4:]))
 
 
 def rolling_cars() -> dict[str, Handling]:
-    """Cars on a rough slope, steered, braked, driven and pushed: as shipped, without symmetry, with curves, and with
-    trailers."""
+    """Test cars by name, steered, braked and driven on a rough road: as shipped, asymmetric, with nonlinear springs,
+    with a caravan, and with a trailer; two are on a slope and pushed by a gust."""
     waves, r19 = plane_waves(4e-6, seed=3), load_vehicle("r19_free")
     gust = Push("body", (0.3, 0.1, 1.0), (0.1, 1.0, 0.2), ((0.0, 0.0), (0.4, 500.0)))
     return {
@@ -64,15 +64,15 @@ def rolling_cars() -> dict[str, Handling]:
         "twin": Handling(
             twin(), Tyres(inclination=-0.03, fixed=("fl", "rr"), cells=11), TURN_CONTROLS, waves, 0.05, (gust,)
         ),
-        "curved": Handling(curved_vehicle(), Tyres(spin_inertia=1.2), TURN_CONTROLS, waves),
+        "curved": Handling(nonlinear_spring_car(), Tyres(spin_inertia=1.2), TURN_CONTROLS, waves),
         "caravan": Handling(caravan(), Tyres(inclination=0.02), TURN_CONTROLS, waves),
         "train": Handling(train(), Tyres(fixed=("fl", "dr", "bl"), cells=11), TURN_CONTROLS, waves, 0.05, (gust,)),
     }
 
 
 def rolling_states(car: Handling, state_count: int) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
-    """Random times (s), coordinates and rates (n,): any heading, rolled and pitched, at speeds from standing to 25
-    m/s."""
+    """Yield random times (s), coordinates and rates (n,) of a car: any heading, rolled and pitched, at speeds from 0 to
+    25 m/s."""
     rng, coordinates = np.random.default_rng(SEED), car.vehicle.coordinates()
     towing = ("sway", *map(hitch_of, car.vehicle.towed))
     leans = [i for i, (name, freedom) in enumerate(coordinates) if name in towing and freedom in ("rx", "ry")]
@@ -91,7 +91,7 @@ def rolling_states(car: Handling, state_count: int) -> Iterator[tuple[float, np.
         yield rng.uniform(0.0, 1.0), q, v
 
 
-def rolling_gap(car: Handling, engine: str, state_count: int) -> float:
+def rolling_acceleration_difference(car: Handling, engine: str, state_count: int) -> float:
     """Largest difference between the accelerations of an engine and of the plain equations, divided by the largest of
     the state."""
     plain, model = build(REFERENCE, car), build(engine, car)
@@ -101,9 +101,9 @@ def rolling_gap(car: Handling, engine: str, state_count: int) -> float:
     )
 
 
-def report_gap(car: Handling, state_count: int) -> float:
-    """Largest difference of the tyre reports and energy ledgers from the plain equations, each column divided by its
-    largest value."""
+def report_difference(car: Handling, state_count: int) -> float:
+    """Largest difference of the reported tyre quantities and energies from the plain equations, each column divided by
+    its largest value."""
     plain, numbers, worst = PlainRolling(car), car.numbers, 0.0
     states = list(rolling_states(car, state_count))
     state_times, q, v = (np.array(column) for column in zip(*states, strict=True))
@@ -116,38 +116,39 @@ def report_gap(car: Handling, state_count: int) -> float:
     return worst
 
 
-def rolling_path_gap(car: Handling, engine: str, duration: float) -> float:
-    """Largest difference of coordinates and rates from the plain equations along a run."""
+def rolling_path_difference(car: Handling, engine: str, duration: float) -> float:
+    """Largest difference of a car's coordinates and rates between runs by an engine and by the plain equations."""
     settings = Settings("RK4", ROLLING_STEP, duration)
     ours, theirs = (build(name, car, settings).run(*car.straight(SPEED)) for name in (engine, REFERENCE))
     return float(max(np.abs(ours.positions - theirs.positions).max(), np.abs(ours.rates - theirs.rates).max()))
 
 
 def cut_cars() -> dict[str, CutVehicle]:
-    """Cars cut at their wheels: as shipped, and without symmetry with tyres that can lift off."""
+    """Cars cut at their wheels, by name: as shipped, and asymmetric with tyres that can lift off."""
     return {"r19_free": cut(load_vehicle("r19_free"), "body"), "twin": cut(twin().with_tyres(pushes_only=True), "body")}
 
 
 def hub_input_sets(vehicle: CutVehicle) -> list[HubInputs]:
-    """Inputs for comparison: random hub forces and moments in each frame, without guide, with a pulling and with a
-    prescribing guide; and a road."""
+    """Inputs of a cut vehicle: random hub forces and moments in each frame, without and with a prescribed guide, with a
+    guide that pulls, and road heights."""
     rng, rows = np.random.default_rng(SEED), static_forces(vehicle, 3).hubs
     hubs = rows + rng.normal(0.0, 500.0, rows.shape)
     guide, pull = rng.normal(0.0, 0.1, (3, 6)), (2e4, 3e3, 5e4, 4e3)
-    wrenches = [HubInputs(hubs, frame, guide=guide_values) for frame in FRAMES for guide_values in (None, guide)]
+    wrenches = [HubInputs(hubs, frame, guide=guide_values) for frame in FORCE_FRAMES for guide_values in (None, guide)]
     road = HubInputs(rng.normal(0.0, 0.01, (3, 2 * len(vehicle.hubs))), speed=SPEED)
     return [*wrenches, HubInputs(hubs, guide=guide, pull=pull), road, replace(road, frame="inertial")]
 
 
 def cut_state(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Random coordinates and rates (n,): any heading, roll and pitch by LARGEST_TILT, tyres near the road."""
+    """Random coordinates and rates (n,) of a cut vehicle: any heading, roll and pitch up to LARGEST_TILT, tyres near
+    the road."""
     q, v = random_states(vehicle, seed)
     q[Z] *= 2e-3
     q[PITCH], q[ROLL] = LARGEST_TILT * q[PITCH], LARGEST_TILT * q[ROLL]
     return q, v
 
 
-def hub_gap(vehicle: CutVehicle, engine: str, state_count: int) -> float:
+def cut_car_acceleration_difference(vehicle: CutVehicle, engine: str, state_count: int) -> float:
     """Largest difference between the accelerations of an engine and of the plain equations, divided by the largest of
     the state."""
     worst, input_sets = 0.0, hub_input_sets(vehicle)
@@ -160,9 +161,9 @@ def hub_gap(vehicle: CutVehicle, engine: str, state_count: int) -> float:
     return worst
 
 
-def inside_gap(vehicle: CutVehicle, state_count: int) -> float:
-    """Largest difference of section forces, hub wrenches and stabilising moments from the plain equations, each divided
-    by its largest value."""
+def inner_force_difference(vehicle: CutVehicle, state_count: int) -> float:
+    """Largest difference of element forces, hub forces and moments, and stabilising moments from the plain equations,
+    each divided by its largest value."""
     worst = 0.0
     for hub_inputs in hub_input_sets(vehicle):
         models = [hub_model(name, vehicle, hub_inputs, STEP, STEP) for name in ("reference", PLAIN)]
@@ -174,11 +175,11 @@ def inside_gap(vehicle: CutVehicle, state_count: int) -> float:
     return worst
 
 
-def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough: bool) -> float:
-    """Largest difference of coordinates and rates from the plain equations along a run, on a rough road or with noisy
-    hub forces."""
+def cut_car_path_difference(vehicle: CutVehicle, engine: str, duration: float, rough_road: bool) -> float:
+    """Largest difference of a cut vehicle's coordinates and rates between runs by an engine and by the plain equations,
+    on a rough road or with noisy hub forces."""
     steps = round(duration / STEP)
-    if rough:
+    if rough_road:
         left, right = (iso8608_road("C", seed) for seed in (1, 2))
         hub_inputs = two_tracks(vehicle, left, right, SPEED, STEP, steps)
     else:
@@ -192,8 +193,8 @@ def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough: bool)
     return float(np.abs(paths[0] - paths[1]).max())
 
 
-def bristles_gap(state_count: int) -> float:
-    """Largest difference of creep forces and moments of random brush contact patches from plain code; forces are
+def brush_force_difference(state_count: int) -> float:
+    """Largest difference of the creep forces and moments of random brush contact patches from plain code; forces are
     divided by the load, moments by load times half width."""
     rng, worst, width = np.random.default_rng(SEED), 0.0, 0.09
     for i in range(state_count):

@@ -1,4 +1,4 @@
-"""One random scene whose stated error is held against a much finer run."""
+"""Samples that compare the error stated by a run of a random scene with the true error, from a much finer run."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,41 +11,41 @@ from models.core.errors import InputError, RunFailed
 
 @dataclass(frozen=True)
 class Sample:
-    """One test of a stated error. name : scene with its random values; told : errors that the result states, by
-    channel, empty where it states none; true : root mean square error against the truth, for the same channels and
-    units.
+    """Comparison of the stated and the true error of a run. name : scene with its random values; stated_errors : errors
+    that the result states, by channel, empty if it states none; true_errors : root mean square error against a finer
+    run, for the same channels and units.
 
     calls, extra_calls : force evaluations (cells, frequencies) of the run and of its estimate.
     """
 
     name: str
     engine: str
-    told: Mapping[str, Estimate]
-    true: Mapping[str, float]
+    stated_errors: Mapping[str, Estimate]
+    true_errors: Mapping[str, float]
     calls: float
     extra_calls: float
 
     @property
-    def printed(self) -> str:
-        """Name of the channel whose error is printed: the one with the largest share (``Estimate.share``)."""
-        return max(self.told, key=lambda channel: self.told[channel].share)
+    def printed_channel(self) -> str:
+        """Name of the channel whose stated error is printed: it has the largest relative error (``Estimate.share``)."""
+        return max(self.stated_errors, key=lambda channel: self.stated_errors[channel].share)
 
     @property
     def ratio(self) -> float:
-        """Ratio of the true to the stated error of the printed channel."""
-        return self.true[self.printed] / self.told[self.printed].error
+        """Ratio of the true to the stated error of the channel whose error is printed."""
+        return self.true_errors[self.printed_channel] / self.stated_errors[self.printed_channel].error
 
 
-def drawn_samples(
+def random_samples(
     sample_count: int, seed: int | Sequence[int], draw: Callable[[np.random.Generator], Sample | None]
 ) -> Iterator[Sample]:
-    """Samples from ``draw``, ``sample_count`` of them; it is called again where a scene is refused, a run fails, or it
-    gives nothing.
+    """Yield ``sample_count`` samples made by ``draw`` from a random generator; ``draw`` is called again if a scene is
+    refused, a run fails, or it returns None.
     """
-    random, samples_made = np.random.default_rng(seed), 0
+    generator, samples_made = np.random.default_rng(seed), 0
     while samples_made < sample_count:
         try:
-            sample = draw(random)
+            sample = draw(generator)
         except (InputError, RunFailed):
             continue
         if sample is not None:

@@ -1,1 +1,1 @@
-"""The wheelset once more in plain code."""
+"""The wheelset's equations of motion written a second time in plain code, for comparison."""

@@ -16,43 +16,43 @@ from models.contact.linear_theory import forces as linear_forces
 from models.rail.wheelset import Wheelset
 
 SLOWEST_SPEED = 0.1
-"""Speed (m/s) below which creepage is relative to this one, and both directions of rolling are mixed."""
+"""Speed (m/s): below it, creepages are sliding speeds divided by it, and both directions of rolling are mixed."""
 LEAST_ECCENTRICITY = 1e-12
-"""Least share of the squared eccentricity, and of what it lacks to 1, that is looked for."""
+"""Distance from 0 and from 1 at which the search for the squared eccentricity of a contact ellipse begins and ends."""
 
 
-class Touch(NamedTuple):
-    """Contact geometry: penetration (m), normal into the rail, position relative to the wheelset's centre (m),
-    curvature along the track (1/m)."""
+class WheelRailContact(NamedTuple):
+    """Contact of a wheel with its rail: penetration (m), normal into the rail, position relative to the wheelset's
+    centre (m), and curvature along the track (1/m)."""
 
     depth: float
     normal: np.ndarray
-    place: np.ndarray
-    along: float
+    position: np.ndarray
+    curvature_along: float
 
 
 class PlainAxle(NamedTuple):
-    """Motion of the wheelset: position of its centre from the middle of the track (m), velocity including travel (m/s),
+    """Motion of a wheelset: position of its centre from the middle of the track (m), velocity including travel (m/s),
     unit vectors along the axle and horizontally forward, and angular velocity including spin (rad/s)."""
 
     centre: np.ndarray
     velocity: np.ndarray
     axle: np.ndarray
-    ahead: np.ndarray
+    forward: np.ndarray
     turning: np.ndarray
 
 
 class PatchForces(NamedTuple):
-    """Force (N) of a contact on the wheelset, its moment about the wheelset's centre (N m), and reported quantities by
-    name."""
+    """Force (N) of a contact on the wheelset, its moment about the wheelset's centre (N m), and further quantities of
+    the contact by name."""
 
     force: np.ndarray
     moment: np.ndarray
-    told: dict[str, float]
+    contact_quantities: dict[str, float]
 
 
 def axle_of(state: np.ndarray, speed: float) -> PlainAxle:
-    """Motion of the wheelset for a state (10,) of ``models.rail.equations``."""
+    """Motion of a wheelset that travels at ``speed`` (m/s), for a state (10,) of ``models.rail.equations``."""
     y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
     forward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
     axle = np.cos(roll) * np.array([-np.sin(yaw), np.cos(yaw), 0.0]) + np.array([0.0, 0.0, np.sin(roll)])
@@ -61,7 +61,7 @@ def axle_of(state: np.ndarray, speed: float) -> PlainAxle:
     return PlainAxle(np.array([0.0, y, z]), np.array([speed, y_rate, z_rate]), axle, forward, turning)
 
 
-def contact_of_wheel(wheelset: Wheelset, wheel_side: float, axle: PlainAxle) -> Touch:
+def contact_of_wheel(wheelset: Wheelset, wheel_side: float, axle: PlainAxle) -> WheelRailContact:
     """Contact of a conical wheel with its rail; wheel_side : 1 right, -1 left.
 
     The tangent plane's normal n, square to x, is inclined to the axle by the cone's half angle: n . axle = side sin.
@@ -79,7 +79,7 @@ def contact_of_wheel(wheelset: Wheelset, wheel_side: float, axle: PlainAxle) -> 
     across_normal = np.cross(np.array([1.0, 0.0, 0.0]), normal)
     distance_to_rail = ((middle - apex) @ across_normal) / (inward @ across_normal)
     depth = w.head_radius - float(normal @ (middle - apex))
-    return Touch(
+    return WheelRailContact(
         depth, normal, apex + distance_to_rail * inward - axle.centre, float(cosine / (2.0 * distance_to_rail * sine))
     )
 
@@ -105,13 +105,14 @@ def hertz_force(
 
 
 def creep_forces(
-    wheelset: Wheelset, contact: tuple[float, float, float], slip: np.ndarray, law: str, cells: int
+    wheelset: Wheelset, contact: tuple[float, float, float], slip: np.ndarray, creep_law: str, cells: int
 ) -> np.ndarray:
-    """Creep forces (N) and moment (N m) of a contact (load, a, b) at creepages and spin (3,)."""
+    """Creep forces (N) and moment (N m) (3,) of a contact with load (N) and semi-axes a, b (m), at creepages and spin
+    (3,), by a creep law."""
     load, a, b = contact
     if a == 0.0:
         return np.zeros(3)
-    if law == "linear":
+    if creep_law == "linear":
         return np.array([float(force) for force in linear_forces(a, b, slip[0], slip[1], slip[2], wheelset.pair)])
     creep = fastsim(
         RollingEllipse(a, b, load, wheelset.friction, slip[0], slip[1], slip[2]), wheelset.pair, cells=cells
@@ -119,13 +120,13 @@ def creep_forces(
     return np.array([float(creep.fx), float(creep.fy), float(creep.mz)])
 
 
-def patch_forces(wheelset: Wheelset, wheel_side: float, axle: PlainAxle, law: str, cells: int) -> PatchForces:
-    """Force and moment of one rail on the wheelset."""
+def patch_forces(wheelset: Wheelset, wheel_side: float, axle: PlainAxle, creep_law: str, cells: int) -> PatchForces:
+    """Force and moment of a rail on the wheelset, by a creep law; wheel_side : 1 right, -1 left."""
     w, speed, touch = wheelset, axle.velocity[0], contact_of_wheel(wheelset, wheel_side, axle)
     across = np.cross(touch.normal, np.array([1.0, 0.0, 0.0]))
-    velocity = axle.velocity + np.cross(axle.turning, touch.place)
+    velocity = axle.velocity + np.cross(axle.turning, touch.position)
     slip, approach = np.array([velocity[0], velocity @ across, axle.turning @ touch.normal]), velocity @ touch.normal
-    elastic, a, b = hertz_force(touch.depth, touch.along, 0.5 / w.head_radius, w.pair.modulus)
+    elastic, a, b = hertz_force(touch.depth, touch.curvature_along, 0.5 / w.head_radius, w.pair.modulus)
     load = elastic * max(0.0, 1.0 + w.contact_damping * approach)
     forwards, reference_speed = (
         float(np.clip(0.5 + 0.5 * speed / SLOWEST_SPEED, 0.0, 1.0)),
@@ -133,9 +134,11 @@ def patch_forces(wheelset: Wheelset, wheel_side: float, axle: PlainAxle, law: st
     )
     mirror, creep = np.array([-1.0, 1.0, -1.0]), np.zeros(3)
     if forwards > 0.0:
-        creep += forwards * creep_forces(w, (load, a, b), slip / reference_speed, law, cells)
+        creep += forwards * creep_forces(w, (load, a, b), slip / reference_speed, creep_law, cells)
     if forwards < 1.0:
-        creep += (1.0 - forwards) * mirror * creep_forces(w, (load, a, b), mirror * slip / reference_speed, law, cells)
+        creep += (
+            (1.0 - forwards) * mirror * creep_forces(w, (load, a, b), mirror * slip / reference_speed, creep_law, cells)
+        )
     beyond = max(0.0, wheel_side * axle.centre[1] - w.flange_clearance)
     push = np.array([0.0, -wheel_side * w.flange_stiffness * beyond, 0.0])
     force = np.array([creep[0], 0.0, 0.0]) + creep[1] * across - load * touch.normal + push
@@ -146,14 +149,15 @@ def patch_forces(wheelset: Wheelset, wheel_side: float, axle: PlainAxle, law: st
         "spin": slip[2] / reference_speed,
         "power": float(creep @ slip),
     }
-    report |= {"x": touch.place[0], "y": touch.place[1], "z": touch.place[2], "flange_force": push[1]}
+    report |= {"x": touch.position[0], "y": touch.position[1], "z": touch.position[2], "flange_force": push[1]}
     report |= {"angle": float(np.arcsin(-touch.normal[1])), "damping_power": (elastic - load) * approach}
     report["elastic_power"] = float(push @ velocity) - elastic * approach
-    return PatchForces(force, np.cross(touch.place, force) + creep[2] * touch.normal, report)
+    return PatchForces(force, np.cross(touch.position, force) + creep[2] * touch.normal, report)
 
 
 class PlainWheelset:
-    """A wheelset at a speed (m/s) with a creep law; gravity is tilted to the right by ``lean``."""
+    """Equations of motion of a wheelset at a speed (m/s) with a creep law; gravity is inclined to the right by
+    ``lean``."""
 
     def __init__(self, wheelset: Wheelset, speed: float, law: str, cells: int = 21, lean: float = 0.0) -> None:
         self.wheelset, self.speed, self.law, self.cells, self.lean = wheelset, speed, law, cells, lean
@@ -163,20 +167,21 @@ class PlainWheelset:
         def short(depth: float) -> float:
             return hertz_force(depth, *curvatures, wheelset.pair.modulus)[0] - half
 
-        self.sunk = brentq(short, 1e-9, 1e-2, xtol=1e-17) / wheelset.slant[1]
+        self.approach_at_rest = brentq(short, 1e-9, 1e-2, xtol=1e-17) / wheelset.slant[1]
 
     def patches(self, state: np.ndarray) -> list[PatchForces]:
-        """Contact forces of both rails for a state (10,), right rail first."""
+        """Contact forces of both rails on the wheelset for a state (10,), right rail first."""
         axle = axle_of(state, self.speed)
         return [patch_forces(self.wheelset, side, axle, self.law, self.cells) for side in (1.0, -1.0)]
 
-    def by_rails(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def rail_force_and_moment(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force (N) and moment about the centre (N m) of both rails on the wheelset, in the track's axes."""
         right, left = self.patches(state)
         return right.force + left.force, right.moment + left.moment
 
-    def by_suspension(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Force (N) and moment (N m) of springs and dampers at both ends of the axle."""
+    def suspension_force_and_moment(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force (N) and moment about the centre (N m) of the suspension at both ends of the axle on the wheelset, in
+        the track's axes."""
         w, axle = self.wheelset, axle_of(state, self.speed)
         stiffness = np.array([w.stiffness_x, w.stiffness_y, w.stiffness_z])
         damping = np.array([w.damping_x, w.damping_y, w.damping_z])
@@ -184,24 +189,26 @@ class PlainWheelset:
         force, moment = np.zeros(3), np.zeros(3)
         for side in (1.0, -1.0):
             arm = side * w.half_spacing * axle.axle
-            extension = axle.centre + arm - np.array([0.0, side * w.half_spacing, self.sunk])
+            extension = axle.centre + arm - np.array([0.0, side * w.half_spacing, self.approach_at_rest])
             pull = -stiffness * extension - damping * (moving + np.cross(axle.turning, arm))
             force, moment = force + pull, moment + np.cross(arm, pull)
         return force, moment
 
     def rates(self, state: np.ndarray) -> np.ndarray:
-        """Time derivatives (10,) of a state (10,): dp/dt = F and dL/dt + W x L = M, in axes that rotate with W but
-        without the spin."""
+        """Time derivatives (10,) of a state (10,), by Newton's and Euler's equations in axes that rotate with the
+        wheelset without its spin."""
         w, axle = self.wheelset, axle_of(state, self.speed)
         roll, (roll_rate, yaw_rate, spin) = state[2], state[7:]
         sums = [
-            by_rails + suspension_part
-            for by_rails, suspension_part in zip(self.by_rails(state), self.by_suspension(state), strict=True)
+            rail_force_and_moment + suspension_part
+            for rail_force_and_moment, suspension_part in zip(
+                self.rail_force_and_moment(state), self.suspension_force_and_moment(state), strict=True
+            )
         ]
         weight = w.load * np.array([0.0, self.lean, 1.0])
         acceleration = (sums[0] + weight) / w.mass
-        upright = np.cross(axle.ahead, axle.axle)
-        moments = np.array([axis @ sums[1] for axis in (axle.ahead, axle.axle, upright)])
+        upright = np.cross(axle.forward, axle.axle)
+        moments = np.array([axis @ sums[1] for axis in (axle.forward, axle.axle, upright)])
         inertia, turning = (
             np.array([w.yaw_inertia, w.spin_inertia, w.yaw_inertia]),
             np.array([roll_rate, spin, yaw_rate * np.cos(roll)]),
@@ -212,14 +219,14 @@ class PlainWheelset:
         position_rates = [state[5], state[6], roll_rate, yaw_rate, spin - yaw_rate * np.sin(roll)]
         return np.array([*position_rates, acceleration[1], acceleration[2], gained[0], yawing, gained[1]])
 
-    def on_joints(self, state: np.ndarray) -> np.ndarray:
+    def rail_forces_on_coordinates(self, state: np.ndarray) -> np.ndarray:
         """Generalised forces (5,) of both rails on y, z, yaw, roll and spin about the axle (N, N m), by virtual
         work."""
-        axle, (force, moment) = axle_of(state, self.speed), self.by_rails(state)
-        return np.array([force[1], force[2], moment[2], moment @ axle.ahead, moment @ axle.axle])
+        axle, (force, moment) = axle_of(state, self.speed), self.rail_force_and_moment(state)
+        return np.array([force[1], force[2], moment[2], moment @ axle.forward, moment @ axle.axle])
 
     def run(self, state: np.ndarray, step: float, step_count: int) -> np.ndarray:
-        """States (count + 1, 10) by steps (s) of the classical Runge-Kutta method."""
+        """States (step_count + 1, 10) from a start state (10,), by steps (s) of the classical Runge-Kutta method."""
         states = [np.asarray(state, float)]
         for _ in range(step_count):
             last_state = states[-1]

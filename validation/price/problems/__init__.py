@@ -1,4 +1,4 @@
-"""Problems of the work-precision runner: one file each, with what is computed and how its error is taken.
+"""Test problems of the work-precision measurements: one file each, with the computed quantities and their errors.
 
 A problem knows its reference solution and that solution's own uncertainty; ``models.advice.price.runner`` does the
 rest. A new system adds a file here whose class fulfils ``models.advice.price.problem.Problem``.
@@ -11,24 +11,24 @@ import numpy as np
 from models.advice.price.problem import Setting
 
 Curves = dict[tuple[str, str], tuple[float, ...]]
-"""Steps (s), tolerances or cells that are tried, by engine and method."""
+"""Steps (s), tolerances or sampling rates that are tried, by engine and method."""
 
 
-def curves_of_methods(engine: str, values: tuple[float, ...], *methods: str) -> Curves:
-    """Settings of several methods of an engine, all with the same list of values."""
-    return {(engine, method): values for method in methods}
+def curves_of_methods(engine: str, steps_or_tolerances: tuple[float, ...], *methods: str) -> Curves:
+    """Curves of several methods of an engine, all with the same steps or tolerances."""
+    return {(engine, method): steps_or_tolerances for method in methods}
 
 
 def milliseconds(*steps: float) -> tuple[float, ...]:
-    """Steps (s) from milliseconds."""
+    """Steps in s, from steps in milliseconds."""
     return tuple(1e-3 * step for step in steps)
 
 
 def settings_of_curves(curves: Curves, setting: Callable[[str, str, float], Setting]) -> tuple[Setting, ...]:
-    """One setting for each value of each curve."""
+    """One setting for each value of each curve, made by ``setting(engine, method, value)``."""
     return tuple(setting(*curve, value) for curve, values in curves.items() for value in values)
 
 
 def largest_differences(channels: dict[str, np.ndarray], true_values: dict[str, np.ndarray]) -> dict[str, float]:
-    """Largest difference of each quantity from its reference."""
+    """Largest absolute difference of each quantity from its reference values."""
     return {name: float(np.abs(values - true_values[name]).max()) for name, values in channels.items()}

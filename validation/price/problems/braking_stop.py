@@ -1,4 +1,4 @@
-"""Problem D: an anti-lock stop of a quarter vehicle from snow on to a wet road.
+"""Test problem: an anti-lock braking stop of a quarter vehicle that rolls from snow on to a wet road.
 
 The valves are those that a slip controller set in one fine run, replayed to every solver alike: in the loop itself one
 valve that changes a sample earlier moves the distance by more than any step, and the error would not be the step's.
@@ -29,35 +29,35 @@ from validation.braking.quarter_stops import FRONT_WHEEL, FrictionChange, Fricti
 from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
 
 SURFACES, SURFACE_CHANGE, SPEED = ("snow", "wet"), 10.0, 11.11
-"""Surfaces, where the second begins (m), speed at the start (m/s)."""
+"""Surfaces of the road, distance (m) at which the second begins, and initial speed (m/s)."""
 REPLAY_SUBSTEPS = 64
-"""Substeps of the run whose valves are replayed."""
+"""Substeps per sample of the run whose valve commands are replayed."""
 EXTRA_SAMPLES = 40
-"""Samples for which the last valves are kept: time for schemes that stop late."""
-OWN_METHOD, EULER, RK4, LITERAL = "exact wheel", "Euler", "RK4", "literal"
-CALLS_PER_STEP = {OWN_METHOD: 2, EULER: 1, RK4: 4, LITERAL: 1}
-"""Force calls of a step; of ours, walks from node to node of the tyre's table."""
-DEFAULT_METHODS = {(OWN_METHOD, BrakedVehicle.substeps): "twinrig", (LITERAL, 1): "paper"}
-"""Whose default a method with so many steps in a sample is."""
-SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
-ORDERS = {EULER: 1, LITERAL: 1}
-FULL_STEPS = {OWN_METHOD: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
-QUICK_SUBSTEPS = {OWN_METHOD: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
-"""The named share of FULL_STEPS that the quick report takes, from half the speed; the paper's own single step is far
-from where its order shows."""
-SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
+"""Number of samples for which the last valve command is repeated, for schemes that stop late."""
+EXACT_WHEEL_METHOD, EULER, RK4, LITERAL = "exact wheel", "Euler", "RK4", "literal"
+CALLS_PER_STEP = {EXACT_WHEEL_METHOD: 2, EULER: 1, RK4: 4, LITERAL: 1}
+"""Force calls per step by method; those of the exact wheel are walks from node to node of the tyre's table."""
+DEFAULT_METHODS = {(EXACT_WHEEL_METHOD, BrakedVehicle.substeps): "twinrig", (LITERAL, 1): "paper"}
+"""For a (method, number of steps per sample), the owner whose default it is."""
+ALL_SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
+METHOD_ORDERS = {EULER: 1, LITERAL: 1}
+FULL_SUBSTEPS = {EXACT_WHEEL_METHOD: ALL_SUBSTEPS, EULER: ALL_SUBSTEPS, RK4: ALL_SUBSTEPS, LITERAL: ALL_SUBSTEPS}
+QUICK_SUBSTEPS = {EXACT_WHEEL_METHOD: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
+"""Substeps per sample, by method, of the quick report, whose stop begins at half the speed; the paper's single step
+is far from where its order shows."""
+REFERENCE_SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
 """Reference solvers with their relative tolerances, by ``quick``: a Runge-Kutta method and a multistep one."""
 
 
 @dataclass
-class TapedController:
-    """Wrapper of a controller that records the valve commands."""
+class RecordingController:
+    """Controller that passes samples on to another controller and records its valve commands."""
 
     controller: Controller
     valves: list[int]
 
     def sample(self, sample: Sample) -> Command:
-        """Command of the wrapped controller for a sample."""
+        """Valve command of the wrapped controller for a sample."""
         command = self.controller.sample(sample)
         self.valves.append(int(np.asarray(command.valves)[0]))
         return Command(valves=np.array(self.valves[-1:]))
@@ -65,7 +65,7 @@ class TapedController:
 
 @dataclass(frozen=True)
 class ReplayedController:
-    """A controller that replays recorded valve commands and repeats the last one for ever."""
+    """Controller that replays recorded valve commands (n,), one per sample, and then repeats the last one."""
 
     valves: np.ndarray
 
@@ -76,7 +76,7 @@ class ReplayedController:
 
 @dataclass(frozen=True)
 class StopResult:
-    """Stopping distance (m), and counts of steps and calls."""
+    """Result of a stop: stopping distance (m), and counts of steps and force calls."""
 
     distance: float
     counts: dict[str, int]
@@ -84,13 +84,13 @@ class StopResult:
 
 @dataclass(frozen=True)
 class StopSolver:
-    """A stop by one method, ready to run."""
+    """A braking stop by one integration method, ready to run."""
 
     run: Callable[[], StopResult]
 
 
 class BrakingStop:
-    """Test problem: a braking stop with its reference solution; see ``validation.price.problems.Problem``."""
+    """Test problem: a braking stop with its reference solution; a ``models.advice.price.problem.Problem``."""
 
     key = "braking"
     note = (
@@ -112,16 +112,16 @@ class BrakingStop:
         self.mu = np.array([np.interp(self.slips, table.slips, table.mu_x[0, 0]) for table in self._tables])
         self._road = road([Stretch(0.0, 0, 0), Stretch(self.change, 1, 1)])
         self._chambers, self._brakes = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY), of_wheels(PAPER_FRONT)
-        self.valves = self._taped_commands()
+        self.valves = self._recorded_commands()
         self.duration = self.valves.size * SAMPLE
-        solvers = SOLVERS[quick]
+        solvers = REFERENCE_SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
         self.true, other_distance = (self._distance_by_scipy(*solver_arguments) for solver_arguments in solvers)
         self.uncertainty = {"stopping distance": abs(self.true - other_distance)}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """FULL_STEPS, or its named share QUICK."""
-        chosen = QUICK_SUBSTEPS if quick else FULL_STEPS
+        """Settings of FULL_SUBSTEPS, or for the quick report of QUICK_SUBSTEPS."""
+        chosen = QUICK_SUBSTEPS if quick else FULL_SUBSTEPS
         return tuple(
             self.setting("reference", method, SAMPLE / n)
             for method, substep_counts in chosen.items()
@@ -129,30 +129,35 @@ class BrakingStop:
         )
 
     def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
-        """A setting: curve, and the longest step (s) up to ``step_or_tolerance`` that divides a sample."""
+        """Setting of an engine and a method with the longest step (s) up to ``step_or_tolerance`` that divides a
+        sample."""
         substeps = math.ceil(SAMPLE / step_or_tolerance * (1 - 1e-9))
         return Setting(
             engine,
             method,
             SAMPLE / substeps,
-            ORDERS.get(method, 0),
+            METHOD_ORDERS.get(method, 0),
             default=DEFAULT_METHODS.get((method, substeps), ""),
         )
 
     def build(self, setting: Setting) -> StopSolver:
-        """The stop by one method in steps."""
+        """The braking stop by the method and step of a setting, ready to run."""
         substeps = round(SAMPLE / setting.value)
-        run = self._stop_by_twinrig if setting.method == OWN_METHOD else partial(self._stop_by_method, setting.method)
+        run = (
+            self._stop_by_twinrig
+            if setting.method == EXACT_WHEEL_METHOD
+            else partial(self._stop_by_method, setting.method)
+        )
         return StopSolver(partial(run, substeps))
 
     def errors(self, solution: StopResult) -> dict[str, float]:
-        """Errors of a solution's stopping distance."""
+        """Error (m) of a solution's stopping distance, by the name of the quantity."""
         return {"stopping distance": abs(solution.distance - self.true)}
 
-    def _taped_commands(self) -> np.ndarray:
-        """Valve commands (n,) of the controller's own run, one per sample, with the last one repeated for some
-        samples."""
-        tape = TapedController(CONTROLLERS["slip_bang_bang"](1), [])
+    def _recorded_commands(self) -> np.ndarray:
+        """Valve commands (n,), one per sample, of a run with the controller; the last one is repeated EXTRA_SAMPLES
+        times."""
+        tape = RecordingController(CONTROLLERS["slip_bang_bang"](1), [])
         vehicle = on_tyres(
             FRONT_WHEEL.plane, self._tables, self._brakes, self._chambers, self._road, substeps=REPLAY_SUBSTEPS
         )
@@ -160,17 +165,17 @@ class BrakingStop:
         return np.array(tape.valves + [tape.valves[-1]] * EXTRA_SAMPLES)
 
     def _distance_by_scipy(self, method: str, tolerance: float) -> float:
-        """Stopping distance (m) by scipy, where changes of friction, locking and release are events."""
+        """Stopping distance (m) by an adaptive method of scipy; changes of friction, locking and release are events."""
         stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, self.change))]
         return tight_distance(
             FRONT_WHEEL, PAPER_FRONT, stretches, ReplayedController(self.valves), self.speed, tolerance, method
         )
 
-    def _friction(self, i: int, slip: float) -> float:
-        return float(np.interp(slip, self.slips, self.mu[i]))
+    def _friction(self, surface_number: int, slip: float) -> float:
+        return float(np.interp(slip, self.slips, self.mu[surface_number]))
 
     def _torques(self, substeps: int) -> np.ndarray:
-        """Brake torque (N m) at the ends of all steps."""
+        """Brake torques (n, 1) in N m at the start and at the end of every step."""
         air, substep_torques = resting_chambers(self._chambers, SAMPLE), np.zeros((substeps + 1, 1))
         torques = [np.zeros(1)]
         for valve in self.valves:
@@ -190,7 +195,8 @@ class BrakingStop:
         if stop.step_of_rest < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return StopResult(
-            stop.distance, {"steps": stop.step_of_rest, "force calls": CALLS_PER_STEP[OWN_METHOD] * stop.step_of_rest}
+            stop.distance,
+            {"steps": stop.step_of_rest, "force calls": CALLS_PER_STEP[EXACT_WHEEL_METHOD] * stop.step_of_rest},
         )
 
     def _stop_by_method(self, method: str, substeps: int) -> StopResult:
@@ -207,5 +213,5 @@ class BrakingStop:
 
 @cache
 def problem(quick: bool) -> BrakingStop:
-    """The problem, its reference computed once per process."""
+    """The test problem of the braking stop; its reference solution is computed once per process."""
     return BrakingStop(quick)

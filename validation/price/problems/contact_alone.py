@@ -1,8 +1,8 @@
-"""Problem G: creep forces of one contact by every theory, over the cells that it is cut into.
+"""Test problem: creep forces of single contacts by every theory of rolling contact, over the number of cells.
 
-Contacts of the kept set, each of another ellipse, kind and size of creepage. The reference is the exact theory of the
-half space with its cells extrapolated to none: another family than all but the exact theory itself, whose own curve
-therefore only shows what its cells cost. What is left of its cells is its uncertainty.
+Contacts of the saved set differ in ellipse, kind and size of creepage. The reference is the exact theory of the half
+space, extrapolated to infinitely small cells. It is independent of all other theories; the curve of the exact theory
+itself only shows the error of its cells. The uncertainty is the error left after the extrapolation.
 """
 
 from collections.abc import Callable
@@ -17,8 +17,8 @@ from models.systems.contact.work_precision import THEORIES_COMPARED, TheorySetti
 from validation.contact.contact_set import read_contacts
 
 CONTACT_SPACING = 23
-"""Every so many contacts of the set stand for all: they go through its ratios of axes, kinds and sizes of creepage."""
-CURVES = {
+"""Every 23rd contact of the saved set is used: these go through its ratios of axes, kinds and sizes of creepage."""
+CURVE_OF_THEORY = {
     "linear theory": ("linear", "theory"),
     "FASTSIM 1982": ("FASTSIM", "of 1982"),
     "FASTSIM, plain march": ("FASTSIM", "plain march"),
@@ -28,17 +28,17 @@ CURVES = {
     "theory of 1983": ("1983", "theory"),
     "exact theory": ("exact", "theory"),
 }
-"""Family and member of every method."""
-_STRIPS, _NET = (5, 7, 11, 15, 21, 41, 81, 161), (7, 11, 15, 21, 31, 45)
-CELLS = {"linear theory": (1,), "theory of 1983": _NET, "exact theory": (6, 7, 8, 10, 14, 20)}
-"""Cells along each axis of a contact, those of FASTSIM left out."""
-DEFAULT_ANSWER = ("FASTSIM", 21)
-"""What a scene of a contact is answered by if it does not say."""
+"""Family and member, (engine, method) of a curve, for the name of every theory."""
+_STRIP_CELLS, _SQUARE_CELLS = (5, 7, 11, 15, 21, 41, 81, 161), (7, 11, 15, 21, 31, 45)
+CELLS_OF_THEORY = {"linear theory": (1,), "theory of 1983": _SQUARE_CELLS, "exact theory": (6, 7, 8, 10, 14, 20)}
+"""Numbers of cells along each axis of a contact, by theory; theories that are not named have those of _STRIP_CELLS."""
+DEFAULT_THEORY_AND_CELLS = ("FASTSIM", 21)
+"""Default of a contact scene: theory, and number of cells along each axis."""
 
 
 @dataclass(frozen=True)
 class ContactResult:
-    """Forces (n, 2) divided by mu N, counts of work, and a doubt about the result ("" if none)."""
+    """Creep forces (n, 2) of n contacts divided by mu N, counts of work, and a doubt about the result ("" if none)."""
 
     forces: np.ndarray
     counts: dict[str, int]
@@ -47,13 +47,13 @@ class ContactResult:
 
 @dataclass(frozen=True)
 class ContactSolver:
-    """A theory on all contacts, ready to run."""
+    """Computation of all contacts by one theory, ready to run."""
 
     run: Callable[[], ContactResult]
 
 
 class ContactAlone:
-    """Test problem: rolling contacts with their exact forces; see ``validation.price.problems.Problem``."""
+    """Test problem: rolling contacts with their exact forces; a ``models.advice.price.problem.Problem``."""
 
     key, duration, uncertain_share = "contact", 1.0, 0.25
     note = (
@@ -66,7 +66,7 @@ class ContactAlone:
 
     def __init__(self) -> None:
         self._cases = read_contacts()[::CONTACT_SPACING]
-        self._ways = {CURVES[theory.name]: theory for theory in THEORIES_COMPARED}
+        self._ways = {CURVE_OF_THEORY[theory.name]: theory for theory in THEORIES_COMPARED}
         self._forces = np.array([case.force for case in self._cases])
         self.title = f"Creep forces of {len(self._cases)} contacts by every theory of rolling contact"
         self.units = {"mean creep force": "% of mu N", "creep force in 95 of 100": "% of mu N"}
@@ -74,25 +74,27 @@ class ContactAlone:
         self.uncertainty = dict(zip(self.units, (float(left.mean()), float(left.max())), strict=True))
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """Every theory with every number of cells."""
+        """Settings of every theory with every number of cells."""
         return tuple(
             self.setting(*curve, 1.0 / cells)
             for curve, theory in self._ways.items()
-            for cells in CELLS.get(theory.name, _STRIPS)
+            for cells in CELLS_OF_THEORY.get(theory.name, _STRIP_CELLS)
         )
 
     def setting(self, engine: str, method: str, inverse_cells: float) -> Setting:
-        """A setting of this problem: curve, and 1 / number of cells as its value."""
+        """Setting of a theory (``engine``: its family, ``method``: its member), with 1 / number of cells as its
+        value."""
         cells = round(1.0 / inverse_cells)
-        usual = (self._ways[engine, method].name, cells) == DEFAULT_ANSWER
+        usual = (self._ways[engine, method].name, cells) == DEFAULT_THEORY_AND_CELLS
         return Setting(engine, method, 1.0 / cells, 0, default="twinrig" if usual else "", cells=True)
 
     def build(self, setting: Setting) -> ContactSolver:
-        """A solver that computes all contacts by one theory."""
+        """The computation of all contacts by the theory and cells of a setting, ready to run."""
         return ContactSolver(partial(self._run, self._ways[setting.engine, setting.method], round(1.0 / setting.value)))
 
     def errors(self, solution: ContactResult) -> dict[str, float]:
-        """Error over the contacts in % of mu N: the mean, and the one that 95 of 100 contacts do not exceed."""
+        """Errors of the creep forces in % of mu N: mean over the contacts, and the error that 95 % of them do not
+        exceed."""
         contact_errors = 100.0 * np.linalg.norm(solution.forces - self._forces, axis=1)
         return dict(
             zip(self.units, (float(contact_errors.mean()), float(np.quantile(contact_errors, 0.95))), strict=True)
@@ -107,5 +109,5 @@ class ContactAlone:
 
 @cache
 def problem(quick: bool) -> ContactAlone:
-    """The problem, its reference read once per process."""
+    """The test problem of rolling contacts; its reference forces are read once per process."""
     return ContactAlone()

@@ -1,4 +1,4 @@
-"""Problems B: the pitch-plane vehicle driven by the samples of its wheel forces, before it drifts off.
+"""Test problems: the pitch-plane vehicle, without a road, under samples of its wheel forces, before it drifts off.
 
 The forces are a virtual measurement of the study road at 100 Hz, linear between the samples: every solver reads the
 same ones, so the error here is the integrator's alone, and not that of the interpolation, from which such a run
@@ -23,13 +23,20 @@ from models.systems.pitch_plane.run import output_channels
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.price.problems import Curves, curves_of_methods, largest_differences, milliseconds, settings_of_curves
-from validation.price.problems.road_excited import MUJOCO, SPEED, judge, scene, setting, settings_of
+from validation.price.problems.road_excited import (
+    MUJOCO_METHODS,
+    SPEED,
+    result_with_assumptions,
+    scene,
+    setting,
+    settings_of,
+)
 
 DURATION, SAMPLING_RATE = 2.0, 100.0
-"""Length of the run (s); rate of the samples (Hz), whose period every fixed step divides."""
+"""Length of the run (s); sampling rate of the forces (Hz), whose period every fixed step divides."""
 SAMPLE_PERIOD = 1 / SAMPLING_RATE
 FINE_STEP = SAMPLE_PERIOD / 1280
-"""Step (s) of the reference's own Runge-Kutta march, which meets every sample: its error is that of rounding."""
+"""Step (s) of the reference solution by RK4, with every sample at a step: its error is that of rounding."""
 STEPS = milliseconds(2.5, 2, 1.25, 1, 0.5, 0.25, 0.125, 0.0625)
 FULL_STEPS: Curves = {
     ("reference", "RK4"): STEPS,
@@ -41,27 +48,27 @@ FULL_STEPS: Curves = {
     ("mujoco", "Euler"): STEPS,
     **curves_of_methods("mujoco", STEPS[:-1], "implicit", "implicitfast", "discrete"),
 }
-"""Steps (s) of every method; the finest is for the engines' defaults and those whose order shows late."""
+"""Steps (s) by engine and method; the finest are for the engines' defaults and methods whose order shows late."""
 QUICK_STEPS: Curves = {
     ("reference", "RK4"): milliseconds(0.5, 0.25, 0.125),
     ("exudyn", "ExplicitEuler"): milliseconds(1, 0.5, 0.25),
     ("mujoco", "Euler"): milliseconds(2, 1, 0.5),
 }
-"""The named share of FULL_STEPS that the quick report takes."""
-GUIDED: Curves = {
+"""Steps (s), by engine and method, that the quick report takes."""
+PRESCRIBED_PITCH_STEPS: Curves = {
     ("reference", "RK4"): STEPS,
     **curves_of_methods("exudyn", (*milliseconds(10), *STEPS), "GeneralizedAlpha 0.9", "GeneralizedAlpha 0.6"),
     ("exudyn", "RK44"): milliseconds(1),
-    **curves_of_methods("mujoco", STEPS[:-2], *MUJOCO),
+    **curves_of_methods("mujoco", STEPS[:-2], *MUJOCO_METHODS),
 }
-"""With the pitch prescribed. RK44 is there to be refused: it does not solve for that. MuJoCo calls Python in every
-step."""
+"""Steps (s), by engine and method, with a prescribed pitch. RK44 is there to be refused, as it cannot solve for a
+constraint; MuJoCo calls Python in every step."""
 SEED, DEVIATION = 77, 100.0
-"""Of the noise; its standard deviation, N."""
+"""Seed of the noise on the wheel forces, and its standard deviation, N."""
 
 
-def driven() -> Assembly:
-    """The vehicle without a road, driven by the wheel forces of its run on the road."""
+def vehicle_under_forces() -> Assembly:
+    """The vehicle without a road, under the sampled wheel forces of its run on the road."""
     on_road = assembly_of_scene(scene(DURATION))
     true = simulate(on_road.scene, "reference", Settings("RK4", SAMPLE_PERIOD / 80, DURATION))
     forces = Sampled(np.column_stack([true["f1"], true["f2"]])[::80], SAMPLE_PERIOD, held=False)
@@ -69,24 +76,26 @@ def driven() -> Assembly:
 
 
 class ForceExcited:
-    """Test problem: a vehicle driven by wheel forces, with its reference solution; see
-    ``validation.price.problems.Problem``. ``first`` : the quantity of a variant for which tolerances are set, listed
-    before the states."""
+    """Test problem: a vehicle under wheel forces, with its reference solution; a
+    ``models.advice.price.problem.Problem``.
+
+    ``judged_quantities`` : name and unit of the quantity for which a variant sets tolerances, before the states.
+    """
 
     key, duration, full, quick = "forces", DURATION, FULL_STEPS, QUICK_STEPS
     note = "The forces are those of a virtual measurement at 100 Hz, linear between the samples, the same for all."
     tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-    what = "driven by its wheel forces"
-    first: tuple[tuple[str, str], ...] = ()
+    excitation_text = "driven by its wheel forces"
+    judged_quantities: tuple[tuple[str, str], ...] = ()
 
     def __init__(self, quick: bool) -> None:
-        self.units = dict((*self.first, ("state", "m, rad, m/s, rad/s")))
+        self.units = dict((*self.judged_quantities, ("state", "m, rad, m/s, rad/s")))
         steps = [1e3 * setting.value for setting in self.settings(quick)]
         self.title = (
-            f"Pitch-plane vehicle {self.what}, {DURATION:g} s at {SPEED:g} m/s, before "
+            f"Pitch-plane vehicle {self.excitation_text}, {DURATION:g} s at {SPEED:g} m/s, before "
             f"drift-off, fixed steps of {min(steps):g} to {max(steps):g} ms"
         )
-        self.assembly = self.driven()
+        self.assembly = self.vehicle_under_forces()
         other_settings = (
             Settings("RK4", 2 * FINE_STEP, DURATION) if quick else Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-12)
         )
@@ -98,21 +107,21 @@ class ForceExcited:
         self.uncertainty = largest_differences(check, self._true)
         self.bound = 10 * float(np.abs(next(iter(self._true.values()))).max())
 
-    def driven(self) -> Assembly:
-        """The assembly that is solved."""
-        return driven()
+    def vehicle_under_forces(self) -> Assembly:
+        """The vehicle with its inputs, whose equations are solved."""
+        return vehicle_under_forces()
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
-        """The compared quantities, (n, ...) each, at all rows of a run."""
+        """The compared quantities (n, ...) by name, at all n rows of a run."""
         return {"state": run.states}
 
     def _sampled(self, run: Trajectory) -> dict[str, np.ndarray]:
-        """The compared quantities at the force samples."""
+        """The compared quantities of a run by name, at the sample times of the forces."""
         stride = (len(run.states) - 1) // round(DURATION / SAMPLE_PERIOD)
         return {name: values[::stride] for name, values in self.read(run).items()}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """All settings, or their named share."""
+        """Settings of all curves, or for the quick report of QUICK_STEPS."""
         return settings_of_curves(self.quick if quick else self.full, self.setting)
 
     def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
@@ -122,84 +131,86 @@ class ForceExcited:
         return setting(engine, method, SAMPLE_PERIOD / math.ceil(SAMPLE_PERIOD / step_or_tolerance * (1 - 1e-9)))
 
     def build(self, setting: Setting) -> Model:
-        """The vehicle in one engine."""
+        """The vehicle in the engine of a setting, ready to run."""
         return build(setting.engine, self.assembly, settings_of(setting))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
-        """Largest error of each quantity at the force samples, which lie on steps; the run's assumptions are
-        checked."""
-        judge(self.assembly, solution)
+        """Largest error of each quantity at the sample times of the forces, which lie on steps; assumptions that
+        the run breaks are reported."""
+        result_with_assumptions(self.assembly, solution)
         return largest_differences(self._sampled(solution), self._true)
 
 
 class NoisyForces(ForceExcited):
-    """The force-excited problem with noisy forces. All solvers use the same noise file, so that no sampling error
-    enters. Its quantity is the suspension force, which measured wheel forces do not show."""
+    """Test problem: a vehicle under noisy wheel forces. All solvers read the same noise, so that no sampling error
+    enters; tolerances are those of the suspension force."""
 
     key = "noise"
     note = f"The forces carry the noise of one fixed file, {DEVIATION:g} N on every sample at 100 Hz."
     tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
-    what = "driven by noisy wheel forces"
-    first = (("suspension force", "N"),)
+    excitation_text = "driven by noisy wheel forces"
+    judged_quantities = (("suspension force", "N"),)
 
-    def driven(self) -> Assembly:
-        """The vehicle driven by forces with noise on them."""
-        clean = driven()
+    def vehicle_under_forces(self) -> Assembly:
+        """The vehicle under wheel forces with noise on every sample."""
+        clean = vehicle_under_forces()
         assert isinstance(clean.input, Sampled)
         noise = DEVIATION * normal_samples(SEED, 0, *clean.input.values.shape)
         return replace(clean, input=Sampled(clean.input.values + noise, SAMPLE_PERIOD, held=False))
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
-        """Both suspension forces and the states of a run."""
+        """Suspension forces (n, 2) in N and states (n, 8) of a run."""
         channels = output_channels(self.assembly, run)
         return {"suspension force": np.column_stack([channels[name][2] for name in ("f3", "f4")]), "state": run.states}
 
 
 class PrescribedPitch(ForceExcited):
-    """The force-excited problem with the pitch prescribed as measured on the road; its quantity is the enforced moment.
+    """Test problem: a vehicle under wheel forces with the pitch prescribed as on the road; tolerances are those of the
+    enforced moment.
 
     The pitch at 100 Hz is a quintic spline: twice differentiable, and the same for all. A constraint is solved by
     Exudyn's generalised-alpha alone, whose multiplier needs a radius below one; MuJoCo and the reference have the
     reduced model, in which the pitch is an input.
     """
 
-    key, full, quick = "pitch", GUIDED, GUIDED
+    key, full, quick = "pitch", PRESCRIBED_PITCH_STEPS, PRESCRIBED_PITCH_STEPS
     note = "The moment of Exudyn is a multiplier, that of the others follows from the reduced model."
     tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
-    what = "driven by its wheel forces, pitch prescribed"
-    first = (("enforced moment", "N m"),)
+    excitation_text = "driven by its wheel forces, pitch prescribed"
+    judged_quantities = (("enforced moment", "N m"),)
 
-    def driven(self) -> Assembly:
-        """The vehicle with forces and pitch as inputs, on the pitch at the start."""
-        forces = driven()
+    def vehicle_under_forces(self) -> Assembly:
+        """The vehicle with wheel forces and prescribed pitch as inputs; it starts with the prescribed pitch and pitch
+        rate."""
+        forces = vehicle_under_forces()
         assert isinstance(forces.input, Sampled)
         run = build(
             "reference", assembly_of_scene(scene(DURATION)), Settings("RK4", SAMPLE_PERIOD / 80, DURATION)
         ).run()
         pitch = Smooth(run.states[::80, 3, None], SAMPLE_PERIOD, derivatives=2, degree=5)
-        guided = replace(forces, initial=forces.initial.copy()).with_input("pitch", Stacked((forces.input, pitch)))
-        guided.initial[[3, 7]] = pitch.at(0.0)[:2]
-        return guided
+        assembly = replace(forces, initial=forces.initial.copy()).with_input("pitch", Stacked((forces.input, pitch)))
+        assembly.initial[[3, 7]] = pitch.at(0.0)[:2]
+        return assembly
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
-        """The enforced moment and the states of a run."""
+        """Enforced moment (n,) in N m and states (n, 8) of a run."""
         assert run.moment is not None
         return {"enforced moment": run.moment, "state": run.states}
 
 
 @cache
 def problem(quick: bool) -> ForceExcited:
-    """The problem, its reference computed once per process."""
+    """The test problem of a vehicle under wheel forces; its reference solution is computed once per process."""
     return ForceExcited(quick)
 
 
 @cache
-def noisy(quick: bool) -> NoisyForces:
-    """The force-excited problem with noise on the forces."""
+def noisy_problem(quick: bool) -> NoisyForces:
+    """The test problem of a vehicle under noisy wheel forces, computed once per process."""
     return NoisyForces(quick)
 
 
 @cache
-def guided(quick: bool) -> PrescribedPitch:
-    """The force-excited problem with a prescribed pitch."""
+def prescribed_pitch_problem(quick: bool) -> PrescribedPitch:
+    """The test problem of a vehicle with prescribed pitch, computed once per process."""
     return PrescribedPitch(quick)

@@ -1,4 +1,5 @@
-"""Problem F: the passenger car of 19 freedoms, free on the road, in time; what its variances cost is in ``price.ride``.
+"""Test problem: time integration of the passenger car of 19 freedoms, free on the road; variances are in
+``price.ride``.
 
 The road is a formula, smooth in every derivative, so that a method keeps its order and another tool has the same one:
 two tracks of sines that rise out of the plane some metres after the start. An engineer reads wheel loads and the
@@ -26,20 +27,20 @@ from validation.price.problems import Curves, curves_of_methods, largest_differe
 from validation.price.problems.road_excited import setting, settings_of
 
 DURATION, SPEED = 0.5, 20.0
-"""s, m/s"""
-SINES, LONGEST_SINE, HEIGHT = 12, 24.0, 0.012
-"""Of each track; length (m) of the first sine, whose k-th has a k-th of it; its amplitude (m), falling as 1 / k."""
+"""Length of the run (s), and speed (m/s)."""
+SINE_COUNT, LONGEST_WAVELENGTH, LARGEST_AMPLITUDE = 12, 24.0, 0.012
+"""Number of sines in each track's height; wavelength (m) and amplitude (m) of the first sine; both fall as 1 / k."""
 GOLDEN = 0.6180339887498949
-"""Phases of the sines are its multiples: a formula that nobody has to draw."""
-RISE_PLACE, RISE_LENGTH = 3.0, 0.5
-"""Where the road has half its height (m from the origin), and over what length it rises."""
+"""Golden ratio less 1, whose multiples give the phases of the sines, so that no random numbers are needed."""
+RISE_STATION, RISE_LENGTH = 3.0, 0.5
+"""Station (m) at which the road has risen to half its height, and length (m) over which it rises."""
 COMPARED_GRID = 20e-3
-"""Spacing (s) of the instants that are compared, which every step meets."""
+"""Spacing (s) of the times at which solutions are compared; every step divides it."""
 GRAVITY = 9.81
 _LONG_STEPS = milliseconds(20, 10, 20 / 3, 5, 4, 2)
 _MIDDLE_STEPS = milliseconds(10, 5, 4, 2.5, 2, 1)
 _SHORT_STEPS = milliseconds(20 / 7, 2.5, 2, 1, 0.5, 0.3125)
-_NATIVE = milliseconds(20, 10, 5, 4, 2, 1, 0.5, 0.25, 0.125)
+_MUJOCO_STEPS = milliseconds(20, 10, 5, 4, 2, 1, 0.5, 0.25, 0.125)
 FULL_STEPS: Curves = {
     ("exudyn", "RK44"): _LONG_STEPS,
     ("exudyn", "ExplicitMidpoint"): milliseconds(10, 20 / 3, 5, 4, 2.5, 2),
@@ -47,37 +48,37 @@ FULL_STEPS: Curves = {
     ("exudyn", "VelocityVerlet"): _MIDDLE_STEPS,
     **curves_of_methods("exudyn", _LONG_STEPS, "GeneralizedAlpha 0.9", "TrapezoidalIndex2"),
     **curves_of_methods("exudyn", (1e-6,), "DOPRI5", "ODE23"),
-    ("mujoco", "RK4"): _NATIVE,
-    **curves_of_methods("mujoco", _NATIVE[1:], "Euler", "implicit", "implicitfast", "discrete"),
+    ("mujoco", "RK4"): _MUJOCO_STEPS,
+    **curves_of_methods("mujoco", _MUJOCO_STEPS[1:], "Euler", "implicit", "implicitfast", "discrete"),
 }
-"""Steps (s) of every method; Exudyn's are few, because a call takes it half a millisecond. Adaptive methods are there
-to be refused: the road is read at half steps."""
+"""Steps (s) by engine and method; Exudyn has few, because a force call takes half a millisecond there. Adaptive
+methods are there to be refused, as the road is sampled at half steps."""
 OUTPUT_KINDS = {"wheel load": "tyre force", "acceleration": "acceleration"}
-"""Kinds of the vehicle's outputs that are read."""
-REFERENCES = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "MuJoCo's accelerations"))
-"""Solvers with their relative tolerances and what they solve: a Runge-Kutta method and a multistep one."""
+"""Kind of the vehicle's outputs that are compared, by the name of the quantity."""
+REFERENCE_SOLVERS = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "MuJoCo's accelerations"))
+"""Reference solvers: method of scipy, relative tolerance, and name of the equations that it solves."""
 
 
-def heights(positions: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
-    """Height (m) and slope of the left (0) or right (1) track at positions (...) in m along the road."""
-    x, k = np.asarray(positions, dtype=float), np.arange(1, SINES + 1)
-    angle = 2 * np.pi * (x[..., None] * k / LONGEST_SINE + GOLDEN * k * (k + SINES * track))
-    shape = (HEIGHT / k * np.sin(angle)).sum(axis=-1)
-    slope = 2 * np.pi * HEIGHT / LONGEST_SINE * np.cos(angle).sum(axis=-1)
-    rise = 1 / (1 + np.exp(-(x - RISE_PLACE) / RISE_LENGTH))
+def track_heights(positions: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
+    """Height (m) and slope of the road's left (0) or right (1) track at positions (...) in m along the road."""
+    x, k = np.asarray(positions, dtype=float), np.arange(1, SINE_COUNT + 1)
+    angle = 2 * np.pi * (x[..., None] * k / LONGEST_WAVELENGTH + GOLDEN * k * (k + SINE_COUNT * track))
+    shape = (LARGEST_AMPLITUDE / k * np.sin(angle)).sum(axis=-1)
+    slope = 2 * np.pi * LARGEST_AMPLITUDE / LONGEST_WAVELENGTH * np.cos(angle).sum(axis=-1)
+    rise = 1 / (1 + np.exp(-(x - RISE_STATION) / RISE_LENGTH))
     return rise * shape, rise * slope + rise * (1 - rise) / RISE_LENGTH * shape
 
 
 @dataclass(frozen=True)
 class FreeVehicleSolver:
-    """A run that is ready."""
+    """A run of the free vehicle in an engine, ready to start."""
 
     run: Callable[[], Trajectory]
 
 
 class FreeVehicle:
-    """Test problem: a free vehicle in space on a road, with its reference solution; see
-    ``validation.price.problems.Problem``."""
+    """Test problem: a free vehicle on a road, with its reference solution; a
+    ``models.advice.price.problem.Problem``."""
 
     key, duration = "vehicle", DURATION
     note = (
@@ -95,26 +96,27 @@ class FreeVehicle:
         self.units = {"wheel load": "N", "acceleration": "m/s^2"}
         self.vehicle = replace(load_vehicle("r19_free"), gravity=GRAVITY)
         self.instants = COMPARED_GRID * np.arange(round(DURATION / COMPARED_GRID) + 1)
-        self.reference = " and ".join(f"{purpose} by {method} at {tol:g}" for method, tol, purpose in REFERENCES)
+        self.reference = " and ".join(f"{purpose} by {method} at {tol:g}" for method, tol, purpose in REFERENCE_SOLVERS)
         self._outputs = linearise(self.vehicle, SPEED).outputs
         self._model = build("mujoco", self.vehicle, None, SPEED)
         laws = SpatialReference(self.vehicle, SPEED).acceleration, self._model.acceleration
-        self.states, self.others = (
-            self._solved(law, *setting[:2]) for law, setting in zip(laws, REFERENCES, strict=True)
+        self.states, self.other_states = (
+            self._solved(law, *setting[:2]) for law, setting in zip(laws, REFERENCE_SOLVERS, strict=True)
         )
         self._true = self.read(self.states, self.instants)
-        self.uncertainty = largest_differences(self.read(self.others, self.instants), self._true)
+        self.uncertainty = largest_differences(self.read(self.other_states, self.instants), self._true)
         self.bound = 10 * float(np.abs(self._true["wheel load"]).max())
 
     def road(self, times: ArrayLike) -> np.ndarray:
-        """Heights (m) under the wheels at times (..., ) in s, then their rates (m/s): (..., 2 w)."""
+        """Road heights (m) under the w wheels at times (...) in s, then their rates (m/s): (..., 2 w)."""
         waves = [
-            heights(SPEED * np.asarray(times) + tyre.point[0], int(tyre.point[1] < 0)) for tyre in self.vehicle.tyres
+            track_heights(SPEED * np.asarray(times) + tyre.point[0], int(tyre.point[1] < 0))
+            for tyre in self.vehicle.tyres
         ]
         return np.stack([*(height for height, _ in waves), *(SPEED * slope for _, slope in waves)], axis=-1)
 
     def _solved(self, acceleration: Callable[..., np.ndarray], method: str, tolerance: float) -> np.ndarray:
-        """States (m, 2 n) at the compared instants, started from rest."""
+        """States (m, 2 n) at the m compared times by a method of scipy, from the equilibrium."""
         n = len(self.vehicle.coordinates())
 
         def rates(t: float, y: np.ndarray) -> np.ndarray:
@@ -132,7 +134,7 @@ class FreeVehicle:
         return solution.y.T
 
     def read(self, states: np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Changes of the wheel loads from the static ones (m, w) in N, and accelerations (m, p) in m/s^2, for states
+        """Dynamic wheel loads (m, w) in N, without the static ones, and accelerations (m, p) in m/s^2, for states
         (m, 2 n)."""
         road = self.road(times)
         n = states.shape[1] // 2
@@ -144,12 +146,12 @@ class FreeVehicle:
         }
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """The settings FULL_STEPS, also in the quick share, since the reference alone takes seconds."""
+        """Settings of FULL_STEPS, also in the quick report, because the reference solution alone takes seconds."""
         return settings_of_curves(FULL_STEPS, self.setting)
 
     def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
-        """A setting: curve, and the longest step (s) up to ``step_or_tolerance`` for which all compared instants fall
-        on steps; or a tolerance.
+        """Setting of an engine and a method: the longest step (s) up to ``step_or_tolerance`` for which all compared
+        times fall on steps; or, for an adaptive method, the tolerance.
         """
         known = CATALOGUE[engine][method.split()[0]]
         step = (
@@ -160,7 +162,7 @@ class FreeVehicle:
         return setting(engine, method, float(step))
 
     def build(self, setting: Setting) -> FreeVehicleSolver:
-        """The vehicle in one engine."""
+        """The vehicle in the engine of a setting, ready to run."""
         settings = replace(settings_of(setting, DURATION), step=1e-3 if setting.adaptive else setting.value)
         half_step_times = 0.5 * settings.step * np.arange(2 * settings.steps + 1)
         model = build(setting.engine, self.vehicle, settings, SPEED, self.road(half_step_times))
@@ -168,7 +170,7 @@ class FreeVehicle:
         return FreeVehicleSolver(partial(model.run, rest_state, rest_state))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
-        """Largest error of any wheel load and of any acceleration at the compared instants."""
+        """Largest error of any wheel load (N) and of any acceleration (m/s^2) at the compared times."""
         stride = round(COMPARED_GRID / (solution.times[1] - solution.times[0]))
         states = np.hstack([solution.positions, solution.rates])[::stride]
         return largest_differences(self.read(states, self.instants), self._true)
@@ -176,5 +178,5 @@ class FreeVehicle:
 
 @cache
 def problem(quick: bool) -> FreeVehicle:
-    """The problem, its reference computed once per process."""
+    """The test problem of the free vehicle; its reference solution is computed once per process."""
     return FreeVehicle(quick)

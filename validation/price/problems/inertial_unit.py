@@ -1,8 +1,8 @@
-"""Problem G: the attitude of a car for ten minutes, integrated from the samples of a gyro.
+"""Test problem: the attitude of a car over ten minutes, integrated from sampled gyro rates.
 
 The motion is a formula: roll, pitch and yaw as sums of sines and a steady turn, with the exact local rates that belong
-to them. So the attitude is known in closed form at every sample, and what differs is how the rates are integrated
-between samples. What an engine does of it is in ``turning_sphere``.
+to them. So the attitude is known in closed form at every sample, and methods differ in how they integrate the rates
+between samples. The engines' solutions are in ``turning_sphere``.
 """
 
 from dataclasses import dataclass
@@ -20,61 +20,65 @@ from models.sensors.rotations import (
     rotation_vector,
 )
 from validation.price.problems import Curves, curves_of_methods, settings_of_curves
-from validation.price.problems.road_excited import DEFAULTS, STAGES
-from validation.price.problems.turning_sphere import Attitudes, in_exudyn, in_mujoco
+from validation.price.problems.road_excited import DEFAULT_SETTING_OWNERS, STAGES_OF_METHOD
+from validation.price.problems.turning_sphere import Attitudes, attitudes_in_exudyn, attitudes_in_mujoco
 
 DURATION, COMPARED_GRID = 600.0, 1.0
-"""s, of the run and between the instants that are compared, which every step meets."""
-SINES = {
+"""Length of the run (s), and spacing (s) of the times at which attitudes are compared, which every step divides."""
+ANGLE_SINES = {
     "roll": ((0.03, 1.1, 0.4), (0.015, 7.3, 1.9)),
     "pitch": ((0.02, 0.9, 2.2), (0.01, 8.1, 0.7)),
     "yaw": ((0.6, 0.05, 0.0), (0.01, 2.7, 1.1)),
 }
-"""Amplitude (rad), circular frequency (rad/s) and phase of the sines of each angle."""
-TURN = 0.02
+"""Amplitude (rad), circular frequency (rad/s) and phase (rad) of the sines of each angle of the car."""
+STEADY_YAW_RATE = 0.02
 """Steady part of the yaw rate, rad/s: two turns in ten minutes."""
-RULES: dict[str, tuple[Rule, int]] = {"held rates": ("held", 1), "mean rates": ("mean", 2), "cubic rates": ("cubic", 4)}
-"""What ``models.sensors.rotations`` offers, and the order."""
+INTEGRATION_RULES: dict[str, tuple[Rule, int]] = {
+    "held rates": ("held", 1),
+    "mean rates": ("mean", 2),
+    "cubic rates": ("cubic", 4),
+}
+"""Rule of ``models.sensors.rotations`` and its order, by the name of the method."""
 FIRST_ORDER_METHODS = {"ExplicitEuler", "Euler", "implicit", "implicitfast", "discrete"}
-"""Methods of first order; all others are of second, because rates are linear between samples."""
-ADAPTIVE = ("DOPRI5", "ODE23")
-"""Methods that are there to be refused."""
+"""Engine methods of first order; all others have order two, because rates are linear between samples."""
+ADAPTIVE_METHODS = ("DOPRI5", "ODE23")
+"""Adaptive methods, which are there to be refused."""
 _RATES, _FEW_RATES = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0), (5.0, 8.0, 10.0, 16.0, 20.0, 25.0)
 _NATIVE, _IMPLICIT = (5.0, 8.0, 10.0, 20.0, 50.0, 100.0), (10.0, 12.0, 16.0, 20.0, 25.0, 100.0)
 FULL_RATES: Curves = {
-    **curves_of_methods("reference", _RATES, *RULES),
+    **curves_of_methods("reference", _RATES, *INTEGRATION_RULES),
     **curves_of_methods("exudyn", _FEW_RATES, "RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler"),
     **curves_of_methods("exudyn", _IMPLICIT, "GeneralizedAlpha 0.9", "VelocityVerlet"),
     ("exudyn", "TrapezoidalIndex2"): (8.0, *_IMPLICIT[:-1]),
-    **curves_of_methods("exudyn", (100.0,), *ADAPTIVE),
+    **curves_of_methods("exudyn", (100.0,), *ADAPTIVE_METHODS),
     ("mujoco", "Euler"): (*_NATIVE, 500.0),
     **curves_of_methods("mujoco", (4.0, *_NATIVE[:-1]), "RK4", "implicit", "implicitfast", "discrete"),
 }
-"""Samples per second of every method; the last two of Exudyn are there to be refused."""
-QUICK: Curves = {("reference", "cubic rates"): (10.0, 20.0, 50.0, 100.0), ("mujoco", "Euler"): (5.0, 10.0, 20.0)}
-"""The named share of FULL_RATES that the quick report takes."""
+"""Sampling rates (Hz) of the gyro by engine and method; Exudyn's last two methods are there to be refused."""
+QUICK_RATES: Curves = {("reference", "cubic rates"): (10.0, 20.0, 50.0, 100.0), ("mujoco", "Euler"): (5.0, 10.0, 20.0)}
+"""Sampling rates (Hz), by engine and method, that the quick report takes."""
 FINE_STEP = 5e-3
-"""Step (s) of the sixth-order method that the closed form is compared with."""
+"""Step (s) of the sixth-order Magnus method that the closed form is compared with."""
 
 
-def angles(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Roll, pitch, yaw (n, 3) in rad at times (n,) in s, and their rates (n, 3) in rad/s."""
+def car_angles(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Roll, pitch and yaw (n, 3) in rad of the car at times (n,) in s, and their rates (n, 3) in rad/s."""
     angle_columns, rates = [], []
-    for name, sines in SINES.items():
-        steady = TURN if name == "yaw" else 0.0
+    for name, sines in ANGLE_SINES.items():
+        steady = STEADY_YAW_RATE if name == "yaw" else 0.0
         angle_columns.append(steady * times + sum(size * np.sin(f * times + phase) for size, f, phase in sines))
         rates.append(steady + sum(size * f * np.cos(f * times + phase) for size, f, phase in sines))
     return np.column_stack(angle_columns), np.column_stack(rates)
 
 
-def attitude(times: np.ndarray) -> np.ndarray:
-    """Quaternions (n, 4) of the motion at times (n,) in s."""
-    return from_cardan(*angles(times)[0].T)
+def car_attitude(times: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4) of the car's attitude at times (n,) in s, in closed form."""
+    return from_cardan(*car_angles(times)[0].T)
 
 
 def gyro(times: np.ndarray) -> np.ndarray:
     """Angular rates (n, 3) in rad/s in body axes at times (n,) in s, as an ideal gyro measures them."""
-    (roll, pitch, _), (by_roll, by_pitch, by_yaw) = (columns.T for columns in angles(times))
+    (roll, pitch, _), (by_roll, by_pitch, by_yaw) = (columns.T for columns in car_angles(times))
     return np.column_stack(
         [
             by_roll - by_yaw * np.sin(pitch),
@@ -84,8 +88,9 @@ def gyro(times: np.ndarray) -> np.ndarray:
     )
 
 
-def magnus(step: float) -> np.ndarray:
-    """Quaternions (n + 1, 4) by the Magnus method of order six, whose rates are read at the three Gauss points.
+def magnus_attitudes(step: float) -> np.ndarray:
+    """Quaternions (n + 1, 4) of the car's attitude by the Magnus method of order six with steps of ``step`` s, which
+    reads the rates at three Gauss points.
 
     The bracket of two rotation vectors is their vector product, with the sign of rates that are local (Blanes, Casas,
     Oteo and Ros, Physics Reports 470, 2009, eq. 257).
@@ -99,11 +104,11 @@ def magnus(step: float) -> np.ndarray:
     second_commutator = np.cross(middle, 2 * bend + odd) / 60
     turn = middle + bend / 12 - np.cross(-20 * middle - bend + odd, slope + second_commutator) / 240
     # a chain of rotations is what rates that are held for one second each make
-    return integrate(np.concatenate([turn, turn[-1:]]), 1.0, attitude(np.zeros(1))[0], "held")
+    return integrate(np.concatenate([turn, turn[-1:]]), 1.0, car_attitude(np.zeros(1))[0], "held")
 
 
-def apart(computed_attitudes: np.ndarray, true_values: np.ndarray) -> float:
-    """Largest angle (rad) between computed and true attitudes (n, 4)."""
+def largest_angle(computed_attitudes: np.ndarray, true_values: np.ndarray) -> float:
+    """Largest angle (rad) between computed and true attitudes, quaternions (n, 4) each."""
     return float(
         np.linalg.norm(
             rotation_vector(quaternion_product(conjugate_quaternion(computed_attitudes), true_values)), axis=-1
@@ -113,22 +118,24 @@ def apart(computed_attitudes: np.ndarray, true_values: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class AttitudeSolver:
-    """One way to integrate an attitude, ready to run: one of our own rules, or a sphere in an engine."""
+    """Integration of the attitude, ready to run: by one of twinrig's rules, or by a rotating sphere in an engine."""
 
     setting: Setting
 
     def run(self) -> Attitudes:
-        """Attitudes at the compared instants; Refused or RunFailed from the engine pass through."""
+        """Attitudes at the compared times; Refused or RunFailed from the engine pass through."""
         engine, method, period = self.setting.engine, self.setting.method, self.setting.value
-        count, stride, start = round(DURATION / period), round(COMPARED_GRID / period), attitude(np.zeros(1))[0]
+        count, stride, start = round(DURATION / period), round(COMPARED_GRID / period), car_attitude(np.zeros(1))[0]
         if engine != "reference":
-            return (in_exudyn if engine == "exudyn" else in_mujoco)(method, period, count, stride, start, gyro)
-        attitudes = integrate(gyro(period * np.arange(count + 1)), period, start, RULES[method][0])
+            return (attitudes_in_exudyn if engine == "exudyn" else attitudes_in_mujoco)(
+                method, period, count, stride, start, gyro
+            )
+        attitudes = integrate(gyro(period * np.arange(count + 1)), period, start, INTEGRATION_RULES[method][0])
         return Attitudes(attitudes[::stride], {"steps": count, "force calls": count})
 
 
 class InertialUnit:
-    """Test problem: attitude from gyro rates, with its reference; see ``validation.price.problems.Problem``."""
+    """Test problem: attitude from gyro rates, with its reference; a ``models.advice.price.problem.Problem``."""
 
     key, duration, bound = "unit", DURATION, 1.0
     note = (
@@ -144,42 +151,44 @@ class InertialUnit:
         )
         self.units = {"attitude": "rad"}
         self.reference = f"closed form, and a Magnus method of order six at {1e3 * FINE_STEP:g} ms"
-        self.true = attitude(COMPARED_GRID * np.arange(round(DURATION / COMPARED_GRID) + 1))
-        self.uncertainty = {"attitude": apart(magnus(FINE_STEP)[:: round(COMPARED_GRID / FINE_STEP)], self.true)}
+        self.true = car_attitude(COMPARED_GRID * np.arange(round(DURATION / COMPARED_GRID) + 1))
+        self.uncertainty = {
+            "attitude": largest_angle(magnus_attitudes(FINE_STEP)[:: round(COMPARED_GRID / FINE_STEP)], self.true)
+        }
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """FULL_RATES, or its named share QUICK."""
+        """Settings of FULL_RATES, or for the quick report of QUICK_RATES."""
         return settings_of_curves(
-            QUICK if quick else FULL_RATES, lambda engine, method, rate: self.setting(engine, method, 1 / rate)
+            QUICK_RATES if quick else FULL_RATES, lambda engine, method, rate: self.setting(engine, method, 1 / rate)
         )
 
     def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
-        """A setting: curve, and the longest step (s) up to ``step_or_tolerance`` for which all compared instants fall
-        on steps.
+        """Setting of an engine and a method: the longest step (s) up to ``step_or_tolerance`` for which all compared
+        times fall on steps.
         """
         step = COMPARED_GRID / np.ceil(COMPARED_GRID / step_or_tolerance * (1 - 1e-9))
-        order = RULES[method][1] if engine == "reference" else 1 if method in FIRST_ORDER_METHODS else 2
-        stages = 1 if engine == "reference" else STAGES.get(method, 0)
+        order = INTEGRATION_RULES[method][1] if engine == "reference" else 1 if method in FIRST_ORDER_METHODS else 2
+        stages = 1 if engine == "reference" else STAGES_OF_METHOD.get(method, 0)
         return Setting(
             engine,
             method,
             float(step),
             order,
-            method in ADAPTIVE,
+            method in ADAPTIVE_METHODS,
             stages,
-            default=DEFAULTS.get((engine, method, float(step)), ""),
+            default=DEFAULT_SETTING_OWNERS.get((engine, method, float(step)), ""),
         )
 
     def build(self, setting: Setting) -> AttitudeSolver:
-        """One way to integrate, ready to run."""
+        """The integration of the attitude by the method and step of a setting, ready to run."""
         return AttitudeSolver(setting)
 
     def errors(self, solution: Attitudes) -> dict[str, float]:
-        """Largest angle between computed and true attitude at the compared instants."""
-        return {"attitude": apart(solution.quaternions, self.true)}
+        """Largest angle (rad) between computed and true attitude at the compared times."""
+        return {"attitude": largest_angle(solution.quaternions, self.true)}
 
 
 @cache
 def problem(quick: bool) -> InertialUnit:
-    """The problem, its reference computed once per process."""
+    """The test problem of the attitude from gyro rates; its reference is computed once per process."""
     return InertialUnit(quick)

@@ -1,4 +1,4 @@
-"""Problem A: the pitch-plane vehicle over the study road, nonlinear in pitch.
+"""Test problem: the pitch-plane vehicle over the study road, nonlinear in pitch.
 
 Quantities of interest: the largest error of a wheel force, which is what durability work reads, and the
 largest error of any state, over every instant that an integrator returns. The road fades in over its
@@ -30,9 +30,9 @@ from models.systems.pitch_plane.scene import build as build_scene
 from validation.price.problems import Curves, curves_of_methods, milliseconds, settings_of_curves
 
 DURATION, SPEED = 2.0, 20.0
-GRID = 1.25e-4
-"""Spacing (s) of the stored reference; every fixed step is a multiple of it."""
-STAGES = {
+REFERENCE_SPACING = 1.25e-4
+"""Spacing (s) of the rows of the stored reference solution; every fixed step is a multiple of it."""
+STAGES_OF_METHOD = {
     "RK44": 4,
     "RK67": 7,
     "RK33": 3,
@@ -45,11 +45,11 @@ STAGES = {
     "implicitfast": 1,
     "discrete": 1,
 }
-"""Force evaluations per step, from the methods' tableaux. Newton iterations are not fixed."""
-DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
-"""What the engines do if not told otherwise: Exudyn 100 steps in 1 s, MuJoCo a timestep of 2 ms."""
+"""Force evaluations per step by method, from the tableaux; methods with Newton iterations have no fixed number."""
+DEFAULT_SETTING_OWNERS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
+"""Owner of each default setting, by engine, method and step (s): 10 ms in Exudyn, 2 ms in MuJoCo."""
 
-MUJOCO = ("RK4", "Euler", "implicit", "implicitfast", "discrete")
+MUJOCO_METHODS = ("RK4", "Euler", "implicit", "implicitfast", "discrete")
 _STEPS = milliseconds(5, 4, 2.5, 2, 1, 0.5, 0.25, 0.125)
 _TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 FULL_STEPS: Curves = {
@@ -67,9 +67,9 @@ FULL_STEPS: Curves = {
     ("exudyn", "DOPRI5"): (1e-2, *_TOLERANCES),
     ("exudyn", "DVERK6"): (1e-6,),
     ("exudyn", "ODE23"): (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
-    **curves_of_methods("mujoco", _STEPS, *MUJOCO),
+    **curves_of_methods("mujoco", _STEPS, *MUJOCO_METHODS),
 }
-QUICK: Curves = {
+QUICK_STEPS: Curves = {
     ("reference", "RK4"): milliseconds(4, 2, 1, 0.5, 0.25),
     ("reference", "LSODA"): (1e-3, 1e-4, 1e-6),
     ("exudyn", "RK44"): milliseconds(5, 4, 2, 1, 0.5, 0.25),
@@ -81,16 +81,16 @@ QUICK: Curves = {
     ("mujoco", "Euler"): milliseconds(5, 2, 1, 0.5, 0.25),
     **curves_of_methods("mujoco", milliseconds(2, 1, 0.5), "implicit", "implicitfast"),
 }
-"""The named share of FULL_STEPS that the quick report takes: each engine's default and fourth-order method, one
+"""Steps (s) or tolerances of the quick report, by engine and method: each engine's default, a fourth-order method, one
 adaptive solver, one that is unstable, one that is refused."""
 
-SOLVERS = {True: (("DOP853", 1e-11), ("LSODA", 1e-12)), False: (("DOP853", 1e-13), ("LSODA", 1e-13))}
+REFERENCE_SOLVERS = {True: (("DOP853", 1e-11), ("LSODA", 1e-12)), False: (("DOP853", 1e-13), ("LSODA", 1e-13))}
 """Reference solvers with their relative tolerances, by ``quick``: an explicit Runge-Kutta method and a multistep
 one."""
 
 
 def scene(duration: float = DURATION):
-    """The scene of the problem."""
+    """The scene of a pitch-plane vehicle on the study road, which lasts ``duration`` s."""
     return build_scene(
         {
             "title": "pitch-plane vehicle on the study road",
@@ -101,8 +101,8 @@ def scene(duration: float = DURATION):
     )
 
 
-def judge(assembly: Assembly, run: Trajectory) -> Result:
-    """Result of a run with the assumptions that it broke."""
+def result_with_assumptions(assembly: Assembly, run: Trajectory) -> Result:
+    """Result of a run, with the assumptions of the assembly that the run broke."""
     channels = output_channels(replace(assembly, sensors=()), run)
     labelled = {name: Channel("time", values, unit, meaning) for name, (unit, meaning, values) in channels.items()}
     time_axis = {"time": Channel("time", run.times, "s")}
@@ -110,26 +110,26 @@ def judge(assembly: Assembly, run: Trajectory) -> Result:
 
 
 def settings_of(setting: Setting, duration: float = DURATION) -> Settings:
-    """A setting converted to the engines' form."""
+    """Engine settings of a setting, for a run of ``duration`` s."""
     return engine_settings(setting, duration)
 
 
 def setting(engine: str, method: str, step_or_tolerance: float) -> Setting:
-    """A setting of this problem, with what the catalogue declares about its method."""
+    """Setting of an engine and a method, with the order, stages and default that the catalogue declares."""
     known = CATALOGUE[engine][method.split()[0]]
     order = 0 if method == "LSODA" else known.order
-    default = DEFAULTS.get((engine, method, step_or_tolerance), "")
-    return Setting(engine, method, step_or_tolerance, order, known.adaptive, STAGES.get(method, 0), default)
+    default = DEFAULT_SETTING_OWNERS.get((engine, method, step_or_tolerance), "")
+    return Setting(engine, method, step_or_tolerance, order, known.adaptive, STAGES_OF_METHOD.get(method, 0), default)
 
 
 def settings(quick: bool) -> tuple[Setting, ...]:
-    """FULL_STEPS, or its named share QUICK."""
-    return settings_of_curves(QUICK if quick else FULL_STEPS, setting)
+    """Settings of FULL_STEPS, or for the quick report of QUICK_STEPS."""
+    return settings_of_curves(QUICK_STEPS if quick else FULL_STEPS, setting)
 
 
-def dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
-    """A scipy solution of the paper's equations that can be evaluated at any time, restarted at points where the road
-    is only C2."""
+def continuous_solution(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
+    """Continuous solution of the paper's equations by a method of scipy, which restarts where the road is only twice
+    differentiable."""
     derivative, p = derivative_of("road", assembly.vehicle.geometry), assembly.parameters.array()
     assert assembly.input is not None
     road_at = assembly.input.at
@@ -152,7 +152,7 @@ def dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
 
 
 class RoadExcited:
-    """Test problem: a vehicle on a road, with its reference solution; see ``validation.price.problems.Problem``."""
+    """Test problem: a vehicle on a road, with its reference solution; a ``models.advice.price.problem.Problem``."""
 
     key, duration = "road", DURATION
     tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
@@ -170,40 +170,40 @@ class RoadExcited:
         )
         self.units = {"wheel force": "N", "state": "m, rad, m/s, rad/s"}
         self.assembly = assembly_of_scene(scene())
-        solvers = SOLVERS[quick]
+        solvers = REFERENCE_SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
-        self._solution = dense(self.assembly, *solvers[0])
-        grid_times = GRID * np.arange(round(DURATION / GRID) + 1)
+        self._solution = continuous_solution(self.assembly, *solvers[0])
+        grid_times = REFERENCE_SPACING * np.arange(round(DURATION / REFERENCE_SPACING) + 1)
         self._states = self._solution(grid_times).T
-        other_solutions = [dense(self.assembly, *solver)(grid_times).T for solver in solvers[1:]]
+        other_solutions = [continuous_solution(self.assembly, *solver)(grid_times).T for solver in solvers[1:]]
         differences = [self._largest_errors(other_solution - self._states) for other_solution in other_solutions]
         self.uncertainty = {name: max(gaps[name] for gaps in differences) for name in self.units}
         signal, p = self.assembly.input, self.assembly.parameters
         assert signal is not None
-        deflections = self._states[:, [0, 1, 4, 5]] - signal.sample(0.0, GRID, len(grid_times))
+        deflections = self._states[:, [0, 1, 4, 5]] - signal.sample(0.0, REFERENCE_SPACING, len(grid_times))
         self.bound = 10 * float(np.abs(deflections[:, :2] * [p.k1, p.k2] + deflections[:, 2:] * [p.d1, p.d2]).max())
 
     def build(self, setting: Setting) -> Model:
-        """The vehicle in one engine."""
+        """The vehicle in the engine of a setting, ready to run."""
         return build(setting.engine, self.assembly, settings_of(setting))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
-        """Largest errors of a wheel force (N) and of a state, at the rows of the solver; the run's assumptions are
-        checked."""
-        judge(self.assembly, solution)
+        """Largest errors of a wheel force (N) and of a state at the rows of a run; assumptions that the run
+        breaks are reported."""
+        result_with_assumptions(self.assembly, solution)
         return self._largest_errors(solution.states - self._reference_states(solution.times))
 
     def _reference_states(self, times: np.ndarray) -> np.ndarray:
-        """Reference states (n, 8): from the stored grid where the times lie on it, else by the solver's own
+        """Reference states (n, 8) at times (n,) in s: from the stored grid if the times lie on it, else by the solver's
         interpolant."""
-        index = np.rint(times / GRID).astype(int)
-        if np.abs(times - GRID * index).max() < 1e-12:
+        index = np.rint(times / REFERENCE_SPACING).astype(int)
+        if np.abs(times - REFERENCE_SPACING * index).max() < 1e-12:
             return self._states[index]
         return self._solution(times).T
 
     def _largest_errors(self, state_errors: np.ndarray) -> dict[str, float]:
-        """Largest errors of wheel force and state from the state differences (n, 8). The road height is the same in
-        both forces and cancels."""
+        """Largest errors of a wheel force (N) and of a state, from state differences (n, 8); the road height cancels in
+        the difference of the forces."""
         p = self.assembly.parameters
         forces = state_errors[:, :2] * [p.k1, p.k2] + state_errors[:, 4:6] * [p.d1, p.d2]
         return {"wheel force": float(np.abs(forces).max()), "state": float(np.abs(state_errors).max())}
@@ -211,5 +211,5 @@ class RoadExcited:
 
 @cache
 def problem(quick: bool) -> RoadExcited:
-    """The problem, its reference computed once per process."""
+    """The test problem of a vehicle on a road; its reference solution is computed once per process."""
     return RoadExcited(quick)

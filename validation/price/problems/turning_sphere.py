@@ -1,4 +1,4 @@
-"""A sphere of unit inertia in an engine under the torque that gives it the sampled rates of a gyro.
+"""A sphere of unit inertia in an engine, under the torque that makes it rotate with the sampled rates of a gyro.
 
 The torque is held from one sample to the next, so that the rates are exact at all samples and linear between them; the
 attitude is the integrator's. Methods that blend a held force with the one before it take the angular acceleration at
@@ -22,26 +22,26 @@ from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_quiet import without_warnings
 from models.sensors.rotations import from_matrix, quaternion_product, rotation_vector
 
-KINDS = exu.OutputVariableType
+OUTPUT_TYPES = exu.OutputVariableType
 Gyro = Callable[[np.ndarray], np.ndarray]
-"""Local rates (n, 3) in rad/s at times (n,) in s."""
-NUDGE = 1e-4
-"""Half the interval (s) of the central difference of the rates: its error is 1e-7 of the second-order methods'."""
+"""Function that returns the local rates (n, 3) in rad/s at times (n,) in s."""
+HALF_DIFFERENCE_INTERVAL = 1e-4
+"""Half the interval (s) of the central difference of the rates; its error is 1e-7 of a second-order method's."""
 
 
 @dataclass(frozen=True)
 class Attitudes:
-    """Quaternions (n, 4) at the compared instants, and counts of work."""
+    """Quaternions (n, 4) at the n compared times, and counts of work."""
 
     quaternions: np.ndarray
     counts: dict[str, int]
 
 
-def in_mujoco(
-    method: str, sample_period: float, step_count: int, stride: int, start_attitude: np.ndarray, gyro: Gyro
+def attitudes_in_mujoco(
+    method: str, sample_period: float, step_count: int, steps_per_row: int, start_attitude: np.ndarray, gyro: Gyro
 ) -> Attitudes:
     """Attitudes of the rotating sphere in MuJoCo: ``step_count`` steps of ``sample_period`` (s) from an attitude (4,),
-    of which every ``stride``-th is kept.
+    of which every ``steps_per_row``-th is kept.
     """
     spec = mujoco.MjSpec()
     spec.option.timestep, spec.option.gravity, spec.option.integrator = sample_period, [0, 0, 0], INTEGRATORS[method]
@@ -59,12 +59,14 @@ def in_mujoco(
             torques,
             control_spec=int(mujoco.mjtState.mjSTATE_QFRC_APPLIED),
         )
-    attitudes = np.vstack([start_attitude, path[0, stride - 1 :: stride, 1:5]])
-    return _sound("mujoco", attitudes, {"steps": step_count, "force calls": (4 if method == "RK4" else 1) * step_count})
+    attitudes = np.vstack([start_attitude, path[0, steps_per_row - 1 :: steps_per_row, 1:5]])
+    return _normalised_attitudes(
+        "mujoco", attitudes, {"steps": step_count, "force calls": (4 if method == "RK4" else 1) * step_count}
+    )
 
 
-def in_exudyn(
-    method: str, sample_period: float, step_count: int, stride: int, start_attitude: np.ndarray, gyro: Gyro
+def attitudes_in_exudyn(
+    method: str, sample_period: float, step_count: int, steps_per_row: int, start_attitude: np.ndarray, gyro: Gyro
 ) -> Attitudes:
     """Attitudes of the rotating sphere in Exudyn; raises Refused for methods whose steps cannot end on samples."""
     name = method.split()[0]
@@ -76,21 +78,23 @@ def in_exudyn(
     pushed = (
         np.diff(rates, axis=0) / sample_period
         if known.holds
-        else (gyro(sample_times + NUDGE) - gyro(sample_times - NUDGE)) / 2 / NUDGE
+        else (gyro(sample_times + HALF_DIFFERENCE_INTERVAL) - gyro(sample_times - HALF_DIFFERENCE_INTERVAL))
+        / 2
+        / HALF_DIFFERENCE_INTERVAL
     )
     implicit = name in ("GeneralizedAlpha", "TrapezoidalIndex2")
     mbs, sensor = _sphere(start_attitude, rates[0], pushed.tolist(), sample_period, implicit, known.holds)
     options = exu.SimulationSettings()
     options.solution.file.write, options.solution.sensors.active = False, True
-    options.solution.sensors.writePeriod = sample_period * stride
+    options.solution.sensors.writePeriod = sample_period * steps_per_row
     options.timeIntegration.automaticStepSize = False
     options.timeIntegration.generalizedAlpha.spectralRadius = 0.9
     note = solve(mbs, Settings(name, sample_period, step_count * sample_period), options)
     stored = mbs.GetSensorStoredData(sensor)[:, 1:]
-    if note or len(stored) != step_count // stride + 1:
-        raise RunFailed("exudyn", "the solver reported failure", sample_period * stride * len(stored))
+    if note or len(stored) != step_count // steps_per_row + 1:
+        raise RunFailed("exudyn", "the solver reported failure", sample_period * steps_per_row * len(stored))
     attitudes = start_attitude + stored[:, 3:] if implicit else from_matrix(stored.reshape(-1, 3, 3))
-    return _sound("exudyn", attitudes, solver_counts(mbs))
+    return _normalised_attitudes("exudyn", attitudes, solver_counts(mbs))
 
 
 def _sphere(
@@ -101,8 +105,8 @@ def _sphere(
     implicit: bool,
     rate_is_held: bool,
 ) -> tuple[Any, Any]:
-    """The sphere's system in Exudyn and its sensor: a rotation vector from the start for explicit methods, Euler
-    parameters for implicit ones."""
+    """Exudyn system of the sphere, and its attitude sensor: a rotation matrix for explicit methods, changes of the
+    Euler parameters for implicit ones."""
     mbs = exu.SystemContainer().AddSystem()
     still, turning = [0.0] * 3, np.concatenate([[0.0], rate])
     if implicit:
@@ -130,15 +134,16 @@ def _sphere(
             nodeNumber=node,
             storeInternal=True,
             writeToFile=False,
-            outputVariableType=KINDS.Coordinates if implicit else KINDS.RotationMatrix,
+            outputVariableType=OUTPUT_TYPES.Coordinates if implicit else OUTPUT_TYPES.RotationMatrix,
         )
     )
     mbs.Assemble()
     return mbs, sensor
 
 
-def _sound(engine: str, attitudes: np.ndarray, work_counts: dict[str, int]) -> Attitudes:
-    """Attitudes normalised to unit length; raises RunFailed if a length differs from 1 by 1 % or is not finite."""
+def _normalised_attitudes(engine: str, attitudes: np.ndarray, work_counts: dict[str, int]) -> Attitudes:
+    """Attitudes with quaternions normalised to unit length; raises RunFailed if a length is not finite or differs from
+    1 by 1 % or more."""
     size = np.linalg.norm(attitudes, axis=1, keepdims=True)
     if not (np.abs(size - 1) < 0.01).all():
         raise RunFailed(engine, "a quaternion is no rotation", 0.0)

@@ -1,4 +1,4 @@
-"""Problems C: a wheel that rolls with FASTSIM at 1, 5 or 20 m/s, released from where it slides, along and across.
+"""Test problems: a wheel rolls at 1, 5 or 20 m/s with creep forces by FASTSIM, and is released from a sliding state.
 
 The creep forces are those of the engines' callback in every solver, so that what differs is the integrator. They have
 kinks wherever a cell begins to slip or to stick, so that no method keeps an order above two, and at low speed not even
@@ -30,59 +30,71 @@ from models.engines.stability import LONG_RUN, limit
 from models.machine.compiled import njit
 from models.machine.stack import start
 from validation.contact.slow_wheels import counting_calls
-from validation.price.force_calls import AT_START
-from validation.price.problems.road_excited import STAGES, setting
+from validation.price.force_calls import START_FORCE_CALLS
+from validation.price.problems.road_excited import STAGES_OF_METHOD, setting
 
 DURATION = 0.1
 """s"""
-CELLS = 11
-LEVEL = np.array([1.0, 1.0, 0.0, 1.0])
-"""The wheel begins at rest on its rail."""
+CONTACT_CELLS = 11
+START_FACTORS = np.array([1.0, 1.0, 0.0, 1.0])
+"""Factors (4,) on the start coordinates and rates of the wheel; the third is 0: it starts in balance on its rail."""
 SMOOTH_SPEED = 20.0
-"""Speed (m/s) from which methods of order two are asked for their order."""
-SLOPE_EVALUATIONS = 16
-"""Evaluations behind one set of slopes."""
-MS = 1e-3
-SOLVERS = (("DOP853", 1e-12), ("LSODA", 1e-12))
+"""Speed (m/s) from which the observed order of second-order methods is judged."""
+JACOBIAN_EVALUATIONS = 16
+"""Force evaluations that one Jacobian of the creep forces counts as."""
+MILLISECOND = 1e-3
+REFERENCE_SOLVERS = (("DOP853", 1e-12), ("LSODA", 1e-12))
 """Reference solvers with their relative tolerances."""
 STEP_RATIOS = (0.5, 1, 1.5, 2, 3, 5, 8)
-"""Steps of a run of an explicit method by the fewest with which it is stable; the first is there to be refused."""
-WITH_SLOPES = "with slopes"
-"""Exudyn's implicit methods by the slopes of the linear theory; otherwise by its own differences of the forces."""
-EXPLICIT = {
+"""Number of steps of an explicit method divided by the fewest with which it is stable; the first is to be refused."""
+JACOBIAN_SUFFIX = "with slopes"
+"""Suffix of Exudyn's implicit methods that get the Jacobian of the linear creep theory; without it, Exudyn computes
+the Jacobian by differences of the forces."""
+EXPLICIT_METHODS = {
     "reference": ("RK4",),
     "exudyn": ("RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler", "VelocityVerlet"),
     "mujoco": ("RK4", "Euler", "implicit", "implicitfast", "discrete"),
 }
-_LONG_STEPS = (10 * MS, 5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS, 0.0625 * MS, 0.02 * MS)
+_LONG_STEPS = (
+    10 * MILLISECOND,
+    5 * MILLISECOND,
+    4 * MILLISECOND,
+    2 * MILLISECOND,
+    1 * MILLISECOND,
+    0.5 * MILLISECOND,
+    0.25 * MILLISECOND,
+    0.125 * MILLISECOND,
+    0.0625 * MILLISECOND,
+    0.02 * MILLISECOND,
+)
 _TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-OTHERS: dict[tuple[str, str], tuple[float, ...]] = {
+OTHER_CURVES: dict[tuple[str, str], tuple[float, ...]] = {
     ("reference", "DOP853"): _TOLERANCES[:6],
     ("reference", "Radau"): (1e-1, 3e-2, *_TOLERANCES[:4]),
     ("reference", "LSODA"): _TOLERANCES,
     ("exudyn", "GeneralizedAlpha 0.9"): _LONG_STEPS,
-    ("exudyn", f"GeneralizedAlpha {WITH_SLOPES}"): _LONG_STEPS,
+    ("exudyn", f"GeneralizedAlpha {JACOBIAN_SUFFIX}"): _LONG_STEPS,
     ("exudyn", "TrapezoidalIndex2"): _LONG_STEPS,
-    ("exudyn", f"TrapezoidalIndex2 {WITH_SLOPES}"): _LONG_STEPS,
+    ("exudyn", f"TrapezoidalIndex2 {JACOBIAN_SUFFIX}"): _LONG_STEPS,
     ("exudyn", "DOPRI5"): _TOLERANCES,
     ("exudyn", "ODE23"): _TOLERANCES,
     ("exudyn", "DVERK6"): (1e-6,),
-    ("mujoco", "Euler"): (2 * MS,),
+    ("mujoco", "Euler"): (2 * MILLISECOND,),
 }
-"""Steps and tolerances that do not go by stability; MuJoCo's is its default."""
-LARGEST_STEP = 5 * MS
-"""Largest step of Exudyn's adaptive solvers, s."""
-QUICK: dict[tuple[str, str], tuple[float, ...]] = {
-    ("reference", "RK4"): (0.25 * MS, 0.125 * MS),
-    ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, 2 * MS, 1 * MS, 0.5 * MS),
-    ("mujoco", "Euler"): (2 * MS, 0.25 * MS, 0.125 * MS, 0.05 * MS),
+"""Steps (s) or tolerances, by engine and method, that are not chosen by stability; MuJoCo's step is its default."""
+LARGEST_STEP = 5 * MILLISECOND
+"""Largest step (s) of Exudyn's adaptive methods."""
+QUICK_STEPS: dict[tuple[str, str], tuple[float, ...]] = {
+    ("reference", "RK4"): (0.25 * MILLISECOND, 0.125 * MILLISECOND),
+    ("exudyn", "GeneralizedAlpha 0.9"): (10 * MILLISECOND, 2 * MILLISECOND, 1 * MILLISECOND, 0.5 * MILLISECOND),
+    ("mujoco", "Euler"): (2 * MILLISECOND, 0.25 * MILLISECOND, 0.125 * MILLISECOND, 0.05 * MILLISECOND),
 }
-"""The named share of it all that the quick report takes."""
+"""Steps (s), by engine and method, that the quick report takes."""
 
 
 @dataclass(frozen=True)
 class WheelsetResult:
-    """Final coordinates and rates (8,), and counts of work."""
+    """Result of a run: final coordinates and rates (8,) of the wheel, and counts of work."""
 
     state: Array
     counts: dict[str, int]
@@ -90,15 +102,15 @@ class WheelsetResult:
 
 @dataclass(frozen=True)
 class WheelsetSolver:
-    """A run by one method, ready to start."""
+    """A run of the rolling wheel by one method, ready to start."""
 
     run: Callable[[], WheelsetResult]
 
 
 @njit(cache=True, error_model="numpy")
 def rates(state, table_of_wheels, table, state_rate):
-    """Fill ``state_rate`` (2 n,) with the time derivatives of coordinates and rates; table (3, n) : masses, springs and
-    dampers."""
+    """Fill ``state_rate`` (2 n,) with the time derivatives of coordinates and rates (2 n,) of rolling wheels; table
+    (3, n) : masses, stiffnesses and dampings."""
     n = table.shape[1]
     state_rate[:n] = state[n:]
     state_rate[n:] = 0.0
@@ -110,7 +122,7 @@ def rates(state, table_of_wheels, table, state_rate):
 
 @njit(cache=True, error_model="numpy")
 def march(state, table_of_wheels, table, step, step_count):
-    """Advance ``state`` in place by ``step_count`` RK4 steps (s)."""
+    """Advance ``state`` (2 n,) in place by ``step_count`` steps of ``step`` s by RK4."""
     total, rate = np.empty(state.size), np.empty(state.size)
     for _ in range(step_count):
         total[:] = 0.0
@@ -124,12 +136,12 @@ def march(state, table_of_wheels, table, step, step_count):
 
 
 class RollingWheels:
-    """Test problem: a rolling wheel with FASTSIM, with its reference solution; see
-    ``validation.price.problems.Problem``."""
+    """Test problem: a rolling wheel with FASTSIM, with its reference solution; a
+    ``models.advice.price.problem.Problem``."""
 
     duration = DURATION
     note = (
-        f"Errors at the end. Every set of slopes that is given to an implicit method counts as {SLOPE_EVALUATIONS} "
+        f"Errors at the end. Every set of slopes that is given to an implicit method counts as {JACOBIAN_EVALUATIONS} "
         "force "
         "calls; Exudyn's own differences count by themselves."
     )
@@ -139,56 +151,61 @@ class RollingWheels:
         self.units = {"creep force": "N", "displacement": "m"}
         self.key = f"wheel-{speed:g}"
         self.title = f"A wheel with FASTSIM at {speed:g} m/s, released from sliding, {DURATION:g} s"
-        self.wheels = Wheels(1, cells=CELLS, speed=speed)
-        self._start = np.concatenate([state_part * LEVEL for state_part in self.wheels.state()])
+        self.wheels = Wheels(1, cells=CONTACT_CELLS, speed=speed)
+        self._start = np.concatenate([state_part * START_FACTORS for state_part in self.wheels.state()])
         self._table = np.array([self.wheels.masses, self.wheels.stiffness, self.wheels.damping])
-        self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in SOLVERS)
-        self._true, other_solution = (self.read(self._run_by_method(*solver).state) for solver in SOLVERS)
+        self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in REFERENCE_SOLVERS)
+        self._true, other_solution = (self.read(self._run_by_method(*solver).state) for solver in REFERENCE_SOLVERS)
         self.uncertainty = self._channel_errors(other_solution)
         self.bound = self.wheels.mu * self.wheels.load
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """All of them, or their named share QUICK."""
-        chosen = [*QUICK.items()] if quick else [*self._explicit(), *OTHERS.items()]
+        """Settings of all curves, or for the quick report of QUICK_STEPS."""
+        chosen = [*QUICK_STEPS.items()] if quick else [*self._explicit_curves(), *OTHER_CURVES.items()]
         return tuple(self.setting(*curve, value) for curve, values in chosen for value in values)
 
-    def _explicit(self) -> list[tuple[tuple[str, str], tuple[float, ...]]]:
-        """Curves with their steps (s), chosen within each explicit method's stability limit."""
+    def _explicit_curves(self) -> list[tuple[tuple[str, str], tuple[float, ...]]]:
+        """Pairs of a curve (engine, method) and its steps (s), chosen by the stability limit of each explicit
+        method."""
         curves = []
-        for engine, method in ((engine, method) for engine, methods in EXPLICIT.items() for method in methods):
+        for engine, method in ((engine, method) for engine, methods in EXPLICIT_METHODS.items() for method in methods):
             like = "Euler" if method == "discrete" else method
-            fewest = math.ceil(1.02 * DURATION / limit(like, 10 * MS, LONG_RUN * MS, linear(self.wheels)))
+            fewest = math.ceil(
+                1.02 * DURATION / limit(like, 10 * MILLISECOND, LONG_RUN * MILLISECOND, linear(self.wheels))
+            )
             curves.append(
                 ((engine, method), tuple(DURATION / round(step_ratio * fewest) for step_ratio in STEP_RATIOS))
             )
         return curves
 
     def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
-        """A setting of this problem: curve, and step (s) or tolerance."""
+        """Setting of an engine and a method with a step (s) or tolerance; without an order if the forces are not smooth
+        enough for it."""
         made_setting = setting(engine, method, step_or_tolerance)
         keeps_order = made_setting.order <= (2 if self.wheels.speed >= SMOOTH_SPEED else 1)
         return made_setting if keeps_order else replace(made_setting, order=0, nominal=made_setting.order)
 
     def build(self, setting: Setting) -> WheelsetSolver:
-        """The wheel in one engine; raises Refused for an unstable step or a missing method."""
+        """The wheel in the engine of a setting, ready to run; raises Refused for an unstable step or a missing
+        method."""
         method = setting.method.split()[0]
         if (setting.engine, method) in MISSING:
             raise Refused(setting.engine, MISSING[setting.engine, method])
         if setting.engine == "exudyn":
-            return self._exudyn(setting, method)
+            return self._solver_in_exudyn(setting, method)
         steps = round(DURATION / setting.value)
         if setting.engine == "mujoco":
-            return self._mujoco(method, steps)
+            return self._solver_in_mujoco(method, steps)
         if not setting.adaptive:
             check_step("reference", self.wheels, method, setting.value, steps)
         return WheelsetSolver(partial(self._run_by_method, method, setting.value))
 
     def errors(self, solution: WheelsetResult) -> dict[str, float]:
-        """Largest errors of the creep forces (N) and of the displacements (m), longitudinal and lateral."""
+        """Largest errors at the end of the run: of a creep force (N), and of a displacement (m)."""
         return self._channel_errors(self.read(solution.state))
 
     def read(self, state: Array) -> dict[str, Array]:
-        """Quantities of a state (8,): creep forces (2,) in N and displacements (2,) in m, longitudinal and lateral."""
+        """Creep forces (2,) in N and displacements (2,) in m of a state (8,), longitudinal and lateral."""
         force = np.zeros(FREEDOMS)
         add_forces(self.wheels.numbers, state[:FREEDOMS].copy(), state[FREEDOMS:].copy(), force)
         return {"creep force": force[:2], "displacement": state[:2]}
@@ -197,7 +214,7 @@ class RollingWheels:
         return {name: float(np.abs(values - self._true[name]).max()) for name, values in channels.items()}
 
     def _run_by_method(self, method: str, step_or_tolerance: float) -> WheelsetResult:
-        """Final state by the written equations: RK4 with steps, or a scipy method at a relative tolerance."""
+        """Final state by the hand-written equations: with RK4 at a step (s), or with scipy at a relative tolerance."""
         state, numbers = self._start.copy(), self.wheels.numbers
         if method == "RK4":
             steps = round(DURATION / step_or_tolerance)
@@ -215,19 +232,23 @@ class RollingWheels:
             raise RunFailed("reference", solution.message)
         return WheelsetResult(solution.y[:, -1], {"steps": solution.t.size - 1, "force calls": int(solution.nfev)})
 
-    def _mujoco(self, method: str, steps: int) -> WheelsetSolver:
+    def _solver_in_mujoco(self, method: str, steps: int) -> WheelsetSolver:
         marcher = Marcher(model(self.wheels, DURATION / steps, method))
 
         def run() -> WheelsetResult:
             with installed(kernel_law(forces)):
                 state = marcher.run(self._start[None], steps)[0, -1]
-            return WheelsetResult(state, {"steps": steps, "force calls": STAGES[method] * steps})
+            return WheelsetResult(state, {"steps": steps, "force calls": STAGES_OF_METHOD[method] * steps})
 
         return WheelsetSolver(run)
 
-    def _exudyn(self, setting: Setting, method: str) -> WheelsetSolver:
+    def _solver_in_exudyn(self, setting: Setting, method: str) -> WheelsetSolver:
         calls, law = [0], Forces(self.wheels)
-        slopes = counting_calls(law.slopes, calls, SLOPE_EVALUATIONS) if setting.method.endswith(WITH_SLOPES) else None
+        slopes = (
+            counting_calls(law.slopes, calls, JACOBIAN_EVALUATIONS)
+            if setting.method.endswith(JACOBIAN_SUFFIX)
+            else None
+        )
         rolling = Rolling(self.wheels, counting_calls(law.of, calls), slopes=slopes)
         steps = round(DURATION / (LARGEST_STEP if setting.adaptive else setting.value))
         tolerance = setting.value if setting.adaptive else 0.0
@@ -237,7 +258,7 @@ class RollingWheels:
             q, v = np.split(self._start, 2)
             state = rolling.run(q, v, steps, DURATION / steps, method, tolerance)
             return WheelsetResult(
-                state, {**solver_counts(rolling.mbs), "force calls": calls[0] - AT_START.get(method, 0)}
+                state, {**solver_counts(rolling.mbs), "force calls": calls[0] - START_FORCE_CALLS.get(method, 0)}
             )
 
         return WheelsetSolver(run)
@@ -245,5 +266,5 @@ class RollingWheels:
 
 @cache
 def problem(quick: bool, speed: float) -> RollingWheels:
-    """The problem at a speed (m/s), its reference computed once per process."""
+    """The test problem of a wheel that rolls at a speed (m/s); its reference is computed once per process."""
     return RollingWheels(speed)

@@ -1,8 +1,8 @@
-"""Problems as sheets that serve without twinrig: equations, numbers, inputs as CSV, end values of the reference.
+"""Problem sheets that serve without twinrig: equations, parameters, inputs as CSV, end values of the reference.
 
     python -m validation.price.sheets FOLDER
 
-One file per system; ``page`` is what they share.
+One file per system; ``page`` holds what they share.
 """
 
 import csv
@@ -10,21 +10,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 from validation.price.sheets import braking, inertial_unit, pitch_plane, ride, vehicle
-from validation.price.sheets.page import Value
+from validation.price.sheets.page import ReferenceValue
 
-WRITERS: tuple[Callable[[Path], list[Value]], ...] = (
+WRITERS: tuple[Callable[[Path], list[ReferenceValue]], ...] = (
     pitch_plane.write,
     braking.write,
     vehicle.write,
     ride.write,
     inertial_unit.write,
 )
-HEADS = ("problem", "quantity", "unit", "time [s]", "value", "uncertainty")
+TABLE_HEADS = ("problem", "quantity", "unit", "time [s]", "value", "uncertainty")
 
 
-def main(folder: Path, writers: tuple[Callable[[Path], list[Value]], ...] = WRITERS) -> None:
-    """Write a problem sheet and its input files for each problem, and ``reference_values.csv`` for all problems."""
+def main(folder: Path, writers: tuple[Callable[[Path], list[ReferenceValue]], ...] = WRITERS) -> None:
+    """Write a problem sheet and its input files for each problem into ``folder``, and one ``reference_values.csv``."""
     values = [value for write in writers for value in write(folder)]
     with open(folder / "reference_values.csv", "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerows([HEADS, *(value.cells() for value in values)])
+        table.writerows([TABLE_HEADS, *(value.cells() for value in values)])

@@ -1,4 +1,4 @@
-"""``python -m validation.price.sheets FOLDER``."""
+"""``python -m validation.price.sheets FOLDER``: write all problem sheets and their input files into a new folder."""
 
 import sys
 from pathlib import Path

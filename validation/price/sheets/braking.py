@@ -1,4 +1,4 @@
-"""Sheet of the anti-lock stop from snow on to a wet road."""
+"""Problem sheet of the anti-lock braking stop from snow on to a wet road."""
 
 from pathlib import Path
 
@@ -11,10 +11,10 @@ from validation.braking.quarter_stops import FRONT_WHEEL
 from validation.braking.sampled_quarter import EMPTY, FILL, LAST_SPEED, SUPPLY
 from validation.price.problems import braking_stop
 from validation.price.problems.braking_stop import SPEED, SURFACE_CHANGE, SURFACES
-from validation.price.sheets.page import Value, columns
+from validation.price.sheets.page import ReferenceValue, write_columns
 from validation.price.sheets.page import write as write_page
 
-BODY = f"""A wheel, and the mass that it carries, are braked straight ahead:
+SHEET_TEXT = f"""A wheel, and the mass that it carries, are braked straight ahead:
 
     m u' = -F        J w' = r F - T        x' = u        F = m g mu(slip)        slip = 1 - r w / u, held to 0 .. 1
 
@@ -37,18 +37,20 @@ Asked for: the stopping distance. After the first sample that ends at u <= {LAST
 rest of the way is u^2 / (2 g mu(1))."""
 
 
-def write(folder: Path) -> list[Value]:
-    """Write the sheet, tyre table and valve commands; returns the reference value of the stopping distance."""
+def write(folder: Path) -> list[ReferenceValue]:
+    """Write the problem sheet, tyre table and valve commands; returns the reference value of the stopping distance."""
     problem = braking_stop.problem(False)
     heads = ("slip", *(f"mu {name}" for name in SURFACES))
-    columns(folder, "braking_friction", heads, np.column_stack([problem.slips, *problem.mu]))
-    columns(folder, "braking_valves", ("valve",), problem.valves[:, None])
-    values = [Value("braking", "stopping distance", "m", 0.0, problem.true, problem.uncertainty["stopping distance"])]
+    write_columns(folder, "braking_friction", heads, np.column_stack([problem.slips, *problem.mu]))
+    write_columns(folder, "braking_valves", ("valve",), problem.valves[:, None])
+    values = [
+        ReferenceValue("braking", "stopping distance", "m", 0.0, problem.true, problem.uncertainty["stopping distance"])
+    ]
     write_page(
         folder,
         "braking",
         problem.title,
-        BODY,
+        SHEET_TEXT,
         f"The distance ({problem.reference}); the uncertainty is the difference of the two.",
         values,
     )

@@ -1,42 +1,42 @@
-"""Sheet of ten minutes of attitude."""
+"""Problem sheet of the attitude from gyro rates over ten minutes."""
 
 from pathlib import Path
 
 from validation.price.problems import inertial_unit
-from validation.price.problems.inertial_unit import DURATION, SINES, TURN
-from validation.price.sheets.page import Value
+from validation.price.problems.inertial_unit import ANGLE_SINES, DURATION, STEADY_YAW_RATE
+from validation.price.sheets.page import ReferenceValue
 from validation.price.sheets.page import write as write_page
 
-NAMES = ("q1", "q2", "q3", "q4")
+QUATERNION_NAMES = ("q1", "q2", "q3", "q4")
 
 
-def write(folder: Path) -> list[Value]:
-    """Write the sheet; returns the reference value of the final quaternion."""
+def write(folder: Path) -> list[ReferenceValue]:
+    """Write the problem sheet into ``folder``; returns the reference values of the final quaternion."""
     problem = inertial_unit.problem(False)
     sure = problem.uncertainty["attitude"]
     values = [
-        Value("unit", name, "", DURATION, float(component), sure)
-        for name, component in zip(NAMES, problem.true[-1], strict=True)
+        ReferenceValue("unit", name, "", DURATION, float(component), sure)
+        for name, component in zip(QUATERNION_NAMES, problem.true[-1], strict=True)
     ]
     return write_page(
         folder,
         "unit",
         problem.title,
-        _body(),
+        _sheet_text(),
         f"The quaternion at {DURATION:g} s ({problem.reference}); the "
         "uncertainty is the largest angle between the two, rad. q and -q are the same attitude.",
         values,
     )
 
 
-def _body() -> str:
+def _sheet_text() -> str:
     angles = "\n".join(
         f"    {name:5s} = "
         + " + ".join(
-            ([f"{TURN:g} t"] if name == "yaw" else [])
+            ([f"{STEADY_YAW_RATE:g} t"] if name == "yaw" else [])
             + [f"{size:g} sin({rate:g} t + {phase:g})" for size, rate, phase in sines]
         )
-        for name, sines in SINES.items()
+        for name, sines in ANGLE_SINES.items()
     )
     return f"""{inertial_unit.InertialUnit.note}
 

@@ -1,4 +1,4 @@
-"""Sheet of the standard deviations of R19-ride on a random road of two tracks."""
+"""Problem sheet of the standard deviations of the vehicle R19-ride on a random road of two tracks."""
 
 from pathlib import Path
 
@@ -6,15 +6,16 @@ import numpy as np
 
 from models.road.two_track import half_track, road_of_level
 from validation.price import ride
-from validation.price.sheets.page import Value, matrices
+from validation.price.sheets.page import ReferenceValue, write_matrices
 from validation.price.sheets.page import write as write_page
 
 
-def write(folder: Path) -> list[Value]:
-    """Write the sheet and its matrices; returns the reference value of each output's standard deviation."""
+def write(folder: Path) -> list[ReferenceValue]:
+    """Write the problem sheet and its matrices into ``folder``; returns the reference standard deviation of each
+    output."""
     problem = ride.problem()
     vehicle = problem.vehicle
-    matrices(
+    write_matrices(
         folder,
         "ride",
         {
@@ -27,17 +28,17 @@ def write(folder: Path) -> list[Value]:
         },
     )
     sure = problem.truth * max(
-        0.5 * problem.uncertainty, float(np.abs(ride.direct_deviations(problem) / problem.truth - 1).max())
+        0.5 * problem.uncertainty, float(np.abs(ride.lyapunov_deviations(problem) / problem.truth - 1).max())
     )
     values = [
-        Value("ride", output.name, output.unit, 0.0, *map(float, known))
+        ReferenceValue("ride", output.name, output.unit, 0.0, *map(float, known))
         for output, *known in zip(vehicle.outputs, problem.truth, sure, strict=True)
     ]
     write_page(
         folder,
         "ride",
         f"Standard deviations of a passenger car of 19 freedoms at {ride.SPEED:g} m/s",
-        _body(problem),
+        _sheet_text(problem),
         "Standard deviations by quadrature over frequencies; the uncertainty holds its own "
         "estimate and the largest relative difference from a Lyapunov equation.",
         values,
@@ -45,7 +46,7 @@ def write(folder: Path) -> list[Value]:
     return values
 
 
-def _body(problem: ride.PricedRide) -> str:
+def _sheet_text(problem: ride.PricedRide) -> str:
     road = road_of_level(half_track(problem.vehicle.wheels))
     wheels = "\n".join(
         f"| {i} | {w.name} | {w.x:.17g} | {w.y:.17g} |" for i, w in enumerate(problem.vehicle.wheels, start=1)

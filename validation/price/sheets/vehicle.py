@@ -1,4 +1,4 @@
-"""Sheet of the passenger car of 19 freedoms that is free on the road."""
+"""Problem sheet of the passenger car of 19 freedoms that moves freely on a road."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,15 +13,15 @@ from validation.price.problems.free_vehicle import (
     DURATION,
     GOLDEN,
     GRAVITY,
-    HEIGHT,
-    LONGEST_SINE,
+    LARGEST_AMPLITUDE,
+    LONGEST_WAVELENGTH,
     RISE_LENGTH,
-    RISE_PLACE,
-    SINES,
+    RISE_STATION,
+    SINE_COUNT,
     SPEED,
     FreeVehicle,
 )
-from validation.price.sheets.page import Value, vector
+from validation.price.sheets.page import ReferenceValue, vector_text
 from validation.price.sheets.page import write as write_page
 
 LAWS = f"""Axes: x forward, y left, z up; every place is given where it lies at rest (m), where all coordinates are 0.
@@ -49,20 +49,20 @@ coordinate of the body. **Drag** along x at its centre: F = -c v x', x' the rate
 **Road**: at time t a tyre at (x, y) meets the height (m) at s = v t + x, v = {SPEED:g} m/s, of its track, n = 0 on the
 left (y > 0) and 1 on the right:
 
-    z = sum_k {HEIGHT:g} / k sin(2 pi (k s / {LONGEST_SINE:g} + {GOLDEN:.16g} k (k + {SINES} n)))
-        / (1 + exp(-(s - {RISE_PLACE:g}) / {RISE_LENGTH:g}))
+    z = sum_k {LARGEST_AMPLITUDE:g} / k sin(2 pi (k s / {LONGEST_WAVELENGTH:g} + {GOLDEN:.16g} k (k + {SINE_COUNT} n)))
+        / (1 + exp(-(s - {RISE_STATION:g}) / {RISE_LENGTH:g}))
 
-with k = 1 .. {SINES}. Start: all coordinates and rates are 0.
+with k = 1 .. {SINE_COUNT}. Start: all coordinates and rates are 0.
 """
 
 
-def write(folder: Path) -> list[Value]:
-    """Write the sheet; returns the reference values of all final coordinates and rates."""
+def write(folder: Path) -> list[ReferenceValue]:
+    """Write the problem sheet; returns the reference values of all final coordinates and rates."""
     problem = free_vehicle.problem(False)
-    sure = np.abs(problem.states - problem.others).max(axis=0)
+    sure = np.abs(problem.states - problem.other_states).max(axis=0)
     values = [
-        Value("vehicle", name, unit, DURATION, *map(float, known))
-        for (name, unit), *known in zip(_states(problem), problem.states[-1], sure, strict=True)
+        ReferenceValue("vehicle", name, unit, DURATION, *map(float, known))
+        for (name, unit), *known in zip(_names_and_units_of_states(problem), problem.states[-1], sure, strict=True)
     ]
     question = (
         "Asked for: the largest error of a tyre force and of an acceleration along z of body, engine or seats at "
@@ -72,14 +72,14 @@ def write(folder: Path) -> list[Value]:
         folder,
         "vehicle",
         problem.title,
-        f"{LAWS}\n{_tables(problem.vehicle)}\n\n{question}",
+        f"{LAWS}\n{_parameter_tables(problem.vehicle)}\n\n{question}",
         f"End values at {DURATION:g} s ({problem.reference}); the uncertainty is the largest difference of the "
         "two over the run.",
         values,
     )
 
 
-def _states(problem: FreeVehicle) -> list[tuple[str, str]]:
+def _names_and_units_of_states(problem: FreeVehicle) -> list[tuple[str, str]]:
     """Names and units of the coordinates, then of their rates."""
     coordinates = [
         (f"{body} {freedom}", "rad" if freedom.startswith("r") else "m")
@@ -88,17 +88,17 @@ def _states(problem: FreeVehicle) -> list[tuple[str, str]]:
     return coordinates + [(f"{name} rate", f"{unit}/s") for name, unit in coordinates]
 
 
-def _tables(vehicle: SpatialVehicle) -> str:
-    """Text with tables of all numbers of the vehicle."""
+def _parameter_tables(vehicle: SpatialVehicle) -> str:
+    """Text with tables of all parameters of a vehicle."""
     preload = preloads(vehicle)
     parts: dict[tuple[str, ...], Sequence[Sequence[Any]]] = {
         ("body", "mass [kg]", "place", "freedoms", "inertia, rows", "parent"): [
             (
                 b.name,
                 b.mass,
-                vector(b.position),
+                vector_text(b.position),
                 " ".join(b.freedoms),
-                " ".join(map(vector, b.inertia)),
+                " ".join(map(vector_text, b.inertia)),
                 b.parent or "space",
             )
             for b in vehicle.bodies
@@ -108,7 +108,7 @@ def _tables(vehicle: SpatialVehicle) -> str:
                 s.name,
                 s.first_body,
                 s.second_body or "ground",
-                *map(vector, (s.first_point, s.second_point, s.axis)),
+                *map(vector_text, (s.first_point, s.second_point, s.axis)),
                 s.stiffness,
                 s.damping,
                 preload.parts[s.name],
@@ -121,7 +121,7 @@ def _tables(vehicle: SpatialVehicle) -> str:
                 b.body,
                 b.left,
                 b.right,
-                *map(vector, (b.point_left, b.point_right)),
+                *map(vector_text, (b.point_left, b.point_right)),
                 b.stiffness,
                 b.damping,
                 preload.parts[b.name],
@@ -129,17 +129,17 @@ def _tables(vehicle: SpatialVehicle) -> str:
             for b in vehicle.bars
         ],
         ("tyre", "body", "place", "k [N/m]", "F0 [N]"): [
-            (t.name, t.body, vector(t.point), t.stiffness, preload.tyres[t.name]) for t in vehicle.tyres
+            (t.name, t.body, vector_text(t.point), t.stiffness, preload.tyres[t.name]) for t in vehicle.tyres
         ],
         ("side force", "body", "point", "C [N/rad]"): [
-            (f.name, f.body, vector(f.point), f.stiffness) for f in vehicle.side_forces
+            (f.name, f.body, vector_text(f.point), f.stiffness) for f in vehicle.side_forces
         ],
         ("drag", "c [N s^2/m^2]"): [(d.body, d.coefficient) for d in vehicle.drags],
     }
-    return "\n\n".join(_table(heads, rows) for heads, rows in parts.items())
+    return "\n\n".join(_markdown_table(heads, rows) for heads, rows in parts.items())
 
 
-def _table(headings: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
-    """Text of a table; its numbers have all digits."""
+def _markdown_table(headings: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
+    """Markdown text of a table; its numbers have all digits."""
     text_rows = [[cell if isinstance(cell, str) else f"{cell:.17g}" for cell in row] for row in rows]
     return "\n".join(f"| {' | '.join(row)} |" for row in (headings, ("---",) * len(headings), *text_rows))

@@ -12,7 +12,7 @@ class Releases:
     def __init__(self, wheels, below=0.8):
         self.below = below
 
-    def sample(self, given):
+    def sample(self, sensor_sample):
         """Valve commands of a sample: -1 releases, 1 applies."""
-        slow = np.asarray(given.wheels) < self.below * np.max(given.wheels)
+        slow = np.asarray(sensor_sample.wheels) < self.below * np.max(sensor_sample.wheels)
         return Command(valves=np.where(slow, -1, 1))

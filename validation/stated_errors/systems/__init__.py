@@ -1,1 +1,1 @@
-"""Random scenes of each system, found by listing."""
+"""Samples of stated and true errors from random scenes, with a module for each system."""

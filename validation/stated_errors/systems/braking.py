@@ -1,5 +1,5 @@
-"""Random stops in random numbers of steps to a sample; the truth is the reference's, or MuJoCo's of a vehicle on its
-suspension, with a hundred times as many."""
+"""Stated errors of random braking stops; the true solution has a hundred times as many steps per sample, by the
+reference, or by MuJoCo for a vehicle on its suspension."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,12 +15,12 @@ from models.systems.braking.errors import motion_and_distance
 from models.systems.braking.march import BrakedVehicle, BrakingPath
 from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene, build
-from validation.stated_errors.sample import Sample, drawn_samples
+from validation.stated_errors.sample import Sample, random_samples
 
 FINER_STEPS = 100
-"""Times as many steps in the truth."""
+"""Ratio of the number of steps of the true solution to that of the run."""
 SURFACES = {"ice": 0.15, "snow": 0.25, "wet": 0.6, "dry": 0.7}
-"""With the friction by which circles are drawn."""
+"""Surfaces of random stops, with a coefficient of friction for the choice of the circle's radius."""
 CONTROLLERS = ("none", "slip_bang_bang", "acceleration_phases", "slip_pi")
 AXLE_DATA = {"track": 1.9, "radius": 0.5, "spin_inertia": 13.35, "roll_share": 0.5}
 TRAILER_DATA = {
@@ -36,76 +36,85 @@ TRAILER_DATA = {
 
 
 def samples(sample_count: int, seed: int) -> Iterator[Sample]:
-    """``sample_count`` samples from stops that come to an end, also those whose result states no error."""
-    return drawn_samples(sample_count, seed, _draw_stop)
+    """Yield ``sample_count`` samples from random braking stops; runs that fail are replaced, results without a stated
+    error are not."""
+    return random_samples(sample_count, seed, _sample_of_random_stop)
 
 
-def _draw_stop(random: np.random.Generator) -> Sample:
-    """Sample from one random stop; raises if the tyres cannot hold the circle or the vehicle rolls over."""
-    engine, scene = str(random.choice(ENGINES)), build(_table(random), "drawn.toml")
+def _sample_of_random_stop(generator: np.random.Generator) -> Sample:
+    """Sample from a random braking stop; raises if the tyres cannot hold the circle or the vehicle rolls over."""
+    engine, scene = str(generator.choice(ENGINES)), build(_random_scene_table(generator), "drawn.toml")
     return _sample_of_stop(scene, engine)
 
 
-def _table(random: np.random.Generator) -> dict[str, Any]:
-    """Table of a random scene with one procedure."""
+def _random_scene_table(generator: np.random.Generator) -> dict[str, Any]:
+    """Table of a random braking scene with one procedure."""
     surface, kind, steps = (
-        str(random.choice(list(SURFACES))),
-        str(random.choice(CONTROLLERS)),
-        int(random.choice(8)) + 1,
+        str(generator.choice(list(SURFACES))),
+        str(generator.choice(CONTROLLERS)),
+        int(generator.choice(8)) + 1,
     )
-    supply = random.uniform(0.9, 2.5) if kind == "none" else random.uniform(3.0, 9.0)
+    supply = generator.uniform(0.9, 2.5) if kind == "none" else generator.uniform(3.0, 9.0)
     table: dict[str, Any] = {
         "title": f"drawn: {kind} on {surface}, {steps} steps",
         "system": "braking",
         "road": {"stretches": [{"left": surface}]},
-        "tyres": {"scale": {"dry": random.uniform(0.6, 1.0)}},
+        "tyres": {"scale": {"dry": generator.uniform(0.6, 1.0)}},
         "brakes": {
             "supply": supply,
-            "front": {"gradient": random.uniform(800.0, 2000.0), "push_out": random.uniform(0.0, 0.8)},
-            "rear": {"gradient": random.uniform(600.0, 1500.0), "push_out": 0.25},
+            "front": {"gradient": generator.uniform(800.0, 2000.0), "push_out": generator.uniform(0.0, 0.8)},
+            "rear": {"gradient": generator.uniform(600.0, 1500.0), "push_out": 0.25},
         },
         "controller": {"kind": kind},
-        "procedures": {"stop": _random_procedure(random, surface)},
-        "run": {"sample": float(random.choice([0.004, 0.0055, 0.01])), "substeps": steps},
+        "procedures": {"stop": _random_procedure(generator, surface)},
+        "run": {"sample": float(generator.choice([0.004, 0.0055, 0.01])), "substeps": steps},
     }
-    if random.random() < 0.2:
-        return table | {"vehicle": {"file": "r19_free", "spin_inertia": 1.0}, "brakes": _random_brakes(random)}
-    table["vehicle"] = {"override": {"mass": random.uniform(4500.0, 9000.0), "yaw_inertia": random.uniform(2e4, 4e4)}}
+    if generator.random() < 0.2:
+        return table | {"vehicle": {"file": "r19_free", "spin_inertia": 1.0}, "brakes": _random_brakes(generator)}
+    table["vehicle"] = {
+        "override": {"mass": generator.uniform(4500.0, 9000.0), "yaw_inertia": generator.uniform(2e4, 4e4)}
+    }
     effects = {
         "load_transfer": {},
-        "pressure": {"fill": random.uniform(0.05, 0.25), "empty": random.uniform(0.05, 0.2)},
+        "pressure": {"fill": generator.uniform(0.05, 0.25), "empty": generator.uniform(0.05, 0.2)},
         "trailer": TRAILER_DATA,
-        "relaxation": {"front": random.uniform(0.2, 0.6), "rear": random.uniform(0.2, 0.6)},
+        "relaxation": {"front": generator.uniform(0.2, 0.6), "rear": generator.uniform(0.2, 0.6)},
     }
     shares = (0.7, 0.8, 0.25, 0.2)
     return table | {
         name: effect_table
         for (name, effect_table), share in zip(effects.items(), shares, strict=True)
-        if random.random() < share
+        if generator.random() < share
     }
 
 
-def _random_brakes(random: np.random.Generator) -> dict[str, Any]:
-    """Random brakes for a vehicle on its suspension."""
-    gradient = random.uniform(200.0, 600.0)
-    return {"supply": random.uniform(1.0, 4.0), "front": {"gradient": gradient}, "rear": {"gradient": 0.5 * gradient}}
+def _random_brakes(generator: np.random.Generator) -> dict[str, Any]:
+    """Table of random brakes for a vehicle on its suspension."""
+    gradient = generator.uniform(200.0, 600.0)
+    return {
+        "supply": generator.uniform(1.0, 4.0),
+        "front": {"gradient": gradient},
+        "rear": {"gradient": 0.5 * gradient},
+    }
 
 
-def _random_procedure(random: np.random.Generator, surface: str) -> dict[str, Any]:
-    kind, speed = str(random.choice(["straight", "split", "turn", "j_turn"])), random.uniform(5.0, 20.0)
-    radius = random.choice([-1.0, 1.0]) * max(speed**2 / (SURFACES[surface] * 9.81 * random.uniform(0.2, 0.6)), 25.0)
-    other_surface = str(random.choice([name for name in SURFACES if name != surface]))
+def _random_procedure(generator: np.random.Generator, surface: str) -> dict[str, Any]:
+    kind, speed = str(generator.choice(["straight", "split", "turn", "j_turn"])), generator.uniform(5.0, 20.0)
+    radius = generator.choice([-1.0, 1.0]) * max(
+        speed**2 / (SURFACES[surface] * 9.81 * generator.uniform(0.2, 0.6)), 25.0
+    )
+    other_surface = str(generator.choice([name for name in SURFACES if name != surface]))
     of_kind = {
         "split": {"right": other_surface},
         "turn": {"radius": radius},
-        "j_turn": {"steer": random.uniform(-0.06, 0.06)},
+        "j_turn": {"steer": generator.uniform(-0.06, 0.06)},
     }
     return {"kind": kind, "speed": speed, **of_kind.get(kind, {})}
 
 
 def _sample_of_stop(scene: BrakingScene, engine: str) -> Sample:
-    """Run a scene with its stated error, and compute its true error by a finer run."""
-    with counted_steps() as calls:
+    """Sample from a run of a braking scene with its stated error; the true error is computed by a finer run."""
+    with counting_steps() as calls:
         try:
             stated_run = run(scene, engine, error=True)
         except RunFailed as error:
@@ -127,8 +136,8 @@ def _sample_of_stop(scene: BrakingScene, engine: str) -> Sample:
 
 
 @contextmanager
-def counted_steps() -> Iterator[list[float]]:
-    """Context that counts the steps of every run."""
+def counting_steps() -> Iterator[list[float]]:
+    """Context that yields a list, to which every braking run within it adds its number of steps."""
     calls, march = list[float](), BrakedVehicle.run
 
     def counting(vehicle: BrakedVehicle, *arguments: Any) -> BrakingPath:

@@ -1,6 +1,6 @@
-"""Random contacts whose stated error is held against ten times the cells along each axis.
+"""Stated errors of random contacts; the true solution has ten times as many cells along each axis.
 
-A call is a cell; of the exact theory every cell feels every other one.
+The work is counted in cells; in the exact theory every cell acts on every other cell.
 """
 
 from collections.abc import Iterator
@@ -13,21 +13,22 @@ from models.contact.theories import RollingContact
 from models.core.discretisation import errors_of, finite_rms
 from models.systems.contact.run import CELL_POWER, run
 from models.systems.contact.scene import ContactScene, build
-from validation.stated_errors.sample import Sample, drawn_samples
+from validation.stated_errors.sample import Sample, random_samples
 
-FINER_CELLS, MOST_CELLS, OF_EXACT = 10, 400, 60
-"""Cells of the truths divided by those of the run; cells at most, along each axis, and those of the exact theory."""
+FINER_CELLS, MOST_CELLS, MOST_CELLS_OF_EXACT_THEORY = 10, 400, 60
+"""Ratio of the true solution's number of cells along each axis to the run's; largest number, and for the exact
+theory."""
 THEORIES = ("fastsim", "fastsim", "fastsim", "simplified", "exact")
 LEAST_CELLS, LARGEST_CELLS = 5, {"fastsim": 50, "simplified": 40, "exact": 14}
-"""Cells along each axis."""
+"""Least and largest number of cells along each axis of a random contact."""
 
 
 def samples(sample_count: int, seed: int) -> Iterator[Sample]:
-    """``sample_count`` samples from random scenes; scenes that are refused are replaced by others."""
-    return drawn_samples(sample_count, seed, lambda random: _sample_of_contact(_draw_scene(random)))
+    """Yield ``sample_count`` samples from random contact scenes; scenes that are refused are replaced."""
+    return random_samples(sample_count, seed, lambda random: _sample_of_contact(_random_scene(random)))
 
 
-def _draw_scene(generator: np.random.Generator) -> ContactScene:
+def _random_scene(generator: np.random.Generator) -> ContactScene:
     theory = str(generator.choice(THEORIES))
     method: dict[str, Any] = {"name": theory, "cells": int(generator.integers(LEAST_CELLS, LARGEST_CELLS[theory]))}
     if theory == "fastsim":
@@ -57,7 +58,7 @@ def _draw_scene(generator: np.random.Generator) -> ContactScene:
 def _sample_of_contact(scene: ContactScene) -> Sample:
     run_ = run(scene, error=True)
     body, motions, cells = run_.detail.contact, run_.detail.motions, scene.method.cells
-    most_cells = OF_EXACT if scene.method.name == "exact" else MOST_CELLS
+    most_cells = MOST_CELLS_OF_EXACT_THEORY if scene.method.name == "exact" else MOST_CELLS
     truth = np.array([_forces_of_motion(body, motion, min(FINER_CELLS * cells, most_cells)) for motion in motions])
     gap = np.column_stack([run_["fx"], run_["fy"], run_["mz"]]) - truth
     true = {"force": finite_rms(np.hypot(gap[:, 0], gap[:, 1])), "mz": finite_rms(gap[:, 2])}

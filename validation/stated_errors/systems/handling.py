@@ -1,5 +1,5 @@
-"""Random manoeuvres of cars on rolling tyres, in random steps and nets; the truth has ten times as many cells across
-and along the patch, and steps an eighth as long: errors are a hundredth and less."""
+"""Stated errors of random manoeuvres of cars; the true solution has ten times as many cells across and along the
+contact patch, and steps an eighth as long, so that its errors are a hundredth or less."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,49 +16,48 @@ from models.engines.free_vehicle import ENGINES, FreeModel
 from models.multibody.forces import CELLS
 from models.systems.handling.run import Drive, drive_run, principal_series, run
 from models.systems.handling.scene import HandlingScene, build
-from validation.stated_errors.sample import Sample, drawn_samples
+from validation.stated_errors.sample import Sample, random_samples
 
 FINER_CELLS, FINER_STEPS = 10, 8
-"""Times that the truth is finer in cells along the patch, and in steps."""
+"""Ratio of the true solution's number of cells along the contact patch, and of steps, to that of the run."""
 
 
 def samples(sample_count: int, seed: int) -> Iterator[Sample]:
-    """``sample_count`` samples from random manoeuvres whose runs come to an end."""
-    return drawn_samples(sample_count, seed, _draw_manoeuvre)
+    """Yield ``sample_count`` samples from random manoeuvres; a scene is replaced if it is refused or its run fails."""
+    return random_samples(sample_count, seed, _sample_of_random_manoeuvre)
 
 
-def _draw_manoeuvre(random: np.random.Generator) -> Sample:
-    """Sample from one random manoeuvre; raises if the tyres cannot be integrated with the step, before an error is
-    estimated."""
-    engine = str(random.choice(ENGINES))
-    return _sample_of_drive(build(_table(random), "drawn.toml"), engine)
+def _sample_of_random_manoeuvre(generator: np.random.Generator) -> Sample:
+    """Sample from a random manoeuvre; raises, before the error is estimated, if the step is too long for the tyres."""
+    engine = str(generator.choice(ENGINES))
+    return _sample_of_drive(build(_random_scene_table(generator), "drawn.toml"), engine)
 
 
-def _table(random: np.random.Generator) -> dict[str, Any]:
-    """Table of a random scene with one manoeuvre; its duration is a multiple of the step."""
-    step, steps = float(f"{10.0 ** random.uniform(-3.4, -2.3):.3g}"), int(random.integers(120, 400))
+def _random_scene_table(generator: np.random.Generator) -> dict[str, Any]:
+    """Table of a random handling scene with one manoeuvre; its duration is a multiple of the step."""
+    step, steps = float(f"{10.0 ** generator.uniform(-3.4, -2.3):.3g}"), int(generator.integers(120, 400))
     lasts = steps * step
     manoeuvre: dict[str, Any] = {
-        "speed": random.uniform(10.0, 35.0),
+        "speed": generator.uniform(10.0, 35.0),
         "duration": lasts,
-        "steer": [[0.1 * lasts, 0.0], [random.uniform(0.3, 0.9) * lasts, random.uniform(-0.08, 0.08)]],
-        "rough": bool(random.integers(2)),
+        "steer": [[0.1 * lasts, 0.0], [generator.uniform(0.3, 0.9) * lasts, generator.uniform(-0.08, 0.08)]],
+        "rough": bool(generator.integers(2)),
     }
-    if pedal := random.choice(["brake", "drive", ""]):
-        manoeuvre[str(pedal)] = [[0.2 * lasts, 0.0], [0.6 * lasts, random.uniform(100.0, 2500.0)]]
+    if pedal := generator.choice(["brake", "drive", ""]):
+        manoeuvre[str(pedal)] = [[0.2 * lasts, 0.0], [0.6 * lasts, generator.uniform(100.0, 2500.0)]]
     return {
         "title": f"drawn, steps of {step:g} s",
         "system": "handling",
-        "tyres": {"friction": random.uniform(0.3, 1.1), "cells": int(random.integers(5, 20))},
-        "road": {"iso8608": str(random.choice(list("ABC"))), "seed": int(random.integers(1000))},
+        "tyres": {"friction": generator.uniform(0.3, 1.1), "cells": int(generator.integers(5, 20))},
+        "road": {"iso8608": str(generator.choice(list("ABC"))), "seed": int(generator.integers(1000))},
         "run": {"step": step},
         "manoeuvres": {"drawn": manoeuvre},
     }
 
 
 def _sample_of_drive(scene: HandlingScene, engine: str) -> Sample:
-    """A run with its stated error, and the true error by a finer run."""
-    with counted_forces() as calls:
+    """Sample from a run of a handling scene with its stated error; the true error is computed by a finer run."""
+    with counting_force_calls() as calls:
         try:
             stated_run = run(scene, engine, error=True)
         except RunFailed as error:
@@ -70,7 +69,7 @@ def _sample_of_drive(scene: HandlingScene, engine: str) -> Sample:
 
 
 def _true_errors(scene: HandlingScene, drive: Drive, engine: str, stated_result: Result) -> dict[str, float]:
-    """True errors of every channel whose error is stated."""
+    """True root mean square error of every channel whose error is stated, by a finer run."""
     manoeuvre = scene.manoeuvres["drawn"]
     fine = scene.model_copy(update={"tyres": scene.tyres.model_copy(update={"cells": FINER_CELLS * scene.tyres.cells})})
     truth = principal_series(
@@ -84,8 +83,9 @@ def _true_errors(scene: HandlingScene, drive: Drive, engine: str, stated_result:
 
 
 @contextmanager
-def counted_forces() -> Iterator[list[float]]:
-    """Context that counts, for every run, evaluations of the forces times cells of the tyres' contact grids."""
+def counting_force_calls() -> Iterator[list[float]]:
+    """Context that yields a list, to which every run within it adds its number of force evaluations times cells of a
+    tyre."""
     calls, march = list[float](), FreeModel.run
 
     def counting(model: FreeModel, q: np.ndarray, v: np.ndarray) -> Trajectory:

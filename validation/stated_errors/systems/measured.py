@@ -1,6 +1,6 @@
-"""Random recordings of a virtual measurement, whose section forces are computed in random engines.
+"""Stated errors of section forces, computed in random engines from random recordings of a virtual measurement.
 
-The truth, measurement and run, has steps a twelfth as long: by their order of 4 its errors are a ten-thousandth.
+The true solution, measurement and run, has steps a twelfth as long: with order 4 its errors are a ten-thousandth.
 """
 
 from collections.abc import Iterator
@@ -14,32 +14,33 @@ from models.core.result import Result
 from models.engines.cut_vehicle import ENGINES
 from models.systems.measured.run import run
 from models.systems.measured.scene import build
-from validation.stated_errors.sample import Sample, drawn_samples
-from validation.stated_errors.systems.hub_forces import counted_forces
+from validation.stated_errors.sample import Sample, random_samples
+from validation.stated_errors.systems.hub_forces import counting_force_calls
 
 FINER_STEPS = 12
-"""Times that the truth's steps are shorter."""
+"""Ratio of the run's step to the step of the true solution."""
 
 
 def samples(sample_count: int, seed: int) -> Iterator[Sample]:
-    """``sample_count`` samples from random recordings whose runs come to an end."""
-    return drawn_samples(sample_count, seed, _draw_recording)
+    """Yield ``sample_count`` samples from random recordings; a recording is replaced if it is refused or its run
+    fails."""
+    return random_samples(sample_count, seed, _sample_of_random_recording)
 
 
-def _draw_recording(random: np.random.Generator) -> Sample:
-    """Sample from one random recording; raises before the run if the step would be unstable."""
-    engine = str(random.choice(ENGINES))
-    return _sample_of_recording(_table(random), engine)
+def _sample_of_random_recording(generator: np.random.Generator) -> Sample:
+    """Sample from a random recording; raises before the run if the step would be unstable."""
+    engine = str(generator.choice(ENGINES))
+    return _sample_of_recording(_random_scene_table(generator), engine)
 
 
-def _table(random: np.random.Generator) -> dict[str, Any]:
-    """Table of a random virtual measurement. The steps of the road run divide its sampling period; the steps of the
-    driven run are equal to it."""
-    period, steps_per_sample = float(f"{10.0 ** random.uniform(-2.9, -2.1):.3g}"), int(random.choice([1, 2]))
+def _random_scene_table(generator: np.random.Generator) -> dict[str, Any]:
+    """Table of a random virtual measurement. The steps of the run on the road divide the sampling period; the steps of
+    the run under the measured forces are equal to it."""
+    period, steps_per_sample = float(f"{10.0 ** generator.uniform(-2.9, -2.1):.3g}"), int(generator.choice([1, 2]))
     road = {
-        "iso8608": str(random.choice(list("BCD"))),
-        "speed": random.uniform(15.0, 45.0),
-        "seed": int(random.integers(99)),
+        "iso8608": str(generator.choice(list("BCD"))),
+        "speed": generator.uniform(15.0, 45.0),
+        "seed": int(generator.integers(99)),
     }
     return {
         "title": f"drawn, every {period:g} s, {steps_per_sample} steps of the road each",
@@ -47,21 +48,22 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
         "vehicle": {"file": "r19_free"},
         "virtual": {
             "road": road,
-            "duration": period * int(random.uniform(2.0, 4.0) / period),
+            "duration": period * int(generator.uniform(2.0, 4.0) / period),
             "sampling_rate": 1.0 / period,
             "step": period / steps_per_sample,
-            "frame": str(random.choice(["hub", "body"])),
-            "faults": {"noise": {"force": random.uniform(0.0, 10.0), "angle": 1e-3, "angular rate": 3e-3}},
+            "frame": str(generator.choice(["hub", "body"])),
+            "faults": {"noise": {"force": generator.uniform(0.0, 10.0), "angle": 1e-3, "angular rate": 3e-3}},
             "format": "csv",
         },
-        "stabilise": {"method": str(random.choice(["none", "kalman", "prescribed"])), "smoothing": 3.0},
+        "stabilise": {"method": str(generator.choice(["none", "kalman", "prescribed"])), "smoothing": 3.0},
     }
 
 
 def _sample_of_recording(table: dict[str, Any], engine: str) -> Sample:
-    """Run a recording with its stated error, and compute its true error."""
+    """Sample from the run of a recording with its stated error; the true error is computed by a finer measurement and
+    run."""
     scene = build(table, "drawn.toml")
-    with counted_forces() as calls:
+    with counting_force_calls() as calls:
         try:
             stated_run = run(scene, engine, error=True)
         except RunFailed as error:
@@ -78,7 +80,7 @@ def _sample_of_recording(table: dict[str, Any], engine: str) -> Sample:
 
 
 def _true_errors(stated_result: Result, truth: Result) -> dict[str, float]:
-    """True errors of every channel whose error is stated."""
+    """True root mean square error of every channel whose error is stated, against a finer run."""
     mine, fine = (run_result.detail.outcome for run_result in (stated_result, truth))
     return {
         name: float(np.sqrt(np.mean((mine.samples(name) - fine.samples(name)[: mine.done]) ** 2)))

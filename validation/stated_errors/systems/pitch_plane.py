@@ -1,6 +1,6 @@
-"""Random runs of the pitch-plane vehicle: every integrator, roads, tyres that lift, wheel forces and what holds the
-pitch, in steps from far too fine to as long as is stable. The truth is the reference in Runge-Kutta steps a hundredth
-as long, which shares no integrator with the engines."""
+"""Stated errors of random runs of the pitch-plane vehicle: every integrator, roads, tyres that lift off, wheel forces
+and stabilisers, in steps from very fine to the longest stable. The true solution is the reference in Runge-Kutta steps
+a hundredth as long, which shares no integrator with the engines."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,28 +22,30 @@ from models.engines.catalogue import CATALOGUE, MISSING
 from models.systems.pitch_plane import run as single
 from models.systems.pitch_plane.scene import Scene, build, parameter_set, settings_of
 from models.systems.pitch_plane.virtual_measurement import measure, write_measurement
-from validation.stated_errors.sample import Sample, drawn_samples
+from validation.stated_errors.sample import Sample, random_samples
 
 FINER_STEPS, FINEST_STEP = 100, 2e-6
-"""Ratio of the run's step to the truth's, and the shortest step (s) of a truth, which that of adaptive methods has."""
+"""Ratio of the run's step to that of the true solution, and shortest step (s) of a true solution, which is taken for
+runs by adaptive methods."""
 SAMPLING_PERIODS = (1e-3, 2e-3, 5e-3)
-"""Sampling periods (s) of wheel forces and pitch."""
+"""Sampling periods (s) of measured wheel forces and pitch."""
 
 
 def samples(sample_count: int, seed: int) -> Iterator[Sample]:
-    """``sample_count`` samples from random runs; scenes that an engine refuses are replaced by others."""
+    """Yield ``sample_count`` samples from random runs of the pitch-plane vehicle; scenes that an engine refuses are
+    replaced."""
     with TemporaryDirectory() as folder:
-        yield from drawn_samples(sample_count, [seed, 1], lambda random: _sample_of_run(random, Path(folder)))
+        yield from random_samples(sample_count, [seed, 1], lambda generator: _sample_of_run(generator, Path(folder)))
 
 
-def _sample_of_run(random: np.random.Generator, folder: Path) -> Sample:
-    """Sample from one random run; raises for an unstable step, and for an interpolation that the method cannot use."""
-    engine = str(random.choice(["reference", "exudyn", "mujoco"]))
+def _sample_of_run(generator: np.random.Generator, folder: Path) -> Sample:
+    """Sample from a random run; raises for an unstable step, and for an interpolation that the method cannot use."""
+    engine = str(generator.choice(["reference", "exudyn", "mujoco"]))
     known = [name for name in CATALOGUE[engine] if (engine, name) not in MISSING]
-    integrator = str(random.choice(known))
-    scene = _scene(random, folder, engine, integrator)
+    integrator = str(generator.choice(known))
+    scene = _random_scene(generator, folder, engine, integrator)
     with _count_force_calls() as calls:
-        run = _run(scene, engine)
+        run = _run_with_error(scene, engine)
     truth = _reference_run(scene, engine)
     estimates = errors_of(run)
     true = {name: float(np.sqrt(np.mean((run[name] - _truth_at(truth, name, run.times)) ** 2))) for name in estimates}
@@ -53,7 +55,7 @@ def _sample_of_run(random: np.random.Generator, folder: Path) -> Sample:
     return Sample(sample_name, engine, estimates, true, calls[0], sum(calls[1:]))
 
 
-def _run(scene: Scene, engine: str) -> Result:
+def _run_with_error(scene: Scene, engine: str) -> Result:
     try:
         return single.run(scene, engine, error=True)
     except RunFailed as failure:
@@ -63,7 +65,7 @@ def _run(scene: Scene, engine: str) -> Result:
 
 
 def _reference_run(scene: Scene, engine: str) -> Result:
-    """The reference's run with steps that divide the scene's."""
+    """Result of the reference with fine steps, which divide the steps of the scene."""
     settings = settings_of(scene, engine)
     step, adaptive = settings.step, CATALOGUE[engine][settings.integrator].adaptive
     finer = max(1, round(step / FINEST_STEP if adaptive else min(FINER_STEPS, step / FINEST_STEP)))
@@ -71,7 +73,7 @@ def _reference_run(scene: Scene, engine: str) -> Result:
 
 
 def _truth_at(truth: Result, name: str, times: np.ndarray) -> np.ndarray:
-    """A channel of the true run at times (n,): at its rows, or by a cubic spline if the times lie between them."""
+    """Channel of the true solution at times (n,) in s: its rows, or a cubic spline if the times lie between them."""
     rows = np.clip(np.searchsorted(truth.times, times - 1e-9), 0, len(truth.times) - 1)
     if np.abs(truth.times[rows] - times).max() < 1e-9:
         return truth[name][rows]
@@ -80,7 +82,7 @@ def _truth_at(truth: Result, name: str, times: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def _count_force_calls() -> Iterator[list[float]]:
-    """Context that counts the force calls of every run."""
+    """Context that yields a list, to which every run within it adds its number of force calls."""
     calls: list[float] = []
     build_model = single.build
 
@@ -100,10 +102,13 @@ def _count_force_calls() -> Iterator[list[float]]:
         yield calls
 
 
-def _scene(generator: np.random.Generator, folder: Path, engine: str, integrator: str) -> Scene:
+def _random_scene(generator: np.random.Generator, folder: Path, engine: str, integrator: str) -> Scene:
     table: dict[str, Any] = {
         "title": "random",
-        "vehicle": {"geometry": str(generator.choice(["exact", "exact", "linear"])), "override": _vehicle(generator)},
+        "vehicle": {
+            "geometry": str(generator.choice(["exact", "exact", "linear"])),
+            "override": _random_parameters(generator),
+        },
         "effects": {},
         "run": {"duration": float(generator.choice([1.0, 2.0, 3.0]))},
     }
@@ -114,18 +119,18 @@ def _scene(generator: np.random.Generator, folder: Path, engine: str, integrator
     kind = str(generator.choice(["free", "road", "road", "road", "forces", "forces"]))
     if kind == "free":
         table["start"] = {"pitch": float(generator.uniform(-0.1, 0.1)), "z3": float(generator.uniform(-0.1, 0.1))}
-        table["effects"] = _lift_off(generator)
+        table["effects"] = _random_lift_off(generator)
     elif kind == "road":
-        table["effects"] = {"road": _road(generator, folder), **_lift_off(generator)}
+        table["effects"] = {"road": _random_road(generator, folder), **_random_lift_off(generator)}
     else:
-        table["effects"] = _forces(generator, folder, table)
+        table["effects"] = _random_force_effects(generator, folder, table)
     period = table.pop("period", None)
-    table["run"]["step"] = _step(generator, table["run"]["duration"], period)
+    table["run"]["step"] = _random_step(generator, table["run"]["duration"], period)
     return build(table, "random.toml", folder)
 
 
-def _vehicle(generator: np.random.Generator) -> dict[str, float]:
-    """A published vehicle with random parameters: each half to twice the published one, dampers down to a tenth."""
+def _random_parameters(generator: np.random.Generator) -> dict[str, float]:
+    """Random parameters of a published vehicle by name: factors from 0.6 to 1.6, suspension dampers down to a tenth."""
     p = parameter_set(str(generator.choice(["itwm_drift", "asymmetric_twin"])), "", Path())
     softer = float(generator.choice([1.0, 0.3, 0.1]))
     return {
@@ -135,11 +140,11 @@ def _vehicle(generator: np.random.Generator) -> dict[str, float]:
     }
 
 
-def _lift_off(generator: np.random.Generator) -> dict[str, Any]:
+def _random_lift_off(generator: np.random.Generator) -> dict[str, Any]:
     return {"lift_off": {}} if generator.random() < 0.5 else {}
 
 
-def _road(generator: np.random.Generator, folder: Path) -> dict[str, Any]:
+def _random_road(generator: np.random.Generator, folder: Path) -> dict[str, Any]:
     speed = float(generator.uniform(5.0, 35.0))
     source = str(generator.choice(["study", "hills", "iso8608", "csv"]))
     options: dict[str, Any] = {}
@@ -155,8 +160,9 @@ def _road(generator: np.random.Generator, folder: Path) -> dict[str, Any]:
     return {"source": source, "speed": speed, **options}
 
 
-def _forces(generator: np.random.Generator, folder: Path, table: dict[str, Any]) -> dict[str, Any]:
-    """Random wheel forces from a virtual measurement, sometimes with noise, sometimes with a prescribed pitch."""
+def _random_force_effects(generator: np.random.Generator, folder: Path, table: dict[str, Any]) -> dict[str, Any]:
+    """Table of effects: wheel forces from a virtual measurement, sometimes with noise, often with a random
+    stabiliser."""
     period, duration = float(generator.choice(SAMPLING_PERIODS)), table["run"]["duration"]
     road = {"source": "study", "speed": float(generator.uniform(8.0, 25.0))}
     on_road = build(
@@ -189,8 +195,8 @@ def _forces(generator: np.random.Generator, folder: Path, table: dict[str, Any])
     return {"wheel_forces": forces, **noise, **holds[int(generator.integers(len(holds)))]}
 
 
-def _step(generator: np.random.Generator, duration: float, sample_period: float | None) -> float:
-    """A random step from 20 microseconds to 8 ms that divides the duration and the period."""
+def _random_step(generator: np.random.Generator, duration: float, sample_period: float | None) -> float:
+    """Random step (s) from 20 microseconds to 8 ms that divides the duration and the sampling period."""
     wanted = float(np.exp(generator.uniform(np.log(2e-5), np.log(8e-3))))
     divided_time = duration if sample_period is None else sample_period
     step = divided_time / max(1, round(divided_time / wanted))

@@ -1,5 +1,5 @@
-"""Samples of rides: covariances beside extended precision, drives beside shorter steps, copies beside many more, and
-engines in time beside runs a hundred times finer on the same road."""
+"""Stated errors of random rides: covariances against extended precision, drives against shorter steps, Monte Carlo
+copies against many more, and engines' runs against runs with a hundredth of the step on the same road."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -28,22 +28,22 @@ from models.vehicles.spatial_linear import linearise, wheels
 from validation.stated_errors.sample import Sample
 
 FINER_STEPS = 100
-"""Times that a truth's steps are shorter."""
+"""Ratio of the run's step to the step of the true solution."""
 TRUTH_COPIES = 2000
-"""Copies of a truth."""
+"""Number of Monte Carlo copies of the true solution."""
 ENGINES = ("exudyn", "mujoco")
 
 
 def samples(sample_count: int, seed: int) -> Iterator[Sample]:
-    """``sample_count`` samples from random rides of all kinds in turn."""
+    """Yield ``sample_count`` samples from random rides: runs in time, sweeps, drives and Monte Carlo copies in turn."""
     rng = np.random.default_rng(seed)
     kinds = (_sample_in_time, _sample_of_sweep, _sample_in_time, _sample_of_drive, _sample_in_time, _sample_of_copies)
     for i in range(sample_count):
         yield kinds[i % len(kinds)](rng, i)
 
 
-def _scene(generator: np.random.Generator, file: str, point: str = "unloaded", **tables: Any) -> RideScene:
-    """Random ride scene, with random level, corners and correlation of the road."""
+def _random_scene(generator: np.random.Generator, file: str, point: str = "unloaded", **tables: Any) -> RideScene:
+    """Ride scene of a vehicle file with a random level, random corners and sometimes a random cutoff of the road."""
     road = {
         "level": float(10 ** generator.uniform(-6.0, -4.3)),
         "corner_mean": float(generator.uniform(0.02, 0.5)),
@@ -55,7 +55,7 @@ def _scene(generator: np.random.Generator, file: str, point: str = "unloaded", *
 
 
 def _varied_vehicle(generator: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle:
-    """The vehicle with random changes of stiffnesses and dampings."""
+    """The vehicle with its stiffnesses and dampings randomly changed."""
     springs = tuple(
         replace(s, stiffness=s.stiffness * generator.uniform(0.6, 1.6), damping=s.damping * generator.uniform(0.5, 1.8))
         for s in vehicle.springs
@@ -65,17 +65,18 @@ def _varied_vehicle(generator: np.random.Generator, vehicle: SpatialVehicle) -> 
 
 
 def _sample_of(
-    result: Result, name: str, engine: str, true_errors: Mapping[str, float], calls: float, extra: float
+    result: Result, name: str, engine: str, true_errors: Mapping[str, float], calls: float, extra_calls: float
 ) -> Sample:
     estimates = {channel: estimate for channel, estimate in errors_of(result).items() if channel in true_errors}
-    return Sample(name, engine, estimates, true_errors, calls, extra)
+    return Sample(name, engine, estimates, true_errors, calls, extra_calls)
 
 
 def _sample_of_sweep(generator: np.random.Generator, sample_number: int) -> Sample:
-    """Sample from the deviations of a linear vehicle at nine speeds, whose truth is computed in extended precision."""
+    """Sample from the standard deviations of a linear vehicle at nine random speeds; the true ones are computed in
+    extended precision."""
     file = str(generator.choice(["quarter_car", "half_car", "seven_freedoms"]))
     engine = str(generator.choice(["reference", *ENGINES]))
-    scene = _scene(generator, file, speeds={"values": sorted(generator.uniform(2.0, 60.0, 9).tolist())})
+    scene = _random_scene(generator, file, speeds={"values": sorted(generator.uniform(2.0, 60.0, 9).tolist())})
     vehicle = _varied_vehicle(generator, vehicle_of(scene))
     result = run(scene, engine, vehicle=vehicle, error=True)
     road, deviation = excitation_of(scene, wheels(vehicle)), result["deviation"][0]
@@ -87,19 +88,20 @@ def _sample_of_sweep(generator: np.random.Generator, sample_number: int) -> Samp
     )
 
 
-def exact_deviations(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
-    """Standard deviations (p,) of a vehicle with undamped tyres in extended precision, from its matrices."""
-    system, n, m = vehicle_with_road(linear, road, speed), len(linear.mass), len(road.F)
+def exact_deviations(linear_vehicle: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
+    """Standard deviations (p,) of the outputs of a linear vehicle with undamped tyres, computed in extended
+    precision."""
+    system, n, m = vehicle_with_road(linear_vehicle, road, speed), len(linear_vehicle.mass), len(road.F)
     A, C = system.A.astype(np.longdouble), system.C.astype(np.longdouble)
-    forces = np.hstack([linear.road_stiffness.astype(np.longdouble) @ heights for heights in road.heights])
-    wanted = np.hstack([-linear.stiffness, -linear.damping, forces])
+    forces = np.hstack([linear_vehicle.road_stiffness.astype(np.longdouble) @ heights for heights in road.heights])
+    wanted = np.hstack([-linear_vehicle.stiffness, -linear_vehicle.damping, forces])
     for _ in range(3):
-        left = wanted - linear.mass.astype(np.longdouble) @ A[n : 2 * n]
-        A[n : 2 * n] += np.linalg.solve(linear.mass, left.astype(float))
+        left = wanted - linear_vehicle.mass.astype(np.longdouble) @ A[n : 2 * n]
+        A[n : 2 * n] += np.linalg.solve(linear_vehicle.mass, left.astype(float))
     A[2 * n :, 2 * n :] = np.kron(np.eye(len(road.heights)), speed * road.F.astype(np.longdouble)).reshape(
         len(road.heights) * m, -1
     )
-    C += linear.read.acceleration_factors @ (A - system.A)[n : 2 * n]
+    C += linear_vehicle.read.acceleration_factors @ (A - system.A)[n : 2 * n]
     met = noise_arrivals(system)
     earlier_response, Q = np.zeros_like(met.B[0], np.longdouble), np.zeros_like(A)
     for j, b in enumerate(met.B):
@@ -128,14 +130,14 @@ def _exponential(A: np.ndarray) -> np.ndarray:
 
 
 def _sample_of_drive(generator: np.random.Generator, sample_number: int) -> Sample:
-    """Sample from a drive with two sections, whose truth has steps eight times shorter (error about 1e-9 of the step's
-    own)."""
+    """Sample from a drive at varying speed with two sections; the true solution has steps an eighth as long, so that
+    its error is about 1e-9 of the run's."""
     first = float(generator.choice([0.0, generator.uniform(2.0, 15.0)]))
     drive = {
         "time": [0.0, float(generator.uniform(1.0, 2.0)), 3.0],
         "speed": [first, *generator.uniform(3.0, 30.0, 2).tolist()],
     }
-    scene = _scene(generator, "quarter_car", drive=drive, study="ride_drive")
+    scene = _random_scene(generator, "quarter_car", drive=drive, study="ride_drive")
     vehicle = _varied_vehicle(generator, vehicle_of(scene))
     engine = str(generator.choice(["reference", *ENGINES]))
     result = run(scene, engine, vehicle=vehicle, error=True)
@@ -157,10 +159,10 @@ def _sample_of_drive(generator: np.random.Generator, sample_number: int) -> Samp
 
 
 def _sample_of_copies(generator: np.random.Generator, sample_number: int) -> Sample:
-    """Sample from Monte Carlo copies and statistical linearisation of a nonlinear quarter car; the truth has many more
-    copies and shorter steps. Both contain random scatter."""
+    """Sample from Monte Carlo copies and statistical linearisation of a nonlinear quarter car; the true solution has
+    many more copies and shorter steps. Both contain random scatter."""
     speed = float(generator.uniform(5.0, 35.0))
-    scene = _scene(generator, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
+    scene = _random_scene(generator, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
     vehicle, sampling = vehicle_of(scene), Sampling(beside=[speed], copies=100, lasting=6.0, seed=sample_number)
     result = linearised_result(scene, vehicle, sampling, lambda text, share: None, error=True)
     run, road = result.detail.copies[speed], excitation_of(scene, wheels(vehicle))
@@ -187,17 +189,17 @@ def _sample_of_copies(generator: np.random.Generator, sample_number: int) -> Sam
 
 
 def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sample:
-    """Sample from a run in time with nonlinear springs or tyres that lift, whose truth has much shorter steps on the
-    same road."""
+    """Sample from a run in time with nonlinear springs or tyres that lift off; the true solution has much shorter steps
+    on the same road."""
     bent, speed = generator.random() < 0.5, float(generator.uniform(5.0, 40.0))
     file = "quarter_car_nonlinear" if bent else str(generator.choice(["quarter_car", "half_car", "seven_freedoms"]))
     tables: dict[str, Any] = {"speeds": {"values": [speed]}, "study": "ride_nonlinear"}
     tables |= {} if bent else {"effects": {"lift_off": {}}}
-    scene = _scene(generator, file, "loaded", **tables)
+    scene = _random_scene(generator, file, "loaded", **tables)
     vehicle, engine = _varied_vehicle(generator, vehicle_of(scene)), str(generator.choice(ENGINES))
     sampling = Sampling(step=float(10 ** generator.uniform(-3.7, -2.5)), driven=3.0, skipped=0.5, seed=sample_number)
     road = excitation_of(scene, wheels(vehicle))
-    path = _path(scene, engine, vehicle, sampling, road, speed)
+    path = _road_path_of_run(scene, engine, vehicle, sampling, road, speed)
     steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half=path.half / FINER_STEPS)
     table = finer.table(steps * FINER_STEPS, sample_number)
     try:
@@ -215,10 +217,10 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
     return _sample_of(result, name, engine, true, calls, 0.54 * RUNGE_KUTTA_ORDER * steps + read)
 
 
-def _path(
+def _road_path_of_run(
     scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: Sampling, road: Excitation, speed: float
 ) -> RoadPath:
-    """The road path with the step that ``in_engine`` uses."""
+    """Road path with the step that ``in_engine`` uses."""
     from models.ride.nonlinear_copies import longest_resolving_step
     from models.ride.road_path import road_path
     from models.systems.ride.nonlinear import LONGEST_STEP

@@ -1,7 +1,8 @@
-"""Random held wheelsets whose stated error is held against four times the cells along each axis.
+"""Stated errors of the contacts of a wheelset at prescribed positions; the true solution has four times as many cells
+along each axis.
 
-A call is a cell of a patch. More cells than that are no better a truth: areas are counted in whole cells, and their
-error falls with the first power.
+The work is counted in cells of a patch. More cells would not be more accurate: areas are counted in whole cells, and
+their error falls with the first power.
 """
 
 from collections.abc import Iterator
@@ -12,17 +13,17 @@ import numpy as np
 from models.core.discretisation import errors_of, finite_rms
 from models.systems.wheel_rail.run import POSITIONS_PER_ERROR, WHEEL_QUANTITIES, run, wheel_sums
 from models.systems.wheel_rail.scene import WheelRailScene, build
-from validation.stated_errors.sample import Sample, drawn_samples
+from validation.stated_errors.sample import Sample, random_samples
 
 FINER_CELLS, POSITION_COUNT = 4.0, 4
 
 
 def samples(sample_count: int, seed: int) -> Iterator[Sample]:
-    """``sample_count`` samples from random scenes; scenes that fail or are refused are replaced by others."""
-    return drawn_samples(sample_count, seed, lambda random: _sample_of_position(_draw_scene(random)))
+    """Yield ``sample_count`` samples from random wheel-rail scenes; scenes that fail or are refused are replaced."""
+    return random_samples(sample_count, seed, lambda random: _sample_of_position(_random_scene(random)))
 
 
-def _draw_scene(generator: np.random.Generator) -> WheelRailScene:
+def _random_scene(generator: np.random.Generator) -> WheelRailScene:
     start = float(generator.uniform(-0.004, 0.004))
     rolls = generator.random() < 0.6
     case = {"yaw": float(generator.uniform(0.0, 3.0)), "friction": float(generator.uniform(0.1, 0.5))} if rolls else {}

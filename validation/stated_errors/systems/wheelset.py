@@ -1,7 +1,7 @@
-"""Random wheelsets whose stated error is held against steps an eighth as long and against ten times the cells.
+"""Stated errors of random wheelsets; the true solutions have steps an eighth as long, or ten times as many cells.
 
-A call is a cell of FASTSIM in a stage of a step, or with the linear law a stage. Truths are paths of the reference,
-from which the engines are 1e-11 apart.
+The work is counted in cells of FASTSIM in a stage of a step, or in stages with the linear law. True solutions are runs
+of the reference, from which the engines differ by 1e-11.
 """
 
 import math
@@ -18,21 +18,21 @@ from models.systems.wheelset import run as system
 from models.systems.wheelset.of_scene import equations_of
 from models.systems.wheelset.scene import WheelsetScene, build
 from models.systems.wheelset.stated_error import principal_series, with_step_factor
-from validation.stated_errors.sample import Sample, drawn_samples
+from validation.stated_errors.sample import Sample, random_samples
 
 ENGINES = ("reference", "exudyn", "mujoco")
 FINER_STEPS, FINER_CELLS, MOST_CELLS = 8.0, 10, 200
-"""Steps and cells of the truths divided by those of the run; cells at most."""
+"""Ratio of the run's step to the true solution's, of the true solution's cells to the run's, and most cells."""
 LONGEST_STEP_FACTOR = 2.4
-"""Steps by the fastest motion's rate, at most."""
+"""Longest step multiplied by the rate (1/s) of the fastest motion, the largest |eigenvalue|."""
 
 
 def samples(sample_count: int, seed: int) -> Iterator[Sample]:
-    """``sample_count`` samples from random scenes; scenes that fail or are refused are replaced by others."""
-    return drawn_samples(sample_count, seed, lambda random: _sample_of_path(*_draw_scene(random)))
+    """Yield ``sample_count`` samples from random wheelset scenes; scenes that fail or are refused are replaced."""
+    return random_samples(sample_count, seed, lambda random: _sample_of_path(*_random_scene(random)))
 
 
-def _draw_scene(generator: np.random.Generator) -> tuple[WheelsetScene, str, float]:
+def _random_scene(generator: np.random.Generator) -> tuple[WheelsetScene, str, float]:
     speed, profiled = float(generator.uniform(8.0, 90.0)), generator.random() < 0.25
     override = {
         "stiffness_x": 10.0 ** generator.uniform(4.7, 6.3),
@@ -89,7 +89,7 @@ def _count_of_cells(scene: WheelsetScene) -> float:
 def _true_errors(
     scene: WheelsetScene, run: Result, march_scene: Callable[[WheelsetScene], WheelsetPath]
 ) -> Mapping[str, float]:
-    """True errors by steps and by cells, for the channels of the estimates."""
+    """True root mean square errors of a run's channels: by shorter steps, and by more cells ("NAME of cells")."""
     fine = principal_series(run.detail)
     true = _rms_differences(fine, principal_series(march_scene(with_step_factor(scene, 1.0 / FINER_STEPS))))
     if scene.contact.law == "linear":
