@@ -85,9 +85,9 @@ def _fitting(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[
     if not mechanism.springs:
         return mechanism, {}
     shift = output.columns["Pos"][0] - mechanism.centre
-    moved = mechanism if starts_with_mechanism(mechanism, output) else mechanism.moved(shift)
+    moved = mechanism if starts_with_mechanism(mechanism, output) else mechanism.displaced(shift)
     (spring,) = moved.springs
-    travel, rate, law = _sprung(moved, output)
+    travel, rate, law = _springdamper_parameters(moved, output)
     law_force = spring.stiffness * (travel - spring.free_length) + spring.damping * rate
     if moved is mechanism and np.abs(law_force - law).max() <= FORCE_BOUND * np.abs(law).max():
         return mechanism, {}
@@ -98,15 +98,19 @@ def _fitting(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[
     return moved.with_spring(stiffness=stiffness, damping=damping, free_length=constants["rest"]), constants
 
 
-def _sprung(mechanism: Mechanism, output: OutputFile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _springdamper_parameters(mechanism: Mechanism, output: OutputFile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Travel and rate of the only spring during the output's motion, and the spring force (m,) by the output, positive
     in extension."""
     (spring,), motion = mechanism.springs, output.motion(mechanism)
-    if spring.turns:
+    if spring.is_rotational:
         axis = mechanism.ground.axes[:, 2]
-        return np.unwrap(np.arctan2(*_angle(motion, axis))), motion.turning @ axis, output.columns["Rtorque"] @ axis
-    arm = motion.turned @ (spring.body - mechanism.centre)
-    apart, speed = motion.place + arm - spring.ground, motion.velocity + np.cross(motion.turning, arm)
+        return (
+            np.unwrap(np.arctan2(*_angle(motion, axis))),
+            motion.angular_velocity @ axis,
+            output.columns["Rtorque"] @ axis,
+        )
+    arm = motion.rotation @ (spring.body_point - mechanism.centre)
+    apart, speed = motion.position + arm - spring.ground_point, motion.velocity + np.cross(motion.angular_velocity, arm)
     travel = np.linalg.norm(apart, axis=1)
     unit = apart / np.maximum(travel, 1e-30)[:, None]
     return travel, (speed * unit).sum(axis=1), (output.columns["Rforce"] * unit).sum(axis=1)
@@ -116,7 +120,7 @@ def _angle(motion: BodyMotion, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """Sine and cosine (m,) of the body's rotation about an axis."""
     side = np.eye(3)[np.argmin(np.abs(axis))]
     first = np.cross(axis, side) / np.linalg.norm(np.cross(axis, side))
-    turned = motion.turned @ first
+    turned = motion.rotation @ first
     return turned @ np.cross(axis, first), turned @ first
 
 
@@ -159,7 +163,7 @@ def own_model_rows(family: str, mechanism: Mechanism, folder: Path, duration: fl
     alike = Observed(_id(family, "mjcf.accelerations"), SYSTEM, quantity, accelerations, "of the largest")
     rows: list[Row] = [alike.at_most(EQUAL_ACCELERATION_SHARE, tolerance_reason, "native")]
     for name, positions in paths.items():
-        off = float(np.abs(positions[::every] - motion.place).max())
+        off = float(np.abs(positions[::every] - motion.position).max())
         quantity = f"{family} in MJCF: position of the centre from the reference with constraints, {name}"
         observed = Observed(_id(family, f"mjcf.position.{name}"), SYSTEM, quantity, off, "m")
         rows.append(observed.at_most(TWINS, "no code in common but Runge-Kutta's steps of 1 ms", "native"))
@@ -171,7 +175,7 @@ def _largest_reaction(mechanism: Mechanism, reaction: Reaction) -> tuple[float, 
     the centre from the joint, at least 1 m (N m)."""
     weight = mechanism.mass * float(np.linalg.norm(mechanism.gravity))
     force = max(float(np.abs(reaction.force).max()), weight)
-    return force, force * max(float(np.linalg.norm(mechanism.centre - mechanism.ground.place)), 1.0)
+    return force, force * max(float(np.linalg.norm(mechanism.centre - mechanism.ground.position)), 1.0)
 
 
 def _reaction_difference(
@@ -199,8 +203,8 @@ def _against_file(
     family: str, name: str, mechanism: Mechanism, output: OutputFile, path: BodyMotion, pushed: Reaction
 ) -> list[Row]:
     m = len(path.times)
-    position_error = np.abs(path.place - output.columns["Pos"][:m]) - output.rounding("Pos")[:m]
-    digits = output.rounding("Rforce")[:m], output.rounding("Rtorque")[:m]
+    position_error = np.abs(path.position - output.columns["Pos"][:m]) - output.rounding_error("Pos")[:m]
+    digits = output.rounding_error("Rforce")[:m], output.rounding_error("Rtorque")[:m]
     theirs = Reaction(output.columns["Rforce"][:m], output.columns["Rtorque"][:m])
     seen = (
         ("position", "position of the centre", max(0.0, float(position_error.max())), "m", PLACE_BOUND),
@@ -233,9 +237,11 @@ def _windows(family: str, mechanism: Mechanism, output: OutputFile, duration: fl
     """
     body, theirs = ConstrainedBody(mechanism), output.motion(mechanism)
     starts = np.arange(0, round(duration / STEP / STEPS_PER_ROW) - WINDOW_ROWS, WINDOW_ROWS)
-    ends = [body.marched(body.at_motion(theirs, k), WINDOW_ROWS * STEPS_PER_ROW, STEP)[:3] for k in starts.tolist()]
-    digits = output.rounding("Pos")[starts] + output.rounding("Pos")[starts + WINDOW_ROWS]
-    off = (np.abs(np.array(ends) - theirs.place[starts + WINDOW_ROWS]) - digits).max(axis=1)
+    ends = [
+        body.state_after(body.state_at_row(theirs, k), WINDOW_ROWS * STEPS_PER_ROW, STEP)[:3] for k in starts.tolist()
+    ]
+    digits = output.rounding_error("Pos")[starts] + output.rounding_error("Pos")[starts + WINDOW_ROWS]
+    off = (np.abs(np.array(ends) - theirs.position[starts + WINDOW_ROWS]) - digits).max(axis=1)
     _, total_energy = output.energies(mechanism)
     speed = np.linalg.norm(theirs.velocity, axis=1)
     fastest = np.maximum(speed[starts], speed[starts + WINDOW_ROWS])
@@ -259,8 +265,8 @@ def _same_pendulum(family: str, mechanism: Mechanism, output: OutputFile, revolu
     hinge, back = read_output(revolute), Rotation.from_euler("z", -SHARED_FILES[family], degrees=True)
     motion, reaction = ConstrainedBody(mechanism).run(float(hinge.times[-1]), STEP, STEPS_PER_ROW)
     position_error, force = hinge.columns["Pos"], hinge.columns["Rforce"]
-    off = float((np.abs(back.apply(motion.place) - position_error) - hinge.rounding("Pos")).max())
-    pushed = float((np.abs(back.apply(reaction.force) - force) - hinge.rounding("Rforce")).max())
+    off = float((np.abs(back.apply(motion.position) - position_error) - hinge.rounding_error("Pos")).max())
+    pushed = float((np.abs(back.apply(reaction.force) - force) - hinge.rounding_error("Rforce")).max())
     files = np.abs(back.apply(output.columns["Pos"]) - position_error).max(axis=1)
     since = output.times[np.argmax(files > PLACE_BOUND)]
     why = "the same pendulum on a hinge by the other code, in a file that keeps its energy; the bound asked for"
@@ -290,8 +296,8 @@ def _twin(
     family: str, name: str, mechanism: Mechanism, run: tuple[BodyMotion, Reaction], plain: tuple[BodyMotion, Reaction]
 ) -> Row:
     """Rows: a mechanism built of joints in an engine, compared with the reference's constraint equations."""
-    position_error = float(np.abs(run[0].place - plain[0].place).max())
-    turned = float(np.abs(run[0].turned - plain[0].turned).max())
+    position_error = float(np.abs(run[0].position - plain[0].position).max())
+    turned = float(np.abs(run[0].rotation - plain[0].rotation).max())
     off = max(position_error, turned, _reaction_difference(mechanism, run[1], plain[1]))
     why = "joint coordinates against constraints with multipliers, no code in common but Runge-Kutta's steps of 5 ms"
     quantity = f"{family}: {name} from the reference: position, rotation, reaction by the largest"
