@@ -18,7 +18,7 @@ from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 from validation.absence import ride
-from validation.absence.hand_built_ride import Car, exudyn_run, mujoco_run, numbers
+from validation.absence.hand_built_ride import Car, exudyn_run, mujoco_run, parameter_array
 from validation.absence.hand_built_ride import march as march_written
 from validation.absence.of_systems import bare_scene
 
@@ -66,7 +66,7 @@ def copy_runs(step_count: int) -> tuple[Job, Job]:
     equations. Both return the final states (14, COPIES)."""
     vehicle, road = vehicle_and_road()
     plain, roads = linearise(vehicle, road.speed), next(road.blocks(step_count, COPIES, 0))
-    laws, car, heights = laws_of(vehicle, plain, (), road.speed), numbers(Car.of(vehicle)), roads[:, :4].copy()
+    laws, car, heights = laws_of(vehicle, plain, (), road.speed), parameter_array(Car.of(vehicle)), roads[:, :4].copy()
     sums = np.zeros((POWERS_SUMMED, len(plain.outputs), COPIES))
 
     def run_twinrig() -> np.ndarray:
