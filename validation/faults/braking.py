@@ -117,7 +117,7 @@ def _table_node_error() -> float:
 def _distance_at_steady_slip() -> float:
     """Quarter vehicle at constant slip: relative difference of the distance from m v^2 / (2 F), as in the hard case of
     this name."""
-    return float(wheels.steady_slip_case(wheels.DRY, 0.02)("reference", Path()))
+    return float(wheels.constant_slip_case(wheels.DRY, 0.02)("reference", Path()))
 
 
 def _converter_error() -> float:

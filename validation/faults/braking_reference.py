@@ -17,7 +17,7 @@ from models.tyre.tyre_table import Tables
 from models.vehicles.spatial_linear import Preloads
 from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
-from validation.braking.compiled_brakes import wheel_forces_in
+from validation.braking.compiled_brakes import wheel_force_views
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
 
@@ -40,14 +40,14 @@ def _accelerations() -> float:
 
 
 def _stop_difference() -> float:
-    return whole.paths_apart(
+    return whole.path_difference(
         whole.run(whole.car_with_stops.__wrapped__(), ENGINE, DURATION), whole.plain_run("bent", DURATION)
     )
 
 
 def _lagging_difference() -> float:
     path = whole.run(whole.car(), ENGINE, DURATION, lags=True)
-    return whole.paths_apart(path, whole.plain_run("car", DURATION, lags=True))
+    return whole.path_difference(path, whole.plain_run("car", DURATION, lags=True))
 
 
 CHECKS = {
@@ -159,13 +159,13 @@ def _euler_step(march: Any, engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
 
 
 def _spun_more(march: Any, engine: Any, *state: np.ndarray) -> Any:
-    wheel_forces_in(engine.numbers).spin_moments[:] *= 1.01
+    wheel_force_views(engine.numbers).spin_moments[:] *= 1.01
     return march(engine, *state)
 
 
 def _forces_exchanged(march: Any, engine: Any, *state: np.ndarray) -> Any:
     """Fault: the forces of the front wheels are exchanged."""
-    forces = wheel_forces_in(engine.numbers).forces
+    forces = wheel_force_views(engine.numbers).forces
     forces[:2] = forces[1::-1].copy()
     return march(engine, *state)
 

@@ -17,7 +17,7 @@ from models.core.errors import InputError
 from models.tyre.tyre_table import stacked_tables
 from validation.braking import braked_trucks as trucks
 from validation.braking import braked_wheels as wheels
-from validation.braking.braked_wheels import DRY, bent_friction
+from validation.braking.braked_wheels import DRY, piecewise_linear_friction
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 
 
@@ -51,25 +51,25 @@ def fails(name: str, difficulty: str, error: wheels.Error) -> Case:
     )
 
 
-LINE = bent_friction((0.0, 0.0), (1.0, 0.9))
+LINE = piecewise_linear_friction((0.0, 0.0), (1.0, 0.9))
 REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 CASES = (
     stops(
         "light braking to a stop",
         "slip has the speed in its denominator, which ends at 0",
-        wheels.steady_slip_case(DRY, 0.02),
+        wheels.constant_slip_case(DRY, 0.02),
         1e-7,
     ),
     stops(
         "light braking to a stop, 20 ms",
         "50 time constants of the wheel in a step",
-        wheels.steady_slip_case(DRY, 0.004, 2e-2),
+        wheels.constant_slip_case(DRY, 0.004, 2e-2),
     ),
-    stops("table of a single cell", "slip 0 and 1 are its only nodes", wheels.steady_slip_case(LINE, 0.5)),
+    stops("table of a single cell", "slip 0 and 1 are its only nodes", wheels.constant_slip_case(LINE, 0.5)),
     stops(
         "slip that settles on a node",
         "the slope of friction jumps there",
-        wheels.steady_slip_case(bent_friction((0.0, 0.0), (0.05, 0.5), (0.2, 0.8), (1.0, 0.6)), 0.05),
+        wheels.constant_slip_case(piecewise_linear_friction((0.0, 0.0), (0.05, 0.5), (0.2, 0.8), (1.0, 0.6)), 0.05),
     ),
     Case(
         "from rolling, 20 ms",
@@ -78,7 +78,7 @@ CASES = (
         "",
         5e-4,
         "asked for",
-        wheels.from_rolling(DRY, 0.05, 2e-2),
+        wheels.rolling_start_case(DRY, 0.05, 2e-2),
     ),
     Case(
         "torque just above the peak",
@@ -87,7 +87,7 @@ CASES = (
         "",
         5e-4,
         "asked for",
-        wheels.beyond_the_peak,
+        wheels.locking_torque_error,
     ),
     Case(
         "torque exactly at the peak",
@@ -96,7 +96,7 @@ CASES = (
         "",
         1e-6,
         "the step in which it stops",
-        wheels.at_the_peak,
+        wheels.peak_torque_error,
     ),
     Case(
         "locked from the start",
@@ -132,7 +132,7 @@ CASES = (
         "m, m/s",
         0.0,
         "exact",
-        wheels.at_rest,
+        wheels.standing_vehicle_error,
     ),
     Case("wheel thrown backwards", "slip above 1", "rolls", "", 1e-6, "25 time constants", wheels.backwards_spin_error),
     Case(
@@ -151,7 +151,7 @@ CASES = (
         "",
         1e-12,
         "rounding",
-        trucks.energy_grows((5.0, 8.0, 0.0), 2e4),
+        trucks.energy_gain_case((5.0, 8.0, 0.0), 2e4),
     ),
     Case(
         "truck spinning on ice",
@@ -160,7 +160,7 @@ CASES = (
         "",
         1e-12,
         "rounding",
-        trucks.energy_grows((8.0, 0.0, 3.0), 2e4),
+        trucks.energy_gain_case((8.0, 0.0, 3.0), 2e4),
     ),
     Case(
         "truck on even friction",
@@ -169,7 +169,7 @@ CASES = (
         "m, rad, rad/s",
         0.0,
         "exact",
-        trucks.on_even_friction,
+        trucks.asymmetry_on_even_friction,
     ),
     Case(
         "truck on split friction in a mirror",
@@ -196,7 +196,7 @@ CASES = (
         "m, m/s",
         0.0,
         "exact",
-        trucks.lagging_at_rest,
+        trucks.motion_after_rest_on_lagging_tyres,
     ),
     Case(
         "wheel exactly on the line",
@@ -205,7 +205,7 @@ CASES = (
         "m",
         0.0,
         "exact",
-        wheels.on_the_line,
+        wheels.surface_line_error,
     ),
     Case(
         "no friction on one side",
@@ -214,7 +214,7 @@ CASES = (
         "",
         1e-4,
         "it has begun to yaw",
-        trucks.no_friction_on_one_side,
+        trucks.split_friction_error,
     ),
     Case(
         "slope of friction changes within a step",
@@ -223,7 +223,7 @@ CASES = (
         "",
         1e-4,
         "the wheel takes up another slip",
-        wheels.slope_changes,
+        wheels.surface_change_error,
     ),
     Case(
         "valves open for ever",
@@ -241,7 +241,7 @@ CASES = (
         "N m",
         0.0,
         "exact",
-        trucks.below_push_out,
+        trucks.torque_below_push_out,
     ),
     Case(
         "slow wheel at the edge of locking",
@@ -250,7 +250,7 @@ CASES = (
         "m/s, rad/s",
         0.0,
         "exact",
-        trucks.rest_error_of_scene(**trucks.AT_THE_EDGE_OF_LOCKING),
+        trucks.rest_error_of_scene(**trucks.J_TURN_AT_LOCKING_LIMIT),
     ),
     Case(
         "one wheel of four lifted",
@@ -259,19 +259,27 @@ CASES = (
         "N, N m",
         1e-9,
         "rounding",
-        trucks.one_wheel_lifted,
+        trucks.load_sharing_error,
         once=True,
     ),
-    fails("truck that rolls over", "both wheels of a side bear nothing", trucks.turned_over),
-    fails("299 bar of a supply of 6", "more than there is", trucks.nonsense_answers(6.0, pressures=np.full(4, 299.0))),
+    fails("truck that rolls over", "both wheels of a side bear nothing", trucks.overturning_truck_error),
+    fails(
+        "299 bar of a supply of 6",
+        "more than there is",
+        trucks.impossible_command_case(6.0, pressures=np.full(4, 299.0)),
+    ),
     fails("truck that lifts its rear wheels", "the plane has no lift-off", trucks.lifting_truck_error),
     fails(
         "controller answers not a number",
         "would spread to every state",
-        trucks.nonsense_answers(pressures=np.array([1.0, np.nan, 1.0, 1.0])),
+        trucks.impossible_command_case(pressures=np.array([1.0, np.nan, 1.0, 1.0])),
     ),
-    fails("controller answers for three wheels", "of four", trucks.nonsense_answers(valves=np.ones(3, dtype=np.int64))),
-    fails("controller answers nothing", "neither valves nor pressures", trucks.nonsense_answers()),
+    fails(
+        "controller answers for three wheels",
+        "of four",
+        trucks.impossible_command_case(valves=np.ones(3, dtype=np.int64)),
+    ),
+    fails("controller answers nothing", "neither valves nor pressures", trucks.impossible_command_case()),
     *(
         Case(name, "a number from senseless input", "refused", "", 0.0, "exact", refused(run), REFUSED)
         for name, run in (
@@ -281,8 +289,8 @@ CASES = (
                     wheels.QUARTER, stacked_tables([DRY]), UNIFORM_ROAD, np.full(3, -1.0), wheels.STEP, wheels.SPEED
                 ),
             ),
-            ("table that ends before it locks", lambda: bent_friction((0.0, 0.0), (0.9, 0.8))),
-            ("table with friction at no slip", lambda: bent_friction((0.0, 0.1), (1.0, 0.8))),
+            ("table that ends before it locks", lambda: piecewise_linear_friction((0.0, 0.0), (0.9, 0.8))),
+            ("table with friction at no slip", lambda: piecewise_linear_friction((0.0, 0.1), (1.0, 0.8))),
             (
                 "stretches shorter than a step",
                 lambda: check_way(road([Stretch(0.0, 0, 0), Stretch(1.0, 1, 1), Stretch(1.01, 0, 0)]), 0.1),
