@@ -11,8 +11,8 @@ from models.advice.ride_choice.choose import EQUAL_COST_LOG, Chooser, RideChoice
 from models.advice.ride_choice.screen import Screen, exact_variances
 from models.core.systems import load
 from models.systems.ride.reduced_scene import Effect, reduced_without
-from validation.choice.judged import asked_speeds, changes_by_frequency, measured_step, worst_nearby
-from validation.choice.price_of_choice import whole_car
+from validation.choice.judged import changes_by_frequency, chooser_over_speeds, measured_step, worst_nearby
+from validation.choice.price_of_choice import car_scene
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.ride.drawn_rides import DrawnRide, drawn_ride
 
@@ -65,7 +65,7 @@ def judged(scene: DrawnRide, on_second: bool) -> Judged:
     """Choose effects for a scene, then check the choice by the identity of covariance and adjoint and, if
     ``on_second``, by frequency responses.
     """
-    chooser = asked_speeds(scene)
+    chooser = chooser_over_speeds(scene)
     choice, full_scene = chooser.choose(), chooser.full_scenes[0]
     rest = full_scene.reduced(reduced_without(scene.scene, choice.left_out))
     two, deviation = Screen(full_scene.full, chooser.rows).certificate_sides(rest)
@@ -237,7 +237,7 @@ def _saving_row(choices: list[Judged]) -> Row:
 def _count_rows() -> list[Row]:
     """Rows: numbers of eigenvalue problems and Lyapunov equations that a choice solves for a car of 19 degrees of
     freedom."""
-    chooser = Chooser.of(whole_car())
+    chooser = Chooser.of(car_scene())
     chooser.choose()
     pairs = len(chooser.effects) ** 2
     return [

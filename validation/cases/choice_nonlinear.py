@@ -9,7 +9,7 @@ from models.advice.choice.variants import Variants
 from models.advice.ride_choice.in_time import FEWEST_COPIES
 from models.core.errors import InputError
 from validation.choice.drawn_scenes import draw_scene
-from validation.choice.judged import JudgedByRuns, judged_of
+from validation.choice.judged import ChoiceCheckedByRuns, choice_checked_by_runs
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row
 from validation.ride.drawn_rides import COPIES, BentRide, drawn_bent
@@ -37,14 +37,14 @@ JUDGED_CHANGES = (1e-4, 0.05)
 """Confirmed changes whose predictions are judged: as for linear scenes."""
 
 
-def judged(system: str, seed: int) -> JudgedByRuns:
+def judged(system: str, seed: int) -> ChoiceCheckedByRuns:
     """Choose effects for the random scene of a seed, and judge the choice."""
     if system == "ride":
         return judged_ride(drawn_bent(seed))
-    return judged_of(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
+    return choice_checked_by_runs(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
-def judged_ride(asked: BentRide) -> JudgedByRuns:
+def judged_ride(asked: BentRide) -> ChoiceCheckedByRuns:
     """Choose effects for a ride, then compare the complete and the reduced vehicle on new roads that the choice did not
     use."""
     engine = ENGINES["ride"][0]
@@ -52,9 +52,9 @@ def judged_ride(asked: BentRide) -> JudgedByRuns:
     fresh = Variants(asked.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
     full_scene, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
     if full_scene is None or rest is None:
-        return JudgedByRuns("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
+        return ChoiceCheckedByRuns("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
     again = [_least_certain_change(full_scene.of(name).cases[0], rest.of(name).cases[0]) for name in asked.quantities]
-    return JudgedByRuns("ride", engine, asked, choice, np.array(again))
+    return ChoiceCheckedByRuns("ride", engine, asked, choice, np.array(again))
 
 
 def _least_certain_change(full_mean_squares: np.ndarray, reduced: np.ndarray) -> float:
@@ -81,7 +81,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"scenes": [_summary_of_choice(judged_choice) for judged_choice in choices], "systems": list(seeds)}
 
 
-def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
+def _row_of_kept_tolerances(choices: list[ChoiceCheckedByRuns]) -> list[Row]:
     kept_share = float(
         np.mean([judged_choice.choice.within_tolerance and judged_choice.is_honest for judged_choice in choices])
     )
@@ -122,7 +122,7 @@ def _refused() -> Row:
     )
 
 
-def _pairs(choices: list[JudgedByRuns]) -> np.ndarray:
+def _pairs(choices: list[ChoiceCheckedByRuns]) -> np.ndarray:
     """Predicted and confirmed changes (n, 2) of all quantities whose change is significant and below 5 %."""
     pairs = [
         (p, c)
@@ -132,7 +132,7 @@ def _pairs(choices: list[JudgedByRuns]) -> np.ndarray:
     return np.array([pair for pair in pairs if JUDGED_CHANGES[0] < pair[1] < JUDGED_CHANGES[1]]).reshape(-1, 2)
 
 
-def _predictions(choices: list[JudgedByRuns], quick: bool) -> Row:
+def _predictions(choices: list[ChoiceCheckedByRuns], quick: bool) -> Row:
     ratios = np.divide(*_pairs(choices).T)
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0))) if len(ratios) else 1.0
     name, asked = "choice_nonlinear.predictions", "asked: within a factor of 2"
@@ -144,7 +144,7 @@ def _predictions(choices: list[JudgedByRuns], quick: bool) -> Row:
     return Observed(name, SYSTEM, quantity, share, "").within(1.0, 0.05, asked, "none")
 
 
-def _saving(choices: list[JudgedByRuns], system: str) -> list[Row]:
+def _saving(choices: list[ChoiceCheckedByRuns], system: str) -> list[Row]:
     of_system = [judged_choice for judged_choice in choices if judged_choice.system == system]
     calls = np.array([judged_choice.choice.calls for judged_choice in of_system], float)
     seconds = np.array([judged_choice.choice.seconds for judged_choice in of_system])
@@ -176,7 +176,7 @@ def _saving(choices: list[JudgedByRuns], system: str) -> list[Row]:
     ]
 
 
-def _summary_of_choice(judged_choice: JudgedByRuns) -> Saved:
+def _summary_of_choice(judged_choice: ChoiceCheckedByRuns) -> Saved:
     choice = judged_choice.choice
     return {
         "system": judged_choice.system,

@@ -20,7 +20,7 @@ from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
 from validation.common import checks
 from validation.common.checks import (
-    Make,
+    ModelBuilder,
     enforced_gap,
     equilibrium_gap,
     momentum_gap,
@@ -146,10 +146,10 @@ class Check:
     unit: str
     tolerance: Callable[[str], float]
     why: str
-    measure: Callable[[Bench, str, Make], float]
+    measure: Callable[[Bench, str, ModelBuilder], float]
 
 
-def _acceleration_error(bench: Bench, engine: str, make_engine: Make) -> float:
+def _acceleration_error(bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
     settings, states = bench.settings(engine), random_states()
     return max(
         relative_difference(
@@ -159,15 +159,15 @@ def _acceleration_error(bench: Bench, engine: str, make_engine: Make) -> float:
     )
 
 
-def _order(bench: Bench, engine: str, make_engine: Make) -> float:
+def _order(bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
     return order_gap(make_engine, bench.road, replace(bench.settings(engine), step=ORDER_STEP), bench.truth)
 
 
-def _momentum_error(bench: Bench, engine: str, make_engine: Make) -> float:
+def _momentum_error(bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
     return max(momentum_gap(make_engine, assembly, bench.settings(engine)) for assembly in (bench.linear, bench.held))
 
 
-def _enforced_force_check(situation: str) -> Callable[[Bench, str, Make], float]:
+def _enforced_force_check(situation: str) -> Callable[[Bench, str, ModelBuilder], float]:
     """A check's function: error of the enforced moment and force, compared with the form in which the pitch is
     eliminated."""
     return lambda bench, engine, make: enforced_gap(
@@ -177,7 +177,7 @@ def _enforced_force_check(situation: str) -> Callable[[Bench, str, Make], float]
     )
 
 
-def _path_difference_check(situation: str) -> Callable[[Bench, str, Make], float]:
+def _path_difference_check(situation: str) -> Callable[[Bench, str, ModelBuilder], float]:
     """A check's function: largest difference of an engine's path from the reference's."""
     return lambda bench, engine, make: state_gap(
         run(make, getattr(bench, situation), bench.settings(engine)), bench.path(situation)
@@ -249,7 +249,7 @@ CHECKS: dict[str, Check] = {
 """What every fault is put to, in the order of the table."""
 
 
-def size_of_error(check: Check, bench: Bench, engine: str, make_engine: Make) -> float:
+def size_of_error(check: Check, bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
     """Error that a check measures; infinite where the engine refuses or fails."""
     try:
         return check.measure(bench, engine, make_engine)

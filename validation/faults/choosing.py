@@ -18,7 +18,13 @@ from models.advice.ride_choice.choose import RideChoice
 from models.advice.ride_choice.screen import Screen as LinearScreen
 from validation.choice.drawn_scenes import ChoiceQuestion
 from validation.choice.drawn_scenes import draw_scene as drawn_run
-from validation.choice.judged import JudgedByRuns, asked_speeds, changes_by_frequency, judged_of, worst_nearby
+from validation.choice.judged import (
+    ChoiceCheckedByRuns,
+    changes_by_frequency,
+    choice_checked_by_runs,
+    chooser_over_speeds,
+    worst_nearby,
+)
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import attribute_patch
 from validation.ride.drawn_rides import DrawnRide, drawn_ride
@@ -51,22 +57,22 @@ def _by_frequency() -> tuple[RideChoice, np.ndarray, float]:
     )
 
 
-def _choice_by_runs() -> JudgedByRuns:
+def _choice_by_runs() -> ChoiceCheckedByRuns:
     """The choice by runs for the half car, judged by two further runs."""
     return _choice_with_functions(Chooser.__init__, Chooser.confirm, Screen.relative_changes)
 
 
 @cache
 def _linear_choice_with_functions(*functions: Any) -> tuple[RideChoice, np.ndarray, float]:
-    chooser = asked_speeds(_linear_ride())
+    chooser = chooser_over_speeds(_linear_ride())
     choice = chooser.choose()
     nearby = worst_nearby(chooser, frozenset(choice.left_out), DRAWN_RIDES, DRAWN_RIDES) * chooser.tolerance
     return choice, changes_by_frequency(chooser, choice), nearby
 
 
 @cache
-def _choice_with_functions(*functions: Any) -> JudgedByRuns:
-    return judged_of(_run(), "pitch-plane", "reference")
+def _choice_with_functions(*functions: Any) -> ChoiceCheckedByRuns:
+    return choice_checked_by_runs(_run(), "pitch-plane", "reference")
 
 
 def _variances() -> float:

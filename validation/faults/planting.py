@@ -14,7 +14,7 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.model import Model
 from models.engines.protocol import build
-from validation.common.checks import Make
+from validation.common.checks import ModelBuilder
 from validation.faults import changes as change
 from validation.faults import patches
 from validation.faults.changes import Change
@@ -62,7 +62,7 @@ class PlantedModel:
         return self.model.plan()
 
 
-def planted_builder(fault: EngineFault, engine: str) -> Make:
+def planted_builder(fault: EngineFault, engine: str) -> ModelBuilder:
     """A function that builds models with the fault in an engine, in the form that the checks expect."""
 
     def make(assembly: Assembly, settings: Settings) -> PlantedModel:

@@ -29,7 +29,7 @@ from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.bounces import Bounces, bounce_energy
+from validation.common.bounces import BouncingVehicle, bounce_energy
 from validation.hard_cases import setups
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 
@@ -53,7 +53,9 @@ def exactly(step: float = STEP, start_state: np.ndarray = FALLING_STATE, **overr
         assembly = vehicle(start_state, "linear", override)
         states = setups.run(engine, assembly, step, LONGEST_DURATION).states
         stride = max(1, round(step / STEP))
-        exact = Bounces(assembly, STEP if stride > 1 else step).path(assembly.initial, stride * (len(states) - 1))
+        exact = BouncingVehicle(assembly, STEP if stride > 1 else step).path(
+            assembly.initial, stride * (len(states) - 1)
+        )
         return setups.largest_magnitude(states - exact[::stride])
 
     return error
