@@ -21,7 +21,7 @@ from validation.contact.drawn_wheelsets import (
     HEAVY_WHEELSET,
     SEED,
     STIFF_WHEELSET,
-    Speeds,
+    CriticalSpeeds,
     critical_speeds,
     drawn_wheelsets,
 )
@@ -107,7 +107,7 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     ]
 
 
-def _critical_rows(speeds: Speeds) -> list[Row]:
+def _critical_rows(speeds: CriticalSpeeds) -> list[Row]:
     """Rows: largest relative difference between the implementations' critical speeds, and whether they agree on which
     wheelsets have one."""
     there = [[speed for speed in of_engine.values() if speed is not None] for of_engine in speeds.values()]
@@ -179,13 +179,13 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     return rows
 
 
-def _speed_of_path(speeds: Speeds, name: str) -> float:
+def _speed_of_path(speeds: CriticalSpeeds, name: str) -> float:
     """Speed (m/s) of a wheelset's path: above its critical speed, or 60 m/s if it has none."""
     critical = speeds[name]["reference"]
     return min(ABOVE * critical, 180.0) if critical is not None else 60.0
 
 
-def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> list[Row]:
+def _path_rows(wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, cells: int) -> list[Row]:
     """Rows on paths of one second by RK4 with FASTSIM: differences between the implementations, and the sign of the
     creep forces' power."""
     pairs = {("reference", engine): 0.0 for engine in ENGINES} | {ENGINES: 0.0}
@@ -234,7 +234,9 @@ def _step(equations: Equations) -> float:
     return DURATION / np.ceil(DURATION / min(STEP, 1.0 / fastest))
 
 
-def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, ...]) -> dict[str, dict[str, Orbit]]:
+def _cycles(
+    wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, engines: tuple[str, ...]
+) -> dict[str, dict[str, Orbit]]:
     """Limit cycle of the chosen wheelset, and, at half the step, of those whose critical speed is low enough for a
     speed above it.
 
