@@ -96,7 +96,9 @@ def not_a_number(engine: str) -> dict[str, str]:
 def constrained(engine: str) -> dict[str, str]:
     """How runs with a prescribed pitch end in each integrator that cannot solve constraints."""
     wrong = [name for name in integrators(engine) if not CATALOGUE[engine][name].constraints]
-    return {name: ending(partial(setups.run, engine, prescribed_pitch.scene(), 1e-3, 0.5, name)) for name in wrong}
+    return {
+        name: ending(partial(setups.run, engine, prescribed_pitch.guided_assembly(), 1e-3, 0.5, name)) for name in wrong
+    }
 
 
 def constrained_unchecked() -> dict[str, str]:
@@ -106,7 +108,7 @@ def constrained_unchecked() -> dict[str, str]:
         name for name in integrators("exudyn", adaptive=False) if name not in setups.CONSTRAINED_INTEGRATORS.values()
     ]
     explicit = [name for name in names if name != "TrapezoidalIndex2"]
-    scene = prescribed_pitch.scene()
+    scene = prescribed_pitch.guided_assembly()
     return {name: ending(partial(setups.unchecked_run, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
 
 
@@ -207,7 +209,7 @@ def _input_rows(engine: str) -> list[Row]:
     numbers = not_a_number(engine)
     caught = {name: "caught" if ended in ("raised", "refused") else ended for name, ended in numbers.items()}
     with TemporaryDirectory() as files_folder:
-        file = ending(lambda: sampled_input.damaged(engine, Path(files_folder)))
+        file = ending(lambda: sampled_input.damaged_file(engine, Path(files_folder)))
     return [
         behaviour_row(
             f"guards.nan-file.{engine}",
@@ -229,7 +231,7 @@ def _input_rows(engine: str) -> list[Row]:
             f"guards.step-sampling.{engine}",
             SYSTEM,
             f"a step that does not divide the sampling period, {engine}",
-            ending(lambda: sampled_input.uneven(engine, Path())),
+            ending(lambda: sampled_input.uneven_steps(engine, Path())),
             "refused",
             "a held sample would change in a step",
         ),
@@ -247,7 +249,7 @@ def _input_rows(engine: str) -> list[Row]:
 def _reduced_row(engine: str) -> Row:
     """Row: in the reference and MuJoCo the pitch is an input and no constraint, so that an explicit solver gives the
     right enforced moment."""
-    error = prescribed_pitch.explicit(engine, Path())
+    error = prescribed_pitch.explicit_error(engine, Path())
     return Observed(
         f"guards.constraint.{engine}",
         SYSTEM,

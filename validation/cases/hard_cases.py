@@ -72,12 +72,12 @@ def quick_cases(cases: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
 
 def _row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
     """Row of a hard case: its error where an answer is expected and given, else how it behaved."""
-    id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.once else implementation}"
-    quantity = f"{case.name}{'' if case.once else f', {implementation}'}: {case.check}"
+    id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.without_engine else implementation}"
+    quantity = f"{case.name}{'' if case.without_engine else f', {implementation}'}: {case.exact_answer}"
     if case.wanted(implementation) == "right" and outcome.error is not None:
         error, judged = outcome.error, case.independence(implementation)
-        return Observed(id, SYSTEM, quantity, error, case.unit).at_most(case.tolerance, case.why, judged)
-    return behaviour_row(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.hard)
+        return Observed(id, SYSTEM, quantity, error, case.unit).at_most(case.tolerance, case.tolerance_reason, judged)
+    return behaviour_row(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.difficulty)
 
 
 def tables(case_data: Saved) -> list[Table]:

@@ -251,7 +251,7 @@ def scores_of_stabilised(
         "inertia_deviation": INERTIA_UNCERTAINTY,
     }
     scene = force_driven_scene(
-        folder, duration, force_noise_settings(force, seed) | {"kalman_filter": effect}, wrong=perturbed
+        folder, duration, force_noise_settings(force, seed) | {"kalman_filter": effect}, perturbed=perturbed
     )
     return {engine: _scores_of_run(true, simulate(scene, engine)) for engine in engines}
 

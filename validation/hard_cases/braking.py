@@ -1,4 +1,5 @@
-"""Braked wheels: standstill, locking, falling friction, hardly any of it or much, steps and answers at their ends.
+"""Hard cases of braked wheels and trucks: standstill, locking, falling friction, very small and large friction, invalid
+controllers.
 
 Every implementation carries the chassis by itself; tyres and wheels are the same compiled ones.
 """
@@ -18,11 +19,11 @@ from models.tyre.tyre_table import stacked_tables
 from validation.braking import braked_trucks as trucks
 from validation.braking import braked_wheels as wheels
 from validation.braking.braked_wheels import DRY, piecewise_linear_friction
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
 
 
-def refused(run: Callable[[], Any]) -> wheels.Error:
-    """Case that must be refused."""
+def refusal_case(run: Callable[[], Any]) -> wheels.Error:
+    """Case: ``run`` must raise a refusal. Error: infinite if it returns."""
 
     def error(implementation: str, folder: Path) -> float:
         run()
@@ -31,42 +32,44 @@ def refused(run: Callable[[], Any]) -> wheels.Error:
     return error
 
 
-def slippery_brake() -> None:
-    """Make a brake whose release pressure is above its push-out pressure; raises InputError."""
+def inconsistent_brake() -> None:
+    """Builds a brake whose release pressure is above its push-out pressure; raises InputError."""
     try:
         Brake(push_out=0.5, release=0.7, rising=1000.0, falling=1000.0)
     except ValueError as error:
         raise InputError("", "release", 0.7, str(error)) from None
 
 
-def stops(name: str, difficulty: str, error: wheels.Error, tolerance: float = 1e-6) -> Case:
-    """Case of a wheel that is held at constant slip."""
+def constant_slip_case(name: str, difficulty: str, error: wheels.Error, tolerance: float = 1e-6) -> Case:
+    """Hard case of a wheel at constant slip, judged by the stopping distance m v^2 / (2 F)."""
     return Case(name, difficulty, "m v^2 / (2 F)", "", tolerance, "the step in which it stops", error)
 
 
-def fails(name: str, difficulty: str, error: wheels.Error) -> Case:
-    """Case in which every implementation must raise an error."""
+def failure_case(name: str, difficulty: str, error: wheels.Error) -> Case:
+    """Hard case in which every implementation must raise an error during the run."""
     return Case(
         name, difficulty, "fails, and says when", "", 0.0, "exact", error, dict.fromkeys(IMPLEMENTATIONS, "raised")
     )
 
 
 LINE = piecewise_linear_friction((0.0, 0.0), (1.0, 0.9))
-REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+REFUSED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 CASES = (
-    stops(
+    constant_slip_case(
         "light braking to a stop",
         "slip has the speed in its denominator, which ends at 0",
         wheels.constant_slip_case(DRY, 0.02),
         1e-7,
     ),
-    stops(
+    constant_slip_case(
         "light braking to a stop, 20 ms",
         "50 time constants of the wheel in a step",
         wheels.constant_slip_case(DRY, 0.004, 2e-2),
     ),
-    stops("table of a single cell", "slip 0 and 1 are its only nodes", wheels.constant_slip_case(LINE, 0.5)),
-    stops(
+    constant_slip_case(
+        "table of a single cell", "slip 0 and 1 are its only nodes", wheels.constant_slip_case(LINE, 0.5)
+    ),
+    constant_slip_case(
         "slip that settles on a node",
         "the slope of friction jumps there",
         wheels.constant_slip_case(piecewise_linear_friction((0.0, 0.0), (0.05, 0.5), (0.2, 0.8), (1.0, 0.6)), 0.05),
@@ -260,28 +263,28 @@ CASES = (
         1e-9,
         "rounding",
         trucks.load_sharing_error,
-        once=True,
+        without_engine=True,
     ),
-    fails("truck that rolls over", "both wheels of a side bear nothing", trucks.overturning_truck_error),
-    fails(
+    failure_case("truck that rolls over", "both wheels of a side bear nothing", trucks.overturning_truck_error),
+    failure_case(
         "299 bar of a supply of 6",
         "more than there is",
         trucks.impossible_command_case(6.0, pressures=np.full(4, 299.0)),
     ),
-    fails("truck that lifts its rear wheels", "the plane has no lift-off", trucks.lifting_truck_error),
-    fails(
+    failure_case("truck that lifts its rear wheels", "the plane has no lift-off", trucks.lifting_truck_error),
+    failure_case(
         "controller answers not a number",
         "would spread to every state",
         trucks.impossible_command_case(pressures=np.array([1.0, np.nan, 1.0, 1.0])),
     ),
-    fails(
+    failure_case(
         "controller answers for three wheels",
         "of four",
         trucks.impossible_command_case(valves=np.ones(3, dtype=np.int64)),
     ),
-    fails("controller answers nothing", "neither valves nor pressures", trucks.impossible_command_case()),
+    failure_case("controller answers nothing", "neither valves nor pressures", trucks.impossible_command_case()),
     *(
-        Case(name, "a number from senseless input", "refused", "", 0.0, "exact", refused(run), REFUSED)
+        Case(name, "a number from senseless input", "refused", "", 0.0, "exact", refusal_case(run), REFUSED)
         for name, run in (
             (
                 "torque that drives the wheel",
@@ -295,7 +298,7 @@ CASES = (
                 "stretches shorter than a step",
                 lambda: check_way(road([Stretch(0.0, 0, 0), Stretch(1.0, 1, 1), Stretch(1.01, 0, 0)]), 0.1),
             ),
-            ("brake that lets go too early", slippery_brake),
+            ("brake that lets go too early", inconsistent_brake),
             ("vehicle lighter than its wheels", lambda: plane_of_truck(PAPER_TRUCK.model_copy(update={"mass": 100.0}))),
             (
                 "roll shares that do not add up",
