@@ -263,7 +263,7 @@ def _spread(virtual_measurement: VirtualMeasurement, folder: Path) -> Row:
 
 def _moving_car(folder: Path) -> list[Row]:
     """Rows: inertial checks on a real car's telephone recording, where it is available."""
-    path = car.find()
+    path = car.find_recording()
     if path is None:
         return [
             not_run("measured_checks.car", SYSTEM, "what the inertial checks say of a moving car", "no recording here")
@@ -273,7 +273,7 @@ def _moving_car(folder: Path) -> list[Row]:
     degrees[:, 4] *= DEGREES
     down[:, :6] *= np.tile(measured_car.TELEPHONE_TO_CAR, 2)
     findings = {
-        name: check(measured_car.recording(values, folder / f"{name}.columns"), None)
+        name: check(measured_car.phone_recording(values, folder / f"{name}.columns"), None)
         for name, values in (("clean", clean), ("degrees", degrees), ("down", down))
     }
     errors = {

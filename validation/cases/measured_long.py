@@ -18,7 +18,12 @@ from models.systems.measured.sections import Sections, guided_bodies
 from models.systems.measured.verdict import channels_to_compare, compare
 from models.vehicles.cut_vehicle import cut
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
-from validation.measured.long_recording import SEED, answers_of, run_killed_process, run_of
+from validation.measured.long_recording import (
+    SEED,
+    computed_channel_bytes,
+    run_killed_process,
+    section_run_of_recording,
+)
 from validation.spatial.cars import random_states, random_wrenches, twin
 from validation.spatial.joint_forces import exudyn_guides, mujoco_guides
 
@@ -142,12 +147,12 @@ def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
     """Row: number of channels that differ between a run in one block and a run in uneven blocks."""
     run_folder = folder / f"blocks {seconds}"
     run_folder.mkdir(exist_ok=True)
-    job = run_of(run_folder, seconds, REPEATED, engine, AttitudeHold(method))  # type: ignore[arg-type]
+    job = section_run_of_recording(run_folder, seconds, REPEATED, engine, AttitudeHold(method))  # type: ignore[arg-type]
     bits = []
     for block in (60.0, 0.073):
         name = f"{engine} {method} {block}"
         run(job, run_folder / name, block=block)
-        bits.append(np.frombuffer(answers_of(run_folder, name), np.int64))
+        bits.append(np.frombuffer(computed_channel_bytes(run_folder, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
         f"measured_long.blocks_{engine}_{method}",
@@ -164,12 +169,12 @@ def _run_killed_twice(folder: Path) -> Row:
     for times in (0, 2):
         run_folder = folder / f"killed {times}"
         run_folder.mkdir()
-        job = run_of(run_folder, seconds, REPEATED)
+        job = section_run_of_recording(run_folder, seconds, REPEATED)
         if times:
             run_killed_process(run_folder, seconds, REPEATED, 0.25, times)
         else:
             run(job, run_folder / "run")
-        bits.append(np.frombuffer(answers_of(run_folder), np.int64))
+        bits.append(np.frombuffer(computed_channel_bytes(run_folder), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
         "measured_long.killed",
@@ -183,7 +188,7 @@ def _run_killed_twice(folder: Path) -> Row:
 
 def _memory(folder: Path) -> list[Row]:
     """Rows: peak memory for an hour of recording, extrapolated from a shorter one, and the speed of the run."""
-    run_of(folder, LONG_DURATION, REPEATED)
+    section_run_of_recording(folder, LONG_DURATION, REPEATED)
     words = map(str, (folder, LONG_DURATION, REPEATED, LONG_DURATION / 10, 2e-3))
     command = [sys.executable, "-m", "validation.measured.long_recording", *words]
     output_lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
@@ -213,7 +218,7 @@ def _handed_on(folder: Path) -> list[Row]:
     """Rows: section forces written in every format and read back; measured check channels compared with the run."""
     run_folder = folder / "handed on"
     run_folder.mkdir()
-    job = run_of(run_folder, 2.0, REPEATED)
+    job = section_run_of_recording(run_folder, 2.0, REPEATED)
     outcome = run(job, run_folder / "run")
     wanted = outcome.answers[:6]
     values = np.column_stack([outcome.samples(answer) for answer in wanted])

@@ -9,7 +9,7 @@ from models.measured.formats.mdf4 import opened_mdf as mdf4_opened
 from models.measured.formats.tdms import BoundedFile, opened_tdms
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 from validation.measured.measured_files import csv, csv_forms, kinds, mdf4, rpc3, tdms
-from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, CutSweep, OddFile, raw
+from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, CutSweep, OddFile, file_of_bytes
 
 CHECKS = {
     "right": "times, values and names as they were written",
@@ -20,7 +20,7 @@ CHECKS = {
 
 def numpy_on_cut_number(folder: Path) -> str:
     """Text on the value that numpy reads from a file that was cut off within a number."""
-    path = raw(csv.whole()[:-3].encode())(folder)
+    path = file_of_bytes(csv.usual_text()[:-3].encode())(folder)
     last_value = np.genfromtxt(path, delimiter=",", skip_header=1)[-1, 2]
     return f"numpy reads the last value as {last_value:g}, which was {FX[-1]:g}"
 
@@ -51,13 +51,13 @@ def case_of_file(odd: OddFile) -> Case:
     """Hard case made from an odd measurement file."""
     return Case(
         name=odd.name,
-        difficulty=odd.hard,
-        exact_answer=CHECKS[odd.wanted],
+        difficulty=odd.difficulty,
+        exact_answer=CHECKS[odd.expected_outcome],
         unit="s or N",
         tolerance=TOLERANCE,
         tolerance_reason="values have bits that every format keeps; CSV writes times with 15 digits",
         error=lambda _, folder: odd.error(folder / "odd"),
-        expected=dict.fromkeys(IMPLEMENTATIONS, "refused") if odd.wanted == "refused" else {},
+        expected=dict.fromkeys(IMPLEMENTATIONS, "refused") if odd.expected_outcome == "refused" else {},
         naive=NAIVE.get(odd.name),
         without_engine=True,
     )
@@ -72,7 +72,7 @@ def case_of_sweep(sweep: CutSweep) -> Case:
         unit="silent cuts",
         tolerance=0.0,
         tolerance_reason="no file that was cut off may be used without a word",
-        error=lambda _, folder: sweep.silent(folder / "cut"),
+        error=lambda _, folder: sweep.silent_cuts(folder / "cut"),
         without_engine=True,
     )
 

@@ -252,6 +252,7 @@ def too_large_naive(folder: Path) -> str:
 
 REFUSED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 RAISED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "raised")
+FAST_RUN, STEEP_RUN = dict[str, Any](speed=200.0, step=2e-4), dict[str, Any](speed=20.0, step=1e-4)
 CASES = (
     Case(
         "wheelset that stands on a slope",
@@ -347,8 +348,8 @@ CASES = (
     *(
         Case(name, hard, "half the step", "m", 1e-8, "error of the step", partial(halving_error, wheelset=w, **run))
         for name, hard, w, run in (
-            ("wheelset at 200 m/s", "far above its critical speed", CHOSEN_WHEELSET, {"speed": 200.0, "step": 2e-4}),
-            ("conicity of 0.5", "geometry far from linear", STEEP_WHEELSET, {"speed": 20.0, "step": 1e-4}),
+            ("wheelset at 200 m/s", "far above its critical speed", CHOSEN_WHEELSET, FAST_RUN),
+            ("conicity of 0.5", "geometry far from linear", STEEP_WHEELSET, STEEP_RUN),
         )
     ),
     Case(
