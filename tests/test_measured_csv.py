@@ -94,7 +94,7 @@ def test_a_tab_is_no_blank_before_a_time():
         [
             form
             for _, _, form, truth in READ
-            if set(truth) == set(usual_truth()) and form.gap is None and not form.beside and "" not in form.headings
+            if set(truth) == set(usual_truth()) and form.gap is None and not form.last_cells and "" not in form.headings
         ]
     ),
     st.booleans(),
