@@ -32,9 +32,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             outcomes = {name: judge(case, name, Path(files_folder)) for name in case.judged()}
             naive = case.naive(Path(files_folder)) if case.naive else ""
         rows += [_row(case, name, outcome) for name, outcome in outcomes.items()]
-        told_errors = {key: getattr(case, key) for key in ("name", "hard", "check", "unit", "tolerance")}
+        told: Saved = {"name": case.name, "hard": case.difficulty, "check": case.exact_answer}
+        told |= {"unit": case.unit, "tolerance": case.tolerance}
         sentence = {name: asdict(outcome) for name, outcome in outcomes.items()}
-        data.append({"family": family, **told_errors, "outcomes": sentence, "naive": naive})
+        data.append({"family": family, **told, "outcomes": sentence, "naive": naive})
     words = [[outcome["word"] for outcome in entry["outcomes"].values()] for entry in data]
     counted = sum(family not in FILES for family, _ in known)
     share = f"{len(data)} of {len(known)}" if quick else f"all {len(known)}"

@@ -10,8 +10,8 @@ fails."""
 
 
 def mean_square(observed: Observed, expected: float, degrees_of_freedom: int, tolerance_reason: str) -> Row:
-    """Row for a mean square of ``freedom`` independent normal values with the variance ``expected``, by the chi-square
-    distribution.
+    """Row for a mean square of ``degrees_of_freedom`` independent normal values with the variance ``expected``, by the
+    chi-square distribution.
 
     degrees_of_freedom times value divided by expected is chi-square distributed; the row passes inside the central band
     of CONFIDENCE_LEVEL, and states the band.

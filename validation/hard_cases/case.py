@@ -19,13 +19,13 @@ class Case:
 
     Attributes
     ----------
-    hard : what makes it hard; check : the invariant or the exact answer, as a phrase
-    unit, tolerance, why : of the error, and the reason for the tolerance
-    error : (implementation, folder for input files) -> the measured error
-    expected : the outcome where it is not "right"
-    against : how far the answer it is judged by is from the implementations
-    naive : measures what an obvious build without the guard or rule does, as a phrase; None if nothing is shown
-    once : whether no implementation has a part in it, so that it is judged once for all of them
+    difficulty, exact_answer : why the case is hard, and the invariant or exact answer, as phrases
+    unit, tolerance, tolerance_reason : unit and tolerance of the error, and the reason for the tolerance
+    error : function of the implementation and a folder for input files that returns the error
+    expected : outcomes other than "right", by implementation
+    naive : function that returns, as a phrase, what code without the guard or rule does; None if there is no such test
+    answer_independence : how independent the exact answer is of the implementations
+    without_engine : whether no implementation takes part, so that the case is judged only once
     """
 
     name: str
