@@ -8,7 +8,7 @@ from itertools import groupby
 from textwrap import fill
 
 from docs.pages import ROOT
-from validation.blind_spots.table import NOT_AUDITED, WHY_HARMLESS, Line, read, uncovered_functions
+from validation.blind_spots.table import NOT_AUDITED, WHY_HARMLESS, Line, read_table, uncovered_functions
 
 PAGE = ROOT / "docs" / "not_covered.md"
 GENERATED_PART_MARK = "<!-- functions: written by `python -m docs.not_covered`; do not edit below -->\n"
@@ -56,7 +56,7 @@ def function_list(names: list[str]) -> str:
 def page(text: str) -> str:
     """Text of docs/not_covered.md, with counts and lists from the saved audit; the part before the mark is
     unchanged."""
-    lines = read()
+    lines = read_table()
     kinds = uncovered_functions(lines, [line.function for line in lines])
     parts = [f"{fill(HEADINGS[kind], 120)}\n\n{function_list(names)}" for kind, names in kinds.items()]
     head = text.partition(GENERATED_PART_MARK)[0] + GENERATED_PART_MARK

@@ -16,9 +16,9 @@ from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
 from validation.absence.probes import (
     belongs_to_effects,
+    counted_march,
     installed_callbacks,
-    leanest_march,
-    march,
+    march_with_least_memory,
     probe,
     registered_callbacks,
     user_functions,
@@ -85,8 +85,10 @@ def test_no_python_and_no_memory_within_a_march(engine, folder):
     2,000 bytes over 1,980 steps: less than one byte a step is a wrapper's own doing, not the loop's.
     """
     for _ in range(2):  # wrappers cache on their first calls
-        march(engine, model(scene({}, 20, folder), engine))
-    short, long = (leanest_march(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
+        counted_march(engine, model(scene({}, 20, folder), engine))
+    short, long = (
+        march_with_least_memory(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000)
+    )
     assert long.frames == short.frames <= 50
     assert abs(long.peak_bytes - short.peak_bytes) < 2000
     assert short.callbacks == long.callbacks == 0
@@ -95,14 +97,14 @@ def test_no_python_and_no_memory_within_a_march(engine, folder):
 def test_the_watch_sees_callbacks_where_there_are_some(folder):
     """Positive control: four Python callbacks at each of RK44's four stages, and one compiled one in MuJoCo."""
     road = {"road": ROAD}
-    assert march("exudyn", model(scene(road, 50, folder), "exudyn")).frames >= 50 * 4 * 4
-    assert march("mujoco", model(scene(road, 50, folder), "mujoco")).callbacks == 1
+    assert counted_march("exudyn", model(scene(road, 50, folder), "exudyn")).frames >= 50 * 4 * 4
+    assert counted_march("mujoco", model(scene(road, 50, folder), "mujoco")).callbacks == 1
     assert installed_callbacks() == 0
 
 
 def test_no_callback_before_during_and_after(folder):
     assert installed_callbacks() == 0
-    assert march("mujoco", model(scene({}, 50, folder), "mujoco")).callbacks == 0
+    assert counted_march("mujoco", model(scene({}, 50, folder), "mujoco")).callbacks == 0
     assert installed_callbacks() == 0
     assert user_functions(model(scene({}, 50, folder), "exudyn")) == 0
 

@@ -23,12 +23,12 @@ from models.systems.braking.scene import build
 from models.systems.pitch_plane.scene import build as build_half_car
 from studies.command.asked import SCENES_FOLDER, plan_of
 from validation.absence.of_systems import (
+    absence_module_of,
     addable_effects,
     added_counts,
     bare_scene,
     counts_and_paths,
     declared_counts,
-    file_of,
 )
 
 CHEAP = [(system, name) for system in ("contact", "braking") for name in addable_effects(system)]
@@ -71,7 +71,7 @@ def test_what_needs_another_leaves_before_it():
 
 def test_effects_that_cannot_be_together_are_told_with_the_remedy():
     on_springs = {
-        **file_of("braking").BARE_SCENE,
+        **absence_module_of("braking").BARE_SCENE,
         "vehicle": {"file": "r19_free", "spin_inertia": 1.7},
         "load_transfer": {},
     }
@@ -84,7 +84,7 @@ def test_effects_that_cannot_be_together_are_told_with_the_remedy():
     with pytest.raises(InputError, match="falling_friction: needs the effect 'saturation': name it too"):
         scene_without(with_effects(bare_scene("contact"), "saturation", "falling_friction"), "saturation")
     with pytest.raises(InputError, match=r"effects.trailer: has another place in a scene: trailer"):
-        build({**file_of("braking").BARE_SCENE, "effects": {"trailer": {}}}, "s.toml")
+        build({**absence_module_of("braking").BARE_SCENE, "effects": {"trailer": {}}}, "s.toml")
 
 
 def test_a_remedy_that_would_break_another_law_says_so():

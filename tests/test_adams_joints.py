@@ -85,7 +85,7 @@ def compared(mechanism, of_engine=None, engine="mujoco", duration=0.4):
     motion, reaction = ConstrainedBody(mechanism).run(duration, 2e-3, 10)
     path, pushed = joint_tree(of_engine or mechanism, motion).run(engine, duration, 2e-3, 10)
     weight = mechanism.mass * 9.8
-    gaps = abs(path.place - motion.place), abs(path.turned - motion.turned)
+    gaps = abs(path.position - motion.position), abs(path.rotation - motion.rotation)
     forces = abs(pushed.force - reaction.force) / weight, abs(pushed.moment - reaction.moment) / weight
     return max(gap.max() for gap in (*gaps, *forces))
 
@@ -120,18 +120,18 @@ def test_swapped_axis_of_a_universal_joint_is_seen(model):
 def test_pendulum_on_a_skew_axis(model):
     """Start: angular acceleration g' m a / (I + m a^2), with what of gravity and arm is square to the axis."""
     mechanism = model("revolute")
-    axis, arm = mechanism.ground.axes[:, 2], mechanism.centre - mechanism.ground.place
+    axis, arm = mechanism.ground.axes[:, 2], mechanism.centre - mechanism.ground.position
     turning = axis @ np.cross(arm, mechanism.mass * mechanism.gravity)
     inertia = axis @ mechanism.inertia @ axis + mechanism.mass * (arm @ arm - (arm @ axis) ** 2)
     motion, _ = ConstrainedBody(mechanism).run(0.02, 2e-3, 10)
-    np.testing.assert_allclose(motion.spin_up[0], turning / inertia * axis, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(motion.angular_acceleration[0], turning / inertia * axis, rtol=1e-12, atol=1e-12)
 
 
 def test_start_velocity(model):
     """A turn about the joint's axis is taken; any other is refused by both."""
     mechanism = model("revolute")
-    axis, arm = mechanism.ground.axes[:, 2], mechanism.centre - mechanism.ground.place
-    turning = replace(mechanism, turning=2.0 * axis, velocity=np.cross(2.0 * axis, arm))
+    axis, arm = mechanism.ground.axes[:, 2], mechanism.centre - mechanism.ground.position
+    turning = replace(mechanism, angular_velocity=2.0 * axis, velocity=np.cross(2.0 * axis, arm))
     assert compared(turning) < 1e-8
     motion, _ = ConstrainedBody(mechanism).run(0.02, 2e-3, 10)
     broken = replace(mechanism, velocity=np.ones(3))
@@ -145,10 +145,10 @@ def test_energy_is_kept(model):
     """Of a body on a ball: the first integral that no fault of a gyroscopic term leaves alone."""
     mechanism = model("spherical")
     motion, _ = ConstrainedBody(mechanism).run(1.0, 2e-3, 10)
-    inertia = motion.turned @ mechanism.inertia @ np.transpose(motion.turned, (0, 2, 1))
+    inertia = motion.rotation @ mechanism.inertia @ np.transpose(motion.rotation, (0, 2, 1))
     kinetic = 0.5 * 3.0 * (motion.velocity**2).sum(axis=1)
-    kinetic += 0.5 * np.einsum("mi,mij,mj->m", motion.turning, inertia, motion.turning)
-    energy = kinetic - 3.0 * motion.place @ mechanism.gravity
+    kinetic += 0.5 * np.einsum("mi,mij,mj->m", motion.angular_velocity, inertia, motion.angular_velocity)
+    energy = kinetic - 3.0 * motion.position @ mechanism.gravity
     assert np.ptp(energy) < 1e-8 * kinetic.max()
 
 
@@ -217,10 +217,10 @@ def test_joints_in_mjcf_move_as_the_constraints_do(model, tmp_path, name):
     accelerations, paths = build_differences(mechanism, tmp_path, 80, 5e-3)
     assert accelerations < 1e-10
     for places in paths.values():
-        assert np.abs(places[::2] - motion.place).max() < 1e-6  # steps of 5 ms
+        assert np.abs(places[::2] - motion.position).max() < 1e-6  # steps of 5 ms
     faulty = replace(mechanism, gravity=1.01 * mechanism.gravity)
     _, others = build_differences(faulty, tmp_path, 80, 5e-3)
-    assert np.abs(others["exudyn"][::2] - motion.place).max() > 1e-4
+    assert np.abs(others["exudyn"][::2] - motion.position).max() > 1e-4
 
 
 def test_a_rod_without_mass_is_no_mjcf(model):
@@ -240,8 +240,8 @@ def test_a_ball_swings_as_a_hinge_does_and_a_fault_is_seen(model, monkeypatch, t
 def _level_pendulum(mechanism):
     """2 m long and at rest, level: it swings in a plane on a ball as on a hinge about y."""
     place, axes = np.array([2.0, 0.0, 0.0]), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    ground, body = (replace(each, place=np.zeros(3), axes=axes.T) for each in (mechanism.ground, mechanism.body))
-    still = {"velocity": np.zeros(3), "turning": np.zeros(3), "gravity": np.array([0.0, 0.0, -9.80665])}
+    ground, body = (replace(each, position=np.zeros(3), axes=axes.T) for each in (mechanism.ground, mechanism.body))
+    still = {"velocity": np.zeros(3), "angular_velocity": np.zeros(3), "gravity": np.array([0.0, 0.0, -9.80665])}
     inertia = np.diag([0.04, 0.1, 0.1])
     return replace(
         mechanism, mass=1.0, centre=place, inertia=inertia, axes=np.eye(3), ground=ground, body=body, **still
@@ -251,4 +251,4 @@ def _level_pendulum(mechanism):
 def _file_of(mechanism):
     """Half a second of its motion, as a file of twelve digits."""
     motion, reaction = ConstrainedBody(mechanism).run(0.5, 5e-3, 2)
-    return OutputFile(motion.times, {"Pos": motion.place, "Rforce": reaction.force}, 12)
+    return OutputFile(motion.times, {"Pos": motion.position, "Rforce": reaction.force}, 12)

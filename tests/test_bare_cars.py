@@ -13,26 +13,26 @@ from validation.absence import bare_cars, hand_built_handling, machinery
 
 
 def test_the_written_car_moves_as_the_bare_one() -> None:
-    ours, theirs = (np.hstack(job()) for job in bare_cars.cars(20))
+    ours, theirs = (np.hstack(job()) for job in bare_cars.car_runs(20))
     assert np.abs(ours - theirs).max() < 1e-11  # sums in another order; states up to 44 rad/s
     assert np.abs(ours[-1] - ours[0]).max() > 0.1  # nothing stands still
 
 
 def test_a_car_of_other_springs_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    numbers_of = hand_built_handling.numbers_of
+    numbers_of = hand_built_handling.parameter_table
 
     def softer(own: Handling) -> np.ndarray:
         numbers = numbers_of(own)
-        numbers[hand_built_handling.HEAD_LENGTH + 5] *= 0.999  # strut of the first wheel
+        numbers[hand_built_handling.GENERAL_NUMBERS + 5] *= 0.999  # strut of the first wheel
         return numbers
 
-    monkeypatch.setattr(hand_built_handling, "numbers_of", softer)
-    ours, theirs = (np.hstack(job()) for job in bare_cars.cars(20))
+    monkeypatch.setattr(hand_built_handling, "parameter_table", softer)
+    ours, theirs = (np.hstack(job()) for job in bare_cars.car_runs(20))
     assert np.abs(ours - theirs).max() > 1e-7
 
 
 def test_bodies_that_are_one_in_mujoco_move_as_they_do_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    own, q, v = bare_cars.start()
+    own, q, v = bare_cars.start_state()
     rng = np.random.default_rng(1)
     q, v = q + rng.normal(0.0, 0.05, len(q)), v + rng.normal(0.0, 0.2, len(v))
     one = FreeMujoco(driven_by(own))
@@ -45,7 +45,7 @@ def test_bodies_that_are_one_in_mujoco_move_as_they_do_apart(monkeypatch: pytest
 
 
 def test_a_wheel_with_inertia_of_its_own_does_not_spin_with_its_rotor() -> None:
-    own, _, _ = bare_cars.start()
+    own, _, _ = bare_cars.start_state()
     heavy = tuple(
         replace(body, inertia=((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0))) if body.name == "fl" else body
         for body in own.vehicle.bodies
@@ -54,5 +54,5 @@ def test_a_wheel_with_inertia_of_its_own_does_not_spin_with_its_rotor() -> None:
 
 
 def test_forces_of_cars_and_hubs_make_no_array() -> None:
-    assert machinery.made_by_car() == 0
-    assert [machinery.made_by_hubs(engine) for engine in ("reference", "mujoco")] == [0, 0]
+    assert machinery.arrays_added_by_car() == 0
+    assert [machinery.arrays_added_by_hubs(engine) for engine in ("reference", "mujoco")] == [0, 0]

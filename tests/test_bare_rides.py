@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from validation.absence import bare_rides
-from validation.absence.bare_rides import copies, rides
+from validation.absence.bare_rides import copy_runs, ride_runs
 from validation.absence.hand_built_contact import contact_jobs
 from validation.absence.hand_built_ride import Car
 
 
 def jobs(engine):
-    return copies(20) if engine == "reference" else rides(engine, 20)
+    return copy_runs(20) if engine == "reference" else ride_runs(engine, 20)
 
 
 @pytest.mark.parametrize("engine", ["reference", "exudyn", "mujoco"])

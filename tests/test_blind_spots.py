@@ -22,22 +22,30 @@ from validation.blind_spots import memory, probe
 from validation.blind_spots.audit import (
     FUNCTIONS,
     TRACE,
-    Asked,
+    FaultChecks,
+    FaultFreeTrace,
     Job,
-    Probes,
-    Traced,
+    WorkerPool,
     audit_of,
-    environment,
     jobs,
-    lines_of,
-    prepare,
+    logged_lines,
+    save_functions,
+    worker_environment,
 )
-from validation.blind_spots.probe import Told
-from validation.blind_spots.rewriting import ROOT, NoSuchFunction, function_of, rewritten, root_of, roots_of_names, text
+from validation.blind_spots.probe import JobLog
+from validation.blind_spots.rewriting import (
+    ROOT,
+    NoSuchFunction,
+    argument_of_names,
+    function_definition,
+    rewritten_module,
+    root_argument,
+    source_text,
+)
 from validation.blind_spots.shared import (
     candidate_functions,
     compiled_functions,
-    definitions,
+    function_definitions,
     shared_functions,
     shared_modules,
 )
@@ -49,9 +57,9 @@ from validation.blind_spots.table import (
     harmless_functions,
     kind_of,
     merged_lines,
-    read,
+    read_table,
     uncovered_functions,
-    write,
+    write_table,
 )
 from validation.report.blind_spots import blind_spots
 
@@ -79,12 +87,12 @@ def fault():
     """Function that sets the fault of the place, which has none after the test."""
     yield lambda value: memory.FAULTS.__setitem__(PLACE, value)
     memory.FAULTS[PLACE] = 0.0
-    memory.forget()
+    memory.clear_marks()
 
 
 def made(names):
     space = {}
-    exec(compile(rewritten(SOURCE, "models.none", names), "a", "exec"), space)
+    exec(compile(rewritten_module(SOURCE, "models.none", names), "a", "exec"), space)
     return space
 
 
@@ -104,7 +112,7 @@ def test_a_function_without_a_fault_gives_what_it_is_given_itself_and_is_marked(
     assert memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN) == [PLACE, PLACE + 1] and memory.nonzero_functions(
         memory.FUNCTIONS_WITH_NUMBERS
     ) == [PLACE]
-    memory.forget()
+    memory.clear_marks()
     assert not memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN) and not memory.nonzero_functions(
         memory.FUNCTIONS_WITH_NUMBERS
     )
@@ -136,23 +144,23 @@ def test_an_object_that_only_hands_on_others_has_no_number_of_its_own():
     assert memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN) == [PLACE] and not memory.nonzero_functions(
         memory.FUNCTIONS_WITH_NUMBERS
     )
-    memory.forget()
+    memory.clear_marks()
 
 
 def test_an_unknown_function_is_an_error():
     with pytest.raises(NoSuchFunction, match="nothing"):
-        rewritten(SOURCE, "models.none", {"nothing": PLACE})
+        rewritten_module(SOURCE, "models.none", {"nothing": PLACE})
 
 
 def test_nothing_stands_before_what_a_module_takes_from_the_future():
     source = '"""A module."""\nfrom __future__ import annotations\n' + SOURCE.partition("\n")[2]
-    compile(rewritten(source, "models.none", {"law": PLACE}), "a", "exec")
+    compile(rewritten_module(source, "models.none", {"law": PLACE}), "a", "exec")
 
 
 def test_functions_that_call_each_other_are_rewritten():
     module = "models.contact.accuracy"
-    names = {name: PLACE for name, _ in definitions(module)}
-    assert "_spoiled_by_audit" in ast.unparse(rewritten(text(module), module, names))
+    names = {name: PLACE for name, _ in function_definitions(module)}
+    assert "_spoiled_by_audit" in ast.unparse(rewritten_module(source_text(module), module, names))
 
 
 def test_compiled_code_takes_a_fault_as_it_runs_and_compiles_nothing_for_it(fault):
@@ -182,7 +190,7 @@ def test_compiled_code_that_gives_no_number_is_marked_as_having_run():
     assert memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN) == [PLACE] and not memory.nonzero_functions(
         memory.FUNCTIONS_WITH_NUMBERS
     )
-    memory.forget()
+    memory.clear_marks()
 
 
 def test_records_are_spoiled_field_by_field_in_python_and_in_compiled_code(fault):
@@ -209,13 +217,15 @@ def test_whole_numbers_of_a_table_that_python_makes_stay_for_they_may_be_places(
 )
 def test_an_argument_that_only_called_functions_fill_is_spoiled_at_the_end(module, name, argument):
     source = ROOT.joinpath(*module.split(".")).with_suffix(".py").read_text()
-    assert f"_scaled_by_audit({argument}, {PLACE})" in ast.unparse(rewritten(source, module, {name: PLACE}))
+    assert f"_scaled_by_audit({argument}, {PLACE})" in ast.unparse(rewritten_module(source, module, {name: PLACE}))
 
 
 def test_an_array_that_a_function_sees_behind_a_pointer_is_spoiled_at_the_end():
     """Once: neither what it is cleared with nor what is handed on is."""
     for module in ("models.multibody.cut_kernel", "models.rail.joint_forces"):
-        function = function_of(rewritten(text(module), module, {"set_joint_forces": PLACE}), "set_joint_forces")
+        function = function_definition(
+            rewritten_module(source_text(module), module, {"set_joint_forces": PLACE}), "set_joint_forces"
+        )
         assert ast.unparse(function.body[-1]) == f"_scaled_by_audit(array(f, (n,)), {PLACE})"
         assert ast.unparse(function).count("_spoiled_by_audit") == 0
 
@@ -252,7 +262,7 @@ def test_a_function_of_python_is_shared_where_several_engines_call_it_in_one_sce
 def test_sides_are_runs_of_scenes_of_every_system_that_has_several_engines():
     systems = {getattr(prepared_scene(scene), "system", DEFAULT_SYSTEM) for scene, _ in runs_to_trace()}
     assert systems == {name for name, system in SYSTEMS.items() if len(system.engines) > 1}
-    traces = [job.trace for job in (*jobs(False), *(Job([], [], [run]) for run in runs_to_trace()))]
+    traces = [job.trace_file for job in (*jobs(False), *(Job([], [], [run]) for run in runs_to_trace()))]
     assert len({*traces}) == len(traces), "a trace of its own for each"
 
 
@@ -263,31 +273,33 @@ def test_a_side_has_what_runs_after_its_scene_is_read_and_nothing_of_a_run_that_
             raise RunFailed("none", "stopped", 0.0)
         return value
 
-    told = Told({"out": tmp_path / "told.jsonl", "sound": [], "budgets": [9.0, 9.0]})
+    told = JobLog({"out": tmp_path / "told.jsonl", "sound": [], "budgets": [9.0, 9.0]})
     monkeypatch.setattr(probe, "prepared_scene", lambda scene: mark(1, scene))
     monkeypatch.setattr("models.systems.run", lambda scene, engine: mark(2, engine))
     for engine in ("exudyn", "none"):
         probe.run_scene("a.toml", engine, told)
-    (line,) = lines_of(tmp_path / "told.jsonl")
+    (line,) = logged_lines(tmp_path / "told.jsonl")
     assert (line["run"], line["numbers"]) == (["a.toml", "exudyn"], [2])
-    memory.forget()
+    memory.clear_marks()
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Folder of an audit, whose machine code the tests share."""
     place = tmp_path_factory.mktemp("audit")
-    prepare(place)
+    save_functions(place)
     return place
 
 
 def process(folder, faults, code):
     """What a new process prints, in which functions have faults."""
     doubles = folder / "memory"
-    shared = memory.rows(doubles)[0]
+    shared = memory.shared_rows(doubles)[0]
     for place in range(len(candidate_functions())):
         shared[place] = faults.get(candidate_functions()[place], 0.0)
-    return float(subprocess.check_output([sys.executable, "-c", code], env=environment(folder, doubles), cwd=ROOT))
+    return float(
+        subprocess.check_output([sys.executable, "-c", code], env=worker_environment(folder, doubles), cwd=ROOT)
+    )
 
 
 def test_machine_code_that_is_kept_takes_the_fault_of_each_process(folder):
@@ -300,21 +312,23 @@ def test_machine_code_that_is_kept_takes_the_fault_of_each_process(folder):
 @pytest.fixture(scope="module")
 def probes(folder):
     """A process of an audit."""
-    with Probes(folder, workers=1) as started:
+    with WorkerPool(folder, workers=1) as started:
         yield started
 
 
-def line_of(probes, name, **case):
+def audited_line(probes, name, **case):
     """What is told of a function that one case runs, which has independent rows."""
     rows = [{"id": "contact_hertz.p0", "status": "passed", "independence": "closed form"}]
     item = {"case": "contact_hertz", "rows": rows, "seconds": 1.0, "ran": {name}, "numbers": {name}}
-    return Asked(probes, Traced(candidate_functions(), {"contact_hertz": item | case}), True, {}).line_of(name)
+    return FaultChecks(
+        probes, FaultFreeTrace(candidate_functions(), {"contact_hertz": item | case}), True, {}
+    ).audited_line(name)
 
 
 def test_a_spoiled_function_is_noticed_by_the_rows_that_call_it(probes):
     """Hertz' ellipse by Johnson's figures and a closed form; the sound run had no failed row."""
     name = "models.contact.hertz:_contact"
-    noticed = line_of(probes, name)
+    noticed = audited_line(probes, name)
     assert (noticed.ended, noticed.calling, noticed.left) == ("whole", 1, 0)
     assert "contact_hertz.p0" in noticed.rows and "contact_hertz.p0" in noticed.independent
 
@@ -322,14 +336,14 @@ def test_a_spoiled_function_is_noticed_by_the_rows_that_call_it(probes):
 def test_a_row_that_fails_without_a_fault_notices_nothing(probes):
     name = "models.contact.hertz:_contact"
     rows = [{"id": "contact_hertz.p0", "status": "failed", "independence": "closed form"}]
-    noticed = line_of(probes, name, rows=rows)
+    noticed = audited_line(probes, name, rows=rows)
     assert noticed.rows and "contact_hertz.p0" not in noticed.rows.split("; ")
 
 
 def test_a_function_that_gives_no_number_has_a_line_that_says_so(probes):
     name = "models.contact.hertz:_contact"
     for case, ended in (({"numbers": set()}, "no numbers"), ({"numbers": set(), "ran": set()}, "not run")):
-        line = line_of(probes, name, **case)
+        line = audited_line(probes, name, **case)
         assert (line.ended, line.calling, line.left, line.rows) == (ended, 0, 0, "")
 
 
@@ -337,13 +351,13 @@ def test_a_folder_of_other_functions_is_refused(folder, tmp_path):
     (tmp_path / TRACE).mkdir()
     (tmp_path / FUNCTIONS).write_text(json.dumps(["models.a:f"]))
     with pytest.raises(InputError, match=FUNCTIONS):
-        prepare(tmp_path)
+        save_functions(tmp_path)
 
 
 def test_judges_and_all_others_make_one_line():
     judges, others = line("models.a:f", rows="x.y"), line("models.a:f", rows="x.z", tests="t")
-    assert judges.with_others(others) == Line("models.a:f", "whole", 2, 0, "x.y; x.z", "t", "", "abc")
-    assert line(ended="not run").with_others(others).ended == "whole"
+    assert judges.joined_with(others) == Line("models.a:f", "whole", 2, 0, "x.y; x.z", "t", "", "abc")
+    assert line(ended="not run").joined_with(others).ended == "whole"
 
 
 def test_what_nothing_independent_notices_is_not_covered_and_so_is_what_has_no_line():
@@ -390,14 +404,14 @@ def is_no_number(node, given):
         return is_no_number(node.body, given) and is_no_number(node.orelse, given)
     is_zero = isinstance(node, ast.Constant) and node.value == 0.0
     is_status = isinstance(node, ast.Name) and (node.id.isupper() or node.id == "status")
-    return is_zero or is_status or ast.unparse(node) in ("math.nan", "np.nan") or root_of(node, given) != ""
+    return is_zero or is_status or ast.unparse(node) in ("math.nan", "np.nan") or root_argument(node, given) != ""
 
 
 @pytest.mark.parametrize("name", VIEWS)
 def test_a_function_that_hands_on_views_has_no_number_of_its_own(name):
     module, _, function = name.partition(":")
-    parsed = function_of(ast.parse(text(module)), function)
-    given, values = roots_of_names(parsed), [each.value for each in ast.walk(parsed) if isinstance(each, ast.Return)]
+    parsed = function_definition(ast.parse(source_text(module)), function)
+    given, values = argument_of_names(parsed), [each.value for each in ast.walk(parsed) if isinstance(each, ast.Return)]
     for node in ast.walk(parsed):
         if isinstance(node, ast.Assign) and any(
             isinstance(each, ast.Subscript | ast.Attribute) for each in node.targets
@@ -418,19 +432,19 @@ def test_an_audit_of_functions_that_there_are_none_of_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"--only = 'models.tyres\.\*'"):
         audit_of("models.tyres.*", tmp_path, lambda *_: None)
     with pytest.raises(InputError, match="test_nothing"):
-        audit_of("*", tmp_path, lambda *_: None, by="tests/test_nothing.py")
+        audit_of("*", tmp_path, lambda *_: None, check_pattern="tests/test_nothing.py")
     with pytest.raises(InputError, match="goes with --blind-spots"):
         validate(only="models.tyre.*")
 
 
 def test_a_table_is_read_as_it_was_written(tmp_path):
     lines = [line("models.a:f", rows="x.y; x.z", independent="x.y"), line("models.a:g")]
-    write(reversed(lines), tmp_path / "table.csv")
-    assert read(tmp_path / "table.csv") == lines
+    write_table(reversed(lines), tmp_path / "table.csv")
+    assert read_table(tmp_path / "table.csv") == lines
 
 
 def test_the_report_names_functions_of_the_sources_that_have_no_line(tmp_path):
-    write([line("models.tyre.bristles:tyre_forces", rows="x.y", independent="x.y")], tmp_path / "table.csv")
+    write_table([line("models.tyre.bristles:tyre_forces", rows="x.y", independent="x.y")], tmp_path / "table.csv")
     told = blind_spots(tmp_path / "table.csv")
     assert "models.tyre.bristles:_blend_directions" in told["uncovered"]["not audited"]
     assert "models.tyre.bristles:tyre_forces" not in told["uncovered"]["not audited"]
@@ -438,10 +452,10 @@ def test_the_report_names_functions_of_the_sources_that_have_no_line(tmp_path):
 
 
 def test_a_page_names_what_the_kept_audit_says_is_not_covered():
-    text = not_covered.PAGE.read_text()
-    assert not_covered.page(text) == text, "run python -m docs.not_covered"
-    lines = read()
+    source_text = not_covered.PAGE.read_text()
+    assert not_covered.page(source_text) == source_text, "run python -m docs.not_covered"
+    lines = read_table()
     assert lines
     for names in uncovered_functions(lines, [each.function for each in lines]).values():
         for name in names:
-            assert f"`{name.replace('.<locals>', '')}`" in text
+            assert f"`{name.replace('.<locals>', '')}`" in source_text

@@ -13,7 +13,7 @@ from models.brake.controllers.per_wheel import SpeedEstimate
 from models.brake.controllers.slip import SlipBangBang, SlipPI
 from models.core.errors import InputError, RunFailed
 from models.tyre.magic_formula import table_of_surface
-from validation.braking.five_phase_exact import ExactWheel, last_cycle
+from validation.braking.five_phase_exact import ExactWheel, last_control_cycle
 
 PHASES = FivePhase(1, e1=20.0, e2=30.0, e3=20.0, e4=2.0, e5=60.0, falling=60.0, fast=40.0, slow=8.0)
 LINE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
@@ -134,7 +134,9 @@ def frozen(**changes):
 def exact(wheel, controller=PHASES):
     phases = [(1500.0 * rate_of_phase(k, controller), *end_of_phase(k, controller)) for k in range(6)]
     forces = wheel.load * wheel.tyre.mu_x[0, 0]
-    return last_cycle(ExactWheel(wheel.speed, wheel.radius, wheel.inertia, wheel.tyre.slips, forces), phases, 12)
+    return last_control_cycle(
+        ExactWheel(wheel.speed, wheel.radius, wheel.inertia, wheel.tyre.slips, forces), phases, 12
+    )
 
 
 @pytest.mark.grounds("closed form")

@@ -15,7 +15,7 @@ from models.brake.trailer import CHOSEN_TRAILER, plane_of_trailer, plane_of_trai
 from models.engines.braking import set_held
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
-from validation.braking.braked_truck import RollingTruck, constant_friction, on_road, truck_on
+from validation.braking.braked_truck import RollingTruck, constant_friction, on_road, truck_on_tables
 
 MU = 0.4
 LOCKING = np.full(4, 1e14)
@@ -100,7 +100,7 @@ def test_locked_wheels_stop_in_the_time_of_coulomb_s_friction(speed):
     """t = v / (mu g), and the wheels bear mu m g on the way; at a walking pace steps are cut into parts."""
     plane = plane_of_truck(PAPER_TRUCK)
     still = plane._replace(radius=plane.radius * 1e9)  # wheels that turn at next to no speed: locked at once
-    moving = RollingTruck(truck_on(constant_friction(MU), still), speed)
+    moving = RollingTruck(truck_on_tables(constant_friction(MU), still), speed)
     moving.on(np.tile(LOCKING, (2, 1)), 5.5e-3)
     forces, loads = -moving.report.force_x.sum(), moving.report.load.sum()
     assert (loads, forces) == pytest.approx((PAPER_TRUCK.mass * GRAVITY, MU * PAPER_TRUCK.mass * GRAVITY), rel=1e-6)

@@ -12,9 +12,9 @@ from validation.braking.braked_truck import (
     ICE_TABLE,
     RollingTruck,
     constant_friction,
-    sideways_with_locked_front_wheels,
+    lateral_displacement_when_locked,
     transfer_errors,
-    truck_on,
+    truck_on_tables,
 )
 from validation.braking.truck_equations import braked_turn
 
@@ -23,7 +23,7 @@ LOCKING, ROLLING = np.full(4, 1e5), np.array([900.0, 900.0, 600.0, 600.0])
 
 def turning(speed, yaw=0.0, side=0.0):
     """The truck on ice, steered a little, at rates of its y and its heading."""
-    moving = RollingTruck(truck_on(), speed, steer=0.03)
+    moving = RollingTruck(truck_on_tables(), speed, steer=0.03)
     moving.state[1, 1:] = side, yaw
     return moving
 
@@ -31,7 +31,7 @@ def turning(speed, yaw=0.0, side=0.0):
 @pytest.mark.grounds("closed form")
 def test_locked_wheels_stop_in_the_closed_form():
     for step in (1e-4, 5.5e-3, 2e-2):
-        state = RollingTruck(truck_on(constant_friction(0.4)), 10.0).braked(LOCKING, step).state
+        state = RollingTruck(truck_on_tables(constant_friction(0.4)), 10.0).braked(LOCKING, step).state
         # the wheels' own stop, v / r in J v / (r T) = 0.3 ms, gives back less force than a locked wheel has
         assert state[0, 0] == pytest.approx(100.0 / (2.0 * 0.4 * GRAVITY), rel=2e-3)
         assert not state[1].any()
@@ -42,7 +42,7 @@ def test_locked_wheels_stop_in_the_closed_form():
 def _locked_from_the_start(tables):
     plane = plane_of_truck(PAPER_TRUCK)
     still = plane._replace(radius=plane.radius * 1e9)  # wheels that turn at next to no speed: locked at once
-    return RollingTruck(truck_on(tables, still), 10.0).braked(LOCKING * 1e9)
+    return RollingTruck(truck_on_tables(tables, still), 10.0).braked(LOCKING * 1e9)
 
 
 @pytest.mark.grounds("closed form")
@@ -51,15 +51,17 @@ def test_load_transfer_of_all_and_of_single_axles():
 
 
 def test_equal_friction_gives_no_yaw_at_all_and_mirrored_steering_a_mirrored_path():
-    straight = RollingTruck(truck_on(), 10.0).braked(ROLLING).state
+    straight = RollingTruck(truck_on_tables(), 10.0).braked(ROLLING).state
     assert straight[0, 1] == 0.0 and straight[0, 2] == 0.0
-    left, right = (RollingTruck(truck_on(), 10.0, steer=s).braked(ROLLING, duration=3.0).state for s in (0.03, -0.03))
+    left, right = (
+        RollingTruck(truck_on_tables(), 10.0, steer=s).braked(ROLLING, duration=3.0).state for s in (0.03, -0.03)
+    )
     assert left[0, 1] > 0.5
     assert np.abs(left * [1.0, -1.0, -1.0] - right).max() < 1e-10
 
 
 def test_locked_front_wheels_do_not_steer():
-    assert abs(sideways_with_locked_front_wheels()) < 1e-3
+    assert abs(lateral_displacement_when_locked()) < 1e-3
 
 
 @pytest.mark.parametrize("step", [pytest.param(1e-4, marks=pytest.mark.full), 5.5e-3, 2e-2])
@@ -77,7 +79,7 @@ def test_every_end_is_at_rest_and_stays(step):
 
 
 def test_backwards_is_forwards_seen_from_behind():
-    ahead, back = (RollingTruck(truck_on(), v).braked(ROLLING, duration=1.0).state for v in (8.0, -8.0))
+    ahead, back = (RollingTruck(truck_on_tables(), v).braked(ROLLING, duration=1.0).state for v in (8.0, -8.0))
     # loads move to the other axle, which has the same friction: the way is the same
     assert back[0, 0] == pytest.approx(-ahead[0, 0], rel=1e-3)
 
@@ -85,7 +87,7 @@ def test_backwards_is_forwards_seen_from_behind():
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
 def test_engines_carry_the_chassis_as_the_compiled_step_does(engine):
     own, carried = (
-        RollingTruck(truck_on(), 10.0, steer=0.03, step_function=go).braked(ROLLING, 1e-3, duration=0.5).state
+        RollingTruck(truck_on_tables(), 10.0, steer=0.03, step_function=go).braked(ROLLING, 1e-3, duration=0.5).state
         for go in (advance, CarriedChassis(engine, plane_of_truck(PAPER_TRUCK)).advance)
     )
     assert own[0, 1] > 0.05
@@ -95,7 +97,7 @@ def test_engines_carry_the_chassis_as_the_compiled_step_does(engine):
 @pytest.mark.full
 def test_the_truck_written_out_turns_as_the_compiled_one():
     where = braked_turn(PAPER_TRUCK, ICE_TABLE, 0.03, (900.0, 600.0), 11.11, 6.0)
-    state = RollingTruck(truck_on(), 11.11, steer=0.03).braked(ROLLING, 1e-3, duration=where.time).state
+    state = RollingTruck(truck_on_tables(), 11.11, steer=0.03).braked(ROLLING, 1e-3, duration=where.time).state
     assert state[0] == pytest.approx([where.x, where.y, where.heading], abs=2e-3)
 
 

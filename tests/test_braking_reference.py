@@ -20,7 +20,7 @@ from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
 from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
-from validation.braking.plain_relaxation import turn_apart
+from validation.braking.plain_relaxation import braked_turn_difference
 from validation.braking.sprung_box import box, car
 from validation.cases import braking_reference as case
 
@@ -85,32 +85,34 @@ def test_accelerations_are_those_of_the_engine(name, engine):
 
 def test_a_piece_of_a_stop_is_that_of_the_engine():
     own = whole.asymmetric_twin()
-    assert whole.paths_apart(whole.run(own, "mujoco", 0.03), whole.plain_run("twin", 0.03)) < 1e-11
+    assert whole.path_difference(whole.run(own, "mujoco", 0.03), whole.plain_run("twin", 0.03)) < 1e-11
 
 
 def test_a_turn_on_relaxing_tyres_tends_to_its_written_equations_by_order_two():
-    errors = [turn_apart(0.6, substeps) for substeps in (1, 2)]
+    errors = [braked_turn_difference(0.6, substeps) for substeps in (1, 2)]
     assert 3.5 < errors[0] / errors[1] < 4.5 and errors[1] < 2e-4  # m, of some 60 m
 
 
 def test_a_steady_circle_is_that_of_the_engine():
-    found, plain = whole.circles_of_both_sides(whole.asymmetric_twin())
+    found, plain = whole.steady_circle_pair(whole.asymmetric_twin())
     assert found[0] > 0.05 and np.abs(found - plain).max() < 1e-11
 
 
 def test_a_stop_ends_where_that_of_the_engine_ends():
     stops = [whole.run(box(), engine, 1.0, False, 0.3) for engine in ("mujoco", "reference")]
-    assert all(stop.ended_at_rest for stop in stops) and whole.paths_apart(*stops) < 1e-11
+    assert all(stop.ended_at_rest for stop in stops) and whole.path_difference(*stops) < 1e-11
 
 
 def test_what_turns_over_and_what_is_too_stiff_is_told():
-    vehicle = whole.vehicle_on(car(), "reference", False)
+    vehicle = whole.braked_vehicle_on_springs(car(), "reference", False)
     start = vehicle.rolling(10.0)
     start.state[0, 4], start.state[1, 4] = 0.49, 5.0
     with pytest.raises(RunFailed, match="turns over"):
         vehicle.run(whole.controller(False), start, 0.1)
     with pytest.raises(Refused, match="at most"):
-        replace(whole.vehicle_on(box(100.0), "reference", False), substeps=1).run(whole.controller(False), 2.0, 0.1)
+        replace(whole.braked_vehicle_on_springs(box(100.0), "reference", False), substeps=1).run(
+            whole.controller(False), 2.0, 0.1
+        )
 
 
 def scene(**run):
@@ -133,7 +135,7 @@ def test_a_scene_is_run_by_the_reference_when_it_is_asked_for():
     check(own, ("reference",))
     for name in own.procedures:
         found, plain = (drive(own, engine, procedure=name) for engine in ("mujoco", "reference"))
-        assert plain.data.attrs["engine"] == "reference" and whole.paths_apart(found.detail, plain.detail) < 1e-11
+        assert plain.data.attrs["engine"] == "reference" and whole.path_difference(found.detail, plain.detail) < 1e-11
         assert float(plain.data["load"][-1].min()) > 1e3
 
 

@@ -55,7 +55,7 @@ def test_loads_are_those_of_levers_and_a_locked_train_stops_by_friction_alone():
     train_of_two = whole.towing_car()
     front, rear, axle, _ = static_loads(train_of_two.handling)
     assert train_of_two.in_plane().static.reshape(3, 2).sum(axis=1) == pytest.approx([front, rear, axle], rel=1e-9)
-    way, wanted = closed.locked_stop()
+    way, wanted = closed.locked_stop_and_closed_form()
     assert way == pytest.approx(wanted, rel=1e-3)  # the car leans ahead by less than a millimetre
 
 
@@ -63,7 +63,9 @@ def test_loads_are_those_of_levers_and_a_locked_train_stops_by_friction_alone():
 def test_a_caravan_that_brakes_alone_pulls_as_its_levers_say_and_brakes_that_hold_on_to_the_car_are_seen():
     errors = closed.caravan_errors()
     assert max(abs(error) for error in (errors.deceleration, errors.load, errors.pull)) < 1e-3
-    wrong = closed.relative_difference(closed.pulled_caravan(closed.hold_on_to_the_car, 2.5), closed.pulled_by_levers())
+    wrong = closed.relative_difference(
+        closed.caravan_run(closed.plant_brakes_on_car, 2.5), closed.caravan_closed_form()
+    )
     assert abs(wrong.load) > 5e-3
 
 
@@ -82,12 +84,14 @@ def test_accelerations_are_those_of_plain_code_and_wheels_that_keep_to_the_car_a
 @pytest.mark.parametrize(("name", "lags"), [("train", False), ("caravan", True)])
 def test_a_piece_of_a_stop_is_that_of_plain_code(name, lags):
     compiled = whole.run(whole.TRAINS[name](), "mujoco", 0.03, lags=lags)
-    assert whole.paths_apart(compiled, whole.plain_run(name, 0.03, lags=lags)) < 1e-11
+    assert whole.path_difference(compiled, whole.plain_run(name, 0.03, lags=lags)) < 1e-11
 
 
 def test_springs_of_a_trailer_are_the_engines_own_and_the_table_has_no_more_of_them():
     for engine in ("mujoco", "exudyn"):
-        native, compiled = (driven(vehicle(), engine) for vehicle in (whole.in_row, whole.compiled_springs))
+        native, compiled = (
+            driven(vehicle(), engine) for vehicle in (whole.asymmetric_train, whole.train_with_compiled_springs)
+        )
         names, _ = built_share(engine, replace(native, kernel=None))
         of_trailer = {s.name for s in train().springs if s.frame in train().towed} | {"trailer's bar"}
         assert set(names) == of_trailer and not compiled.parts

@@ -14,7 +14,7 @@ from models.contact.linear_theory import coefficients, flexibilities
 from models.contact.material import Falling, MaterialPair
 from models.core.errors import InputError
 from validation.cases import fastsim as case
-from validation.contact.fuzzed_creepage import COMPUTED_OPTIONS, most_moment, random_contacts, worst_violation
+from validation.contact.fuzzed_creepage import COMPUTED_OPTIONS, moment_bound, random_contacts, worst_violation
 
 PAIR = MaterialPair()
 AT = {"a": 6e-3, "b": 4e-3, "load": 80e3, "mu": 0.3, "xi_x": 1e-3, "xi_y": -5e-4, "spin": 0.3}
@@ -97,7 +97,7 @@ def test_the_moment_reaches_the_limit_of_friction_and_no_more():
     """Pure spin that slides all over: 3 pi / 16 mu N a by Hertz's pressure on a circle, 8 / 15 by a parabola."""
     round_patch = {"a": np.full(1, 5e-3), "b": np.full(1, 5e-3), "load": np.full(1, 8e4), "mu": np.full(1, 0.3)}
     for bound, share in (("elliptic", 3 * math.pi / 16), ("parabolic", 8 / 15)):
-        most = most_moment(round_patch, 81, bound)
+        most = moment_bound(round_patch, 81, bound)
         assert most == pytest.approx(share * 120, rel=5e-4)
         turning = RollingEllipse(5e-3, 5e-3, 8e4, 0.3, 0.0, 0.0, -1e3)
         spun = fastsim(turning, PAIR, cells=81, bound=bound, flexibilities="one")

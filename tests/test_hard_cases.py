@@ -50,7 +50,7 @@ def test_outcome(case, implementation, tmp_path):
 def test_there_are_enough_cases_with_names_of_their_own():
     names = Counter(case.name for case in ALL)
     assert len(names) >= 14 and set(names.values()) == {1}
-    assert all(case.why and case.hard and case.check for case in ALL)
+    assert all(case.tolerance_reason and case.difficulty and case.exact_answer for case in ALL)
 
 
 def found(module, name: str, implementation: str, folder) -> str:
@@ -209,6 +209,8 @@ def test_there_are_eighty_cases_without_the_measurement_files():
 
 
 def test_a_refusal_that_is_wanted_passes_its_row_also_where_no_implementation_has_a_part():
-    case = Case("odd", "hard", "check", "", 0.0, "why", broken, dict.fromkeys(IMPLEMENTATIONS, "refused"), once=True)
+    case = Case(
+        "odd", "hard", "check", "", 0.0, "why", broken, dict.fromkeys(IMPLEMENTATIONS, "refused"), without_engine=True
+    )
     row = hard_cases._outcome_row(case, "reference", hard_cases.CaseOutcome("refused"))
     assert (row.id, row.status) == ("hard.odd.any", "passed")

@@ -60,10 +60,10 @@ def test_cone_is_a_motion_with_these_rates():
 
 def test_recorded_car():
     """A telephone's gyro and its camera see the same turns: without this, frames or signs are wrong."""
-    path = recording.find()
+    path = recording.find_recording()
     if path is None:
         pytest.skip(f"needs {recording.RECORDING_FILE} in the folder that TWINRIG_DATA names")
-    own = recording.read(path)
+    own = recording.read_recording(path)
     seen = rotation_vector(unit.error_rotation(own.pose[20:], own.pose[:-20])) / (20 * recording.SAMPLE_PERIOD)
     read = np.einsum("nij,nj->ni", rotation_matrix(own.pose[10:-10]), own.rates[10:-10])
     smooth = np.column_stack([np.convolve(read[:, i], np.ones(20) / 20, "same") for i in range(3)])

@@ -34,7 +34,7 @@ from models.vehicles.spatial_linear import preloads, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from studies import ride_nonlinear
 from validation.common import checks
-from validation.common.bounces import Bounces, bounce_energy
+from validation.common.bounces import BouncingVehicle, bounce_energy
 from validation.common.scenes import largest_difference
 
 ENGINES = ("reference", "exudyn", "mujoco")
@@ -133,7 +133,7 @@ def test_a_wheel_alone_bounces_by_the_closed_form(engine):
 def test_the_exact_path_piece_by_piece(override):
     own = scene(geometry="linear", start=DROP, duration=1.0, step=1e-4, **override)
     assembly = assembly_of_scene(own)
-    exact = Bounces(assembly, 1e-4).path(assembly.initial, 10_000)
+    exact = BouncingVehicle(assembly, 1e-4).path(assembly.initial, 10_000)
     tight = simulate(own, "reference", Settings("DOP853", 1e-4, 1.0, 1e-11))
     assert np.abs(tight.states - exact).max() < 1e-6  # its rows are interpolated, across corners, too
     for engine in ENGINES:
@@ -143,7 +143,7 @@ def test_the_exact_path_piece_by_piece(override):
 def test_the_error_falls_with_the_square_of_the_step():
     own = scene(geometry="linear", start=DROP)
     assembly, steps = assembly_of_scene(own), 1e-3 / 2.0 ** np.arange(6)
-    exact = Bounces(assembly, 1e-3).path(assembly.initial, 1000)
+    exact = BouncingVehicle(assembly, 1e-3).path(assembly.initial, 1000)
     errors = []
     for step in steps:
         run = build("reference", assembly, Settings("RK4", step, 1.0)).run()

@@ -23,26 +23,26 @@ from validation.measured.measured_files.csv_forms import (
     READ,
     TITLES,
     Form,
-    clock,
-    german,
-    iso,
-    stamps,
+    clock_text,
+    german_text,
+    iso_text,
+    time_texts,
 )
-from validation.measured.measured_files.odd import SAMPLE_TIMES, OddFile, difference, read, usual
+from validation.measured.measured_files.odd import SAMPLE_TIMES, OddFile, read_channels, reading_error, usual_truth
 
 PLAIN = Form().times
 FORMS = st.builds(
     Form,
     headings=st.just(HEADINGS),
-    above=st.sampled_from([(), TITLES, KEYS, ("# by hand",)]),
+    lines_above=st.sampled_from([(), TITLES, KEYS, ("# by hand",)]),
     separator=st.sampled_from(",;\t"),
     decimal=st.sampled_from(".,"),
     quoted=st.booleans(),
     trailing=st.sampled_from(["", ","]),
     end=st.sampled_from(["\n", "\r\n"]),
     encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "cp1252"]),
-    below=st.sampled_from([(), ("",), (",,",)]),
-    times=st.sampled_from([PLAIN, stamps(clock), stamps(iso), stamps(german)]),
+    last_lines=st.sampled_from([(), ("",), (",,",)]),
+    times=st.sampled_from([PLAIN, time_texts(clock_text), time_texts(iso_text), time_texts(german_text)]),
 )
 
 
@@ -51,7 +51,7 @@ def possible(form: Form) -> Form:
     form = replace(
         form,
         trailing=form.trailing and form.separator,
-        below=tuple(line.replace(",", form.separator) for line in form.below),
+        last_lines=tuple(line.replace(",", form.separator) for line in form.last_lines),
     )
     commas = form.decimal == "," or "," in form.times[0]
     return replace(form, quoted=True) if commas and form.separator == "," else form
@@ -65,7 +65,7 @@ def ended(form: Form, text: str | None = None) -> float | str:
         try:
             source = open_source(path)
             said = [one.text for one in source.noticed]
-            return difference(source, usual(), "cut off" if any("cut off" in text for text in said) else "")
+            return reading_error(source, usual_truth(), "cut off" if any("cut off" in text for text in said) else "")
         except InputError as refusal:
             assert path.name in str(refusal) and "\n" not in str(refusal)
             return str(refusal)
@@ -80,7 +80,9 @@ def test_every_form_that_is_meant_is_read_as_the_plain_file(form):
 
 def test_a_tab_is_no_blank_before_a_time():
     """It may stand for a lost digit: 23:59:59 would become 3:59:59, a gap of 20 hours before the next row."""
-    form = next(form for _, _, form, truth in READ if set(truth) == set(usual()) and form.times[0].startswith("23:"))
+    form = next(
+        form for _, _, form, truth in READ if set(truth) == set(usual_truth()) and form.times[0].startswith("23:")
+    )
     text = form.text().replace(form.times[0], "\t" + form.times[0][1:], 1)
     assert "a tab in it" in str(ended(form, text))
 
@@ -92,7 +94,7 @@ def test_a_tab_is_no_blank_before_a_time():
         [
             form
             for _, _, form, truth in READ
-            if set(truth) == set(usual()) and form.gap is None and not form.beside and "" not in form.headings
+            if set(truth) == set(usual_truth()) and form.gap is None and not form.last_cells and "" not in form.headings
         ]
     ),
     st.booleans(),
@@ -123,7 +125,7 @@ def test_a_cut_within_a_line_is_never_silent(form, place):
 
 @pytest.mark.parametrize("odd", FILES, ids=lambda odd: odd.name)
 def test_a_form_is_read_or_refused_as_it_should(tmp_path, odd: OddFile):
-    if odd.wanted == "refused":
+    if odd.expected_outcome == "refused":
         with pytest.raises(InputError):
             odd.error(tmp_path)
     else:
@@ -143,9 +145,9 @@ def test_the_case_sees_a_form_that_is_read_without_a_word(tmp_path, monkeypatch)
 
 
 def test_stamps_keep_their_zone_and_their_day(tmp_path):
-    path = Form(times=stamps(lambda stamp: iso(stamp) + "+01:00")).make(tmp_path)
+    path = Form(times=time_texts(lambda stamp: iso_text(stamp) + "+01:00")).make(tmp_path)
     assert open_source(path).start.isoformat() == "2026-03-02T09:30:00+01:00"
-    found = read(open_source(Form(times=stamps(clock)).make(tmp_path)))
+    found = read_channels(open_source(Form(times=time_texts(clock_text)).make(tmp_path)))
     assert np.abs(found["Fz"][0] - SAMPLE_TIMES).max() <= 1e-16 and open_source(path).channels[0].unit == "N"
 
 
@@ -185,18 +187,21 @@ def test_units_beneath_the_headings_reach_the_channels(tmp_path):
         (("time [s]", "Fz", "Fx"), "-,kN,N m"),
         (BARE_HEADINGS, "s;kN;N m"),
     ):
-        form = Form(headings, between=(row,), separator=";" if ";" in row else ",")
+        form = Form(headings, lines_below_headings=(row,), separator=";" if ";" in row else ",")
         assert [one.unit for one in open_source(form.make(tmp_path)).channels] == ["kN", "N m"]
 
 
 def test_groups_above_the_headings_are_known_where_names_differ(tmp_path):
-    source = open_source(Form(above=(",WFT VL,",)).make(tmp_path))
+    source = open_source(Form(lines_above=(",WFT VL,",)).make(tmp_path))
     assert [(one.name, one.family) for one in source.channels] == [("Fz", "WFT VL"), ("Fx", "WFT VL")]
 
 
 def test_titles_and_comments_are_the_comment_of_the_file(tmp_path):
     form = Form(
-        BARE_HEADINGS, above=("# comment: by hand", '"Run; 7",,', "# samples: 40"), between=("ms,N,N",), times=MILLI
+        BARE_HEADINGS,
+        lines_above=("# comment: by hand", '"Run; 7",,', "# samples: 40"),
+        lines_below_headings=("ms,N,N",),
+        times=MILLI,
     )
     source = open_source(form.make(tmp_path))
     assert source.comment == "by hand\nRun; 7"

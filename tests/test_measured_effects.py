@@ -74,7 +74,7 @@ def test_a_recording_is_run_as_every_scene_is_and_its_result_says_where_its_samp
 
 
 def test_a_recording_is_run_for_a_part_and_in_longer_steps(tmp_path, monkeypatch):
-    monkeypatch.setattr("validation.absence.measured.SAMPLES", 201)
+    monkeypatch.setattr("validation.absence.measured.SAMPLE_COUNT", 201)
     write(tmp_path)
     of_files = build(bare_scene("measured").table() | {"stabilise": {"method": "none"}}, "s.toml", tmp_path)
     for own, steps in ((short(), 180), (of_files, 200)):

@@ -15,7 +15,16 @@ from validation.cases import measured_formats as case
 from validation.measured.measured_files import csv as csv_files
 from validation.measured.measured_files import mdf4 as mdf4_files
 from validation.measured.measured_files import tdms as tdms_files
-from validation.measured.measured_files.odd import FX, FZ, SAMPLE_TIMES, CutSweep, read, two_rates, usual, written
+from validation.measured.measured_files.odd import (
+    FX,
+    FZ,
+    SAMPLE_TIMES,
+    CutSweep,
+    file_of_two_rates,
+    read_channels,
+    usual_truth,
+    write_usual_file,
+)
 
 EXTENSIONS = (".csv", ".mf4", ".rsp", ".tdms")
 
@@ -82,7 +91,7 @@ def test_channels_are_asked_for_by_names_that_exist(tmp_path, extension):
 
 
 def test_channels_of_two_rates_are_not_read_as_one(tmp_path):
-    source = open_source(two_rates(".mf4")(tmp_path))
+    source = open_source(file_of_two_rates(".mf4")(tmp_path))
     with pytest.raises(InputError, match="one sampling rate"):
         source.blocks(["Fz", "Fx"])
 
@@ -193,14 +202,14 @@ def test_a_file_without_a_start_gives_none(tmp_path):
 
 
 def test_a_file_that_does_not_exist_offers_the_next(tmp_path):
-    written(tmp_path / "monday.csv")
+    write_usual_file(tmp_path / "monday.csv")
     with pytest.raises(InputError, match=r"did you mean 'monday\.csv'"):
         open_source(tmp_path / "mondy.csv")
 
 
 @pytest.mark.parametrize(("extension", "name"), [(".mf4", "asammdf"), (".tdms", "nptdms")])
 def test_a_missing_package_is_named_with_its_extra(tmp_path, monkeypatch, extension, name):
-    path = written(tmp_path / f"a{extension}")
+    path = write_usual_file(tmp_path / f"a{extension}")
     original = builtins.__import__
 
     def without(module, *args, **kwargs):
@@ -218,7 +227,7 @@ def test_a_missing_package_is_named_with_its_extra(tmp_path, monkeypatch, extens
 def test_steps_of_whole_numbers_are_told(tmp_path):
     source = open_source(odd(mdf4_files, "MDF 4 of whole numbers").make(tmp_path))
     assert source.channels[0].resolution == 0.5
-    assert open_source(written(tmp_path / "a.mf4")).channels[0].resolution == 0.0
+    assert open_source(write_usual_file(tmp_path / "a.mf4")).channels[0].resolution == 0.0
 
 
 def test_readers_say_nothing_on_the_terminal(tmp_path, capfd):
@@ -239,7 +248,7 @@ def test_numbers_in_other_hands(tmp_path):
     path.write_text('Zeit [ms]\tKraft [kN]\t"a, b"\n0\t+1.5e3\t.5\n10\t-1E-3\tNaN\n', encoding="utf-8")
     source = open_source(path)
     assert [(one.name, one.unit) for one in source.channels] == [("Kraft", "kN"), ("a, b", "")]
-    found = read(source)
+    found = read_channels(source)
     assert np.array_equal(found["Kraft"][0], [0.0, 0.01]) and np.array_equal(found["Kraft"][1], [1500.0, -1e-3])
     assert "tabs" in source.noticed[0].text
 
@@ -250,7 +259,7 @@ def test_shortest_and_longest_decimals_are_read_to_the_last_bit(tmp_path):
     )
     rows = "".join(f"{i},{value:.17g}\n" for i, value in enumerate(values))
     (tmp_path / "a.csv").write_text("time [s],x [N]\n" + rows)
-    assert np.array_equal(read(open_source(tmp_path / "a.csv"))["x"][1], values)
+    assert np.array_equal(read_channels(open_source(tmp_path / "a.csv"))["x"][1], values)
 
 
 def test_without_the_count_of_columns_a_short_row_is_filled_up(tmp_path, monkeypatch):
@@ -277,8 +286,12 @@ def test_without_the_announced_rows_a_cut_at_a_line_end_is_silent(tmp_path, monk
 @pytest.mark.grounds("closed form")
 def test_the_usual_file_is_what_the_truth_says(tmp_path):
     for extension in EXTENSIONS:
-        found = read(open_source(written(tmp_path / f"a{extension}")))
-        assert set(found) == set(usual()) and np.array_equal(found["Fz"][1], FZ) and np.array_equal(found["Fx"][1], FX)
+        found = read_channels(open_source(write_usual_file(tmp_path / f"a{extension}")))
+        assert (
+            set(found) == set(usual_truth())
+            and np.array_equal(found["Fz"][1], FZ)
+            and np.array_equal(found["Fx"][1], FX)
+        )
         assert np.allclose(found["Fz"][0], SAMPLE_TIMES, atol=1e-12)
 
 
@@ -286,7 +299,7 @@ def test_the_usual_file_is_what_the_truth_says(tmp_path):
 @pytest.mark.parametrize("extension", EXTENSIONS)
 def test_no_cut_at_any_byte_is_silent(tmp_path, extension):
     sweep = CutSweep(extension, 2000 if extension == ".rsp" else 0)  # its samples fill 57,000 bytes
-    assert sweep.silent(tmp_path) == 0
+    assert sweep.silent_cuts(tmp_path) == 0
 
 
 @pytest.mark.parametrize("unit, factor", [("ms", 1e3), ("s", 1.0), ("us", 1e6), ("", 1.0)])

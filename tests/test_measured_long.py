@@ -24,7 +24,13 @@ from models.systems.measured.sections import AccelerometerPoint, Sections, accel
 from models.systems.measured.verdict import channels_to_compare, compare
 from models.vehicles.cut_vehicle import PITCH, ROLL
 from validation.cases import measured_long as case
-from validation.measured.long_recording import answers_of, long_recording, repeated_pattern, run_killed_process, run_of
+from validation.measured.long_recording import (
+    computed_channel_bytes,
+    long_recording,
+    repeated_pattern,
+    run_killed_process,
+    section_run_of_recording,
+)
 from validation.spatial.cars import r19
 
 SECONDS = 0.2
@@ -39,8 +45,8 @@ def test_the_quick_share_passes(tmp_path):
 def whole(tmp_path_factory):
     """A short run in one piece."""
     folder = tmp_path_factory.mktemp("whole")
-    own = run_of(folder, SECONDS, case.PATTERN_SECONDS)
-    return own, run(own, folder / "run"), answers_of(folder)
+    own = section_run_of_recording(folder, SECONDS, case.PATTERN_SECONDS)
+    return own, run(own, folder / "run"), computed_channel_bytes(folder)
 
 
 def changed(own: SectionRun, folder, change) -> SectionRun:
@@ -86,7 +92,7 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_bits(whole, tmp_path, monke
             run(own, tmp_path / "run", block=0.04)
     told = list[float]()
     found = run(own, tmp_path / "run", lambda done, of: told.append(done), block=0.05)
-    assert answers_of(tmp_path) == bits and found.done == own.count
+    assert computed_channel_bytes(tmp_path) == bits and found.done == own.count
     assert told[0] > 0.0 or time == 1  # it did not begin anew
     assert told[-1] == pytest.approx(SECONDS, abs=2e-3)
 
@@ -262,7 +268,7 @@ def test_an_hour_at_1_khz_in_less_than_2_gb_killed_and_gone_on_to_the_same_bits(
         folder.mkdir()
         long_recording(3600.0, folder / "recording.f64")
         if times:
-            run_killed_process(folder, 3600.0, 20.0, 60.0, times, lasting=60.0)
+            run_killed_process(folder, 3600.0, 20.0, 60.0, times, kill_window=60.0)
         else:
             command = [sys.executable, "-m", "validation.measured.long_recording", str(folder), "3600", "20", "60"]
             told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()

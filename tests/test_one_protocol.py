@@ -46,7 +46,7 @@ def hub_forces(engine: str) -> tuple[Model, Trajectory]:
 
 
 def handling(engine: str) -> tuple[Model, Trajectory]:
-    car, q, v = bare_cars.start()
+    car, q, v = bare_cars.start_state()
     model = on_tyres(engine, car, Settings("RK4", STEP, STEPS * STEP))
     return model, model.run(q, v)
 

@@ -57,7 +57,7 @@ class Engine:
     order = 4
 
     def __init__(self, assembly, settings):
-        self.inside = checks.engine("reference")(assembly, checks.by_hand(settings))
+        self.inside = checks.engine("reference")(assembly, checks.reference_settings(settings))
 
     def run(self):
         return self.inside.run()
@@ -194,7 +194,7 @@ def test_a_name_that_leads_nowhere_is_refused_by_the_command(name, said, twinrig
 
 def test_wrong_integrators_are_told_in_a_run_and_right_ones_say_how_near_they_are(own, twinrig, capsys):
     assert wrong_engines.integrators_that_pass() == []
-    assert wrong_engines.integrators_that_pass((wrong_engines.Right,)) == ["Right"]
+    assert wrong_engines.integrators_that_pass((wrong_engines.FaultlessIntegrator,)) == ["FaultlessIntegrator"]
     assert twinrig("run", "study_road", "--engine", own(Scipy), "--set", "run.duration=0.2") == 0
     assert "of the largest motion from the reference" in capsys.readouterr().out
 

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.grounds("plain counterpart")
 PAIR = MaterialPair(STEEL, Material(E=2.0e11, nu=0.29))
 NAMES = ("a", "b", "load", "mu", "xi_x", "xi_y", "spin")
 PROGRAMS = [
-    plain.Program(9, *each)
+    plain.FastsimSettings(9, *each)
     for each in (
         ("intermediate", "blended", "second-order"),
         ("parabolic", "one", "second-order"),
@@ -129,7 +129,7 @@ def test_friction_that_falls():
 @pytest.mark.parametrize("flexible", ["blended", "one"])
 def test_derivatives_are_differences_of_the_plain_march(flexible):
     """By central differences; the contacts are drawn so that no cell begins to slip or stick within a step."""
-    ellipses, step, program = drawn(4, 4, 4.0), 1e-6, plain.Program(7, flexibilities=flexible)
+    ellipses, step, program = drawn(4, 4, 4.0), 1e-6, plain.FastsimSettings(7, flexibilities=flexible)
     computed = derivatives(given(ellipses), PAIR, cells=7, flexibilities=flexible)
     for i, ellipse in enumerate(ellipses):
         assert np.abs((computed.forces[i] - plain.fastsim(ellipse, program)[0][:3]) / units(ellipse)).max() <= CLOSE
@@ -169,7 +169,7 @@ def test_the_kernel_from_curvatures_to_forces(cells):
         grown = (ellipse.a * ellipse.b / (a * b)) ** 0.5
         motion = ellipse.xi_x * grown**2, ellipse.xi_y * grown**2, ellipse.spin * grown**3
         ellipse = plain.PlainEllipse(a, b, ellipse.load, ellipse.mu, *motion, flexible)
-        expected = plain.fastsim(ellipse, plain.Program(cells))[0] if cells else linear(ellipse)
+        expected = plain.fastsim(ellipse, plain.FastsimSettings(cells))[0] if cells else linear(ellipse)
         unit = units(ellipse) * max(1.0, np.abs(expected[:3] / units(ellipse)).max())
         shapes = (A, B, ellipse.load), (A, B, approach), (a, b, ellipse.load), (a, b, approach)
         for kind, shape in enumerate(shapes):

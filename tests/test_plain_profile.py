@@ -32,7 +32,7 @@ def test_touches_at_random_poses(side):
         for _ in range(4):
             pose = Pose(shift, z + draw.uniform(4e-5, 1.5e-4), roll + draw.normal(0.0, 2e-5), draw.uniform(-0.02, 0.02))
             profile_on_rail(side, pose, profile, MODULUS, touches)
-            expected = plain.touches_of(side, pose, profile, MODULUS)
+            expected = plain.contacts_of_wheel(side, pose, profile, MODULUS)
             assert touches["depth"] == pytest.approx(expected["depth"], abs=DEEP)
             for name in ("n_y", "n_z", "x", "y", "z"):
                 assert touches[name] == pytest.approx(expected[name], abs=1e-11), name

@@ -55,7 +55,7 @@ def bodies(name):
 @cache
 def expected(name, options):
     """The plain patch at the approach, and what comes out of both motions."""
-    pressed = plain.press(bodies(name)[1], APPROACH, PAIR, options)
+    pressed = plain.patch_at_approach(bodies(name)[1], APPROACH, PAIR, options)
     return pressed, [plain.roll(bodies(name)[1], pressed, MU, motion, PAIR, CELLS, options) for motion in MOTIONS]
 
 

@@ -46,13 +46,13 @@ def test_there_are_enough_and_each_has_a_name_of_its_own():
 def test_what_a_fault_changes_is_there(own):
     """What it is planted in has not been renamed since; the full campaigns run it."""
     for each in own.faults:
-        with each.inside()():
+        with each.patch()():
             pass
 
 
 @pytest.mark.parametrize("own", planted_faults.CAMPAIGNS, ids=lambda own: own.id)
 def test_a_campaign_has_several_faults_with_names_of_their_own(own):
-    assert len({(fault.place, fault.name) for fault in own.faults}) == len(own.faults) >= 6
+    assert len({(fault.planted_in, fault.name) for fault in own.faults}) == len(own.faults) >= 6
 
 
 @pytest.mark.full

@@ -115,5 +115,5 @@ def test_slip_angles_on_a_suspension_rise_by_the_way_and_tend_to_those_without_l
 def test_a_stop_on_a_suspension_is_that_of_plain_code():
     found = whole.run(whole.car(), "exudyn", 0.05, lags=True)
     plain = whole.plain_run("car", 0.05, lags=True)
-    assert whole.paths_apart(found, plain) < 1e-10
-    assert whole.paths_apart(found, whole.run(whole.car(), "exudyn", 0.05)) > 1e-3
+    assert whole.path_difference(found, plain) < 1e-10
+    assert whole.path_difference(found, whole.run(whole.car(), "exudyn", 0.05)) > 1e-3

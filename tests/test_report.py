@@ -347,14 +347,14 @@ def test_rows_that_an_older_report_called_passed_without_judging_them_are_report
 def test_what_nothing_independent_notices_stands_under_what_is_not_covered_by_name(folder, tmp_path, monkeypatch):
     from functools import partial
 
-    from validation.blind_spots.table import Line, write
+    from validation.blind_spots.table import Line, write_table
     from validation.report.blind_spots import blind_spots
 
     seen = Line("models.tyre.bristles:_blend_directions", "whole", 3, 0, "handling.a", "", "handling.a", "abc1234")
     unseen = Line(
         "models.tyre.bristles:tyre_forces", "whole", 3, 1, "handling.b", "tests/test_a.py::test_b", "", "abc1234"
     )
-    write([seen, unseen], tmp_path / "table.csv")
+    write_table([seen, unseen], tmp_path / "table.csv")
     monkeypatch.setattr(report, "blind_spots", partial(blind_spots, tmp_path / "table.csv"))
     page = report.write(folder).read_text(encoding="utf-8")
     gaps = page[page.index('id="gaps"') : page.index('id="system-')]

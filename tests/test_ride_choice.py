@@ -26,7 +26,7 @@ from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from studies.command.asked import SCENES_FOLDER
 from validation.choice.judged import measured_step, worst_nearby
-from validation.choice.sampled import Sampled
+from validation.choice.sampled import SampledStatistics
 from validation.ride.drawn_rides import random_linear_ride
 
 SPEED = 20.0
@@ -315,10 +315,10 @@ def test_two_closed_forms_of_runs_agree(road):
     march = March(FullScene(scene, SPEED).full, SPEED, (0, 2), ())
     for share in (0.9, 0.2):
         step = share * march.longest_stable_step
-        assert Sampled(march).deviations(step) == pytest.approx(march.deviations(step), rel=1e-3)
+        assert SampledStatistics(march).deviations(step) == pytest.approx(march.deviations(step), rel=1e-3)
     late = replace(march, reduced=replace(march.reduced, excitation=further(march.reduced.excitation)))
     if scene.ride.road.front_rear == "delayed":
-        assert Sampled(late).deviations(step) != pytest.approx(march.deviations(step), rel=3e-3)
+        assert SampledStatistics(late).deviations(step) != pytest.approx(march.deviations(step), rel=3e-3)
 
 
 def further(excitation):

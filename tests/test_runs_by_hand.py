@@ -20,7 +20,7 @@ from models.systems.hub_forces.run import measure
 from models.systems.hub_forces.tilt_filter import Deviations, estimate
 from models.vehicles.parameters import asymmetric_twin
 from models.vehicles.vehicle_file import load_vehicle
-from validation.absence.hub_forces import BARE_SCENE, HUBS, ON_ROAD, SAMPLE_PERIOD, STEP, STEPS, write
+from validation.absence.hub_forces import BARE_SCENE, HUBS, ON_ROAD, SAMPLE_PERIOD, STEP, STEP_COUNT, write
 from validation.spatial.cars import r19
 from validation.spatial.hub_inputs import centres_of_mass
 
@@ -156,21 +156,21 @@ def test_hub_forces_of_a_file_move_the_centre_of_mass_as_they_would_a_point(engi
     """Four forces up, 4 kN and 500 N u^2 by the time u (1 at the end) at the samples, lines between them."""
     write(tmp_path)
     result = run(of_table(BARE_SCENE, "s.toml", tmp_path), engine, method="none")
-    samples = 4.0 * (4e3 + 500.0 * np.linspace(0.0, 1.0, round(STEPS * STEP / SAMPLE_PERIOD) + 1) ** 2)
-    time, dense = STEP * STEPS, 4001
+    samples = 4.0 * (4e3 + 500.0 * np.linspace(0.0, 1.0, round(STEP_COUNT * STEP / SAMPLE_PERIOD) + 1) ** 2)
+    time, dense = STEP * STEP_COUNT, 4001
     fine = np.linspace(0.0, time, dense)
     acceleration = np.interp(fine, SAMPLE_PERIOD * np.arange(len(samples)), samples) / CUT_MASS - GRAVITY
     rise = np.trapezoid((time - fine) * acceleration, fine)
     path = centres_of_mass(CUT, result.detail.positions[[0, -1]])
     assert path[1] - path[0] == pytest.approx([0.0, 0.0, rise], abs=1e-6 * abs(rise))
-    assert result.times == pytest.approx(STEP * np.arange(STEPS + 1), abs=1e-12)
+    assert result.times == pytest.approx(STEP * np.arange(STEP_COUNT + 1), abs=1e-12)
     assert result["z"].tolist() == result.detail.positions[:, 2].tolist()
 
 
 def test_angles_of_a_file_are_those_of_the_run_that_is_held_to_them(tmp_path):
     """Roll and pitch that stay: a low-pass leaves them as they are."""
     write(tmp_path)
-    still = np.ones(round(STEPS * STEP / SAMPLE_PERIOD) + 1)
+    still = np.ones(round(STEP_COUNT * STEP / SAMPLE_PERIOD) + 1)
     units = {"roll": "rad", "pitch": "rad", "roll_rate": "rad/s", "pitch_rate": "rad/s"}
     held = {"roll": 0.02, "pitch": -0.01, "roll_rate": 0.0, "pitch_rate": 0.0}
     columns = {name: (unit, held[name] * still) for name, unit in units.items()}
@@ -187,7 +187,7 @@ def test_at_rest_on_the_road_hubs_bear_the_vehicle_and_mounts_what_they_carry(en
     assert first[:, 2].sum() == pytest.approx(CUT_MASS * GRAVITY, rel=1e-9)
     assert np.abs(measured.angles.samples[0]).max() < 1e-12
     assert measured.forces.period == pytest.approx(1.0 / scene.forces.sampling_rate, rel=1e-12)
-    tracks = two_tracks(CUT, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, STEP, STEPS)
+    tracks = two_tracks(CUT, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, STEP, STEP_COUNT)
     direct = HubModel(engine, CUT, replace(tracks, frame="inertial"), scene.settings(engine), scene.run.forces).run()
     assert measured.truth.states == pytest.approx(direct.states, abs=1e-13)
     result = run(scene, engine, method="none", measurement=measured)

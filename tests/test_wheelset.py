@@ -26,7 +26,7 @@ from models.rail.linear import (
 from models.rail.profile_contact import Pose
 from models.rail.wheel_forces import REPORT
 from models.rail.wheelset import CHOSEN_WHEELSET
-from validation.contact.manchester_references import CONTACT, contact_of, patch_sums, placed_at
+from validation.contact.manchester_references import PUBLISHED_CONTACT, contact_of, placement_at, wheel_sums
 
 SPRINGS = {f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"}
 FREE = CHOSEN_WHEELSET.changed(**SPRINGS)
@@ -251,26 +251,26 @@ def test_first_harmonic_of_a_table():
 
 def against_contact(rows):
     """Mean places, forces and peaks of both wheels against CONTACT's, with yaw and rolling."""
-    found = [placed_at("A-2", float(shift)) for shift in rows[:, 0] * 1e-3]
+    found = [placement_at("A-2", float(shift)) for shift in rows[:, 0] * 1e-3]
     for (_, _, *right_left), one in zip(rows, found, strict=True):
         for wheel, (y, normal, peak) in (("right", right_left[:3]), ("left", right_left[3:])):
-            own = patch_sums(one, wheel)
+            own = wheel_sums(one, wheel)
             assert own[0] == pytest.approx(y, abs=0.3)
             assert own[1] == pytest.approx(normal, rel=0.02)  # 0.5 % seen
             assert own[2] == pytest.approx(peak, rel=0.04)  # cells of 0.2 mm there
 
 
 def test_manchester_at_the_flange():
-    against_contact(CONTACT[[13]])
+    against_contact(PUBLISHED_CONTACT[[13]])
 
 
 @pytest.mark.full
 def test_manchester():
-    against_contact(CONTACT)
+    against_contact(PUBLISHED_CONTACT)
 
 
 def test_two_patches_at_five_millimetres():
-    one = placed_at("A-1", 5e-3)
+    one = placement_at("A-1", 5e-3)
     assert [round(1e3 * place.touch_y) for place in one.right] == [727, 737]
     assert len(one.left) == 1
     assert rolling_radius_difference(one) > 2e-3

@@ -16,7 +16,7 @@ from models.rail.linear import klingel_wavelength
 from models.rail.profile_contact import TOUCH, Pose, normal_force_and_axes
 from models.rail.profile_statics import equilibrium, steering_cones
 from models.rail.wheelset import CHOSEN_WHEELSET
-from validation.contact.manchester_references import SCENE, placed_at
+from validation.contact.manchester_references import SCENE, placement_at
 
 ON_PROFILES = CHOSEN_WHEELSET.changed(profiles=Profiles())
 FREE = ON_PROFILES.changed(**{f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"})
@@ -27,7 +27,7 @@ FLANGE = math.radians(-45.0)
 def against_table(shifts):
     """Forces within 2 % and places within 0.3 mm of the exact contact, wheel by wheel."""
     for shift in shifts:
-        one = placed_at("A-1", shift)
+        one = placement_at("A-1", shift)
         found = equilibrium(ON_PROFILES.changed(load=2e4), shift)
         loads, places = found.loads.reshape(2, -1), found.touches["y"].reshape(2, -1)
         for k, wheel, side in ((0, one.right, 1), (1, one.left, -1)):

@@ -305,7 +305,7 @@ def _hard_cases(name: str, folder: Path) -> Iterator[Row]:
     for family in HARD_CASE_FAMILIES:
         for case in import_module(f"validation.hard_cases.{family}").CASES:
             id = f"conformity.hard.{case.name.replace(',', '').replace(' ', '-')}"
-            quantity, case_folder = f"hard case: {case.name}: {case.check}", folder / id
+            quantity, case_folder = f"hard case: {case.name}: {case.exact_answer}", folder / id
             case_folder.mkdir()
             if case.unit in STEP_COMPARISON_UNITS and (_is_adaptive(name) or CATALOGUE[name][name].order < 4):
                 yield not_run(id, SYSTEM, quantity, "compares steps of a method of order 4")
@@ -326,5 +326,5 @@ def _hard_cases(name: str, folder: Path) -> Iterator[Row]:
                 quantity,
                 outcome.word if good else f"SILENT, off by {outcome.error:.3g}",
                 outcome.word if good else "right, refused or raised",
-                f"{case.hard}{f': {outcome.message}' if outcome.message else ''}",
+                f"{case.difficulty}{f': {outcome.message}' if outcome.message else ''}",
             )

@@ -1,4 +1,4 @@
-"""Rides without effects, compared in time with hand-written code for that case: a car with seven degrees of freedom on
+"""Computing time of twinrig's rides without effects against hand-written code: a car with seven degrees of freedom on
 a single track."""
 
 import time
@@ -18,7 +18,7 @@ from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 from validation.absence import ride
-from validation.absence.hand_built_ride import Car, exudyn_run, mujoco_run, numbers
+from validation.absence.hand_built_ride import Car, exudyn_run, mujoco_run, parameter_array
 from validation.absence.hand_built_ride import march as march_written
 from validation.absence.of_systems import bare_scene
 
@@ -26,60 +26,65 @@ STEP = 1e-3
 """Step of the runs (s)."""
 COPIES = 64
 Job = Callable[[], np.ndarray]
-BY_HAND = {"exudyn": exudyn_run, "mujoco": mujoco_run}
+HAND_BUILT_RUNS = {"exudyn": exudyn_run, "mujoco": mujoco_run}
 
 
-def scene() -> tuple[SpatialVehicle, RoadPath]:
-    """The vehicle of the bare scene without its anti-roll bars, an effect of a vehicle's file, and its road."""
+def vehicle_and_road() -> tuple[SpatialVehicle, RoadPath]:
+    """The vehicle of the ride scene without effects, and its road. Anti-roll bars, which come from the vehicle's file,
+    are removed."""
     bare = bare_scene("ride")
     vehicle = replace(vehicle_of(bare), bars=())
     return vehicle, road_path(excitation_of(bare, wheels(vehicle)), ride.SPEED, STEP)
 
 
-def rides(engine: str, steps: int) -> tuple[Job, Job]:
-    """Two runs of the bare ride in one engine, by twinrig's model and by the hand-written car. Both give states (steps
-    + 1, 14), and check them with the same guard."""
-    vehicle, road = scene()
-    table, rest_state, duration = road.table(steps, 0), np.zeros(len(vehicle.coordinates())), steps * road.step
+def ride_runs(engine: str, step_count: int) -> tuple[Job, Job]:
+    """Two functions that simulate a ride without effects in an engine, by twinrig's model and by the hand-written car.
+    Both return states (step_count + 1, 14) and check them in the same way."""
+    vehicle, road = vehicle_and_road()
+    table, rest_state, duration = (
+        road.table(step_count, 0),
+        np.zeros(len(vehicle.coordinates())),
+        step_count * road.step,
+    )
     model = build(engine, vehicle, Settings(INTEGRATORS[engine], road.step, duration), road.speed, table)
-    by_hand = BY_HAND[engine](Car.of(vehicle), table[:, : len(vehicle.tyres)], road.step, steps)
+    by_hand = HAND_BUILT_RUNS[engine](Car.of(vehicle), table[:, : len(vehicle.tyres)], road.step, step_count)
 
-    def ours() -> np.ndarray:
+    def run_twinrig() -> np.ndarray:
         path = model.run(rest_state, rest_state)
         return np.hstack([path.positions, path.rates])
 
-    def theirs() -> np.ndarray:
+    def run_hand_built() -> np.ndarray:
         states = by_hand()
-        guard(engine, road.step * np.arange(steps + 1), states, duration)
+        guard(engine, road.step * np.arange(step_count + 1), states, duration)
         return states
 
-    return ours, theirs
+    return run_twinrig, run_hand_built
 
 
-def copies(steps: int) -> tuple[Job, Job]:
-    """Two runs of COPIES linear cars on different random roads, by twinrig and by hand-written equations. Both give the
-    final states (14, COPIES)."""
-    vehicle, road = scene()
-    plain, roads = linearise(vehicle, road.speed), next(road.blocks(steps, COPIES, 0))
-    laws, car, heights = laws_of(vehicle, plain, (), road.speed), numbers(Car.of(vehicle)), roads[:, :4].copy()
+def copy_runs(step_count: int) -> tuple[Job, Job]:
+    """Two functions that simulate COPIES linear cars on different random roads, by twinrig and by hand-written
+    equations. Both return the final states (14, COPIES)."""
+    vehicle, road = vehicle_and_road()
+    plain, roads = linearise(vehicle, road.speed), next(road.blocks(step_count, COPIES, 0))
+    laws, car, heights = laws_of(vehicle, plain, (), road.speed), parameter_array(Car.of(vehicle)), roads[:, :4].copy()
     sums = np.zeros((POWERS_SUMMED, len(plain.outputs), COPIES))
 
-    def ours() -> np.ndarray:
+    def run_twinrig() -> np.ndarray:
         states = np.zeros((2 * len(plain.mass), COPIES))
-        march(states, roads, road.step, steps, 1, laws, sums)
+        march(states, roads, road.step, step_count, 1, laws, sums)
         return states
 
-    def theirs() -> np.ndarray:
+    def run_hand_built() -> np.ndarray:
         states = np.zeros((2 * len(plain.mass), COPIES))
         march_written(states, heights, road.step, car)
         return states
 
-    return ours, theirs
+    return run_twinrig, run_hand_built
 
 
-def ratio_of_rides(engine: str, steps: int, round_count: int) -> tuple[float, tuple[float, float, float]]:
-    """Compare twinrig with a hand-built ride in an engine or the reference: largest difference of the states (m, rad,
-    m/s, rad/s), and the ratio of computing times with its confidence interval."""
-    jobs = copies(steps) if engine == "reference" else rides(engine, steps)
+def ratio_of_rides(engine: str, step_count: int, round_count: int) -> tuple[float, tuple[float, float, float]]:
+    """Largest difference of the states (m, rad, m/s, rad/s) between twinrig's ride and the hand-written one in an
+    engine or the reference, and the ratio of computing times with its confidence interval."""
+    jobs = copy_runs(step_count) if engine == "reference" else ride_runs(engine, step_count)
     ours, theirs = (job() for job in jobs)
     return float(np.abs(ours - theirs).max()), paired_ratio(*interleave(jobs, round_count, clock=time.process_time))

@@ -1,7 +1,7 @@
-"""Braking: a bare stop, what a run of one is made of, and its path.
+"""Braking scene without effects, for the absence checks: its tables, counts of its model's components, its path.
 
-Two absences are none of code: a brake without hysteresis runs the same torque law with its two lines on each other, and
-a chamber without dynamics the same law with time constants of none.
+Two absent effects still run code: a brake without hysteresis runs the same torque law with coinciding lines for rising
+and falling pressure, and a brake chamber without dynamics runs the same law with time constants of zero.
 """
 
 from pathlib import Path
@@ -18,7 +18,7 @@ BARE_SCENE: dict[str, Any] = {
     "road": {"stretches": [{"left": "snow"}]},
     "procedures": {STOP: {"kind": "j_turn", "speed": 3.0, "steer": 0.02}},
 }
-BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+HAND_WRITTEN_TABLES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "measured_pressures": ({}, {"measured": {"file": "pressures.csv"}})
 }
 
@@ -31,8 +31,8 @@ def write(folder: Path) -> None:
 
 
 def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
-    """Numbers of components (lags, controllers, noisy signals, ...) in the model of a braking scene, and the path as
-    bytes."""
+    """Counts of the components (lags, controllers, noisy signals, ...) in the model of a braking scene, and the states
+    of a run as bytes."""
     from models.systems.braking.march import BrakedVehicle
     from models.systems.braking.run import run
 
@@ -48,7 +48,7 @@ def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dic
 
 
 def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
-    """Numbers of components in the model of a braked vehicle and its controller."""
+    """Counts of the components in the model of a braked vehicle and its controller, by kind."""
     from models.brake.controllers import CONTROLLERS
     from models.brake.pressure import resting_chambers
     from models.systems.braking.measured_pressures import MeasuredPressures

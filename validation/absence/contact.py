@@ -1,4 +1,4 @@
-"""One contact: what computes a bare one, and its forces."""
+"""Contact scene without effects, for the absence checks: its tables, counts of the theory's features, its forces."""
 
 from typing import Any
 from unittest import mock
@@ -17,13 +17,14 @@ BARE_SCENE: dict[str, Any] = {
     "method": {"name": "linear"},
 }
 BOUNDED: dict[str, Any] = {"method": {"name": "simplified"}}
-BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+HAND_WRITTEN_TABLES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "profiles": (BOUNDED, BOUNDED | {"ellipse": None, "profiles": {}})
 }
 
 
 def counts_and_path(scene: ContactScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Numbers of features that the contact theory of a scene uses, and the forces of all motions as bytes."""
+    """Counts of the features that a scene's contact theory uses (spin, falling friction, contact search, ...), and the
+    creep forces as bytes."""
     from models.contact.theories import Exact, ExactOnEllipse, LinearTheory, Simplified
     from models.systems.contact import run
 

@@ -1,8 +1,7 @@
-"""The pitch-plane vehicle written directly for each engine, as someone would who has never heard of twinrig.
+"""The pitch-plane vehicle written by hand for each engine, without any part of twinrig, to measure twinrig's overhead.
 
-No description, no assembly, no effects: the paper's symbols straight into Exudyn's items and MuJoCo's XML,
-free on its tyres over a flat road. What twinrig's machinery costs where nothing is asked of it is measured
-against these.
+The paper's symbols go straight into Exudyn's items and MuJoCo's XML; the vehicle moves freely on its tyres over a flat
+road. The computing time of twinrig without effects is compared with that of these models.
 """
 
 from collections.abc import Callable
@@ -13,11 +12,12 @@ import numpy as np
 from models.vehicles.pitch_plane import Parameters
 
 Run = Callable[[], np.ndarray]
-"""One run from the start state; returns the states (steps + 1, 8)."""
+"""Function that simulates from the start state; returns the states (step_count + 1, 8)."""
 
 
-def exudyn_run(parameters: Parameters, start_state: np.ndarray, step: float, steps: int) -> Run:
-    """A run in Exudyn by the classical Runge-Kutta method. Exudyn's x axis in the plane points backward."""
+def exudyn_run(parameters: Parameters, start_state: np.ndarray, step: float, step_count: int) -> Run:
+    """Returns a function that simulates the pitch-plane vehicle in Exudyn by the classical Runge-Kutta method; step in
+    s. Exudyn's x axis in the plane points backward."""
     import exudyn as exu
     import exudyn.itemInterface as items
 
@@ -47,10 +47,10 @@ def exudyn_run(parameters: Parameters, start_state: np.ndarray, step: float, ste
         heave = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=1))
         mbs.AddLoad(items.LoadCoordinate(markerNumber=heave, load=mass * parameters.g))
 
-    def spring(upper, upper_x, lower, stiffness, damping):
+    def spring(upper_body, upper_x, lower_body, stiffness, damping):
         ends = [
             mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=body, localPosition=[-x, 0, 0]))
-            for body, x in ((lower, 0.0), (upper, upper_x))
+            for body, x in ((lower_body, 0.0), (upper_body, upper_x))
         ]
         mbs.AddObject(
             items.CartesianSpringDamper(markerNumbers=ends, stiffness=[0, stiffness, 0], damping=[0, damping, 0])
@@ -60,7 +60,7 @@ def exudyn_run(parameters: Parameters, start_state: np.ndarray, step: float, ste
     spring(wheels[1], 0.0, ground, parameters.k2, parameters.d2)
     spring(chassis, parameters.b, wheels[0], parameters.k3, parameters.d3)
     spring(chassis, -parameters.a, wheels[1], parameters.k4, parameters.d4)
-    march = exudyn_march(container, mbs, nodes, step, steps)
+    march = exudyn_march(container, mbs, nodes, step, step_count)
 
     def run() -> np.ndarray:
         read = march()
@@ -80,9 +80,11 @@ def exudyn_run(parameters: Parameters, start_state: np.ndarray, step: float, ste
     return run
 
 
-def exudyn_march(container: Any, mbs: Any, nodes: list[Any], step: float, steps: int) -> Callable[[], list[np.ndarray]]:
-    """March a model in Exudyn by the classical Runge-Kutta method. Returns the coordinates of every node, then their
-    rates, each with the times in the first column."""
+def exudyn_march(
+    container: Any, mbs: Any, nodes: list[Any], step: float, step_count: int
+) -> Callable[[], list[np.ndarray]]:
+    """Returns a function that simulates a model in Exudyn by the classical Runge-Kutta method. The function returns
+    arrays: coordinates of every node, then rates of every node, each with times (s) in the first column."""
     import exudyn as exu
     import exudyn.itemInterface as items
 
@@ -97,11 +99,11 @@ def exudyn_march(container: Any, mbs: Any, nodes: list[Any], step: float, steps:
     options.solution.file.write = False
     options.solution.sensors.writePeriod = step
     ti = options.timeIntegration
-    ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, step * steps, 0
+    ti.numberOfSteps, ti.endTime, ti.verboseMode = step_count, step * step_count, 0
     ti.adaptiveStep = False
     ti.explicit.computeEndOfStepAccelerations = False
 
-    def march(owner: Any = container) -> list[np.ndarray]:  # the system lives as long as its container
+    def march(kept_container: Any = container) -> list[np.ndarray]:  # the system lives as long as its container
         mbs.SolveDynamic(options, solverType=exu.DynamicSolverType.RK44)
         return [mbs.GetSensorStoredData(sensor) for sensor in sensors]
 
@@ -109,7 +111,7 @@ def exudyn_march(container: Any, mbs: Any, nodes: list[Any], step: float, steps:
 
 
 def mujoco_model(parameters: Parameters, step: float) -> Any:
-    """The vehicle in MuJoCo, from its own XML; z is down, the hinge lifts the front."""
+    """The pitch-plane vehicle in MuJoCo, from hand-written XML; z points down, positive pitch lifts the front."""
     import mujoco
 
     return mujoco.MjModel.from_xml_string(
@@ -117,8 +119,9 @@ def mujoco_model(parameters: Parameters, step: float) -> Any:
     )
 
 
-def mujoco_run(parameters: Parameters, start_state: np.ndarray, step: float, steps: int) -> Run:
-    """A run in MuJoCo by the classical Runge-Kutta method."""
+def mujoco_run(parameters: Parameters, start_state: np.ndarray, step: float, step_count: int) -> Run:
+    """Returns a function that simulates the pitch-plane vehicle in MuJoCo by the classical Runge-Kutta method; step in
+    s."""
     import mujoco
     from mujoco import rollout
 
@@ -127,7 +130,7 @@ def mujoco_run(parameters: Parameters, start_state: np.ndarray, step: float, ste
     state = np.concatenate(([0.0], start_state))
 
     def run() -> np.ndarray:
-        path, _ = rollout.rollout(model, data, state[None, :], nstep=steps)
+        path, _ = rollout.rollout(model, data, state[None, :], nstep=step_count)
         return np.vstack([start_state, path[0, :, 1:9]])
 
     return run

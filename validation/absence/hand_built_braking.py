@@ -1,9 +1,9 @@
-"""A truck that brakes in a turn on one surface, written out for that alone: what a bare scene of braking comes to.
+"""A truck that brakes in a turn on one surface, written by hand for this case alone: the braking scene without effects.
 
-One rigid body on four wheels whose loads stay, brakes that are all applied from the start and whose torques follow at
-once, front wheels held at one angle. No trailer, load transfer, second surface, brake dynamics, hysteresis, controller
-or engine, and no way to have them. The method is that of ``models.brake.plane_step``; how a wheel goes through a step
-and what a tyre's table says are the tyre's.
+One rigid body on four wheels with constant loads, brakes that are all applied from the start and whose torques follow
+at once, front wheels at a fixed steer angle. No trailer, load transfer, second surface, brake dynamics, hysteresis,
+controller or engine, and no way to have them. The method of integration is the one of ``models.brake.plane_step``; the
+step of a wheel and the tyre table are shared with twinrig.
 """
 
 import math
@@ -24,7 +24,7 @@ from validation.absence.braking import STOP
 from validation.absence.of_systems import bare_scene
 
 ACCELERATION_TOLERANCE, LOCKING_SLIP, ANDERSON_ROUNDS = 1e-7, 0.98, 12
-MOST_PARTS = 64
+MOST_SUBSTEPS = 64
 
 
 class Truck(NamedTuple):
@@ -44,15 +44,15 @@ class Truck(NamedTuple):
 
 
 class Step(NamedTuple):
-    """Length of a step (s), and the speed (m/s) below which slip angles are computed as at this speed."""
+    """Length of a time step (s), and the speed (m/s) below which slip angles are computed as at this speed."""
 
     time: float
-    regular: float
+    regularising_speed: float
 
 
 class TruckState(NamedTuple):
     """Present state of the truck: x, y, heading and their rates (6,); accelerations (3,); angular velocities of the
-    wheels (4,). Reports (7, 4) of the wheels for a step, and their sums over the parts of a step."""
+    wheels (4,). Reports (7, 4) of the wheels (force, load, slip, ...) for a step, and their sums over the substeps."""
 
     state: np.ndarray
     accelerations: np.ndarray
@@ -71,15 +71,15 @@ class Stop(NamedTuple):
     reports: np.ndarray
 
 
-class Known(NamedTuple):
-    """Workspace of a step. Arrays (4,) hold each wheel's state (see ``models.brake.plane_records.Wheels``), its
-    heading, and lever arms about the centre of mass. last, off (3,): accelerations of an iteration and their error;
-    first (6,): initial state; middle (4,): torques at mid-step; ends (2, 4): torques at the ends of a substep."""
+class StepWorkspace(NamedTuple):
+    """Workspace of a time step. Arrays (4,) contain each wheel's speeds, slip angle, place in the tyre table, heading
+    (east, north), and lever arms about the centre of mass. previous_response, residual (3,): accelerations of the
+    previous iteration and their error; torques at mid-step (4,) and at the ends of a substep (2, 4)."""
 
-    start: np.ndarray
-    rate: np.ndarray
-    along: np.ndarray
-    aside: np.ndarray
+    initial_speed: np.ndarray
+    speed_rate: np.ndarray
+    forward_speed: np.ndarray
+    lateral_speed: np.ndarray
     angle: np.ndarray
     cell: np.ndarray
     share: np.ndarray
@@ -87,22 +87,23 @@ class Known(NamedTuple):
     north: np.ndarray
     arm: np.ndarray
     side: np.ndarray
-    last: np.ndarray
-    off: np.ndarray
-    first: np.ndarray
-    middle: np.ndarray
-    ends: np.ndarray
+    previous_response: np.ndarray
+    residual: np.ndarray
+    initial_state: np.ndarray
+    mid_torques: np.ndarray
+    end_torques: np.ndarray
 
 
-def step_workspace() -> Known:
-    """Zeroed arrays in which a step keeps its intermediate values."""
-    wheels = {name: np.zeros(4) for name in Known._fields}
-    other_arrays = {"last": np.zeros(3), "off": np.zeros(3), "first": np.zeros(6), "ends": np.zeros((2, 4))}
-    return Known(**{**wheels, **other_arrays, "cell": np.zeros(4, dtype=np.int64)})
+def step_workspace() -> StepWorkspace:
+    """Returns zeroed arrays for the intermediate values of a time step."""
+    wheels = {name: np.zeros(4) for name in StepWorkspace._fields}
+    vectors = {"previous_response": np.zeros(3), "residual": np.zeros(3), "initial_state": np.zeros(6)}
+    cells, torques = np.zeros(4, dtype=np.int64), np.zeros((2, 4))
+    return StepWorkspace(**{**wheels, **vectors, "cell": cells, "end_torques": torques})
 
 
 @inlined
-def settle(truck_state, regularising_speed, starts, truck, workspace):
+def store_wheel_kinematics(truck_state, regularising_speed, at_step_start, truck, workspace):
     """Compute each wheel's velocity, slip angle, heading and lever arms from the truck's state, and store them in
     ``workspace``."""
     x, y, angles = truck.x, truck.y, truck.tables.angles
@@ -115,44 +116,40 @@ def settle(truck_state, regularising_speed, starts, truck, workspace):
             c, s, e, f = 1.0, 0.0, cosine, aslant
         arm, side = x[i] * s - y[i] * c, x[i] * c + y[i] * s
         u, v = e * vx + f * vy + arm * r, e * vy - f * vx + side * r
-        if starts:
-            workspace.start[i] = u
-        forwards = u if workspace.start[i] >= 0.0 else -u
+        if at_step_start:
+            workspace.initial_speed[i] = u
+        forwards = u if workspace.initial_speed[i] >= 0.0 else -u
         angle = math.atan2(abs(v), max(forwards, regularising_speed))
-        workspace.rate[i], workspace.along[i], workspace.aside[i] = (v - side * r) * r, max(forwards, 0.0), v
-        workspace.angle[i] = angle
+        workspace.speed_rate[i], workspace.angle[i] = (v - side * r) * r, angle
+        workspace.forward_speed[i], workspace.lateral_speed[i] = max(forwards, 0.0), v
         workspace.cell[i], workspace.share[i] = cell_and_share(angles, angle)
         workspace.east[i], workspace.north[i], workspace.arm[i], workspace.side[i] = e, f, arm, side
 
 
 @inlined
-def tyre(i, truck_state, step_input, truck, workspace):
+def store_tyre_forces(i, step_input, truck_state, truck, workspace):
     """Compute the forces, slip and angular velocity of wheel i at the end of a step, and store them in the report."""
     report, tables, load, u0, v = (
-        report_of(step_input.report),
+        report_of(truck_state.report),
         truck.tables,
         truck.load[i],
-        workspace.start[i],
-        workspace.aside[i],
+        workspace.initial_speed[i],
+        workspace.lateral_speed[i],
     )
     sign, cells = 1.0 if u0 >= 0.0 else -1.0, TableCell(workspace.cell[i], workspace.share[i], 0, 0.0)
     w, force, slip, locked = wheel_step(
         StepInput(
-            sign * truck_state.speed0,
-            sign * truck_state.speed1,
-            truck_state.torque0,
-            truck_state.torque1,
-            truck_state.step,
+            sign * step_input.speed0, sign * step_input.speed1, step_input.torque0, step_input.torque1, step_input.step
         ),
-        Wheel(truck.radius[i], truck.spin[i], sign * step_input.turning[i]),
+        Wheel(truck.radius[i], truck.spin[i], sign * truck_state.turning[i]),
         Grip(0, 0, 0.0, cells, load, tables.slips, tables.mu_x),
     )
     k, cell_share = cell_and_share(tables.slips, abs(slip))
     side = load * lateral_adhesion(0, cells, k, cell_share, tables.g, tables.h)
-    if slip > LOCKING_SLIP and (workspace.along[i] > 0.0 or v != 0.0):
-        total, speed = math.hypot(force, side), math.hypot(workspace.along[i], v)
+    if slip > LOCKING_SLIP and (workspace.forward_speed[i] > 0.0 or v != 0.0):
+        total, speed = math.hypot(force, side), math.hypot(workspace.forward_speed[i], v)
         cell_share = min((slip - LOCKING_SLIP) / (1.0 - LOCKING_SLIP), 1.0)
-        force += cell_share * (total * workspace.along[i] / speed - force)
+        force += cell_share * (total * workspace.forward_speed[i] / speed - force)
         side += cell_share * (total * abs(v) / speed - side)
     report.force_x[i], report.force_y[i] = -sign * force, -math.copysign(side, v) if v != 0.0 else 0.0
     report.load[i], report.slip[i], report.slip_angle[i] = load, slip, math.copysign(workspace.angle[i], v)
@@ -160,23 +157,22 @@ def tyre(i, truck_state, step_input, truck, workspace):
 
 
 @inlined
-def respond(truck_state, torques_before, torques_after, step, truck, workspace):
-    """Accelerations that the tyre forces cause over a step (s) in which the torques go from ``torques_before`` to
-    ``torques_after``, with wheel speeds extrapolated by the present accelerations.
+def accelerations_by_tyres(truck_state, torques_before, torques_after, step, truck, workspace):
+    """Accelerations (x, y, yaw; m/s^2, rad/s^2) that the tyre forces cause over a step (s) in which the brake torques
+    go from ``torques_before`` to ``torques_after``. Wheel speeds are extrapolated by the present accelerations.
     """
     accelerations, report = truck_state.accelerations, report_of(truck_state.report)
     ax, ay, turn = 0.0, 0.0, 0.0
     for i in range(4):
         rate = (
-            workspace.rate[i]
+            workspace.speed_rate[i]
             + workspace.east[i] * accelerations[0]
             + workspace.north[i] * accelerations[1]
             + workspace.arm[i] * accelerations[2]
         )
-        step_input = StepInput(
-            workspace.start[i], workspace.start[i] + step * rate, torques_before[i], torques_after[i], step
-        )
-        tyre(i, step_input, truck_state, truck, workspace)
+        speed = workspace.initial_speed[i]
+        step_input = StepInput(speed, speed + step * rate, torques_before[i], torques_after[i], step)
+        store_tyre_forces(i, step_input, truck_state, truck, workspace)
         fx, fy, e, f = report.force_x[i], report.force_y[i], workspace.east[i], workspace.north[i]
         ax, ay = ax + e * fx - f * fy, ay + f * fx + e * fy
         turn += workspace.arm[i] * fx + workspace.side[i] * fy
@@ -185,12 +181,14 @@ def respond(truck_state, torques_before, torques_after, step, truck, workspace):
 
 @inlined
 def iterate_accelerations(truck_state, torques, step, truck, workspace):
-    """Iterate until the accelerations agree with those that the tyre forces cause; returns whether this converged."""
-    accelerations, last_response, last_residual = truck_state.accelerations, workspace.last, workspace.off
+    """Iterate the truck's accelerations until they agree with the accelerations that the tyre forces cause. Returns
+    whether this converged."""
+    accelerations, last_residual = truck_state.accelerations, workspace.residual
+    response_before = workspace.previous_response
     left, last_change = math.inf, 0.0
     for n in range(ANDERSON_ROUNDS):
         response, change, product, square = (
-            respond(truck_state, torques[0], torques[1], step, truck, workspace),
+            accelerations_by_tyres(truck_state, torques[0], torques[1], step, truck, workspace),
             0.0,
             0.0,
             0.0,
@@ -205,21 +203,23 @@ def iterate_accelerations(truck_state, torques, step, truck, workspace):
         mix = min(max(product / square, -2.0), 0.75) if n > 0 and square > 0.0 and not is_done else 0.0
         for a in range(3):
             last_residual[a] = response[a] - accelerations[a]
-            accelerations[a] = response[a] - mix * (response[a] - last_response[a])
-            last_response[a] = response[a]
+            accelerations[a] = response[a] - mix * (response[a] - response_before[a])
+            response_before[a] = response[a]
         if is_done:
             break
     return left <= ACCELERATION_TOLERANCE
 
 
 @inlined
-def time_of_rest(truck_state, first, step, truck):
-    """Time within the step at which the truck comes to rest, or -1 if it still moves at the end."""
+def time_of_rest(truck_state, state0, step, truck):
+    """Time (s) within the step at which the truck comes to rest, or -1 if it still moves at the end."""
     accelerations, mass, inertia = truck_state.accelerations, truck.mass, truck.inertia
-    speed = mass * (first[3] * first[3] + first[4] * first[4]) + inertia * first[5] * first[5]
+    speed = mass * (state0[3] * state0[3] + state0[4] * state0[4]) + inertia * state0[5] * state0[5]
     if speed == 0.0 and not truck_state.turning.any():
         return 0.0
-    power = mass * (first[3] * accelerations[0] + first[4] * accelerations[1]) + inertia * first[5] * accelerations[2]
+    power = (
+        mass * (state0[3] * accelerations[0] + state0[4] * accelerations[1]) + inertia * state0[5] * accelerations[2]
+    )
     rate = (
         mass * (accelerations[0] * accelerations[0] + accelerations[1] * accelerations[1])
         + inertia * accelerations[2] * accelerations[2]
@@ -230,36 +230,36 @@ def time_of_rest(truck_state, first, step, truck):
 
 
 @inlined
-def moved_state(truck_state, time, workspace):
-    """Advance the state by a time (s) from the start of the step."""
-    state, first, accelerations = truck_state.state, workspace.first, truck_state.accelerations
+def advance_state(truck_state, time, workspace):
+    """Set the truck's state to the one a time (s) after the start of the step, at the present accelerations."""
+    state, first, accelerations = truck_state.state, workspace.initial_state, truck_state.accelerations
     for a in range(3):
         state[3 + a] = first[3 + a] + time * accelerations[a]
         state[a] = first[a] + 0.5 * time * (first[3 + a] + state[3 + a])
 
 
 @lean
-def go(truck_state, torques, step, truck, workspace):
-    """Advance the truck by one ``Step`` with torques (2, 4) at its ends. Returns for how long the truck moved, or -1 if
-    the accelerations did not converge."""
-    first, middle = workspace.first, workspace.middle
+def advance_truck(truck_state, torques, step, truck, workspace):
+    """Advance the truck by one time step with brake torques (2, 4) at its ends. Returns how long (s) the truck moved
+    within the step, or -1 if the accelerations did not converge."""
+    first, middle = workspace.initial_state, workspace.mid_torques
     for a in range(6):
         first[a] = truck_state.state[a]
     for i in range(4):
         middle[i] = 0.5 * (torques[0, i] + torques[1, i])
-    settle(truck_state, step.regular, True, truck, workspace)
-    accelerations = respond(truck_state, torques[0], middle, 0.5 * step.time, truck, workspace)
+    store_wheel_kinematics(truck_state, step.regularising_speed, True, truck, workspace)
+    accelerations = accelerations_by_tyres(truck_state, torques[0], middle, 0.5 * step.time, truck, workspace)
     truck_state.accelerations[0], truck_state.accelerations[1], truck_state.accelerations[2] = accelerations
     rest_time = time_of_rest(truck_state, first, step.time, truck)
     if rest_time >= 0.0:
-        moved_state(truck_state, rest_time, workspace)
+        advance_state(truck_state, rest_time, workspace)
         truck_state.state[3:], truck_state.turning[:] = 0.0, 0.0
         return rest_time
-    moved_state(truck_state, 0.5 * step.time, workspace)
-    settle(truck_state, step.regular, False, truck, workspace)
+    advance_state(truck_state, 0.5 * step.time, workspace)
+    store_wheel_kinematics(truck_state, step.regularising_speed, False, truck, workspace)
     if not iterate_accelerations(truck_state, torques, step.time, truck, workspace):
         return -1.0
-    moved_state(truck_state, step.time, workspace)
+    advance_state(truck_state, step.time, workspace)
     turning = report_of(truck_state.report).turning
     for i in range(4):
         truck_state.turning[i] = turning[i]
@@ -267,21 +267,17 @@ def go(truck_state, torques, step, truck, workspace):
 
 
 @lean
-def in_parts(part_count, truck_state, torques, step, truck, workspace):
-    """Advance by a ``Step`` in equal substeps with ``go``. The report is the mean over the substeps; times of locking
-    are added."""
-    rows, sums, step_part, time = (
-        truck_state.report,
-        truck_state.weighted_sums,
-        Step(step.time / part_count, step.regular / part_count),
-        0.0,
-    )
+def advance_in_substeps(part_count, truck_state, torques, step, truck, workspace):
+    """Advance the truck by one time step in equal substeps. Returns how long (s) it moved, or -1 if the accelerations
+    did not converge. The wheels' report becomes the mean over the substeps; locked times are added."""
+    rows, sums, ends, time = truck_state.report, truck_state.weighted_sums, workspace.end_torques, 0.0
+    step_part = Step(step.time / part_count, step.regularising_speed / part_count)
     sums[:] = 0.0
     for k in range(part_count):
         for i in range(4):
             for side in range(2):
-                workspace.ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / part_count
-        used = go(truck_state, workspace.ends, step_part, truck, workspace)
+                ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / part_count
+        used = advance_truck(truck_state, ends, step_part, truck, workspace)
         if used < 0.0:
             return used
         time += used
@@ -300,22 +296,21 @@ def in_parts(part_count, truck_state, torques, step, truck, workspace):
 
 
 @njit(cache=True, error_model="numpy")
-def march(truck_state, torque, steps, step, truck, workspace, stop):
-    """Fill a ``Stop`` sample by sample, with ``steps`` steps per sample. torque (4,) acts fully from the end of the
-    first step on. Returns the number of samples, or 0 if the accelerations did not converge."""
+def march(truck_state, torque, steps_per_sample, step, truck, workspace, stop):
+    """Simulate a stop and fill ``stop`` sample by sample. The brake torque (4,) acts fully from the end of the first
+    step on. Returns the number of samples, or 0 if the accelerations did not converge."""
     torques = np.zeros((2, 4))
     torques[1] = torque
     stop.times[0], stop.states[0], stop.turning[0] = 0.0, truck_state.state, truck_state.turning
     for n in range(1, stop.times.size):
         used = 0.0
-        for _ in range(steps):
-            parts = int(
-                min(math.ceil(step.regular / math.hypot(truck_state.state[3], truck_state.state[4])), MOST_PARTS)
-            )
+        for _ in range(steps_per_sample):
+            speed = math.hypot(truck_state.state[3], truck_state.state[4])
+            parts = int(min(math.ceil(step.regularising_speed / speed), MOST_SUBSTEPS))
             if parts <= 1:
-                time_moved = go(truck_state, torques, step, truck, workspace)
+                time_moved = advance_truck(truck_state, torques, step, truck, workspace)
             else:
-                time_moved = in_parts(parts, truck_state, torques, step, truck, workspace)
+                time_moved = advance_in_substeps(parts, truck_state, torques, step, truck, workspace)
             torques[0] = torque
             used += time_moved
             if time_moved < step.time:
@@ -331,9 +326,10 @@ def march(truck_state, torque, steps, step, truck, workspace, stop):
     return stop.times.size
 
 
-def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], BrakingPath]:
-    """A hand-written stop from a speed (m/s) with steered front wheels (rad), built from the parameters of a bare
-    vehicle (``models.systems.braking.march.BrakedVehicle``). It has at most ``samples`` samples, the start included."""
+def run(vehicle: Any, speed: float, steer: float, most_samples: int) -> Callable[[], BrakingPath]:
+    """Returns a function that simulates a stop with the hand-written code, from a speed (m/s) with steered front wheels
+    (rad) and the parameters of a vehicle without effects (``models.systems.braking.march.BrakedVehicle``). The path has
+    at most ``most_samples`` samples, the start included."""
     plane, pressure, step = vehicle.plane, vehicle.chambers.supply, vehicle.sample / vehicle.substeps
     truck = Truck(
         plane.place[:, 0].copy(),
@@ -349,10 +345,10 @@ def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], 
     )
     torque, grid = vehicle.brakes.rising * pressure, Step(step, vehicle.slope * 9.81 * step)
 
-    def marched() -> BrakingPath:
+    def run_stop() -> BrakingPath:
         truck_state = TruckState(np.zeros(6), np.zeros(3), speed / truck.radius, *np.zeros((2, REPORT_SIZE, 4)))
         truck_state.state[3] = speed
-        stop = Stop(*(np.empty((samples, *shape)) for shape in ((), (6,), (4,), (REPORT_SIZE, 4))))
+        stop = Stop(*(np.empty((most_samples, *shape)) for shape in ((), (6,), (4,), (REPORT_SIZE, 4))))
         n = march(truck_state, torque, vehicle.substeps, grid, truck, step_workspace(), stop)
         applied = (np.arange(n) > 0.0)[:, None]
         return BrakingPath(
@@ -366,17 +362,18 @@ def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], 
             ("x", "y", "heading_0"),
         )
 
-    return marched
+    return run_stop
 
 
 STEER_ANGLE, SUPPLY_PRESSURE = 0.02, 0.5
-"""Angle of the front wheels (rad); pressure of the brakes (bar): all wheels roll down to walking pace, so that their
-whole motion takes part."""
+"""Steer angle of the front wheels (rad); supply pressure of the brakes (bar), so low that all wheels still roll at
+walking pace."""
 Job = Callable[[], BrakingPath]
 
 
 def bare_stops(speed: float) -> tuple[Job, Job]:
-    """Two stops of the bare vehicle from a speed (m/s), ready to run: by twinrig and by the hand-written code."""
+    """Two functions that simulate the same stop of a vehicle without effects from a speed (m/s): by twinrig and by the
+    hand-written code."""
     scene = bare_scene(
         "braking",
         brakes={"supply": SUPPLY_PRESSURE},
@@ -384,31 +381,30 @@ def bare_stops(speed: float) -> tuple[Job, Job]:
     )
     vehicle, start = vehicle_and_start(scene, STOP)
 
-    def ours() -> BrakingPath:
+    def run_twinrig() -> BrakingPath:
         return vehicle.run(controller_of(scene, vehicle.plane.wheels, STOP), start, scene.run.duration)
 
-    return ours, run(vehicle, speed, STEER_ANGLE, len(ours().times))
+    return run_twinrig, run(vehicle, speed, STEER_ANGLE, len(run_twinrig().times))
 
 
-def forces(path: BrakingPath) -> np.ndarray:
-    """Longitudinal and lateral forces (2, n - 1, W) in N of the W tyres, in the wheels' axes."""
+def tyre_forces(path: BrakingPath) -> np.ndarray:
+    """Longitudinal and lateral tyre forces (N), shape (2, number of samples - 1, number of wheels), in wheel axes."""
     return np.stack((path.reports.force_x, path.reports.force_y))
 
 
-def largest_difference(own_path: BrakingPath, theirs: BrakingPath) -> float:
-    """Largest difference between two stops: of states (m, rad, m/s, rad/s) and wheel speeds (rad/s), and of tyre
-    forces, pressures and torques, these divided by their largest values."""
+def largest_difference(stop: BrakingPath, by_hand: BrakingPath) -> float:
+    """Largest difference between two stops among states (m, rad, m/s, rad/s), wheel speeds (rad/s), and tyre forces,
+    pressures and torques. Forces, pressures and torques are divided by their largest values by hand."""
     shares = [
-        np.abs(states - other_states).max() / np.abs(other_states).max()
-        for states, other_states in (
-            (forces(own_path), forces(theirs)),
-            (own_path.pressures, theirs.pressures),
-            (own_path.torques, theirs.torques),
+        np.abs(values - other_values).max() / np.abs(other_values).max()
+        for values, other_values in (
+            (tyre_forces(stop), tyre_forces(by_hand)),
+            (stop.pressures, by_hand.pressures),
+            (stop.torques, by_hand.torques),
         )
     ]
-    return float(
-        max(np.abs(own_path.states - theirs.states).max(), np.abs(own_path.turning - theirs.turning).max(), *shares)
-    )
+    states, turning = np.abs(stop.states - by_hand.states).max(), np.abs(stop.turning - by_hand.turning).max()
+    return float(max(states, turning, *shares))
 
 
 def ratio_of_stops(speed: float, round_count: int) -> tuple[float, tuple[float, float, float]]:

@@ -1,9 +1,9 @@
-"""The car of the handling scenes rolling freely on a flat road, written for MuJoCo and for that alone: struts and
-bushes, bars, an engine on three mounts, two seats, drag, brush tyres.
+"""The car of the handling scenes rolling freely on a flat road, written by hand for MuJoCo: struts and bushes,
+anti-roll bars, an engine on three mounts, two seats, drag, brush tyres.
 
-No steering, brakes, drive, rough road, leaning wheels, curves or friction in its suspension, and no way to have them;
-no tree is walked. Forces act along axes that only yaw with the car, as in ``models.vehicles.free_vehicle``. Places are
-relative to S, which the car has on the road where its chassis rolls and pitches. The tyres' march is the contact's.
+No steering, brakes, drive, rough road, leaning wheels, curves or friction in its suspension, and no way to have them.
+Forces act along axes that only yaw with the car, as in ``models.vehicles.free_vehicle``. Positions are relative to S,
+the point of the car on the road about which its chassis rolls and pitches. The tyres' brush model is twinrig's.
 """
 
 import math
@@ -28,24 +28,25 @@ from models.tyre.bristles import SECOND_ORDER_MARCH, THREE_BRISTLES, net, shape_
 from models.vehicles.free_vehicle import SPECK
 
 COORDINATE_COUNT, CELLS = 23, 21
-HEAD_LENGTH, WHEEL, MOUNT, SEAT = 14, 18, 15, 6
-"""Numbers in the table that ``numbers_of`` writes."""
-TOUCH = size_of(CONTACT)
+GENERAL_NUMBERS, WHEEL_NUMBERS, MOUNT_NUMBERS, SEAT_NUMBERS = 14, 18, 15, 6
+"""Lengths of the sections of ``parameter_table``: general parameters, and parameters of each wheel, engine mount and
+seat."""
+CONTACT_NUMBERS = size_of(CONTACT)
 
 
 @lean
 def add_car_forces(table, t, q, v, forces_out):
-    """Add the generalised forces of the hand-written car to ``forces_out`` (23,). All arguments but the time are
-    pointers to doubles: the parameter table, coordinates, rates and forces.
+    """Add the generalised forces of the hand-written car to ``forces_out`` (23,). All arguments but the time t are
+    pointers to doubles: the parameter table, coordinates q, rates v and forces.
     """
     head, q, v, forces_out = (
-        array(table, (HEAD_LENGTH,)),
+        array(table, (GENERAL_NUMBERS,)),
         array(q, (COORDINATE_COUNT,)),
         array(v, (COORDINATE_COUNT,)),
         array(forces_out, (COORDINATE_COUNT,)),
     )
-    wheels, mounts = beyond(table, HEAD_LENGTH), beyond(table, HEAD_LENGTH + 4 * WHEEL)
-    cells = beyond(mounts, 3 * MOUNT + 2 * SEAT)
+    wheels, mounts = beyond(table, GENERAL_NUMBERS), beyond(table, GENERAL_NUMBERS + 4 * WHEEL_NUMBERS)
+    cells = beyond(mounts, 3 * MOUNT_NUMBERS + 2 * SEAT_NUMBERS)
     c_yaw, s_yaw, c_roll, s_roll = math.cos(q[2]), math.sin(q[2]), math.cos(q[4]), math.sin(q[4])
     c_pitch, s_pitch = math.cos(q[5]), math.sin(q[5])
     x, y = (c_pitch, s_roll * s_pitch, -c_roll * s_pitch), (0.0, c_roll, s_roll)
@@ -53,15 +54,15 @@ def add_car_forces(table, t, q, v, forces_out):
     turning = v[4], c_roll * v[5], s_roll * v[5]
     frame, speed_forward, speed_leftward = (x, y, z, turning), c_yaw * v[0] + s_yaw * v[1], c_yaw * v[1] - s_yaw * v[0]
     passing = speed_forward, speed_leftward, head[0]
-    contacts, forces = doubles(4 * TOUCH), stacked(4, FORCES)
+    contacts, forces = doubles(4 * CONTACT_NUMBERS), stacked(4, FORCES)
     wheel_positions, pushes = doubles(12), doubles(12)
     left = wheel_positions, pushes, contacts
     moment = plus(
-        _engine(mounts, head, frame, q, v, forces_out),
-        _add_seat_forces(beyond(mounts, 3 * MOUNT), frame, q, v, forces_out),
+        _add_engine_forces(mounts, head, frame, q, v, forces_out),
+        _add_seat_forces(beyond(mounts, 3 * MOUNT_NUMBERS), frame, q, v, forces_out),
     )
     for i in range(4):
-        moment = plus(moment, _wheel(row(wheels, WHEEL, i), frame, passing, q, v, i, left))
+        moment = plus(moment, _wheel_forces(row(wheels, WHEEL_NUMBERS, i), frame, passing, q, v, i, left))
     _add_bar_forces((head[6], head[7], head[8]), 0, left, q, forces_out)
     _add_bar_forces((head[9], head[10], head[11]), 2, left, q, forces_out)
     forces_within(
@@ -83,7 +84,11 @@ def add_car_forces(table, t, q, v, forces_out):
         moment = plus(
             moment, plus(cross(three(wheel_position, 0), force), (radius * creep.fy, -radius * creep.fx, creep.mz))
         )
-        force_along, across, lift = force_along + creep.fx, across + creep.fy, lift + row(contacts, TOUCH, i)[2]
+        force_along, across, lift = (
+            force_along + creep.fx,
+            across + creep.fy,
+            lift + row(contacts, CONTACT_NUMBERS, i)[2],
+        )
         turn += (head[0] + wheel_position[0]) * creep.fy - wheel_position[1] * creep.fx + creep.mz
     middle = times(z, head[2])
     speed = speed_forward + turning[1] * middle[2] - turning[2] * middle[1] - v[2] * middle[1]
@@ -99,40 +104,48 @@ def add_car_forces(table, t, q, v, forces_out):
 
 
 @lean
-def _wheel(w, frame, passing, q, v, i, wheel_records):
+def _wheel_forces(wheel, frame, speeds, q, v, i, wheel_records):
     """Compute spring forces, load and creepages of wheel i. Returns the moment of the springs on the chassis about S.
 
-    passing : speeds of S ahead and aside, its place ahead of the origin. wheel_records : where places, pushes and
-    contacts of all wheels are left.
+    speeds : forward and lateral speed of S, and its distance ahead of the origin. wheel_records : arrays that receive
+    positions, forces and contact inputs of all wheels.
     """
-    (x, y, z, turning), (speed_forward, speed_leftward, s_x), k = frame, passing, 9 + 3 * i
+    (x, y, z, turning), (speed_forward, speed_leftward, s_x), k = frame, speeds, 9 + 3 * i
     wheel_position, push, contact = (
         row(wheel_records[0], 3, i),
         row(wheel_records[1], 3, i),
-        row(wheel_records[2], TOUCH, i),
+        row(wheel_records[2], CONTACT_NUMBERS, i),
     )
-    arm = plus(plus(times(x, w[0]), times(y, w[1])), times(z, w[2]))
+    arm = plus(plus(times(x, wheel[0]), times(y, wheel[1])), times(z, wheel[2]))
     displacement, sliding = plus(times(x, q[k]), times(z, q[k + 1])), plus(times(x, v[k]), times(z, v[k + 1]))
     rate = plus(sliding, cross(turning, displacement))
-    strut = w[7] + w[5] * (w[3] * displacement[0] + w[4] * displacement[2]) + w[6] * (w[3] * rate[0] + w[4] * rate[2])
-    bush = w[10] + w[8] * (w[4] * displacement[0] - w[3] * displacement[2]) + w[9] * (w[4] * rate[0] - w[3] * rate[2])
-    force_along, force_up = -strut * w[3] - bush * w[4], bush * w[3] - strut * w[4]
+    strut = (
+        wheel[7]
+        + wheel[5] * (wheel[3] * displacement[0] + wheel[4] * displacement[2])
+        + wheel[6] * (wheel[3] * rate[0] + wheel[4] * rate[2])
+    )
+    bush = (
+        wheel[10]
+        + wheel[8] * (wheel[4] * displacement[0] - wheel[3] * displacement[2])
+        + wheel[9] * (wheel[4] * rate[0] - wheel[3] * rate[2])
+    )
+    force_along, force_up = -strut * wheel[3] - bush * wheel[4], bush * wheel[3] - strut * wheel[4]
     wheel_position[0], wheel_position[1], wheel_position[2] = plus(arm, displacement)
     u, radius = plus(sliding, cross(turning, three(wheel_position, 0))), q[3] + wheel_position[2]
-    load, tread = max(w[11] - w[12] * (radius - w[13]), 0.0), radius * v[k + 2]
+    load, tread = max(wheel[11] - wheel[12] * (radius - wheel[13]), 0.0), radius * v[k + 2]
     push[0], push[1], push[2] = force_along, 0.0, force_up + load
-    contact[0], contact[1], contact[2], contact[3] = math.sqrt(w[14] * load / w[12]), w[15], load, w[17]
+    contact[0], contact[1], contact[2], contact[3] = math.sqrt(wheel[14] * load / wheel[12]), wheel[15], load, wheel[17]
     contact[4] = (u[0] + speed_forward - v[2] * wheel_position[1] - radius * (turning[1] + v[k + 2])) / tread
     contact[5] = (u[1] + speed_leftward + v[2] * (s_x + wheel_position[0]) + radius * turning[0]) / tread
     contact[6] = (turning[2] + v[2]) / tread
-    contact[7] = contact[8] = contact[9] = w[16]
+    contact[7] = contact[8] = contact[9] = wheel[16]
     return cross((force_along, 0.0, force_up), arm)
 
 
 @lean
 def _add_bar_forces(bar, i, wheel_records, q, forces_out):
-    """Add the forces of an anti-roll bar (stiffness, moment at rest, 1 / track) between the wheels i and i + 1 and the
-    chassis' roll."""
+    """Add the forces of an anti-roll bar on the chassis' roll and on the wheels i and i + 1. ``bar``: stiffness, moment
+    at rest, 1 / track."""
     (stiffness, moment_at_rest, inverse_track), (wheel_positions, pushes, _) = bar, wheel_records
     twist = moment_at_rest + stiffness * (
         q[4] - (row(wheel_positions, 3, i)[2] - row(wheel_positions, 3, i + 1)[2]) * inverse_track
@@ -143,8 +156,9 @@ def _add_bar_forces(bar, i, wheel_records, q, forces_out):
 
 
 @lean
-def _engine(mounts, car_head, frame, q, v, forces_out):
-    """Add the forces of the mounts on the engine's three coordinates. Returns their moment on the chassis about S."""
+def _add_engine_forces(mounts, car_head, frame, q, v, forces_out):
+    """Add the forces of the engine mounts on the engine's three coordinates. Returns their moment on the chassis about
+    S."""
     x, y, z, turning = frame
     c_roll, s_roll, c_pitch, s_pitch = math.cos(q[7]), math.sin(q[7]), math.cos(q[8]), math.sin(q[8])
     lateral_axis = plus(times(y, c_roll), times(z, s_roll))
@@ -158,7 +172,7 @@ def _engine(mounts, car_head, frame, q, v, forces_out):
     passing, total, twist = plus(cross(turning, joint), times(z, v[6])), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     moment = 0.0, 0.0, 0.0
     for i in range(3):
-        m = row(mounts, MOUNT, i)
+        m = row(mounts, MOUNT_NUMBERS, i)
         mount_point = plus(plus(times(x, m[0]), times(y, m[1])), times(z, m[2]))
         arm = plus(plus(times(forward_axis, m[3]), times(lateral_axis, m[4])), times(high, m[5]))
         gap = plus(mount_point, times(plus(joint, arm), -1.0))
@@ -178,11 +192,12 @@ def _engine(mounts, car_head, frame, q, v, forces_out):
 
 @lean
 def _add_seat_forces(seats, frame, q, v, forces_out):
-    """Add the forces of both seats on their coordinates. Returns their moment on the chassis about S."""
+    """Add the spring and damper forces of both seats on the seats' coordinates. Returns their moment on the chassis
+    about S."""
     _, _, z, turning = frame
     moment = 0.0, 0.0, 0.0
     for i in range(2):
-        s, k = row(seats, SEAT, i), 21 + i
+        s, k = row(seats, SEAT_NUMBERS, i), 21 + i
         displacement = times(z, q[k])
         force = s[5] - s[3] * displacement[2] - s[4] * (v[k] * z[2] + cross(turning, displacement)[2])
         forces_out[k] += force * z[2]
@@ -190,9 +205,9 @@ def _add_seat_forces(seats, frame, q, v, forces_out):
     return moment
 
 
-def numbers_of(handling: Handling) -> np.ndarray:
-    """The car's parameters as one array: general ones, then those of the wheels, the engine mounts, the seats and the
-    grid of the contact patch."""
+def parameter_table(handling: Handling) -> np.ndarray:
+    """The car's parameters as one array: general ones, then parameters of the wheels, the engine mounts, the seats and
+    the grid of the contact patch."""
     car, contact_net, preload_of = handling.vehicle, net(CELLS), handling.held.parts
     springs, s, joint = {p.name: p for p in car.springs}, car.body("sway").position, car.body("engine").position
     bars = [number for bar in car.bars for number in (bar.stiffness, preload_of[bar.name], 1.0 / bar.track)]
@@ -208,7 +223,7 @@ def numbers_of(handling: Handling) -> np.ndarray:
         contact_net.middle,
     ]
 
-    def law(name: str) -> list[float]:
+    def stiffness_damping_preload(name: str) -> list[float]:
         return [springs[name].stiffness, springs[name].damping, preload_of[name]]
 
     wheels = []
@@ -221,8 +236,8 @@ def numbers_of(handling: Handling) -> np.ndarray:
             *np.subtract(tyre.point, s),
             strut[0],
             strut[2],
-            *law(corner),
-            *law(f"{corner} bush"),
+            *stiffness_damping_preload(corner),
+            *stiffness_damping_preload(f"{corner} bush"),
             load,
             tyre.stiffness,
             tyre.point[2],
@@ -235,20 +250,23 @@ def numbers_of(handling: Handling) -> np.ndarray:
         np.r_[
             np.subtract(springs[f"{name} mount.x"].first_point, s),
             np.subtract(springs[f"{name} mount.x"].first_point, joint),
-            np.array([law(f"{name} mount.{axis}") for axis in "xyz"]).T.ravel(),
+            np.array([stiffness_damping_preload(f"{name} mount.{axis}") for axis in "xyz"]).T.ravel(),
         ]
         for name in ("left", "right", "rear")
     ]
-    seats = [[*np.subtract(springs[name].first_point, s), *law(name)] for name in ("left seat", "right seat")]
+    seats = [
+        [*np.subtract(springs[name].first_point, s), *stiffness_damping_preload(name)]
+        for name in ("left seat", "right seat")
+    ]
     return np.concatenate(
         [head, wheels, np.ravel(mounts), np.ravel(seats), contact_net.cells.ravel(), contact_net.strips.ravel()]
     )
 
 
 def model_of(handling: Handling, step: float) -> mujoco.MjModel:
-    """The car's model in MuJoCo, which carries the parameter table; bodies without inertia get it when the model
-    exists."""
-    car, table = handling.vehicle, numbers_of(handling)
+    """The car's model in MuJoCo, with the parameter table in its numeric data. Inertias are set after the XML is
+    compiled."""
+    car, table = handling.vehicle, parameter_table(handling)
     chassis = car.body("body")
     bodies = "".join(
         BODY_TEXT.format(
@@ -286,17 +304,18 @@ def model_of(handling: Handling, step: float) -> mujoco.MjModel:
     return built
 
 
-def run(handling: Handling, q: np.ndarray, v: np.ndarray, step: float, steps: int) -> Callable[[], np.ndarray]:
-    """A hand-written run from coordinates and rates (23,); the returned function gives states (steps + 1, 46)."""
+def run(handling: Handling, q: np.ndarray, v: np.ndarray, step: float, step_count: int) -> Callable[[], np.ndarray]:
+    """Returns a function that simulates the car from coordinates q and rates v (23,) in MuJoCo; it returns states
+    (step_count + 1, 46)."""
     built = model_of(handling, step)
     data, state, callback = mujoco.MjData(built), np.concatenate(([0.0], q, v)), kernel_law(add_car_forces)
 
-    def marched() -> np.ndarray:
+    def run_car() -> np.ndarray:
         with installed(callback):
-            path, _ = rollout.rollout(built, data, state[None, :], nstep=steps)
+            path, _ = rollout.rollout(built, data, state[None, :], nstep=step_count)
         return np.vstack([state[1:], path[0, :, 1 : 1 + 2 * COORDINATE_COUNT]])
 
-    return marched
+    return run_car
 
 
 def _text(values: Any) -> str:
@@ -311,7 +330,7 @@ BODIES_ON_CHASSIS = {
     "left seat": "z",
     "right seat": "z",
 }
-"""Bodies on the chassis and their joints."""
+"""Body on the chassis -> its joints: x, z translations; R, P rotations in roll and pitch."""
 JOINT_TEXTS = {
     "x": '<joint type="slide" axis="1 0 0"/>',
     "z": '<joint type="slide" axis="0 0 1"/>',

@@ -1,10 +1,8 @@
-"""A car with seven degrees of freedom on a rough road, written directly for each engine, and its equations of motion.
+"""A car with seven degrees of freedom on a rough road, written by hand for each engine, and its equations of motion.
 
-As someone would write it who needs that alone.
-
-Body (z, roll, pitch) on four upright spring-dampers, wheels (z) on tyre springs, neither gravity nor anything else:
-its numbers straight into Exudyn's items, and into MuJoCo's XML with site actuators for the suspension. No engine reads
-a table at the stages of a step, so the road's forces come by one callback in each, compiled in MuJoCo.
+Body (z, roll, pitch) on four vertical spring-dampers, wheels (z) on tyre springs, without gravity. Its parameters go
+straight into Exudyn's items, and into MuJoCo's XML with site actuators for the suspension. No engine reads a table at
+the stages of a step, so the road's forces come by one callback in each engine, compiled in MuJoCo.
 """
 
 from collections.abc import Callable
@@ -19,13 +17,15 @@ from models.vehicles.spatial import SpatialVehicle
 from validation.absence.hand_built import exudyn_march
 
 Run = Callable[[], np.ndarray]
-"""One run from rest; returns the states (steps + 1, 14): z, roll and pitch of the body, the wheels, then all rates."""
+"""Function that simulates from rest; returns the states (step_count + 1, 14): z, roll and pitch of the body, z of the
+wheels, then all rates."""
 
 
 @dataclass(frozen=True)
 class Car:
-    """Parameters of a car with four wheels. Positions (m) are relative to the body's centre of mass; corners (4, 5): x,
-    y, z of each strut, its stiffness and its damping."""
+    """Parameters of a car with four wheels: mass of the body and of a wheel (kg), inertias of the body (kg m^2), tyre
+    stiffness (N/m), centre of mass (m). corners (4, 5): position x, y, z of each strut relative to the body's centre of
+    mass (m), its stiffness (N/m) and its damping (N s/m)."""
 
     mass: float
     inertia: tuple[float, float, float]
@@ -36,7 +36,7 @@ class Car:
 
     @classmethod
     def of(cls, vehicle: SpatialVehicle) -> "Car":
-        """Parameters of the car, read from a vehicle of this kind."""
+        """Parameters of the car, read from a seven-degree-of-freedom vehicle."""
         body, wheel = vehicle.bodies[:2]
         corners = [[*np.subtract(s.first_point, body.position), s.stiffness, s.damping] for s in vehicle.springs]
         return cls(
@@ -49,9 +49,9 @@ class Car:
         )
 
 
-def exudyn_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
-    """A run in Exudyn by the classical Runge-Kutta method; ``road`` (2 steps + 1, 4): heights (m) under the wheels at
-    half steps."""
+def exudyn_run(car: Car, road: np.ndarray, step: float, step_count: int) -> Run:
+    """Returns a function that simulates the car in Exudyn by the classical Runge-Kutta method; ``road`` (2 step_count +
+    1, 4): heights (m) under the wheels at half steps."""
     import exudyn as exu
     import exudyn.itemInterface as typed_items
 
@@ -112,13 +112,13 @@ def exudyn_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
             forceUserFunction=lambda mbs, t, item, q, v: forces[round(t * per_time)],
         )
     )
-    march = exudyn_march(container, mbs, nodes, step, steps)
+    march = exudyn_march(container, mbs, nodes, step, step_count)
     return lambda: np.hstack([states[:, 1:] for states in march()])
 
 
-def mujoco_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
-    """A run in MuJoCo by the classical Runge-Kutta method; ``road`` (2 steps + 1, 4): heights (m) under the wheels at
-    half steps."""
+def mujoco_run(car: Car, road: np.ndarray, step: float, step_count: int) -> Run:
+    """Returns a function that simulates the car in MuJoCo by the classical Runge-Kutta method; ``road`` (2 step_count +
+    1, 4): heights (m) under the wheels at half steps."""
     import mujoco
     from mujoco import rollout
 
@@ -142,7 +142,7 @@ def mujoco_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
     def run() -> np.ndarray:
         mujoco.set_mjcb_passive(law.ctypes)
         try:
-            path, _ = rollout.rollout(model, data, start, nstep=steps)
+            path, _ = rollout.rollout(model, data, start, nstep=step_count)
         finally:
             mujoco.set_mjcb_passive(None)
         return np.vstack([start[:, 1:], path[0, :, 1:15]])
@@ -152,7 +152,7 @@ def mujoco_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
 
 @cache
 def _road_law() -> Any:
-    """The compiled callback: forces of the road on the wheels, from the model's numeric data."""
+    """Compiled MuJoCo callback that adds the road's forces on the wheels, from a table in the model's numeric data."""
     from numba import cfunc, types
 
     from models.engines.mujoco_layout import offset
@@ -163,25 +163,25 @@ def _road_law() -> Any:
 
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
     def law(model, case_data):
-        numbers, forces = array_at(model, numeric), array_at(case_data, passive)
-        row = 2 + 4 * int(np.rint(double_at(case_data, time)[0] * numbers[0]))
+        parameter_array, forces = array_at(model, numeric), array_at(case_data, passive)
+        row = 2 + 4 * int(np.rint(double_at(case_data, time)[0] * parameter_array[0]))
         for i in range(4):
-            forces[3 + i] += numbers[1] * numbers[row + i]
+            forces[3 + i] += parameter_array[1] * parameter_array[row + i]
 
     return law
 
 
-STATES, BODY, CORNER = 14, 4, 5
-"""States of the written car; where the numbers of its corners begin in ``numbers``, and how many each has."""
+STATE_COUNT, BODY_NUMBERS, CORNER_NUMBERS = 14, 4, 5
+"""Number of states of the car; in ``parameter_array``, number of values of the body and of each corner."""
 
 
 @lean
 def rates(x, road, car, state_rate):
-    """Time derivatives (14,) of the state of a linear car on road heights (4,). ``car`` holds masses of body and wheel,
-    roll and pitch inertia, then x, y, stiffness, damping and tyre stiffness of every corner."""
+    """Compute the time derivatives (14,) of a linear car's state on road heights (4,) (m). ``car``: masses of body and
+    wheel, roll and pitch inertia, then x, y, stiffness, damping and tyre stiffness of every corner."""
     lift = roll = pitch = 0.0
     for i in range(4):
-        k = BODY + CORNER * i
+        k = BODY_NUMBERS + CORNER_NUMBERS * i
         distance_ahead, distance_aside, stiffness, damping, tyre = (
             car[k],
             car[k + 1],
@@ -203,28 +203,28 @@ def rates(x, road, car, state_rate):
 
 @njit(cache=True, error_model="numpy")
 def march(states, roads, step, car):
-    """March each copy by the classical Runge-Kutta method, one after the other, and overwrite ``states`` (14, copies).
-    roads (2 steps + 1, 4, copies): heights (m) at half steps."""
-    rate, total, stage_state = np.empty(STATES), np.empty(STATES), np.empty(STATES)
+    """Simulate each copy of the car by the classical Runge-Kutta method and overwrite ``states`` (14, copies) with the
+    final states. roads (2 step_count + 1, 4, copies): heights (m) at half steps."""
+    rate, total, stage_state = np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(STATE_COUNT)
     for copy in range(states.shape[1]):
         x, road = states[:, copy].copy(), roads[:, :, copy].copy()
         for i in range(len(road) // 2):
             rates(x, road[2 * i], car, rate)
-            for k in range(STATES):
+            for k in range(STATE_COUNT):
                 total[k], stage_state[k] = rate[k], x[k] + 0.5 * step * rate[k]
             for stage in range(2):
                 rates(stage_state, road[2 * i + 1], car, rate)
-                for k in range(STATES):
+                for k in range(STATE_COUNT):
                     total[k] += 2.0 * rate[k]
                     stage_state[k] = x[k] + (0.5 * step if stage == 0 else step) * rate[k]
             rates(stage_state, road[2 * i + 2], car, rate)
-            for k in range(STATES):
+            for k in range(STATE_COUNT):
                 x[k] += step / 6.0 * (total[k] + rate[k])
         states[:, copy] = x
 
 
-def numbers(car: Car) -> np.ndarray:
-    """A car's parameters in the order that ``rates`` expects."""
+def parameter_array(car: Car) -> np.ndarray:
+    """A car's parameters as one array, in the order that ``rates`` expects."""
     corners = np.column_stack([car.corners[:, [0, 1, 3, 4]], np.full(4, car.tyre)])
     return np.concatenate([[car.mass, car.wheel, car.inertia[0], car.inertia[1]], corners.ravel()])
 
@@ -246,7 +246,7 @@ CORNERS = {
          gainprm="0" biastype="affine" biasprm="0 -{k!r} -{d!r}"/>
 """,
 }
-"""What each corner adds to the body's sites, to the world and to the actuators."""
+"""MuJoCo XML of a corner: the strut's site on the body, the wheel's body, the suspension's actuator."""
 VEHICLE_XML = """
 <mujoco>
   <compiler angle="radian"/>

@@ -1,8 +1,9 @@
-"""A free wheelset on cones written out for that alone: Kalker's linear creep forces and Hertz' load, nothing else.
+"""A free wheelset with conical wheels, written by hand for this case alone: Kalker's linear creep forces and Hertz'
+normal load, nothing else.
 
-No suspension, flange, contact damping, profiles or FASTSIM, and no way to have them; the equations are those in the
-head of ``models.rail.equations``, and what it tells of its contacts is the REPORT of ``models.rail.wheel_forces``.
-Where cones touch rails, Hertz' theory and Kalker's coefficients are the contact's.
+No suspension, flange, contact damping, profiles or FASTSIM, and no way to have them. The equations of motion are stated
+in the head of ``models.rail.equations``; the columns of a contact's report are those of REPORT in
+``models.rail.wheel_forces``. The contact point of a cone, Hertz' theory and Kalker's coefficients are twinrig's.
 """
 
 from collections.abc import Callable
@@ -17,17 +18,18 @@ from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
 from models.rail.profile_contact import Pose, normal_force_and_axes
 from models.rail.wheel_forces import REPORT, rails_of
 
-STATES = 10
+STATE_COUNT = 10
 REPORT_LENGTH = size_of(REPORT)
 
 
 @lean
-def rates(state, speed, p, fills_report, state_rate, report):
-    """Time derivatives (10,) of a wheelset's state: y, z, roll, yaw, spin angle, and their rates. If ``fills_report``,
-    the two contacts are written to report (2, 18). p: mass, inertias about the track's direction and the axle, weight
-    on each side, radius, half gauge, conicity, rail head radius, contact modulus, shear modulus, Poisson's ratio.
+def rates(state, speed, parameters, fills_report, state_rate, report):
+    """Compute the time derivatives (10,) of a wheelset's state: y, z, roll, yaw, spin angle, and their rates. If
+    ``fills_report``, the two contacts are written to report (2, 18). parameters: mass, inertia about the axle, inertia
+    across the axle, weight on each side, radius, half gauge, conicity, rail head radius, contact modulus, shear
+    modulus, Poisson's ratio.
     """
-    mass, yaw_inertia, across, carried, radius, gauge, conicity, head, modulus, shear, poisson = p
+    mass, spin_inertia, cross_inertia, carried, radius, gauge, conicity, head, modulus, shear, poisson = parameters
     cone = Cone(radius, gauge, conicity, head)
     y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
     cr, sr, cy, sy = np.cos(roll), np.sin(roll), np.cos(yaw), np.sin(yaw)
@@ -88,41 +90,41 @@ def rates(state, speed, p, fills_report, state_rate, report):
         yaw_rate,
         turn_rate,
     )
-    state_rate[5], state_rate[6], state_rate[9] = fy / mass, (fz + 2.0 * carried) / mass + 9.81, m2 / yaw_inertia
-    state_rate[7] = (m1 + yaw_inertia * spin * yaw_rate * cr) / across - yaw_rate**2 * sr * cr
-    state_rate[8] = ((m3 - yaw_inertia * spin * roll_rate) / across + 2.0 * roll_rate * yaw_rate * sr) / cr
+    state_rate[5], state_rate[6], state_rate[9] = fy / mass, (fz + 2.0 * carried) / mass + 9.81, m2 / spin_inertia
+    state_rate[7] = (m1 + spin_inertia * spin * yaw_rate * cr) / cross_inertia - yaw_rate**2 * sr * cr
+    state_rate[8] = ((m3 - spin_inertia * spin * roll_rate) / cross_inertia + 2.0 * roll_rate * yaw_rate * sr) / cr
 
 
 @njit(cache=True, error_model="numpy")
-def march(state, speed, step, p, path, reports):
-    """March from a state (10,) by the classical Runge-Kutta method; fills path (steps + 1, 10) and reports (steps + 1,
-    2, 18)."""
-    total, rate, stage_state = np.empty(STATES), np.empty(STATES), np.empty(STATES)
+def march(state, speed, step, parameters, path, contact_reports):
+    """Simulate from a state (10,) by the classical Runge-Kutta method; fills path (step_count + 1, 10) and
+    contact_reports (step_count + 1, 2, 18)."""
+    total, rate, stage_state = np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(STATE_COUNT)
     path[0] = state
     for i in range(len(path)):
         for stage in range(4):
-            for k in range(STATES):
+            for k in range(STATE_COUNT):
                 stage_state[k] = (
                     path[i, k] + (step if stage == 3 else 0.5 * step) * rate[k] if stage > 0 else path[i, k]
                 )
-            rates(stage_state, speed, p, stage == 0, rate, reports[i])
-            for k in range(STATES):
+            rates(stage_state, speed, parameters, stage == 0, rate, contact_reports[i])
+            for k in range(STATE_COUNT):
                 total[k] = total[k] + (1.0 if stage == 3 else 2.0) * rate[k] if stage > 0 else rate[k]
             if i == len(path) - 1:
                 return
-        for k in range(STATES):
+        for k in range(STATE_COUNT):
             path[i + 1, k] = path[i, k] + step / 6.0 * total[k]
 
 
-def run(wheelset: Any, state: np.ndarray, speed: float, step: float, steps: int) -> Callable[[], Any]:
-    """A hand-written run of a free wheelset (``models.rail.wheelset``). The returned function gives states (steps + 1,
-    10) and contacts, REPORT (steps + 1, 2)."""
+def run(wheelset: Any, state: np.ndarray, speed: float, step: float, step_count: int) -> Callable[[], Any]:
+    """Returns a function that simulates a free wheelset (``models.rail.wheelset``). The function returns states
+    (step_count + 1, 10) and contact reports (step_count + 1, 2)."""
     w = wheelset
     p = (w.mass, w.spin_inertia, w.yaw_inertia, (w.load - w.mass * 9.81) / 2.0, *rails_of(w).wheels[0].tolist()[:7])
 
-    def marched() -> tuple[np.ndarray, np.ndarray]:
-        path, reports = np.empty((steps + 1, STATES)), np.empty((steps + 1, 2, REPORT_LENGTH))
+    def run_wheelset() -> tuple[np.ndarray, np.ndarray]:
+        path, reports = np.empty((step_count + 1, STATE_COUNT)), np.empty((step_count + 1, 2, REPORT_LENGTH))
         march(state, speed, step, p, path, reports)
         return path, reports.view(REPORT)[..., 0]
 
-    return marched
+    return run_wheelset

@@ -1,4 +1,4 @@
-"""Handling: a bare manoeuvre, what its table of numbers holds, and its path in both engines."""
+"""Handling scene without effects, for the absence checks: its tables, counts of its model's components, its path."""
 
 from typing import Any
 
@@ -16,7 +16,8 @@ BARE_SCENE: dict[str, Any] = {
 
 
 def counts_and_path(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Numbers of components in the model of a manoeuvre as both engines receive it, and the path as bytes."""
+    """Counts of the components in the model of a manoeuvre (wheels, road waves, controls, ...), and the coordinates of
+    a run as bytes."""
     path = run(scene, engine)
     handling = path.detail.handling
     controls = (handling.controls.steer, handling.controls.brake, handling.controls.drive)

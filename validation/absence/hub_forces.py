@@ -1,4 +1,5 @@
-"""Hub forces: a bare scene has files of forces and angles; what a run of the cut vehicle is made of, and its path."""
+"""Hub-force scene without effects, for the absence checks: its files of forces and angles, counts of the components in
+the model of the vehicle above its hubs, its path."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,19 +17,19 @@ from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES, COLUMNS_OF_HUB, H
 
 ENGINES = ("reference", "exudyn", "mujoco")
 HUBS = ("fl", "fr", "rl", "rr")
-STEPS, STEP, SAMPLE_PERIOD = 20, 1e-3, 2e-3
+STEP_COUNT, STEP, SAMPLE_PERIOD = 20, 1e-3, 2e-3
 BARE_SCENE: dict[str, Any] = {
     "title": "bare",
     "system": "hub-forces",
     "vehicle": {"file": "r19_free"},
-    "run": {"duration": STEPS * STEP, "step": STEP},
+    "run": {"duration": STEP_COUNT * STEP, "step": STEP},
     "stabilise": {"smoothing": 60.0},
     "angles": {"file": "angles.csv"},
     "forces": {"file": "forces.csv", "frame": "inertial"},
 }
 NO_NOISE: dict[str, Any] = {"noise": "none"}
 ON_ROAD: dict[str, Any] = {"road": {}, "angles": NO_NOISE, "forces": NO_NOISE | {"frame": "inertial"}}
-BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+HAND_WRITTEN_TABLES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "virtual_measurement": ({}, ON_ROAD),
     "force_noise": (ON_ROAD, ON_ROAD | {"forces": {"frame": "inertial"}}),
     "angle_noise": (ON_ROAD, ON_ROAD | {"angles": {}}),
@@ -37,9 +38,9 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 
 def write(folder: Path) -> None:
-    """Write files of hub forces that carry the vehicle, with a vertical force that rises, and of angles that stay
+    """Write a file of hub forces, whose vertical components rise from the static load, and a file of angles that stay
     zero."""
-    rising = np.linspace(0.0, 1.0, round(STEPS * STEP / SAMPLE_PERIOD) + 1) ** 2
+    rising = np.linspace(0.0, 1.0, round(STEP_COUNT * STEP / SAMPLE_PERIOD) + 1) ** 2
     forces = {
         f"{hub}_{name}": (next(iter(units)), (4e3 + 500.0 * rising) * (name == "fz"))
         for hub in HUBS
@@ -51,14 +52,15 @@ def write(folder: Path) -> None:
 
 
 def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Numbers of features (noisy columns, held forces, ...) in the run as an engine receives it, and the path as
-    bytes."""
+    """Counts of the components of a run (noisy columns, sampled and held forces, ...), and its states as bytes."""
     measurement, step = measure(scene, engine), scene.run.step
-    hub_inputs = measurement.hub_inputs(scene.stabilise.method, step, STEPS)
+    hub_inputs = measurement.hub_inputs(scene.stabilise.method, step, STEP_COUNT)
     model = build(engine, measurement.vehicle, hub_inputs, step, scene.run.duration)
     head = model.numbers
-    period = hub_inputs.hubs[: round(2 * measurement.forces.period / step) + 1]  # of the samples, at half steps
-    curved = not hub_inputs.held and np.abs(np.diff(period, n=2, axis=0)).max() > 1e-9 * np.abs(period).max()
+    sample_inputs = hub_inputs.hubs[: round(2 * measurement.forces.period / step) + 1]  # of the samples, at half steps
+    curved = (
+        not hub_inputs.held and np.abs(np.diff(sample_inputs, n=2, axis=0)).max() > 1e-9 * np.abs(sample_inputs).max()
+    )
     noisy_forces, noisy_angles = _noisy_columns(measurement)
     counts = {
         "runs on tyres": int(measurement.truth is not None),
@@ -74,14 +76,17 @@ def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes
     return counts, model.run(*np.split(measurement.start(hub_inputs), 2)).states.tobytes()
 
 
-def job(scene: HubScene, engine: str, steps: int) -> Callable[[], Any]:
-    """A run of the scene over ``steps`` of its steps, with its model built already."""
+def scene_run(scene: HubScene, engine: str, step_count: int) -> Callable[[], Any]:
+    """Returns a function that simulates the scene over ``step_count`` steps; its model is built beforehand."""
     measurement, step = measure(scene, engine), scene.run.step
-    return build(engine, measurement.vehicle, measurement.hub_inputs("none", step, steps), step, steps * step).run
+    return build(
+        engine, measurement.vehicle, measurement.hub_inputs("none", step, step_count), step, step_count * step
+    ).run
 
 
 def _noisy_columns(measurement: Measurement) -> list[int]:
-    """Numbers of force columns and of angle columns that contain noise; 0 and 0 for measurements from files."""
+    """Number of force columns with noise and number of angle columns with noise; 0 and 0 for measurements from
+    files."""
     forces, angles, scene = measurement.forces, measurement.angles, measurement.scene
     if measurement.truth is None:
         return [0, 0]

@@ -1,4 +1,4 @@
-"""Cost of the loop of a bare scene beside a loop written for that scene alone: seconds, and arrays made."""
+"""Cost of the time loop of scenes without effects beside hand-written loops: computing time and allocated arrays."""
 
 import time
 from collections.abc import Callable
@@ -12,18 +12,18 @@ from models.machine.timing import interleave, paired_ratio
 from models.rail.equations import WheelsetPath
 from models.systems.wheelset.of_scene import equations_of
 from validation.absence import braking, hand_built_wheelset, hub_forces, wheelset
-from validation.absence.bare_cars import cars
-from validation.absence.bare_rides import copies, rides
+from validation.absence.bare_cars import car_runs
+from validation.absence.bare_rides import copy_runs, ride_runs
 from validation.absence.of_systems import bare_scene
 from validation.common.rows import Observed, Row, System
 
 SYSTEM: System = "effects"
 STEP, SHORT_RUN_STEPS = 5e-4, 40
-"""Step of the wheelset's runs (s); steps of the shorter one of two that are counted."""
+"""Step of the wheelset's runs (s); number of steps of the shorter of two runs whose allocated arrays are compared."""
 
 
 def allocated_arrays(job: Callable[[], Any]) -> int:
-    """Number of arrays that compiled code allocates during a job, as counted by numba."""
+    """Number of arrays that compiled code allocates while a function runs, as counted by numba."""
     _nrt_python.memsys_enable_stats()
     try:
         arrays_before = rtsys.get_allocation_stats().alloc
@@ -33,26 +33,29 @@ def allocated_arrays(job: Callable[[], Any]) -> int:
         _nrt_python.memsys_disable_stats()
 
 
-def bare_wheelsets(steps: int) -> tuple[Callable[[], WheelsetPath], Callable[[], WheelsetPath]]:
-    """Two runs of the bare wheelset, by twinrig and by code written for linear creep on cones alone. Both check the
-    path in the same way, and give states and contacts."""
-    equations, times = equations_of(bare_scene("wheelset"), "reference", wheelset.SPEED), STEP * np.arange(steps + 1)
+def bare_wheelsets(step_count: int) -> tuple[Callable[[], WheelsetPath], Callable[[], WheelsetPath]]:
+    """Two functions that simulate the same wheelset without effects: by twinrig and by hand-written code for linear
+    creep on cones. Both check the path in the same way, and return states and contacts."""
+    equations, times = (
+        equations_of(bare_scene("wheelset"), "reference", wheelset.SPEED),
+        STEP * np.arange(step_count + 1),
+    )
     start = equations.displaced_state(1e-3)
-    theirs = hand_built_wheelset.run(equations.wheelset, start, wheelset.SPEED, STEP, steps)
+    theirs = hand_built_wheelset.run(equations.wheelset, start, wheelset.SPEED, STEP, step_count)
 
-    def written() -> WheelsetPath:
+    def run_hand_built() -> WheelsetPath:
         states, contacts = theirs()
         path = WheelsetPath(times, states, contacts=contacts)
         equations.check(path, STEP, 1)
         return path
 
-    return lambda: equations.run(start, steps * STEP, STEP), written
+    return lambda: equations.run(start, step_count * STEP, STEP), run_hand_built
 
 
-def ratio_of_wheelsets(steps: int, round_count: int) -> tuple[float, tuple[float, float, float]]:
-    """Largest difference of states (m, rad, m/s, rad/s) and contact forces (ratio to the load) between twinrig's
-    wheelset and the hand-written one; ratio of their computing times."""
-    jobs = bare_wheelsets(steps)
+def ratio_of_wheelsets(step_count: int, round_count: int) -> tuple[float, tuple[float, float, float]]:
+    """Largest difference of states (m, rad, m/s, rad/s) and contact forces (divided by the load) between twinrig's
+    wheelset and the hand-written one, and the ratio of their computing times with its confidence interval."""
+    jobs = bare_wheelsets(step_count)
     ours, theirs = (job() for job in jobs)
     gaps = [np.abs(ours.contacts[name] - theirs.contacts[name]).max() for name in ("load", "fx", "fy", "mz")]
     force_gap = max(gaps) / theirs.contacts["load"].max()
@@ -60,45 +63,49 @@ def ratio_of_wheelsets(steps: int, round_count: int) -> tuple[float, tuple[float
     return float(gap), paired_ratio(*interleave(jobs, round_count, clock=time.process_time))
 
 
-def arrays_per_steps(
-    job: Callable[[int], Callable[[], Any]], short_steps: int = SHORT_RUN_STEPS, long_steps: int = 10 * SHORT_RUN_STEPS
+def added_arrays(
+    job_of_steps: Callable[[int], Callable[[], Any]],
+    short_steps: int = SHORT_RUN_STEPS,
+    long_steps: int = 10 * SHORT_RUN_STEPS,
 ) -> int:
-    """How many more arrays a job allocates in ``long_steps`` steps than in ``short_steps`` ones; ``job(steps)`` builds
-    the job.
+    """How many more arrays a run of ``long_steps`` steps allocates than a run of ``short_steps`` steps.
+    ``job_of_steps(step_count)`` returns the function that runs.
     """
-    jobs = [job(steps) for steps in (short_steps, long_steps)]
+    jobs = [job_of_steps(steps) for steps in (short_steps, long_steps)]
     for warm in jobs:
         warm()
     arrays_of_short, arrays_of_long = map(allocated_arrays, jobs)
     return arrays_of_long - arrays_of_short
 
 
-def made_by_wheelset(which: int) -> int:
-    """How many more arrays a longer run allocates: 0 for twinrig's bare wheelset, 1 for the hand-written one."""
-    return arrays_per_steps(lambda steps: bare_wheelsets(steps)[which])
+def arrays_added_by_wheelset(job_index: int) -> int:
+    """How many more arrays a longer run of the wheelset without effects allocates; job_index 0: twinrig, 1:
+    hand-written code."""
+    return added_arrays(lambda steps: bare_wheelsets(steps)[job_index])
 
 
-def made_by_ride() -> int:
-    """How many more arrays a longer run of the bare ride allocates: in MuJoCo, where all its forces are compiled, and
-    as linear copies."""
-    return arrays_per_steps(lambda steps: rides("mujoco", steps)[0]) + arrays_per_steps(lambda steps: copies(steps)[0])
+def arrays_added_by_ride() -> int:
+    """How many more arrays a longer run of the ride scene without effects allocates: in MuJoCo, where all its forces
+    are compiled, and as linear Monte Carlo copies."""
+    return added_arrays(lambda steps: ride_runs("mujoco", steps)[0]) + added_arrays(lambda steps: copy_runs(steps)[0])
 
 
-def made_by_car() -> int:
-    """How many more arrays a longer run of the bare car of ``handling`` allocates in MuJoCo."""
-    return arrays_per_steps(lambda steps: cars(steps)[0])
+def arrays_added_by_car() -> int:
+    """How many more arrays a longer run of the handling scene's car without effects allocates in MuJoCo."""
+    return added_arrays(lambda steps: car_runs(steps)[0])
 
 
-def made_by_hubs(engine: str) -> int:
-    """How many more arrays a longer run of a bare vehicle driven by hub forces allocates."""
+def arrays_added_by_hubs(engine: str) -> int:
+    """How many more arrays a longer run of a vehicle on prescribed hub forces allocates in an engine, without
+    effects."""
     scene = bare_scene("hub-forces")
-    step_count = hub_forces.STEPS
-    step_count = hub_forces.STEPS
-    return arrays_per_steps(lambda steps: hub_forces.job(scene, engine, steps), step_count // 4, step_count)
+    step_count = hub_forces.STEP_COUNT
+    return added_arrays(lambda steps: hub_forces.scene_run(scene, engine, steps), step_count // 4, step_count)
 
 
-def made_by_braking(engine: str) -> tuple[int, int]:
-    """How many more arrays a longer run of a bare braked vehicle allocates, and by how many samples it is longer."""
+def arrays_added_by_braking(engine: str) -> tuple[int, int]:
+    """How many more arrays a longer stop of a braked vehicle without effects allocates, and by how many samples the
+    stop is longer."""
     from models.systems.braking.run import run
 
     slow, fast = (
@@ -113,17 +120,17 @@ def made_by_braking(engine: str) -> tuple[int, int]:
 
 
 def rows() -> list[Row]:
-    """Report rows: numbers of arrays that the time loops of bare scenes allocate, which must be none."""
-    braking_arrays, samples = zip(*map(made_by_braking, braking.ENGINES), strict=True)
+    """Report rows: numbers of arrays that the time loops of scenes without effects allocate, which must be 0."""
+    braking_arrays, samples = zip(*map(arrays_added_by_braking, braking.ENGINES), strict=True)
     why = "a short run against a long one, by the count of numba's own memory; no effect is there that could make one"
     counted = {
-        "wheelset": ("360 more steps of a bare wheelset make", made_by_wheelset(0)),
-        "ride": ("360 more steps of a bare ride make in MuJoCo and as copies", made_by_ride()),
-        "handling": ("360 more steps of a bare car make in MuJoCo", made_by_car()),
+        "wheelset": ("360 more steps of a bare wheelset make", arrays_added_by_wheelset(0)),
+        "ride": ("360 more steps of a bare ride make in MuJoCo and as copies", arrays_added_by_ride()),
+        "handling": ("360 more steps of a bare car make in MuJoCo", arrays_added_by_car()),
         "hub-forces": (
             "15 more steps of a bare vehicle driven by its hub forces make in the reference, Exudyn and MuJoCo "
             "together",
-            sum(map(made_by_hubs, hub_forces.ENGINES)),
+            sum(map(arrays_added_by_hubs, hub_forces.ENGINES)),
         ),
         "braking": (
             f"{samples[0]} more samples of a bare braked vehicle make in compiled code of the reference, Exudyn and "

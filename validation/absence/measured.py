@@ -1,4 +1,5 @@
-"""Recordings: a bare scene has one file and holds nothing; what its run is made of, and its answers."""
+"""Scene of a measured recording without effects, for the absence checks: one file, no stabiliser, counts of the run's
+components, its computed channels."""
 
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from models.systems.measured.scene import MeasuredScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
 HUBS = ("fl", "fr", "rl", "rr")
-SAMPLES, SAMPLE_PERIOD = 101, 1e-3
+SAMPLE_COUNT, SAMPLE_PERIOD = 101, 1e-3
 CHANNELS = [
     *({"channel": hub, "quantity": "force", "at": hub, "component": "z", "frame": "inertial"} for hub in HUBS),
     *(
@@ -38,7 +39,7 @@ BARE_SCENE: dict[str, Any] = {
     "files": [FILE],
     "stabilise": {"method": "none", "smoothing": 20.0},
 }
-VIRTUAL = {"duration": SAMPLE_PERIOD * (SAMPLES - 1), "format": "csv"}
+VIRTUAL = {"duration": SAMPLE_PERIOD * (SAMPLE_COUNT - 1), "format": "csv"}
 ON_ROAD: dict[str, Any] = {"files": [], "virtual": VIRTUAL}
 FAULTS: dict[str, Any] = {
     "sensor_noise": {"noise": {"force": 8.0, "moment": 1.0, "angle": 1.75e-3, "angular rate": 5e-3}},
@@ -48,8 +49,9 @@ FAULTS: dict[str, Any] = {
     "offsets": {"bias": {"force": 20.0}},
     "dropouts": {"dropouts": {"rate": 20.0, "length": 5e-3}},
 }
-"""What the effects of transducers put in; of dropouts more than usual, so that a short recording has some."""
-BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+"""Effect of a transducer -> its table of faults in the scene. Dropouts are more frequent than usual, so that a short
+recording has some."""
+HAND_WRITTEN_TABLES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "own_clocks": ({}, {"files": [FILE | {"drift": 1e-4}]}),
     "virtual_measurement": ({}, ON_ROAD),
     **{name: (ON_ROAD, {**ON_ROAD, "virtual": VIRTUAL | {"faults": fault}}) for name, fault in FAULTS.items()},
@@ -57,16 +59,16 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 
 def write(folder: Path) -> None:
-    """Write files of hub forces that carry the vehicle, and of angles of a vehicle that sways."""
-    swing = np.sin(np.linspace(0.0, 3.0, SAMPLES))
+    """Write a recording with hub forces that carry the vehicle's weight and angles of a vehicle that sways."""
+    swing = np.sin(np.linspace(0.0, 3.0, SAMPLE_COUNT))
     forces = dict.fromkeys(HUBS, ("N", 4000.0 + 100.0 * swing))
     angles = {name: (next(iter(units)), 1e-3 * swing) for name, units in COLUMNS_OF_ANGLES.items()}
     write_time_series(folder / "recording.csv", forces | angles, SAMPLE_PERIOD)
 
 
 def counts_and_path(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Numbers of features in the run driven by a recording, as an engine receives it, and the computed channels as
-    bytes."""
+    """Counts of the components of a run on a recording (faulty channels, enforced angles, ...), and the computed
+    channels as bytes."""
     tables, build = list[np.ndarray](), section_run.build
 
     def watched(*settings: Any) -> Any:

@@ -1,8 +1,9 @@
-"""Every system: a scene that names nothing is made of no effect, and each effect adds what its file says and no more.
+"""Checks of every system: a scene without effects runs no code of any effect, and each effect adds to the model the
+counts that its file declares, and no more.
 
-One fresh process runs a bare scene of each system while the files of its effects are not there and what only they
-import cannot be imported; then, with all of it there, the scene with one effect after the other, each a positive
-control; last the bare scene again, which must give the same path to the last bit.
+A fresh process first runs a bare scene (without effects) of each system while the files of the effects, and modules
+that only they import, cannot be imported. Then, with all files present, it runs the scene with each effect in turn, as
+a positive control. Last it runs the bare scene again, which must give the same path to the last bit.
 """
 
 import json
@@ -25,46 +26,47 @@ from validation.common.rows import Observed, Row, System, behaviour_row
 
 SYSTEM: System = "effects"
 BARE_SCENE_FILES = {system: file for system, file in modules_of("validation.absence").items() if system in SYSTEMS}
-"""System -> the file beside this one, of its name, that has its bare scene and counts what a run of a scene is made
-of; found by listing."""
+"""System -> module of this folder that has the system's bare scene (without effects) and counts the components of a
+run."""
 Counts = dict[str, dict[str, int]]
-"""By engine; "all" where every engine agrees."""
+"""Counts of a model's components, by engine and kind of component; the engine "all" stands for every engine."""
 
 
-def file_of(system: str) -> Any:
-    """The module that describes a system's bare scene. It has BARE_SCENE, ENGINES, and counts_and_path(scene, engine),
-    which returns counts and path.
+def absence_module_of(system: str) -> Any:
+    """The module of this folder that has a system's scene without effects. It contains BARE_SCENE, ENGINES, and
+    counts_and_path(scene, engine), which returns counts and path.
 
-    If its scenes read files there is also write(folder), and BY_HAND for effects without usual values: what the bare
-    scene has in place of its own tables without such an effect, and with it.
+    If its scenes read files there is also write(folder). For effects without usual values there is
+    HAND_WRITTEN_TABLES: tables that replace those of the bare scene, once without and once with the effect.
     """
     return import_module(BARE_SCENE_FILES[system])
 
 
-def bare_scene(system: str, **instead: Any) -> Any:
-    """The bare scene of a system. Keyword arguments replace tables of the scene."""
-    table = {**file_of(system).BARE_SCENE, **instead}
+def bare_scene(system: str, **replaced_tables: Any) -> Any:
+    """The scene of a system without effects. Keyword arguments replace tables of the scene."""
+    table = {**absence_module_of(system).BARE_SCENE, **replaced_tables}
     return import_module(SYSTEMS[system].scene).build(table, "bare", Path(_scene_folder(system).name))
 
 
 @cache
 def _scene_folder(system: str) -> tempfile.TemporaryDirectory[str]:
-    """A temporary folder with the files that scenes of a system read; it lasts as long as this process."""
+    """A temporary folder with the files that a system's scenes read; it lasts as long as this process."""
     folder = tempfile.TemporaryDirectory()
-    getattr(file_of(system), "write", lambda folder_path: None)(Path(folder.name))
+    getattr(absence_module_of(system), "write", lambda folder_path: None)(Path(folder.name))
     return folder
 
 
-def by_hand(system: str) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
-    """For each effect without usual values: tables that replace those of the bare scene, once without and once with the
+def hand_written_tables(system: str) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
+    """Effect without usual values -> tables that replace tables of the bare scene, once without and once with the
     effect."""
-    return getattr(file_of(system), "BY_HAND", {})
+    return getattr(absence_module_of(system), "HAND_WRITTEN_TABLES", {})
 
 
 def counts_and_paths(system: str, scene: Any, quick: bool = False) -> dict[str, tuple[dict[str, int], bytes]]:
-    """Counts and path of a scene, by engine: all that do not refuse it, or only the first one if ``quick``. In Exudyn
-    and MuJoCo the largest number of callbacks during the run is counted, too."""
-    file, seen_by_engine = file_of(system), dict[str, tuple[dict[str, int], bytes]]()
+    """Engine -> counts of the model's components and path of a run as bytes, for all engines that accept the scene; if
+    ``quick``, for the first engine alone. In Exudyn and MuJoCo the largest number of callbacks during the run is a
+    count, too."""
+    file, seen_by_engine = absence_module_of(system), dict[str, tuple[dict[str, int], bytes]]()
     for engine in file.ENGINES[:1] if quick else file.ENGINES:
         with suppress(Refused), registered_callbacks(engine) as callbacks:
             counts, path = file.counts_and_path(scene, engine)
@@ -73,34 +75,37 @@ def counts_and_paths(system: str, scene: Any, quick: bool = False) -> dict[str, 
 
 
 def addable_effects(system: str) -> tuple[str, ...]:
-    """Effects that can be added to a bare scene, with their usual values or with tables written by hand."""
+    """Names of the effects that can be added to a system's bare scene, with usual values or with hand-written
+    tables."""
     modules = {name: module_of(system, name) for name in names_of(system)}
     return tuple(
         name
         for name, module in modules.items()
-        if name in by_hand(system) or hasattr(module, "put_in") or "file" not in getattr(module, "EXAMPLE", ("file",))
+        if name in hand_written_tables(system)
+        or hasattr(module, "put_in")
+        or "file" not in getattr(module, "EXAMPLE", ("file",))
     )
 
 
 def scenes_with_and_without(system: str, effect: str) -> tuple[Any, Any]:
     """Two scenes that differ by one effect: the bare scene with only the effects that this effect needs, and the same
-    with the effect."""
-    if effect in by_hand(system):
-        scene_without, scene_with = (bare_scene(system, **tables) for tables in by_hand(system)[effect])
+    scene with this effect added."""
+    if effect in hand_written_tables(system):
+        scene_without, scene_with = (bare_scene(system, **tables) for tables in hand_written_tables(system)[effect])
         return scene_without, scene_with
     needs = module_of(system, effect).NEEDS
     return with_effects(bare_scene(system), *needs), with_effects(bare_scene(system), *needs, effect)
 
 
 def declared_counts(system: str, effect: str, engines: Iterable[str]) -> Counts:
-    """Counts that the effect's file declares, engine by engine."""
+    """Counts of components that an effect adds to a model in each engine, as its file declares them."""
     counts = module_of(system, effect).COUNTS
     return {engine: {**counts.get("all", {}), **counts.get(engine, {})} for engine in engines}
 
 
 def added_counts(system: str, effect: str, quick: bool = False) -> Counts:
-    """Counts that an effect adds, by engine: the difference between the two scenes of ``scenes_with_and_without`` in
-    engines that accept both."""
+    """Counts of components that an effect adds to the model in each engine, measured: counts of the scene with the
+    effect minus counts of the scene without it, in engines that accept both."""
     counts_without, counts_with = (
         _counts_without_effect(system, effect, quick),
         counts_and_paths(system, scenes_with_and_without(system, effect)[1], quick),
@@ -113,16 +118,16 @@ def added_counts(system: str, effect: str, quick: bool = False) -> Counts:
 
 
 def _counts_without_effect(system: str, effect: str, quick: bool) -> Counts:
-    """Counts of the scene without an effect."""
-    if effect in by_hand(system):
-        return _counts_text(system, (), json.dumps(by_hand(system)[effect][0]), quick)
-    return _counts_text(system, module_of(system, effect).NEEDS, "{}", quick)
+    """Engine -> counts of components in the scene without an effect, but with the effects that it needs."""
+    if effect in hand_written_tables(system):
+        return _counts_with_tables(system, (), json.dumps(hand_written_tables(system)[effect][0]), quick)
+    return _counts_with_tables(system, module_of(system, effect).NEEDS, "{}", quick)
 
 
 @cache
-def _counts_text(system: str, needs: tuple[str, ...], tables: str, quick: bool) -> Counts:
-    """Counts, by engine, of a bare scene with some of its tables replaced (``tables``, JSON) and some effects added."""
-    scene = with_effects(bare_scene(system, **json.loads(tables)), *needs)
+def _counts_with_tables(system: str, needed_effects: tuple[str, ...], tables_json: str, quick: bool) -> Counts:
+    """Engine -> counts of components in a bare scene with some of its tables replaced and some effects added."""
+    scene = with_effects(bare_scene(system, **json.loads(tables_json)), *needed_effects)
     return {engine: counts for engine, (counts, _) in counts_and_paths(system, scene, quick).items()}
 
 
@@ -130,30 +135,30 @@ def _count_increases(counts_before: dict[str, int], counts_after: dict[str, int]
     return {key: n - counts_before[key] for key, n in counts_after.items() if n != counts_before[key]}
 
 
-def probed_facts(systems: tuple[str, ...] = tuple(BARE_SCENE_FILES)) -> dict[str, Any]:
-    """Facts for the report, to be gathered in a fresh process: modules that bare scenes and effects import, counts that
-    effects add, and whether an effect's removal keeps the path."""
+def absence_facts(systems: tuple[str, ...] = tuple(BARE_SCENE_FILES)) -> dict[str, Any]:
+    """Facts on the absence of effects, for the report; to be called in a fresh process. They are the modules that bare
+    scenes and effects import, the counts that effects add, and whether removing the effects' files keeps the path."""
     modules_of = {
         system: sorted({module for effect_modules in _modules_of_effects(system).values() for module in effect_modules})
         for system in systems
     }
     for system in systems:
-        if file_of(system).ENGINES[0] == "reference":
+        if absence_module_of(system).ENGINES[0] == "reference":
             with _without_modules(system, modules_of[system]):
                 counts_and_paths(system, bare_scene(system), quick=True)
     engines, bares = _loaded_modules(["exudyn", "mujoco"]), dict[str, Any]()
     for system in systems:  # all of them before any effect, as two systems may have a module in common
         with _without_modules(system, modules_of[system]):
             bares[system] = counts_and_paths(system, bare_scene(system)), _loaded_modules(modules_of[system])
-    return {"engines": engines, "systems": {system: _probed_in_process(system, *bares[system]) for system in systems}}
+    return {"engines": engines, "systems": {system: _effect_facts(system, *bares[system]) for system in systems}}
 
 
 def _modules_of_effects(system: str) -> dict[str, tuple[str, ...]]:
     return {name: module_of(system, name).MODULES for name in names_of(system)}
 
 
-def _probed_in_process(
-    system: str, first: dict[str, tuple[dict[str, int], bytes]], imported: list[str]
+def _effect_facts(
+    system: str, first_runs: dict[str, tuple[dict[str, int], bytes]], imported_modules: list[str]
 ) -> dict[str, Any]:
     modules = _modules_of_effects(system)
     adds, missing = dict[str, Counts](), []
@@ -161,13 +166,13 @@ def _probed_in_process(
         adds[name] = added_counts(system, name)
         missing += [module for module in modules[name] if not _loaded_modules([module])]
     repeated = counts_and_paths(system, bare_scene(system))
-    callbacks = {engine: counts["callbacks"] for engine, (counts, _) in first.items() if engine != "reference"}
+    callbacks = {engine: counts["callbacks"] for engine, (counts, _) in first_runs.items() if engine != "reference"}
     return {
-        "imported": imported,
+        "imported": imported_modules,
         "missing": missing,
         "adds": adds,
         "callbacks": callbacks,
-        "same": all(first[e][1] == repeated[e][1] for e in first),
+        "same": all(first_runs[e][1] == repeated[e][1] for e in first_runs),
     }
 
 
@@ -193,16 +198,16 @@ def _loaded_modules(modules: list[str]) -> list[str]:
 
 
 @cache
-def measured_counts() -> dict[str, Any]:
-    """The facts of ``probed_facts``, computed in a process of their own."""
-    code = "import json; from validation.absence.of_systems import probed_facts; print(json.dumps(probed_facts()))"
+def absence_facts_of_fresh_process() -> dict[str, Any]:
+    """The result of ``absence_facts``, computed in a fresh process."""
+    code = "import json; from validation.absence.of_systems import absence_facts; print(json.dumps(absence_facts()))"
     completed_process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return dict(json.loads(completed_process.stdout.splitlines()[-1]))
 
 
 def rows(quick: bool) -> list[Row]:
-    """Report rows: absence of every effect of every system, and a positive control of each; quick: every third effect,
-    in one engine."""
+    """Report rows: no effect leaves a trace in a scene that does not name it, and a positive control of each effect.
+    If ``quick``, the positive control of every third effect, in one engine."""
     if quick:
         return [
             row
@@ -211,7 +216,7 @@ def rows(quick: bool) -> list[Row]:
                 system, {name: added_counts(system, name, quick) for name in addable_effects(system)[::3]}
             )
         ]
-    seen_there = measured_counts()
+    seen_there = absence_facts_of_fresh_process()
     present = [
         row for system, probe in seen_there["systems"].items() for row in _added_count_rows(system, probe["adds"])
     ]
@@ -225,25 +230,25 @@ def rows(quick: bool) -> list[Row]:
     return [
         *present,
         engines,
-        *(row for system, probe in seen_there["systems"].items() for row in _absent_modules(system, probe)),
+        *(row for system, probe in seen_there["systems"].items() for row in _absence_rows(system, probe)),
     ]
 
 
-def _absent_modules(system: str, seen_there: dict[str, Any]) -> list[Row]:
+def _absence_rows(system: str, facts: dict[str, Any]) -> list[Row]:
     why = "in a fresh process in which none of them could have been imported, nor any effect's file read"
     return [
         Observed(
             f"absent.{system}.modules",
             SYSTEM,
             f"{system}: modules of effects that a bare scene imports, and those that no effect imports",
-            len(seen_there["imported"]) + len(seen_there["missing"]),
+            len(facts["imported"]) + len(facts["missing"]),
             "",
         ).at_most(0, why, "none"),
         behaviour_row(
             f"absent.{system}.bits",
             SYSTEM,
             f"{system}: a bare scene takes the same path without the files of effects and after all effects ran",
-            "the same" if seen_there["same"] else "not the same",
+            "the same" if facts["same"] else "not the same",
             "the same",
             "to the last bit, in every implementation",
         ),
@@ -260,28 +265,29 @@ def _absent_modules(system: str, seen_there: dict[str, Any]) -> list[Row]:
                 "the system that marches, or in the engine's globals; no effect adds any but what its file says",
                 "none",
             )
-            for engine, count in seen_there["callbacks"].items()
+            for engine, count in facts["callbacks"].items()
         ),
     ]
 
 
 def _added_count_rows(system: str, added_counts: dict[str, Counts]) -> list[Row]:
-    """A row for each effect on the counts that it adds."""
+    """Report rows, one for each effect: the counts that it adds to a model against the counts that its file
+    declares."""
     return [
         behaviour_row(
             f"absent.{system}.adds.{name}",
             SYSTEM,
             f"{system}: counts that the effect {name} adds to a bare scene",
-            _text(counts),
-            _text(declared_counts(system, name, counts)),
+            _counts_text(counts),
+            _counts_text(declared_counts(system, name, counts)),
             "positive control: what its file says, and no more",
         )
         for name, counts in added_counts.items()
     ]
 
 
-def _text(counts_by_engine: Counts) -> str:
-    """Text of the counts by engine; a single text where all engines have the same counts."""
+def _counts_text(counts_by_engine: Counts) -> str:
+    """Text of the counts of each engine, such as "exudyn +1 callbacks"; without engines where all counts agree."""
     count_texts = {
         engine: ", ".join(f"{n:+d} {key}" for key, n in sorted(counted.items()))
         for engine, counted in counts_by_engine.items()

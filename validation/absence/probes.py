@@ -1,7 +1,7 @@
-"""Traces that an effect leaves behind where a scene does not name it: looked for, counted, never assumed.
+"""Counters of what an effect may leave in a run whose scene does not name it: modules, kernels, callbacks, memory.
 
-Everything here observes a run from outside: the modules of a fresh process, Exudyn's own items, MuJoCo's
-global callbacks, the Python frames that are entered while an engine marches, the memory it takes.
+Everything here observes a run from outside: the modules of a fresh process, Exudyn's items, MuJoCo's global callbacks,
+the Python frames that are entered while an engine integrates over time, and the memory that it takes.
 """
 
 import json
@@ -35,11 +35,12 @@ print(json.dumps({
     "derivatives": [list(key) for key in reference._SINGLE],
 }))
 """
-"""Runs a scene in all engines in a process of its own and says what it imported, compiled and found."""
+"""Script that runs a scene in all engines in a fresh process and prints the modules imported, the kernels compiled and
+the states computed, as JSON."""
 
 
 def probe(table: Mapping[str, Any], folder: str = ".", **options: Any) -> dict[str, Any]:
-    """Modules imported, kernels compiled and states (as hexadecimal bytes) after a scene was run in a fresh process."""
+    """Modules imported, kernels compiled and states (hexadecimal bytes) after a scene was run in a fresh process."""
     command = [sys.executable, "-c", PROBE_SCRIPT, json.dumps(table), folder]
     completed_process = subprocess.run(command, capture_output=True, text=True, check=True, **options)
     return json.loads(completed_process.stdout.splitlines()[-1])
@@ -84,23 +85,27 @@ def installed_callbacks() -> int:
     return sum(getattr(mujoco, f"get_mjcb_{name}")() is not None for name in CALLBACK_NAMES)
 
 
-def march(engine: str, model: Model) -> MarchCounts:
-    """Run a model once and count what its engine's march uses; the guard and the making of results are not counted."""
+def counted_march(engine: str, model: Model) -> MarchCounts:
+    """Run a model once and return the Python frames, memory and callbacks that its engine used while it integrated over
+    time. Checks of the path and the making of results are not counted."""
     march_counts = MarchCounts()
-    with _watched_entry(engine, march_counts):
+    with _probes_around_march(engine, march_counts):
         model.run()
     return march_counts
 
 
-def leanest_march(engine: str, make_model: Callable[[], Model], runs: int = 3) -> MarchCounts:
-    """The march with the least memory among several runs. Memory that the time loop needs occurs in every run, so that
-    it is in the least, too."""
-    return min((march(engine, make_model()) for _ in range(runs)), key=lambda march_counts: march_counts.peak_bytes)
+def march_with_least_memory(engine: str, make_model: Callable[[], Model], run_count: int = 3) -> MarchCounts:
+    """Counts of the run with the least memory among several runs. Memory that the time loop itself allocates occurs in
+    every run, so that the least includes it."""
+    return min(
+        (counted_march(engine, make_model()) for _ in range(run_count)),
+        key=lambda march_counts: march_counts.peak_bytes,
+    )
 
 
 @contextmanager
-def _watched_entry(engine: str, march_counts: MarchCounts) -> Iterator[None]:
-    """Put a watch around the one function in which an engine spends its time."""
+def _probes_around_march(engine: str, march_counts: MarchCounts) -> Iterator[None]:
+    """Context in which the function that an engine integrates with counts frames, memory and callbacks."""
     if engine == "reference":
         from models.engines import reference
 
@@ -121,7 +126,8 @@ def _watched_entry(engine: str, march_counts: MarchCounts) -> Iterator[None]:
 
 
 def _with_probes(function: Callable[..., Any], march_counts: MarchCounts) -> Callable[..., Any]:
-    """The function, with frames, memory and callbacks added to ``march_counts``."""
+    """Returns the function with counting added: each call adds its Python frames, memory and callbacks to
+    ``march_counts``."""
 
     def call(*args: Any, **options: Any) -> Any:
         march_counts.callbacks = max(march_counts.callbacks, installed_callbacks())
@@ -144,7 +150,7 @@ def _count_frame(march_counts: MarchCounts, event: str) -> None:
 
 
 def _returned_bytes(result: Any, filled_arrays: Sequence[Any]) -> int:
-    """Bytes of the arrays that a march returned, except for those that it received as arguments and filled."""
+    """Bytes of the arrays that an engine's run returned, without arrays that it received as arguments and filled."""
     parts = result if isinstance(result, tuple) else (result,)
     arrays = [value for value in parts if isinstance(value, np.ndarray)]
     filled = [array for array in filled_arrays if isinstance(array, np.ndarray)]
@@ -154,9 +160,9 @@ def _returned_bytes(result: Any, filled_arrays: Sequence[Any]) -> int:
 
 
 def user_functions(model: Any) -> int:
-    """Number of user functions of an Exudyn model, counted over all items of its system and its own.
+    """Number of Python user functions in an Exudyn model, counted over all items of its system and the system itself.
 
-    It takes the model and not the system, which is empty without a word once its container is gone.
+    The argument is the model and not the system, as a system is silently empty once its container is deleted.
     """
     return _user_functions(model.built.mbs)
 
@@ -179,43 +185,43 @@ def _user_functions(mbs: Any) -> int:
 
 @contextmanager
 def registered_callbacks(engine: str) -> Iterator[list[int]]:
-    """Context in which callbacks are counted: for every Exudyn system that is marched, or whenever a MuJoCo callback is
-    set or cleared. It yields the list of counts."""
-    functions, patches = list[int](), list[Any]()
+    """Context that yields a list of numbers of callbacks: one number for every Exudyn system that is integrated, or for
+    every time that a MuJoCo callback is set or cleared."""
+    counts, patches = list[int](), list[Any]()
     if engine == "mujoco":
         import mujoco
 
         patches = [
-            mock.patch.object(mujoco, name, _counting_setter(getattr(mujoco, name), functions))
+            mock.patch.object(mujoco, name, _counting_setter(getattr(mujoco, name), counts))
             for name in (f"set_mjcb_{callback}" for callback in CALLBACK_NAMES)
         ]
     elif engine == "exudyn":
         import exudyn as exu
 
         patches = [
-            mock.patch.object(exu.MainSystem, "SolveDynamic", _counting_march(exu.MainSystem.SolveDynamic, functions))
+            mock.patch.object(exu.MainSystem, "SolveDynamic", _counting_march(exu.MainSystem.SolveDynamic, counts))
         ]
     with ExitStack() as stack:
         for patch in patches:
             stack.enter_context(patch)
-        yield functions
+        yield counts
 
 
-def _counting_setter(function: Callable[..., Any], functions: list[int]) -> Callable[..., Any]:
-    def call(law: Any) -> None:
-        function(law)
-        functions.append(installed_callbacks())
+def _counting_setter(setter: Callable[..., Any], callback_counts: list[int]) -> Callable[..., Any]:
+    def call(callback: Any) -> None:
+        setter(callback)
+        callback_counts.append(installed_callbacks())
 
     return call
 
 
-def _counting_march(function: Callable[..., Any], functions: list[int]) -> Callable[..., Any]:
+def _counting_march(solve: Callable[..., Any], function_counts: list[int]) -> Callable[..., Any]:
     systems_seen = dict[int, Any]()
 
     def call(mbs: Any, *args: Any, **options: Any) -> Any:
         if id(mbs) not in systems_seen:  # which keeps it, so that no other one has its number
             systems_seen[id(mbs)] = mbs
-            functions.append(_user_functions(mbs))
-        return function(mbs, *args, **options)
+            function_counts.append(_user_functions(mbs))
+        return solve(mbs, *args, **options)
 
     return call

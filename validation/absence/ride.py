@@ -1,6 +1,7 @@
-"""Ride: what a scene and its vehicle do not name is not imported, has no state and no callback.
+"""Absence checks of the ride scene: an effect that the scene and its vehicle do not name is not imported and adds no
+state and no callback.
 
-Positive controls stand beside: what is named changes the counts by what it says.
+Positive controls stand beside: an effect in the scene changes the counts as its file declares.
 """
 
 import json
@@ -46,7 +47,7 @@ FOREIGN_MODULES = (
     "models.ride.monte_carlo",
     "models.ride.frequency",
 )
-"""What a linear ride of the reference at constant speeds does without."""
+"""Modules that a linear ride of the reference at constant speeds must not import."""
 
 WEIGHTED_OUTPUTS = (("body centre", "Wk"), ("left occupant", "Wd"))
 ENGINES = ("reference",)
@@ -59,7 +60,7 @@ BARE_SCENE: dict[str, Any] = {
     "speeds": {"values": [SPEED]},
 }
 ONE_TRACK: dict[str, Any] = {"left_right": "equal", "front_rear": "equal"}
-BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+HAND_WRITTEN_TABLES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "curves": (
         {"vehicle": {"file": "quarter_car_nonlinear", "small_motion": True}},
         {"vehicle": {"file": "quarter_car_nonlinear"}},
@@ -79,8 +80,8 @@ def write(folder: Path) -> None:
 
 
 def counts_and_path(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Numbers of features of the linear system that a scene leads to, and the standard deviations of its outputs as
-    bytes."""
+    """Counts of the components of a ride scene's vehicle and road (states, delays, nonlinear springs, ...), and the
+    standard deviations of its outputs as bytes."""
     vehicle = of_scene.vehicle_of(scene)
     with mock.patch.object(of_scene, "fitted_road", wraps=of_scene.fitted_road) as fitted:
         road = of_scene.excitation_of(scene, wheels(vehicle))
@@ -132,16 +133,17 @@ def imported_modules(engine: str) -> list[str]:
     ]
 
 
-def states(filters: dict[str, str]) -> int:
-    """Number of states of the vehicle R19-ride with two road filters and with weightings."""
+def state_count(weightings: dict[str, str]) -> int:
+    """Number of states of the linear system of the vehicle R19-ride with its road filters and the weighting filters
+    (output -> weighting)."""
     vehicle = _linear_vehicle("r19_ride")
-    return len(system_with_weightings(vehicle_with_road(vehicle, paper_road(vehicle.wheels), SPEEDS[0]), filters).A)
+    return len(system_with_weightings(vehicle_with_road(vehicle, paper_road(vehicle.wheels), SPEEDS[0]), weightings).A)
 
 
-def count_of_linearisations(name: str) -> int:
-    """Number of linear vehicles that a sweep over SPEEDS needs."""
+def count_of_linearisations(vehicle_name: str) -> int:
+    """How often a sweep over SPEEDS linearises a vehicle."""
     with mock.patch.object(of_scene, "linearise", wraps=linearise) as watched_linearise:
-        linear = of_scene.linear_vehicle(load_vehicle(name))
+        linear = of_scene.linear_vehicle(load_vehicle(vehicle_name))
         for speed in SPEEDS:
             linear(speed)
     return watched_linearise.call_count
@@ -156,12 +158,12 @@ def count_of_noisy_outputs(damping: float) -> int:
     return sum(any(d[i].any() for d in system.D) for i in range(len(system.C)))
 
 
-def curve_and_callback_counts(name: str) -> dict[str, tuple[int, int]]:
-    """Numbers of curves and of callbacks of a vehicle in both engines; Exudyn's are counted over the items of its
-    system."""
+def curve_and_callback_counts(vehicle_name: str) -> dict[str, tuple[int, int]]:
+    """Engine -> numbers of spring curves and of callbacks in its model of a vehicle. Callbacks of Exudyn are counted
+    over the items of its system."""
     counts = {}
     for engine in ("exudyn", "mujoco"):
-        model = build(engine, load_vehicle(name))
+        model = build(engine, load_vehicle(vehicle_name))
         plan = model.plan()
         counted = user_functions(model) if engine == "exudyn" else plan["callbacks"]
         counts[engine] = (plan["curves"], counted)
@@ -174,7 +176,8 @@ def _linear_vehicle(name: str) -> LinearVehicle:
 
 
 def rows(quick: bool = False) -> list[Row]:
-    """Report rows on all counts, each next to a positive control. quick: without the imports of a fresh process."""
+    """Report rows: modules, states, linearisations, callbacks and noise inputs of rides without effects, each next to a
+    positive control. If ``quick``, without the modules, which need a fresh process."""
     names = ("quarter_car", "quarter_car_nonlinear")
     bare, curved = (curve_and_callback_counts(name) for name in names)
     why = "counted from outside, in the modules of a fresh process, in the engine's items, in the system's size"
@@ -186,7 +189,7 @@ def rows(quick: bool = False) -> list[Row]:
             "absent.ride.states",
             SYSTEM,
             "number of states of R19-ride alone, with the filter Wk, and with Wk and Wd",
-            ", ".join(str(states(dict(WEIGHTED_OUTPUTS[:count]))) for count in range(3)),
+            ", ".join(str(state_count(dict(WEIGHTED_OUTPUTS[:count]))) for count in range(3)),
             "42, 50, 56",
             "twice 19 freedoms, two filters at each of two axles; Wk has 8 states, Wd 6",
         ),

@@ -1,8 +1,9 @@
-"""A wheelset: what its scene does not name is not read, has no element and no callback.
+"""Absence checks of the wheelset: an effect that its scene does not name reads no parameter and adds no element and no
+callback to an engine.
 
-Positive controls stand beside: what is named changes the counts by what it says. The creep law is chosen at run time,
-by one comparison per call: FASTSIM is compiled, or loaded from disk, with the kernel that both laws share, but with the
-linear law it is never called and none of its numbers is read.
+Positive controls stand beside: an effect in the scene changes the counts as its file declares. The creep law is chosen
+at run time, by one comparison per call: FASTSIM is compiled, or loaded from disk, with the kernel that both laws share,
+but with the linear law it is never called and none of its parameters is read.
 """
 
 from typing import Any, cast
@@ -29,11 +30,12 @@ BARE_SCENE: dict[str, Any] = {
     "wheelset": {"override": {**FREE_WHEELSET, "flange_stiffness": 0.0, "contact_damping": 0.0}},
     "run": {"duration": 0.01, "step": 5e-4, "displacement": 1e-3, "speeds": [SPEED]},
 }
-"""A free wheelset on cones without flanges."""
+"""Scene of a wheelset without effects: conical wheels without flanges, no suspension, linear creep law."""
 
 
 def counts_and_path(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Numbers of features of a wheelset, in its parameters and in an engine's model, and the path as bytes."""
+    """Counts of the components of a wheelset's model (springs, flanges, creep grids, ...), and the states of a run as
+    bytes."""
     from models.systems.wheelset.of_scene import equations_of
     from models.systems.wheelset.run import run
 
@@ -41,7 +43,7 @@ def counts_and_path(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], 
     body, rails = equations.body, equations.rails
     wheels, profiles = rails.wheels[0], rails.profile.nodes.size > 0  # profiles have flanges of their own
     counts = {
-        "springs": sum(stiffness > 0.0 for stiffness in body.stiffness),
+        "spring_counts": sum(stiffness > 0.0 for stiffness in body.stiffness),
         "dampers": sum(damping > 0.0 for damping in body.damping),
         "creep nets": int(rails.law == forces.FASTSIM),
         "flanges": int(wheels.flange > 0.0 and not profiles),
@@ -49,15 +51,15 @@ def counts_and_path(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], 
         "profiles": int(profiles),
     }
     if engine != "reference":
-        exudyn, mujoco = springs(equations.wheelset)
+        exudyn, mujoco = spring_counts(equations.wheelset)
         counts |= {"spring-dampers": exudyn} if engine == "exudyn" else {"actuators": mujoco}
     return counts, run(scene, engine, SPEED).detail.states.tobytes()
 
 
-def without_net(law: Any) -> str:
-    """Returns "the same" if the wheelset's rates do not change by a bit when FASTSIM's grid is filled with NaN, else
+def rates_with_nan_grid(creep_law: Any) -> str:
+    """Returns "the same" if filling FASTSIM's grid with NaN does not change a bit of the wheelset's state rates, else
     "no numbers"."""
-    equations = Equations(CHOSEN_WHEELSET, SPEED, law, 11)
+    equations = Equations(CHOSEN_WHEELSET, SPEED, creep_law, 11)
     state, (speed, body, _), rails = equations.displaced_state(LATERAL_SHIFT), equations.parameters, equations.rails
     rails = rails._replace(strips=np.full_like(rails.strips, np.nan), cells=np.full_like(rails.cells, np.nan))
     rates = np.empty(eq.STATE_COUNT)
@@ -65,8 +67,8 @@ def without_net(law: Any) -> str:
     return "the same" if rates.tobytes() == equations.rates(state).tobytes() else "no numbers"
 
 
-def springs(wheelset: Wheelset) -> tuple[int, int]:
-    """Numbers of spring-dampers in Exudyn's system and of actuators in MuJoCo's model."""
+def spring_counts(wheelset: Wheelset) -> tuple[int, int]:
+    """Number of spring-dampers in Exudyn's model of a wheelset, and number of actuators in MuJoCo's model."""
     from models.engines.wheelset import ExudynWheelset, MujocoWheelset
 
     exudyn, mujoco = (cast(Any, engine(wheelset, SPEED).model) for engine in (ExudynWheelset, MujocoWheelset))
@@ -76,14 +78,17 @@ def springs(wheelset: Wheelset) -> tuple[int, int]:
 
 
 def rows() -> list[Row]:
-    """Report rows on all counts, each next to a positive control."""
-    counts = [", ".join(map(str, springs(wheelset))) for wheelset in (CHOSEN_WHEELSET, free_wheelset(CHOSEN_WHEELSET))]
+    """Report rows: a wheelset without FASTSIM reads no FASTSIM grid, and one without suspension has no suspension
+    elements. Each stands next to a positive control."""
+    counts = [
+        ", ".join(map(str, spring_counts(wheelset))) for wheelset in (CHOSEN_WHEELSET, free_wheelset(CHOSEN_WHEELSET))
+    ]
     return [
         behaviour_row(
             "absent.wheelset.fastsim",
             SYSTEM,
             "rates of a wheelset while FASTSIM's net holds no numbers, with the linear law and with FASTSIM",
-            ", ".join(without_net(law) for law in ("linear", "fastsim")),
+            ", ".join(rates_with_nan_grid(law) for law in ("linear", "fastsim")),
             "the same, no numbers",
             "what is not read cannot spoil anything",
         ),

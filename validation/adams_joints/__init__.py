@@ -1,1 +1,1 @@
-"""Joints and springs of another multibody code: its model files read, built on the common description, compared."""
+"""Comparison with Adams/Solver: its model files of single bodies on joints are read, built for the engines and run."""

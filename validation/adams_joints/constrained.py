@@ -1,4 +1,4 @@
-"""The plain reference: a free body with constraints, whose multipliers are the forces of the joint.
+"""Independent reference: a free rigid body with joint constraints, whose Lagrange multipliers are the joint's forces.
 
 Newton's and Euler's equations of six freedoms, with the second derivative of each constraint as a further row. Nothing
 is shared with the trees of joints that the engines build: no joint coordinates, and reactions come from multipliers
@@ -11,26 +11,27 @@ from scipy.spatial.transform import Rotation
 from models.core.errors import InputError
 from models.core.runge_kutta import step_on
 from validation.adams_joints.mechanism import Mechanism
-from validation.adams_joints.motion import BodyMotion, Reaction, about_marker
+from validation.adams_joints.motion import BodyMotion, Reaction, reaction_about_marker
 
 POSITION, QUATERNION, VELOCITY, ANGULAR_VELOCITY, ANGLE = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), 13
-"""Of a state (14,): centre, quaternion (scalar last), velocity, angular velocity, angle about the joint's axis."""
+"""Positions in a state (14,): centre, quaternion (scalar last), velocity, angular velocity, angle about the joint's
+axis."""
 START_VELOCITY_TOLERANCE = 1e-9
-"""m/s, rad/s: start velocities that no joint allows."""
+"""Largest start velocity (m/s, rad/s) against the joint's constraints."""
 
 
 class ConstrainedBody:
-    """The equations of one mechanism."""
+    """Equations of motion of a rigid body on a joint, with constraints and multipliers."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
-        self.arm = mechanism.body.place - mechanism.centre
+        self.arm = mechanism.body.position - mechanism.centre
         self.joint_axes = mechanism.ground.axes.T
 
     def start(self) -> np.ndarray:
-        """State (14,) at the start; InputError where the joint does not allow its velocity."""
+        """State (14,) at the start. Raises InputError where the joint does not allow the start velocity."""
         m = self.mechanism
-        state = np.concatenate([m.centre, [0.0, 0.0, 0.0, 1.0], m.velocity, m.turning, [0.0]])
+        state = np.concatenate([m.centre, [0.0, 0.0, 0.0, 1.0], m.velocity, m.angular_velocity, [0.0]])
         rows, _ = self._constraints(state)
         speed = rows @ state[7:13]
         if speed.size and np.abs(speed).max() > START_VELOCITY_TOLERANCE:
@@ -38,7 +39,7 @@ class ConstrainedBody:
         return state
 
     def rates(self, state: np.ndarray) -> np.ndarray:
-        """Rates (14,) of a state."""
+        """Time derivatives (14,) of a state."""
         quaternion, turning = state[QUATERNION], state[ANGULAR_VELOCITY]
         x, y, z, w = quaternion
         product = np.array(  # of the angular velocity and the quaternion
@@ -54,8 +55,8 @@ class ConstrainedBody:
         return np.concatenate([state[VELOCITY], 0.5 * product, accelerations, [axis_rate]])
 
     def accelerations_and_reaction(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Linear and angular accelerations (6,) of the body's centre, and the joint's force and moment (6,) about the
-        centre."""
+        """Linear and angular accelerations (6,) of the body, and the joint's force and moment (6,) on the body about
+        its centre."""
         m, rotation = self.mechanism, _rotation_matrix(state[QUATERNION])
         inertia = rotation @ m.inertia @ rotation.T
         turning = state[ANGULAR_VELOCITY]
@@ -74,13 +75,13 @@ class ConstrainedBody:
         """Force and moment (6,) of all springs on the body about its centre."""
         wrench, rotation = np.zeros(6), _rotation_matrix(state[QUATERNION])
         for spring in self.mechanism.springs:
-            if spring.turns:
+            if spring.is_rotational:
                 law = spring.stiffness * (state[ANGLE] - spring.free_length)
                 law += spring.damping * (self.joint_axes[2] @ state[ANGULAR_VELOCITY])
                 wrench[3:] -= law * self.joint_axes[2]
                 continue
-            arm = rotation @ (spring.body - self.mechanism.centre)
-            offset = state[POSITION] + arm - spring.ground
+            arm = rotation @ (spring.body_point - self.mechanism.centre)
+            offset = state[POSITION] + arm - spring.ground_point
             length = np.linalg.norm(offset)
             if length > 0.0:
                 direction = offset / length
@@ -112,24 +113,27 @@ class ConstrainedBody:
             swing = -axes[2] @ _vector_product(turning, _vector_product(turning, on_body))
             return np.vstack([point, row]), np.append(bent, swing)
         if kind == "distance":
-            offset = state[POSITION] + arm - self.mechanism.ground.place
+            offset = state[POSITION] + arm - self.mechanism.ground.position
             speed = state[VELOCITY] + _vector_product(turning, arm)
             return (offset @ point)[None], np.array([offset @ bent - speed @ speed])
         return np.empty((0, 6)), np.empty(0)
 
-    def at_motion(self, motion: BodyMotion, row: int) -> np.ndarray:
-        """State (14,) of the body at a row of a motion; the angle about the joint's axis is zero there."""
-        quaternion = Rotation.from_matrix(motion.turned[row]).as_quat()
-        return np.concatenate([motion.place[row], quaternion, motion.velocity[row], motion.turning[row], [0.0]])
+    def state_at_row(self, motion: BodyMotion, row: int) -> np.ndarray:
+        """State (14,) of the body at a row of a recorded motion, with the angle about the joint's axis set to zero."""
+        quaternion = Rotation.from_matrix(motion.rotation[row]).as_quat()
+        return np.concatenate(
+            [motion.position[row], quaternion, motion.velocity[row], motion.angular_velocity[row], [0.0]]
+        )
 
-    def marched(self, state: np.ndarray, steps: int, step: float) -> np.ndarray:
-        """State after ``steps`` steps of length ``step`` (s)."""
-        for _ in range(steps):
+    def state_after(self, state: np.ndarray, step_count: int, step: float) -> np.ndarray:
+        """State (14,) after ``step_count`` Runge-Kutta steps of length ``step`` (s)."""
+        for _ in range(step_count):
             state = self._after_step(state, step)
         return state
 
     def run(self, duration: float, step: float, stride: int) -> tuple[BodyMotion, Reaction]:
-        """Motion and reaction by the classical Runge-Kutta method, at every ``stride``-th step."""
+        """Motion of the body and reaction of the joint by the classical Runge-Kutta method, recorded at every
+        ``stride``-th step (s)."""
         state, states_kept = self.start(), list[np.ndarray]()
         for k in range(round(duration / step) + 1):
             if k % stride == 0:
@@ -155,7 +159,7 @@ class ConstrainedBody:
             states[:, ANGULAR_VELOCITY],
             accelerations[:, 3:],
         )
-        return motion, about_marker(self.mechanism, motion, wrenches[:, :3], wrenches[:, 3:])
+        return motion, reaction_about_marker(self.mechanism, motion, wrenches[:, :3], wrenches[:, 3:])
 
 
 def _vector_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -165,13 +169,13 @@ def _vector_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _skew_matrix(vector: np.ndarray) -> np.ndarray:
-    """Matrix of the vector product from the left."""
+    """Skew-symmetric matrix (3, 3) that forms the vector product of ``vector`` with another vector."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _rotation_matrix(quaternion: np.ndarray) -> np.ndarray:
-    """Rotation (3, 3) of a quaternion, scalar last; it is scaled to 1 here."""
+    """Rotation matrix (3, 3) of a quaternion (scalar last), which is normalised first."""
     x, y, z, w = quaternion / np.sqrt(quaternion @ quaternion)
     skew_part = _skew_matrix(np.array([x, y, z]))
     return np.eye(3) + 2.0 * (w * skew_part + skew_part @ skew_part)

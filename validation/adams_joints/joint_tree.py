@@ -21,27 +21,30 @@ from validation.adams_joints.motion import BodyMotion, Reaction, reaction_by_mom
 from validation.adams_joints.spring_kernel import set_spring_forces, spring_forces, spring_table
 
 LEAST_COSINE = 0.05
-"""Least cosine of the second of three hinges on the whole path."""
+"""Least cosine of the second hinge's angle, of three hinges in a row, anywhere on the path."""
 START_VELOCITY_TOLERANCE = 1e-9
-"""m/s, rad/s: start velocities that the joint does not allow."""
+"""Largest start velocity (m/s, rad/s) that the joint does not allow."""
 BODY_NAME = "body"
 
 
 @dataclass(frozen=True, eq=False)
 class JointTree:
-    """A mechanism's chain of joints. axes (3, 3): the vehicle's axes as columns, in the ground's axes."""
+    """A mechanism as a chain of slides and hinges. axes (3, 3): the vehicle's axes as columns, in the ground's axes."""
 
     mechanism: Mechanism
     axes: np.ndarray
 
-    def local(self, vector: np.ndarray) -> np.ndarray:
-        """A vector of the ground's axes in the vehicle's."""
+    def to_vehicle_axes(self, vector: np.ndarray) -> np.ndarray:
+        """Components in the vehicle's axes of a vector (3,) given in the ground's axes."""
         return self.axes.T @ vector
 
     def vehicle(self) -> SpatialVehicle:
-        """Joints as massless bodies, then the body at its centre."""
+        """Vehicle description of the mechanism: its joints as massless bodies, then the body at its centre."""
         m = self.mechanism
-        ground, end = _vector_of(self.local(m.ground.place)), _vector_of(self.local(m.body.place))
+        ground, end = (
+            _vector_of(self.to_vehicle_axes(m.ground.position)),
+            _vector_of(self.to_vehicle_axes(m.body.position)),
+        )
         joint_bodies = {
             "revolute": [Body("joint", 0.0, end, ("rz",))],
             "prismatic": [Body("joint", 0.0, end, ("z",))],
@@ -52,28 +55,40 @@ class JointTree:
                 Body("rod", 0.0, ground, ("rx", "ry")),
                 Body("joint", 0.0, end, ("rx", "ry", "rz"), parent="rod"),
             ],
-            "free": [Body("joint", 0.0, _vector_of(self.local(m.centre)), FREEDOMS)],
+            "free": [Body("joint", 0.0, _vector_of(self.to_vehicle_axes(m.centre)), FREEDOMS)],
         }[m.kind]
         inertia = self.axes.T @ m.inertia @ self.axes
         rows = tuple(_vector_of(row) for row in 0.5 * (inertia + inertia.T))
         body = Body(
-            BODY_NAME, m.mass, _vector_of(self.local(m.centre)), (), (rows[0], rows[1], rows[2]), joint_bodies[-1].name
+            BODY_NAME,
+            m.mass,
+            _vector_of(self.to_vehicle_axes(m.centre)),
+            (),
+            (rows[0], rows[1], rows[2]),
+            joint_bodies[-1].name,
         )
         return SpatialVehicle("mechanism", (*joint_bodies, body), (), (), ())
 
-    def driven(self) -> Driven:
-        """The vehicle as the engines build it, with its springs as compiled forces."""
+    def vehicle_with_springs(self) -> Driven:
+        """The vehicle description for the engines, with the springs as compiled forces."""
         vehicle = self.vehicle()
         springs = [
-            replace(spring, ground=self.local(spring.ground), body=self.local(spring.body))
+            replace(
+                spring,
+                ground_point=self.to_vehicle_axes(spring.ground_point),
+                body_point=self.to_vehicle_axes(spring.body_point),
+            )
             for spring in self.mechanism.springs
         ]
-        gravity = self.local(self.mechanism.gravity)
+        gravity = self.to_vehicle_axes(self.mechanism.gravity)
         return Driven(vehicle, gravity, spring_table(vehicle, springs), spring_forces, set_spring_forces)
 
     def motion(self, motion_times: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> BodyMotion:
-        """The body by coordinates, rates and accelerations (m, n) of the joints, in the axes of the ground."""
-        position, velocity, acceleration, rotation, turning, spin_up = _motion_of_last_body(self.vehicle(), q, v, a)
+        """Motion of the body in the axes of the ground, from coordinates q, rates v and accelerations a (m, n) of the
+        joints."""
+        position, velocity, acceleration, rotation, turning, angular_acceleration = _motion_of_last_body(
+            self.vehicle(), q, v, a
+        )
         to_ground = self.axes.T
         return BodyMotion(
             motion_times,
@@ -82,16 +97,17 @@ class JointTree:
             acceleration @ to_ground,
             self.axes @ rotation @ to_ground,
             turning @ to_ground,
-            spin_up @ to_ground,
+            angular_acceleration @ to_ground,
         )
 
     def start_rates(self) -> np.ndarray:
-        """Rates (n,) of the joints at the start; InputError where the joint does not allow the body's velocity."""
+        """Rates (n,) of the joint coordinates at the start. Raises InputError where the joint does not allow the body's
+        velocity."""
         n = len(self.vehicle().coordinates())
         zero, unit = np.zeros((n, n)), np.eye(n)
         unit_motions = self.motion(np.zeros(n), zero, unit, zero)
-        columns = np.hstack([unit_motions.velocity, unit_motions.turning]).T
-        wanted = np.concatenate([self.mechanism.velocity, self.mechanism.turning])
+        columns = np.hstack([unit_motions.velocity, unit_motions.angular_velocity]).T
+        wanted = np.concatenate([self.mechanism.velocity, self.mechanism.angular_velocity])
         rates = np.linalg.lstsq(columns, wanted, rcond=None)[0]
         if np.abs(columns @ rates - wanted).max() > START_VELOCITY_TOLERANCE:
             raise InputError("", "PART, V and W", wanted.tolist(), "is no velocity that the joint allows at the start")
@@ -100,7 +116,7 @@ class JointTree:
     def run(self, engine: str, duration: float, step: float, stride: int) -> tuple[BodyMotion, Reaction]:
         """Motion and reaction of the mechanism in an engine, at every ``stride``-th step (s). The reaction follows from
         the engine's accelerations by Newton's and Euler's equations."""
-        model = free_model(engine, self.driven(), Settings("RK44", step, duration))
+        model = free_model(engine, self.vehicle_with_springs(), Settings("RK44", step, duration))
         rates = self.start_rates()
         states = model.march(0.0 * rates, rates, round(duration / step), step)[::stride]
         q, v = np.split(states, 2, axis=1)
@@ -111,8 +127,8 @@ class JointTree:
 
 
 def joint_tree(mechanism: Mechanism, path: BodyMotion) -> JointTree:
-    """The joint chain whose hinges stay farthest from a singularity along a path; raises Refused where every chain
-    comes too near."""
+    """The joint chain whose hinges stay farthest from a singularity along a path. Raises Refused where every chain
+    comes too near to one."""
     trees = [JointTree(mechanism, axes) for axes in _candidate_axes(mechanism)]
     hinge_cosines = [_least_hinge_cosine(tree, path) for tree in trees]
     best = int(np.argmax(hinge_cosines))
@@ -121,36 +137,36 @@ def joint_tree(mechanism: Mechanism, path: BodyMotion) -> JointTree:
     return trees[best]
 
 
-def _candidate_axes(m: Mechanism) -> list[np.ndarray]:
+def _candidate_axes(mechanism: Mechanism) -> list[np.ndarray]:
     """Candidate axes (3, 3) for the chain of joints, as columns."""
-    if m.kind in ("revolute", "prismatic", "cylindrical"):
-        return [m.ground.axes]
-    if m.kind == "universal":
-        x, y = m.ground.axes[:, 2], m.body.axes[:, 2]
+    if mechanism.kind in ("revolute", "prismatic", "cylindrical"):
+        return [mechanism.ground.axes]
+    if mechanism.kind == "universal":
+        x, y = mechanism.ground.axes[:, 2], mechanism.body.axes[:, 2]
         return [np.column_stack([x, y, np.cross(x, y)])]
-    arm = (m.body.place if m.kind == "distance" else m.centre) - m.ground.place
+    arm = (mechanism.body.position if mechanism.kind == "distance" else mechanism.centre) - mechanism.ground.position
     arm_direction = arm / np.linalg.norm(arm) if np.linalg.norm(arm) > 0.0 else np.array([0.0, 0.0, 1.0])
-    side = np.cross(arm_direction, m.gravity)
-    if np.linalg.norm(side) < 1e-6 * (1.0 + np.linalg.norm(m.gravity)):
+    side = np.cross(arm_direction, mechanism.gravity)
+    if np.linalg.norm(side) < 1e-6 * (1.0 + np.linalg.norm(mechanism.gravity)):
         side = np.cross(arm_direction, np.eye(3)[np.argmin(np.abs(arm_direction))])
     x = side / np.linalg.norm(side)
     base = np.column_stack([x, np.cross(arm_direction, x), arm_direction])
-    if m.kind == "distance":
+    if mechanism.kind == "distance":
         return [base, np.column_stack([base[:, 1], -base[:, 0], base[:, 2]])]
     return [np.roll(base, shift, axis=1) for shift in range(3)]
 
 
 def _least_hinge_cosine(tree: JointTree, path: BodyMotion) -> float:
-    """Least cosine of the angle of a ball's or a rod's second hinge along a path: 0 at its singularity, 1 where the
-    mechanism has no such hinge."""
+    """Least cosine of the second hinge's angle of a ball joint or rod along a path: 0 at the hinges' singularity, 1
+    where the mechanism has no such hinge."""
     if tree.mechanism.kind not in ("spherical", "free", "distance"):
         return 1.0
-    rotation = tree.axes.T @ path.turned @ tree.axes
+    rotation = tree.axes.T @ path.rotation @ tree.axes
     if tree.mechanism.kind != "distance":
         return float(np.sqrt(1.0 - np.minimum(rotation[:, 0, 2] ** 2, 1.0)).min())
     m = tree.mechanism
-    end = path.place + path.turned @ (m.body.place - m.centre)
-    d = (end - m.ground.place) @ tree.axes / m.length
+    end = path.position + path.rotation @ (m.body.position - m.centre)
+    d = (end - m.ground.position) @ tree.axes / m.length
     of_rod = np.sqrt(np.maximum(1.0 - d[:, 0] ** 2, 0.0))
     tilt = np.arctan2(-d[:, 1], d[:, 2])
     first = np.column_stack([of_rod, d[:, 0] * np.sin(tilt), -d[:, 0] * np.cos(tilt)])  # the rod's own x axis
@@ -186,7 +202,7 @@ def _motion_of_last_body(
 
 
 def _rotations_about(axis: int, angle: np.ndarray) -> np.ndarray:
-    """Rotations (m, 3, 3) about an axis by angles (m,)."""
+    """Rotation matrices (m, 3, 3) about the coordinate axis number ``axis`` by angles (m,) in rad."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     turns = np.tile(np.eye(3), (len(angle), 1, 1))
     turns[:, i, i] = turns[:, j, j] = np.cos(angle)

@@ -1,4 +1,4 @@
-"""One rigid body and what holds it to the ground, from the statements of a model file.
+"""A rigid body with its joint and springs to the ground, read from an Adams model file.
 
 Everything is in SI and in the axes of the ground, at the start. The ground's markers lie where the file says; those of
 the body follow its own frame. Inertia is about the centre of mass.
@@ -27,17 +27,18 @@ JOINT_KINDS: dict[str, Kind] = {
     "HOOKE": "universal",
 }
 ASSEMBLY_TOLERANCE = 1e-6
-"""m and rad within which a joint must be assembled at the start; angles in files have six digits or more."""
+"""Largest gap (m) and angle (rad) between the joint's markers at the start; angles in files have at least six
+digits."""
 NUMBER_PATTERN = r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)"
 
 
 @dataclass(frozen=True, eq=False)
 class Marker:
-    """A coordinate frame on a part. part : number of the part; place (3,) : position in m; axes (3, 3) : axes as
-    columns."""
+    """A coordinate frame on a part of the mechanism. part : number of the part; position (3,) in m; axes (3, 3) : axes
+    as columns."""
 
     part: int
-    place: np.ndarray
+    position: np.ndarray
     axes: np.ndarray
 
 
@@ -45,14 +46,14 @@ class Marker:
 class Spring:
     """A spring and damper from the ground to the body.
 
-    turns : about the joint's axis, or else along the line between both points. ground, body (3,): points at the start
-    (m). stiffness (N/m or N m/rad), damping (N s/m or N m s/rad), free_length : length (m) or angle (rad) without
-    force.
+    is_rotational : acts about the joint's axis, or else along the line between both points. ground_point, body_point
+    (3,): ends at the start (m). stiffness (N/m or N m/rad), damping (N s/m or N m s/rad), free_length : length (m) or
+    angle (rad) without force.
     """
 
-    turns: bool
-    ground: np.ndarray
-    body: np.ndarray
+    is_rotational: bool
+    ground_point: np.ndarray
+    body_point: np.ndarray
     stiffness: float
     damping: float
     free_length: float
@@ -60,11 +61,12 @@ class Spring:
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """mass (kg), centre (3,) m, inertia (3, 3) kg m^2, axes (3, 3) of the centre's marker; gravity (3,) m/s^2.
+    """A rigid body on a joint. mass (kg), centre (3,) m, inertia (3, 3) kg m^2, axes (3, 3) of the marker at the
+    centre; gravity (3,) m/s^2.
 
-    kind, ground, body : the joint and its markers on both; length (m): of a distance. velocity (3,) m/s, turning (3,)
-    rad/s : of the centre and the body at the start. on_body : whether the joint's first marker, at which reactions are
-    told, is the body's.
+    kind, ground, body : the joint and its markers on ground and body; length (m): of a distance joint. velocity (3,)
+    m/s and angular_velocity (3,) rad/s at the start. on_body : whether the joint's first marker, at which the file
+    states reactions, lies on the body.
     """
 
     mass: float
@@ -78,35 +80,37 @@ class Mechanism:
     length: float
     springs: tuple[Spring, ...]
     velocity: np.ndarray
-    turning: np.ndarray
+    angular_velocity: np.ndarray
     on_body: bool = False
 
     def with_spring(self, **values: float) -> "Mechanism":
-        """The mechanism with other values of its only spring."""
+        """A copy of the mechanism with parameters of its only spring replaced."""
         (spring,) = self.springs
         return replace(self, springs=(replace(spring, **values),))  # type: ignore[arg-type]
 
-    def moved(self, displacement: np.ndarray) -> "Mechanism":
-        """The mechanism with the body shifted (m) at the start, together with its joint point and spring ends."""
+    def displaced(self, displacement: np.ndarray) -> "Mechanism":
+        """A copy of the mechanism with the body displaced (m) at the start, together with its joint point and spring
+        ends."""
         return replace(
             self,
             centre=self.centre + displacement,
-            body=replace(self.body, place=self.body.place + displacement),
-            springs=tuple(replace(spring, body=spring.body + displacement) for spring in self.springs),
+            body=replace(self.body, position=self.body.position + displacement),
+            springs=tuple(replace(spring, body_point=spring.body_point + displacement) for spring in self.springs),
         )
 
 
 def read_mechanism(path: str | Path) -> Mechanism:
-    """The mechanism of a model file; InputError by name and line for what is not supported or not assembled."""
-    return _Reading(str(path), read_statements(path)).mechanism()
+    """Read the mechanism of a model file. Raises InputError with statement and line for what is not supported or not
+    assembled."""
+    return _MechanismReader(str(path), read_statements(path)).mechanism()
 
 
-class _Reading:
-    """Statements of one file by kind."""
+class _MechanismReader:
+    """Reader that makes a mechanism from the statements of a model file."""
 
     def __init__(self, file: str, statements: list[Statement]) -> None:
         self.file, self.statements = file, statements
-        parts = {part_statement.number: part_statement for part_statement in self.named("PART")}
+        parts = {part_statement.number: part_statement for part_statement in self.statements_named("PART")}
         grounds = [part_statement for part_statement in parts.values() if part_statement.has("GROUND")]
         bodies = [part_statement for part_statement in parts.values() if not part_statement.has("GROUND")]
         if len(grounds) != 1 or len(bodies) != 1:
@@ -116,16 +120,17 @@ class _Reading:
             )
         self.ground, self.part = grounds[0], bodies[0]
         self.markers = {
-            part_statement.number: self._marker(part_statement, parts) for part_statement in self.named("MARKER")
+            part_statement.number: self._marker(part_statement, parts)
+            for part_statement in self.statements_named("MARKER")
         }
 
-    def named(self, *names: str) -> list[Statement]:
+    def statements_named(self, *names: str) -> list[Statement]:
         return [statement for statement in self.statements if statement.name in names]
 
     def _marker(self, statement: Statement, parts_by_number: dict[int, Statement]) -> Marker:
-        marker_part = parts_by_number.get(statement.whole("PART"))
+        marker_part = parts_by_number.get(statement.reference("PART"))
         if marker_part is None:
-            raise statement.refuse(", PART", statement.whole("PART"), "is no part of the file")
+            raise statement.refuse(", PART", statement.reference("PART"), "is no part of the file")
         frame = _turned_axes(marker_part.numbers("REULER", (0.0, 0.0, 0.0)))
         position = marker_part.numbers("QG", (0.0, 0.0, 0.0)) + frame @ statement.numbers("QP", (0.0, 0.0, 0.0))
         return Marker(marker_part.number, position, frame @ _turned_axes(statement.numbers("REULER", (0.0, 0.0, 0.0))))
@@ -135,8 +140,10 @@ class _Reading:
             raise statement.refuse("", marker_number, "is no marker of the file")
         return self.markers[marker_number]
 
-    def pair(self, statement: Statement, first_number: int, second_number: int) -> tuple[Marker, Marker]:
-        """Of two markers, the one on the ground and the one on the body, in this order."""
+    def ground_and_body_markers(
+        self, statement: Statement, first_number: int, second_number: int
+    ) -> tuple[Marker, Marker]:
+        """Two markers given by their numbers, sorted: first the marker on the ground, then the marker on the body."""
         marker_pair = self.marker(statement, first_number), self.marker(statement, second_number)
         if {marker.part for marker in marker_pair} != {self.ground.number, self.part.number}:
             raise statement.refuse(
@@ -146,17 +153,19 @@ class _Reading:
 
     def mechanism(self) -> Mechanism:
         body_part = self.part
-        centre = self.marker(body_part, body_part.whole("CM"))
+        centre = self.marker(body_part, body_part.reference("CM"))
         ixx, iyy, izz, ixy, ixz, iyz = body_part.numbers("IP", (0.0,) * 6)
         inertia_at_marker = np.array([[ixx, -ixy, -ixz], [-ixy, iyy, -iyz], [-ixz, -iyz, izz]])
         mass = float(body_part.numbers("MASS", (0.0,))[0])
         if mass <= 0.0 or np.linalg.eigvalsh(inertia_at_marker)[0] <= 0.0:
             raise body_part.refuse("", None, "must have a mass and a positive inertia")
         kind, (ground, body), length = self._joint(centre)
-        gravity = [sum(float(g.numbers(f"{axis}GRAV", (0.0,))[0]) for g in self.named("ACCGRAV")) for axis in "IJK"]
+        gravity = [
+            sum(float(g.numbers(f"{axis}GRAV", (0.0,))[0]) for g in self.statements_named("ACCGRAV")) for axis in "IJK"
+        ]
         return Mechanism(
             mass=mass,
-            centre=centre.place,
+            centre=centre.position,
             inertia=centre.axes @ inertia_at_marker @ centre.axes.T,
             axes=centre.axes,
             gravity=np.array(gravity),
@@ -166,51 +175,60 @@ class _Reading:
             length=length,
             springs=tuple(
                 self._spring(spring_statement, kind, ground)
-                for spring_statement in self.named("SFORCE", "SPRINGDAMPER")
+                for spring_statement in self.statements_named("SFORCE", "SPRINGDAMPER")
             ),
             velocity=np.array([body_part.numbers(f"V{axis}", (0.0,))[0] for axis in "XYZ"]),
-            on_body=any(self.marker(j, j.whole("I")).part == body_part.number for j in self.named("JOINT")),
-            turning=centre.axes @ [body_part.numbers(f"W{axis}", (0.0,))[0] for axis in "XYZ"],
+            on_body=any(
+                self.marker(j, j.reference("I")).part == body_part.number for j in self.statements_named("JOINT")
+            ),
+            angular_velocity=centre.axes @ [body_part.numbers(f"W{axis}", (0.0,))[0] for axis in "XYZ"],
         )
 
     def _joint(self, centre: Marker) -> tuple[Kind, tuple[Marker, Marker], float]:
-        joints = self.named("JOINT", "GCON")
+        joints = self.statements_named("JOINT", "GCON")
         if len(joints) > 1:
             raise joints[1].refuse("", None, "is the second joint of one body: not supported")
         if not joints:
-            springs = [self.pair(s, s.whole("I"), s.whole("J")) for s in self.named("SFORCE", "SPRINGDAMPER")]
+            springs = [
+                self.ground_and_body_markers(s, s.reference("I"), s.reference("J"))
+                for s in self.statements_named("SFORCE", "SPRINGDAMPER")
+            ]
             origin = Marker(self.ground.number, np.zeros(3), np.eye(3))
             return "free", (springs[0][0] if springs else origin, centre), 0.0
         (joint,) = joints
         if joint.name == "GCON":
-            return self._distance(joint)
+            return self._distance_joint(joint)
         kind = next((kind for name, kind in JOINT_KINDS.items() if joint.has(name)), None)
         if kind is None:
             raise joint.refuse("", ", ".join(joint.values), "is not supported: " + ", ".join(JOINT_KINDS) + " are")
-        ends = self.pair(joint, joint.whole("I"), joint.whole("J"))
-        first = self.marker(joint, joint.whole("I"))
+        ends = self.ground_and_body_markers(joint, joint.reference("I"), joint.reference("J"))
+        first = self.marker(joint, joint.reference("I"))
         if kind == "universal":
             ends = _crossed_markers(*ends, first.part == self.ground.number)
         _check_assembled(joint, kind, *ends)
         return kind, ends, 0.0
 
-    def _distance(self, joint: Statement) -> tuple[Kind, tuple[Marker, Marker], float]:
+    def _distance_joint(self, joint: Statement) -> tuple[Kind, tuple[Marker, Marker], float]:
         text = re.sub(r"\s", "", joint.text("FUNCTION")).upper()
         match = re.fullmatch(r"DM\((\d+),(\d+)\)-" + NUMBER_PATTERN, text)
         if match is None:
             raise joint.refuse(", FUNCTION", text, "is not supported: only DM(marker, marker) - length")
-        ends, length = self.pair(joint, int(match[1]), int(match[2])), float(match[3])
-        distance = float(np.linalg.norm(ends[1].place - ends[0].place))
+        ends, length = self.ground_and_body_markers(joint, int(match[1]), int(match[2])), float(match[3])
+        distance = float(np.linalg.norm(ends[1].position - ends[0].position))
         if abs(distance - length) > ASSEMBLY_TOLERANCE or length <= 0.0:
             raise joint.refuse(", FUNCTION", length, f"must be above 0 and the distance at the start, {distance:g} m")
         return "distance", ends, distance
 
     def _spring(self, statement: Statement, joint_kind: Kind, joint: Marker) -> Spring:
-        ground, body = self.pair(statement, statement.whole("I"), statement.whole("J"))
+        ground, body = self.ground_and_body_markers(statement, statement.reference("I"), statement.reference("J"))
         turns = statement.has("ROTATIONAL") or statement.has("ROTATION")
         if turns and not (joint_kind == "revolute" and _are_parallel(ground.axes[:, 2], joint.axes[:, 2])):
             raise statement.refuse("", None, "turns about an axis that no revolute joint has: not supported")
-        law = self._sprung(statement, turns) if statement.name == "SPRINGDAMPER" else self._function(statement, turns)
+        law = (
+            self._springdamper_parameters(statement, turns)
+            if statement.name == "SPRINGDAMPER"
+            else self._parameters_of_function(statement, turns)
+        )
         angle = 0.0
         if turns:  # of the body beside the ground about the joint's axis, at the start
             x, y = (ground.axes[:, k] @ body.axes[:, 0] for k in range(2))
@@ -218,21 +236,21 @@ class _Reading:
             angle = math.atan2(y, x) * sense
         stiffness, damping, free_length = law
         return Spring(
-            turns, ground.place, body.place, stiffness, damping, free_length - angle if turns else free_length
+            turns, ground.position, body.position, stiffness, damping, free_length - angle if turns else free_length
         )
 
-    def _sprung(self, statement: Statement, is_rotational: bool) -> tuple[float, float, float]:
+    def _springdamper_parameters(self, statement: Statement, is_rotational: bool) -> tuple[float, float, float]:
         names = ("KT", "CT", "ANGLE", "TORQUE") if is_rotational else ("K", "C", "LENGTH", "FORCE")
         stiffness, damping, free_length, preload = (float(statement.numbers(name, (0.0,))[0]) for name in names)
         if preload:
             raise statement.refuse(f", {names[3]}", preload, "is not supported: give the free length or angle")
         return stiffness, damping, free_length
 
-    def _function(self, statement: Statement, is_rotational: bool) -> tuple[float, float, float]:
-        """Stiffness, damping and free length (or angle) of a spring force, which must be linear in travel and rate.
-        They are found by evaluating its expression."""
+    def _parameters_of_function(self, statement: Statement, is_rotational: bool) -> tuple[float, float, float]:
+        """Stiffness, damping and free length (or angle) of a spring force given as an expression, which must be linear
+        in travel and rate."""
         text = statement.text("FUNCTION").lower().replace("\\", " ")
-        i, j = (f"0*{statement.whole(end)}" for end in "IJ")
+        i, j = (f"0*{statement.reference(end)}" for end in "IJ")
         travel, rate = (rf"az\(\s*{i}\s*,\s*{j}\s*\)", rf"wz\(\s*{i}\s*,\s*{j}\s*,\s*{j}\s*\)")
         if not is_rotational:
             travel, rate = (rf"{name}\(\s*(?:{i}\s*,\s*{j}|{j}\s*,\s*{i})\s*\)" for name in ("dm", "vr"))
@@ -255,7 +273,7 @@ class _Reading:
 
 
 def _evaluated_expression(statement: Statement, text: str) -> Callable[[float, float], float]:
-    """Value of an expression as a function of travel and rate; it may contain numbers, RTOD and DTOR."""
+    """The force expression as a function of travel and rate; it may contain numbers, RTOD and DTOR."""
     names = {"rtod": 180.0 / math.pi, "dtor": math.pi / 180.0, "pi": math.pi}
     try:
         tree = ast.parse(text.strip(), mode="eval")
@@ -272,7 +290,7 @@ def _evaluated_expression(statement: Statement, text: str) -> Callable[[float, f
 
 
 def _turned_axes(angles: np.ndarray) -> np.ndarray:
-    """Axes (3, 3) as columns after turns about z, the new x and the new z."""
+    """Axes (3, 3) as columns after rotations (rad) about z, the new x and the new z."""
     return Rotation.from_euler("ZXZ", angles).as_matrix()
 
 
@@ -290,8 +308,8 @@ def _crossed_markers(ground: Marker, body: Marker, ground_first: bool) -> tuple[
 
 
 def _check_assembled(joint: Statement, joint_kind: Kind, ground: Marker, body: Marker) -> None:
-    """Refuse a joint that the start does not fit."""
-    offset, z = body.place - ground.place, ground.axes[:, 2]
+    """Raise InputError where the joint's markers do not fit together at the start."""
+    offset, z = body.position - ground.position, ground.axes[:, 2]
     if joint_kind in ("prismatic", "cylindrical"):
         offset = offset - z * (z @ offset)
     if np.linalg.norm(offset) > ASSEMBLY_TOLERANCE:

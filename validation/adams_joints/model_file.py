@@ -14,7 +14,8 @@ import numpy as np
 from models.core.errors import InputError
 
 IGNORED_STATEMENTS = ("ADAMS", "GRAPHICS", "REQUEST", "OUTPUT", "RESULTS", "VARIABLE", "END", "LIST", "INTEGRATOR")
-"""Statements that change no motion; a force that reads a VARIABLE is refused where it names it."""
+"""Statements without influence on the motion. A force that reads a VARIABLE is refused where its expression names
+it."""
 KEYS_OF_STATEMENT = {
     "UNITS": ("FORCE", "MASS", "LENGTH", "TIME"),
     "PART": ("GROUND", "MASS", "CM", "IP", "QG", "REULER", "VX", "VY", "VZ", "WX", "WY", "WZ"),
@@ -25,7 +26,7 @@ KEYS_OF_STATEMENT = {
     "SPRINGDAMPER": ("TRANSLATION", "ROTATION", "I", "J", "K", "C", "LENGTH", "FORCE", "KT", "CT", "ANGLE", "TORQUE"),
     "ACCGRAV": ("IGRAV", "JGRAV", "KGRAV"),
 }
-"""Statements that are read, and what each may say."""
+"""Supported statements, and the keys and flags that each may have."""
 SI_UNITS = {"FORCE": "NEWTON", "MASS": "KILOGRAM", "LENGTH": "METER", "TIME": "SECOND"}
 _STATEMENT_PATTERN = re.compile(r"\s*([A-Za-z_]+)\s*/\s*(\d*)\s*(?:,|$|\b)(.*)", re.DOTALL)
 _KEY_PATTERN = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)", re.DOTALL)
@@ -43,23 +44,23 @@ class Statement:
     values: dict[str, list[str]]
 
     def refuse(self, key_text: str, wrong_value: object, allowed: str) -> InputError:
-        """InputError about a key or value of this statement."""
+        """Returns an InputError that names file, line and statement, the wrong value and what is allowed."""
         return InputError(self.file, f"line {self.line}: {self.name}/{self.number}{key_text}", wrong_value, allowed)
 
     def has(self, key: str) -> bool:
         """Whether the statement has this key or flag."""
         return key in self.values
 
-    def whole(self, key: str) -> int:
-        """The number of a marker or part that a key refers to; InputError where it is missing."""
+    def reference(self, key: str) -> int:
+        """Number of the marker or part that a key refers to. Raises InputError where it is missing."""
         text = self.values.get(key, [""])[0]
         if not text.isdigit():
             raise self.refuse(f", {key}", text or None, "must be the number of a statement")
         return int(text)
 
     def numbers(self, key: str, default: tuple[float, ...]) -> np.ndarray:
-        """Values of a key, angles in rad. Those that the file omits are taken from the default, which also sets their
-        number."""
+        """Numerical values of a key, angles in rad. Values that the file omits are taken from the default, whose length
+        is the number of values."""
         values_given = [self._number(key, text) for text in self.values.get(key, [])]
         if len(values_given) > len(default):
             raise self.refuse(f", {key}", len(values_given), f"values found, at most {len(default)} have a meaning")
@@ -76,12 +77,13 @@ class Statement:
         return math.radians(value) if degrees else value
 
     def text(self, key: str) -> str:
-        """An expression, lines joined."""
+        """Text of the expression that a key has, its lines joined."""
         return " ".join(self.values.get(key, []))
 
 
 def read_statements(path: str | Path) -> list[Statement]:
-    """All statements of a file that affect its motion; raises InputError with name and line for unsupported ones."""
+    """All statements of an Adams model file that affect the motion. Raises InputError with name and line for
+    unsupported statements."""
     try:
         lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
@@ -97,7 +99,7 @@ def read_statements(path: str | Path) -> list[Statement]:
 
 
 def _statement_texts(lines: list[str]) -> list[tuple[int, str]]:
-    """Number of the first line and text of every statement."""
+    """For every statement of a file: number of its first line, and its text with continuation lines joined."""
     joined: list[tuple[int, str]] = []
     for number, line in enumerate(lines, 1):
         text = line.partition("!")[0].strip()
@@ -139,7 +141,7 @@ def _parsed_statement(file: str, line_number: int, text: str) -> Statement:
 
 
 def _between_commas(text: str) -> list[str]:
-    """Text between the commas that stand outside of brackets."""
+    """Parts of a text between commas outside of brackets."""
     parts, depth = [""], 0
     for sign in text:
         depth += (sign == "(") - (sign == ")")

@@ -1,4 +1,4 @@
-"""What the other code wrote of a mechanism's motion: a table, its digits, and the energy that its motion lost."""
+"""Output files of Adams/Solver: table of a body's motion, its number of digits, and the energy that the motion lost."""
 
 import csv
 import gzip
@@ -13,7 +13,7 @@ from validation.adams_joints.mechanism import Mechanism
 from validation.adams_joints.motion import BodyMotion, Reaction, reaction_by_momentum
 
 COLUMN_GROUPS = {"Pos": 3, "Quat": 4, "Vel": 3, "Avel": 3, "Acc": 3, "Aacc": 3, "Rforce": 3, "Rtorque": 3}
-"""Groups of columns, numbered from 1."""
+"""Group of columns in an output file -> number of columns; columns are numbered from 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,13 +25,13 @@ class OutputFile:
     columns: dict[str, np.ndarray]
     digits: int
 
-    def rounding(self, column_group: str) -> np.ndarray:
-        """Rounding error (m, columns) of a group's numbers: half of their last digit."""
+    def rounding_error(self, column_group: str) -> np.ndarray:
+        """Largest rounding error (m, 3 or 4) of the numbers of a column group: half of their last digit."""
         size = np.maximum(np.abs(self.columns[column_group]), 1e-30)
         return 0.5 * 10.0 ** (np.floor(np.log10(size)) - self.digits + 1)
 
     def motion(self, mechanism: Mechanism) -> BodyMotion:
-        """The body's motion as the file gives it."""
+        """Motion of the body as stated in the file."""
         scalar, *vector = self.columns["Quat"].T
         rotations = Rotation.from_quat(np.column_stack([*vector, scalar])).as_matrix() @ mechanism.axes.T
         c = self.columns
@@ -41,27 +41,28 @@ class OutputFile:
         """Kinetic energy and total energy (m,) in J. The total is the sum of the kinetic and the gravitational
         energy."""
         motion = self.motion(mechanism)
-        inertia = motion.turned @ mechanism.inertia @ np.transpose(motion.turned, (0, 2, 1))
+        inertia = motion.rotation @ mechanism.inertia @ np.transpose(motion.rotation, (0, 2, 1))
         kinetic = 0.5 * mechanism.mass * (motion.velocity**2).sum(axis=1)
-        kinetic += 0.5 * np.einsum("mi,mij,mj->m", motion.turning, inertia, motion.turning)
-        return kinetic, kinetic - mechanism.mass * motion.place @ mechanism.gravity
+        kinetic += 0.5 * np.einsum("mi,mij,mj->m", motion.angular_velocity, inertia, motion.angular_velocity)
+        return kinetic, kinetic - mechanism.mass * motion.position @ mechanism.gravity
 
     def energy_lost(self, mechanism: Mechanism) -> float:
-        """Ratio of the largest change of total energy to the largest kinetic energy; 0 for a body at rest."""
+        """Largest change of the total energy divided by the largest kinetic energy; 0 for a body at rest."""
         kinetic, total_energy = self.energies(mechanism)
         return float(np.abs(total_energy - total_energy[0]).max() / max(kinetic.max(), 1e-30))
 
     def reaction(self) -> Reaction:
-        """The reaction force and moment that the file gives."""
+        """Reaction force and moment of joint and springs as stated in the file."""
         return Reaction(self.columns["Rforce"], self.columns["Rtorque"])
 
     def reaction_of_motion(self, mechanism: Mechanism) -> Reaction:
-        """Reaction by Newton's and Euler's equations from the file's own motion."""
+        """Reaction of joint and springs computed from the motion stated in the file, by Newton's and Euler's
+        equations."""
         return reaction_by_momentum(mechanism, self.motion(mechanism))
 
 
 def read_output(path: str | Path) -> OutputFile:
-    """The table of a file, plain or compressed; InputError names the column or the line that is wrong."""
+    """Read an output file, plain or compressed (.gz). Raises InputError that names the wrong column or line."""
     path = Path(path)
     try:
         with (gzip.open if path.suffix == ".gz" else open)(path, "rt", encoding="utf-8") as file:
@@ -82,10 +83,10 @@ def read_output(path: str | Path) -> OutputFile:
 
 
 def _significant_digits(cell: str) -> int:
-    """Significant digits of a number as it is written."""
+    """Number of significant digits in the text of a number."""
     return len(cell.lower().partition("e")[0].replace(".", "").lstrip("+-0"))
 
 
 def starts_with_mechanism(mechanism: Mechanism, output: OutputFile) -> bool:
-    """Whether the body's position in the file's first row is that of the mechanism at its start."""
+    """Whether the body's position in the first row of the output file equals the start position of the mechanism."""
     return bool(np.abs(output.columns["Pos"][0] - mechanism.centre).max() <= 1e-5)

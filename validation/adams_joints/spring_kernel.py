@@ -1,7 +1,7 @@
-"""Compiled forces of springs from the ground to a body on a chain of joints, as forces of the joints.
+"""Compiled forces of springs between the ground and a body on a chain of joints, as generalised forces of the joints.
 
-For engines: all but the time are pointers to doubles, see ``models.engines.free_vehicle``. The table is a head (counts
-of joints and springs), the joints as ``models.multibody.cut_mechanics`` has them, then the springs.
+For engines: all arguments but the time are pointers to doubles, see ``models.engines.free_vehicle``. The table is a
+head (numbers of joints and springs), the joints as in ``models.multibody.cut_mechanics``, then the springs.
 """
 
 import math
@@ -16,28 +16,29 @@ from models.vehicles.free_vehicle import anchor, joints
 from models.vehicles.spatial import FREEDOMS, SpatialVehicle
 from validation.adams_joints.mechanism import Spring
 
-HEAD_LENGTH, PER_SPRING = 2, 10
+HEAD_NUMBERS, NUMBERS_PER_SPRING = 2, 10
 COORDINATE, STIFFNESS, DAMPING, FREE_LENGTH, GROUND, ARM = 0, 1, 2, 3, 4, 7
-"""Of a spring: the coordinate that it turns (-1: it lies between two points), N/m, N s/m, m, place of its point on the
-ground, and that on the body from the last joint (m)."""
+"""Positions in a spring's row: number of the joint coordinate on which it acts (-1: it acts between two points),
+stiffness (N/m), damping (N s/m), free length (m), its point on the ground (m), its point on the body relative to the
+last joint (m)."""
 _NONE = (0.0, 0.0, 0.0)
 
 
 def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
-    """Numbers of the springs and of the chain of joints, as one array for ``spring_forces``. The springs' points are in
-    the vehicle's axes; a torsion spring acts on the last coordinate."""
+    """Parameters of the springs and of the chain of joints as one array for ``spring_forces``. The springs' points are
+    in the vehicle's axes; a torsion spring acts on the last coordinate."""
     chain = joints(vehicle)
     kinds = chain[:, 0].astype(int)
     rows = np.column_stack([chain[:, 1], kinds >= FREEDOMS.index("rx"), kinds % 3, chain[:, 2:]])
     last_body, origin = anchor(vehicle, vehicle.bodies[-1].name)
     laws = [
         [
-            last_body if spring.turns else -1,
+            last_body if spring.is_rotational else -1,
             spring.stiffness,
             spring.damping,
             spring.free_length,
-            *spring.ground,
-            *(spring.body - origin),
+            *spring.ground_point,
+            *(spring.body_point - origin),
         ]
         for spring in springs
     ]
@@ -46,13 +47,13 @@ def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
 
 @compiled
 def spring_forces(table, t, q, v, force_sum):
-    """Add the springs' forces (N, N m) to ``force_sum`` (n,), at coordinates and rates (n,)."""
-    head = array(table, (HEAD_LENGTH,))
+    """Add the springs' generalised forces (N, N m) to ``force_sum`` (n,), at joint coordinates q and rates v (n,)."""
+    head = array(table, (HEAD_NUMBERS,))
     n, count = int(head[0]), int(head[1])
     if count == 0:
         return
-    chain = array(beyond(table, HEAD_LENGTH), (n, PER_JOINT))
-    springs = array(beyond(table, HEAD_LENGTH + n * PER_JOINT), (count, PER_SPRING))
+    chain = array(beyond(table, HEAD_NUMBERS), (n, PER_JOINT))
+    springs = array(beyond(table, HEAD_NUMBERS + n * PER_JOINT), (count, NUMBERS_PER_SPRING))
     joint_positions, rate, force_view = array(q, (n,)), array(v, (n,)), array(force_sum, (n,))
     m = array(doubles((n + 1) * PER_MOTION), (n + 1, PER_MOTION))
     move(chain, joint_positions, rate, m)
@@ -76,8 +77,8 @@ def spring_forces(table, t, q, v, force_sum):
 
 @compiled
 def set_spring_forces(block, t, n):
-    """Call ``spring_forces`` on one block of doubles at an address: f, q and v (n,), then the table. f is set to zero
-    first."""
+    """Set the generalised forces of the springs in a block of doubles at an address: forces, coordinates and rates
+    (n,), then the parameter table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     spring_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

@@ -1,7 +1,7 @@
-"""Joints of the other code as MJCF, read and built as ``twinrig twin`` does with a user's own file.
+"""Mechanisms of Adams files written as MJCF, then read and built as ``twinrig twin`` does with a user's own file.
 
-A body on one joint has that joint in MJCF, with its axis and anchor. A distance has none: its rod has no mass, and
-MuJoCo's parser refuses a moving body without.
+A body on a joint has that joint in MJCF, with its axis and anchor. A distance joint has none: its rod has no mass, and
+MuJoCo's parser refuses a moving body without mass.
 """
 
 from pathlib import Path
@@ -18,18 +18,21 @@ from models.own_model.reading import TwinModel
 from validation.adams_joints.mechanism import Mechanism, Spring
 
 STATE_COUNT = 20
+"""Number of random states at which accelerations are compared."""
 SLIDE, HINGE = "slide", "hinge"
 
 
 def as_mjcf(mechanism: Mechanism) -> str:
-    """The mechanism as MJCF; its body's frame is at the centre, parallel to the ground's axes at the start."""
+    """The mechanism as MJCF text; the body's frame is at its centre, parallel to the ground's axes at the start."""
     m, inertia = mechanism, mechanism.inertia
-    laws = [spring for spring in m.springs if spring.turns]
-    lines = [spring for spring in m.springs if not spring.turns]
+    laws = [spring for spring in m.springs if spring.is_rotational]
+    lines = [spring for spring in m.springs if not spring.is_rotational]
     six = (*inertia.diagonal(), inertia[0, 1], inertia[0, 2], inertia[1, 2])
-    feet = "".join(f'<site name="foot {i}" pos="{_numbers_text(spring.ground)}"/>' for i, spring in enumerate(lines))
+    feet = "".join(
+        f'<site name="foot {i}" pos="{_numbers_text(spring.ground_point)}"/>' for i, spring in enumerate(lines)
+    )
     tips = "".join(
-        f'<site name="tip {i}" pos="{_numbers_text(spring.body - m.centre)}"/>' for i, spring in enumerate(lines)
+        f'<site name="tip {i}" pos="{_numbers_text(spring.body_point - m.centre)}"/>' for i, spring in enumerate(lines)
     )
     tendons = "".join(_tendon_text(i, spring) for i, spring in enumerate(lines))
     return (
@@ -45,8 +48,8 @@ def _numbers_text(values: np.ndarray) -> str:
     return " ".join(repr(float(number)) for number in values)
 
 
-def _joints(m: Mechanism, laws: list[Spring]) -> str:
-    """MJCF text of the body's joints, in the order in which they act; Refused where MJCF has no such joint."""
+def _joints(m: Mechanism, torsion_springs: list[Spring]) -> str:
+    """MJCF text of the body's joints, in the order in which they act. Raises Refused where MJCF has no such joint."""
     first, second = m.ground.axes[:, 2], m.body.axes[:, 2]
     kinds = {
         "revolute": [(HINGE, first)],
@@ -58,8 +61,10 @@ def _joints(m: Mechanism, laws: list[Spring]) -> str:
     }
     if m.kind not in kinds:
         raise Refused(m.kind, "its rod has no mass, and MuJoCo's parser takes no moving body without")
-    law = "".join(f' stiffness="{s.stiffness!r}" damping="{s.damping!r}" springref="{s.free_length!r}"' for s in laws)
-    anchor = m.body.place - m.centre
+    law = "".join(
+        f' stiffness="{s.stiffness!r}" damping="{s.damping!r}" springref="{s.free_length!r}"' for s in torsion_springs
+    )
+    anchor = m.body.position - m.centre
     return "".join(
         f'<joint name="{kind} {i}" type="{kind}"/>'
         if kind == "free"
@@ -74,19 +79,20 @@ def _tendon_text(i: int, spring: Spring) -> str:
 
 
 def build_differences(
-    mechanism: Mechanism, folder: Path, steps: int, step: float
+    mechanism: Mechanism, folder: Path, step_count: int, step: float
 ) -> tuple[float, dict[str, np.ndarray]]:
-    """Largest relative difference between the accelerations of all builds and those of the file. Paths (steps + 1, 3)
-    of the centre: by the file's own model in MuJoCo and by Exudyn's build, with steps of ``step`` (s) from the start.
+    """Largest relative difference of accelerations between the models that twinrig builds and the MJCF file. Then, by
+    engine, paths (step_count + 1, 3) of the body's centre: by the MJCF file in MuJoCo and by twinrig's model in Exudyn,
+    with steps of ``step`` (s) from the start.
     """
     path = folder / "joint.xml"
     path.write_text(as_mjcf(mechanism), encoding="utf-8")
     twin = read(path).twin
     worst = max(row.acceleration for row in certificate(twin, STATE_COUNT))
     start = np.zeros(twin.size), _start_rates(mechanism, twin)
-    n, built = twin.size, free_model("exudyn", twin.driven).march(*start, steps, step)
+    n, built = twin.size, free_model("exudyn", twin.driven).march(*start, step_count, step)
     in_engine = [twin.coordinates.to_mujoco(row[:n], row[n:]).qpos for row in built]
-    in_file = file_path(twin, start, (steps, step))[:, : twin.model.nq]
+    in_file = file_path(twin, start, (step_count, step))[:, : twin.model.nq]
     return worst, {"mujoco": _body_centres(twin, in_file), "exudyn": _body_centres(twin, np.array(in_engine))}
 
 
@@ -96,7 +102,7 @@ def _start_rates(mechanism: Mechanism, twin: TwinModel) -> np.ndarray:
     mujoco.mj_forward(twin.model, data)
     centre_jacobian, rotation_jacobian = np.empty((2, 3, size))
     mujoco.mj_jacBodyCom(twin.model, data, centre_jacobian, rotation_jacobian, 1)
-    wanted = np.concatenate((mechanism.velocity, mechanism.turning))
+    wanted = np.concatenate((mechanism.velocity, mechanism.angular_velocity))
     rates: np.ndarray = np.linalg.lstsq(np.vstack((centre_jacobian, rotation_jacobian)), wanted, rcond=None)[0]
     return rates
 

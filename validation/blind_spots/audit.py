@@ -1,4 +1,5 @@
-"""The audit: runs scenes, cases and tests once, then spoils each shared function in a process that is forked for it.
+"""Audit for blind spots: runs scenes, cases and tests once, then plants a 1 % fault in each shared function in turn, in
+a forked process, and runs again the cases and tests that call the function.
 
 All processes run the same rewritten modules (``planting``), whose machine code is kept in the audit's folder: ready
 after the first run, whichever function is spoiled. First judge the cases with independent rows and the tests on
@@ -36,31 +37,31 @@ from validation.blind_spots.table import (
     Line,
     is_independent,
     kind_of,
-    read,
+    read_table,
     uncovered_functions,
-    write,
+    write_table,
 )
 from validation.cases import CASES
 
 STARTUP_SCRIPT = Path(__file__).with_name("startup")
 TRACE, FUNCTIONS, TABLE = "trace", "functions.json", "blind_spots.csv"
 JUDGES_FILE, OTHERS_FILE = "judges.csv", "others.csv"
-UNJUDGING_SYSTEMS = ("cost", "effects")
-"""Systems whose cases judge effort and choices: what they see of a value, the others see before."""
+SYSTEMS_WITHOUT_VALUES = ("cost", "effects")
+"""Systems whose cases judge computing effort and choices; a wrong value is noticed by the cases of other systems."""
 LAW_FOLDERS = ("tyre", "contact", "rail", "brake", "road", "sensors", "multibody", "vehicles", "ride")
-"""Folders whose functions come first: the laws of physics, and the tables that hold their numbers."""
+"""Folders of ``models`` that are audited first: the laws of physics and the tables of their parameters."""
 WORKER_COUNT = 2
 SECONDS_BUDGETS = (8.0, 40.0)
-"""Seconds of the processor, without compiling, after which no other case or test is run for a function: if something
-independent has noticed, and if not. How many are left is told."""
+"""Processor time (s), without compilation, after which no other case or test is run on a function's fault: where an
+independent check has noticed the fault, and where none has."""
 FAULT_SIZE = 0.01
 LONGEST_SOUND_CASE = 1200
-"""Seconds of the processor after which a case or test without a fault has lost its way."""
+"""Processor time (s) after which a run of a case or test without a fault is stopped."""
 LONGEST_FAULTY_CASE = 120
-"""Seconds of the processor after which one with a fault has, as a stop whose wheels never come to rest."""
-Told = dict[str, Any]
-Noticed = tuple[str, str, str]
-"""Ids of rows, of tests, and of those that are independent."""
+"""Processor time (s) after which a run of a case or test with a fault is stopped."""
+LogLine = dict[str, Any]
+NoticingChecks = tuple[str, str, str]
+"""Ids of the rows, the tests and the independent checks among them that notice a fault."""
 Progress = Callable[[str, float], None]
 
 
@@ -77,70 +78,71 @@ class Job(NamedTuple):
         return (*self.cases, *self.tests, *(f"{scene} in {engine}" for scene, engine in self.runs))[0]
 
     @property
-    def trace(self) -> str:
+    def trace_file(self) -> str:
         """Name of the file for this job's trace."""
         return self.name.rpartition("/")[2].replace(".py", "").replace(".toml", "").replace(" ", "_") + ".jsonl"
 
 
 @dataclass(frozen=True)
-class Traced:
-    """Record of all cases and tests that ran without a fault: for each by name, the functions that it ran, its time,
-    and how it ended.
+class FaultFreeTrace:
+    """Record of all cases and tests that ran without a planted fault: name -> functions that it ran, its time, and how
+    it ended.
 
-    functions : all names, by place; items : each with "numbers", the functions that gave numbers in it.
+    functions : names of all functions, by number; items : cases and tests; the entry "numbers" contains the functions
+    that gave numbers.
     """
 
     functions: list[str]
-    items: dict[str, Told]
+    items: dict[str, LogLine]
 
     @cached_property
     def numbers(self) -> set[str]:
         """Functions that returned or wrote a number in any case or test."""
         return {name for item in self.items.values() for name in item["numbers"]}
 
-    def callers(self, function: str, judges: bool) -> list[str]:
-        """Names of the judges (cases and tests with independent grounds), or of all others, in which a function gave
-        numbers; the quickest first."""
+    def callers(self, function: str, by_judges: bool) -> list[str]:
+        """Names of the judges (cases and tests with independent grounds), or of all other cases and tests, in which a
+        function gave numbers; the quickest first."""
         names = (name for name, item in self.items.items() if function in item["numbers"])
         return sorted(
-            (name for name in names if self.is_judge(name) == judges), key=lambda name: self.items[name]["seconds"]
+            (name for name in names if self.is_judge(name) == by_judges), key=lambda name: self.items[name]["seconds"]
         )
 
     def is_judge(self, name: str) -> bool:
-        """Whether a case or test has independent grounds."""
+        """Whether a case or test judges by independent grounds, such as a closed form or a published value."""
         item = self.items[name]
         rows = item.get("rows", [{"id": name, "independence": item.get("grounds", "")}])
         return any(is_independent(row["id"], row["independence"]) for row in rows)
 
     @cached_property
-    def sound(self) -> frozenset[str]:
+    def failing_already(self) -> frozenset[str]:
         """Ids of rows and tests that fail already without a planted fault."""
         rows = (row["id"] for item in self.items.values() for row in item.get("rows", ()) if row["status"] == "failed")
         return frozenset((*rows, *(name for name, item in self.items.items() if item.get("failed"))))
 
 
-class Probes:
-    """Pool of worker processes that run jobs (``validation.blind_spots.probe``). ``folder`` keeps their compiled
-    code."""
+class WorkerPool:
+    """Pool of worker processes that run jobs (``validation.blind_spots.probe``). Their compiled code is saved in
+    ``folder``."""
 
     def __init__(self, folder: Path, workers: int = WORKER_COUNT) -> None:
         self.workers = min(workers, os.cpu_count() or 1)
         self.folder, self.idle = folder, Queue[subprocess.Popen[str]]()
-        self._place = TemporaryDirectory()
+        self._memory_folder = TemporaryDirectory()
         command = [sys.executable, "-m", "validation.blind_spots.probe"]
         for worker in range(self.workers):
-            doubles = Path(self._place.name) / f"memory{worker}"
-            variables, pipe = environment(folder, doubles), subprocess.PIPE
+            doubles = Path(self._memory_folder.name) / f"memory{worker}"
+            variables, pipe = worker_environment(folder, doubles), subprocess.PIPE
             self.idle.put(subprocess.Popen(command, cwd=ROOT, env=variables, stdin=pipe, stdout=pipe, text=True))
 
-    def __enter__(self) -> "Probes":
+    def __enter__(self) -> "WorkerPool":
         return self
 
     def __exit__(self, *error: object) -> None:
         """End the worker processes, which are all idle unless an error occurred."""
         while not self.idle.empty():
             self.idle.get().communicate()
-        self._place.cleanup()
+        self._memory_folder.cleanup()
 
     def map(self, work: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
         """Apply ``work`` to each item in as many threads as there are worker processes; yields the results in the order
@@ -149,11 +151,11 @@ class Probes:
             for future in as_completed([pool.submit(work, item) for item in items]):
                 yield future.result()
 
-    def run(self, job: Job, out: Path, faults: dict[int, float], sound: Collection[str]) -> str:
-        """Run the cases and tests of a job in a worker process, with ``faults`` planted (function's number: relative
-        error). Returns how the job ended."""
-        out.write_text("")
-        told: Told = {**job._asdict(), "out": str(out), "faults": faults, "sound": sorted(sound)}
+    def run(self, job: Job, log_file: Path, faults: dict[int, float], failing_already: Collection[str]) -> str:
+        """Run the cases and tests of a job in a worker process, with ``faults`` planted (number of the function ->
+        relative error). Returns "whole", "out of time" or "crashed"."""
+        log_file.write_text("")
+        told: LogLine = {**job._asdict(), "out": str(log_file), "faults": faults, "sound": sorted(failing_already)}
         told |= (
             {"patience": LONGEST_FAULTY_CASE, "budgets": SECONDS_BUDGETS}
             if faults
@@ -169,32 +171,33 @@ class Probes:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """Checks that are run on functions with planted faults: either the judges of a trace, or all its other cases and
-    tests.
+class FaultChecks:
+    """Checks that are run on functions with planted faults: either the judges (cases and tests with independent
+    grounds), or all other cases and tests.
 
-    engines : that share a function of Python, by its name.
+    engines : name of a Python function -> engines that share it.
     """
 
-    probes: Probes
-    traced: Traced
-    judges: bool
+    pool: WorkerPool
+    traced: FaultFreeTrace
+    by_judges: bool
     engines: Mapping[str, tuple[str, ...]]
 
-    def line_of(self, function: str) -> Line:
-        """Plant a fault in one function, run the checks in which it gives numbers, and return the line that says which
-        of them notice the fault."""
-        traced = self.traced
-        callers, ended = traced.callers(function, self.judges), unspoiled_reason(function, traced)
+    def audited_line(self, function: str) -> Line:
+        """Plant a fault in a function, run the checks in which it gives numbers, and return the table line with the
+        checks that notice the fault."""
+        traced, sound = self.traced, self.traced.failing_already
+        callers, ended = traced.callers(function, self.by_judges), unspoiled_reason(function, traced)
         if ended or not callers:
             return self.line(function, ended or "whole", len(callers), len(callers))
         job = Job([name for name in callers if name in CASES], [name for name in callers if name not in CASES])
-        with TemporaryDirectory() as place:
-            out = Path(place) / "told.jsonl"
-            ended = self.probes.run(job, out, {traced.functions.index(function): FAULT_SIZE}, traced.sound)
-            told = lines_of(out)
+        with TemporaryDirectory() as folder:
+            log_file = Path(folder) / "log.jsonl"
+            ended = self.pool.run(job, log_file, {traced.functions.index(function): FAULT_SIZE}, sound)
+            told = logged_lines(log_file)
         rows, tests = (
-            [each for each in kind(told) if each[0] not in traced.sound] for kind in (_failed_rows, _failed_tests)
+            [each for each in failed_checks(told) if each[0] not in sound]
+            for failed_checks in (_failed_rows, _failed_tests)
         )
         independent = [id for id, grounds in (*rows, *tests) if is_independent(id, grounds)]
         ids = ({id for id, _ in rows}, {id for id, _ in tests}, {*independent})
@@ -202,71 +205,78 @@ class Asked:
         left = len(callers) - len(told)
         return self.line(function, ended, len(callers), left, (noticed, failed, grounded))
 
-    def line(self, function: str, ended: str, calling: int = 0, left: int = 0, noticed: Noticed = ("", "", "")) -> Line:
-        """Table line of a function at the present commit; noticed: ids of the rows, tests and independent checks that
-        notice its fault."""
+    def line(
+        self, function: str, ended: str, calling: int = 0, not_run: int = 0, noticing: NoticingChecks = ("", "", "")
+    ) -> Line:
+        """Table line of a function at the present commit. noticing: ids of the rows, tests and independent checks that
+        notice its fault; calling, not_run: numbers of checks."""
         commit = str(provenance("")["commit"])
-        return Line(function, ended, calling, left, *noticed, commit, kind_of(function, self.engines))
+        return Line(function, ended, calling, not_run, *noticing, commit, kind_of(function, self.engines))
 
 
 def audit(folder: Path, progress: Progress) -> list[Line]:
-    """Audit all shared functions and return a line for each; lines that ``folder`` has already are kept.
+    """Audit all shared functions and return a table line for each. Functions that ``folder`` already has lines for are
+    not audited again.
 
     Raises InputError where the folder belongs to other functions than the sources have now.
     """
-    functions = prepare(folder)
-    with Probes(folder) as probes:
-        engines = trace_of_sides(probes, functions, progress)
+    functions = save_functions(folder)
+    with WorkerPool(folder) as probes:
+        engines = engines_by_function(probes, functions, progress)
         traced = trace(probes, functions, jobs(with_grounds=True), progress)
-        shared = in_order(shared_functions(engines))
-        lines = measured(folder / JUDGES_FILE, shared, Asked(probes, traced, True, engines), progress)
-        write(lines.values(), folder / TABLE)
+        shared = audit_order(shared_functions(engines))
+        lines = audited_lines(folder / JUDGES_FILE, shared, FaultChecks(probes, traced, True, engines), progress)
+        write_table(lines.values(), folder / TABLE)
         traced = trace(probes, functions, jobs(with_grounds=False), progress)
         doubtful = [name for name in shared if not lines[name].is_covered]
-        more = measured(folder / OTHERS_FILE, doubtful, Asked(probes, traced, False, engines), progress)
-    whole = [lines[name].with_others(more[name]) for name in doubtful]
+        more = audited_lines(folder / OTHERS_FILE, doubtful, FaultChecks(probes, traced, False, engines), progress)
+    whole = [lines[name].joined_with(more[name]) for name in doubtful]
     whole += [line for name, line in lines.items() if name not in doubtful]
-    write(whole, folder / TABLE)
+    write_table(whole, folder / TABLE)
     return whole
 
 
-def audit_of(only: str, folder: Path, progress: Progress, by: str = "*", workers: int = WORKER_COUNT) -> list[Line]:
-    """Audit the shared functions whose ``module:name`` matches ``only``, by judges alone; returns their lines.
+def audit_of(
+    function_pattern: str, folder: Path, progress: Progress, check_pattern: str = "*", workers: int = WORKER_COUNT
+) -> list[Line]:
+    """Audit the shared functions whose ``module:name`` matches a pattern, by judges (checks with independent grounds)
+    alone; returns their table lines.
 
-    by : what the names of the cases and test files that are asked are like; the fewer, the shorter the trace. Raises
-    InputError where no function or judge is like that, or as ``audit`` does.
+    check_pattern : pattern for the names of the cases and test files to run; fewer make the trace shorter. Raises
+    InputError where no function or no judge matches, or as ``audit`` does.
     """
-    functions = prepare(folder, only)
-    asked = [job for job in jobs(with_grounds=True) if fnmatchcase(job.name, by)]
+    functions = save_functions(folder, function_pattern)
+    asked = [job for job in jobs(with_grounds=True) if fnmatchcase(job.name, check_pattern)]
     if not asked:
-        raise InputError("", "by", by, "no case, and no test file that names independent grounds, is called so")
-    with Probes(folder, workers) as probes:
-        engines = trace_of_sides(probes, functions, progress)
+        allowed = "no case, and no test file that names independent grounds, is called so"
+        raise InputError("", "check_pattern", check_pattern, allowed)
+    with WorkerPool(folder, workers) as probes:
+        engines = engines_by_function(probes, functions, progress)
         traced = trace(probes, functions, asked, progress)
-        run = [name for name in shared_functions(engines) if by == "*" or traced.callers(name, judges=True)]
-        wanted = [name for name in in_order(run) if name in functions]
-        lines = measured(folder / TABLE, wanted, Asked(probes, traced, True, engines), progress)
+        run = [name for name in shared_functions(engines) if check_pattern == "*" or traced.callers(name, True)]
+        wanted = [name for name in audit_order(run) if name in functions]
+        lines = audited_lines(folder / TABLE, wanted, FaultChecks(probes, traced, True, engines), progress)
     return list(lines.values())
 
 
-def measured(path: Path, functions: list[str], asked: Asked, progress: Progress) -> dict[str, Line]:
-    """Lines of the given functions, by name: read from the file if it has them, else measured now and added to it.
+def audited_lines(path: Path, functions: list[str], checks: FaultChecks, progress: Progress) -> dict[str, Line]:
+    """Function -> table line: read from the file where it has the line, else audited now and added to the file.
 
-    The file has a line for each of them from the start on, which says that it is not audited until it is.
+    The file has a line for each function from the start; functions not yet audited are marked so.
     """
-    lines = {name: asked.line(name, NOT_AUDITED) for name in functions} | {line.function: line for line in read(path)}
+    lines = {name: checks.line(name, NOT_AUDITED) for name in functions}
+    lines |= {line.function: line for line in read_table(path)}
     left = [name for name, line in lines.items() if line.ended == NOT_AUDITED]
-    write(lines.values(), path)
-    for done, line in enumerate(asked.probes.map(asked.line_of, left), len(lines) - len(left) + 1):
+    write_table(lines.values(), path)
+    for done, line in enumerate(checks.pool.map(checks.audited_line, left), len(lines) - len(left) + 1):
         lines[line.function] = line
-        write(lines.values(), path)
+        write_table(lines.values(), path)
         progress(line.function, done / len(lines))
     return lines
 
 
-def in_order(functions: list[str]) -> list[str]:
-    """Functions sorted for the audit: compiled ones before those in Python, and in each group physical laws before
-    others."""
+def audit_order(functions: list[str]) -> list[str]:
+    """Functions in audit order: compiled functions before Python ones, and in each group physical laws first."""
     compiled = set(compiled_functions())
 
     def rank(function: str) -> tuple[bool, int]:
@@ -277,29 +287,29 @@ def in_order(functions: list[str]) -> list[str]:
 
 
 def audit_summary(lines: list[Line], folder: Path) -> list[str]:
-    """Printed summary of an audit: counts, then each function whose fault no independent check notices."""
+    """Lines of text that summarise an audit: counts, then each function whose fault no independent check notices."""
     text = [f"{len(lines)} functions, {sum(line.is_covered for line in lines)} noticed by something independent"]
     for kind, names in uncovered_functions(lines, [line.function for line in lines]).items():
         text += [f"{kind}:", *(f"  {name}" for name in names)]
     return [*text, f"table: {folder / TABLE}"]
 
 
-def judged_cases() -> list[str]:
-    """Names of the cases whose rows judge values."""
+def cases_that_judge_values() -> list[str]:
+    """Names of the validation cases whose rows judge computed values, not effort or choices."""
     systems = {name: getattr(import_module(f"validation.cases.{name}"), "SYSTEM", "") for name in CASES}
-    return [name for name, system in systems.items() if system not in UNJUDGING_SYSTEMS]
+    return [name for name, system in systems.items() if system not in SYSTEMS_WITHOUT_VALUES]
 
 
-def prepare(folder: Path, only: str = "*") -> list[str]:
-    """Functions whose ``module:name`` matches ``only``. They are saved in the folder, since the worker processes can
-    plant faults in these functions alone.
+def save_functions(folder: Path, pattern: str = "*") -> list[str]:
+    """Returns the functions whose ``module:name`` matches a pattern, and saves their names in the folder. The worker
+    processes can plant faults in these functions alone.
 
-    Raises InputError where there are none, or where the folder holds others.
+    Raises InputError where no function matches, or where the folder has other functions saved.
     """
     (folder / TRACE).mkdir(parents=True, exist_ok=True)
-    path, functions = folder / FUNCTIONS, [name for name in candidate_functions() if fnmatchcase(name, only)]
+    path, functions = folder / FUNCTIONS, [name for name in candidate_functions() if fnmatchcase(name, pattern)]
     if not functions:
-        raise InputError("--only", "", only, "no shared function is called so: module:name, as in 'models.tyre.*'")
+        raise InputError("--only", "", pattern, "no shared function is called so: module:name, as in 'models.tyre.*'")
     if path.is_file() and json.loads(path.read_text()) != functions:
         raise InputError(str(path), "", "other functions", "an audit goes on with the functions that it began with")
     write_whole(path, json.dumps(functions))
@@ -307,21 +317,21 @@ def prepare(folder: Path, only: str = "*") -> list[str]:
 
 
 def jobs(with_grounds: bool) -> list[Job]:
-    """Jobs of the trace, each in a process of its own: cases, and test files that name independent grounds; or also
-    test files that name none."""
+    """Jobs of the trace without faults: all cases, and the test files that name independent grounds, or all test files
+    without ``with_grounds``. Each job runs in a separate process."""
     files = sorted((ROOT / "tests").glob("test_*.py"))
     chosen = [str(each.relative_to(ROOT)) for each in files if not with_grounds or "mark.grounds(" in each.read_text()]
-    return [Job([name], []) for name in judged_cases()] + [Job([], [file]) for file in chosen]
+    return [Job([name], []) for name in cases_that_judge_values()] + [Job([], [file]) for file in chosen]
 
 
-def trace(probes: Probes, functions: list[str], jobs: list[Job], progress: Progress) -> Traced:
-    """Trace of cases and tests: read from the folder where it is there, else made now."""
-    lines = traced_lines(probes, functions, jobs, progress)
-    return Traced(functions, {line.get("case") or line["test"]: line for line in lines})
+def trace(probes: WorkerPool, functions: list[str], trace_jobs: list[Job], progress: Progress) -> FaultFreeTrace:
+    """Trace of cases and tests without faults: read from the audit's folder, or made now where it is missing."""
+    lines = traced_lines(probes, functions, trace_jobs, progress)
+    return FaultFreeTrace(functions, {line.get("case") or line["test"]: line for line in lines})
 
 
-def trace_of_sides(probes: Probes, functions: list[str], progress: Progress) -> dict[str, tuple[str, ...]]:
-    """Engines that share each Python function, by its name. Nothing is run where all functions are compiled."""
+def engines_by_function(probes: WorkerPool, functions: list[str], progress: Progress) -> dict[str, tuple[str, ...]]:
+    """Python function -> engines that share it, by a trace of scenes; empty where all functions are compiled."""
     if {*functions} <= {*compiled_functions()}:
         return {}
     return engines_of_functions(
@@ -329,48 +339,47 @@ def trace_of_sides(probes: Probes, functions: list[str], progress: Progress) -> 
     )
 
 
-def traced_lines(probes: Probes, functions: list[str], jobs: list[Job], progress: Progress) -> list[Told]:
-    """Trace lines of jobs, with the names of the functions that they ran. Traces are read from the folder, and made
-    where they are missing."""
+def traced_lines(probes: WorkerPool, functions: list[str], trace_jobs: list[Job], progress: Progress) -> list[LogLine]:
+    """Trace lines of jobs with the functions that they ran, read from the audit's folder or made now."""
 
     def run_once(job: Job) -> Path:
-        path = probes.folder / TRACE / job.trace
+        path = probes.folder / TRACE / job.trace_file
         if not path.is_file():
             probes.run(job, path.with_suffix(".part"), {}, ())
             path.with_suffix(".part").rename(path)
         return path
 
     paths = list[Path]()
-    for path in probes.map(run_once, jobs):
+    for path in probes.map(run_once, trace_jobs):
         paths.append(path)
-        progress(f"trace of {path.stem}", len(paths) / len(jobs))
-    lines = [line for path in sorted(paths) for line in lines_of(path)]
+        progress(f"trace of {path.stem}", len(paths) / len(trace_jobs))
+    lines = [line for path in sorted(paths) for line in logged_lines(path)]
     for line in lines:
-        line |= {kind: {functions[place] for place in line[kind]} for kind in ("ran", "numbers")}
+        line |= {kind: {functions[number] for number in line[kind]} for kind in ("ran", "numbers")}
     return lines
 
 
-def lines_of(path: Path) -> list[Told]:
-    """Lines that a process has written; a last line that was cut off is not."""
+def logged_lines(path: Path) -> list[LogLine]:
+    """Complete JSON lines that a worker process has written to its log."""
     if not path.is_file():
         return []
     return [json.loads(line) for line in path.read_text().splitlines(keepends=True) if line.endswith("\n")]
 
 
-def environment(folder: Path, doubles: Path) -> dict[str, str]:
-    """Environment variables for a worker process. They keep its machine code and bytecode in the audit's folder."""
-    place = folder.absolute()
-    order = {"functions": str(place / FUNCTIONS), "bytecode": str(place / "bytecode"), "memory": str(doubles)}
+def worker_environment(folder: Path, memory_file: Path) -> dict[str, str]:
+    """Environment variables of a worker process; its machine code and bytecode go to the audit's folder."""
+    home = folder.absolute()
+    order = {"functions": str(home / FUNCTIONS), "bytecode": str(home / "bytecode"), "memory": str(memory_file)}
     return {
         **os.environ,
         "PYTHONPATH": os.pathsep.join([str(STARTUP_SCRIPT), str(ROOT)]),
-        "NUMBA_CACHE_DIR": str(place / "machine_code"),
+        "NUMBA_CACHE_DIR": str(home / "machine_code"),
         memory.ENVIRONMENT_VARIABLE: json.dumps(order),
     }
 
 
-def unspoiled_reason(function: str, traced: Traced) -> str:
-    """Reason why no 1 % fault can be planted in a function, in the words of ``Line.ended``; "" where it can."""
+def unspoiled_reason(function: str, traced: FaultFreeTrace) -> str:
+    """Reason, as in ``Line.ended``, why no fault can be planted in a function; "" where a fault can be planted."""
     if not can_be_spoiled(*function.split(":")):
         return "not spoiled"
     if function in traced.numbers:
@@ -378,14 +387,14 @@ def unspoiled_reason(function: str, traced: Traced) -> str:
     return "no numbers" if any(function in item["ran"] for item in traced.items.values()) else "not run"
 
 
-def _failed_rows(told: list[Told]) -> Iterator[tuple[str, str]]:
-    """Failed rows of the log: id and grounds of each."""
-    for line in told:
+def _failed_rows(log_lines: list[LogLine]) -> Iterator[tuple[str, str]]:
+    """Id and grounds (independence) of each failed report row in a worker's log."""
+    for line in log_lines:
         for row in line.get("rows", ()):
             if row["status"] == "failed":
                 yield row["id"], row["independence"]
 
 
-def _failed_tests(told: list[Told]) -> Iterator[tuple[str, str]]:
-    """Failed tests of the log: id and grounds of each."""
-    return ((line["test"], line["grounds"]) for line in told if line.get("failed"))
+def _failed_tests(log_lines: list[LogLine]) -> Iterator[tuple[str, str]]:
+    """Id and grounds (independence) of each failed test in a worker's log."""
+    return ((line["test"], line["grounds"]) for line in log_lines if line.get("failed"))

@@ -1,4 +1,5 @@
-"""``spoiling`` in compiled code, whose factors are read from memory as it runs: a new fault compiles nothing."""
+"""Planted faults in compiled functions: factors are read from memory at run time, so that a new fault needs no
+compilation."""
 
 from typing import Any
 
@@ -16,19 +17,19 @@ _intrinsic: Any = intrinsic
 llvmlite.binding.add_symbol(ADDRESS_SYMBOL, ADDRESS)
 
 
-def _pointer(builder: Any, row: int, place: Any) -> Any:
-    """Address of a function's entry in a row of ``memory`` (faults, functions that ran, functions that gave
-    numbers)."""
+def _pointer(builder: Any, row: int, number: Any) -> Any:
+    """Address of a function's entry in a row of the shared memory (0: faults, 1: functions that ran, 2: functions that
+    gave numbers)."""
     double = ir.DoubleType()
     rows = builder.module.globals.get(ADDRESS_SYMBOL)
     rows = rows or ir.GlobalVariable(builder.module, ir.ArrayType(double, 3 * MOST_FUNCTIONS), ADDRESS_SYMBOL)
     whole = ir.IntType(64)
-    return builder.gep(rows, [whole(0), builder.add(place, whole(row * MOST_FUNCTIONS))])
+    return builder.gep(rows, [whole(0), builder.add(number, whole(row * MOST_FUNCTIONS))])
 
 
 @_intrinsic
-def ran(typingctx: Any, place: Any) -> Any:
-    """Compiled marker: record that a function ran which returns no number."""
+def mark_as_run(typingctx: Any, number: Any) -> Any:
+    """In compiled code, record that a function without numeric result ran."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         builder.store(ir.DoubleType()(1.0), _pointer(builder, 1, arguments[0]))
@@ -38,9 +39,9 @@ def ran(typingctx: Any, place: Any) -> Any:
 
 
 @_intrinsic
-def factor(typingctx: Any, place: Any) -> Any:
-    """Compiled marker: record that a function ran and gave a number. Returns the factor of its planted fault, 1 without
-    a fault."""
+def fault_factor(typingctx: Any, number: Any) -> Any:
+    """In compiled code, record that a function ran and gave a number. Returns the factor of its planted fault, 1
+    without a fault."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         double = ir.DoubleType()
@@ -53,19 +54,19 @@ def factor(typingctx: Any, place: Any) -> Any:
     return types.float64(types.int64), generate
 
 
-def _same(value, place):
-    ran(place)
+def _unchanged(value, number):
+    mark_as_run(number)
     return value
 
 
-def _product(value, place):
-    return value * factor(place)
+def _faulty_number(value, number):
+    return value * fault_factor(number)
 
 
-def _product_if_off(value, place):
-    """The value times the fault's factor. Without a fault it is the same array, because the caller may write into
+def _faulty_array(value, number):
+    """The array times the fault's factor. Without a fault the same array is returned, as the caller may write into
     it."""
-    by = factor(place)
+    by = fault_factor(number)
     return value if by == 1.0 else value * by
 
 
@@ -74,66 +75,68 @@ def _is_number(kind: Any) -> bool:
 
 
 @overload(spoiled)
-def _spoiled(value, place):
-    """Choose the compiled function that plants the fault in a value of this type. An array stays unchanged where the
-    compiled function may not allocate another one (``lean``)."""
+def _compiled_spoiled(value, number):
+    """Returns the compiled function that plants the fault in a value of this type. An array stays unchanged where the
+    function being compiled may not allocate memory (``lean``)."""
     if _is_number(value):
-        return _product
-    if isinstance(value, types.BaseTuple) and any(_is_number(part) or _makes_arrays(part) for part in _parts(value)):
-        return _tuple(value)
-    return _product_if_off if _makes_arrays(value) else _same
+        return _faulty_number
+    if isinstance(value, types.BaseTuple) and any(
+        _is_number(part) or _is_copyable_array(part) for part in _element_types(value)
+    ):
+        return _faulty_tuple_function(value)
+    return _faulty_array if _is_copyable_array(value) else _unchanged
 
 
-def _parts(kind: Any) -> list[Any]:
-    """Types of all elements of a tuple type, those of nested tuples included."""
-    return [inner for part in kind for inner in (_parts(part) if isinstance(part, types.BaseTuple) else [part])]
+def _element_types(kind: Any) -> list[Any]:
+    """Types of all elements of a tuple type, including the elements of nested tuples."""
+    return [inner for part in kind for inner in (_element_types(part) if isinstance(part, types.BaseTuple) else [part])]
 
 
-def _makes_arrays(kind: Any) -> bool:
-    """Whether the type is an array of numbers, and the function being compiled may allocate arrays."""
+def _is_copyable_array(kind: Any) -> bool:
+    """Whether a type is an array of numbers and the function being compiled may allocate a copy."""
     flags = ConfigStack.top_or_none()
     is_array = isinstance(kind, types.Array) and _is_number(kind.dtype)
     return is_array and flags is not None and bool(flags.nrt)
 
 
-def _tuple(kind: Any) -> Any:
-    """A compiled function that plants the fault in each element of a tuple of this type."""
-    parts = ", ".join(f"spoiled(value[{i}], place)" for i in range(len(kind)))
+def _faulty_tuple_function(kind: Any) -> Any:
+    """Returns a compiled function that plants the fault in each element of a tuple of this type."""
+    parts = ", ".join(f"spoiled(value[{i}], number)" for i in range(len(kind)))
     made = f"cls({parts})" if isinstance(kind, types.BaseNamedTuple) else f"({parts},)"
     names = {"spoiled": spoiled, "cls": getattr(kind, "instance_class", tuple)}
-    exec(f"def whole(value, place):\n    return {made}\n", names)
-    return names["whole"]
+    exec(f"def with_fault(value, number):\n    return {made}\n", names)
+    return names["with_fault"]
 
 
 @overload(scaled)
-def _scaled(values, place):
+def _compiled_scaled(values, number):
     if not isinstance(values, types.Array) or not values.mutable:
-        return lambda values, place: ran(place)
+        return lambda values, number: mark_as_run(number)
     if isinstance(values.dtype, types.Record):
-        return _records(values.dtype)
+        return _record_scaler(values.dtype)
     if not _is_number(values.dtype):
-        return lambda values, place: ran(place)
+        return lambda values, number: mark_as_run(number)
 
-    def whole(values, place):
-        by = factor(place)
+    def with_fault(values, number):
+        by = fault_factor(number)
         if by != 1.0:
             for each in np.ndindex(values.shape):
                 values[each] *= by
 
-    return whole
+    return with_fault
 
 
-def _records(kind: types.Record) -> Any:
-    """A compiled function that multiplies all fields of an array of such records by the fault's factor."""
+def _record_scaler(kind: types.Record) -> Any:
+    """Returns a compiled function that multiplies all fields of an array of records by the fault's factor."""
     lines = "".join(f"            record.{name} = by * record.{name}\n" for name in kind.fields)
-    names = {"np": np, "factor": factor}
+    names = {"np": np, "fault_factor": fault_factor}
     loop = "        for each in np.ndindex(values.shape):\n            record = values[each]\n"
-    exec(f"def whole(values, place):\n    by = factor(place)\n    if by != 1.0:\n{loop}{lines}", names)
-    return names["whole"]
+    exec(f"def with_fault(values, number):\n    by = fault_factor(number)\n    if by != 1.0:\n{loop}{lines}", names)
+    return names["with_fault"]
 
 
 @overload(put)
-def _put(value, into, place):
+def _compiled_put(value, into, number):
     if isinstance(into, types.Array) or not isinstance(value, types.Float | types.BaseTuple):
-        return lambda value, into, place: value
-    return lambda value, into, place: spoiled(value, place)
+        return lambda value, into, number: value
+    return lambda value, into, number: spoiled(value, number)

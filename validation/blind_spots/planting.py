@@ -1,8 +1,8 @@
-"""Change of a process by an audit before it imports anything: shared functions multiply their results by a factor.
+"""Import hook of the audit's processes: shared functions are rewritten on import to multiply their results by a factor.
 
-The environment names the functions, so that the workers of a process are treated as it is. Files on the disk stay as
-they are: modules are rewritten as they are imported. All factors are 1 but where the memory of the process says
-otherwise, so that machine code is compiled once, for every function that is spoiled after that.
+An environment variable names the functions, so that worker processes are changed in the same way. Files on the disk are
+not changed. All factors are 1 except where the shared memory states a fault, so that machine code is compiled once, for
+all faults.
 """
 
 import json
@@ -11,53 +11,53 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from typing import Any
 
-from validation.blind_spots.memory import order
+from validation.blind_spots.memory import audit_instructions
 
 
-def start() -> None:
-    """Install the import hook that plants faults, if the environment asks for it."""
-    if order():
-        sys.meta_path.insert(0, Planter(json.loads(Path(order()["functions"]).read_text())))
+def install_import_hook() -> None:
+    """Install the import hook that rewrites functions for planted faults, if this process belongs to an audit."""
+    if audit_instructions():
+        sys.meta_path.insert(0, Planter(json.loads(Path(audit_instructions()["functions"]).read_text())))
 
 
 class Planter:
-    """Import hook for modules with given functions: it rewrites these functions as their module is imported.
+    """Import hook that rewrites given functions when their module is imported, so that faults can be planted in them.
 
-    functions : ``module:name`` of each; its place in this list is the place of its factor.
+    functions : ``module:name`` of each function; its position in this list is its number.
     """
 
     def __init__(self, functions: list[str]) -> None:
         self.modules: dict[str, dict[str, int]] = {}
-        for place, function in enumerate(functions):
+        for number, function in enumerate(functions):
             module, _, name = function.partition(":")
-            self.modules.setdefault(module, {})[name] = place
+            self.modules.setdefault(module, {})[name] = number
 
     def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
-        """Import specification, with a rewriting loader, of a module whose functions are to be rewritten; None for any
-        other module."""
+        """Import specification of a module whose functions are to be rewritten, with a loader that rewrites them; None
+        for any other module."""
         if fullname not in self.modules:
             return None
         spec = PathFinder.find_spec(fullname, path, target)
         if spec is not None and spec.origin is not None:
-            spec.loader = _Rewriting(fullname, spec.origin, self.modules[fullname])
+            spec.loader = _RewritingLoader(fullname, spec.origin, self.modules[fullname])
         return spec
 
 
-class _Rewriting(SourceFileLoader):
-    def __init__(self, fullname: str, path: str, names: dict[str, int]) -> None:
+class _RewritingLoader(SourceFileLoader):
+    def __init__(self, fullname: str, path: str, function_numbers: dict[str, int]) -> None:
         super().__init__(fullname, path)
-        self.names = names
+        self.names = function_numbers
 
     def get_code(self, fullname: str) -> Any:
-        """Code of the rewritten module. Its bytecode is cached apart from that of the original source."""
-        earlier, sys.pycache_prefix = sys.pycache_prefix, order()["bytecode"]
+        """Code of the rewritten module. Its bytecode is cached in a separate folder from the original's bytecode."""
+        earlier, sys.pycache_prefix = sys.pycache_prefix, audit_instructions()["bytecode"]
         try:
             return super().get_code(fullname)
         finally:
             sys.pycache_prefix = earlier
 
     def source_to_code(self, data: Any, path: Any, *, _optimization: int = -1) -> Any:  # type: ignore[override]
-        from validation.blind_spots.rewriting import rewritten
+        from validation.blind_spots.rewriting import rewritten_module
 
-        parsed = rewritten(bytes(data).decode(), self.name, self.names)
+        parsed = rewritten_module(bytes(data).decode(), self.name, self.names)
         return compile(parsed, path, "exec", dont_inherit=True, optimize=_optimization)

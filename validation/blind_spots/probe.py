@@ -1,12 +1,12 @@
-"""A process of an audit: runs cases, tests and scenes, and tells what of each failed and which functions it ran.
+"""Worker process of an audit: runs cases, tests and scenes, and logs what failed and which functions ran.
 
-It reads jobs from its standard input and imports the cases that they name, and what the named tests and runs import,
-each once, without a fault. For each job it starts a fork of itself, in which nothing is left of an earlier fault, and
-answers how that has ended. A job is a line of JSON: "cases", "tests" (what pytest is given) and "runs"
-(``sides.Run``); "out", a file to which a line of JSON is added for each of them that has ended; "faults", by the place
-of the function; "sound", ids that fail without a fault; "patience", seconds of the processor after which the fork is
-stopped; and "budgets", seconds of the processor after which nothing more begins: if something independent has noticed,
-and if not.
+It reads jobs from its standard input and imports the cases that they name, and the modules that the named tests and
+runs import, each once, without a fault. For each job it forks, so that no earlier fault remains, and prints how the
+fork ended. A job is a line of JSON: "cases", "tests" (pytest's arguments) and "runs" (``sides.Run``); "out", a log file
+to which a line of JSON is added for each case, test or run that has ended; "faults" by the number of the function;
+"sound", ids that fail without a fault; "patience", processor time (s) after which the fork is stopped; and "budgets",
+processor times (s) after which no other check begins: where an independent check has noticed the fault, and where none
+has.
 """
 
 import json
@@ -37,50 +37,50 @@ def processor_time() -> float:
     return sum(os.times()[:4])
 
 
-class Compiling(event.Listener):
-    """Timer of the processor time (s) that numba's compilation takes."""
+class CompilationTimer(event.Listener):
+    """Timer that sums up the processor time (s) of numba's compilations."""
 
     def __init__(self) -> None:
         self.seconds, self.depth, self.start = 0.0, 0, 0.0
 
     def on_start(self, event: Any) -> None:
-        """numba starts to compile, perhaps within another compilation."""
+        """Called when numba starts a compilation, perhaps within another compilation; starts the timer."""
         self.start = processor_time() if self.depth == 0 else self.start
         self.depth += 1
 
     def on_end(self, event: Any) -> None:
-        """numba has finished a compilation."""
+        """Called when numba has finished a compilation; stops the timer after the outermost compilation."""
         self.depth -= 1
         self.seconds += processor_time() - self.start if self.depth == 0 else 0.0
 
 
-class Told:
-    """Log of a job: writes to its file how each case or test ended, the functions that it ran, and its time without
-    compilation."""
+class JobLog:
+    """Log of a job: writes to a file how each case or test ended, which functions it ran, and its processor time
+    without compilation."""
 
     def __init__(self, job: dict[str, Any]) -> None:
-        self.out, self.sound, self.budgets = Path(job["out"]), set(job["sound"]), job["budgets"]
-        self.refused, self.noticed, self.start = False, False, 0.0
-        self.compiling = Compiling()
-        event.register("numba:compiler_lock", self.compiling)
-        self.first = self.clock()
+        self.out, self.failing_already, self.budgets = Path(job["out"]), set(job["sound"]), job["budgets"]
+        self.refused, self.is_noticed, self.start = False, False, 0.0
+        self.compilation_timer = CompilationTimer()
+        event.register("numba:compiler_lock", self.compilation_timer)
+        self.job_start = self.clock()
 
     def clock(self) -> float:
-        """Processor time (s) so far without numba's compilations."""
-        return processor_time() - self.compiling.seconds
+        """Processor time (s) of this process until now, without numba's compilations."""
+        return processor_time() - self.compilation_timer.seconds
 
-    def is_enough(self) -> bool:
+    def budget_is_used(self) -> bool:
         """Whether the job has used up its budget of processor time."""
-        return self.clock() - self.first > self.budgets[0 if self.noticed else 1]
+        return self.clock() - self.job_start > self.budgets[0 if self.is_noticed else 1]
 
     def begin(self) -> None:
-        """Record that a case or test begins."""
+        """Start the log of a case or test."""
         self.start, self.refused = self.clock(), False
-        memory.forget()
+        memory.clear_marks()
 
     def end(self, line: dict[str, Any], failed: list[tuple[str, str]]) -> None:
-        """Record that a case or test has ended; failed: ids and grounds of what failed."""
-        self.noticed |= any(id not in self.sound and is_independent(id, grounds) for id, grounds in failed)
+        """Write the log line of a case or test that has ended. failed: ids and grounds of its failed rows or tests."""
+        self.is_noticed |= any(id not in self.failing_already and is_independent(id, grounds) for id, grounds in failed)
         line |= {
             "ran": memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN),
             "numbers": memory.nonzero_functions(memory.FUNCTIONS_WITH_NUMBERS),
@@ -90,8 +90,8 @@ class Told:
             file.write(json.dumps(line) + "\n")
 
 
-def run_case(name: str, log: Told) -> None:
-    """Run the quick share of a case and log it; a case that raises an error counts as one failed row."""
+def run_case(name: str, log: JobLog) -> None:
+    """Run the quick rows of a validation case and log them; a case that raises an error counts as a failed row."""
     from validation.common.rows import rows_on_grounds
 
     log.begin()
@@ -104,13 +104,13 @@ def run_case(name: str, log: Told) -> None:
         ]
     except Exception as error:
         lines = [{"id": f"{name}.broken", "status": "failed", "independence": "none"}]
-        log.refused |= is_of_numba(error)
+        log.refused |= is_numba_error(error)
     failed = [(line["id"], line["independence"]) for line in lines if line["status"] == "failed"]
     log.end({"case": name, "rows": lines}, failed)
 
 
-def run_scene(scene: str, engine: str, log: Told) -> None:
-    """Run a scene in an engine and log it; functions of a refused or failed run do not count as shared."""
+def run_scene(scene: str, engine: str, log: JobLog) -> None:
+    """Run a scene in an engine and log the functions that it called; a refused or failed run is not logged."""
     from models.systems import run
 
     read = prepared_scene(scene)
@@ -120,76 +120,75 @@ def run_scene(scene: str, engine: str, log: Told) -> None:
         log.end({"run": [scene, engine]}, [])
 
 
-def is_of_numba(error: BaseException) -> bool:
-    """Whether the error is numba's refusal to compile a function. The planted fault then caused it, and no row has
-    noticed anything."""
+def is_numba_error(error: BaseException) -> bool:
+    """Whether an error is numba's refusal to compile a function. The rewriting then caused the failure, and no check
+    has noticed the fault."""
     return type(error).__module__.startswith("numba.")
 
 
-class Watching:
-    """Plug-in for pytest that logs how each test ended."""
+class TestLogger:
+    """Plug-in for pytest that writes to a job's log how each test ended."""
 
-    def __init__(self, log: Told) -> None:
-        self.told, self.failed = log, False
+    def __init__(self, log: JobLog) -> None:
+        self.log, self.failed = log, False
         self.session: pytest.Session | None = None
 
     def pytest_sessionstart(self, session: pytest.Session) -> None:
-        """Keep pytest's session, which is stopped when the budget is used up."""
+        """Store pytest's session, which is stopped when the job's budget is used up."""
         self.session = session
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
-        """A test begins."""
+        """Start the log of a test."""
         self.failed = False
-        self.told.begin()
+        self.log.begin()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Record whether the set-up, call or tear-down of a test failed."""
+        """Record whether the set-up, call or tear-down of a test failed, and log the test after its tear-down."""
         self.failed |= report.failed
         if report.when == "teardown":
             marked = str(dict(report.user_properties).get("grounds", ""))
             line = {"test": report.nodeid, "failed": self.failed, "grounds": marked}
-            self.told.end(line, [(report.nodeid, marked)] if self.failed else [])
-            if self.session is not None and self.told.is_enough():
+            self.log.end(line, [(report.nodeid, marked)] if self.failed else [])
+            if self.session is not None and self.log.budget_is_used():
                 self.session.shouldstop = "the budget is used"
 
     def pytest_runtest_makereport(self, item: pytest.Item, call: pytest.CallInfo) -> None:
-        """Note that numba refused a function."""
+        """Record whether a test failed because numba refused to compile a function."""
         if call.excinfo is not None:
-            self.told.refused |= is_of_numba(call.excinfo.value)
+            self.log.refused |= is_numba_error(call.excinfo.value)
 
     def pytest_runtest_setup(self, item: pytest.Item) -> None:
-        """Record the independent grounds that a test names."""
+        """Record the independent grounds that a test states by its mark ``grounds``."""
         marker = item.get_closest_marker("grounds")
         if marker:
             item.user_properties.append(("grounds", marker.args[0]))
 
 
-def work(job: dict[str, Any]) -> None:
-    """Plant the faults of a job, then run its scenes or its tests, and then its cases as long as its budget lasts.
-    Scene runs form jobs of their own."""
+def run_job(job: dict[str, Any]) -> None:
+    """Plant the faults of a job, then run its scenes, its tests, and its cases as long as its budget lasts."""
     signal.setitimer(signal.ITIMER_PROF, job["patience"])
-    for place, fault in job["faults"].items():
-        memory.FAULTS[int(place)] = fault
-    told = Told(job)
+    for number, fault in job["faults"].items():
+        memory.FAULTS[int(number)] = fault
+    log = JobLog(job)
     for scene, engine in job["runs"]:
-        run_scene(scene, engine, told)
+        run_scene(scene, engine, log)
     if job["tests"]:
-        pytest.main(["-q", "-p", "no:cacheprovider", "--tb=no", *job["tests"]], plugins=[Watching(told)])
+        pytest.main(["-q", "-p", "no:cacheprovider", "--tb=no", *job["tests"]], plugins=[TestLogger(log)])
     for name in job["cases"]:
-        if not told.is_enough():
-            run_case(name, told)
+        if not log.budget_is_used():
+            run_case(name, log)
 
 
-def imported_by(tests: list[str]) -> list[str]:
-    """Modules that test files import at their top level; the tests are given as pytest's arguments."""
+def modules_of_tests(tests: list[str]) -> list[str]:
+    """Modules of the project that test files import; the tests are given as pytest's arguments."""
     files = dict.fromkeys(test.partition("::")[0] for test in tests)
     return list(
         dict.fromkeys(name for file in files for name in IMPORT_PATTERN.findall((ROOT / file).read_text("utf-8")))
     )
 
 
-def imported_by_runs(runs: list[Run]) -> list[str]:
-    """Modules to import before scenes are run: all systems and engines; none if the job has no runs."""
+def modules_of_runs(runs: list[Run]) -> list[str]:
+    """Modules to import before scenes are run: those of all systems and engines; none if the job runs no scene."""
     return (
         sorted(name for name in all_modules() if name.startswith(("models.systems.", "models.engines.")))
         if runs
@@ -198,16 +197,16 @@ def imported_by_runs(runs: list[Run]) -> list[str]:
 
 
 def run_in_fork(job: dict[str, Any]) -> str:
-    """Run a job in a forked process; returns how it ended, in the words of ``Line.run_in_fork``."""
+    """Run a job in a forked process. Returns how the process ended: "whole", "out of time" or "crashed"."""
     memory.clear(memory.FAULTS)
     named = [f"validation.cases.{name}" for name in job["cases"]]
-    for module in [*named, *imported_by(job["tests"]), *imported_by_runs(job["runs"])]:
+    for module in [*named, *modules_of_tests(job["tests"]), *modules_of_runs(job["runs"])]:
         with suppress(Exception):  # a module that breaks as it is imported breaks again where its case or test is run
             import_module(module)
     child = os.fork()
     if child == 0:
         with suppress(BaseException):
-            work(job)
+            run_job(job)
             os._exit(0)
         os._exit(1)
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
@@ -215,7 +214,8 @@ def run_in_fork(job: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Run one job after the other until there are no more; their printed output is discarded."""
+    """Run jobs, read from standard input, one after the other, and print how each ended; output of the jobs is
+    discarded."""
     answers = os.fdopen(os.dup(1), "w")
     nowhere = os.open(os.devnull, os.O_RDWR)
     os.dup2(nowhere, 1)

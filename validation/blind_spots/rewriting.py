@@ -1,8 +1,9 @@
-"""The source of a module whose functions can be spoiled: what they return, yield or write into their arguments.
+"""Rewriting of a module so that faults can be planted in what its functions return, yield or write into arguments.
 
-Numbers that one puts into an argument, or into a part of one, are spoiled as they are put there. An array that
-functions which it calls write into is spoiled as a whole instead, where it ends; so is an array that it sees behind a
-pointer. Where it sees none, nobody knows the length, and the numbers are that those functions are given.
+A number that a function assigns into an argument, or into an element of an argument, is multiplied by the fault's
+factor as it is assigned. An array argument that the functions which it calls write into is multiplied as a whole, at
+the function's end; so is an array that it creates over a pointer. Where it creates none, the array's length is unknown,
+and the numbers passed to the called functions are multiplied instead.
 """
 
 import ast
@@ -17,12 +18,12 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 SPOILED, SCALED, PUT = "_spoiled_by_audit", "_scaled_by_audit", "_put_by_audit"
 HELPERS = {"spoiled": SPOILED, "scaled": SCALED, "put": PUT}
-"""Functions of ``spoiling``, and their names in a rewritten module."""
+"""Function of ``spoiling`` that plants a fault -> its name in a rewritten module."""
 COMPILER_PATTERN = re.compile(r"\bnumba\b|machine\.compiled")
-"""What the source of a module names that compiles functions."""
+"""Pattern in the source of a module that compiles functions with numba."""
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 VIEW_FUNCTIONS = ("array_at", "double_at", "row", "array", "beyond", "start", "at", "records", "reshape", "ravel")
-"""Functions that give a view of their first argument: those of ``models.machine``, and numpy's."""
+"""Functions of ``models.machine`` and numpy that return a view of their first argument."""
 
 
 class NoSuchFunction(Exception):
@@ -30,8 +31,8 @@ class NoSuchFunction(Exception):
 
 
 @cache
-def text(module: str) -> str:
-    """The source of a module of the project."""
+def source_text(module: str) -> str:
+    """Source text of a module of the project."""
     path = ROOT.joinpath(*module.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     return file.read_text(encoding="utf-8")
@@ -39,49 +40,49 @@ def text(module: str) -> str:
 
 @cache
 def module_tree(module: str) -> ast.Module:
-    """The parsed source of a module of the project."""
-    return ast.parse(text(module))
+    """Syntax tree of a module of the project."""
+    return ast.parse(source_text(module))
 
 
-def function_of(parsed: ast.AST, name: str) -> Function:
-    """The definition with this qualified name; raises NoSuchFunction."""
-    place: ast.AST = parsed
+def function_definition(parsed: ast.AST, name: str) -> Function:
+    """Syntax tree of the function with a qualified name. Raises NoSuchFunction where there is none."""
+    scope: ast.AST = parsed
     for part in name.replace(".<locals>", "").split("."):
         inner = [
-            each for each in _nodes_of_block(place) if isinstance(each, Function | ast.ClassDef) and each.name == part
+            each for each in _nodes_of_block(scope) if isinstance(each, Function | ast.ClassDef) and each.name == part
         ]
         if not inner:
             raise NoSuchFunction(name)
-        place = inner[-1]
-    if not isinstance(place, Function):
+        scope = inner[-1]
+    if not isinstance(scope, Function):
         raise NoSuchFunction(name)
-    return place
+    return scope
 
 
 def _nodes_of_block(node: ast.AST) -> Iterator[ast.AST]:
-    """Nodes of a function's block, except those inside nested functions and classes."""
+    """Syntax nodes of a function's block, without nodes inside nested functions and classes."""
     for child in ast.iter_child_nodes(node):
         yield child
         if not isinstance(child, Function | ast.ClassDef | ast.Lambda):
             yield from _nodes_of_block(child)
 
 
-def parameters(function: Function) -> list[str]:
-    """Names of a function's arguments, without the object of a method."""
+def argument_names(function: Function) -> list[str]:
+    """Names of a function's arguments, without ``self`` and ``cls``."""
     given = [each.arg for each in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)]
     return [name for name in given if name not in ("self", "cls")]
 
 
-def roots_of_names(function: Function) -> dict[str, str]:
-    """Names that refer to an argument of the function or to a view of it, each with the argument's name."""
-    known = {name: name for name in parameters(function)}
+def argument_of_names(function: Function) -> dict[str, str]:
+    """Name in a function -> name of the argument that it refers to or is a view of."""
+    argument_of = {name: name for name in argument_names(function)}
     for node in _nodes_of_block(function):
         if isinstance(node, ast.Assign):
             for target, value in _assigned_pairs(node):
-                root = root_of(value, known)
+                root = root_argument(value, argument_of)
                 if isinstance(target, ast.Name) and root and not isinstance(value, ast.BinOp):
-                    known.setdefault(target.id, root)
-    return known
+                    argument_of.setdefault(target.id, root)
+    return argument_of
 
 
 def _assigned_pairs(node: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
@@ -92,8 +93,8 @@ def _assigned_pairs(node: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
             yield target, node.value
 
 
-def root_of(node: ast.expr, known: dict[str, str]) -> str:
-    """Name of the argument of which an expression is an element, attribute or view; "" for none."""
+def root_argument(node: ast.expr, argument_of: dict[str, str]) -> str:
+    """Name of the argument that an expression is an element, attribute or view of; "" for none."""
     while isinstance(node, ast.Subscript | ast.Attribute | ast.Call):
         if isinstance(node, ast.Call):
             inner = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
@@ -102,18 +103,20 @@ def root_of(node: ast.expr, known: dict[str, str]) -> str:
             node = node.args[0] if isinstance(node.func, ast.Name) and node.args else node.func
         else:
             node = node.value
-    return known.get(node.id, "") if isinstance(node, ast.Name) else ""
+    return argument_of.get(node.id, "") if isinstance(node, ast.Name) else ""
 
 
-def _written_arguments(node: ast.AST, known: dict[str, str]) -> set[str]:
-    """Names of the arguments that an assignment writes into."""
+def _written_arguments(node: ast.AST, argument_of: dict[str, str]) -> set[str]:
+    """Names of the arguments that an assignment statement writes into."""
     targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AugAssign) else []
     parts = [part for target in targets for part in (target.elts if isinstance(target, ast.Tuple) else [target])]
-    return {root_of(part, known) for part in parts if isinstance(part, ast.Subscript | ast.Attribute)} - {""}
+    return {root_argument(part, argument_of) for part in parts if isinstance(part, ast.Subscript | ast.Attribute)} - {
+        ""
+    }
 
 
 def _defining_module(module: str, name: str) -> tuple[str, str] | None:
-    """Module and name where a name used in a module is defined; None for names from outside the project."""
+    """Module and original name of a name that a module uses; its import from ``models`` is followed."""
     for node in ast.walk(module_tree(module)):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("models"):
             for each in node.names:
@@ -124,79 +127,84 @@ def _defining_module(module: str, name: str) -> tuple[str, str] | None:
 
 @cache
 def original_definition(module: str, name: str) -> Function | None:
-    """Definition of a function in the unchanged sources; None if there is none."""
+    """Syntax tree of a function in the unchanged source; None if there is no such function."""
     try:
-        return function_of(module_tree(module), name)
+        return function_definition(module_tree(module), name)
     except (NoSuchFunction, OSError):
         return None
 
 
 @cache
-def written_arguments(module: str, name: str) -> frozenset[str]:
-    """Arguments of a function that it passes to other functions which write into them. A function that is being
-    examined already, in a recursion, counts as writing nothing."""
+def arguments_written_by_callees(module: str, name: str) -> frozenset[str]:
+    """Names of a function's arguments that it passes to other functions which write into them. In a recursion, a
+    function already being examined counts as writing nothing."""
     function = original_definition(module, name)
-    if function is None or (module, name) in _functions_asked:
+    if function is None or (module, name) in _functions_in_progress:
         return frozenset()
-    _functions_asked.add((module, name))
-    known, touched = roots_of_names(function), set[str]()
+    _functions_in_progress.add((module, name))
+    argument_of, touched = argument_of_names(function), set[str]()
     for node in _nodes_of_block(function):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            touched |= arguments_handed_on((module, name), node, known)
-    _functions_asked.remove((module, name))
+            touched |= arguments_written_by_call((module, name), node, argument_of)
+    _functions_in_progress.remove((module, name))
     return frozenset(touched)
 
 
-_functions_asked: set[tuple[str, str]] = set()
+_functions_in_progress: set[tuple[str, str]] = set()
 
 
-def arguments_handed_on(caller: tuple[str, str], call: ast.Call, known: dict[str, str]) -> set[str]:
-    """Names of the caller's arguments that a call passes to a function which writes into them; caller: module and
-    name."""
-    place = _defining_module(caller[0], getattr(call.func, "id", ""))
-    if place is None or place == caller:
+def arguments_written_by_call(caller: tuple[str, str], call: ast.Call, argument_of: dict[str, str]) -> set[str]:
+    """Names of the caller's arguments that a call passes to a function which writes into them. caller: module and name
+    of the calling function."""
+    definition = _defining_module(caller[0], getattr(call.func, "id", ""))
+    if definition is None or definition == caller:
         return set()
-    callee = original_definition(*place)
+    callee = original_definition(*definition)
     if callee is None:
         return set()
-    inner = roots_of_names(callee)
-    touched = set().union(*(_written_arguments(node, inner) for node in _nodes_of_block(callee))) | written_arguments(
-        *place
-    )
-    pairs = zip(call.args, parameters(callee), strict=False)
-    return {root_of(given, known) for given, parameter in pairs if parameter in touched} - {""}
+    inner = argument_of_names(callee)
+    touched = set().union(
+        *(_written_arguments(node, inner) for node in _nodes_of_block(callee))
+    ) | arguments_written_by_callees(*definition)
+    pairs = zip(call.args, argument_names(callee), strict=False)
+    return {root_argument(given, argument_of) for given, parameter in pairs if parameter in touched} - {""}
 
 
-def arrays_behind(function: Function, known: dict[str, str], roots: set[str]) -> dict[str, list[ast.Call]]:
-    """Arrays that a function creates over pointers with ``array(pointer, shape)``, by the pointer's argument. Only
-    calls count whose names are arguments or occur in assignments at the function's top level."""
-    outermost = {*parameters(function)}
+def arrays_over_pointers(function: Function, argument_of: dict[str, str], roots: set[str]) -> dict[str, list[ast.Call]]:
+    """Pointer argument of a function -> calls ``array(pointer, shape)`` that create arrays over it. Only calls count
+    whose names are arguments or occur in assignments at the function's top level."""
+    outermost = {*argument_names(function)}
     for statement in function.body:
         if isinstance(statement, ast.Assign):
             outermost |= {each.id for each in ast.walk(statement) if isinstance(each, ast.Name)}
-    behind = dict[str, list[ast.Call]]()
+    arrays = dict[str, list[ast.Call]]()
     for node in _nodes_of_block(function):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "array":
             pointer, names = node.args[0], {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
-            root = known.get(pointer.id, "") if isinstance(pointer, ast.Name) else ""
+            root = argument_of.get(pointer.id, "") if isinstance(pointer, ast.Name) else ""
             if root in roots and names <= outermost | {"array"}:
-                behind.setdefault(root, []).append(node)
-    return {root: list({ast.unparse(each): each for each in calls}.values()) for root, calls in behind.items()}
+                arrays.setdefault(root, []).append(node)
+    return {root: list({ast.unparse(each): each for each in calls}.values()) for root, calls in arrays.items()}
 
 
-class _Spoil(ast.NodeTransformer):
-    """Rewrites one function so that its results carry the fault. caller: its module and name; last: arguments that are
-    scaled when the function ends; behind: arrays over those of them that are pointers, see ``arrays_behind``."""
+class _FaultRewriter(ast.NodeTransformer):
+    """Rewriter of a function whose results are to be multiplied by the fault's factor. caller: the function's module
+    and name; scaled_arguments: arguments that are multiplied when the function ends; number: of the function."""
 
-    def __init__(self, caller: tuple[str, str], function: Function, last: list[str], place: int) -> None:
-        self.caller, self.known, self.last, self.place = caller, roots_of_names(function), last, place
-        self.behind = {
+    def __init__(self, caller: tuple[str, str], function: Function, scaled_arguments: list[str], number: int) -> None:
+        self.caller, self.argument_of, self.scaled_arguments, self.number = (
+            caller,
+            argument_of_names(function),
+            scaled_arguments,
+            number,
+        )
+        self.arrays = {
             root: [copy.deepcopy(each) for each in calls]
-            for root, calls in arrays_behind(function, self.known, {*last}).items()
+            for root, calls in arrays_over_pointers(function, self.argument_of, {*scaled_arguments}).items()
         }
 
     def body(self, statements: list[ast.stmt]) -> list[ast.stmt]:
-        """The rewritten statements of the function's body."""
+        """Rewritten statements of the function's body."""
         made: list[ast.stmt] = []
         for statement in statements:
             new = self.visit(statement)
@@ -211,7 +219,7 @@ class _Spoil(ast.NodeTransformer):
     def visit_Return(self, node: ast.Return) -> list[ast.stmt]:
         if node.value is None or (isinstance(node.value, ast.Constant) and node.value.value is None):
             return [*self._endings(), node]
-        if not self.last:
+        if not self.scaled_arguments:
             return [ast.Return(self._spoiled(node.value))]
         held = ast.Assign([ast.Name("_given_by_audit", ast.Store())], self._spoiled(node.value))
         return [held, *self._endings(), ast.Return(ast.Name("_given_by_audit", ast.Load()))]
@@ -220,10 +228,16 @@ class _Spoil(ast.NodeTransformer):
         return ast.Yield(self._spoiled(node.value)) if node.value else node
 
     def visit_Expr(self, node: ast.Expr) -> ast.Expr:
-        """Spoil the value that a call writes behind a pointer before the call; an array is spoiled at the end."""
+        """Rewrite a call that writes behind a pointer, so that the numbers passed to it carry the fault; arrays are
+        multiplied at the function's end."""
         if isinstance(node.value, ast.Call):
-            for root in sorted(arguments_handed_on(self.caller, node.value, self.known) - {*self.behind})[:1]:
-                given = [each if root_of(each, self.known) else self._into(each, root) for each in node.value.args]
+            for root in sorted(arguments_written_by_call(self.caller, node.value, self.argument_of) - {*self.arrays})[
+                :1
+            ]:
+                given = [
+                    each if root_argument(each, self.argument_of) else self._into(each, root)
+                    for each in node.value.args
+                ]
                 node.value.args = given
         return node
 
@@ -235,12 +249,12 @@ class _Spoil(ast.NodeTransformer):
 
     def _put(self, node: Any) -> Any:
         """Rewrite an assignment into an argument so that the assigned value carries the fault. If the whole argument is
-        scaled at the end, the value is only changed where the argument is no array."""
-        into = sorted(_written_arguments(node, self.known))
-        if into and not set(into) & set(self.last):
+        multiplied at the end, the value is only changed where the argument is not an array."""
+        into = sorted(_written_arguments(node, self.argument_of))
+        if into and not set(into) & set(self.scaled_arguments):
             node.value = self._spoiled(node.value)
         elif into:
-            whole = next(name for name in into if name in self.last)
+            whole = next(name for name in into if name in self.scaled_arguments)
             node.value = self._into(node.value, whole)
         return node
 
@@ -251,26 +265,28 @@ class _Spoil(ast.NodeTransformer):
         return self._call(PUT, value, ast.Name(argument, ast.Load()))
 
     def _endings(self) -> list[ast.stmt]:
-        """Statements at the function's end that scale whole arguments."""
-        wholes = [whole for name in self.last for whole in self.behind.get(name, [ast.Name(name, ast.Load())])]
+        """Statements for the function's end that multiply whole array arguments by the fault's factor."""
+        wholes = [
+            whole for name in self.scaled_arguments for whole in self.arrays.get(name, [ast.Name(name, ast.Load())])
+        ]
         return [ast.Expr(self._call(SCALED, whole)) for whole in wholes]
 
     def _call(self, name: str, *arguments: ast.expr) -> ast.Call:
-        return ast.Call(ast.Name(name, ast.Load()), [*arguments, ast.Constant(self.place)], [])
+        return ast.Call(ast.Name(name, ast.Load()), [*arguments, ast.Constant(self.number)], [])
 
 
-def rewritten(source: str, module: str, names: dict[str, int]) -> ast.Module:
-    """Syntax tree of the module with some functions rewritten; names: the number of each function's fault. Raises
-    NoSuchFunction."""
+def rewritten_module(source: str, module: str, function_numbers: dict[str, int]) -> ast.Module:
+    """Syntax tree of a module with some of its functions rewritten. function_numbers: name -> number of the function.
+    Raises NoSuchFunction where a name is not defined."""
     parsed = ast.parse(source)
-    for name, place in names.items():
-        function = function_of(parsed, name)
-        last = sorted(written_arguments(module, name))
-        function.body = _Spoil((module, name), function, last, place).body(function.body)
+    for name, number in function_numbers.items():
+        function = function_definition(parsed, name)
+        scaled_arguments = sorted(arguments_written_by_callees(module, name))
+        function.body = _FaultRewriter((module, name), function, scaled_arguments, number).body(function.body)
     helpers: list[ast.stmt] = [ast.ImportFrom("validation.blind_spots.spoiling", [*map(_as_helper, HELPERS)], 0)]
     if COMPILER_PATTERN.search(source):
         helpers += [ast.Import([ast.alias("validation.blind_spots.compiled_spoiling", "_compiled_by_audit")])]
-    first = sum(1 for _ in takewhile(_stands_first, parsed.body))
+    first = sum(1 for _ in takewhile(_is_module_head, parsed.body))
     parsed.body[first:first] = helpers
     return ast.fix_missing_locations(parsed)
 
@@ -279,15 +295,15 @@ def _as_helper(name: str) -> ast.alias:
     return ast.alias(name, HELPERS[name])
 
 
-def _stands_first(statement: ast.stmt) -> bool:
+def _is_module_head(statement: ast.stmt) -> bool:
     """Whether a statement must stay at the head of a module: the docstring or an import from ``__future__``."""
     is_docstring = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
     return is_docstring or (isinstance(statement, ast.ImportFrom) and statement.module == "__future__")
 
 
 def can_be_spoiled(module: str, name: str) -> bool:
-    """Whether the function returns or writes a value into which a fault can be planted."""
-    function = function_of(rewritten(text(module), module, {name: 0}), name)
+    """Whether a function returns or writes a value in which a fault can be planted."""
+    function = function_definition(rewritten_module(source_text(module), module, {name: 0}), name)
     named = {
         node.func.id for node in ast.walk(function) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     }

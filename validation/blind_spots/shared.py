@@ -1,4 +1,4 @@
-"""The functions that more than one side of a comparison shares, by rule from the imports.
+"""Functions that more than one side of a comparison (Exudyn, MuJoCo, the reference) shares, derived from the imports.
 
 An engine's side is every module that imports the engine, and all that these import. ``systems`` are the third side:
 they run every engine and read what it gives. A module belongs to one engine alone where it imports that engine, or
@@ -15,12 +15,12 @@ import re
 from collections.abc import Collection, Iterable, Iterator
 from functools import cache
 
-from validation.blind_spots.rewriting import COMPILER_PATTERN, ROOT, Function, module_tree, text
+from validation.blind_spots.rewriting import COMPILER_PATTERN, ROOT, Function, module_tree, source_text
 
 ENGINES = ("exudyn", "mujoco")
 SYSTEMS_PREFIX = "models.systems."
 MACHINERY_FOLDERS = ("advice", "core", "drawing", "ensemble", "machine")
-"""Folders that hold no law of a vehicle: scene files, results, prices, workers, pictures."""
+"""Folders of ``models`` without physical laws of a vehicle: scene files, results, prices, workers, pictures."""
 IMPORT_PATTERN = re.compile(
     r"^ *(?:import (\S.*)|from ((?:models|exudyn|mujoco)[.\w]*) import (?:\(([^)]*)\)|(.*)))", re.MULTILINE
 )
@@ -30,30 +30,30 @@ COMPILING_DECORATORS = ("njit", "compiled", "lean", "inlined", "register_jitable
 
 @cache
 def all_modules() -> frozenset[str]:
-    """All modules of ``models``, by name."""
+    """Names of all modules of ``models``."""
     paths = (path.relative_to(ROOT).with_suffix("") for path in sorted((ROOT / "models").rglob("*.py")))
     return frozenset(".".join(path.parts).removesuffix(".__init__") for path in paths)
 
 
 @cache
 def imported_modules(module: str) -> frozenset[str]:
-    """Modules of ``models`` and engines that a module imports, anywhere in its source."""
+    """Names of the modules of ``models`` and of the engines that a module imports, anywhere in its source."""
     names = set[str]()
-    for whole, package, inside, line in IMPORT_PATTERN.findall(text(module)):
+    for whole, package, inside, line in IMPORT_PATTERN.findall(source_text(module)):
         parts = (part.split()[0] for part in (inside or line).split(",") if part.strip())
         names |= {whole.split()[0]} if whole else {package, *(f"{package}.{part}" for part in parts)}
     return frozenset((names & all_modules()) | ({name.partition(".")[0] for name in names} & set(ENGINES)))
 
 
-def modules_of_side(begin: Iterable[str], without: frozenset[str] = frozenset()) -> set[str]:
-    """The modules in ``begin`` and all modules that they import, directly or not, without passing through those in
-    ``without``."""
-    reached, left = set[str](), [name for name in begin if name not in without]
+def modules_of_side(start_modules: Iterable[str], excluded: frozenset[str] = frozenset()) -> set[str]:
+    """The start modules and all modules that they import, directly or indirectly, without imports through excluded
+    modules."""
+    reached, left = set[str](), [name for name in start_modules if name not in excluded]
     while left:
         name = left.pop()
         if name not in reached:
             reached.add(name)
-            left += [each for each in imported_modules(name) if each not in ENGINES and each not in without]
+            left += [each for each in imported_modules(name) if each not in ENGINES and each not in excluded]
     return reached
 
 
@@ -68,8 +68,8 @@ def shared_modules() -> tuple[str, ...]:
     return tuple(sorted(all_modules() - engines - alone - {"models"}))
 
 
-def definitions(module: str) -> Iterator[tuple[str, Function]]:
-    """Qualified names and definitions of all functions of a module."""
+def function_definitions(module: str) -> Iterator[tuple[str, Function]]:
+    """Qualified name and syntax tree of each function of a module."""
 
     def inside(node: ast.AST, prefix: str) -> Iterator[tuple[str, Function]]:
         for child in (*getattr(node, "body", ()), *getattr(node, "orelse", ())):
@@ -83,7 +83,7 @@ def definitions(module: str) -> Iterator[tuple[str, Function]]:
 
 
 def is_compiled(function: Function) -> bool:
-    """Whether a decorator says that numba compiles it."""
+    """Whether numba compiles a function, by its decorators."""
     names = (ast.unparse(each).partition("(")[0].rpartition(".")[2] for each in function.decorator_list)
     return any(name in COMPILING_DECORATORS for name in names)
 
@@ -91,24 +91,26 @@ def is_compiled(function: Function) -> bool:
 @cache
 def compiled_functions() -> list[str]:
     """``module:name`` of every compiled function of the shared modules."""
-    compiling = [module for module in shared_modules() if COMPILER_PATTERN.search(text(module))]
-    return [f"{module}:{name}" for module in compiling for name, each in definitions(module) if is_compiled(each)]
+    compiling = [module for module in shared_modules() if COMPILER_PATTERN.search(source_text(module))]
+    return [
+        f"{module}:{name}" for module in compiling for name, each in function_definitions(module) if is_compiled(each)
+    ]
 
 
 @cache
 def law_functions() -> list[str]:
-    """``module:name`` of every function, compiled or not, of the shared modules that hold laws."""
+    """``module:name`` of every function, compiled or not, of the shared modules with physical laws."""
     laws = [module for module in shared_modules() if module.split(".")[1] not in MACHINERY_FOLDERS]
-    return [f"{module}:{name}" for module in laws for name, _ in definitions(module)]
+    return [f"{module}:{name}" for module in laws for name, _ in function_definitions(module)]
 
 
 def candidate_functions() -> list[str]:
-    """``module:name`` of all functions that are shared if they give numbers, compiled ones first."""
+    """``module:name`` of all functions that the audit may examine, compiled functions first."""
     return list(dict.fromkeys((*compiled_functions(), *law_functions())))
 
 
-def shared_functions(several: Collection[str]) -> list[str]:
-    """``module:name`` of all shared functions, compiled ones first; several : Python functions that several engines
-    call."""
+def shared_functions(python_functions: Collection[str]) -> list[str]:
+    """``module:name`` of all shared functions, compiled functions first. python_functions: Python functions that at
+    least two engines call."""
     compiled = set(compiled_functions())
-    return [name for name in candidate_functions() if name in compiled or name in several]
+    return [name for name in candidate_functions() if name in compiled or name in python_functions]

@@ -1,4 +1,4 @@
-"""The plain Python functions that more than one side of a comparison calls, as a trace of short runs tells.
+"""Python functions that more than one side of a comparison calls, measured by a trace of short runs.
 
 Shared modules hold thousands of functions of Python. Of these the audit asks about the ones that at least two engines
 (the reference is one of them) call in runs of one scene and that give numbers there. Each run has a process of its own
@@ -17,45 +17,45 @@ from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, of_table
 from validation.blind_spots.rewriting import ROOT
 
 SCENE_FOLDERS = tuple(ROOT / "validation" / name / "scenes" for name in ("replay", "blind_spots"))
-"""Scenes that are short to run, which name as many tables as go together; no two of one name."""
+"""Folders of scenes that are short to run and have as many tables as go together; file names are unique."""
 JUDGE_SUFFIX = ".assumptions"
-"""End of the names of modules that judge the answer of a run, and give no number of it."""
+"""Suffix of modules that check assumptions of a run and give no number of its result."""
 Run = tuple[str, str]
-"""File of a scene, and an engine."""
+"""File name of a scene, and name of the engine that runs it."""
 
 
-def scenes() -> dict[str, Path]:
-    """All scenes, by the names of their files."""
+def scene_files() -> dict[str, Path]:
+    """File name of a scene -> its path, for all scenes of ``SCENE_FOLDERS``."""
     return {path.name: path for folder in SCENE_FOLDERS for path in sorted(folder.glob("*.toml"))}
 
 
 def runs_to_trace() -> list[Run]:
-    """The runs to trace: each scene in all engines of its system, if it has at least two."""
-    engines = {name: engines_of(path) for name, path in scenes().items()}
+    """Runs to trace: each scene in every engine of its system, if the system has at least two engines."""
+    engines = {name: engines_of(path) for name, path in scene_files().items()}
     return [(name, engine) for name, several in engines.items() if len(several) > 1 for engine in several]
 
 
 def engines_of(scene: Path) -> tuple[str, ...]:
-    """The engines of a scene's system."""
+    """Names of the engines that can run a scene file, the engines on request included."""
     system = SYSTEMS[tomllib.loads(scene.read_text(encoding="utf-8")).get("system", DEFAULT_SYSTEM)]
     return (*system.engines, *system.on_request)
 
 
 def prepared_scene(scene: str) -> Any:
-    """One of the ``scenes``, read and checked."""
-    path = scenes()[scene]
+    """Reads and checks a scene of ``scene_files``."""
+    path = scene_files()[scene]
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     table.pop("engines_asked", None)  # the key of a recorded job
     return of_table(table, scene, path.parent)
 
 
-def engines_of_functions(traced: Iterable[Mapping[str, Any]]) -> dict[str, tuple[str, ...]]:
-    """Engines that share each function, sorted, by its name. Functions that no scene runs in two engines are left out.
+def engines_of_functions(run_traces: Iterable[Mapping[str, Any]]) -> dict[str, tuple[str, ...]]:
+    """Function -> sorted engines that share it. Functions that no scene runs in two engines are left out.
 
-    traced : of each run its "run", a ``Run``, and "numbers", the names of functions that gave numbers in it.
+    run_traces : for each run, "run" (a ``Run``) and "numbers", the names of the functions that gave numbers in it.
     """
     engines = defaultdict[tuple[str, str], set[str]](set)
-    for each in traced:
+    for each in run_traces:
         scene, engine = each["run"]
         for function in each["numbers"]:
             engines[function, scene].add(engine)

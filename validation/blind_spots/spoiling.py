@@ -1,8 +1,8 @@
-"""Numbers that are 1 % off: what a spoiled function gives back or writes into its arguments.
+"""Planted faults in Python functions: their results, or what they write into arguments, multiplied by 1.01.
 
-Numbers that count or name places stay: whole numbers of Python, of numba, and those in arrays that Python makes, whose
-tables hold places among their numbers; so do labels of labelled arrays, and dataclasses within another one, which it
-hands on. A function without a fault gives what it is given, itself.
+Counts and indices are not changed: integers of Python and numba, and whole numbers in arrays made by Python, whose
+tables contain indices; nor are labels of labelled arrays, and dataclasses nested in another dataclass. Without a fault
+a value is returned itself, not a copy.
 """
 
 import copy
@@ -14,19 +14,19 @@ import numpy as np
 from validation.blind_spots.memory import FAULTS, FUNCTIONS_THAT_RAN, FUNCTIONS_WITH_NUMBERS
 
 
-def numeric(value: Any) -> bool:
-    """Whether a value holds numbers that can be 1 % off."""
+def has_numbers(value: Any) -> bool:
+    """Whether a value contains floating-point numbers that a fault can change."""
     if isinstance(value, np.ndarray):
         return value.dtype.kind in "fc" or value.dtype.names is not None
     if isinstance(value, tuple | list):
-        return any(numeric(part) for part in value[:20])
+        return any(has_numbers(part) for part in value[:20])
     if type(value) is dict:
-        return any(numeric(part) for part in value.values())
+        return any(has_numbers(part) for part in value.values())
     if is_dataclass(value) and not isinstance(value, type):
         parts = (getattr(value, field.name, None) for field in fields(value))
-        return any(numeric(part) for part in parts if not is_dataclass(part))
+        return any(has_numbers(part) for part in parts if not is_dataclass(part))
     if _is_labelled(value):
-        return any(numeric(channel.values) for channel in value.data_vars.values())
+        return any(has_numbers(channel.values) for channel in value.data_vars.values())
     return isinstance(value, float | complex | np.floating | np.complexfloating)
 
 
@@ -35,54 +35,55 @@ def _is_labelled(value: Any) -> bool:
     return type(value).__name__ == "Dataset" and hasattr(value, "data_vars")
 
 
-def _ran(value: Any, place: int) -> float:
-    """Record that a function gave a value; returns the factor of its planted fault, 1 without a fault."""
-    FUNCTIONS_THAT_RAN[place] = 1.0
-    if not FUNCTIONS_WITH_NUMBERS[place] and numeric(value):
-        FUNCTIONS_WITH_NUMBERS[place] = 1.0
-    return 1.0 + FAULTS[place]
+def _mark_and_factor(value: Any, number: int) -> float:
+    """Record that a function ran, and whether its value contains numbers. Returns the factor of its planted fault, 1
+    without a fault."""
+    FUNCTIONS_THAT_RAN[number] = 1.0
+    if not FUNCTIONS_WITH_NUMBERS[number] and has_numbers(value):
+        FUNCTIONS_WITH_NUMBERS[number] = 1.0
+    return 1.0 + FAULTS[number]
 
 
-def spoiled(value: Any, place: int) -> Any:
-    """The value with the fault of a function's number: a copy whose numbers are multiplied, or the value itself without
-    a fault."""
-    factor = _ran(value, place)
-    return value if factor == 1.0 else _times(value, factor)
+def spoiled(value: Any, number: int) -> Any:
+    """Returns a copy of a value with its numbers multiplied by the fault's factor of function ``number``, or the value
+    itself without a fault."""
+    factor = _mark_and_factor(value, number)
+    return value if factor == 1.0 else _multiplied(value, factor)
 
 
-def scaled(values: Any, place: int) -> None:
-    """Multiply the numbers of an array, or of its records, in place by the fault's factor; pointers and other values
-    stay."""
-    factor = _ran(values, place)
+def scaled(values: Any, number: int) -> None:
+    """Multiply the numbers of an array, or of its records, in place by the fault's factor of function ``number``.
+    Pointers and other values stay unchanged."""
+    factor = _mark_and_factor(values, number)
     if factor != 1.0:
-        _scale(values, factor)
+        _multiply_in_place(values, factor)
 
 
-def put(value: Any, into: Any, place: int) -> Any:
-    """``spoiled`` for a value that is assigned into an argument. A value that goes into an array stays, as the whole
-    array is ``scaled`` when the function ends."""
-    return value if isinstance(into, np.ndarray) else spoiled(value, place)
+def put(value: Any, into: Any, number: int) -> Any:
+    """Returns a value that is to be assigned into an argument ``into``, multiplied by the fault's factor. A value for
+    an array stays unchanged, as the whole array is ``scaled`` when the function ends."""
+    return value if isinstance(into, np.ndarray) else spoiled(value, number)
 
 
-def _times(value: Any, factor: float) -> Any:
-    """Copy of a value with all its numbers multiplied by a factor; the value itself if it holds no numbers."""
+def _multiplied(value: Any, factor: float) -> Any:
+    """Copy of a value with all its numbers multiplied by a factor; the value itself if it contains no numbers."""
     if isinstance(value, float | complex | np.floating | np.complexfloating):
         return type(value)(factor * value)  # type: ignore[arg-type]
     if isinstance(value, np.ndarray):
-        return _array(value, factor)
+        return _multiplied_array(value, factor)
     if isinstance(value, tuple):
-        parts = [_times(part, factor) for part in value]
+        parts = [_multiplied(part, factor) for part in value]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
     if isinstance(value, list):
-        return [_times(part, factor) for part in value]
+        return [_multiplied(part, factor) for part in value]
     if type(value) is dict:
-        return {key: _times(part, factor) for key, part in value.items()}
+        return {key: _multiplied(part, factor) for key, part in value.items()}
     if _is_labelled(value):
-        return value.map(lambda channel: channel.copy(data=_times(channel.values, factor)), keep_attrs=True)
-    return _dataclass(value, factor) if is_dataclass(value) and not isinstance(value, type) else value
+        return value.map(lambda channel: channel.copy(data=_multiplied(channel.values, factor)), keep_attrs=True)
+    return _multiplied_dataclass(value, factor) if is_dataclass(value) and not isinstance(value, type) else value
 
 
-def _array(values: np.ndarray, factor: float) -> Any:
+def _multiplied_array(values: np.ndarray, factor: float) -> Any:
     if values.dtype.kind not in "fc":
         return values
     made = np.where(values == np.rint(values), values, factor * values).astype(values.dtype)
@@ -90,20 +91,20 @@ def _array(values: np.ndarray, factor: float) -> Any:
     return made
 
 
-def _dataclass(value: Any, factor: float) -> Any:
-    """Copy of a dataclass with its fields multiplied; its validation is not run again."""
+def _multiplied_dataclass(value: Any, factor: float) -> Any:
+    """Copy of a dataclass with the numbers of its fields multiplied by a factor; its validation is not run again."""
     made = copy.copy(value)
     for field in fields(value):
         old = getattr(value, field.name, None)
-        new = old if is_dataclass(old) else _times(old, factor)
+        new = old if is_dataclass(old) else _multiplied(old, factor)
         if new is not old:
             object.__setattr__(made, field.name, new)
     return made
 
 
-def _scale(values: Any, factor: float) -> None:
+def _multiply_in_place(values: Any, factor: float) -> None:
     if isinstance(values, np.ndarray) and values.dtype.names:
         for name in values.dtype.names:
-            _scale(values[name], factor)
+            _multiply_in_place(values[name], factor)
     if isinstance(values, np.ndarray) and values.dtype.kind in "fc":
-        values[...] = _array(values, factor)
+        values[...] = _multiplied_array(values, factor)

@@ -1,8 +1,8 @@
-"""The kept table of the audit: for each shared function, which rows and tests notice that it is 1 % off.
+"""Saved table of the audit: for each shared function, which rows and tests notice that its output is 1 % wrong.
 
-Independent are rows whose other side does not share the function: an exact answer, a published figure, or force laws of
-its own (``validation.common.rows.Independence``); of tests, those that name such grounds by the mark ``grounds``.
-Rows of planted faults are none: they judge checks, not values.
+A row is independent if its other side does not share the function: a closed form, a published figure, or separate force
+laws (``validation.common.rows.Independence``). A test is independent if its mark ``grounds`` names such grounds. Rows
+of planted faults are not independent: they judge checks, not values.
 
 A fault that changes no value needs no judge: ``harmless.csv`` names such functions, why, and the test that proves it.
 
@@ -27,9 +27,9 @@ WHY_HARMLESS = (
     "harmless, without a number of their own",
     "harmless, as they give whole numbers alone",
 )
-"""Why a fault changes no value: it moves a starting point or a step of a search, whose end stays within the stated
-error; or the function gives views of its arguments, new arrays that are written over, zeros, or nothing; or it selects,
-by arrays of zeros and ones, which are not spoiled."""
+"""Reasons why a fault changes no value: it moves a starting point or a step of a search, whose result stays within the
+stated error; or the function returns views of its arguments, new arrays that are overwritten, zeros, or nothing; or it
+selects by arrays of zeros and ones, in which no fault is planted."""
 INDEPENDENT_GROUNDS = ("closed form", "published", "native", "written equations", "plain counterpart")
 CHECKS_OF_CHECKS = "planted."
 LIST_SEPARATOR = "; "
@@ -38,15 +38,15 @@ NOT_AUDITED = "not audited"
 
 @dataclass(frozen=True)
 class Line:
-    """Result for one function: the checks (ids of rows and tests) that notice its fault, which of these are
+    """Result of the audit for a function: the checks (ids of rows and tests) that notice its fault, which of them are
     independent, and how many were not run.
 
-    ended : "whole", or why not: "crashed", "out of time", "not spoiled" (rewriting sees nothing that it gives back or
-    writes), "no numbers" (what it gives counts or names places), "not run" (by any case or test that was asked), "not
-    audited" (it is shared, and not all that call it were asked);
-    calling : in how many cases and tests that were asked it gives numbers, which are those on independent grounds, and
-    all others if none of these noticed; left : how many of them were not run, for want of time; commit : that the line
-    belongs to; kind : "compiled", or "Python" and the engines that call the function.
+    ended : "whole", or why not: "crashed", "out of time", "not spoiled" (the function returns and writes nothing in
+    which a fault can be planted), "no numbers" (it returns counts or indices alone), "not run" (by any case or test of
+    the audit), "not audited" (not all checks that call it were run);
+    calling : number of the audit's cases and tests in which it gives numbers: checks on independent grounds, and all
+    others if no independent check noticed; left : number of these checks not run, for lack of time; commit : of the
+    sources; kind : "compiled", or "Python" and the engines that call the function.
     """
 
     function: str
@@ -61,27 +61,27 @@ class Line:
 
     @property
     def is_covered(self) -> bool:
-        """Whether an independent check notices the fault."""
+        """Whether an independent check notices the function's fault."""
         return bool(self.independent)
 
     @property
-    def noticed(self) -> int:
-        """Number of rows and tests that notice the fault."""
+    def noticing_count(self) -> int:
+        """Number of rows and tests that notice the function's fault."""
         return sum(len(text.split(LIST_SEPARATOR)) for text in (self.rows, self.tests) if text)
 
-    def with_others(self, line: "Line") -> "Line":
-        """This line joined with a line of other checks on the same function."""
+    def joined_with(self, other_line: "Line") -> "Line":
+        """Joins this line with a line that other checks gave for the same function."""
         texts = {
-            name: LIST_SEPARATOR.join(filter(None, (getattr(self, name), getattr(line, name))))
+            name: LIST_SEPARATOR.join(filter(None, (getattr(self, name), getattr(other_line, name))))
             for name in ("rows", "tests", "independent")
         }
-        made = replace(self, calling=self.calling + line.calling, left=self.left + line.left)
-        made = replace(made, ended=line.ended if self.ended in ("whole", "not run", "no numbers") else self.ended)
+        made = replace(self, calling=self.calling + other_line.calling, left=self.left + other_line.left)
+        made = replace(made, ended=other_line.ended if self.ended in ("whole", "not run", "no numbers") else self.ended)
         return Line(**{**asdict(made), **texts})
 
 
-def read(path: Path = TABLE_FILE) -> list[Line]:
-    """The lines of a table; none where there is no file."""
+def read_table(path: Path = TABLE_FILE) -> list[Line]:
+    """Lines of an audit's table (CSV); none where there is no file."""
     if not path.is_file():
         return []
     with path.open(newline="", encoding="utf-8") as file:
@@ -91,8 +91,8 @@ def read(path: Path = TABLE_FILE) -> list[Line]:
         ]
 
 
-def write(lines: Iterable[Line], path: Path) -> None:
-    """Keep a table, functions in the order of their names."""
+def write_table(lines: Iterable[Line], path: Path) -> None:
+    """Write an audit's table (CSV), sorted by the names of the functions."""
     with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(Line)], lineterminator="\n")
         writer.writeheader()
@@ -100,37 +100,38 @@ def write(lines: Iterable[Line], path: Path) -> None:
 
 
 def is_independent(id: str, grounds: str) -> bool:
-    """Whether a row or test with this id on these grounds counts as independent."""
+    """Whether a row or test with an id and grounds counts as an independent check."""
     return grounds in INDEPENDENT_GROUNDS and not id.startswith(CHECKS_OF_CHECKS)
 
 
 @cache
 def harmless_functions() -> dict[str, tuple[str, str]]:
-    """Functions whose faults change no value: why, one of ``WHY_HARMLESS``, and the id of the test that proves it."""
+    """Function whose fault changes no value -> the reason, one of ``WHY_HARMLESS``, and the id of the test that proves
+    it."""
     with HARMLESS_FILE.open(newline="", encoding="utf-8") as file:
         return {each["function"]: (each["why"], each["proof"]) for each in csv.DictReader(file)}
 
 
 def kind_of(function: str, engines: Mapping[str, tuple[str, ...]]) -> str:
-    """Kind of a function, in the words of ``Line.kind``: compiled, or in Python and shared by which engines."""
+    """Kind of a function, in the words of ``Line.kind``: "compiled", or "Python" with the engines that share it."""
     return "compiled" if function in compiled_functions() else " ".join(["Python", *engines.get(function, ())])
 
 
-def merged_lines(kept: Iterable[Line], measured: Iterable[Line], functions: Iterable[str]) -> list[Line]:
-    """The newly measured lines, and the kept lines of all other functions that still exist.
+def merged_lines(saved_lines: Iterable[Line], new_lines: Iterable[Line], functions: Iterable[str]) -> list[Line]:
+    """Table lines of a new audit, joined with the saved lines of all other functions that still exist.
 
-    A function that was not audited now keeps its line.
+    A function that the new audit did not examine retains its saved line.
     """
-    measured = sorted(measured, key=lambda line: line.ended != NOT_AUDITED)
-    count = sum(line.ended == NOT_AUDITED for line in measured)
-    lines = {line.function: line for line in (*measured[:count], *kept, *measured[count:])}
+    new_lines = sorted(new_lines, key=lambda line: line.ended != NOT_AUDITED)
+    count = sum(line.ended == NOT_AUDITED for line in new_lines)
+    lines = {line.function: line for line in (*new_lines[:count], *saved_lines, *new_lines[count:])}
     return [lines[name] for name in functions if name in lines]
 
 
 def uncovered_functions(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list[str]]:
-    """Functions whose fault no independent check notices, grouped by the reason.
+    """Reason -> functions whose fault no independent check notices.
 
-    functions : all that are shared now; those that have no line are "not audited" as well.
+    functions : all functions that are shared now; functions without a line count as "not audited".
     """
     known = {line.function: line for line in lines}
     gaps: dict[str, list[str]] = {"noticed by nothing": [], "noticed by nothing independent": []}
@@ -144,7 +145,7 @@ def uncovered_functions(lines: Iterable[Line], functions: Iterable[str]) -> dict
         elif line.ended == "not run":
             gaps["run by nothing"].append(name)
         elif not line.is_covered and line.ended != "no numbers":
-            some = line.noticed or line.ended != "whole"
+            some = line.noticing_count or line.ended != "whole"
             gaps["noticed by nothing independent" if some else "noticed by nothing"].append(name)
     return {kind: names for kind, names in gaps.items() if names}
 
@@ -152,4 +153,6 @@ def uncovered_functions(lines: Iterable[Line], functions: Iterable[str]) -> dict
 if __name__ == "__main__":
     from validation.blind_spots.shared import candidate_functions
 
-    write(merged_lines(read(), read(Path(sys.argv[1]) / TABLE_FILE.name), candidate_functions()), TABLE_FILE)
+    write_table(
+        merged_lines(read_table(), read_table(Path(sys.argv[1]) / TABLE_FILE.name), candidate_functions()), TABLE_FILE
+    )

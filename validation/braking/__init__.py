@@ -1,1 +1,1 @@
-"""Vehicles, exact stops and other schemes that cases and tests of braking share."""
+"""Braked vehicles, exact stops and independent schemes that the validation cases and tests of braking share."""

@@ -1,4 +1,4 @@
-"""Plane vehicles under given brake torques, advanced by twinrig's step or an engine, for checks of a truck's motion."""
+"""Plane vehicles under prescribed brake torques, advanced by twinrig's step or by an engine, for checks of a truck."""
 
 from collections.abc import Callable
 
@@ -14,14 +14,16 @@ from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 
 
 def on_road(plane: Plane, tables: Tables, road: Road = UNIFORM_ROAD, slope: float = 10.0) -> OnRoad:
-    """A vehicle whose wheels all have the same tyre, with a slip-angle slope (1/rad), on a road."""
+    """A plane vehicle on a road, all of its wheels with the same tyre. slope: cornering slope of its friction
+    (1/rad)."""
     return OnRoad(plane, np.zeros(plane.wheels, dtype=int), slope, tables, road)
 
 
 class RollingTruck:
-    """A vehicle that begins by rolling along x at a speed (m/s), its front wheels steered (rad).
+    """A plane vehicle that starts by rolling along x at a speed (m/s), with steered front wheels (rad).
 
-    motion : moved in place; time : that passed (s); go : ``advance``, or an engine's.
+    motion : its present motion, overwritten in every step; time : simulated until now (s); step_function : ``advance``,
+    or an engine's.
     """
 
     def __init__(
@@ -41,17 +43,17 @@ class RollingTruck:
 
     @property
     def state(self) -> np.ndarray:
-        """Positions and rates (2, 2 + U)."""
+        """Positions and rates (2, 2 + number of units): x, y (m, m/s), then heading of each unit (rad, rad/s)."""
         return self.motion.state
 
     @property
     def turning(self) -> np.ndarray:
-        """Angular velocities of the W wheels (W,) in rad/s."""
+        """Angular velocities of the wheels (number of wheels,) in rad/s."""
         return self.motion.turning
 
     @property
     def report(self) -> Report:
-        """Report of the wheels in the last step."""
+        """Forces, loads, slips and further quantities of the wheels in the last step."""
         return Report(*self.motion.report)
 
     @property
@@ -60,10 +62,10 @@ class RollingTruck:
         return float(np.hypot(*self.state[1, :2]))
 
     def on(self, torques: np.ndarray, step: float) -> tuple[int, float]:
-        """Advance by steps (s) with brake torques (n + 1, W) in N m at their ends. Returns the status of the last step
-        and the time (s) that passed.
+        """Advance by n time steps (s) with brake torques (n + 1, number of wheels) in N m at their ends. Returns the
+        status of the last step and the simulated time (s).
 
-        torques (W,) : stay for one step.
+        torques (number of wheels,) : constant during a single step.
         """
         ends = torques if torques.ndim > 1 else np.tile(torques, (2, 1))
         status, used = self._go(self.motion, ends, step, *self._others)
@@ -73,8 +75,8 @@ class RollingTruck:
     def braked(
         self, torques: np.ndarray, step: float = 5.5e-3, end_speed: float = 0.0, duration: float = 200.0
     ) -> "RollingTruck":
-        """Advance until the vehicle stands, or until it reaches a speed (m/s) or a time (s); returns the vehicle.
-        Raises RunFailed."""
+        """Advance with constant brake torques (N m) until the vehicle stands, or until it reaches a speed (m/s) or a
+        time (s); returns the vehicle. Raises RunFailed."""
         status = FINE
         while status == FINE and self.speed > end_speed and self.time < duration - 1e-9:
             status, _ = self.on(torques, step)
@@ -89,13 +91,13 @@ LOCKING_TORQUE = 1e9
 """Torque (N m) that locks a wheel at once."""
 
 
-def truck_on(tables: Tables | None = None, plane: Plane = PAPER_PLANE) -> OnRoad:
-    """The truck on ice, or on other tyre tables with the slip-angle slope of those of ice."""
+def truck_on_tables(tables: Tables | None = None, plane: Plane = PAPER_PLANE) -> OnRoad:
+    """The paper's truck on ice, or on other tyre tables with the cornering slope of ice."""
     return on_road(plane, tables or stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering)
 
 
 def constant_friction(mu: float) -> Tables:
-    """Tyre table whose friction has the same value at every slip from 0.1 on."""
+    """Tyre tables whose friction coefficient is ``mu`` at every slip above 0.1."""
     flat = np.broadcast_to(np.array([0.0, mu, mu]), (3, 1, 3)).copy()
     nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
     g, h = np.ones((3, 3)) * np.array([1.0, 0.0, 0.0]), np.array([[0.0], [mu], [mu]])
@@ -103,7 +105,7 @@ def constant_friction(mu: float) -> Tables:
 
 
 def transfer_errors(mu: float = 0.4) -> dict[str, float]:
-    """Relative errors of the axle loads against a closed form, with locked wheels: all, the front, or the rear ones.
+    """Relative errors of the axle loads against a closed form, with all wheels, the front or the rear wheels locked.
 
     Friction mu on a part of the weight slows the whole mass: z = mu F / (m g -+ mu m g h / E) for one axle, and the
     axles' loads change by m z g h / E.
@@ -117,14 +119,16 @@ def transfer_errors(mu: float = 0.4) -> dict[str, float]:
     }
     torques, errors = {"all wheels": (1e5, 1e5), "front wheels": (1e5, 0.0), "rear wheels": (0.0, 1e5)}, {}
     for name, torque in torques.items():
-        slid = RollingTruck(truck_on(constant_friction(mu), light), 10.0).braked(np.repeat(torque, 2), duration=0.5)
+        slid = RollingTruck(truck_on_tables(constant_friction(mu), light), 10.0).braked(
+            np.repeat(torque, 2), duration=0.5
+        )
         wanted = static + PAPER_TRUCK.mass * slowing[name] * lift * np.array([1.0, -1.0])
         errors[name] = float(np.abs(slid.report.load.reshape(2, 2).sum(1) / wanted - 1.0).max())
     return errors
 
 
-def sideways_with_locked_front_wheels() -> float:
+def lateral_displacement_when_locked() -> float:
     """Lateral displacement (m) of a truck that slows from 10 to 1 m/s on ice with its front wheels steered by 0.05 rad
     and locked."""
     locked = np.array([LOCKING_TORQUE, LOCKING_TORQUE, 0.0, 0.0])
-    return float(RollingTruck(truck_on(), 10.0, steer=0.05).braked(locked, end_speed=1.0).state[0, 1])
+    return float(RollingTruck(truck_on_tables(), 10.0, steer=0.05).braked(locked, end_speed=1.0).state[0, 1])

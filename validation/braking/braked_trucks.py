@@ -1,4 +1,5 @@
-"""Trucks and trains that lock, slide, fold or fall, and controllers that answer nonsense: errors of hard cases."""
+"""Hard cases of braked trucks and trains that lock, slide, jackknife or overturn, and of controllers with impossible
+commands; each function returns the case's error."""
 
 from pathlib import Path
 from typing import Any
@@ -17,37 +18,37 @@ from models.systems.braking.march import StartState
 from models.systems.braking.procedures import vehicle_and_start
 from models.systems.braking.run import marched_by, run
 from models.systems.braking.scene import BrakingScene, build
-from validation.braking.braked_wheels import DRY, ICE, SPEED, Error, MovedVehicle, bent_friction
+from validation.braking.braked_wheels import DRY, ICE, SPEED, AdvancedVehicle, Error, piecewise_linear_friction
 
 TRUCK, HIGH_TRUCKS = plane_of_truck(PAPER_TRUCK), plane_of_truck(PAPER_TRUCK.model_copy(update={"height": 4.0}))
-"""The paper's truck, and one as high as it is long and twice as high as it is wide."""
+"""The paper's truck, and a truck as high as it is long and twice as high as it is wide."""
 
 
-def energy_grows(speeds: tuple[float, float, float], brake_torque: float) -> Error:
-    """Case: the truck slides on ice with rates of x, y (m/s) and heading (rad/s) under brake torques (N m). Error:
-    ratio of the largest gain of kinetic energy over 20 ms to the initial energy."""
+def energy_gain_case(speeds: tuple[float, float, float], brake_torque: float) -> Error:
+    """Case: the truck slides on ice with initial rates of x, y (m/s) and heading (rad/s) under brake torques (N m).
+    Error: largest gain of kinetic energy over 20 ms divided by the initial energy."""
 
     def energy(rates: np.ndarray) -> float:
         return float(TRUCK.masses[0] * (rates[:2] ** 2).sum() + TRUCK.inertias[0] * rates[2] ** 2)
 
     def error(implementation: str, folder: Path) -> float:
-        moved_vehicle = MovedVehicle(implementation, TRUCK, ICE, rim_turning=0.0)
+        moved_vehicle = AdvancedVehicle(implementation, TRUCK, ICE, rim_turning=0.0)
         moved_vehicle.state[1] = speeds
         first, gains = energy(moved_vehicle.state[1]), []
         for _ in range(25):
             energy_before = energy(moved_vehicle.state[1])
-            moved_vehicle.under(np.full((5, 4), brake_torque), 5e-3)
+            moved_vehicle.advance_with(np.full((5, 4), brake_torque), 5e-3)
             gains.append(energy(moved_vehicle.state[1]) - energy_before)
         return float(max(*gains, 0.0) / first) if np.isfinite(moved_vehicle.state).all() else np.inf
 
     return error
 
 
-def on_even_friction(implementation: str, folder: Path) -> float:
-    """Case: the truck brakes straight ahead on even friction. Error: y, heading and yaw rate (m, rad, rad/s), which
-    should be 0."""
-    moved_vehicle = MovedVehicle(implementation, TRUCK, DRY)
-    moved_vehicle.under(np.full((101, 4), 4e3))
+def asymmetry_on_even_friction(implementation: str, folder: Path) -> float:
+    """Case: the truck brakes straight ahead on even friction. Error: largest of y, heading and their rates (m, rad, per
+    s), which should be 0."""
+    moved_vehicle = AdvancedVehicle(implementation, TRUCK, DRY)
+    moved_vehicle.advance_with(np.full((101, 4), 4e3))
     return float(np.abs(moved_vehicle.state[:, 1:]).max())
 
 
@@ -56,29 +57,30 @@ def mirrored_truck_error(implementation: str, folder: Path) -> float:
     mirror image of the mirrored stop."""
     ends = []
     for side, stretch in ((1.0, Stretch(0.0, 0, 1)), (-1.0, Stretch(0.0, 1, 0))):
-        moved_vehicle = MovedVehicle(implementation, TRUCK, ICE, DRY, road=road([stretch]), steer=0.05 * side)
-        moved_vehicle.under(np.full((101, 4), 2e3))
+        moved_vehicle = AdvancedVehicle(implementation, TRUCK, ICE, DRY, road=road([stretch]), steer=0.05 * side)
+        moved_vehicle.advance_with(np.full((101, 4), 2e3))
         ends.append(moved_vehicle.state * np.array([1.0, side, side]))
     return float(np.abs(ends[0] - ends[1]).max())
 
 
 def lifting_truck_error(implementation: str, folder: Path) -> float:
-    """A truck as high as it is long, braked on dry road."""
-    MovedVehicle(implementation, HIGH_TRUCKS, DRY, speed=20.0).under(np.full((101, 4), 2e4))
+    """Case: a truck as high as it is long brakes on dry road; the run must be refused. Error: infinite if it is not."""
+    AdvancedVehicle(implementation, HIGH_TRUCKS, DRY, speed=20.0).advance_with(np.full((101, 4), 2e4))
     return np.inf
 
 
-def turned_over(implementation: str, folder: Path) -> float:
-    """A truck twice as high as it is wide, steered on dry road."""
-    MovedVehicle(implementation, HIGH_TRUCKS, DRY, speed=20.0, steer=0.1).under(np.zeros((201, 4)))
+def overturning_truck_error(implementation: str, folder: Path) -> float:
+    """Case: a truck twice as high as it is wide steers on dry road; the run must be refused. Error: infinite if it is
+    not."""
+    AdvancedVehicle(implementation, HIGH_TRUCKS, DRY, speed=20.0, steer=0.1).advance_with(np.zeros((201, 4)))
     return np.inf
 
 
 def jackknifed_train_error(implementation: str, folder: Path) -> float:
-    """Case: a train folded by 100 degrees slides on dry road with all wheels locked. Error: ratio of the largest gain
-    of energy over 0.4 s to the initial energy."""
+    """Case: a train folded by 100 degrees slides on dry road with all wheels locked. Error: largest gain of kinetic
+    energy in 20 ms divided by the initial energy."""
     plane = plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER.model_copy(update={"fold": np.pi}), with_load_transfer=False)
-    moved_vehicle = MovedVehicle(implementation, plane, DRY, rim_turning=0.0)
+    moved_vehicle = AdvancedVehicle(implementation, plane, DRY, rim_turning=0.0)
     state = moved_vehicle.state
     state[0, 3:] = np.radians(-100.0)
 
@@ -90,33 +92,34 @@ def jackknifed_train_error(implementation: str, folder: Path) -> float:
 
     levels = [energy()]
     for _ in range(20):
-        moved_vehicle.under(np.full((5, plane.wheels), 2e4), 5e-3)
+        moved_vehicle.advance_with(np.full((5, plane.wheels), 2e4), 5e-3)
         levels.append(energy())
     return float(max(np.diff(levels).max(), 0.0) / levels[0]) if levels[-1] < 0.8 * levels[0] else np.inf
 
 
-def no_friction_on_one_side(implementation: str, folder: Path) -> float:
+def split_friction_error(implementation: str, folder: Path) -> float:
     """Case: all wheels of the truck are locked for 5 ms, with friction 0 on the left and 0.8 on the right. Error:
-    relative difference of the lost speed from mu g t / 2."""
+    relative difference of the loss of speed from mu g t / 2."""
     tyres, plane = (
-        (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)),
+        (piecewise_linear_friction((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)),
         plane_of_truck(PAPER_TRUCK, with_load_transfer=False),
     )
-    moved_vehicle = MovedVehicle(implementation, plane, *tyres, rim_turning=0.0, road=road([Stretch(0.0, 0, 1)]))
-    moved_vehicle.under(np.full((6, 4), 2e4), 1e-3)
+    moved_vehicle = AdvancedVehicle(implementation, plane, *tyres, rim_turning=0.0, road=road([Stretch(0.0, 0, 1)]))
+    moved_vehicle.advance_with(np.full((6, 4), 2e4), 1e-3)
     lost = abs((SPEED - moved_vehicle.state[1, 0]) / (0.4 * GRAVITY * 5e-3) - 1.0)
     return lost if moved_vehicle.state[1, 2] < 0.0 else np.inf
 
 
 def braking_scene(**tables: Any) -> BrakingScene:
-    """Scene: the truck brakes from 1.5 m/s on ice without an anti-lock system."""
+    """Braking scene of the truck from 1.5 m/s on ice without an anti-lock system; keyword arguments add or replace
+    tables."""
     plain = {"title": "hard", "system": "braking", "procedures": {"stop": {"speed": 1.5}}, "pressure": {}}
     return build({**plain, **tables})
 
 
-def lagging_at_rest(implementation: str, folder: Path) -> float:
-    """Case: the truck stops from a slide on tyres with relaxation, then brakes on for 1 s. Error: distance and speed
-    (m, m/s) after the stop."""
+def motion_after_rest_on_lagging_tyres(implementation: str, folder: Path) -> float:
+    """Case: the truck slides to rest on tyres with relaxation lengths, then keeps its brakes on for 1 s. Error:
+    displacement (m) and speed (m/s) after the stop."""
     scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5})
     vehicle, start_state = vehicle_and_start(scene, "stop")
     vehicle = marched_by(vehicle, implementation)
@@ -129,7 +132,7 @@ def lagging_at_rest(implementation: str, folder: Path) -> float:
 
 
 def rest_error_of_scene(**tables: Any) -> Error:
-    """Case from a scene in which the vehicle must come to rest. Error: remaining speeds of vehicle and wheels (m/s,
+    """Case: a braking scene in which the vehicle must come to rest. Error: remaining speeds of vehicle and wheels (m/s,
     rad/s)."""
 
     def error(implementation: str, folder: Path) -> float:
@@ -141,19 +144,19 @@ def rest_error_of_scene(**tables: Any) -> Error:
     return error
 
 
-AT_THE_EDGE_OF_LOCKING: dict[str, Any] = {
+J_TURN_AT_LOCKING_LIMIT: dict[str, Any] = {
     "load_transfer": {"front": 0.3},
     "brakes": {"supply": 5.0},
     "road": {"stretches": [{"left": "dry"}]},
     "procedures": {"stop": {"kind": "j_turn", "speed": 15.0, "steer": 0.02}},
     "pressure": None,
 }
-"""A J-turn on dry road, stopped under full brakes."""
+"""Scene tables of a J-turn on dry road with brake torques at the limit of locking."""
 
 
-def one_wheel_lifted(implementation: str, folder: Path) -> float:
-    """Case: wheel loads of which one is negative are shared out among the others. Error: change of their sum (N) and of
-    their moments (N m) about both axes."""
+def load_sharing_error(implementation: str, folder: Path) -> float:
+    """Case: four wheel loads of which one is negative are redistributed to the other wheels. Error: change of their sum
+    (N) and of their moments (N m) about both horizontal axes."""
     loads = np.array([9e3, 24e3, -4e3, 26e3])
 
     def balance() -> np.ndarray:
@@ -164,14 +167,14 @@ def one_wheel_lifted(implementation: str, folder: Path) -> float:
     return float(np.abs(balance() - balance_before).max()) if loads.min() >= 0.0 else np.inf
 
 
-def below_push_out(implementation: str, folder: Path) -> float:
-    """Brake torque (N m) below the push-out pressure; it should be 0."""
+def torque_below_push_out(implementation: str, folder: Path) -> float:
+    """Case: a brake just below its push-out pressure. Error: its torque (N m), which should be 0."""
     return float(torque(0, 0.99 * PAPER_FRONT.push_out, 0.0, of_wheels(PAPER_FRONT)))
 
 
-def nonsense_answers(supply_pressure: float = 8.0, **command: Any) -> Error:
-    """Case: a controller returns an impossible command while the supply has ``supply_pressure`` bar; it must be
-    refused."""
+def impossible_command_case(supply_pressure: float = 8.0, **command: Any) -> Error:
+    """Case: a controller returns an impossible command while the supply has a pressure (bar); the command must be
+    refused. Error: infinite if it is not."""
 
     def error(implementation: str, folder: Path) -> float:
         checked_answer(

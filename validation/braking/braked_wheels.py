@@ -1,4 +1,5 @@
-"""One wheel that bears all of a vehicle, moved on by the compiled step or by an engine: errors of hard cases."""
+"""Hard cases of a quarter vehicle braked by its only wheel, advanced by the compiled step or by an engine; each
+function returns the case's error."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -23,9 +24,9 @@ LOAD = QUARTER.mass * GRAVITY
 DRY, ICE = table_of_surface("dry"), table_of_surface("ice")
 
 
-def bent_friction(*points: tuple[float, float]) -> TyreTable:
-    """Tyre table with friction at given points (slip, mu), equal at every load and slip angle, and no lateral
-    friction."""
+def piecewise_linear_friction(*points: tuple[float, float]) -> TyreTable:
+    """Tyre table with longitudinal friction linear between points (slip, mu), equal at every load and slip angle, and
+    no lateral friction."""
     slips, mu = np.array(points).T
     friction_along = np.tile(mu, (2, 1, 1))
     return TyreTable(
@@ -33,8 +34,8 @@ def bent_friction(*points: tuple[float, float]) -> TyreTable:
     )
 
 
-class MovedVehicle(RollingTruck):
-    """A vehicle on tyres that starts with rolling wheels and is advanced by one of the implementations."""
+class AdvancedVehicle(RollingTruck):
+    """A plane vehicle that starts with rolling wheels and is advanced by the reference or an engine."""
 
     def __init__(
         self,
@@ -52,9 +53,9 @@ class MovedVehicle(RollingTruck):
         if rim_turning is not None:
             self.turning[:] = rim_turning
 
-    def under(self, torques: np.ndarray, step: float = STEP) -> bool:
-        """Advance with torques (n + 1, W) at the ends of steps (s); returns whether the vehicle came to rest. Raises
-        RunFailed."""
+    def advance_with(self, torques: np.ndarray, step: float = STEP) -> bool:
+        """Advance with brake torques (n + 1, number of wheels) in N m at the ends of n steps (s). Returns whether the
+        vehicle came to rest. Raises RunFailed."""
         self.motion.accelerations[:] = 0.0
         status, used = self.on(torques, step)
         if status in FATAL_ENDS:
@@ -63,7 +64,7 @@ class MovedVehicle(RollingTruck):
 
     @property
     def first_wheel_slip(self) -> float:
-        """Slip magnitude of the first wheel: |ratio of rim speed to vehicle speed - 1|."""
+        """Magnitude of the first wheel's slip: |rim speed / vehicle speed - 1|."""
         return float(abs(self.plane.radius[0] * self.turning[0] / self.state[1, 0] - 1.0))
 
 
@@ -75,16 +76,19 @@ def stopping_distance(
     rim_turning: float | None = None,
     road: Road = UNIFORM_ROAD,
 ) -> float:
-    """Stopping distance (m) under a constant torque (N m); infinite unless all speeds end at exactly 0."""
-    wheel = MovedVehicle(implementation, QUARTER.plane, *tyres, rim_turning=rim_turning, road=road)
+    """Stopping distance (m) of the quarter vehicle under a constant brake torque (N m); infinite unless all speeds end
+    at exactly 0."""
+    wheel = AdvancedVehicle(implementation, QUARTER.plane, *tyres, rim_turning=rim_turning, road=road)
     least_force = min(brake_torque / QUARTER.radius, LOAD * min(float(tyre.mu_x[0, 0, -1]) for tyre in tyres))
-    rests = wheel.under(np.full((int(2.0 * SPEED * QUARTER.mass / least_force / step) + 50, 1), brake_torque), step)
+    rests = wheel.advance_with(
+        np.full((int(2.0 * SPEED * QUARTER.mass / least_force / step) + 50, 1), brake_torque), step
+    )
     return float(wheel.state[0, 0]) if rests and not wheel.state[1].any() and wheel.turning[0] == 0.0 else np.inf
 
 
-def settled_stop(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
-    """Torque (N m) that holds the slip constant, the stopping distance (m) at this slip, and the wheel's initial
-    angular velocity (rad/s)."""
+def constant_slip_stop(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
+    """Brake torque (N m) at which a slip stays constant, the stopping distance (m) at this slip, and the wheel's
+    initial angular velocity (rad/s)."""
     force = LOAD * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
     return (
         QUARTER.steady_torque(slip, force),
@@ -93,28 +97,29 @@ def settled_stop(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
     )
 
 
-def steady_slip_case(tyre: TyreTable, slip: float, step: float = STEP) -> Error:
-    """Case: a stop at constant slip. Error: relative difference of the distance from m v^2 / (2 F)."""
-    level, distance, turning = settled_stop(tyre, slip)
+def constant_slip_case(tyre: TyreTable, slip: float, step: float = STEP) -> Error:
+    """Case: a stop at constant slip. Error: relative difference of the stopping distance from m v^2 / (2 F)."""
+    level, distance, turning = constant_slip_stop(tyre, slip)
     return lambda name, folder: abs(
         stopping_distance(name, level, tyre, step=step, rim_turning=turning) / distance - 1.0
     )
 
 
-def from_rolling(tyre: TyreTable, slip: float, step: float) -> Error:
-    """Case: a stop that starts with a rolling wheel. Error: relative difference of the distance from the exact one."""
-    level, _, _ = settled_stop(tyre, slip)
+def rolling_start_case(tyre: TyreTable, slip: float, step: float) -> Error:
+    """Case: a stop that starts with a rolling wheel. Error: relative difference of the stopping distance from the exact
+    one."""
+    level, _, _ = constant_slip_stop(tyre, slip)
     return lambda name, folder: abs(
         stopping_distance(name, level, tyre, step=step) / exact_distance(QUARTER, tyre, level, SPEED) - 1.0
     )
 
 
-PEAKED_FRICTION = bent_friction((0.0, 0.0), (0.1, 0.8), (1.0, 0.6))
+PEAKED_FRICTION = piecewise_linear_friction((0.0, 0.0), (0.1, 0.8), (1.0, 0.6))
 
 
-def beyond_the_peak(implementation: str, folder: Path) -> float:
-    """Case: a torque 0.1 % above that of the friction peak, so that the wheel locks. Error: relative difference of the
-    distance from the exact one."""
+def locking_torque_error(implementation: str, folder: Path) -> float:
+    """Case: a brake torque 0.1 % above the torque of the friction peak, so that the wheel locks. Error: relative
+    difference of the stopping distance from the exact one."""
     peak = 1.001 * LOAD * 0.8 * (QUARTER.radius + QUARTER.spin_inertia / (QUARTER.mass * QUARTER.radius))
     return abs(
         stopping_distance(implementation, peak, PEAKED_FRICTION) / exact_distance(QUARTER, PEAKED_FRICTION, peak, SPEED)
@@ -122,9 +127,9 @@ def beyond_the_peak(implementation: str, folder: Path) -> float:
     )
 
 
-def at_the_peak(implementation: str, folder: Path) -> float:
-    """Case: exactly the torque of the friction peak. Error: relative amount by which the distance lies outside the
-    range from constant peak friction to constant sliding friction."""
+def peak_torque_error(implementation: str, folder: Path) -> float:
+    """Case: a brake torque exactly at the friction peak. Error: relative amount by which the stopping distance lies
+    outside the range from constant peak friction to constant sliding friction."""
     force = LOAD * 0.8
     distance = stopping_distance(
         implementation, QUARTER.steady_torque(0.1, force), PEAKED_FRICTION, rim_turning=0.9 * SPEED / QUARTER.radius
@@ -134,15 +139,16 @@ def at_the_peak(implementation: str, folder: Path) -> float:
 
 
 def locked_wheel_error(implementation: str, folder: Path) -> float:
-    """Case: the wheel is locked from the start. Error: relative difference of the distance from v^2 / (2 mu g)."""
+    """Case: the wheel is locked from the start. Error: relative difference of the stopping distance from v^2 / (2 mu
+    g)."""
     distance = stopping_distance(implementation, 2e4, DRY, rim_turning=0.0)
     return abs(distance * 2.0 * GRAVITY * float(DRY.mu_x[0, 0, -1]) / SPEED**2 - 1.0)
 
 
 def changing_friction_error(implementation: str, folder: Path) -> float:
     """Case: a locked wheel whose friction changes from 0.2 to 0.8 after 10 m. Error: relative difference of the
-    distance from its closed form."""
-    slick, rough = (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.2, 0.8))
+    stopping distance from its closed form."""
+    slick, rough = (piecewise_linear_friction((0.0, 0.0), (1.0, mu)) for mu in (0.2, 0.8))
     distance = stopping_distance(
         implementation, 1e5, slick, rough, rim_turning=0.0, road=road([Stretch(0.0, 0, 0), Stretch(10.0, 1, 1)])
     )
@@ -150,50 +156,52 @@ def changing_friction_error(implementation: str, folder: Path) -> float:
 
 
 def friction_range_error(implementation: str, folder: Path) -> float:
-    """Case: a locked wheel for 0.2 s, with friction from 1e-6 to 1.5. Error: difference of the lost speed from mu g
-    t."""
+    """Case: a wheel locked for 0.2 s, with friction from 1e-6 to 1.5. Error: relative difference of the loss of speed
+    from mu g t."""
     errors = []
     for mu in (1e-6, 1e-3, 0.1, 1.5):
-        wheel = MovedVehicle(implementation, QUARTER.plane, bent_friction((0.0, 0.0), (1.0, mu)), rim_turning=0.0)
-        wheel.under(np.full((41, 1), 1e6), 5e-3)
+        wheel = AdvancedVehicle(
+            implementation, QUARTER.plane, piecewise_linear_friction((0.0, 0.0), (1.0, mu)), rim_turning=0.0
+        )
+        wheel.advance_with(np.full((41, 1), 1e6), 5e-3)
         errors.append(abs((SPEED - wheel.state[1, 0]) / (mu * GRAVITY * 0.2) - 1.0))
     return float(max(errors))
 
 
-def at_rest(implementation: str, folder: Path) -> float:
-    """Case: a vehicle that stands with its brakes on. Error: distance and speed (m, m/s), which should be 0."""
-    wheel = MovedVehicle(implementation, QUARTER.plane, DRY, speed=0.0)
-    wheel.under(np.full((51, 1), 5e3))
+def standing_vehicle_error(implementation: str, folder: Path) -> float:
+    """Case: a standing vehicle with its brakes on. Error: its displacement and speed (m, m/s), which should be 0."""
+    wheel = AdvancedVehicle(implementation, QUARTER.plane, DRY, speed=0.0)
+    wheel.advance_with(np.full((51, 1), 5e3))
     return float(np.abs(wheel.state).max() + abs(wheel.turning[0]))
 
 
 def backwards_spin_error(implementation: str, folder: Path) -> float:
-    """Case: an unbraked wheel starts spinning backwards. Error: relative difference of rim speed and vehicle speed
-    after 0.5 s."""
-    wheel = MovedVehicle(implementation, QUARTER.plane, DRY, rim_turning=-10.0)
-    wheel.under(np.zeros((101, 1)), 5e-3)
+    """Case: an unbraked wheel that spins backwards at the start. Error: relative difference of rim speed and vehicle
+    speed after 0.5 s."""
+    wheel = AdvancedVehicle(implementation, QUARTER.plane, DRY, rim_turning=-10.0)
+    wheel.advance_with(np.zeros((101, 1)), 5e-3)
     return wheel.first_wheel_slip
 
 
 def released_brake_error(implementation: str, folder: Path) -> float:
     """Case: the brake of a locked wheel is released at the end of a step. Error: relative difference of rim speed and
     vehicle speed 0.6 s later."""
-    wheel = MovedVehicle(implementation, QUARTER.plane, ICE, rim_turning=0.0)
-    wheel.under(np.where(np.arange(161) < 40, 2e4, 0.0)[:, None], 5e-3)
+    wheel = AdvancedVehicle(implementation, QUARTER.plane, ICE, rim_turning=0.0)
+    wheel.advance_with(np.where(np.arange(161) < 40, 2e4, 0.0)[:, None], 5e-3)
     return wheel.first_wheel_slip
 
 
-def on_the_line(implementation: str, folder: Path) -> float:
-    """Case: a wheel exactly on the line between dry surface (left) and ice (right). Error: difference of the distance
-    (m) from that on dry surface alone."""
+def surface_line_error(implementation: str, folder: Path) -> float:
+    """Case: a wheel exactly on the line between dry surface (left) and ice (right). Error: difference of the stopping
+    distance (m) from the distance on dry surface alone."""
     distance_on_line = stopping_distance(implementation, 2e3, DRY, ICE, road=road([Stretch(0.0, 0, 1)]))
     return abs(distance_on_line - stopping_distance(implementation, 2e3, DRY))
 
 
-def slope_changes(implementation: str, folder: Path) -> float:
+def surface_change_error(implementation: str, folder: Path) -> float:
     """Case: a lightly braked wheel whose surface changes from dry to wet within a step of 20 ms. Error: relative
-    difference of the distance from that with the unchanged force."""
-    level, steady_distance, turning = settled_stop(DRY, 0.004)
+    difference of the stopping distance from the distance with unchanged tyre force."""
+    level, steady_distance, turning = constant_slip_stop(DRY, 0.004)
     two_surfaces = road([Stretch(0.0, 0, 0), Stretch(5.03, 1, 1)])
     stop = stopping_distance(
         implementation, level, DRY, table_of_surface("wet"), step=2e-2, rim_turning=turning, road=two_surfaces

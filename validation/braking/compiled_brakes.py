@@ -1,4 +1,5 @@
-"""Laws of the braked wheel by compiled code, each called alone: what the plain ones are compared with."""
+"""Calls of single compiled laws of the braked wheel (tyre, road, relaxation, suspension), for comparison with plain
+code."""
 
 import numpy as np
 
@@ -32,7 +33,7 @@ DRY_TABLES = stacked_tables([table_of_surface("dry")])
 
 
 def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: BrakedStep) -> np.ndarray:
-    """Compiled tyre step; its values (7,) are those of ``models.brake.plain.tyre.tyre``."""
+    """Report (7,) of a tyre after a step, by compiled code: the same values as by ``models.brake.plain.tyre.tyre``."""
     wheels, report, surfaces_below = Wheels(*np.zeros((KNOWN, 1))), np.empty((REPORT_SIZE, 1)), surfaces(1)
     surfaces_below.first[0], surfaces_below.second[0], surfaces_below.share[0] = (
         surface.first,
@@ -56,7 +57,8 @@ def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, bra
 
 
 def friction(tables: Tables, table_index: int, angle: float, load: float, slip: float) -> tuple[float, float]:
-    """mu_x and mu_y of one of the tables at a slip angle (rad), a load (N) and a slip."""
+    """Friction coefficients mu_x and mu_y, by compiled code, of a tyre table at a slip angle (rad), a load (N) and a
+    slip."""
     cells, (s, w) = (
         TableCell(*cell_and_share(tables.angles, angle), *cell_and_share(tables.loads, load)),
         cell_and_share(tables.slips, slip),
@@ -68,8 +70,8 @@ def friction(tables: Tables, table_index: int, angle: float, load: float, slip: 
 
 
 def under_wheels(road: Road, state: np.ndarray, step: float, surface_kinds: np.ndarray) -> np.ndarray:
-    """First table, second table and share of the second (4, 3) under the truck's wheels, for a state (2, 3) and a step
-    (s)."""
+    """Surfaces under the truck's four wheels during a step (s) from a state (2, 3), by compiled code: number of the
+    first surface, of the second, and share of the second (4, 3)."""
     surfaces_below = surfaces(4)
     compiled_under_wheels(state, step, OnRoad(PAPER_PLANE, surface_kinds, 0.0, DRY_TABLES, road), surfaces_below)
     return np.column_stack((surfaces_below.first, surfaces_below.second, surfaces_below.share))
@@ -78,22 +80,22 @@ def under_wheels(road: Road, state: np.ndarray, step: float, surface_kinds: np.n
 def lag_on(
     state: np.ndarray, time: float, steer: np.ndarray, slope: float, length: np.ndarray, slip_lags: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compiled counterpart of ``validation.braking.plain_relaxation.lag_on``: lagging slip angles of the truck's tyres
-    after a step."""
+    """Lagging slip angles of the truck's tyres after a time step and those used within the step (4,), rad, by compiled
+    code. Arguments as in ``validation.braking.plain_relaxation.lag_on``."""
     lags_after, lagging = slip_lags.copy(), np.zeros(4)
     truck_on_road = OnRoad(PAPER_PLANE, np.zeros(4, dtype=np.int64), slope, DRY_TABLES, UNIFORM_ROAD)
     compiled_lag_on(state, time, steer, truck_on_road, Lag(length, lags_after), lagging)
     return lags_after, lagging
 
 
-def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
-    """A vehicle on its suspension in an engine that calls the compiled forces. ``wheel_forces_in`` of its table gives
-    access to the quantities held constant at its wheels."""
+def engine_model(vehicle: Sprung, engine: str) -> FreeModel:
+    """Model of a vehicle on its suspension in an engine that calls the compiled forces. ``wheel_force_views`` of its
+    table gives access to the quantities that are constant at each wheel during a step."""
     return free_model(engine, driven(vehicle, engine))
 
 
-def wheel_forces_in(table: np.ndarray, wheels: int = 4) -> WheelForces:
-    """Views into a table of numbers on the quantities that are constant at each wheel during a step; writing to them
-    changes the table."""
+def wheel_force_views(table: np.ndarray, wheels: int = 4) -> WheelForces:
+    """Views into a model's parameter table on the quantities that are constant at each wheel during a step (steer
+    angles, forces, spin moments); writing to them changes the table."""
     rows = table[-wheels * VALUES_PER_WHEEL :].reshape(VALUES_PER_WHEEL, wheels)
     return WheelForces(rows[0], rows[1:3].T, rows[3])

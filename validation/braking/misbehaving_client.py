@@ -1,4 +1,4 @@
-"""A process at the socket of a braked vehicle that answers well a few times and then does one thing wrong.
+"""Controller process at the socket of a braked vehicle that answers correctly for some samples, then makes one error.
 
 Run as ``python misbehaving_client.py KIND PORT``; it knows the port by its documented bytes alone.
 """
@@ -10,21 +10,21 @@ import sys
 import time
 
 GOOD_SAMPLES = 20
-"""Samples that are answered well."""
+"""Number of samples that are answered correctly."""
 NAN = float("nan")
 
 
 def answer_frame(
     sample_number: int, magic: bytes = b"TRA1", frame_mode: bytes = b"V", wheels: int = 4, first: float = 1.0
 ) -> bytes:
-    """Bytes of a controller's answer, valid by default; arguments make it invalid."""
+    """Bytes of a controller's answer to a sample, valid by default; other arguments make it invalid."""
     return struct.pack(
         "<4sIBB6x8d", magic, sample_number, frame_mode[0], wheels, first, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0
     )
 
 
 def misbehave(misbehaviour: str, sample_number: int, link: socket.socket) -> None:
-    """Misbehave in the way ``misbehaviour``, then wait until the other end closes the connection."""
+    """Send the wrong answer named by ``misbehaviour``, then wait until the vehicle's side closes the connection."""
     if misbehaviour == "died":
         os._exit(9)
     if misbehaviour == "late":
@@ -49,7 +49,8 @@ def misbehave(misbehaviour: str, sample_number: int, link: socket.socket) -> Non
 
 
 def main(misbehaviour: str, port: str) -> None:
-    """Answer correctly for some samples, then misbehave in the way ``misbehaviour``."""
+    """Connect to the port, answer correctly for GOOD_SAMPLES samples, then send the wrong answer named by
+    ``misbehaviour``."""
     with socket.create_connection(("127.0.0.1", int(port))) as link:
         while True:
             question = link.recv(104, socket.MSG_WAITALL)

@@ -1,6 +1,6 @@
-"""Laws of the braked wheel, each by compiled code and by plain code, at random states.
+"""Laws of the braked wheel, each computed by compiled code and by independent plain code, at random states.
 
-Differences are by the largest of the values, so that a state whose force is small does not count by its rounding.
+Differences are divided by the largest of the values, so that the rounding of a small force does not count.
 """
 
 from dataclasses import replace
@@ -23,33 +23,33 @@ from validation.braking.plain_relaxation import lag_on as plain_lag_on
 STATE_COUNT = 400
 SEED = 20_26
 LOADS = np.array([1e3, 4e3, 1e4])
-BY_LOAD = np.array([1.1, 1.0, 0.8])
-"""Friction at these loads (N) divided by that of the surface."""
+FRICTION_BY_LOAD = np.array([1.1, 1.0, 0.8])
+"""Friction at the loads LOADS (N) divided by the surface's friction."""
 
 
-def by_load(surface_name: str) -> TyreTable:
-    """A surface's tyre whose friction falls with the load."""
+def load_dependent_tyre(surface_name: str) -> TyreTable:
+    """Tyre table of a surface, changed so that friction falls with the load."""
     tables_of = table_of_surface(surface_name)
     spread = tables_of.refined(tables_of.angles, tables_of.slips, LOADS)
-    return replace(spread, mu_x=spread.mu_x * BY_LOAD[None, :, None], h=spread.h * BY_LOAD)
+    return replace(spread, mu_x=spread.mu_x * FRICTION_BY_LOAD[None, :, None], h=spread.h * FRICTION_BY_LOAD)
 
 
 def tables() -> Tables:
-    """Friction tables of three surfaces, each at several loads."""
-    return stacked_tables([by_load(name) for name in ("dry", "wet", "ice")])
+    """Tyre tables of three surfaces, each at several loads, stacked for compiled functions."""
+    return stacked_tables([load_dependent_tyre(name) for name in ("dry", "wet", "ice")])
 
 
 def largest_difference(compiled_values: np.ndarray, plain_values: np.ndarray) -> float:
-    """Largest difference between two arrays; in each column it is divided by the column's largest magnitude. Infinite
-    where only one of them is not a number."""
+    """Largest difference between two arrays (n, columns), divided in each column by its largest magnitude. Infinite
+    where a value is not a number."""
     scale = np.maximum(np.abs(plain_values).max(axis=0), 1e-300)
     difference = float(np.max(np.abs(compiled_values - plain_values) / scale))
     return difference if np.isfinite(difference) else np.inf
 
 
 def tyre_reports(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Tyre reports (state_count, 7) for random steps, by compiled and by plain code; wheels roll, are locked, are
-    released or spin backwards.
+    """Tyre reports (state_count, 7) after random time steps, by compiled and by plain code. Wheels roll, are locked,
+    are released or spin backwards.
     """
     random, tyre_tables = np.random.default_rng(seed), tables()
     reports, plain = np.empty((2, state_count, 7))
@@ -71,8 +71,8 @@ def tyre_reports(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.n
 
 
 def random_surfaces(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Surface numbers and shares (4 count, 3) under the wheels of a truck that crosses seams and lines, by compiled and
-    by plain code."""
+    """Surfaces under the wheels of a truck that crosses seams and lines between surfaces, by compiled and by plain
+    code. Shape (4 state_count, 3): number of the first surface, of the second, share of the second."""
     random, shares, plain = np.random.default_rng(seed), list[np.ndarray](), list[list[float]]()
     stretched: Road = road([Stretch(0.0, 0, 1), Stretch(1.0, 2, 2), Stretch(1.7, 1, 0)], 0.3, 2)
     kind = np.array([0, 0, 1, 1])
@@ -87,7 +87,7 @@ def random_surfaces(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[n
     return np.concatenate(shares), np.array(plain)
 
 
-def torques_by_commands(samples: int = 60, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+def torques_by_commands(sample_count: int = 60, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """Pressures, torques and supply pressure (n, 9) under random valve and pressure commands, by compiled and by plain
     code."""
     random, four = np.random.default_rng(seed), np.ones(4)
@@ -104,7 +104,7 @@ def torques_by_commands(samples: int = 60, seed: int = SEED) -> tuple[np.ndarray
         )
         airs = resting_chambers(chambers, 5.5e-3), resting_chambers(chambers, 5.5e-3)
         pressures = plain_pressure.Pressures(chambers, brakes, 5.5e-3, airs[1])
-        for n in range(samples):
+        for n in range(sample_count):
             valves = random.choice([RELEASE, HOLD, APPLY, APPLY, SLOW], 4)
             torques = np.empty((2, 5, 4))
             if n % 20 == 19:
@@ -124,8 +124,8 @@ def _air_row(air: Air, torques: np.ndarray) -> np.ndarray:
 
 
 def slip_lags(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Lagging slip angles after a step, and those used within the step, (state_count, 8) for random states, by compiled
-    and by plain code.
+    """Lagging slip angles (rad) after a time step and those used within the step, (state_count, 8), of random states,
+    by compiled and by plain code.
     """
     random, steer = np.random.default_rng(seed), np.array([0.1, 0.1, 0.0, 0.0])
     lags, plain = np.empty((2, state_count, 8))
@@ -141,10 +141,13 @@ def slip_lags(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndar
 
 
 def friction_of_random_states(state_count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """mu_x and mu_y (state_count, 2) of random states: compiled code on stacked tables, and plain code on each table
-    with its own nodes.
+    """Friction coefficients mu_x and mu_y (state_count, 2) of random states, by compiled code on stacked tables and by
+    plain code on each single table with its original nodes.
     """
-    random, tyres = np.random.default_rng(seed), [table_of_surface("dry"), by_load("wet"), by_load("ice")]
+    random, tyres = (
+        np.random.default_rng(seed),
+        [table_of_surface("dry"), load_dependent_tyre("wet"), load_dependent_tyre("ice")],
+    )
     all_tables, (coefficients, plain) = stacked_tables(tyres), np.empty((2, state_count, 2))
     for i in range(state_count):
         tyre_index, angle, load = int(random.integers(len(tyres))), random.uniform(0.0, 1.7), random.uniform(0.0, 12e3)

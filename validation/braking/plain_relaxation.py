@@ -1,4 +1,4 @@
-"""Slip angles of a truck that lag behind, by plain code, and a braked turn on such tyres beside written equations."""
+"""Lagging slip angles of tyres with a relaxation length by plain code, and a braked turn of a truck on such tyres."""
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -12,8 +12,8 @@ from models.tyre.magic_formula import table_of_surface
 from validation.braking.sprung_box import TORQUE_PER_BAR, steady_torques
 from validation.braking.truck_equations import braked_turn
 
-FIRST_SPEED, LAST_SPEED, TURN_OF_TRUCK = 11.11, 9.0, 0.03
-"""Speeds (m/s) from which and to which the truck turns, and its steer angle (rad)."""
+FIRST_SPEED, LAST_SPEED, STEER_ANGLE = 11.11, 9.0, 0.03
+"""Speeds (m/s) at start and end of the truck's braked turn, and its steer angle (rad)."""
 
 
 def lag_on(
@@ -25,9 +25,10 @@ def lag_on(
     length: np.ndarray,
     slip_lags: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Call ``models.brake.plain.relaxation.lag_on`` for a state (2, 3): x, y, heading, and their rates.
+    """Lagging slip angles after a time step (s), and those used within the step (W,) in rad, by plain code for a state
+    (2, 3): x, y, heading, and their rates.
 
-    wheel_positions (W, 2) : of the wheels (m); steer (W,) : rad; slip_lags (W,) : the angles before.
+    wheel_positions (W, 2) : of the W wheels (m); steer (W,) : rad; slip_lags (W,) : lagging angles before the step.
     """
     velocity, turning = state[1, :2], state[1, 2]
     centres = velocity + turning * (wheel_positions @ rotation(state[0, 2] + 0.5 * np.pi).T)
@@ -43,19 +44,19 @@ def rotation(angle: float) -> np.ndarray:
     return np.array([[c, -s], [s, c]])
 
 
-def turn_apart(length: float, substeps: int = 4) -> float:
-    """Distance (m) between the final positions of a braked turn by the truck model and by its written-out equations.
-    The truck's tyres have a relaxation length (m)."""
+def braked_turn_difference(relaxation_length: float, substeps: int = 4) -> float:
+    """Distance (m) between the final positions of a braked turn by twinrig's truck model and by independently written
+    equations. The truck's tyres have a relaxation length (m)."""
     tyre, torques = table_of_surface("ice"), (300.0, 200.0)
-    end = braked_turn(PAPER_TRUCK, tyre, TURN_OF_TRUCK, torques, FIRST_SPEED, LAST_SPEED, length)
+    end = braked_turn(PAPER_TRUCK, tyre, STEER_ANGLE, torques, FIRST_SPEED, LAST_SPEED, relaxation_length)
     path = on_tyres(
         plane_of_truck(PAPER_TRUCK),
         [tyre],
         of_wheels(*4 * (Brake(push_out=0.0, release=0.0, rising=TORQUE_PER_BAR, falling=TORQUE_PER_BAR),)),
         Chambers(np.zeros(4), np.zeros(4), 6.0),
-        steer=np.array([TURN_OF_TRUCK, TURN_OF_TRUCK, 0.0, 0.0]),
+        steer=np.array([STEER_ANGLE, STEER_ANGLE, 0.0, 0.0]),
         substeps=substeps,
-        relaxation=np.full(4, length),
+        relaxation=np.full(4, relaxation_length),
     ).run(steady_torques(*np.repeat(torques, 2)), FIRST_SPEED, end.time)
     position_at = CubicHermiteSpline(path.times, path.states[:, 0, :2], path.states[:, 1, :2])
     return float(np.hypot(*(position_at(end.time) - (end.x, end.y))))

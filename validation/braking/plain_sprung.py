@@ -1,4 +1,4 @@
-"""The braked vehicle on its suspension by an engine and by plain code: accelerations at states, and runs."""
+"""The braked vehicle on its suspension, by an engine and by plain code: accelerations at random states, and runs."""
 
 from dataclasses import replace
 from functools import cache
@@ -19,27 +19,27 @@ from models.systems.braking.procedures import steady_turn
 from models.tyre.magic_formula import table_of_surface
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
-from validation.braking.compiled_brakes import in_engine, wheel_forces_in
-from validation.braking.sprung_box import SPIN, car, steady_torques
+from validation.braking.compiled_brakes import engine_model, wheel_force_views
+from validation.braking.sprung_box import WHEEL_SPIN_INERTIA, car, steady_torques
 from validation.spatial.cars import twin
 from validation.spatial.trains import caravan, train
 
 STATE_COUNT, SEED = 100, 22
 RELAXATION_LENGTHS = np.array([0.4, 0.4, 0.3, 0.3])
-"""m, over which tyres relax where they do; those of what is towed as the last one."""
+"""Relaxation lengths (m) of a vehicle's tyres where they lag; tyres of a trailer have the last one."""
 LARGEST_LEAN = 0.3
-"""rad: largest roll and pitch of the states."""
+"""Largest roll and pitch (rad) of the random states."""
 
 
 @cache
 def asymmetric_twin() -> Sprung:
-    """The twin without any symmetry."""
-    return suspended_vehicle(twin(), SPIN)
+    """The asymmetric twin of the car on its suspension: a vehicle without any symmetry."""
+    return suspended_vehicle(twin(), WHEEL_SPIN_INERTIA)
 
 
 @cache
 def car_with_stops() -> Sprung:
-    """The car with stops and dry friction at its wheels, and dampers in its tyres."""
+    """The car of 19 freedoms with bump stops, nonlinear dampers and dry friction at its wheels, and damped tyres."""
     stop = Curve((-0.06, -0.03, 0.0, 0.03, 0.06), (-4e3, -500.0, 0.0, 300.0, 3e3))
     damper = Curve((-1.0, -0.1, 0.0, 0.2, 1.0), (-900.0, -200.0, 0.0, 150.0, 400.0))
     vehicle: SpatialVehicle = load_vehicle("r19_free")
@@ -49,42 +49,42 @@ def car_with_stops() -> Sprung:
         for s in vehicle.springs
     )
     tyres = tuple(replace(tyre, damping=80.0 + 10.0 * i) for i, tyre in enumerate(vehicle.tyres))
-    return suspended_vehicle(replace(vehicle, springs=springs, tyres=tyres), SPIN)
+    return suspended_vehicle(replace(vehicle, springs=springs, tyres=tyres), WHEEL_SPIN_INERTIA)
 
 
 @cache
 def towing_car() -> Sprung:
-    """The car with the caravan on its ball, without drag."""
-    return suspended_vehicle(replace(caravan(), drags=()), SPIN)
+    """The car with a caravan on its tow ball, without aerodynamic drag."""
+    return suspended_vehicle(replace(caravan(), drags=()), WHEEL_SPIN_INERTIA)
 
 
 @cache
-def in_row() -> Sprung:
-    """The twin with a trailer made of a drawbar and a box, all without symmetry."""
-    return suspended_vehicle(train(), SPIN)
+def asymmetric_train() -> Sprung:
+    """The asymmetric twin with a trailer made of a drawbar and a box, all without symmetry."""
+    return suspended_vehicle(train(), WHEEL_SPIN_INERTIA)
 
 
 @cache
-def compiled_springs() -> Sprung:
-    """The twin with its trailer, with all springs computed by the compiled force function."""
-    return suspended_vehicle(train(), SPIN, forces="compiled")
+def train_with_compiled_springs() -> Sprung:
+    """The asymmetric twin with its trailer, all springs computed by the compiled force function."""
+    return suspended_vehicle(train(), WHEEL_SPIN_INERTIA, forces="compiled")
 
 
 VEHICLES = {"car": car, "twin": asymmetric_twin, "bent": car_with_stops}
-TRAINS = {"caravan": towing_car, "train": in_row, "compiled train": compiled_springs}
+TRAINS = {"caravan": towing_car, "train": asymmetric_train, "compiled train": train_with_compiled_springs}
 EVERY_VEHICLE = {**VEHICLES, **TRAINS}
 
 
-def wheels_of(vehicle: Sprung) -> int:
-    """Number of wheels of a vehicle, those of its trailer included."""
+def wheel_count(vehicle: Sprung) -> int:
+    """Number of wheels of a vehicle, including those of its trailer."""
     return len(vehicle.handling.vehicle.tyres)
 
 
-def states(
+def random_states(
     coordinate_count: int, state_count: int = STATE_COUNT, wheels: int = 4
 ) -> tuple[np.ndarray, list[WheelForces]]:
-    """Random coordinates and rates (state_count, 2, size) at any heading, and the random quantities held constant at
-    their wheels.
+    """Random coordinates and rates (state_count, 2, coordinate_count) at any heading, and random steer angles, forces
+    and moments of their wheels.
     """
     random = np.random.default_rng(SEED)
     coordinates_and_rates = random.normal(0.0, 1.0, (state_count, 2, coordinate_count)) * np.array([[0.02], [0.3]])
@@ -107,9 +107,9 @@ def states(
 
 @cache
 def plain_accelerations(vehicle: str, state_count: int = STATE_COUNT) -> np.ndarray:
-    """Accelerations (state_count, n) at the states of ``states``, by plain code."""
+    """Accelerations (state_count, number of coordinates) of a vehicle at the random states, by plain code."""
     suspension = Suspension(EVERY_VEHICLE[vehicle]())
-    coordinates_and_rates, wheel_forces = states(suspension.size, state_count, len(suspension.tyres))
+    coordinates_and_rates, wheel_forces = random_states(suspension.size, state_count, len(suspension.tyres))
     return np.array(
         [
             suspension.acceleration(q, v, kept_state)
@@ -119,11 +119,12 @@ def plain_accelerations(vehicle: str, state_count: int = STATE_COUNT) -> np.ndar
 
 
 def accelerations(vehicle: Sprung, engine: str, state_count: int = STATE_COUNT) -> np.ndarray:
-    """Accelerations (state_count, n) at the states of ``states``, by an engine that calls the compiled forces."""
-    model, computed = in_engine(vehicle, engine), np.empty((state_count, vehicle.size))
-    wheels = wheels_of(vehicle)
-    rows = wheel_forces_in(model.numbers, wheels)
-    for i, (state, kept_state) in enumerate(zip(*states(vehicle.size, state_count, wheels), strict=True)):
+    """Accelerations (state_count, number of coordinates) of a vehicle at the random states, by an engine that calls the
+    compiled forces."""
+    model, computed = engine_model(vehicle, engine), np.empty((state_count, vehicle.size))
+    wheels = wheel_count(vehicle)
+    rows = wheel_force_views(model.numbers, wheels)
+    for i, (state, kept_state) in enumerate(zip(*random_states(vehicle.size, state_count, wheels), strict=True)):
         rows.steer[:], rows.forces[:], rows.spin_moments[:] = (
             kept_state.steer,
             kept_state.forces,
@@ -134,15 +135,15 @@ def accelerations(vehicle: Sprung, engine: str, state_count: int = STATE_COUNT) 
 
 
 def relative_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
-    """Largest difference of the accelerations, in each state divided by the largest acceleration; infinite where one of
-    them is not a number."""
+    """Largest difference of the accelerations, divided in each state by its largest acceleration; infinite where an
+    acceleration is not a number."""
     difference = float(np.max(np.abs(compiled - plain).max(axis=1) / np.abs(plain).max(axis=1)))
     return difference if np.isfinite(difference) else np.inf
 
 
-def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -> BrakedVehicle:
-    """A vehicle steered to the left, with hysteresis in its brakes. Its road is dry on the left and wet on the right
-    for 3 m, then ice; lags: whether its tyres have the relaxation lengths RELAXATION_LENGTHS."""
+def braked_vehicle_on_springs(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -> BrakedVehicle:
+    """A braked vehicle on its suspension, steered to the left, with hysteresis in its brakes. Its road is dry on the
+    left and wet on the right for 3 m, then ice. lags: whether its tyres have relaxation lengths."""
     front, rear = (
         Brake(push_out=0.4, release=0.3, rising=level, falling=1.1 * level)
         for level in ((150.0, 50.0) if valves else (3e2, 1e2))
@@ -164,46 +165,48 @@ def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -
 
 
 def controller(valves: bool, wheels: int = 4) -> Controller:
-    """A slip controller that sets valves, or constant pressures."""
+    """A slip controller that sets valves if ``valves``, else constant brake pressures."""
     return SlipBangBang(wheels=wheels) if valves else steady_torques(*wheels * (4e4,))
 
 
 def run(
     vehicle: Sprung, engine: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
 ) -> BrakingPath:
-    """Simulate a stop from a speed (m/s) for a duration (s)."""
-    return vehicle_on(vehicle, engine, valves, lags).run(controller(valves, wheels_of(vehicle)), speed, duration)
+    """Simulate a stop of a vehicle on its suspension from a speed (m/s) for a duration (s) in an engine."""
+    return braked_vehicle_on_springs(vehicle, engine, valves, lags).run(
+        controller(valves, wheel_count(vehicle)), speed, duration
+    )
 
 
 @cache
 def plain_run(
     vehicle: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
 ) -> BrakingPath:
-    """The same stop as ``run``, by plain code."""
+    """Simulate the stop of ``run`` by plain code."""
     return run(EVERY_VEHICLE[vehicle](), "reference", duration, valves, speed, lags)
 
 
-def paths_apart(first: BrakingPath, other_path: BrakingPath) -> float:
-    """Largest difference of two paths in positions, rates and rim speeds (m, rad, per s); infinite if they have
-    different lengths."""
-    if len(first.times) != len(other_path.times):
+def path_difference(path: BrakingPath, other_path: BrakingPath) -> float:
+    """Largest difference of two paths in positions, rates and rim speeds (m, rad, per s); infinite if they differ in
+    length or a value is not a number."""
+    if len(path.times) != len(other_path.times):
         return np.inf
     difference = max(
-        float(np.abs(first.states - other_path.states).max()),
-        0.3 * float(np.abs(first.turning - other_path.turning).max()),
+        float(np.abs(path.states - other_path.states).max()),
+        0.3 * float(np.abs(path.turning - other_path.turning).max()),
     )
     return difference if np.isfinite(difference) else np.inf
 
 
-def circles_of_both_sides(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
-    """Steady circle at a speed (m/s) and radius (m), by the engine's forces and by plain code. Each row has steer
-    angles, wheel speeds and state; NaN where no steady turn exists."""
+def steady_circle_pair(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
+    """Steady circle of a vehicle at a speed (m/s) and radius (m), by MuJoCo's forces and by plain code. Each array has
+    steer angles, wheel speeds and state; NaN where no steady turn exists."""
     rows = []
     for engine in ("mujoco", "reference"):
-        on_suspension = vehicle_on(vehicle, engine, False)
+        on_suspension = braked_vehicle_on_springs(vehicle, engine, False)
         turn = steady_turn(replace(on_suspension, road=UNIFORM_ROAD), speed, radius)
         if turn is None:
-            rows.append(np.full(2 * wheels_of(vehicle) + 2 * vehicle.size, np.nan))
+            rows.append(np.full(2 * wheel_count(vehicle) + 2 * vehicle.size, np.nan))
         else:
             rows.append(np.concatenate((turn.steer, turn.start.turning, turn.start.state.ravel())))
     return rows[0], rows[1]

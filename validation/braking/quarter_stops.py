@@ -1,4 +1,4 @@
-"""A quarter vehicle braked to a stop by a constant torque: by the product, by other people's schemes, and exactly.
+"""A quarter vehicle braked to a stop by a constant torque: by twinrig, by other integration schemes, and exactly.
 
 Explicit Euler and Runge-Kutta 4 take wheel and vehicle together. The literal scheme is the paper's as it is written:
 the wheel exact over a step with the secant slope F(s) / s, the vehicle by the tyre's force at the start of the step.
@@ -22,13 +22,13 @@ from models.tyre.tyre_table import Tables, TyreTable, cell_and_share, stacked_ta
 EULER, RK4, LITERAL = "explicit Euler", "RK4", "paper's, literal"
 SCHEMES = (EULER, RK4, LITERAL)
 SLOWEST_SPEED = 1e-6
-"""Speed (m/s) below which slip is taken at this one."""
+"""Speed (m/s) below which slip is computed as at this speed."""
 SETTLED_RATE = 1e-11
-"""Rate of the slip divided by that of the start at which it has settled."""
+"""Rate of the slip divided by its initial rate at which the slip counts as constant."""
 LONGEST_TIME_RATIO = 3.0
 
 
-class Numbers(NamedTuple):
+class QuarterCar(NamedTuple):
     """A quarter vehicle: mass (kg), radius (m) and inertia (kg m^2) of its wheel."""
 
     mass: float
@@ -37,23 +37,24 @@ class Numbers(NamedTuple):
 
 
 class FrictionCurve(NamedTuple):
-    """Friction mu (s,) by slips (s,)."""
+    """Friction coefficients mu (n,) at slips (n,), linear between them."""
 
     slips: np.ndarray
     mu: np.ndarray
 
 
 class FrictionChange(NamedTuple):
-    """A road whose friction changes at a position (m)."""
+    """A road whose friction curve changes at a position (m)."""
 
     before: FrictionCurve
-    behind: FrictionCurve
-    place: float = math.inf
+    after: FrictionCurve
+    position: float = math.inf
 
 
 @njit(cache=True, error_model="numpy")
 def force_at(u, w, quarter_car, curve):
-    """Longitudinal force (N) and slip of a wheel with angular velocity w (rad/s), whose centre moves at u (m/s)."""
+    """Longitudinal tyre force (N) and slip of a wheel with angular velocity w (rad/s), whose centre moves at u
+    (m/s)."""
     u, mu = max(u, SLOWEST_SPEED), curve.mu
     slip = (u - quarter_car.radius * w) / u
     cell, share = cell_and_share(curve.slips, min(abs(slip), 1.0))
@@ -62,15 +63,16 @@ def force_at(u, w, quarter_car, curve):
 
 @njit(cache=True, error_model="numpy")
 def rates(u, w, torque, quarter_car, curve):
-    """Time derivatives of u (m/s^2) and w (rad/s^2); the brake holds a wheel that does not turn."""
+    """Time derivatives of the speed u (m/s^2) and of the wheel's angular velocity w (rad/s^2); the brake holds a wheel
+    that does not turn."""
     force, _ = force_at(u, w, quarter_car, curve)
     brake = torque if w > 0.0 else min(torque, quarter_car.radius * force)
     return -force / quarter_car.mass, (quarter_car.radius * force - brake) / quarter_car.inertia
 
 
 @njit(cache=True, error_model="numpy")
-def literal_step(u, w, torque, quarter_car, curve, step):
-    """Speed and angular velocity after one step of the scheme as printed in the paper."""
+def literal_paper_step(u, w, torque, quarter_car, curve, step):
+    """Speed u (m/s) and angular velocity w (rad/s) after a step (s) of the scheme as printed in the paper."""
     mass, radius, inertia = quarter_car
     force, slip = force_at(u, w, quarter_car, curve)
     secant = force / slip if abs(slip) > 1e-12 else mass * GRAVITY * curve.mu[1] / curve.slips[1]
@@ -80,13 +82,13 @@ def literal_step(u, w, torque, quarter_car, curve, step):
 
 
 @njit(cache=True, error_model="numpy")
-def advanced_by_scheme(scheme, u, w, torques, quarter_car, curve, step):
-    """Speed and angular velocity after one step of a scheme (0 Euler, 1 RK4, 2 literal), with brake torques (N m) at
-    the step's start and end."""
+def step_of_scheme(scheme, u, w, torques, quarter_car, curve, step):
+    """Speed u (m/s) and angular velocity w (rad/s) after a step (s) of a scheme (0 Euler, 1 RK4, 2 the paper's), with
+    brake torques (N m) at the step's start and end."""
     torque_at_start, torque_at_end = torques
     middle = 0.5 * (torque_at_start + torque_at_end)
     if scheme == 2:
-        return literal_step(u, w, middle, quarter_car, curve, step)
+        return literal_paper_step(u, w, middle, quarter_car, curve, step)
     a, b = rates(u, w, torque_at_start, quarter_car, curve)
     if scheme == 0:
         return u + step * a, w + step * b
@@ -98,15 +100,15 @@ def advanced_by_scheme(scheme, u, w, torques, quarter_car, curve, step):
 
 @njit(cache=True, error_model="numpy")
 def march(scheme, u, w, torques, quarter_car, road, step):
-    """Stopping distance (m), number of steps (s) and remaining speed (m/s) by a scheme (0 Euler, 1 RK4, 2 literal).
-    torques (n + 1,): N m at the ends of the steps; the number of steps is -1 if the vehicle does not stop.
+    """Stopping distance (m), number of steps and remaining speed (m/s) by a scheme (0 Euler, 1 RK4, 2 the paper's).
+    torques (n + 1,): N m at the ends of the steps (s); the number of steps is -1 if the vehicle does not stop.
 
     u (m/s), w (rad/s) : speeds at the start; road : a ``FrictionChange``.
     """
     x = 0.0
     for n in range(torques.size - 1):
-        curve = road.before if x < road.place else road.behind
-        speed_after, turning = advanced_by_scheme(scheme, u, w, (torques[n], torques[n + 1]), quarter_car, curve, step)
+        curve = road.before if x < road.position else road.after
+        speed_after, turning = step_of_scheme(scheme, u, w, (torques[n], torques[n + 1]), quarter_car, curve, step)
         if speed_after <= 0.0:
             return x + 0.5 * u * step * u / (u - speed_after), n + 1, 0.0
         x += 0.5 * step * (u + speed_after)
@@ -114,11 +116,12 @@ def march(scheme, u, w, torques, quarter_car, road, step):
     return x, -1, u
 
 
-def marched_quarter(
+def stop_by_scheme(
     scheme: int, quarter_car: Quarter, torques: np.ndarray, road: FrictionChange, speed: float, step: float
 ) -> tuple[float, int, float]:
-    """``march`` for a quarter vehicle that starts with a rolling wheel at a speed (m/s)."""
-    numbers = Numbers(quarter_car.mass, quarter_car.radius, quarter_car.spin_inertia)
+    """Stopping distance (m), number of steps and remaining speed (m/s), by a scheme, of a quarter vehicle that starts
+    with a rolling wheel at a speed (m/s)."""
+    numbers = QuarterCar(quarter_car.mass, quarter_car.radius, quarter_car.spin_inertia)
     distance, steps, left = march(scheme, speed, speed / quarter_car.radius, torques, numbers, road, step)
     return distance, steps, left
 
@@ -126,14 +129,15 @@ def marched_quarter(
 def stopping_distance(
     scheme: str, quarter_car: Quarter, tyre: TyreTable, torque: float, speed: float, step: float
 ) -> tuple[float, float]:
-    """Stopping distance (m) by one of SCHEMES under a constant torque (N m), from a speed (m/s) with a rolling wheel.
+    """Stopping distance (m) and remaining speed (m/s) by one of SCHEMES under a constant brake torque (N m), from a
+    speed (m/s) with a rolling wheel.
 
-    A scheme may chatter or creep for ever. After LONGEST_TIME_RATIO times the time that the torque alone would take,
-    the way until then is given, with the speed (m/s) that is left, else 0.
+    A scheme may chatter or creep for ever. The run ends after LONGEST_TIME_RATIO times the time that the torque alone
+    would take; then the distance until that time is returned. The remaining speed is 0 after a stop.
     """
     step_limit = int(LONGEST_TIME_RATIO * speed * quarter_car.mass * quarter_car.radius / (torque * step))
     curve = FrictionCurve(tyre.slips, tyre.mu_x[0, 0])
-    distance, _, left = marched_quarter(
+    distance, _, left = stop_by_scheme(
         SCHEMES.index(scheme), quarter_car, np.full(step_limit + 1, torque), FrictionChange(curve, curve), speed, step
     )
     return distance, left
@@ -166,20 +170,20 @@ def exact_distance(quarter_car: Quarter, tyre: TyreTable, torque: float, speed: 
 
 
 FRONT_WHEEL = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
-"""A front wheel of the paper's truck under what it bears while braking."""
+"""A front wheel of the paper's truck with the mass that it carries while braking."""
 PAPER_STEP = 5.5e-3
-"""The paper's step (s)."""
+"""Time step of the paper (s)."""
 
 
 @cache
 def friction_table(surface_name: str, friction_scale: float = 1.0) -> tuple[TyreTable, Tables]:
-    """Tyre table of a surface, both as an object and in the form for compiled functions."""
+    """Tyre table of a surface, as an object and in the form for compiled functions."""
     tyre = table_of_surface(surface_name, friction_scale)
     return tyre, stacked_tables([tyre])
 
 
 def steady_torque(quarter_car: Quarter, tyre: TyreTable, slip: float) -> tuple[float, float]:
-    """Tyre force (N) at a slip, and the brake torque (N m) that holds this slip constant."""
+    """Tyre force (N) at a slip, and brake torque (N m) at which this slip stays constant."""
     force = quarter_car.mass * GRAVITY * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
     return force, quarter_car.steady_torque(slip, force)
 
@@ -193,8 +197,8 @@ def constant_torque_stop(
     extra_time: float = 0.0,
     rim_turning: float | None = None,
 ) -> QuarterStop:
-    """A run under a constant torque (N m). It lasts ``extra_time`` (s) longer than a stop would take with the smaller
-    of two forces: torque / radius, and locked-wheel friction.
+    """Stop of a quarter vehicle under a constant brake torque (N m), by twinrig. The run lasts ``extra_time`` (s)
+    longer than a stop would take with the smaller of two forces: torque / radius, and locked-wheel friction.
     """
     least_force = min(torque / quarter_car.radius, quarter_car.mass * GRAVITY * float(tyre[0].mu_x[0, 0, -1]))
     steps = (

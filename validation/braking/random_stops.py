@@ -1,4 +1,4 @@
-"""Random scenes of braking that are legal: every one of them has to end at rest, or by a limit of the vehicle.
+"""Random legal braking scenes, each of which must end at rest or at a limit of the vehicle.
 
 Drawn are surface, levels and split of friction, mass, inertia, height, axles, wheels, brakes, chambers, procedure and
 steering, controller, step, lag of tyres, a trailer, or a vehicle on its suspension. Every number lies where a user's
@@ -16,16 +16,16 @@ CONTROLLERS = ("none", "none", "slip_bang_bang", "acceleration_phases", "five_ph
 
 @dataclass(frozen=True)
 class Draw:
-    """Generator of random numbers and choices in a fixed sequence."""
+    """Random generator of numbers and choices for scenes."""
 
     random: np.random.Generator
 
     def within(self, low: float, high: float) -> float:
-        """A random number, uniform between low and high."""
+        """A random number, uniformly distributed between low and high."""
         return float(self.random.uniform(low, high))
 
     def integer(self, low: int, upper_limit: int) -> int:
-        """A random integer from low to below the end."""
+        """A random integer from low to upper_limit - 1."""
         return int(self.random.integers(low, upper_limit))
 
     def choice(self, *choices: Any) -> Any:
@@ -33,12 +33,12 @@ class Draw:
         return self.random.choice(choices).item()
 
     def chance(self, share: float) -> bool:
-        """True with this probability."""
+        """True with the probability ``share``."""
         return bool(self.random.random() < share)
 
 
 def random_stop(seed: int, scene_number: int) -> dict[str, Any]:
-    """Table of one random scene; equal arguments give equal scenes."""
+    """Table of a random braking scene; equal arguments give equal scenes."""
     draw = Draw(np.random.default_rng([seed, scene_number]))
     kind = draw.choice("straight", "straight", "split", "j_turn", "j_turn", "turn")
     table: dict[str, Any] = {
@@ -70,7 +70,7 @@ def random_stop(seed: int, scene_number: int) -> dict[str, Any]:
 
 
 def procedure(generator: Draw, procedure_kind: str) -> dict[str, Any]:
-    """A random procedure of the driver, as a table of a scene."""
+    """Scene table of a random procedure: kind of stop, speed, and steering or radius."""
     options: dict[str, Any] = {"kind": procedure_kind, "speed": generator.within(2.0, 25.0)}
     if procedure_kind == "split":
         options["right"] = generator.choice(*SURFACES)
@@ -87,13 +87,13 @@ def procedure(generator: Draw, procedure_kind: str) -> dict[str, Any]:
 
 
 def road(generator: Draw) -> dict[str, Any]:
-    """A random road of one to three stretches."""
+    """Scene table of a random road with one to three surfaces in succession."""
     starts = [0.0, 12.0, 25.0][: generator.integer(1, 4)]
     return {"stretches": [{"x": x, "left": generator.choice(*SURFACES)} for x in starts]}
 
 
 def brakes(generator: Draw) -> dict[str, Any]:
-    """Random brake characteristics of the axles, with hysteresis, and a supply pressure."""
+    """Scene table of random brake characteristics of the axles, with hysteresis, and a random supply pressure."""
     table: dict[str, Any] = {"supply": generator.within(3.0, 10.0)}
     for axle in ("front", "rear", "trailer"):
         rising, push_out = generator.within(400.0, 3000.0), generator.within(0.0, 0.8)
@@ -107,7 +107,7 @@ def brakes(generator: Draw) -> dict[str, Any]:
 
 
 def axle(generator: Draw, x: float) -> dict[str, float]:
-    """Random parameters of an axle at x (m)."""
+    """Scene table of an axle at x (m) with random track, wheel radius and spin inertia."""
     return {
         "x": x,
         "track": generator.within(1.7, 2.1),
@@ -117,7 +117,7 @@ def axle(generator: Draw, x: float) -> dict[str, float]:
 
 
 def vehicle(generator: Draw) -> dict[str, Any]:
-    """A truck, light or laden, low enough that friction of 1 does not turn it over."""
+    """Scene table of a random truck, light or laden, low enough that a friction of 1 does not overturn it."""
     mass = generator.within(1500.0, 16000.0)
     return {
         "mass": mass,
@@ -129,7 +129,7 @@ def vehicle(generator: Draw) -> dict[str, Any]:
 
 
 def trailer(generator: Draw) -> dict[str, Any]:
-    """A drawbar trailer."""
+    """Scene table of a random drawbar trailer."""
     mass = generator.within(1500.0, 9000.0)
     axles = {
         "front": axle(generator, generator.within(1.5, 2.4)),

@@ -1,4 +1,5 @@
-"""A quarter vehicle under a sampled controller: the product's, and a tight reference that shares only the controller.
+"""A quarter vehicle under a sampled brake controller, by twinrig and by an accurate reference that shares only the
+controller.
 
 The reference integrates m u' = -F, J w' = r F - T by DOP853 within every sample, mu straight from the magic formula,
 T by the brake's law along the chamber's exponential, and the wheel's stop and its release as events.
@@ -20,15 +21,15 @@ from models.tyre.magic_formula import NAMED_SURFACES, table_of_surface
 
 SUPPLY, FILL, EMPTY = 10.0, 0.15, 0.1
 LAST_SPEED = 0.06
-"""Speed (m/s) at which the reference ends, above what one sample takes; the rest of its way is that of sliding."""
-Stretches = Sequence[tuple[float, Callable[[float], float]]]
-"""Stretches of a road: where each begins (m), and mu by the slip."""
+"""Speed (m/s) at which the reference's integration ends; from there the locked wheel slides to rest."""
+RoadStretches = Sequence[tuple[float, Callable[[float], float]]]
+"""Stretches of a road: where each begins (m), and its friction as a function of slip."""
 
 
-def own_distance(
+def twinrig_distance(
     quarter_car: Quarter, brake: Brake, surface_name: str, controller: Controller, speed: float, substeps: int
 ) -> float:
-    """Stopping distance (m) by twinrig's time step."""
+    """Stopping distance (m) of the quarter vehicle by twinrig, from a speed (m/s)."""
     chambers = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY)
     vehicle = on_tyres(
         quarter_car.plane, [table_of_surface(surface_name)], of_wheels(brake), chambers, substeps=substeps
@@ -39,17 +40,17 @@ def own_distance(
 def reference_distance(
     quarter_car: Quarter, brake: Brake, surface: str, controller: Controller, speed: float, tolerance: float = 1e-10
 ) -> float:
-    """Stopping distance (m) by an adaptive reference solver, at a relative tolerance."""
+    """Stopping distance (m) of the quarter vehicle on a surface by the reference solver, at a relative tolerance."""
     curve = NAMED_SURFACES[surface][0]
-    return tight_distance(
+    return reference_distance_on_stretches(
         quarter_car, brake, [(0.0, lambda s: float(curve(np.array(s))))], controller, speed, tolerance
     )
 
 
-def tight_distance(
+def reference_distance_on_stretches(
     quarter_car: Quarter,
     brake: Brake,
-    road_stretches: Stretches,
+    road_stretches: RoadStretches,
     controller: Controller,
     speed: float,
     tolerance: float = 1e-10,
@@ -61,8 +62,8 @@ def tight_distance(
     while y[1] > LAST_SPEED:
         sample = Sample(number, round(number * SAMPLE * 1e9), y[2:] * quarter_car.radius, True, SUPPLY, float(y[1]))
         valve = int(np.asarray(controller.sample(sample).valves)[0])
-        law = _law(pressure, torque, valve, brake)
-        y = _sample(
+        law = _brake_law(pressure, torque, valve, brake)
+        y = _state_after_sample(
             y, law, quarter_car, road_stretches, {"method": method, "rtol": tolerance, "atol": 1e-2 * tolerance}
         )
         pressure, torque, number = law(SAMPLE)[0], law(SAMPLE)[1], number + 1
@@ -70,8 +71,10 @@ def tight_distance(
     return float(y[0] + max(y[1], 0.0) ** 2 / (2.0 * slowing))
 
 
-def _law(pressure: float, torque: float, valve_command: int, brake: Brake) -> Callable[[float], tuple[float, float]]:
-    """Function of the time (s) since the sample's start that gives brake pressure (bar) and torque (N m)."""
+def _brake_law(
+    pressure: float, torque: float, valve_command: int, brake: Brake
+) -> Callable[[float], tuple[float, float]]:
+    """Returns a function of the time (s) since the sample's start that gives brake pressure (bar) and torque (N m)."""
 
     def law_at(time: float) -> tuple[float, float]:
         p = pressure
@@ -88,16 +91,17 @@ def _law(pressure: float, torque: float, valve_command: int, brake: Brake) -> Ca
     return law_at
 
 
-def _friction_at(x: float, road_stretches: Stretches) -> tuple[Callable[[float], float], float]:
+def _friction_at(x: float, road_stretches: RoadStretches) -> tuple[Callable[[float], float], float]:
     """Friction law mu(slip) at a position x (m), and the position (m) at which this stretch ends."""
     number = sum(begin <= x + 1e-10 for begin, _ in road_stretches[1:])
     return road_stretches[number][1], road_stretches[number + 1][0] if number + 1 < len(road_stretches) else np.inf
 
 
-def _sample(
-    y: np.ndarray, law: Any, quarter_car: Quarter, road_stretches: Stretches, options: dict[str, Any]
+def _state_after_sample(
+    y: np.ndarray, law: Any, quarter_car: Quarter, road_stretches: RoadStretches, options: dict[str, Any]
 ) -> np.ndarray:
-    """State x, u, w after one sample. A wheel that stops turning stays locked as long as its brake can hold it."""
+    """Position (m), speed (m/s) and angular velocity of the wheel (rad/s) after a sample. A wheel that stops turning
+    stays locked as long as its brake can hold it."""
     radius, inertia, load, time = quarter_car.radius, quarter_car.spin_inertia, quarter_car.mass * GRAVITY, 0.0
     mu, end = _friction_at(y[0], road_stretches)
 

@@ -1,4 +1,4 @@
-"""A box on four springs that is braked: what its loads and its pitch must be by closed forms, and runs of it."""
+"""A braked box on four springs: closed forms of its wheel loads and its pitch, and runs of it."""
 
 from dataclasses import replace
 from functools import cache
@@ -17,24 +17,24 @@ from models.tyre.tyre_table import TyreTable
 from models.vehicles.spatial import FREEDOMS, Body, SideForce, SpatialVehicle, SpringDamper, Tyre, Vector
 from models.vehicles.vehicle_file import load_vehicle
 
-HALF, SIDE, RADIUS = 1.3, 0.7, 0.3
-SPRING, TYRE, DAMPER = 3e4, 2e5, 2e3
-SPIN = 1.7
+HALF_WHEELBASE, HALF_TRACK, RADIUS = 1.3, 0.7, 0.3
+SPRING_STIFFNESS, TYRE_STIFFNESS, SPRING_DAMPING = 3e4, 2e5, 2e3
+WHEEL_SPIN_INERTIA = 1.7
 INERTIA_TENSOR = ((400.0, 0.0, 0.0), (0.0, 1500.0, 0.0), (0.0, 0.0, 1700.0))
 LOCKING_TORQUE = 1e5
 """Torque (N m) that locks a wheel at once."""
 SUPPLY = 6.0
-"""bar"""
+"""Supply pressure of the brakes (bar)."""
 TORQUE_PER_BAR = 2e4
-"""Torque by pressure (N m/bar) of brakes whose torques are given."""
+"""Torque divided by pressure (N m/bar) of brakes with prescribed torques."""
 
 
 @cache
-def box(stiffer: float = 1.0, spin_inertia: float = SPIN) -> Sprung:
-    """A box of 1000 kg on four wheels of 30 kg; springs and tyres are ``stiffer`` times as stiff, with the same damping
-    ratio."""
+def box(stiffness_factor: float = 1.0, spin_inertia: float = WHEEL_SPIN_INERTIA) -> Sprung:
+    """A box of 1000 kg on four wheels of 30 kg. The stiffness of springs and tyres is multiplied by a factor, at the
+    same damping ratio."""
     wheels = {
-        f"{x}{y}": (u * HALF, v * SIDE, RADIUS)
+        f"{x}{y}": (u * HALF_WHEELBASE, v * HALF_TRACK, RADIUS)
         for x, u in (("f", 1.0), ("r", -1.0))
         for y, v in (("l", 1.0), ("r", -1.0))
     }
@@ -47,11 +47,23 @@ def box(stiffer: float = 1.0, spin_inertia: float = SPIN) -> Sprung:
                 *(Body(name, 30.0, point, ("z",)) for name, point in wheels.items()),
             ),
             tuple(
-                SpringDamper(name, "chassis", name, point, point, upward, SPRING * stiffer, DAMPER * stiffer**0.5)
+                SpringDamper(
+                    name,
+                    "chassis",
+                    name,
+                    point,
+                    point,
+                    upward,
+                    SPRING_STIFFNESS * stiffness_factor,
+                    SPRING_DAMPING * stiffness_factor**0.5,
+                )
                 for name, point in wheels.items()
             ),
-            tuple(Tyre(name, name, point, "fr".index(name[0]), TYRE * stiffer) for name, point in wheels.items()),
-            (HALF, -HALF),
+            tuple(
+                Tyre(name, name, point, "fr".index(name[0]), TYRE_STIFFNESS * stiffness_factor)
+                for name, point in wheels.items()
+            ),
+            (HALF_WHEELBASE, -HALF_WHEELBASE),
             side_forces=tuple(
                 SideForce(name, "chassis", (x, y, 0.0), "chassis", 5e4) for name, (x, y, _) in wheels.items()
             ),
@@ -62,8 +74,8 @@ def box(stiffer: float = 1.0, spin_inertia: float = SPIN) -> Sprung:
 
 @cache
 def car() -> Sprung:
-    """The car of 19 freedoms, without drag."""
-    return suspended_vehicle(replace(load_vehicle("r19_free"), drags=()), SPIN)
+    """The car with 19 degrees of freedom on its suspension, without aerodynamic drag."""
+    return suspended_vehicle(replace(load_vehicle("r19_free"), drags=()), WHEEL_SPIN_INERTIA)
 
 
 def pitch_and_transfer(deceleration: float) -> tuple[float, float]:
@@ -73,7 +85,7 @@ def pitch_and_transfer(deceleration: float) -> tuple[float, float]:
     K theta / L of it. To first order in theta.
     """
     plane = box().plane
-    stiffness = 4.0 * HALF**2 / (1.0 / SPRING + 1.0 / TYRE)
+    stiffness = 4.0 * HALF_WHEELBASE**2 / (1.0 / SPRING_STIFFNESS + 1.0 / TYRE_STIFFNESS)
     pitch = plane.mass * deceleration * plane.height / (stiffness - plane.mass * GRAVITY * (plane.height - RADIUS))
     return pitch, stiffness * pitch / plane.wheelbase
 
@@ -87,7 +99,7 @@ def constant_friction(mu: float) -> TyreTable:
 
 
 def steady_torques(*torques: float) -> Pressures:
-    """Constant brake torques (W,) in N m of the runs of ``braked_vehicle``."""
+    """Controller that keeps constant brake torques (N m), one for each wheel, in runs of ``braked_vehicle``."""
     return Pressures(np.array(torques) / TORQUE_PER_BAR)
 
 
@@ -100,10 +112,10 @@ def braked_vehicle(
     substeps: int = 1,
     gradient: float = TORQUE_PER_BAR,
 ) -> BrakedVehicle:
-    """The vehicle on one surface, with brakes that follow their command at once. Without an engine it is the plane
-    vehicle.
+    """A vehicle on its suspension on a single surface, with brakes without hysteresis. If ``engine`` is None, the plane
+    vehicle without suspension.
 
-    steer : rad, of the front wheels; gradient : N m/bar. A controller of valves has SUPPLY.
+    steer : angle of the front wheels (rad); gradient : brake torque divided by pressure (N m/bar).
     """
     brake, plane = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), sprung.in_plane()
     zeros = np.zeros(plane.wheels)
@@ -121,7 +133,8 @@ def braked_vehicle(
 
 
 def remaining_speed(vehicle: BrakedVehicle, path: BrakingPath, duration: float = 2.0) -> float:
-    """Largest speed (m/s) of the vehicle or of a wheel's rim during a time (s) after a stop."""
+    """Largest speed (m/s) of the vehicle or of a wheel's rim during a duration (s) after a stop, with unchanged brake
+    torques."""
     rates, report = np.zeros(2 + vehicle.plane.masses.size), np.zeros((REPORT_SIZE, vehicle.plane.wheels))
     motion = PlaneMotion(path.states[-1].copy(), path.turning[-1].copy(), rates, report)
     torques, largest = np.tile(path.torques[-1], (2, 1)), 0.0

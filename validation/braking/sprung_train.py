@@ -1,4 +1,4 @@
-"""A braking car with a caravan, both with suspension: closed forms of both, and their runs.
+"""A braking car with a caravan, both on their suspensions: closed forms of deceleration and loads, and runs.
 
 The closed forms are statics of two bodies on a ball, with the forces of inertia of a steady deceleration. They take
 masses, places and nothing else from the vehicle's description, and share no code with what computes the runs.
@@ -17,26 +17,32 @@ from models.multibody.numbers import Handling
 from models.systems.braking.march import BrakingPath
 from models.vehicles.spatial import SpatialVehicle, hitch_of
 from validation.braking.plain_sprung import towing_car
-from validation.braking.sprung_box import LOCKING_TORQUE, SPIN, braked_vehicle, constant_friction, steady_torques
+from validation.braking.sprung_box import (
+    LOCKING_TORQUE,
+    WHEEL_SPIN_INERTIA,
+    braked_vehicle,
+    constant_friction,
+    steady_torques,
+)
 
 LOCKED_FRICTION, CARAVAN_FRICTION = 0.05, 0.1
-"""Friction under wheels that all lock, and under those of a caravan that brakes alone."""
+"""Friction coefficient where all wheels lock, and where the caravan alone brakes."""
 SETTLED_SHARE = 0.4
-"""Share of a stop over whose end a deceleration and loads are taken: springs and hitch are at rest before."""
+"""Last share of a run over which deceleration and loads are averaged; springs and hitch have come to rest before."""
 
 
 @dataclass(frozen=True)
 class PulledCaravan:
-    """A caravan that brakes alone: deceleration (m/s^2) of the train, load (N) of the caravan's axle, and force (N) by
-    which the caravan pulls at the ball."""
+    """Results of a train of which only the caravan brakes: deceleration (m/s^2), load (N) of the caravan's axle, and
+    force (N) by which the caravan pulls at the tow ball."""
 
     deceleration: float
     load: float
     pull: float
 
 
-def locked_stop(speed: float = 1.5) -> tuple[float, float]:
-    """Stopping distance (m) from a speed (m/s) with all wheels locked, and the distance by friction alone, v^2 / (2 mu
+def locked_stop_and_closed_form(speed: float = 1.5) -> tuple[float, float]:
+    """Stopping distance (m) of the train from a speed (m/s) with all wheels locked, and its closed form v^2 / (2 mu
     g)."""
     path = braked_vehicle(towing_car(), constant_friction(LOCKED_FRICTION)).run(
         steady_torques(*6 * (LOCKING_TORQUE,)), speed
@@ -44,9 +50,9 @@ def locked_stop(speed: float = 1.5) -> tuple[float, float]:
     return float(path.states[-1, 0, 0]), speed**2 / (2.0 * LOCKED_FRICTION * GRAVITY)
 
 
-def pulled_by_levers() -> PulledCaravan:
-    """Deceleration, axle load and ball force, from moments about the ball and the train's momentum, of a train of which
-    only the caravan brakes.
+def caravan_closed_form() -> PulledCaravan:
+    """Closed form of deceleration, axle load and ball force of a train of which only the caravan brakes, from moments
+    about the ball and the train's momentum.
 
     With N under its axle l behind the ball, its mass m2 c behind and d above that, the ball h above the road, and a
     deceleration a = mu N / M, M all masses and what the car's rolling wheels count for,
@@ -57,7 +63,7 @@ def pulled_by_levers() -> PulledCaravan:
     (name,) = vehicle.towed
     car, behind = _mass(vehicle, None), _mass(vehicle, name)
     hitch, axle = np.array(vehicle.body(hitch_of(name)).position), vehicle.axles[2]
-    rolling = sum(SPIN / tyre.point[2] ** 2 for tyre in vehicle.tyres if tyre.axle < 2)
+    rolling = sum(WHEEL_SPIN_INERTIA / tyre.point[2] ** 2 for tyre in vehicle.tyres if tyre.axle < 2)
     total_mass = car[0] + behind[0] + rolling
     back, height_of_load = hitch[0] - behind[1], behind[2] - hitch[2]
     arm = hitch[0] - axle + CARAVAN_FRICTION * (hitch[2] + height_of_load * behind[0] / total_mass)
@@ -75,12 +81,12 @@ def _mass(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, flo
     return float(masses.sum()), float(x), float(z)
 
 
-def pulled_caravan(change: Callable[[Handling], None] | None = None, duration: float = 4.0) -> PulledCaravan:
-    """A run in MuJoCo of a train of which only the caravan brakes, with all its wheels locked; change: plants a fault
-    in the table."""
-    vehicle = towing_car() if change is None else towing_car.__wrapped__()
-    if change is not None:
-        change(vehicle.handling)
+def caravan_run(plant_fault: Callable[[Handling], None] | None = None, duration: float = 4.0) -> PulledCaravan:
+    """Deceleration, axle load and ball force by a run in MuJoCo of a train of which only the caravan brakes, its wheels
+    locked. plant_fault: function that changes the parameter table."""
+    vehicle = towing_car() if plant_fault is None else towing_car.__wrapped__()
+    if plant_fault is not None:
+        plant_fault(vehicle.handling)
     path = braked_vehicle(vehicle, constant_friction(CARAVAN_FRICTION)).run(
         steady_torques(0.0, 0.0, 0.0, 0.0, LOCKING_TORQUE, LOCKING_TORQUE), 8.0, duration
     )
@@ -92,13 +98,14 @@ def pulled_caravan(change: Callable[[Handling], None] | None = None, duration: f
 
 
 def _ball_force(vehicle: Sprung, path: BrakingPath, late: slice, slowing: float) -> float:
-    """Longitudinal force (N) at the ball from the caravan's balance: tyre drag minus mass times deceleration."""
+    """Longitudinal force (N) at the tow ball from the caravan's balance: tyre drag minus mass times deceleration."""
     mass, _, _ = _mass(vehicle.handling.given, vehicle.handling.given.towed[0])
     return -float(path.reports.force_x[late, 4:].sum(axis=1).mean()) - mass * slowing
 
 
-def hold_on_to_the_car(car: Handling) -> None:
-    """Plant a fault: the caravan's wheels brake the car's body in place of the caravan's."""
+def plant_brakes_on_car(car: Handling) -> None:
+    """Plant a fault in a vehicle: brake forces of the caravan's wheels act on the car's body instead of the
+    caravan's."""
     for i in range(4, len(car.vehicle.tyres)):
         car.tyre_numbers(i)[at.CARRYING] = car.tyre_numbers(0)[at.CARRYING]
 
@@ -106,11 +113,11 @@ def hold_on_to_the_car(car: Handling) -> None:
 @cache
 def caravan_errors() -> PulledCaravan:
     """Relative differences between the simulated train of which only the caravan brakes and its closed form."""
-    return relative_difference(pulled_caravan(), pulled_by_levers())
+    return relative_difference(caravan_run(), caravan_closed_form())
 
 
 def relative_difference(run: PulledCaravan, expected: PulledCaravan) -> PulledCaravan:
-    """Relative difference of each quantity: ratio of the run's value to the expected one, minus 1."""
+    """Relative difference of each quantity: the run's value divided by the expected value, minus 1."""
     return PulledCaravan(
         run.deceleration / expected.deceleration - 1.0, run.load / expected.load - 1.0, run.pull / expected.pull - 1.0
     )

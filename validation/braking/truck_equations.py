@@ -1,4 +1,5 @@
-"""The truck written out once more, for comparison only: Newton and Euler in its own axes, wheels as ordinary states.
+"""Independent equations of the braked truck, for comparison: Newton and Euler in vehicle axes, with wheel speeds as
+states.
 
 Nothing of the compiled step is used: velocities are those along and across the vehicle, slips follow from the wheels'
 own speeds, loads from a linear system, and a solver of stiff equations marches all of it. Wheels must not lock.
@@ -32,16 +33,17 @@ def braked_turn(
     torques: tuple[float, float],
     speed: float,
     end_speed: float,
-    length: float = 0.0,
+    relaxation_length: float = 0.0,
 ) -> TurnEnd:
     """Final position of a braked turn from steady rolling at ``speed`` down to ``end_speed`` (m/s). The front wheels
     are steered by an angle (rad); torques: brake torques of the two axles (N m).
 
-    length : over which tyres relax (m); 0 for none. Above 1 m/s only they have no damper of their own. The tyre's
-    friction must not depend on the load. Raises RunFailed if the vehicle does not slow down in 200 s.
+    relaxation_length : of the tyres (m); 0 for none. With one, speeds must stay above 1 m/s, as the tyres' damper at
+    lower speeds is left out. The tyre's friction must not depend on the load. Raises RunFailed if the vehicle does not
+    reach ``end_speed`` in 200 s.
     """
-    equations = _Equations(vehicle, tyre, steer, np.repeat(torques, 2), length)
-    lags = np.zeros(4 if length else 0)
+    equations = _TruckEquations(vehicle, tyre, steer, np.repeat(torques, 2), relaxation_length)
+    lags = np.zeros(4 if relaxation_length else 0)
     start = np.concatenate(([0.0, 0.0, 0.0, speed, 0.0, 0.0], speed / equations.radius, lags))
 
     def slow(_: float, state: np.ndarray) -> float:
@@ -57,12 +59,15 @@ def braked_turn(
     return TurnEnd(float(x), float(y), float(heading), float(solution.t_events[0][0]))
 
 
-class _Equations:
-    """Equations of a braked truck. The state has x, y, heading, longitudinal and lateral velocity, yaw rate and the
-    speeds of the four wheels; with a relaxation length also the tangents of the lagging slip angles."""
+class _TruckEquations:
+    """Equations of motion of a braked truck. The state has x, y, heading, longitudinal and lateral velocity, yaw rate
+    and the angular velocities of the four wheels; with a relaxation length also the tangents of the lagging slip
+    angles."""
 
-    def __init__(self, vehicle: Truck, tyre: TyreTable, steer: float, torques: np.ndarray, length: float = 0.0) -> None:
-        self.vehicle, self.tyre, self.torques, self.length = vehicle, tyre, torques, length
+    def __init__(
+        self, vehicle: Truck, tyre: TyreTable, steer: float, torques: np.ndarray, relaxation_length: float = 0.0
+    ) -> None:
+        self.vehicle, self.tyre, self.torques, self.relaxation_length = vehicle, tyre, torques, relaxation_length
         axles, sides = (vehicle.front, vehicle.front, vehicle.rear, vehicle.rear), np.array([1.0, -1.0, 1.0, -1.0])
         self.x = np.array([axle.x for axle in axles])
         self.y = sides * [axle.track / 2.0 for axle in axles]
@@ -78,7 +83,7 @@ class _Equations:
         psi, u, v, r, turning = state[2], state[3], state[4], state[5], state[6:10]
         vx, vy = u - r * self.y, v + r * self.x
         speed_along, speed_aside = self.c * vx + self.s * vy, self.c * vy - self.s * vx
-        slope = state[10:] if self.length else speed_aside / speed_along
+        slope = state[10:] if self.relaxation_length else speed_aside / speed_along
         mu_x, mu_y = self._friction(1.0 - self.radius * turning / speed_along, np.arctan(np.abs(slope)))
         mu_y = -np.sign(slope) * mu_y
         force_ahead, left = -self.c * mu_x - self.s * mu_y, -self.s * mu_x + self.c * mu_y
@@ -91,24 +96,28 @@ class _Equations:
         yaw = (self.x * left - self.y * force_ahead) @ loads / self.vehicle.yaw_inertia
         wheels = (self.radius * mu_x * loads - self.torques) / self.inertia
         rates = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r, ax + v * r, ay - u * r, yaw]
-        lags = (speed_aside - np.abs(speed_along) * slope) / self.length if self.length else np.zeros(0)
+        lags = (
+            (speed_aside - np.abs(speed_along) * slope) / self.relaxation_length
+            if self.relaxation_length
+            else np.zeros(0)
+        )
         return np.concatenate((rates, wheels, lags))
 
     def _friction(self, slips: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Longitudinal friction mu_x with the sign of the slip, and lateral friction mu_y."""
+        """Longitudinal friction coefficients mu_x with the sign of the slip, and lateral ones mu_y, (4,) each."""
         tyre = self.tyre
-        i, p = _cells_of_values(tyre.angles, angles)
-        k, w = _cells_of_values(tyre.slips, np.abs(slips))
+        i, p = _cells_and_shares(tyre.angles, angles)
+        k, w = _cells_and_shares(tyre.slips, np.abs(slips))
 
-        def mean(table: np.ndarray) -> np.ndarray:
+        def interpolated(table: np.ndarray) -> np.ndarray:
             low, high = (1 - w) * table[i, k] + w * table[i, k + 1], (1 - w) * table[i + 1, k] + w * table[i + 1, k + 1]
             return (1 - p) * low + p * high
 
         h = tyre.h[:, 0]
-        return np.sign(slips) * mean(tyre.mu_x[:, 0, :]), mean(tyre.g) * ((1 - p) * h[i] + p * h[i + 1])
+        return np.sign(slips) * interpolated(tyre.mu_x[:, 0, :]), interpolated(tyre.g) * ((1 - p) * h[i] + p * h[i + 1])
 
 
-def _cells_of_values(nodes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _cells_and_shares(nodes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """For each value, the index of the cell between nodes in which it lies, and its relative position in the cell."""
     cell = np.clip(np.searchsorted(nodes, values, side="right") - 1, 0, nodes.size - 2)
     return cell, (values - nodes[cell]) / (nodes[cell + 1] - nodes[cell])

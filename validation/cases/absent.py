@@ -20,9 +20,9 @@ from models.systems.pitch_plane.scene import build as build_scene
 from validation.absence import machinery, of_systems, ride, wheelset
 from validation.absence.probes import (
     belongs_to_effects,
+    counted_march,
     installed_callbacks,
-    leanest_march,
-    march,
+    march_with_least_memory,
     probe,
     user_functions,
 )
@@ -159,8 +159,10 @@ def _absence_rows(engine: str, folder: Path) -> list[Row]:
     """Rows: Python function calls, memory and callbacks that 1,980 more steps of a scene without effects need. All must
     be zero."""
     for bare in (scene({}, steps, folder) for steps in (20, 20)):  # wrappers cache on their first calls
-        march(engine, model(bare, engine))
-    short, long = (leanest_march(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
+        counted_march(engine, model(bare, engine))
+    short, long = (
+        march_with_least_memory(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000)
+    )
     callbacks = max(short.callbacks, installed_callbacks())
     if engine == "exudyn":
         callbacks += user_functions(model(scene({}, 20, folder), engine))

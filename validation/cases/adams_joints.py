@@ -99,7 +99,7 @@ def _mechanism_of_output(mechanism: Mechanism, output: OutputFile) -> tuple[Mech
     if not mechanism.springs:
         return mechanism, {}
     shift = output.columns["Pos"][0] - mechanism.centre
-    moved = mechanism if starts_with_mechanism(mechanism, output) else mechanism.moved(shift)
+    moved = mechanism if starts_with_mechanism(mechanism, output) else mechanism.displaced(shift)
     (spring,) = moved.springs
     travel, rate, law = _spring_motion(moved, output)
     law_force = spring.stiffness * (travel - spring.free_length) + spring.damping * rate
@@ -116,15 +116,15 @@ def _spring_motion(mechanism: Mechanism, output: OutputFile) -> tuple[np.ndarray
     """Deflection, rate and force (each (m,)) of the mechanism's only spring during the motion in the output file. The
     force is read from the file and positive in extension."""
     (spring,), motion = mechanism.springs, output.motion(mechanism)
-    if spring.turns:
+    if spring.is_rotational:
         axis = mechanism.ground.axes[:, 2]
         return (
             np.unwrap(np.arctan2(*_sine_and_cosine(motion, axis))),
-            motion.turning @ axis,
+            motion.angular_velocity @ axis,
             output.columns["Rtorque"] @ axis,
         )
-    arm = motion.turned @ (spring.body - mechanism.centre)
-    apart, speed = motion.place + arm - spring.ground, motion.velocity + np.cross(motion.turning, arm)
+    arm = motion.rotation @ (spring.body_point - mechanism.centre)
+    apart, speed = motion.position + arm - spring.ground_point, motion.velocity + np.cross(motion.angular_velocity, arm)
     travel = np.linalg.norm(apart, axis=1)
     unit = apart / np.maximum(travel, 1e-30)[:, None]
     return travel, (speed * unit).sum(axis=1), (output.columns["Rforce"] * unit).sum(axis=1)
@@ -134,7 +134,7 @@ def _sine_and_cosine(motion: BodyMotion, axis: np.ndarray) -> tuple[np.ndarray, 
     """Sine and cosine (m,) of the body's rotation about a unit axis."""
     side = np.eye(3)[np.argmin(np.abs(axis))]
     first = np.cross(axis, side) / np.linalg.norm(np.cross(axis, side))
-    turned = motion.turned @ first
+    turned = motion.rotation @ first
     return turned @ np.cross(axis, first), turned @ first
 
 
@@ -178,7 +178,7 @@ def mjcf_rows(family: str, mechanism: Mechanism, folder: Path, duration: float) 
     alike = Observed(_row_id(family, "mjcf.accelerations"), SYSTEM, quantity, accelerations, "of the largest")
     rows: list[Row] = [alike.at_most(EQUAL_ACCELERATION_SHARE, tolerance_reason, "native")]
     for name, positions in paths.items():
-        off = float(np.abs(positions[::every] - motion.place).max())
+        off = float(np.abs(positions[::every] - motion.position).max())
         quantity = f"{family} in MJCF: position of the centre from the reference with constraints, {name}"
         observed = Observed(_row_id(family, f"mjcf.position.{name}"), SYSTEM, quantity, off, "m")
         rows.append(observed.at_most(ENGINE_TOLERANCE, "no code in common but Runge-Kutta's steps of 1 ms", "native"))
@@ -190,7 +190,7 @@ def _reaction_scales(mechanism: Mechanism, reaction: Reaction) -> tuple[float, f
     of mass from the joint, at least 1 m (N m)."""
     weight = mechanism.mass * float(np.linalg.norm(mechanism.gravity))
     force = max(float(np.abs(reaction.force).max()), weight)
-    return force, force * max(float(np.linalg.norm(mechanism.centre - mechanism.ground.place)), 1.0)
+    return force, force * max(float(np.linalg.norm(mechanism.centre - mechanism.ground.position)), 1.0)
 
 
 def _reaction_difference(
@@ -224,8 +224,8 @@ def _file_rows(
     """Rows: positions and reactions of one simulation compared with the output file. Where the motion in the file loses
     energy although nothing damps, the bound is only an aim."""
     m = len(motion.times)
-    position_error = np.abs(motion.place - output.columns["Pos"][:m]) - output.rounding("Pos")[:m]
-    digits = output.rounding("Rforce")[:m], output.rounding("Rtorque")[:m]
+    position_error = np.abs(motion.position - output.columns["Pos"][:m]) - output.rounding_error("Pos")[:m]
+    digits = output.rounding_error("Rforce")[:m], output.rounding_error("Rtorque")[:m]
     theirs = Reaction(output.columns["Rforce"][:m], output.columns["Rtorque"][:m])
     seen = (
         ("position", "position of the centre", max(0.0, float(position_error.max())), "m", POSITION_BOUND),
@@ -259,9 +259,11 @@ def _window_row(family: str, mechanism: Mechanism, output: OutputFile, duration:
     """
     body, theirs = ConstrainedBody(mechanism), output.motion(mechanism)
     starts = np.arange(0, round(duration / STEP / STEPS_PER_ROW) - WINDOW_ROWS, WINDOW_ROWS)
-    ends = [body.marched(body.at_motion(theirs, k), WINDOW_ROWS * STEPS_PER_ROW, STEP)[:3] for k in starts.tolist()]
-    digits = output.rounding("Pos")[starts] + output.rounding("Pos")[starts + WINDOW_ROWS]
-    off = (np.abs(np.array(ends) - theirs.place[starts + WINDOW_ROWS]) - digits).max(axis=1)
+    ends = [
+        body.state_after(body.state_at_row(theirs, k), WINDOW_ROWS * STEPS_PER_ROW, STEP)[:3] for k in starts.tolist()
+    ]
+    digits = output.rounding_error("Pos")[starts] + output.rounding_error("Pos")[starts + WINDOW_ROWS]
+    off = (np.abs(np.array(ends) - theirs.position[starts + WINDOW_ROWS]) - digits).max(axis=1)
     _, total_energy = output.energies(mechanism)
     speed = np.linalg.norm(theirs.velocity, axis=1)
     fastest = np.maximum(speed[starts], speed[starts + WINDOW_ROWS])
@@ -286,8 +288,8 @@ def _same_pendulum_rows(family: str, mechanism: Mechanism, output: OutputFile, r
     hinge, back = read_output(revolute_file), Rotation.from_euler("z", -REVOLUTE_ANGLES[family], degrees=True)
     motion, reaction = ConstrainedBody(mechanism).run(float(hinge.times[-1]), STEP, STEPS_PER_ROW)
     position_error, force = hinge.columns["Pos"], hinge.columns["Rforce"]
-    off = float((np.abs(back.apply(motion.place) - position_error) - hinge.rounding("Pos")).max())
-    pushed = float((np.abs(back.apply(reaction.force) - force) - hinge.rounding("Rforce")).max())
+    off = float((np.abs(back.apply(motion.position) - position_error) - hinge.rounding_error("Pos")).max())
+    pushed = float((np.abs(back.apply(reaction.force) - force) - hinge.rounding_error("Rforce")).max())
     files = np.abs(back.apply(output.columns["Pos"]) - position_error).max(axis=1)
     since = output.times[np.argmax(files > POSITION_BOUND)]
     why = "the same pendulum on a hinge by the other code, in a file that keeps its energy; the bound asked for"
@@ -322,9 +324,9 @@ def _engine_row(
 ) -> Row:
     """Row: difference of position, rotation and reaction between a mechanism built of an engine's joints and the
     reference's constraint equations."""
-    position_error = float(np.abs(engine_run[0].place - reference_run[0].place).max())
-    turned = float(np.abs(engine_run[0].turned - reference_run[0].turned).max())
-    off = max(position_error, turned, _reaction_difference(mechanism, engine_run[1], reference_run[1]))
+    position_error = float(np.abs(engine_run[0].position - reference_run[0].position).max())
+    rotation = float(np.abs(engine_run[0].rotation - reference_run[0].rotation).max())
+    off = max(position_error, rotation, _reaction_difference(mechanism, engine_run[1], reference_run[1]))
     why = "joint coordinates against constraints with multipliers, no code in common but Runge-Kutta's steps of 5 ms"
     quantity = f"{family}: {engine} from the reference: position, rotation, reaction by the largest"
     return Observed(_row_id(family, f"twin.{engine}"), SYSTEM, quantity, off, "m, -").at_most(

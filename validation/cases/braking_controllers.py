@@ -20,7 +20,7 @@ from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import table_of_surface
 from validation.braking.five_phase_exact import exact_cycle
 from validation.braking.quarter_stops import FRONT_WHEEL
-from validation.braking.sampled_quarter import own_distance, reference_distance
+from validation.braking.sampled_quarter import reference_distance, twinrig_distance
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
 TITLE = "Brakes and controllers of anti-lock braking"
@@ -268,7 +268,7 @@ def _substep_rows() -> list[Row]:
     for on, speed in (("snow", 13.9), ("dry", 22.22)):
         tight = reference_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed)
         for n in SUBSTEP_COUNTS:
-            distance = own_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
+            distance = twinrig_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
             rows.append(
                 Observed(
                     f"braking_controllers.stop_{on}_{n}",
@@ -290,7 +290,7 @@ def _ensemble_rows(run_count: int = 24, fine_substeps: int = 32) -> list[Row]:
     distances = [
         np.array(
             [
-                own_distance(FRONT_WHEEL, PAPER_FRONT, "ice", CONTROLLERS["slip_bang_bang"](1), speed, n)
+                twinrig_distance(FRONT_WHEEL, PAPER_FRONT, "ice", CONTROLLERS["slip_bang_bang"](1), speed, n)
                 for speed in some
             ]
         )

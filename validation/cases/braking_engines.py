@@ -21,8 +21,8 @@ from validation.braking.braked_truck import (
     ICE_TABLE,
     PAPER_PLANE,
     RollingTruck,
+    lateral_displacement_when_locked,
     on_road,
-    sideways_with_locked_front_wheels,
     transfer_errors,
 )
 from validation.braking.truck_equations import TurnEnd, braked_turn
@@ -122,7 +122,7 @@ def _axle_load_rows() -> list[Row]:
             "braking_engines.locked-front",
             SYSTEM,
             "sideways distance of a truck with steered, locked front wheels",
-            abs(sideways_with_locked_front_wheels()),
+            abs(lateral_displacement_when_locked()),
             "m",
         ).at_most(1e-3, "a locked wheel's force is against its way, wherever it points", "closed form"),
     ]

@@ -8,7 +8,7 @@ import numpy as np
 
 from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
-from validation.braking.plain_relaxation import turn_apart
+from validation.braking.plain_relaxation import braked_turn_difference
 from validation.common.rows import Observed, Row, System
 
 TITLE = "Braking beside the independent reference"
@@ -84,7 +84,7 @@ def _relaxing_turn_row() -> Row:
         SYSTEM,
         "difference at the end of a braked turn of the truck on ice from Newton's and Euler's "
         "equations, tyres that relax over 0.3 m, 8 steps in a sample",
-        turn_apart(0.3, 8),
+        braked_turn_difference(0.3, 8),
         "m",
     ).at_most(
         3e-5, "order two: 47 and 11 micrometres at 4 and 8 steps; a length 1 % wrong moves the law's row", "native"
@@ -92,7 +92,7 @@ def _relaxing_turn_row() -> Row:
 
 
 def _circle_row(vehicle: str) -> Row:
-    computed, plain = whole.circles_of_both_sides(whole.VEHICLES[vehicle]())
+    computed, plain = whole.steady_circle_pair(whole.VEHICLES[vehicle]())
     return Observed(
         f"braking_reference.turn.{vehicle}",
         SYSTEM,
@@ -110,6 +110,6 @@ def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
         SYSTEM,
         f"largest difference of {duration:g} s of a stop of the {vehicle} in {engine} from plain "
         "code, slip controller on split and changing friction",
-        whole.paths_apart(path, whole.plain_run(vehicle, duration)),
+        whole.path_difference(path, whole.plain_run(vehicle, duration)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps, in another code from the valves to the bodies", "native")

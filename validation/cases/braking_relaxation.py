@@ -93,7 +93,7 @@ def _reference_row(vehicle: str, engine: str, duration: float) -> Row:
         f"braking_relaxation.reference.{vehicle}.{engine}",
         SYSTEM,
         f"difference of {duration:g} s of a stop in {engine} from plain code: {vehicle}, relaxing tyres, slip control",
-        whole.paths_apart(path, whole.plain_run(vehicle, duration, lags=True)),
+        whole.path_difference(path, whole.plain_run(vehicle, duration, lags=True)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps in plain code, whose lag is an exponential of a matrix", "native")
 

@@ -76,13 +76,13 @@ def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
         SYSTEM,
         f"largest difference of {duration:g} s of a stop of the {vehicle} in {engine} from plain code, slip controller "
         "of all wheels on split and changing friction",
-        whole.paths_apart(path, whole.plain_run(vehicle, duration)),
+        whole.path_difference(path, whole.plain_run(vehicle, duration)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps, in another code from the valves to the bodies", "native")
 
 
 def _locked_wheels_row() -> Row:
-    stopping_way, wanted = train.locked_stop()
+    stopping_way, wanted = train.locked_stop_and_closed_form()
     return Observed(
         "braking_trailer.locked",
         SYSTEM,
@@ -137,7 +137,7 @@ def _slip_control_rows() -> list[Row]:
 
 def _fault_rows() -> list[Row]:
     """Rows: faults planted in the force table that Exudyn and MuJoCo share must be caught."""
-    pulled = train.relative_difference(train.pulled_caravan(train.hold_on_to_the_car), train.pulled_by_levers())
+    pulled = train.relative_difference(train.caravan_run(train.plant_brakes_on_car), train.caravan_closed_form())
     turned = whole.towing_car.__wrapped__()
     give_towed_wheels_car_heading(turned.handling)
     apart = whole.relative_difference(whole.accelerations(turned, "exudyn", 5), whole.plain_accelerations("caravan", 5))

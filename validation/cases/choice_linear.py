@@ -12,8 +12,8 @@ from models.advice.ride_choice.choose import EQUAL_COST_LOG, Chooser, RideChoice
 from models.advice.ride_choice.screen import Screen, exact_variances
 from models.core.systems import load
 from models.systems.ride.reduced_scene import Effect, reduced_without
-from validation.choice.judged import asked_speeds, changes_by_frequency, measured_step, worst_nearby
-from validation.choice.price_of_choice import whole_car
+from validation.choice.judged import changes_by_frequency, chooser_over_speeds, measured_step, worst_nearby
+from validation.choice.price_of_choice import car_scene
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.ride.drawn_rides import LinearRide, random_linear_ride
 
@@ -68,7 +68,7 @@ class JudgedChoice:
 def judged_choice_of(scene: LinearRide, by_frequency: bool) -> JudgedChoice:
     """Choose effects for a scene, then check the choice by the identity of covariance and adjoint and, if
     ``by_frequency``, by frequency responses."""
-    chooser = asked_speeds(scene)
+    chooser = chooser_over_speeds(scene)
     choice, full_scene = chooser.choose(), chooser.full_scenes[0]
     rest = full_scene.reduced(reduced_without(scene.scene, choice.left_out))
     two, deviation = Screen(full_scene.full, chooser.rows).certificate_sides(rest)
@@ -241,7 +241,7 @@ def _saving_row(choices: list[JudgedChoice]) -> Row:
 def _solver_count_rows() -> list[Row]:
     """Rows: numbers of eigenvalue problems and of Lyapunov equations that a choice solves for a car of 19 degrees of
     freedom, divided by the square of its number of effects."""
-    chooser = Chooser.from_scene(whole_car())
+    chooser = Chooser.from_scene(car_scene())
     chooser.choose()
     pairs = len(chooser.effects) ** 2
     return [

@@ -10,7 +10,7 @@ from models.advice.choice.variants import Variants
 from models.advice.ride_choice.in_time import FEWEST_COPIES
 from models.core.errors import InputError
 from validation.choice.drawn_scenes import draw_scene
-from validation.choice.judged import JudgedByRuns, judged_of
+from validation.choice.judged import ChoiceCheckedByRuns, choice_checked_by_runs
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row
 from validation.ride.drawn_rides import COPIES, NonlinearRide, random_nonlinear_ride
@@ -39,14 +39,14 @@ JUDGED_RANGE = (1e-4, 0.05)
 """Smallest and largest relative change whose prediction is judged, as for linear scenes."""
 
 
-def judge_choice(system: str, seed: int) -> JudgedByRuns:
+def judge_choice(system: str, seed: int) -> ChoiceCheckedByRuns:
     """Choose effects for the random scene of a seed, and judge the choice."""
     if system == "ride":
         return judge_ride(random_nonlinear_ride(seed))
-    return judged_of(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
+    return choice_checked_by_runs(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
-def judge_ride(bent_ride: NonlinearRide) -> JudgedByRuns:
+def judge_ride(bent_ride: NonlinearRide) -> ChoiceCheckedByRuns:
     """Choose effects for a ride with nonlinear springs, then compare the complete and the reduced vehicle on new roads
     that the choice did not use."""
     engine = ENGINES["ride"][0]
@@ -54,12 +54,12 @@ def judge_ride(bent_ride: NonlinearRide) -> JudgedByRuns:
     fresh = Variants(bent_ride.prepared_in_time(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
     full_scene, rest = fresh.quantities_of_run(), fresh.quantities_of_run(choice.left_out, choice.step_factor)
     if full_scene is None or rest is None:
-        return JudgedByRuns("ride", engine, bent_ride, choice, np.full(len(bent_ride.quantities), np.inf))
+        return ChoiceCheckedByRuns("ride", engine, bent_ride, choice, np.full(len(bent_ride.quantities), np.inf))
     again = [
         _significant_change(full_scene.quantity(name).cases[0], rest.quantity(name).cases[0])
         for name in bent_ride.quantities
     ]
-    return JudgedByRuns("ride", engine, bent_ride, choice, np.array(again))
+    return ChoiceCheckedByRuns("ride", engine, bent_ride, choice, np.array(again))
 
 
 def _significant_change(full_mean_squares: np.ndarray, reduced_mean_squares: np.ndarray) -> float:
@@ -86,7 +86,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"scenes": [_summary_of_choice(judged_choice) for judged_choice in choices], "systems": list(seeds)}
 
 
-def _kept_tolerance_rows(choices: list[JudgedByRuns]) -> list[Row]:
+def _kept_tolerance_rows(choices: list[ChoiceCheckedByRuns]) -> list[Row]:
     kept_share = float(
         np.mean([judged_choice.choice.within_tolerance and judged_choice.is_honest for judged_choice in choices])
     )
@@ -129,7 +129,7 @@ def _refusal_row() -> Row:
     )
 
 
-def _predicted_and_confirmed(choices: list[JudgedByRuns]) -> np.ndarray:
+def _predicted_and_confirmed(choices: list[ChoiceCheckedByRuns]) -> np.ndarray:
     """Predicted and confirmed relative changes (n, 2) of all quantities whose confirmed change is in JUDGED_RANGE."""
     pairs = [
         (p, c)
@@ -139,7 +139,7 @@ def _predicted_and_confirmed(choices: list[JudgedByRuns]) -> np.ndarray:
     return np.array([pair for pair in pairs if JUDGED_RANGE[0] < pair[1] < JUDGED_RANGE[1]]).reshape(-1, 2)
 
 
-def _prediction_row(choices: list[JudgedByRuns], quick: bool) -> Row:
+def _prediction_row(choices: list[ChoiceCheckedByRuns], quick: bool) -> Row:
     ratios = np.divide(*_predicted_and_confirmed(choices).T)
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0))) if len(ratios) else 1.0
     name, asked = "choice_nonlinear.predictions", "asked: within a factor of 2"
@@ -151,7 +151,7 @@ def _prediction_row(choices: list[JudgedByRuns], quick: bool) -> Row:
     return Observed(name, SYSTEM, quantity, share, "").within(1.0, 0.05, asked, "none")
 
 
-def _saving_rows(choices: list[JudgedByRuns], system: str) -> list[Row]:
+def _saving_rows(choices: list[ChoiceCheckedByRuns], system: str) -> list[Row]:
     of_system = [judged_choice for judged_choice in choices if judged_choice.system == system]
     calls = np.array([judged_choice.choice.calls for judged_choice in of_system], float)
     seconds = np.array([judged_choice.choice.seconds for judged_choice in of_system])
@@ -183,7 +183,7 @@ def _saving_rows(choices: list[JudgedByRuns], system: str) -> list[Row]:
     ]
 
 
-def _summary_of_choice(judged_choice: JudgedByRuns) -> Saved:
+def _summary_of_choice(judged_choice: ChoiceCheckedByRuns) -> Saved:
     choice = judged_choice.choice
     return {
         "system": judged_choice.system,

@@ -19,7 +19,13 @@ from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
 from models.systems.contact.work_precision import ContactCase, with_exact_forces
 from validation.common.rows import Observed, Row, System, Table
-from validation.contact.contact_bands import FASTSIM_BANDS, HELD_SHARE, ROUNDING, kept_shares, theory_errors
+from validation.contact.contact_bands import (
+    BAND_SHARE,
+    FASTSIM_BANDS,
+    MOMENT_ROUNDING,
+    shares_within_bands,
+    theory_errors,
+)
 from validation.contact.contact_set import (
     AXIS_RATIOS,
     JUDGED_PART,
@@ -29,7 +35,7 @@ from validation.contact.contact_set import (
     read_drawn,
     read_wide,
 )
-from validation.contact.programs import compare, table
+from validation.contact.programs import compare_programs, table
 
 TITLE = "Stated errors of rolling contact"
 SYSTEM: System = "contact"
@@ -75,7 +81,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows += _moment_rows(cases, read_drawn(JUDGED_PART), wide) + _cell_rows([*cases, *wide], quick)
     if quick:
         return rows, {}
-    programs = compare(cases[::2])
+    programs = compare_programs(cases[::2])
     return [*rows, *_program_rows(programs), _long_table_row(folder)], {"programs": programs}
 
 
@@ -108,11 +114,11 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
         drawn = theory_errors(name, unseen)
         for some, row_name, which, most in (
             (theory_errors(name, cases), "", "of the set", MISSED_SHARE),
-            (drawn, "drawn.", "drawn", 1 - HELD_SHARE),
-            (drawn.of(against), "against.", "drawn with lateral creepage against spin", MISSED_SHARE),
+            (drawn, "drawn.", "drawn", 1 - BAND_SHARE),
+            (drawn.selected(against), "against.", "drawn with lateral creepage against spin", MISSED_SHARE),
         ):
             for what, kind, within in zip(
-                ("force", "moment"), ("band", "moment"), kept_shares(name, some), strict=True
+                ("force", "moment"), ("band", "moment"), shares_within_bands(name, some), strict=True
             ):
                 rows.append(
                     Observed(
@@ -123,7 +129,7 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
                         f"with the {what}",
                         1 - within,
                         "",
-                    ).at_most(most, f"the band is meant to hold {HELD_SHARE:.0%}", "native")
+                    ).at_most(most, f"the band is meant to hold {BAND_SHARE:.0%}", "native")
                 )
     return rows
 
@@ -137,7 +143,7 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
         answers, error = rolled(contact, case.motion, 21)
         limit, moment = case.limit, case.limit * np.sqrt(case.a * case.b) * case.mz
         off.append((np.linalg.norm(answers.force - limit * case.force), abs(answers.mz - moment)))
-        stated.append((error.total, error.moment + ROUNDING * limit))
+        stated.append((error.total, error.moment + MOMENT_ROUNDING * limit))
     beyond = np.array(off) > np.array(stated)
     return [
         Observed(
@@ -147,7 +153,7 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
             f"contacts of a/b 0.1 to 10 and Poisson's ratio {nu:g} whose {what} is off by more than is stated",
             float(beyond[ratios == nu, k].mean()),
             "",
-        ).at_most(1 - HELD_SHARE, "what users read: 95 % are covered", "native")
+        ).at_most(1 - BAND_SHARE, "what users read: 95 % are covered", "native")
         for k, what in enumerate(("force", "moment"))
         for nu in POISSON
     ]
@@ -198,7 +204,7 @@ def _cell_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
                     f"whose error of the cells in the {what} is beyond the stated one",
                     value,
                     "",
-                ).at_most(1 - HELD_SHARE, "what users read: 95 % are covered", "native")
+                ).at_most(1 - BAND_SHARE, "what users read: 95 % are covered", "native")
             )
     return rows
 
@@ -211,7 +217,7 @@ def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[st
         fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED_CELLS)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
         answers.append(
-            np.array(off) > np.array(remaining_errors(contact, case.motion, cells, fine)) + ROUNDING * case.limit
+            np.array(off) > np.array(remaining_errors(contact, case.motion, cells, fine)) + MOMENT_ROUNDING * case.limit
         )
     return [float(value) for value in np.mean(answers, axis=0)]
 

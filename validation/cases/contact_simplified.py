@@ -25,8 +25,8 @@ from validation.contact.contact_shapes import (
     Box,
     Shape,
     creepages,
+    exact_contact_of_wheelset,
     exact_normal,
-    exact_placed,
     exact_rolling,
     merged_shapes,
     placed_wheelsets,
@@ -158,7 +158,7 @@ def _rail_approach_errors() -> dict[str, dict[str, float]]:
         along = np.cos(min(patch_pressure.patch.lean for patch_pressure in pressed.patches))
         name = f"S1002 on UIC 60, {1e3 * position.shift:g} mm, yaw {1e3 * position.yaw:g} mrad, "
         name += f"{1e-3 * position.load:g} kN"
-        error = pressed.approach * along / exact_placed(position, pressed, EXACT_CELLS).approach - 1.0
+        error = pressed.approach * along / exact_contact_of_wheelset(position, pressed, EXACT_CELLS).approach - 1.0
         errors[name] = {"each": float(error), "one": np.nan}
     return errors
 

@@ -17,7 +17,7 @@ from models.contact.material import MaterialPair
 from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_bands import theory_errors
 from validation.contact.contact_set import JUDGED_PART, read_contacts, read_drawn
-from validation.contact.fastsim_speed import speed
+from validation.contact.fastsim_speed import speed_rows_and_table
 from validation.contact.fuzzed_creepage import COMPUTED_OPTIONS, SUM_ROUNDING, random_contacts, worst_violation
 
 TITLE = "FASTSIM"
@@ -74,7 +74,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, data
     answers, data["model"] = _model_error_rows()
-    timed, data["speed"] = speed(MATERIAL_PAIR, LOAD, FRICTION, MEAN_SEMI_AXIS)
+    timed, data["speed"] = speed_rows_and_table(MATERIAL_PAIR, LOAD, FRICTION, MEAN_SEMI_AXIS)
     return rows + answers + timed, data
 
 

@@ -97,7 +97,9 @@ def nan_force_endings(engine: str) -> dict[str, str]:
 def constrained_endings(engine: str) -> dict[str, str]:
     """How runs with a prescribed pitch end in each integrator that cannot solve constraints."""
     wrong = [name for name in integrators(engine) if not CATALOGUE[engine][name].constraints]
-    return {name: ending(partial(setups.run, engine, prescribed_pitch.scene(), 1e-3, 0.5, name)) for name in wrong}
+    return {
+        name: ending(partial(setups.run, engine, prescribed_pitch.guided_assembly(), 1e-3, 0.5, name)) for name in wrong
+    }
 
 
 def unchecked_constrained_endings() -> dict[str, str]:
@@ -107,7 +109,7 @@ def unchecked_constrained_endings() -> dict[str, str]:
         name for name in integrators("exudyn", adaptive=False) if name not in setups.CONSTRAINED_INTEGRATORS.values()
     ]
     explicit = [name for name in names if name != "TrapezoidalIndex2"]
-    scene = prescribed_pitch.scene()
+    scene = prescribed_pitch.guided_assembly()
     return {name: ending(partial(setups.unchecked_run, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
 
 
@@ -142,7 +144,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def _outside_engine_rows() -> list[Row]:
     """Rows: the guards report wrong integrators from outside the project in every run, and pass a right one."""
-    silent, right = wrong_engines.integrators_that_pass(), wrong_engines.integrators_that_pass((wrong_engines.Right,))
+    silent, right = (
+        wrong_engines.integrators_that_pass(),
+        wrong_engines.integrators_that_pass((wrong_engines.FaultlessIntegrator,)),
+    )
     names = ", ".join(kind.__name__ for kind in wrong_engines.WRONG_ENGINES)
     return [
         Observed(
@@ -205,7 +210,7 @@ def _input_rows(engine: str) -> list[Row]:
     numbers = nan_force_endings(engine)
     caught = {name: "caught" if ended in ("raised", "refused") else ended for name, ended in numbers.items()}
     with TemporaryDirectory() as files_folder:
-        file = ending(lambda: sampled_input.damaged(engine, Path(files_folder)))
+        file = ending(lambda: sampled_input.damaged_file(engine, Path(files_folder)))
     return [
         behaviour_row(
             f"guards.nan-file.{engine}",
@@ -227,7 +232,7 @@ def _input_rows(engine: str) -> list[Row]:
             f"guards.step-sampling.{engine}",
             SYSTEM,
             f"a step that does not divide the sampling period, {engine}",
-            ending(lambda: sampled_input.uneven(engine, Path())),
+            ending(lambda: sampled_input.uneven_steps(engine, Path())),
             "refused",
             "a held sample would change in a step",
         ),
@@ -245,7 +250,7 @@ def _input_rows(engine: str) -> list[Row]:
 def _explicit_solver_row(engine: str) -> Row:
     """Row: error of the enforced moment by an explicit solver in the hand-written reference and in MuJoCo, where the
     pitch is an input and no constraint."""
-    error = prescribed_pitch.explicit(engine, Path())
+    error = prescribed_pitch.explicit_error(engine, Path())
     return Observed(
         f"guards.constraint.{engine}",
         SYSTEM,

@@ -33,9 +33,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             outcomes = {name: judge(case, name, Path(files_folder)) for name in case.judged()}
             naive = case.naive(Path(files_folder)) if case.naive else ""
         rows += [_outcome_row(case, name, outcome) for name, outcome in outcomes.items()]
-        told_errors = {key: getattr(case, key) for key in ("name", "hard", "check", "unit", "tolerance")}
+        case_texts: Saved = {"name": case.name, "hard": case.difficulty, "check": case.exact_answer}
+        case_texts |= {"unit": case.unit, "tolerance": case.tolerance}
         sentence = {name: asdict(outcome) for name, outcome in outcomes.items()}
-        data.append({"family": family, **told_errors, "outcomes": sentence, "naive": naive})
+        data.append({"family": family, **case_texts, "outcomes": sentence, "naive": naive})
     words = [[outcome["word"] for outcome in entry["outcomes"].values()] for entry in data]
     counted = sum(family not in FILE_FAMILIES for family, _ in known)
     share = f"{len(data)} of {len(known)}" if quick else f"all {len(known)}"
@@ -73,12 +74,12 @@ def quick_cases(cases: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
 
 def _outcome_row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
     """Row of a hard case: its error if a result is expected and given, else its outcome."""
-    id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.once else implementation}"
-    quantity = f"{case.name}{'' if case.once else f', {implementation}'}: {case.check}"
+    id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.without_engine else implementation}"
+    quantity = f"{case.name}{'' if case.without_engine else f', {implementation}'}: {case.exact_answer}"
     if case.wanted(implementation) == "right" and outcome.error is not None:
         error, judged = outcome.error, case.independence(implementation)
-        return Observed(id, SYSTEM, quantity, error, case.unit).at_most(case.tolerance, case.why, judged)
-    return behaviour_row(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.hard)
+        return Observed(id, SYSTEM, quantity, error, case.unit).at_most(case.tolerance, case.tolerance_reason, judged)
+    return behaviour_row(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.difficulty)
 
 
 def tables(case_data: Saved) -> list[Table]:

@@ -19,7 +19,7 @@ from models.vehicles.description import matrices
 from models.vehicles.pitch_plane_equations import numbers
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, behaviour_row, not_run
 from validation.common.scenes import force_scene, on_paper_road, virtual_drive
-from validation.hard_cases.prescribed_pitch import AsItComes
+from validation.hard_cases.prescribed_pitch import UncheckedExudyn
 
 TITLE = "Drift by index reduction, and drift by noise"
 SYSTEM: System = "drift"
@@ -118,7 +118,7 @@ def _pitch_errors(assembly: Assembly, drive: MeasuredDrive) -> dict[str, np.ndar
         name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND_WRITTEN_FORMULATIONS.items()
     }
     for name, integrator in EXUDYN_INTEGRATORS.items():
-        paths[name] = AsItComes(assembly, Settings(integrator, STEP, duration, spectral_radius=0.6)).run().states
+        paths[name] = UncheckedExudyn(assembly, Settings(integrator, STEP, duration, spectral_radius=0.6)).run().states
     paths |= {
         f"eliminated, {engine}": build(engine, assembly, Settings("RK4", STEP, duration)).run().states
         for engine in ("reference", "mujoco")

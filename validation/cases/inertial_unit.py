@@ -397,14 +397,14 @@ def _section_force_rows() -> list[Row]:
 def _recording_rows(path_count: int) -> CaseAnswer:
     """Rows and data from a recording of a minute in a real car: gyro compared with camera, and the noise law on the
     car's motion."""
-    path = recording.find()
+    path = recording.find_recording()
     if path is None:
         reason = f"needs {recording.RECORDING_FILE} in the folder that TWINRIG_DATA names"
         return [
             not_run(f"inertial_unit.recording{end}", SYSTEM, f"a minute in a real car: {what}", reason)
             for end, what in (("", "gyro against camera"), (".law", "noise law on its motion"))
         ], {}
-    recorded = recording.read(path)
+    recorded = recording.read_recording(path)
     off = np.degrees(recording.gyro_error(recorded))
     rates, period = recorded.rates[::5], 5 * recording.SAMPLE_PERIOD
     deviation = np.array([0.02, 0.05, 0.1]) / period**0.5

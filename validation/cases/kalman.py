@@ -18,13 +18,13 @@ from validation.common.scenes import on_paper_road
 from validation.drift import kalman_runs as runs
 from validation.drift.kalman_runs import (
     COARSE_PERIOD,
-    at_period,
-    closed_loop,
-    gyro_alone,
+    closed_loop_covariance,
+    deviation_at_period,
+    gyro_only_pitch_error,
     loop_errors,
+    run_with_missing_samples,
     scores_of_stabilised,
     spread_of_mean_square,
-    with_gaps,
 )
 
 TITLE = "The Kalman filter of the pitch"
@@ -60,10 +60,11 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     rows = _consistency_rows(run_folder, 24, 12.0, tuple(VARIANCE_FACTORS))
     rows += _gap_rows(run_folder, 40.0, OUTAGE, tuple(SENSORS))
     loop_rows, deviations = _loop_rows(run_folder)
-    gyro = gyro_alone(run_folder, 600.0, SEED)
+    gyro = gyro_only_pitch_error(run_folder, 600.0, SEED)
     damage = [scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES) for i in range(SAMPLE_COUNT)]
     right = [
-        scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES[:1], wrong=False)["reference"] for i in range(2)
+        scores_of_stabilised(run_folder, DURATION, SEED + i, ENGINES[:1], perturbed=False)["reference"]
+        for i in range(2)
     ]
     rows += loop_rows + _gyro_rows(gyro) + _damage_rows(damage) + _moment_rows(damage, right)
     return rows, {"damage": damage, "deviations": deviations, "gyro": gyro}
@@ -75,7 +76,7 @@ def _consistency_rows(folder: Path, run_count: int, duration: float, filter_name
     by_filter: dict[str, list[Any]] = {name: [] for name in filter_names}
     for i in range(run_count):
         scales = {name: VARIANCE_FACTORS[name] for name in filter_names if name == "right" or i < run_count // 4}
-        for name, consistent in runs.consistency(folder, duration, SEED + i, scales).items():
+        for name, consistent in runs.filter_consistency(folder, duration, SEED + i, scales).items():
             by_filter[name].append(consistent)
     errors, surprises = (
         {name: np.concatenate([consistent[j] for consistent in some]) for name, some in by_filter.items()}
@@ -164,7 +165,7 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
     samples."""
     rows = []
     for name in sensors:
-        gaps = with_gaps(folder, duration, SEED, SENSORS[name], LOST_SHARE, outage)
+        gaps = run_with_missing_samples(folder, duration, SEED, SENSORS[name], LOST_SHARE, outage)
         gaps_text = f"{LOST_SHARE:.0%} of the samples lost" + (
             f", none from {outage[0]:g} to {outage[1]:g} s" if outage else ""
         )
@@ -193,8 +194,8 @@ def _short_run_rows(folder: Path) -> list[Row]:
 def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
     """Rows and table: variances of the errors of filter estimate and of stabilised run, compared with the discrete
     Lyapunov equation."""
-    force = at_period(35.0, COARSE_PERIOD)
-    step, covariance = closed_loop(folder, force)
+    force = deviation_at_period(35.0, COARSE_PERIOD)
+    step, covariance = closed_loop_covariance(folder, force)
     errors = [loop_errors(folder, force, LOOP_SECONDS, SEED + i) for i in range(LOOP_RUN_COUNT)]
     squares = np.mean([np.mean(error_series**2, axis=0) for error_series in errors], axis=0)
     spread = spread_of_mean_square(step, covariance, sum(map(len, errors)))

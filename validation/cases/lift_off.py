@@ -25,7 +25,7 @@ from models.vehicles.cut_vehicle import cut
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common import checks
-from validation.common.bounces import Bounces, bounce_energy
+from validation.common.bounces import BouncingVehicle, bounce_energy
 from validation.common.checks import acceleration_gap
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Observed, Row, System
@@ -141,7 +141,7 @@ def _bounce_rows(duration: float) -> list[Row]:
     for what, override in dampers.items():
         lifting = scene(geometry="linear", duration=duration, override=override)
         assembly = assembly_of_scene(lifting)
-        exact = Bounces(assembly, STEP).path(assembly.initial, round(duration / STEP))
+        exact = BouncingVehicle(assembly, STEP).path(assembly.initial, round(duration / STEP))
         for engine in IMPLEMENTATIONS:
             error = float(np.abs(simulate(lifting, engine).states - exact).max())
             name = f"lift_off.exact.{engine}.{'stiff' if override else 'own'}"
@@ -167,7 +167,9 @@ def _order_row(halving_count: int) -> Row:
     """Row: observed order of the error in the step, for a run with landings."""
     lifting = scene(geometry="linear")
     steps, coarse = 1e-3 / 2.0 ** np.arange(halving_count), 1e-3
-    exact = Bounces(assembly_of_scene(lifting), coarse).path(assembly_of_scene(lifting).initial, round(1.0 / coarse))
+    exact = BouncingVehicle(assembly_of_scene(lifting), coarse).path(
+        assembly_of_scene(lifting).initial, round(1.0 / coarse)
+    )
     errors = []
     for step in steps:
         states = simulate(lifting, "reference", Settings("RK4", step, 1.0)).states[:: round(coarse / step)]

@@ -17,14 +17,14 @@ from validation.common.grounds import allowing_breaches
 from validation.common.rows import Observed, Row, System, Table, not_run
 from validation.common.scenes import data_folder
 from validation.contact.manchester_references import (
-    CONTACT,
+    PUBLISHED_CONTACT,
     SCENE,
     contact_of,
+    exact_on_contact_plane,
     first_touch,
-    on_one_plane,
     patch_forces,
-    patch_sums,
-    placed_at,
+    placement_at,
+    wheel_sums,
 )
 
 TITLE = "The Manchester contact benchmark, cases A"
@@ -46,7 +46,7 @@ FIRST_COLUMNS = {"right": 2, "left": 5}
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on case A-2 compared with the published results; a full run also has case A-1 at every mm, searches, profile
     files, and computing times."""
-    published = CONTACT[np.isin(CONTACT[:, 0], QUICK_SHIFTS)] if quick else CONTACT
+    published = PUBLISHED_CONTACT[np.isin(PUBLISHED_CONTACT[:, 0], QUICK_SHIFTS)] if quick else PUBLISHED_CONTACT
     placed, position_seconds = _timed_positions("A-2", published[:, 0])
     rows = [row for wheel in FIRST_COLUMNS for row in _published_rows(wheel, placed, published)]
     rows.append(
@@ -54,7 +54,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             "manchester.two_patches",
             SYSTEM,
             "patches on the right wheel at a shift of 5 mm, case A-1",
-            float(len(placed_at("A-1", 5e-3).right)),
+            float(len(placement_at("A-1", 5e-3).right)),
             "",
         ).within(2.0, 0.0, "the gauge corner takes over from the head", "published")
     )
@@ -63,7 +63,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         "published": published.tolist(),
     }
     if not quick:
-        static, each_still = _timed_positions("A-1", CONTACT[::2, 0])
+        static, each_still = _timed_positions("A-1", PUBLISHED_CONTACT[::2, 0])
         data["A-1"] = [_table_of_patches(position_seconds) for position_seconds in static]
         rows += [
             *_first_contact_rows(static),
@@ -86,7 +86,7 @@ def _timed_positions(case: str, shifts: np.ndarray) -> tuple[list[WheelsetPlacem
 
 def _published_rows(wheel: str, placements: list[WheelsetPlacement], published: np.ndarray) -> list[Row]:
     published_sums = published[:, FIRST_COLUMNS[wheel] : FIRST_COLUMNS[wheel] + 3]
-    off = np.abs(np.array([patch_sums(position, wheel) for position in placements]) - published_sums)
+    off = np.abs(np.array([wheel_sums(position, wheel) for position in placements]) - published_sums)
     patch, _, _ = off.max(axis=0).tolist()
     _, force, peak = (100.0 * off / published_sums).max(axis=0).tolist()
     rows = [
@@ -185,7 +185,7 @@ def _load_share_rows(placement: WheelsetPlacement) -> list[Row]:
     forces = [patch.normal for patch in placement.right]
     total = sum(forces)
     contact = contact_of("A-2")
-    alone, (mean, _, plane) = patch_forces(contact, placement), on_one_plane(contact, placement)
+    alone, (mean, _, plane) = patch_forces(contact, placement), exact_on_contact_plane(contact, placement)
     far = {
         name: 100.0 * max(abs(a - b) for a, b in zip(forces, other_contact, strict=True)) / total
         for name, other_contact in (("apart", alone), ("one plane", plane))
@@ -206,7 +206,7 @@ def _load_share_rows(placement: WheelsetPlacement) -> list[Row]:
             "%",
         ).at_most(FORCE_TOLERANCE, "exact theory on CONTACT's plane, lowered as the wheel is", "native"),
         Observed("manchester.split.mean", SYSTEM, "mean place at 5 mm on CONTACT's own plane", mean, "mm").beside(
-            float(CONTACT[10, 2]), "CONTACT lays more on the smaller patch; 4 um of shift do the same"
+            float(PUBLISHED_CONTACT[10, 2]), "CONTACT lays more on the smaller patch; 4 um of shift do the same"
         ),
     ]
 
@@ -244,7 +244,7 @@ def _file_rows(placements: list[WheelsetPlacement]) -> list[Row]:
         if round(1e3 * placement.shift, 6) in FILE_SHIFTS
     ]
     pairs = [
-        (patch_sums(placement, wheel), patch_sums(theirs, wheel))
+        (wheel_sums(placement, wheel), wheel_sums(theirs, wheel))
         for placement, theirs in chosen
         for wheel in FIRST_COLUMNS
     ]

@@ -292,7 +292,7 @@ def _mean_delay_row(virtual_measurement: VirtualMeasurement, folder: Path) -> Ro
 
 def _moving_car_rows(folder: Path) -> list[Row]:
     """Rows: inertial checks of a telephone recording in a real car, if the recording is available."""
-    path = car.find()
+    path = car.find_recording()
     if path is None:
         return [
             not_run("measured_checks.car", SYSTEM, "what the inertial checks say of a moving car", "no recording here")
@@ -302,7 +302,7 @@ def _moving_car_rows(folder: Path) -> list[Row]:
     degrees[:, 4] *= DEGREES_PER_RADIAN
     down[:, :6] *= np.tile(measured_car.TELEPHONE_TO_CAR, 2)
     findings = {
-        name: check(measured_car.recording(values, folder / f"{name}.columns"), None)
+        name: check(measured_car.phone_recording(values, folder / f"{name}.columns"), None)
         for name, values in (("clean", clean), ("degrees", degrees), ("down", down))
     }
     errors = {

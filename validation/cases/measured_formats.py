@@ -20,7 +20,7 @@ from models.measured.formats import open_source, write
 from models.measured.formats.writing import ChannelGroup
 from validation.common.rows import Observed, Row, System, Table, behaviour_row, not_run
 from validation.measured.measured_files import csv_forms, kinds
-from validation.measured.measured_files.odd import OddFile, read
+from validation.measured.measured_files.odd import OddFile, read_channels
 from validation.measured.measured_files.own_libraries import LIBRARIES
 
 TITLE = "Measurement files"
@@ -165,7 +165,7 @@ def two_rates_row(path: Path, file_extension: str) -> Row:
             for names, (period, values_of) in values.items()
         ],
     )
-    channels = read(open_source(path))
+    channels = read_channels(open_source(path))
     errors = [
         np.abs(channels[name][k] - truth).max()
         for (name,), (period, values_of) in values.items()
@@ -186,23 +186,23 @@ def form_rows(folder: Path) -> list[Row]:
     files = (*csv_forms.FILES, *kinds.FILES)
     ends = [_difference_or_error(odd, folder / f"form {i}") for i, odd in enumerate(files)]
     crashed = sorted({odd.name for odd, end in zip(files, ends, strict=True) if isinstance(end, str)})
-    read = [(odd, end) for odd, end in zip(files, ends, strict=True) if odd.wanted != "refused"]
-    errors = [end if isinstance(end, float) else float("inf") for _, end in read]
-    silent = sum(end is not None for odd, end in zip(files, ends, strict=True) if odd.wanted == "refused")
+    readable = [(odd, end) for odd, end in zip(files, ends, strict=True) if odd.expected_outcome != "refused"]
+    errors = [end if isinstance(end, float) else float("inf") for _, end in readable]
+    silent = sum(end is not None for odd, end in zip(files, ends, strict=True) if odd.expected_outcome == "refused")
     why = "all of them are hard cases of their own"
     bits = f"{why}; half a bit of a time of 0.4 s, and less than the last bit of any force"
     return [
         Observed(
             "measured_formats.forms.values",
             SYSTEM,
-            f"difference of times and values of {len(read)} forms of CSV and of file names from the plain file",
+            f"difference of times and values of {len(readable)} forms of CSV and of file names from the plain file",
             max(errors),
             "s or N",
         ).at_most(1e-16, bits, "closed form"),
         Observed(
             "measured_formats.forms.silent",
             SYSTEM,
-            f"files that are read without a word, of {len(files) - len(read)} with two meanings or of another kind",
+            f"files that are read without a word, of {len(files) - len(readable)} with two meanings or of another kind",
             silent,
             "files",
         ).at_most(0.0, f"{why}; each refusal says what to do", "none"),
@@ -241,7 +241,7 @@ def resolution_rows(folder: Path) -> list[Row]:
     files are written in floating point for this reason."""
     load = wheel_force()
     path = write(folder / "choice.rsp", [ChannelGroup(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
-    floating = read(open_source(path))["Fz"][1]
+    floating = read_channels(open_source(path))["Fz"][1]
     step = np.abs(load).max() / 32752
     rounded_load = step * np.round(load / step)
     errors = [

@@ -19,7 +19,12 @@ from models.systems.measured.sections import Sections, guided_bodies
 from models.systems.measured.verdict import channels_to_compare, compare
 from models.vehicles.cut_vehicle import cut
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
-from validation.measured.long_recording import SEED, answers_of, run_killed_process, run_of
+from validation.measured.long_recording import (
+    SEED,
+    computed_channel_bytes,
+    run_killed_process,
+    section_run_of_recording,
+)
 from validation.spatial.cars import random_states, random_wrenches, twin
 from validation.spatial.joint_forces import exudyn_guides, mujoco_guides
 
@@ -145,12 +150,12 @@ def _equal_blocks_row(folder: Path, engine: str, stabiliser: str, seconds: float
     """Row: number of channels that differ between a run in one block and a run in uneven blocks."""
     run_folder = folder / f"blocks {seconds}"
     run_folder.mkdir(exist_ok=True)
-    job = run_of(run_folder, seconds, PATTERN_SECONDS, engine, AttitudeHold(stabiliser))  # type: ignore[arg-type]
+    job = section_run_of_recording(run_folder, seconds, PATTERN_SECONDS, engine, AttitudeHold(stabiliser))  # type: ignore[arg-type]
     bits = []
     for block in (60.0, 0.073):
         name = f"{engine} {stabiliser} {block}"
         run(job, run_folder / name, block=block)
-        bits.append(np.frombuffer(answers_of(run_folder, name), np.int64))
+        bits.append(np.frombuffer(computed_channel_bytes(run_folder, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
         f"measured_long.blocks_{engine}_{stabiliser}",
@@ -168,12 +173,12 @@ def _killed_row(folder: Path) -> Row:
     for times in (0, 2):
         run_folder = folder / f"killed {times}"
         run_folder.mkdir()
-        job = run_of(run_folder, seconds, PATTERN_SECONDS)
+        job = section_run_of_recording(run_folder, seconds, PATTERN_SECONDS)
         if times:
             run_killed_process(run_folder, seconds, PATTERN_SECONDS, 0.25, times)
         else:
             run(job, run_folder / "run")
-        bits.append(np.frombuffer(answers_of(run_folder), np.int64))
+        bits.append(np.frombuffer(computed_channel_bytes(run_folder), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
         "measured_long.killed",
@@ -187,7 +192,7 @@ def _killed_row(folder: Path) -> Row:
 
 def _memory_rows(folder: Path) -> list[Row]:
     """Rows: peak memory for an hour of recording, extrapolated from a shorter recording, and speed of the run."""
-    run_of(folder, LONG_DURATION, PATTERN_SECONDS)
+    section_run_of_recording(folder, LONG_DURATION, PATTERN_SECONDS)
     words = map(str, (folder, LONG_DURATION, PATTERN_SECONDS, LONG_DURATION / 10, 2e-3))
     command = [sys.executable, "-m", "validation.measured.long_recording", *words]
     output_lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
@@ -217,7 +222,7 @@ def _export_rows(folder: Path) -> list[Row]:
     """Rows: section forces written in every format and read back; a measured check channel compared with the run."""
     run_folder = folder / "handed on"
     run_folder.mkdir()
-    job = run_of(run_folder, 2.0, PATTERN_SECONDS)
+    job = section_run_of_recording(run_folder, 2.0, PATTERN_SECONDS)
     outcome = run(job, run_folder / "run")
     wanted = outcome.answers[:6]
     values = np.column_stack([outcome.samples(answer) for answer in wanted])

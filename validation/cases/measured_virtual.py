@@ -342,11 +342,11 @@ def frame_of_measurement(true_measurement: VirtualMeasurement) -> str:
 def _moving_car_rows(folder: Path) -> list[Row]:
     """Rows on a real car: a telephone's gyro and accelerometers compared with the angles of its camera, from two files
     with different clocks."""
-    path, what = moving_car.find(), "telephone and camera of a moving car, two files on one clock:"
+    path, what = moving_car.find_recording(), "telephone and camera of a moving car, two files on one clock:"
     if path is None:
         id, gyro = "measured_virtual.moving_gyro", f"{what} ratio of the gyro to the camera's angles"
         return [not_run(id, SYSTEM, gyro, f"TWINRIG_DATA does not lead to {moving_car.RECORDING_FILE}")]
-    scene = measured_car.scene(path, cut(load_vehicle("r19_free"), "body"), folder)
+    scene = measured_car.recording_scene(path, cut(load_vehicle("r19_free"), "body"), folder)
     recording = read_files(scene, folder)
     findings = check_recording(recording, None, scene.places, {})
     ratio = next((f.size for f in findings if f.check == "turning" and "pitch_rate" in f.place), None)

@@ -22,7 +22,7 @@ from validation.contact.drawn_wheelsets import (
     HEAVY_WHEELSET,
     SEED,
     STIFF_WHEELSET,
-    Speeds,
+    CriticalSpeeds,
     critical_speeds,
     drawn_wheelsets,
 )
@@ -111,7 +111,7 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     ]
 
 
-def _critical_rows(speeds: Speeds) -> list[Row]:
+def _critical_rows(speeds: CriticalSpeeds) -> list[Row]:
     """Rows: largest relative difference between the implementations' critical speeds, and whether they agree on which
     wheelsets have one."""
     there = [[speed for speed in of_engine.values() if speed is not None] for of_engine in speeds.values()]
@@ -183,13 +183,13 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     return rows
 
 
-def _simulation_speed(speeds: Speeds, wheelset_name: str) -> float:
+def _simulation_speed(speeds: CriticalSpeeds, wheelset_name: str) -> float:
     """Speed (m/s) of a wheelset's simulation: above its critical speed, or 60 m/s if it has none."""
     critical = speeds[wheelset_name]["reference"]
     return min(SPEED_RATIO * critical, 180.0) if critical is not None else 60.0
 
 
-def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> list[Row]:
+def _path_rows(wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, cells: int) -> list[Row]:
     """Rows on simulations of one second by RK4 with FASTSIM: differences between the implementations, and the sign of
     the creep forces' power."""
     pairs = {("reference", engine): 0.0 for engine in ENGINES} | {ENGINES: 0.0}
@@ -239,7 +239,7 @@ def _time_step(equations: Equations) -> float:
 
 
 def _limit_cycles(
-    wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, ...]
+    wheelsets: dict[str, Wheelset], speeds: CriticalSpeeds, engines: tuple[str, ...]
 ) -> dict[str, dict[str, Orbit]]:
     """Limit cycles by wheelset and implementation: of the chosen wheelset, and of those whose critical speed is low
     enough for a simulation above this speed.

@@ -1,1 +1,1 @@
-"""Common parts of the validation cases of choices of effects."""
+"""Common parts of the validation cases on the automatic choice of effects."""

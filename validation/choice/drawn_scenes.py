@@ -1,4 +1,4 @@
-"""Random scenes of systems that are run in time, each with a question: quantities, and a tolerance."""
+"""Random scenes for the choice of effects in time simulation, each with quantities and a tolerance."""
 
 from dataclasses import dataclass
 from importlib import import_module
@@ -9,24 +9,24 @@ import numpy as np
 from models.core.systems import SYSTEMS
 
 TOLERANCES = (0.02, 0.005, 0.05)
-"""Drawn scenes take these in turn."""
+"""Tolerances of the random scenes, used in turn."""
 
 
 @dataclass(frozen=True)
 class ChoiceQuestion:
-    """A random scene, as a table, with the quantities and tolerance of its choice."""
+    """A random scene, as a table, with the quantities and the tolerance for which effects are to be chosen."""
 
     table: dict[str, Any]
     quantities: tuple[str, ...]
     tolerance: float
 
     def scene(self) -> Any:
-        """The scene, built from the table."""
+        """Scene built from the table."""
         return import_module(SYSTEMS[self.table.get("system", "pitch-plane")].scene).build(self.table, "drawn")
 
 
 def draw_scene(system: str, seed: int) -> ChoiceQuestion:
-    """The random scene of a system for a seed."""
+    """Random scene of a system with quantities and tolerance, for a seed."""
     draw = np.random.default_rng([SEED, seed])
     table, quantities = DRAWN_SYSTEMS[system](draw)
     return ChoiceQuestion(
@@ -37,9 +37,9 @@ def draw_scene(system: str, seed: int) -> ChoiceQuestion:
 SEED = 2210
 
 
-def _pitch_plane(generator: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """A random half car on a road, with a pitch spring of random strength and a gyro; half of them start away from
-    rest."""
+def _random_half_car(generator: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Scene table and quantities of a random half car on a road. It may have a pitch spring of random stiffness and a
+    gyro; half of the scenes start with a pitch."""
     road = [
         {"source": "study", "speed": float(generator.uniform(8.0, 30.0))},
         {
@@ -66,8 +66,8 @@ def _pitch_plane(generator: np.random.Generator) -> tuple[dict[str, Any], tuple[
 
 
 def _random_wheelset(generator: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """A random wheelset scene at a speed below or above critical, with a displacement from small up to flange
-    contact."""
+    """Scene table and quantities of a random wheelset at a speed below or above its critical speed, with a displacement
+    from small up to flange contact."""
     factors = {name: float(np.exp(generator.uniform(-0.7, 0.7))) for name in ("stiffness_x", "damping_x", "damping_y")}
     usual = {"stiffness_x": 2e5, "damping_x": 1e3, "damping_y": 1e3}
     displacement = float(10.0 ** generator.uniform(-4.0, -2.2))
@@ -86,7 +86,8 @@ def _random_wheelset(generator: np.random.Generator) -> tuple[dict[str, Any], tu
 
 
 def _random_stop(generator: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """A truck that stops on one of four surfaces, with and without anti-lock control."""
+    """Scene table and quantities of a random stop of a truck on one of four surfaces, with or without anti-lock
+    control."""
     push_out = float(generator.uniform(0.05, 0.8))
     table: dict[str, Any] = {
         "road": {"stretches": [{"left": str(generator.choice(["dry", "wet", "snow", "ice"]))}]},
@@ -114,4 +115,4 @@ def _random_stop(generator: np.random.Generator) -> tuple[dict[str, Any], tuple[
     return table, tuple(map(str, drawn_quantities))
 
 
-DRAWN_SYSTEMS = {"pitch-plane": _pitch_plane, "wheelset": _random_wheelset, "braking": _random_stop}
+DRAWN_SYSTEMS = {"pitch-plane": _random_half_car, "wheelset": _random_wheelset, "braking": _random_stop}

@@ -1,7 +1,7 @@
-"""Choices looked at by other routes than their own.
+"""Checks of chosen effects by independent computations.
 
-Of linear rides: near the scene by the exact solve, by sums over frequencies, and at equal accuracy by the covariance of
-what runs sample; of scenes that are run: by two runs more.
+Choices for linear rides are checked at nearby speeds and parameters by exact variances, by sums over frequencies, and
+by the covariance of sampled runs at equal accuracy. Choices for time simulation are checked by two further runs.
 """
 
 from dataclasses import dataclass, replace
@@ -19,17 +19,18 @@ from models.advice.ride_choice.screen import exact_variances
 from models.ride.frequency import spectral_densities
 from models.systems.ride.reduced_scene import ReducedScene, reduced_without
 from validation.choice.drawn_scenes import ChoiceQuestion
-from validation.choice.sampled import Sampled
+from validation.choice.sampled import SampledStatistics
 from validation.ride.drawn_rides import LinearRide, NonlinearRide
 
 SPEED_SHARES = (0.7, 1.0, 1.3)
-"""Speeds of a scene by the one that is drawn."""
+"""Speeds of a scene divided by its random speed."""
 ANGULAR_FREQUENCIES = np.geomspace(1e-2, 3e5, 3000)
-"""rad/s of the frequency route: its sums are good to 1e-3 of a change, being the same grid for both."""
+"""Angular frequencies (rad/s) of the sums over frequencies. Changes are accurate to 1e-3, as both scenes use the same
+grid."""
 
 
-def asked_speeds(drawn_scene: LinearRide) -> Chooser:
-    """A chooser for a range of speeds about the scene's speed."""
+def chooser_over_speeds(drawn_scene: LinearRide) -> Chooser:
+    """Chooser of effects for a range of speeds about the scene's speed."""
     return Chooser(
         drawn_scene.scene,
         [share * drawn_scene.speed for share in SPEED_SHARES],
@@ -39,30 +40,32 @@ def asked_speeds(drawn_scene: LinearRide) -> Chooser:
 
 
 def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
-    """Changes (quantities,) at the speed at which they are largest, by frequency responses."""
+    """Relative changes (number of quantities,) that a choice of effects causes, by frequency responses, at the speed at
+    which they are largest."""
     left = reduced_without(chooser.scene, choice.left_out)
     ratios = [
-        _by_frequency(full_scene, left, chooser.rows) / _by_frequency(full_scene, chooser.scene, chooser.rows)
+        _variances_by_frequency(full_scene, left, chooser.rows)
+        / _variances_by_frequency(full_scene, chooser.scene, chooser.rows)
         for full_scene in chooser.full_scenes
     ]
     return largest_changes(np.sqrt(ratios) - 1)
 
 
-def _by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -> np.ndarray:
-    """Variances (quantities,) from sums over frequencies with the matrices M, D, K. No state space is built, so that M
-    may be singular."""
+def _variances_by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -> np.ndarray:
+    """Variances (number of quantities,) of a scene from sums over frequencies with the mass, damping and stiffness
+    matrices. No state space is built, so that the mass matrix may be singular."""
     reduced = full_scene.reduced(scene)
     densities = spectral_densities(reduced.vehicle, reduced.excitation, full_scene.speed, ANGULAR_FREQUENCIES)[:, rows]
     return 2 * np.trapezoid(densities, ANGULAR_FREQUENCIES, axis=0)
 
 
-def worst_nearby(chooser: Chooser, omitted_effects: EffectSet, draws: int, seed: int) -> float:
-    """Ratio of the largest change to the tolerance, over random speeds in the range with random errors of all
-    parameters."""
+def worst_nearby(chooser: Chooser, omitted_effects: EffectSet, draw_count: int, seed: int) -> float:
+    """Largest relative change without the omitted effects divided by the tolerance, over random speeds in the chooser's
+    range and random errors of all parameters."""
     random, reduced_scene, worst = np.random.default_rng(seed), chooser.reduced_scene_without(omitted_effects), 0.0
     low, high = chooser.full_scenes[0].speed, chooser.full_scenes[-1].speed
     names = uncertain_parameters(chooser.scene.vehicle)
-    for _ in range(draws):
+    for _ in range(draw_count):
         factors = dict(zip(names, 1.0 + PARAMETER_ERROR * random.uniform(-1.0, 1.0, len(names)), strict=True))
         full, left = (
             replace(scene, vehicle=scaled_vehicle(scene.vehicle, factors)) for scene in (chooser.scene, reduced_scene)
@@ -74,17 +77,19 @@ def worst_nearby(chooser: Chooser, omitted_effects: EffectSet, draws: int, seed:
 
 
 def measured_step(chooser: Chooser, omitted_effects: EffectSet) -> float:
-    """Longest step (s) with which runs keep the tolerance, by the covariance of their sampled states; for quantities
-    without weighting."""
+    """Longest time step (s) with which runs without the omitted effects keep the tolerance, by the covariance of their
+    sampled states; for quantities without weighting."""
     return longest_step(
-        [Sampled(march) for march in chooser.marches(omitted_effects)], chooser.exact_deviations(), chooser.tolerance
+        [SampledStatistics(march) for march in chooser.marches(omitted_effects)],
+        chooser.exact_deviations(),
+        chooser.tolerance,
     )
 
 
 @dataclass(frozen=True)
-class JudgedByRuns:
-    """A scene, its choice, and the changes (quantities,) that two further runs show. For rides these use new roads, and
-    the changes are the smallest that are significant."""
+class ChoiceCheckedByRuns:
+    """A scene, its choice of effects, and the relative changes (number of quantities,) that two further runs show. For
+    rides the runs use new roads, and the changes are the smallest that are significant."""
 
     system: str
     engine: str
@@ -94,29 +99,30 @@ class JudgedByRuns:
 
     @property
     def is_honest(self) -> bool:
-        """False if the choice claims to keep the tolerance and the further runs break it."""
+        """False if the choice claims to keep the tolerance and the further runs exceed it."""
         return not self.choice.within_tolerance or bool(
             (self.repeated_changes <= self.asked.tolerance * (1 + 1e-9)).all()
         )
 
 
-def judged_of(request: ChoiceQuestion, system: str, engine: str) -> JudgedByRuns:
-    """Choose effects, then run the complete and the reduced scene once more."""
-    chooser = ChooserByRuns(request.scene(), engine, list(request.quantities), request.tolerance)
+def choice_checked_by_runs(question: ChoiceQuestion, system: str, engine: str) -> ChoiceCheckedByRuns:
+    """Choose effects for a scene in an engine, then run the full and the reduced scene once more to check the
+    choice."""
+    chooser = ChooserByRuns(question.scene(), engine, list(question.quantities), question.tolerance)
     choice, runs = chooser.choose(), chooser.whole.variants
-    full_run = runs.system.computed_quantities(request.scene(), engine)
+    full_run = runs.system.computed_quantities(question.scene(), engine)
     reduced_run = runs.system.computed_quantities(
         runs.changed_scene(frozenset(choice.left_out), choice.step_factor), engine
     )
     confirmed_changes = [
-        largest_change(full_run.quantity(name).cases, reduced_run.quantity(name).cases) for name in request.quantities
+        largest_change(full_run.quantity(name).cases, reduced_run.quantity(name).cases) for name in question.quantities
     ]
-    return JudgedByRuns(system, engine, request, choice, np.array(confirmed_changes))
+    return ChoiceCheckedByRuns(system, engine, question, choice, np.array(confirmed_changes))
 
 
 def largest_change(full_cases: tuple[np.ndarray, ...], reduced_cases: tuple[np.ndarray, ...]) -> float:
-    """Largest relative change over the cases: rms difference at common rows divided by the path's standard deviation,
-    or by the magnitude of a single number."""
+    """Largest relative change between the full and the reduced scene over all cases: rms difference at common rows
+    divided by the standard deviation of the full path, or by the magnitude of a single number."""
     worst = 0.0
     for full, left in zip(full_cases, reduced_cases, strict=True):
         rows = np.linspace(0, len(full) - 1, len(left)).round().astype(int)

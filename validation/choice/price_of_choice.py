@@ -1,4 +1,5 @@
-"""What a linear choice costs by the full covariance of the same scene: a car of 19 degrees of freedom, five speeds."""
+"""Computing time of a linear choice of effects divided by that of the full covariance: a car with 19 degrees of
+freedom, five speeds."""
 
 import time
 
@@ -9,7 +10,7 @@ from models.systems import run
 from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.scene import RideScene, build
 
-ASKED_SCENE = {
+CAR_SCENE_TABLE = {
     "title": "a car of 19 degrees of freedom",
     "system": "ride",
     "study": "ride_choice",
@@ -20,18 +21,18 @@ ASKED_SCENE = {
     "speeds": {"values": [10.0, 15.0, 20.0, 25.0, 30.0]},
 }
 TIMING_ROUNDS = 5
-"""Pairs of a choice and a full covariance."""
+"""Number of timed pairs of a choice and a full covariance."""
 
 
-def whole_car() -> RideScene:
-    """Scene of a car with 19 degrees of freedom, for which a choice is made."""
-    return build(ASKED_SCENE, "a car of 19 degrees of freedom")
+def car_scene() -> RideScene:
+    """Scene of a car with 19 degrees of freedom, for which effects are chosen."""
+    return build(CAR_SCENE_TABLE, "a car of 19 degrees of freedom")
 
 
 def price_of_choice() -> tuple[tuple[float, float, float], float]:
-    """Ratio of the processor time of a choice to that of the full covariance with its error, with a 95 % interval; and
-    ratio of the predicted to the actual time of a choice."""
-    scene = whole_car()
+    """Processor time of a choice divided by that of the full covariance with its error, with a 95 % interval; and
+    predicted divided by actual time of a choice."""
+    scene = car_scene()
 
     def choose() -> None:
         with scene_errors(scene):

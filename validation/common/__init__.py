@@ -1,1 +1,1 @@
-"""Common parts of all cases: rows and their verdicts, bands, timing, scenes, kept results."""
+"""Common parts of all validation cases: report rows and their verdicts, confidence bands, scenes, saved results."""

@@ -9,7 +9,7 @@ PUBLISHED_MATRICES = {
     "K2": [[0.0, 76.5973458957322], [0.0, 2.654315237946041]],
 }
 WEAVE_SPEED, CAPSIZE_SPEED = 4.29238253634111, 6.02426201538837
-"""m/s"""
+"""Published weave and capsize speed (m/s)."""
 EIGENVALUES_AT_STANDSTILL = (3.13164324790656, 5.53094371765393)
 _EIGENVALUE_TABLE = """
 1 3.52696170990070 0.80774027519930 -3.13423125066578 -7.11008014637442
@@ -23,7 +23,7 @@ _EIGENVALUE_TABLE = """
 9 -3.21675402252485 9.69377351531791 0.15790184030917 -22.43788559040858
 10 -3.72016840437287 10.90681139476287 0.16105338653172 -24.62459635017404
 """
-"""Speed (m/s), weave (real and imaginary part), capsize, castering (1/s)."""
+"""Published eigenvalues: speed (m/s), weave (real and imaginary part), capsize, castering (1/s)."""
 
 
 def _published_eigenvalues() -> dict[float, np.ndarray]:
@@ -39,4 +39,4 @@ def _published_eigenvalues() -> dict[float, np.ndarray]:
 
 
 PUBLISHED_EIGENVALUES = _published_eigenvalues()
-"""Eigenvalues (4,) in 1/s, sorted, by speed (m/s)."""
+"""Speed (m/s) -> published eigenvalues (4,) in 1/s, sorted."""

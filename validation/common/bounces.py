@@ -1,4 +1,4 @@
-"""A vehicle that bounces on the flat road, exact: piece by piece, by matrix exponentials.
+"""Exact path of a pitch-plane vehicle that bounces on a flat road, by matrix exponentials between contact changes.
 
 With geometry linear in the pitch and the tyres of the effect ``lift_off`` the motion is linear as long as each tyre
 stays in one of three states: in the air (no force), pressed (k e + d e') or hit so fast that the damper is limited by
@@ -16,80 +16,87 @@ from models.engines.assembly import Assembly
 from models.vehicles.description import matrices
 from models.vehicles.pitch_plane import Parameters
 
-IN_AIR, PRESSED, JUST_HIT = range(3)
+IN_AIR, PRESSED, DAMPER_LIMITED = range(3)
 SWITCH_BISECTIONS = 52
-Pair = tuple[int, int]
+ContactStates = tuple[int, int]
 
 
-class Bounces:
-    """Exact path of a bouncing vehicle. A tyre must not switch twice within the ``step`` (s) between two rows."""
+class BouncingVehicle:
+    """Exact solution for a bouncing pitch-plane vehicle. A tyre must not change its contact state twice within a
+    ``step`` (s)."""
 
     def __init__(self, assembly: Assembly, step: float) -> None:
-        vehicle, self.p, self.step = assembly.vehicle, assembly.parameters, step
+        vehicle, self.parameters, self.step = assembly.vehicle, assembly.parameters, step
         bare = replace(vehicle, struts=tuple(strut for strut in vehicle.struts if strut.lower.body is not None))
         mass, damping, stiffness = matrices(bare)
         weight = np.array([*(body.mass * vehicle.gravity for body in vehicle.bodies), 0.0])
         self.rates = {
-            (i, j): _rate_matrix(mass, damping, stiffness, weight, _tyre_laws(self.p, (i, j)))
+            (i, j): _rate_matrix(mass, damping, stiffness, weight, _tyre_laws(self.parameters, (i, j)))
             for i, j in product(range(3), range(3))
         }
-        self.moves = {states: expm(rate * step) for states, rate in self.rates.items()}
+        self.transitions = {states: expm(rate * step) for states, rate in self.rates.items()}
 
     def path(self, start_state: np.ndarray, state_count: int) -> np.ndarray:
-        """States (count + 1, 8) at intervals of ``step`` (s), from the initial state (8,)."""
+        """States (state_count + 1, 8) at intervals of ``step`` (s), from the initial state (8,)."""
         states = [np.append(start_state, 1.0)]
         for _ in range(state_count):
             states.append(self._state_after_step(states[-1]))
         return np.array(states)[:, :8]
 
     def _state_after_step(self, x: np.ndarray) -> np.ndarray:
-        """The state (9,) a step later."""
-        left, states = self.step, self._states(x)
+        """State (8,) with a 1 appended, a step later."""
+        left, states = self.step, self._contact_states(x)
         while True:
-            state_after = (self.moves[states] if left == self.step else expm(self.rates[states] * left)) @ x
-            if self._states(state_after) == states:
+            state_after = (self.transitions[states] if left == self.step else expm(self.rates[states] * left)) @ x
+            if self._contact_states(state_after) == states:
                 return state_after
-            passed, x = self._switch(x, states, left)
-            left, states = left - passed, self._states(x)
+            passed, x = self._state_at_switch(x, states, left)
+            left, states = left - passed, self._contact_states(x)
 
-    def _switch(self, x: np.ndarray, states: Pair, longest_step: float) -> tuple[float, np.ndarray]:
-        """Time (s) at which a tyre changes its contact state, and the vehicle's state at that time."""
+    def _state_at_switch(
+        self, x: np.ndarray, contact_states: ContactStates, longest_step: float
+    ) -> tuple[float, np.ndarray]:
+        """Time (s) until a tyre changes its contact state, and the vehicle's state (9,) then."""
         time_before, time_after = 0.0, longest_step
         for _ in range(SWITCH_BISECTIONS):
             middle = 0.5 * (time_before + time_after)
-            if self._states(expm(self.rates[states] * middle) @ x) == states:
+            if self._contact_states(expm(self.rates[contact_states] * middle) @ x) == contact_states:
                 time_before = middle
             else:
                 time_after = middle
-        return time_after, expm(self.rates[states] * time_after) @ x
+        return time_after, expm(self.rates[contact_states] * time_after) @ x
 
-    def _states(self, x: np.ndarray) -> Pair:
-        """Contact state of each tyre."""
-        p = self.p
+    def _contact_states(self, x: np.ndarray) -> ContactStates:
+        """Contact states of the front and rear tyre: in the air, pressed, or with its damper limited."""
+        p = self.parameters
         return _contact_state(p.k1 * x[0], p.d1 * x[4]), _contact_state(p.k2 * x[1], p.d2 * x[5])
 
 
 def _contact_state(spring: float, damper: float) -> int:
     if spring <= 0.0 or spring + damper <= 0.0:
         return IN_AIR
-    return JUST_HIT if damper > spring else PRESSED
+    return DAMPER_LIMITED if damper > spring else PRESSED
 
 
-def _tyre_laws(parameters: Parameters, states: Pair) -> list[tuple[float, float]]:
-    """Stiffness (N/m) and damping (N s/m) of both tyres in their contact states."""
+def _tyre_laws(parameters: Parameters, contact_states: ContactStates) -> list[tuple[float, float]]:
+    """Stiffness (N/m) and damping (N s/m) of the front and rear tyre in their contact states."""
     laws = [
         ((0.0, 0.0), (k, d), (2.0 * k, 0.0))
         for k, d in ((parameters.k1, parameters.d1), (parameters.k2, parameters.d2))
     ]
-    return [law[state] for law, state in zip(laws, states, strict=True)]
+    return [law[state] for law, state in zip(laws, contact_states, strict=True)]
 
 
 def _rate_matrix(
-    mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, weight: np.ndarray, laws: list[tuple[float, float]]
+    mass: np.ndarray,
+    damping: np.ndarray,
+    stiffness: np.ndarray,
+    weight: np.ndarray,
+    tyre_laws: list[tuple[float, float]],
 ) -> np.ndarray:
-    """Matrix A (9, 9) of x' = A x, where x is the vehicle's state followed by 1."""
+    """Matrix A (9, 9) of x' = A x, where x is the vehicle's state (8,) followed by 1."""
     a, inverse = np.zeros((9, 9)), 1.0 / mass.diagonal()
-    extra_k, extra_d = (np.diag([*(law[i] for law in laws), 0.0, 0.0]) for i in range(2))
+    extra_k, extra_d = (np.diag([*(law[i] for law in tyre_laws), 0.0, 0.0]) for i in range(2))
     a[:4, 4:8] = np.eye(4)
     a[4:8, :4], a[4:8, 4:8] = -inverse[:, None] * (stiffness + extra_k), -inverse[:, None] * (damping + extra_d)
     a[4:8, 8] = inverse * weight
@@ -97,7 +104,7 @@ def _rate_matrix(
 
 
 def bounce_energy(assembly: Assembly, states: np.ndarray) -> np.ndarray:
-    """Energy (m,) in J of states (m, 8) on a flat road: sum of kinetic energy, weight, suspension and compressed
+    """Total energy (m,) in J of states (m, 8) on a flat road: kinetic energy, weight, suspension springs and compressed
     tyres."""
     p, vehicle = assembly.parameters, assembly.vehicle
     z, v = states[:, :3], states[:, 4:]

@@ -1,4 +1,4 @@
-"""Changes between two reports: rows that are new, gone, or have another value than before."""
+"""Changes between two validation reports: rows that are new, missing or changed."""
 
 import json
 from collections.abc import Iterator
@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from models.core.errors import InputError
-from validation.common.rows import STATUSES, Row, Saved, of_saved
+from validation.common.rows import STATUSES, Row, Saved, row_of_saved
 
 ROUNDING_SHARE = 1e-9
 """Relative change that rounding explains."""
 NEGLIGIBLE_SHARE = 1e-3
-"""Share of its tolerance by which an error (expected 0) may change unmentioned: its digits are those of rounding."""
+"""Share of its tolerance by which an error (expected 0) may change without mention, as rounding decides its digits."""
 CHANGE_KINDS = ("status", "gone", "new", "expected", "value")
-"""In the order in which they are told: what passes or fails now, then what is judged otherwise, then values."""
+"""Kinds of changes in the order of the comparison: status, missing and new rows, changed expectations, values."""
 
 Change = Saved
 
@@ -35,15 +35,15 @@ def read_results(path: Path) -> Saved:
 
 
 def _misread_text(error: Exception) -> str:
-    """Text on what is wrong with a file that was read."""
+    """Text that says why a results file cannot be read."""
     if isinstance(error, json.JSONDecodeError):
         return f"line {error.lineno} is no JSON"
     return f"{error} is missing" if isinstance(error, KeyError) else str(error)
 
 
 def _rows_by_id(report_content: Saved) -> dict[str, Saved]:
-    """Rows by id; raises ValueError if two rows have the same id, because only one of them would be compared."""
-    saved = map(of_saved, report_content["rows"])
+    """Row id -> row of a report. Raises ValueError if two rows have the same id."""
+    saved = map(row_of_saved, report_content["rows"])
     rows = {row["id"]: {name: row[name] for name in Row.__dataclass_fields__} for row in saved}
     if len(rows) < len(report_content["rows"]):
         raise ValueError("an id stands there twice")
@@ -51,17 +51,17 @@ def _rows_by_id(report_content: Saved) -> dict[str, Saved]:
 
 
 def _provenance_tables(report_content: Saved) -> Saved:
-    """Provenance of the rows, as tables."""
+    """Provenance of a report (versions, seeds, machine), with tables where an old report lacks them."""
     tables = dict(report_content["provenance"])
     return tables | {name: dict(tables.get(name) or {}) for name in ("versions", "seeds")}
 
 
 def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], report_source: Saved) -> Saved:
-    """Comparison with an earlier report, for ``results.json``: the earlier file and commit, notes, and all changed
-    rows.
+    """Comparison of rows with an earlier report, for ``results.json``: the earlier file and commit, notes, and all
+    changed rows.
 
-    report_source : provenance of the rows; the notes say where that of the earlier report differs in what numbers
-    depend on.
+    report_source : provenance of the rows. The notes list versions, seeds and machine that differ from the earlier
+    report's.
     """
     was = earlier_report["provenance"]
     old, new = (("quick" if report.get("quick") else "full") for report in (was, report_source))
@@ -78,25 +78,25 @@ def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], report_sou
     }
 
 
-def _differing_environment(was: Saved, report_source: Saved) -> Iterator[tuple[str, Any, Any]]:
-    """Versions, seeds, Python, machine and system in which both reports differ, in the order of the earlier report."""
+def _differing_environment(earlier_source: Saved, report_source: Saved) -> Iterator[tuple[str, Any, Any]]:
+    """Name, earlier and present value of each version, seed, Python, machine and system in which two reports differ."""
     for name in ("versions", "seeds"):
-        old, new = was.get(name) or {}, report_source.get(name) or {}
+        old, new = earlier_source.get(name) or {}, report_source.get(name) or {}
         yield from (
             (f"{name[:-1]} of {key}", old.get(key), new.get(key))
             for key in {**old, **new}
             if old.get(key) != new.get(key)
         )
     yield from (
-        (name, was.get(name), report_source.get(name))
+        (name, earlier_source.get(name), report_source.get(name))
         for name in ("python", "machine", "system")
-        if was.get(name) != report_source.get(name)
+        if earlier_source.get(name) != report_source.get(name)
     )
 
 
 def changed_rows(earlier_rows: dict[str, Saved], later_rows: dict[str, Saved]) -> list[Change]:
-    """Changed rows by id, sorted by CHANGE_KINDS; rows with changed values are sorted by their change as a share of the
-    tolerance, largest first."""
+    """Changes of all rows that differ between two reports, sorted by CHANGE_KINDS; changed values are sorted by their
+    change divided by the tolerance, largest first."""
     listed = [
         change
         for id in (*earlier_rows, *(id for id in later_rows if id not in earlier_rows))
@@ -108,7 +108,7 @@ def changed_rows(earlier_rows: dict[str, Saved], later_rows: dict[str, Saved]) -
 
 
 def _status_rank(status: Any) -> int:
-    """Rank of a status for sorting: the worst first; 0 for a value that is no status."""
+    """Rank of a row's status for sorting, 0 for the worst; 0 also for a value that is not a status."""
     return STATUSES.index(status) if status in STATUSES else 0
 
 
@@ -135,7 +135,7 @@ def _changes_of_row(id: str, old_row: Saved | None, new_row: Saved | None) -> It
     for name in ("expected", "tolerance"):
         if _values_differ(old_row[name], new_row[name]):
             yield change("expected", f"{name} {old_row[name]}", f"{name} {new_row[name]}")
-    size = _size_of_change(old_row, new_row)
+    size = _relative_change(old_row, new_row)
     if size > 0.0:
         yield change("value", old_row["value"], new_row["value"], size)
 
@@ -155,8 +155,8 @@ def _values_differ(old_value: Any, new_value: Any) -> bool:
     )
 
 
-def _size_of_change(old_row: Saved, new_row: Saved) -> float:
-    """Change of a value as a share of its tolerance, or of the value if there is no tolerance; 0 for mere rounding."""
+def _relative_change(old_row: Saved, new_row: Saved) -> float:
+    """Change of a row's value divided by its tolerance, or by the value if it has no tolerance; 0 for rounding."""
     was, current_value, tolerance = old_row["value"], new_row["value"], new_row["tolerance"]
     if not _values_differ(was, current_value):
         return 0.0
@@ -168,12 +168,12 @@ def _size_of_change(old_row: Saved, new_row: Saved) -> float:
     return abs(current_value - was) / max(abs(was), abs(current_value))
 
 
-def change_lines(compared: Saved) -> list[str]:
-    """The comparison as text, changed rows first."""
-    changed = compared["changes"]
+def change_lines(comparison: Saved) -> list[str]:
+    """Lines of text of a comparison: counts of changes, the note, then each changed row."""
+    changed = comparison["changes"]
     names = zip(CHANGE_KINDS, ("of status", "gone", "new", "judged otherwise", "of value"), strict=True)
     counts = ", ".join(f"{sum(change['kind'] == kind for change in changed)} {text}" for kind, text in names)
-    head = f"against {compared['file']} (commit {compared['commit']}): {len(changed)} changes: {counts}"
+    head = f"against {comparison['file']} (commit {comparison['commit']}): {len(changed)} changes: {counts}"
     lines = [
         f"  {change['kind']}: {change['id']}: {change['quantity']}: "
         f"{_value_text(change['before'])} -> {_value_text(change['after'])}"
@@ -181,7 +181,7 @@ def change_lines(compared: Saved) -> list[str]:
         f"{': ' + change['reason'] if change['reason'] else ''}"
         for change in changed
     ]
-    return [head, *([f"  note: {compared['note']}"] if compared["note"] else []), *lines]
+    return [head, *([f"  note: {comparison['note']}"] if comparison["note"] else []), *lines]
 
 
 def _value_text(row_value: Any) -> str:

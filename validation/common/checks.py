@@ -1,7 +1,7 @@
-"""Checks that cases and planted faults share: how far a built model is from the equations and from invariants.
+"""Checks that cases and planted faults share: differences of a built model from the equations and from invariants.
 
-Each takes ``make``, a function (assembly, settings) -> model, so that the same check judges an engine as
-it is (``engine("mujoco")``) and one with a fault in it. A run that is refused or fails is infinitely far.
+Each check takes ``make_engine``, a function (assembly, settings) -> model, so that it can judge an engine without
+(``engine("mujoco")``) and with a planted fault. The difference of a refused or failed run is infinite.
 """
 
 from collections.abc import Callable
@@ -19,25 +19,26 @@ from models.engines.model import Model
 from models.engines.protocol import build
 from models.vehicles import pitch_plane
 
-Make = Callable[[Assembly, Settings], Model]
+ModelBuilder = Callable[[Assembly, Settings], Model]
 SEED = 20
-"""Of the random states."""
+"""Seed of the random states."""
 STATE_HALF_WIDTHS = np.array([0.5, 0.5, 0.5, 0.6, 3.0, 3.0, 3.0, 3.0])
-"""Half-width of the random states (m, rad, m/s, rad/s): pitch up to 34 degrees, far beyond any road."""
+"""Half-widths of the random states (m, rad, m/s, rad/s), uniform about 0: pitch up to 34 degrees, more than on any
+road."""
 
 
-def engine(name: str) -> Make:
-    """Return a function that builds an assembly in the engine of this name, without any planted fault."""
+def engine(name: str) -> ModelBuilder:
+    """Returns a function (assembly, settings) -> model that builds in the named engine, without a planted fault."""
     return partial(build, name)
 
 
 def random_states(state_count: int = 100) -> np.ndarray:
-    """The random states (state_count, 8) at which accelerations are compared; the same at every call."""
+    """Random states (state_count, 8) at which accelerations are compared; the same at every call."""
     return np.random.default_rng(SEED).uniform(-1, 1, (state_count, 8)) * STATE_HALF_WIDTHS
 
 
-def accelerations(make_engine: Make, assembly: Assembly, settings: Settings, states: np.ndarray) -> np.ndarray:
-    """Accelerations (n, 4) at states (n, 8), at times spread over the run's steps."""
+def accelerations(make_engine: ModelBuilder, assembly: Assembly, settings: Settings, states: np.ndarray) -> np.ndarray:
+    """Accelerations (n, 4) of a model at states (n, 8) and at times spread over the run's steps."""
     model = make_engine(assembly, settings)
     steps = np.rint(np.linspace(0.05, 0.95, len(states)) * settings.steps)
     return np.array(
@@ -45,65 +46,73 @@ def accelerations(make_engine: Make, assembly: Assembly, settings: Settings, sta
     )
 
 
-def acceleration_gap(make_engine: Make, assembly: Assembly, settings: Settings, state_count: int = 100) -> float:
-    """Largest difference from the accelerations of the paper's equations, relative to the largest acceleration."""
+def acceleration_gap(
+    make_engine: ModelBuilder, assembly: Assembly, settings: Settings, state_count: int = 100
+) -> float:
+    """Largest difference between a model's accelerations and those of the paper's equations at random states, divided
+    by the largest acceleration."""
     states = random_states(state_count)
-    hand = accelerations(engine("reference"), assembly, by_hand(settings), states)
+    hand = accelerations(engine("reference"), assembly, reference_settings(settings), states)
     return relative_difference(accelerations(make_engine, assembly, settings, states), hand)
 
 
-def relative_difference(computed_values: np.ndarray, hand: np.ndarray) -> float:
-    """Largest difference divided by the largest expected magnitude."""
-    return float(np.abs(computed_values - hand).max() / np.abs(hand).max())
+def relative_difference(computed_values: np.ndarray, expected: np.ndarray) -> float:
+    """Largest difference between computed and expected values, divided by the largest expected magnitude."""
+    return float(np.abs(computed_values - expected).max() / np.abs(expected).max())
 
 
-def run(make_engine: Make, assembly: Assembly, settings: Settings) -> Trajectory | None:
-    """The trajectory, None where the run was refused or failed."""
+def run(make_engine: ModelBuilder, assembly: Assembly, settings: Settings) -> Trajectory | None:
+    """Trajectory of a model's run; None where the run was refused or failed."""
     try:
         return make_engine(assembly, settings).run()
     except (InputError, RunFailed):
         return None
 
 
-def trajectory_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
-    """Largest difference of any state (m, rad, m/s, rad/s) to the reference with the same tableau and step.
+def trajectory_gap(make_engine: ModelBuilder, assembly: Assembly, settings: Settings) -> float:
+    """Largest difference of any state (m, rad, m/s, rad/s) from the reference's run with the same step.
 
     The reference integrates with RK4, so this is a check to rounding for engines that do the same.
     """
-    hand = engine("reference")(assembly, by_hand(settings)).run()
+    hand = engine("reference")(assembly, reference_settings(settings)).run()
     return state_gap(run(make_engine, assembly, settings), hand)
 
 
-def state_gap(path: Trajectory | None, other_trajectory: Trajectory) -> float:
-    """Largest difference of any state at common times; ``other_trajectory`` may have a time step smaller by an integer
-    factor."""
+def state_gap(path: Trajectory | None, fine_path: Trajectory) -> float:
+    """Largest difference of any state (m, rad, m/s, rad/s) between two trajectories at common times; the step of
+    ``fine_path`` may be smaller by an integer factor."""
     if path is None:
         return float("inf")
-    stride = (len(other_trajectory.times) - 1) // (len(path.times) - 1)
-    return float(np.abs(path.states - other_trajectory.states[::stride]).max())
+    stride = (len(fine_path.times) - 1) // (len(path.times) - 1)
+    return float(np.abs(path.states - fine_path.states[::stride]).max())
 
 
-def order_gap(make_engine: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
+def order_gap(make_engine: ModelBuilder, assembly: Assembly, settings: Settings, reference_path: Trajectory) -> float:
     """Difference between observed and declared order of convergence, from runs at the settings' step and at half of it.
 
-    ``truth`` is a path of the reference over the same time at a step finer by a whole factor.
+    reference_path : path of the reference over the same time, with a step smaller by an integer factor.
     """
     name = settings.integrator
     declared = next(entries[name].order for entries in CATALOGUE.values() if name in entries)
-    return abs(observed_order(make_engine, assembly, settings, truth) - declared)
+    return abs(observed_order(make_engine, assembly, settings, reference_path) - declared)
 
 
-def observed_order(make_engine: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
-    """log2 of the ratio of the largest state errors at the settings' step and its half."""
+def observed_order(
+    make_engine: ModelBuilder, assembly: Assembly, settings: Settings, reference_path: Trajectory
+) -> float:
+    """Observed order of convergence: log2 of the largest state error at the settings' step divided by the error at half
+    of it."""
     halved = replace(settings, step=settings.step / 2)
-    coarse, fine = (state_gap(run(make_engine, assembly, run_settings), truth) for run_settings in (settings, halved))
+    coarse, fine = (
+        state_gap(run(make_engine, assembly, run_settings), reference_path) for run_settings in (settings, halved)
+    )
     return float(np.log2(coarse / fine)) if np.isfinite([coarse, fine]).all() and fine > 0 else float("-inf")
 
 
-def equilibrium_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
-    """Largest distance that any state moves away from the static equilibrium (closed form) on a flat road.
+def equilibrium_gap(make_engine: ModelBuilder, assembly: Assembly, settings: Settings) -> float:
+    """Largest difference of any state from the static equilibrium (closed form) during a run on a flat road.
 
-    ``assembly`` is the vehicle on its tyres with nothing that drives it.
+    assembly : the vehicle on its tyres without excitation.
     """
     trajectory = run(make_engine, assembly, settings)
     if trajectory is None:
@@ -112,12 +121,12 @@ def equilibrium_gap(make_engine: Make, assembly: Assembly, settings: Settings) -
     return float(np.abs(trajectory.states - rest_state).max())
 
 
-def momentum_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
-    """Error of the vertical momentum balance, relative to weight times time: change of momentum compared with the
-    integral of weight minus wheel forces.
+def momentum_gap(make_engine: ModelBuilder, assembly: Assembly, settings: Settings) -> float:
+    """Error of the vertical momentum balance divided by weight times duration: change of momentum against the integral
+    of weight minus wheel forces.
 
-    An invariant of any vehicle under prescribed wheel forces, whatever its suspension does; exact under
-    RK4 for forces that are constant or linear over each step. Needs no second implementation.
+    The balance holds for any vehicle under prescribed wheel forces, whatever its suspension; with RK4 it is exact for
+    forces that are constant or linear over each step. It needs no second implementation.
     """
     trajectory = run(make_engine, assembly, settings)
     if trajectory is None:
@@ -131,7 +140,7 @@ def momentum_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> f
 
 
 def _force_impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
-    """Integral of both wheel forces from 0 to each step's end, shape (n + 1,), N s."""
+    """Time integral (n + 1,) in N s of the sum of both wheel forces from 0 to the end of each of n steps."""
     signal, h, n = assembly.input, settings.step, settings.steps
     assert signal is not None
     force = signal.sample(0.0, h, n + 1)[:, :2].sum(axis=1)
@@ -139,18 +148,20 @@ def _force_impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
     return np.concatenate(([0.0], np.cumsum(h * mean_force)))
 
 
-def enforced_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
-    """Rms difference of the enforced moment (or force, if worse) to the eliminated form, relative to its rms."""
+def enforced_gap(make_engine: ModelBuilder, assembly: Assembly, settings: Settings) -> float:
+    """Rms difference of the enforced moment (or force, whichever is worse) from the reference's, which eliminates the
+    prescribed coordinate, divided by the reference's rms."""
     path = run(make_engine, assembly, settings)
     if path is None or path.enforced is None:
         return float("inf")
-    hand = engine("reference")(assembly, by_hand(settings)).run().enforced
+    hand = engine("reference")(assembly, reference_settings(settings)).run().enforced
     assert hand is not None
     return float(np.sqrt(np.mean((path.enforced - hand) ** 2, axis=0) / np.mean(hand**2, axis=0)).max())
 
 
-def by_hand(settings: Settings) -> Settings:
-    """Settings for the reference's classical Runge-Kutta method with the step and duration of the given ones."""
+def reference_settings(settings: Settings) -> Settings:
+    """The settings with the reference's integrator, the classical Runge-Kutta method; step and duration are
+    unchanged."""
     return replace(settings, integrator=RECOMMENDED["reference"])
 
 

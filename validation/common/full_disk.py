@@ -1,7 +1,7 @@
-"""Files of a run on a full disk, tried at moments from before the first byte to after the last one.
+"""Check that a full disk leaves no damaged files, at moments from before the first byte to after the last byte.
 
-A limit on the size of the files of this process stands for the disk: the system answers a write beyond it as it
-answers one on a full disk.
+A limit on the size of this process' files simulates the disk: the system reports the same kind of error for a write
+beyond the limit as on a full disk.
 """
 
 import resource
@@ -18,6 +18,7 @@ from models.systems.pitch_plane.run import run as simulate
 from validation.common.scenes import road_scene
 
 MOMENTS_TRIED = 20
+"""Number of file sizes at which the disk is full."""
 
 
 @contextmanager
@@ -32,7 +33,7 @@ def files_of_at_most(byte_limit: int) -> Iterator[None]:
 
 
 def damaged_moments(folder: Path) -> int:
-    """Number of moments of a full disk at which a broken file remained, or no system error was reported."""
+    """Number of moments at which a full disk left a damaged file or caused no error."""
     result = simulate(road_scene(duration=0.05), "reference")
     (folder / "whole").mkdir()
     _save_until_full(result, folder / "whole")
@@ -42,7 +43,7 @@ def damaged_moments(folder: Path) -> int:
 
 
 def file_sizes(folder: Path) -> dict[str, int]:
-    """Bytes of every file in a folder, by name."""
+    """File name -> size in bytes, for all files of a folder."""
     return {path.name: path.stat().st_size for path in folder.iterdir()}
 
 

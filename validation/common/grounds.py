@@ -1,9 +1,9 @@
-"""Broken assumptions that rows rest on: those of the runs that were made before a row.
+"""Broken assumptions of the runs that a report row rests on.
 
-While a case is measured, every result that is judged is noted. A row rests on the results that were judged between the
-rows before it and itself, and so do those that follow it until another result is judged, or until the part of the case
-ends that made both run and row. A row that rests on a broken assumption fails, unless the runs were made within
-``allowing_breaches``. Runs in other processes are not seen.
+While a case is measured, the assumptions of every result are recorded. A row rests on the results that were made
+between the previous rows and itself. So do the rows that follow, until another result is made or until the statement of
+the case ends that made both run and row. A row that rests on a broken assumption fails, unless the runs were made
+within ``allowing_breaches``. Runs in other processes are not recorded.
 """
 
 import sys
@@ -17,12 +17,13 @@ from models.core.assumptions import BrokenAssumption, broken_of, watching
 from models.core.result import Result
 
 ANY_ASSUMPTION = ""
-"""Stands for the name of every assumption."""
+"""Name that stands for every assumption."""
 
 
 @dataclass(frozen=True)
 class Breach:
-    """An assumption that a run broke. ``permission``: reason why this is allowed, "" if it is not."""
+    """An assumption that a run broke. run: title and engine; permission: reason why this is allowed, "" if it is
+    not."""
 
     run: str
     assumption: BrokenAssumption
@@ -31,31 +32,31 @@ class Breach:
 
 @dataclass
 class Grounds:
-    """Broken assumptions of the runs since the last rows were made, and whether rows rest on them already."""
+    """Assumptions broken by the runs since the last rows were made, and whether rows rest on these runs already."""
 
     breaches: list[Breach] = field(default_factory=list)
     rows_rest_on_them: bool = False
-    part: int = 0
+    part_index: int = 0
     is_closed: bool = False
 
-    def note(self, run: Result) -> None:
-        """Record the broken assumptions of a result."""
+    def record(self, run: Result) -> None:
+        """Record the assumptions that a result's run broke."""
         if self.rows_rest_on_them:
             self.breaches, self.rows_rest_on_them, self.is_closed = [], False, False
-        self.part = _instruction_index()
+        self.part_index = _instruction_index()
         name, reasons = f"{run.data.attrs['title']}, {run.data.attrs['engine']}".strip(", "), _ALLOWED_ASSUMPTIONS.get()
         for broken in broken_of(run):
             self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY_ASSUMPTION, "")))
 
-    def rest(self, is_allowed: bool) -> str:
-        """Text on the broken assumptions on which the current row rests: the allowed ones, or those that are not."""
-        same_part = self.part == _instruction_index()
+    def breaches_of_row(self, is_allowed: bool) -> str:
+        """Text on the broken assumptions that the row being made rests on: the allowed ones, or the forbidden ones."""
+        same_part = self.part_index == _instruction_index()
         self.rows_rest_on_them, self.is_closed = True, self.is_closed or same_part
-        return "" if self.is_closed and not same_part else self.told(is_allowed)
+        return "" if self.is_closed and not same_part else self.breach_text(is_allowed)
 
-    def told(self, is_allowed: bool) -> str:
-        """Text on each broken assumption (allowed or not): number of runs, longest share of time, and why it is
-        allowed."""
+    def breach_text(self, is_allowed: bool) -> str:
+        """Text on each recorded broken assumption, the allowed or the forbidden ones: number of runs, largest share of
+        time, and why it is allowed."""
         by_name: dict[str, list[Breach]] = {}
         for breach in self.breaches:
             if bool(breach.permission) == is_allowed:
@@ -73,24 +74,24 @@ _CURRENT_GROUNDS: ContextVar[Grounds | None] = ContextVar("grounds", default=Non
 _ALLOWED_ASSUMPTIONS: ContextVar[dict[str, str]] = ContextVar("allowed", default={})  # noqa: B039  never changed in place
 
 
-Answer = TypeVar("Answer")
+CaseResult = TypeVar("CaseResult")
 
 
-def measured_rows(measure: Callable[[], Answer]) -> tuple[Answer, str]:
-    """Rows of a case with the broken assumptions of its runs, and the assumptions that were broken without permission
-    after its last row."""
+def measured_rows(measure: Callable[[], CaseResult]) -> tuple[CaseResult, str]:
+    """Measure a case: returns its rows with the broken assumptions of its runs, and text on the assumptions that were
+    broken without permission after its last row."""
     grounds = Grounds()
     token = _CURRENT_GROUNDS.set(grounds)
     try:
-        with watching(grounds.note):
+        with watching(grounds.record):
             answer = measure()
     finally:
         _CURRENT_GROUNDS.reset(token)
-    return answer, "" if grounds.rows_rest_on_them else grounds.told(is_allowed=False)
+    return answer, "" if grounds.rows_rest_on_them else grounds.breach_text(is_allowed=False)
 
 
 def _instruction_index() -> int:
-    """Index of the bytecode instruction that ``measure`` is executing, also if ``measure`` is decorated."""
+    """Index of the bytecode instruction that the case's function ``measure`` is executing, also if it is decorated."""
     frame, outer = sys._getframe(), sys._getframe()
     while frame.f_back is not None and frame.f_code is not measured_rows.__code__:
         outer = outer if frame.f_globals["__name__"] == "contextlib" else frame
@@ -100,7 +101,8 @@ def _instruction_index() -> int:
 
 @contextmanager
 def allowing_breaches(tolerance_reason: str, *names: str) -> Iterator[None]:
-    """Context in which runs may break the named assumptions, or any if none is named; it can decorate a function."""
+    """Context or decorator in which runs may break the named assumptions, or any assumption if none is named.
+    tolerance_reason: why this is allowed."""
     token = _ALLOWED_ASSUMPTIONS.set(
         _ALLOWED_ASSUMPTIONS.get() | dict.fromkeys(names or (ANY_ASSUMPTION,), tolerance_reason)
     )
@@ -111,12 +113,12 @@ def allowing_breaches(tolerance_reason: str, *names: str) -> Iterator[None]:
 
 
 def forbidden_breaches() -> str:
-    """Broken assumptions that are not allowed and on which the current row rests."""
+    """Text on the assumptions broken without permission by the runs that the row being made rests on."""
     grounds = _CURRENT_GROUNDS.get()
-    return "" if grounds is None else grounds.rest(is_allowed=False)
+    return "" if grounds is None else grounds.breaches_of_row(is_allowed=False)
 
 
 def allowed_breaches() -> str:
-    """Allowed broken assumptions on which the current row rests."""
+    """Text on the assumptions broken with permission by the runs that the row being made rests on."""
     grounds = _CURRENT_GROUNDS.get()
-    return "" if grounds is None else grounds.rest(is_allowed=True)
+    return "" if grounds is None else grounds.breaches_of_row(is_allowed=True)

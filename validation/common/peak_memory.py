@@ -1,4 +1,4 @@
-"""Largest memory of this process alone."""
+"""Peak memory of this process, without its parent's."""
 
 import resource
 from pathlib import Path
@@ -7,10 +7,10 @@ PROCESS_STATUS = Path("/proc/self/status")
 
 
 def peak_memory() -> int:
-    """Largest memory that this process has had since its program began (bytes).
+    """Peak memory (bytes) of this process since its program began.
 
-    Linux writes it into ``VmHWM``. ``getrusage`` counts the parent's memory at the moment of the start as well: in a
-    process that a large one starts it would tell the size of the large one. It serves where there is no such file.
+    Linux reports it as ``VmHWM``. ``getrusage``, which serves where there is no such file, also counts the parent's
+    memory at the start: in a child of a large process it would return the size of the parent.
     """
     if not PROCESS_STATUS.exists():
         return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

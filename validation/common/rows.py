@@ -1,4 +1,4 @@
-"""Rows of the validation report: one quantity each, with what was expected and why."""
+"""Rows of the validation report: a measured quantity with its expected value, its tolerance and the reason for it."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
@@ -19,21 +19,23 @@ System = Literal[
     "effects",
 ]
 Independence = Literal["native", "handed over", "shared kernel", "closed form", "published", "measured", "none"]
-"""How far the two sides are apart: separate force laws, an engine that is handed matrices, the same force code, an
-exact answer, a published figure, what was measured on a real vehicle, or no second side."""
+"""How independent the two sides of a comparison are. "native": separate force laws; "handed over": an engine that is
+given matrices; "shared kernel": the same force code; "closed form": an exact solution; "published": a published figure;
+"measured": measured on a real vehicle; "none": no second side."""
 Status = Literal["failed", "missed", "not run", "reported", "passed"]
-"""In the order in which they are told. ``failed`` and ``passed`` are judged, the same on any machine; ``missed`` is
-a stated aim that was not reached, as by seconds of a slow machine; ``reported`` stands without being judged."""
+"""Verdict of a row, worst first. ``failed`` and ``passed`` are the same on any machine; ``missed`` is a stated aim that
+was not reached, such as seconds on a slow machine; ``reported`` is a figure without a verdict."""
 STATUSES: tuple[Status, ...] = get_args(Status)
 Side = Literal["at most", "at least"]
-"""On which side of its bound an aim is reached."""
+"""Side of its bound on which an aim is reached."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One measured quantity. ``value`` and ``expected`` may be text where a behaviour is judged.
+    """A measured quantity with its expected value and verdict. ``value`` and ``expected`` are text where a behaviour is
+    judged.
 
-    broken, allowed : assumptions that the runs it rests on broke, without and with leave: see ``grounds``.
+    broken, allowed : assumptions that the row's runs broke, without and with permission: see ``grounds``.
     """
 
     id: str
@@ -51,23 +53,24 @@ class Row:
     allowed: str = field(default_factory=grounds.allowed_breaches)
 
     def with_grounds(self) -> "Row":
-        """The row; its status is "failed" if it rests on an assumption that was broken without permission."""
+        """Returns the row with the status "failed" if its runs broke an assumption without permission, else
+        unchanged."""
         if not self.broken or self.status == "not run":
             return self
         reason = f"{self.reason}; rests on a broken assumption: {self.broken}".removeprefix("; ")
         return replace(self, status="failed", reason=reason)
 
     def as_dict(self) -> dict[str, Any]:
-        """The row in the form for ``results.json``."""
+        """The row as a dictionary for ``results.json``."""
         return asdict(self)
 
 
 Saved = dict[str, Any]
-"""What a case saves beside its rows, as JSON keeps it."""
+"""Data that a case saves beside its rows, in the form of JSON."""
 CaseAnswer = tuple[list[Row], Saved]
-"""What a case answers when it is measured."""
+"""Rows of a measured case, and the data that it saves for figures and tables."""
 Drawn = list[tuple[str, Any]]
-"""Captions and figures that a case shows."""
+"""Captions and figures of a case."""
 
 
 @dataclass(frozen=True)
@@ -82,11 +85,11 @@ class Table:
 
 @dataclass(frozen=True)
 class Observed:
-    """A measured value before it is judged; each method makes a row with one kind of verdict.
+    """A measured value before it is judged; each method makes a report row with a kind of verdict.
 
-    id : name of the row, which begins with the name of its case.
-    system, quantity : system that the figure belongs to, and in words what was measured.
-    value, unit : the figure, and its unit as text; "" for a pure number.
+    id : identifier of the row, which begins with the name of its case.
+    system, quantity : system that the value belongs to, and a description of what was measured.
+    value, unit : the value, and its unit as text; "" for a pure number.
     """
 
     id: str
@@ -102,20 +105,21 @@ class Observed:
         return self._row(expected, tolerance, tolerance_reason, independence, "passed" if passed else "failed", reason)
 
     def at_most(self, bound: float, tolerance_reason: str, independence: Independence) -> Row:
-        """Row for an error or a ratio that must not exceed a bound: expected 0, tolerance the bound."""
+        """Row for an error or a ratio that must not exceed a bound; its expected value is 0, its tolerance the
+        bound."""
         return self.within(0.0, bound, tolerance_reason, independence)
 
     def beside(self, expected: float | str, tolerance_reason: str, independence: Independence = "published") -> Row:
-        """Row that reports a value next to a published value without a verdict."""
+        """Row that reports a value next to an expected (mostly published) value, without a verdict."""
         return self._row(expected, None, tolerance_reason, independence, "reported")
 
     def aim(
         self, bound: float, tolerance_reason: str, side: Side = "at most", independence: Independence = "none"
     ) -> Row:
-        """Row of a stated aim that decides no verdict: reported where it is reached, missed otherwise or for no number.
+        """Row of a stated aim, which does not pass or fail: "reported" where the aim is reached, else "missed".
 
-        So are figures that the machine decides, as seconds, their ratios and memory, and aims that the method is known
-        not to reach: ``tolerance_reason`` says for which of the two reasons.
+        It serves for figures that depend on the machine, such as seconds, their ratios and memory, and for aims that
+        the method is known not to reach; ``tolerance_reason`` says which.
         """
         reached = self.value <= bound if side == "at most" else self.value >= bound
         wanted = f"{side} {bound:,.4g}"
@@ -146,7 +150,7 @@ def behaviour_row(
     tolerance_reason: str,
     independence: Independence = "none",
 ) -> Row:
-    """Row for a behaviour, such as "refused": passes if found and expected are the same word."""
+    """Row for a behaviour in words, such as "refused"; it passes if ``outcome`` equals ``expected``."""
     passed = outcome == expected
     reason = "" if passed else f"found {outcome!r}"
     return Row(
@@ -165,19 +169,20 @@ def behaviour_row(
 
 
 def not_run(id: str, system: System, quantity: str, reason: str) -> Row:
-    """Row for something that could not be measured here, with the reason."""
+    """Row for a quantity that could not be measured here, with the reason."""
     return Row(id, system, quantity, None, "", "", None, "", "none", "not run", reason, "", "")
 
 
 def failed_row(id: str, quantity: str, reason: str) -> Row:
-    """Row for a case that gave no value, or whose value rests on a broken assumption."""
+    """Failed row for a case that gave no value, or whose value rests on a broken assumption."""
     return Row(id, "pitch-plane", quantity, None, "", "", None, "", "none", "failed", reason)
 
 
 def rows_on_grounds(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
-    """Rows of a case, failed if they rest on an assumption that was broken without permission.
+    """Measure a case: returns its rows, "failed" where they rest on an assumption broken without permission, and its
+    saved data.
 
-    What runs after the last row broke has a row of its own.
+    Assumptions that runs after the last row broke have a separate row.
     """
     (rows, data), remaining_breaches = grounds.measured_rows(measure)
     rows = [row.with_grounds() for row in rows]
@@ -186,8 +191,9 @@ def rows_on_grounds(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
     return rows, data
 
 
-def of_saved(row: dict[str, Any]) -> dict[str, Any]:
-    """Row from saved results; older reports used "passed" for rows without verdict, and had no assumptions."""
+def row_of_saved(row: dict[str, Any]) -> dict[str, Any]:
+    """Row read from saved results, brought to the present form: older reports used "passed" for rows without verdict,
+    and had no assumptions."""
     unjudged = row["status"] == "passed" and row["reason"] == "reported, not judged"
     row = {"broken": "", "allowed": "", **row}
     return row | {"status": "reported", "reason": ""} if unjudged else row

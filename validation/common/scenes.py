@@ -1,4 +1,4 @@
-"""Scenes that the cases share, and the measured road where there is one."""
+"""Pitch-plane scenes that the validation cases share, and the folder of measured data."""
 
 import os
 from contextlib import ContextDecorator
@@ -16,12 +16,12 @@ from validation.common.grounds import allowing_breaches
 VEHICLE_SETS = ("itwm_drift", "asymmetric_twin")
 STUDY_ROAD = {"source": "study", "speed": 20.0}
 COURSE_FILE = "detrended_rms_course_2in.crg"
-"""The 504 m measured course; it is not part of the repository."""
+"""File of a measured road of 504 m, which is not part of the repository."""
 
 
 def on_paper_road() -> ContextDecorator:
-    """Context in which runs of the paper's vehicle, on its road or under its wheel forces, may break certain
-    assumptions."""
+    """Context in which runs of the paper's vehicle may break assumptions on its tyres and springs, on the paper's road
+    or under its wheel forces."""
     why = "the paper's linear tyres pull or lie on their rims at times on its road, on both sides of a comparison alike"
     return allowing_breaches(why, "tyres press", "springs compressed", "tyres not flat")
 
@@ -33,7 +33,7 @@ def road_scene(
     road: dict[str, Any] | None = None,
     folder: Path = Path(),
 ) -> Scene:
-    """Scene of the vehicle on a road; the study road by default."""
+    """Pitch-plane scene of the vehicle on a road, by default the road of the paper's study; step and duration in s."""
     return build(
         {
             "title": "validation",
@@ -71,7 +71,8 @@ def force_scene(
     override: dict[str, float] | None = None,
     effects: dict[str, Any] | None = None,
 ) -> Scene:
-    """Scene of the vehicle driven by the wheel forces that ``virtual_drive`` wrote to the folder."""
+    """Pitch-plane scene of the vehicle under the wheel forces that ``virtual_drive`` wrote to the folder; step and
+    duration in s."""
     forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": interpolation}}
     return build(
         {
@@ -86,11 +87,12 @@ def force_scene(
 
 
 def data_folder() -> Path | None:
-    """Folder of measured files, named by TWINRIG_DATA; None where it is not set or not there."""
+    """Folder of measured files, named by the environment variable TWINRIG_DATA; None where it is not set or
+    missing."""
     named = os.environ.get("TWINRIG_DATA")
     return Path(named) if named and Path(named).is_dir() else None
 
 
-def largest_difference(first: Result, other_result: Result) -> float:
+def largest_difference(result: Result, other_result: Result) -> float:
     """Largest difference of any state (m, rad, m/s, rad/s) of two runs on the same times."""
-    return float(np.abs(first.states - other_result.states).max())
+    return float(np.abs(result.states - other_result.states).max())

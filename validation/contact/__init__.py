@@ -1,1 +1,1 @@
-"""Sets of contacts, exact answers and bounds that cases and tests of rolling contact share."""
+"""Sets of contacts, exact solutions and bounds that the validation cases and tests of rolling contact share."""

@@ -1,8 +1,8 @@
-"""Bands of error of the simplified theories, from their forces and moments on ``contact_set``.
+"""Error bands of the simplified contact theories, from their forces and moments on ``contact_set``.
 
-Those contacts are the set and one of the two parts of the drawn and of the wide ones; the other part judges. A band
-holds for every group of contacts by itself: each Poisson's ratio, spin with and against the lateral creepage, ellipses
-longer along the rolling direction and across it.
+The bands are fitted to the regular contacts and to a part of the random and wide ones; the other part judges them. A
+band holds for every group of contacts separately: each Poisson's ratio, spin with and against the lateral creepage,
+ellipses longer along the rolling direction and across it.
 
 ``python -m validation.contact.contact_bands`` prints what ``models/contact/error_bands.csv`` keeps.
 """
@@ -21,12 +21,12 @@ from models.systems.contact.work_precision import ContactCase
 from validation.contact.contact_set import FITTED_PART, FRICTION, LOAD, read_contacts, read_drawn, read_wide
 
 CELLS_PER_STRIP = 101
-"""In each strip of FASTSIM_BANDS: its own error is then below 0.05 % of mu N."""
-HELD_SHARE, KNOWN_SHARE, FEWEST_OF_GROUP = 0.95, 0.96, 12
-"""Part of unseen contacts that a band is to hold; of the known ones of each group between the neighbours of each knot;
-contacts that tell no quantile."""
-ROUNDING = 1e-9
-"""Of a moment that is zero by symmetry."""
+"""Cells per strip of FASTSIM where its bands are fitted; the error of the cells is then below 0.05 % of mu N."""
+BAND_SHARE, FITTED_QUANTILE, FEWEST_CONTACTS = 0.95, 0.96, 12
+"""Share of unseen contacts whose error must lie within a band; quantile of the fitted contacts' errors that is the
+band; smallest number of contacts in a group of which a quantile is taken."""
+MOMENT_ROUNDING = 1e-9
+"""Rounding error of a scaled moment that is zero by symmetry."""
 FASTSIM_BANDS = [
     f"{kind} {bound}" for kind in ("blended", "one", "three") for bound in ("intermediate", "parabolic", "elliptic")
 ]
@@ -34,44 +34,44 @@ FASTSIM_BANDS = [
 
 @dataclass(frozen=True)
 class TheoryErrors:
-    """Forces and errors of a theory relative to the exact one: force (n, 2) divided by mu N, moment (n,) divided by mu
-    N times the lever arm.
+    """Forces of a contact theory and their errors against the exact theory: force (n, 2) divided by mu N, moment (n,)
+    divided by mu N times the longer semi-axis.
 
-    error, moment_error : (n,) of both, in the same units. spinning : (n,) share of spin. group : (n,) numbers by
-    ``groups_of_contacts``.
+    error, moment_error (n,) : of force and moment, in the same units; spin_share (n,) : share of spin in the creepage;
+    group (n,) : numbers by ``groups_of_contacts``.
     """
 
     force: Array
     moment: Array
     error: Array
     moment_error: Array
-    spinning: Array
+    spin_share: Array
     group: Array
 
     @property
     def used_friction(self) -> Array:
-        """Magnitude (n,) of the force divided by mu N."""
+        """Magnitude (n,) of the creep force divided by mu N."""
         return np.linalg.norm(self.force, axis=1)
 
     @property
     def used_with_moment(self) -> Array:
-        """Magnitude (n,) of force and moment together."""
+        """Magnitude (n,) of the scaled creep force and moment together."""
         return used_with_moment(self.used_friction, self.moment)
 
-    def of(self, mask: Array) -> "TheoryErrors":
-        """The contacts that a mask (n,) selects."""
+    def selected(self, mask: Array) -> "TheoryErrors":
+        """Forces and errors of the contacts that a mask (n,) selects."""
         return TheoryErrors(*(getattr(self, part.name)[mask] for part in fields(self)))
 
 
-def forces(name: str, cases: list[ContactCase], cells: int) -> Array:
-    """Forces (n, 3) of a theory, FASTSIM_BANDS or "simplified": force divided by mu N, and moment divided by mu N and
-    the longer semi-axis."""
+def theory_forces(name: str, cases: list[ContactCase], cells: int) -> Array:
+    """Creep forces (n, 3) of a theory named as in FASTSIM_BANDS or "simplified": fx, fy divided by mu N, and moment
+    divided by mu N times the longer semi-axis."""
     axes, motions = _arrays_of_contacts(cases)
     unit = FRICTION * LOAD * np.array([np.ones(len(cases)), np.ones(len(cases)), axes.max(axis=0)]).T
     if name == "simplified":
         pressed = [interpenetrating(by_axes(c.a, c.b, c.pair, load=LOAD), c.pair) for c in cases]
-        forces = [Simplified(p, FRICTION).roll(c.motion, cells) for p, c in zip(pressed, cases, strict=True)]
-        return np.array([(force.fx, force.fy, force.mz) for force in forces]) / unit
+        theory_forces = [Simplified(p, FRICTION).roll(c.motion, cells) for p, c in zip(pressed, cases, strict=True)]
+        return np.array([(force.fx, force.fy, force.mz) for force in theory_forces]) / unit
     kind, bound = name.split()
     moved, nus = np.empty((len(cases), 3)), np.array([case.pair.nu for case in cases])
     for nu in np.unique(nus):
@@ -84,20 +84,20 @@ def forces(name: str, cases: list[ContactCase], cells: int) -> Array:
 
 
 def _arrays_of_contacts(cases: list[ContactCase]) -> tuple[Array, Array]:
-    """Semi-axes (2, n) and motions (3, n)."""
+    """Semi-axes a, b (2, n) and creepages xi_x, xi_y, spin (3, n) of contacts."""
     return np.array([(c.a, c.b) for c in cases]).T, np.array([c.motion for c in cases]).T
 
 
 def groups_of_contacts(cases: list[ContactCase]) -> Array:
-    """Group number (n,) of each contact. Groups, in which theories have different errors, differ in Poisson's ratio, in
-    spin with or against the lateral creepage, and in ellipses longer along or across the rolling direction."""
+    """Group number (n,) of each contact. Groups, which have different errors, differ in Poisson's ratio, in spin with
+    or against the lateral creepage, and in ellipses longer along or across the rolling direction."""
     kinds = [(c.pair.nu, c.parts[1] * c.parts[2] < 0, c.a < c.b) for c in cases]
     return np.unique(np.array(kinds, dtype=float), axis=0, return_inverse=True)[1].ravel()
 
 
 def theory_errors(name: str, cases: list[ContactCase], cells: int = CELLS_PER_STRIP) -> TheoryErrors:
-    """A theory's forces, moments and errors."""
-    answers, nu = forces(name, cases, cells), np.array([c.pair.nu for c in cases])
+    """Forces, moments and errors of a contact theory on a list of contacts with exact forces."""
+    answers, nu = theory_forces(name, cases, cells), np.array([c.pair.nu for c in cases])
     axes, motions = _arrays_of_contacts(cases)
     exact = np.array([(*c.force, c.mz * np.sqrt(c.a * c.b) / max(c.a, c.b)) for c in cases])
     off, share = answers - exact, spin_share(axes[0], axes[1], motions, nu)
@@ -111,35 +111,35 @@ def theory_errors(name: str, cases: list[ContactCase], cells: int = CELLS_PER_ST
     )
 
 
-def kept_shares(name: str, constant: TheoryErrors) -> tuple[float, float]:
-    """Shares of contacts whose errors of force and of moment are within those that ``models.contact.accuracy``
+def shares_within_bands(name: str, theory: TheoryErrors) -> tuple[float, float]:
+    """Shares of contacts whose errors of force and of moment lie within the bands that ``models.contact.accuracy``
     states."""
-    moment = moment_band(name, constant.used_with_moment, constant.spinning)
+    moment = moment_band(name, theory.used_with_moment, theory.spin_share)
     return (
-        float(np.mean(constant.error <= band(name, constant.used_friction, constant.spinning))),
-        float(np.mean(constant.moment_error <= moment + ROUNDING)),
+        float(np.mean(theory.error <= band(name, theory.used_friction, theory.spin_share))),
+        float(np.mean(theory.moment_error <= moment + MOMENT_ROUNDING)),
     )
 
 
-def measured_bands(error: Array, used: Array, theory: TheoryErrors) -> tuple[list[float], ...]:
-    """Quantiles of the error at each knot, of the group of contacts with the largest; one list without spin and one
-    with spin."""
+def measured_bands(error: Array, used_friction: Array, theory: TheoryErrors) -> tuple[list[float], ...]:
+    """Bands of a theory's error: its quantile at each knot of used friction, largest over the groups of contacts; a
+    list without spin and a list with spin."""
     ends = (0.0, *KNOTS, 1.1)
-    within = [(used >= low) & (used <= high) for low, high in zip(ends, ends[2:], strict=False)]
-    kinds = theory.spinning < 0.5, theory.spinning >= 0.5
+    within = [(used_friction >= low) & (used_friction <= high) for low, high in zip(ends, ends[2:], strict=False)]
+    kinds = theory.spin_share < 0.5, theory.spin_share >= 0.5
     return tuple([_largest_quantile(error, rows & some, theory.group) for some in within] for rows in kinds)
 
 
 def _largest_quantile(error: Array, rows: Array, group: Array) -> float:
-    """Largest quantile over the groups with enough contacts, or the quantile over all contacts if no group has
+    """Largest error quantile over the groups with enough contacts, or the quantile over all contacts if no group has
     enough."""
     parts = [error[rows & (group == value)] for value in np.unique(group)]
-    told = [part for part in parts if part.size >= FEWEST_OF_GROUP] or [error[rows]]
-    return max(float(np.quantile(part, KNOWN_SHARE)) for part in told)
+    told = [part for part in parts if part.size >= FEWEST_CONTACTS] or [error[rows]]
+    return max(float(np.quantile(part, FITTED_QUANTILE)) for part in told)
 
 
 def main() -> None:
-    """Print the rows of ``error_bands.csv``."""
+    """Fit the bands of all theories and print the rows of ``error_bands.csv``."""
     known = read_contacts() + read_drawn(FITTED_PART) + read_wide(FITTED_PART)
     theories = {name: theory_errors(name, known) for name in (*FASTSIM_BANDS, "simplified")}
     for quantity, error, used in (("force", "error", "used_friction"), ("moment", "moment_error", "used_with_moment")):

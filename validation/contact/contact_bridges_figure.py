@@ -1,4 +1,4 @@
-"""Figure of the cost of a contact kernel inside an engine."""
+"""Figure of the computing time of a contact kernel inside an engine's step."""
 
 from typing import Any
 
@@ -26,12 +26,12 @@ LINE_STYLES = {1: ":", WHEELS: "-", 8: "--"}
 
 
 def figure(points: list[dict[str, Any]]) -> Figure:
-    """Figure of the cost per step for each contact law, and of the shares of engine, kernel and bridge by law and by
-    number of wheels."""
+    """Figure of the computing time per step for each contact law, and of the shares of engine, kernel and bridge
+    between them, by law and by number of wheels."""
     drawing, places = subplot_mosaic([["laws", "laws"], ["by law", "by wheels"]], figsize=(COLUMN_WIDTH, 8.6))
     left, middle, right = (places[name] for name in ("laws", "by law", "by wheels"))
     some = [p for p in points if METHOD_OF_ENGINE[p["engine"]] == p["method"]]
-    best = [p for p in some if p["bridge"] in ("empty", _main(p["engine"]))]
+    best = [p for p in some if p["bridge"] in ("empty", _best_bridge(p["engine"]))]
     _plot_laws(left, some)
     _draw_stacked_shares(
         middle, [(f"{ENGINE_NAMES[p['engine']]}, {p['law']}", p) for p in best if p["wheels"] == WHEELS]
@@ -47,20 +47,23 @@ def figure(points: list[dict[str, Any]]) -> Figure:
     return drawing
 
 
-def _main(engine: str) -> str:
+def _best_bridge(engine: str) -> str:
     return "native" if engine == "mujoco" else "generic object"
 
 
 def _plot_laws(axis: Any, points: list[dict[str, Any]]) -> None:
-    """Plot a line of the best bridge for each number of wheels, and marks for the other bridges."""
+    """Plot the time per step over the contact laws: a line of the fastest bridge for each number of wheels, and marks
+    for the other bridges between engine and kernel."""
     for engine in METHOD_OF_ENGINE:
         of_engine = [p for p in points if p["engine"] == engine]
         for count, style in LINE_STYLES.items():
-            line = [p for p in of_engine if p["wheels"] == count and p["bridge"] in ("none", "empty", _main(engine))]
+            line = [
+                p for p in of_engine if p["wheels"] == count and p["bridge"] in ("none", "empty", _best_bridge(engine))
+            ]
             x, y = np.array(sorted((LAW_NAMES.index(p["law"]), 1e6 * p["step"]) for p in line)).T
-            label = f"{ENGINE_NAMES[engine]}, {_main(engine)}, {count} wheel{'s' * (count > 1)}"
+            label = f"{ENGINE_NAMES[engine]}, {_best_bridge(engine)}, {count} wheel{'s' * (count > 1)}"
             axis.semilogy(x, y, style, marker=".", color=COLOURS[engine], label=label)
-        others = [p for p in of_engine if p["bridge"] not in ("none", "empty", _main(engine))]
+        others = [p for p in of_engine if p["bridge"] not in ("none", "empty", _best_bridge(engine))]
         for mark, bridge in zip("sD^", dict.fromkeys(p["bridge"] for p in others), strict=False):
             x, y = np.array([(LAW_NAMES.index(p["law"]), 1e6 * p["step"]) for p in others if p["bridge"] == bridge]).T
             axis.semilogy(
@@ -80,7 +83,7 @@ def _plot_laws(axis: Any, points: list[dict[str, Any]]) -> None:
 
 
 def _draw_stacked_shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) -> None:
-    """Draw a bar of 100 % for each point, made of the shares of engine, kernel and bridge; negative shares count as
+    """Draw for each measurement a bar of 100 % with the shares of engine, kernel and bridge; negative shares count as
     zero."""
     labels, before = [label for label, _ in points], np.zeros(len(points))
     whole = np.array([sum(max(p[part], 0.0) for part, _, _ in STEP_PARTS) for _, p in points])

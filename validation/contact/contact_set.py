@@ -31,25 +31,27 @@ CREEPAGE_KINDS = {
         for sign in "+-"
     },
 }
-"""Parts of the creepages; lateral creepage with and against spin, where theories differ most, by angles in degrees."""
+"""Name -> scaled creepages xi_x, xi_y and spin; lateral creepage with and against spin, where theories differ most, is
+added by angles in degrees."""
 CONTACT_SIZE, LOAD, FRICTION, MATERIAL_PAIR = 5e-3, 8e4, 0.3, MaterialPair()
-"""sqrt(ab) in m, N, coefficient of friction and materials with which the set is computed."""
+"""sqrt(ab) (m), normal load (N), coefficient of friction and materials with which the set is computed."""
 SEED, DRAWN_CONTACTS, SIZE_RANGE = 43, 300, (0.2, 10.0)
-"""Of the drawn contacts: seed, how many in each part, and their sizes."""
+"""Random contacts: seed, number in each part, and range of the creepages' sizes."""
 WIDE_RATIOS, WIDE_RANGE, POISSON = (0.1, 10.0), (0.05, 10.0), (0.0, 0.28, 0.5)
-"""Of the wide contacts: a/b, sizes of the creepages, and Poisson's ratios in turn."""
+"""Wide contacts: range of a/b, range of the creepages' sizes, and Poisson's ratios, used in turn."""
 WIDE_CONTACTS, ABSENT_SHARE = ((300, 450), (300,)), 0.25
-"""Wide contacts in each part, draw by draw; share of them that have no xi_x, no xi_y and no spin."""
+"""Numbers of wide contacts in each part, draw by draw; share of contacts in which each of xi_x, xi_y and spin is
+zero."""
 FITTED_PART, JUDGED_PART = 0, 1
-"""Parts of the drawn contacts: one goes into the bands, the other one has never been seen by them."""
+"""Parts of the random contacts: the error bands are fitted to the first and judged by the second."""
 FORCES_FILE = Path(__file__).with_suffix(".csv")
 DRAWN_FILE, WIDE_FILE = (FORCES_FILE.with_name(f"contact_{name}.csv") for name in ("drawn", "wide"))
-ANSWER_COLUMNS = ("fx", "fy", "mz", "error")
-Ends = tuple[float, float]
+RESULT_COLUMNS = ("fx", "fy", "mz", "error")
+Range = tuple[float, float]
 
 
 def regular_contacts() -> list[ContactCase]:
-    """All contacts of the regular set, with no forces computed."""
+    """All contacts of the regular set, without forces."""
     return [
         case
         for ratio in AXIS_RATIOS
@@ -58,8 +60,8 @@ def regular_contacts() -> list[ContactCase]:
 
 
 def drawn_contacts(part_number: int) -> list[ContactCase]:
-    """One part of the randomly drawn contacts, with no forces computed; all directions of the scaled creepages are
-    equally likely."""
+    """A part (FITTED_PART or JUDGED_PART) of the random contacts, without forces; all directions of the scaled
+    creepages are equally likely."""
     return _draw_contacts(
         part_number,
         DRAWN_CONTACTS,
@@ -71,7 +73,8 @@ def drawn_contacts(part_number: int) -> list[ContactCase]:
 
 
 def wide_contacts(part_number: int) -> list[ContactCase]:
-    """One part of the contacts with wide ranges of shape and material, with no forces computed."""
+    """A part (FITTED_PART or JUDGED_PART) of the random contacts with wide ranges of shape and material, without
+    forces."""
     bodies = [Material(E=MATERIAL_PAIR.wheel.E, nu=nu) for nu in POISSON]
     pairs, first = [MaterialPair(body, body) for body in bodies], 2 + len(WIDE_CONTACTS[FITTED_PART]) * part_number
     streams = enumerate(WIDE_CONTACTS[part_number], first)
@@ -85,17 +88,19 @@ def wide_contacts(part_number: int) -> list[ContactCase]:
 def _draw_contacts(
     stream: int,
     count: int,
-    ratios: Ends,
-    size_ends: Ends,
+    ratios: Range,
+    size_range: Range,
     contact_kind: str,
     material_pairs: list[MaterialPair],
-    absent: float = 0.0,
+    absent_share: float = 0.0,
 ) -> list[ContactCase]:
-    """Random contacts from a stream of numbers, with the material pairs in turn. Each creepage is zero in a share of
-    the contacts, but never all three."""
+    """Random contacts from a stream of random numbers, with the material pairs in turn. Each creepage is zero in a
+    share of the contacts, but never all three at a time."""
     rng = np.random.default_rng((SEED, stream))
-    ratio, level = (np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (ratios, size_ends))
-    directions, present = rng.normal(size=(count, 3)), rng.uniform(size=(count, 3)) >= absent
+    ratio, level = (
+        np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (ratios, size_range)
+    )
+    directions, present = rng.normal(size=(count, 3)), rng.uniform(size=(count, 3)) >= absent_share
     present[~present.any(axis=1)] = True
     parts = map(tuple, (directions * present).tolist())
     drawn = zip(ratio, level, parts, cycle(material_pairs), strict=False)
@@ -110,19 +115,19 @@ def _semi_axes(ratio: float) -> tuple[float, float]:
 
 
 def read_contacts() -> list[ContactCase]:
-    """All contacts of the regular set, with their stored forces."""
+    """All contacts of the regular set, with their stored exact forces."""
     return _read_contacts(FORCES_FILE, regular_contacts())
 
 
 def read_drawn(part_number: int) -> list[ContactCase]:
-    """One part of the randomly drawn contacts, with their stored forces."""
+    """A part (FITTED_PART or JUDGED_PART) of the random contacts, with their stored exact forces."""
     return _read_contacts(DRAWN_FILE, drawn_contacts(FITTED_PART) + drawn_contacts(JUDGED_PART))[
         part_number * DRAWN_CONTACTS : (part_number + 1) * DRAWN_CONTACTS
     ]
 
 
 def read_wide(part_number: int) -> list[ContactCase]:
-    """One part of the contacts with wide ranges, with their stored forces."""
+    """A part (FITTED_PART or JUDGED_PART) of the wide contacts, with their stored exact forces."""
     return _read_contacts(WIDE_FILE, wide_contacts(FITTED_PART) + wide_contacts(JUDGED_PART))[
         part_number * sum(WIDE_CONTACTS[FITTED_PART]) :
     ][: sum(WIDE_CONTACTS[part_number])]
@@ -131,22 +136,22 @@ def read_wide(part_number: int) -> list[ContactCase]:
 def _read_contacts(path: Path, contacts: list[ContactCase]) -> list[ContactCase]:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    forces: list[dict[str, Any]] = [{name: float(row[name]) for name in ANSWER_COLUMNS} for row in rows]
+    forces: list[dict[str, Any]] = [{name: float(row[name]) for name in RESULT_COLUMNS} for row in rows]
     return [replace(case, **force) for case, force in zip(contacts, forces, strict=True)]
 
 
-def write(path: Path, contacts: list[ContactCase]) -> None:
-    """Compute and write the forces of the given contacts."""
+def compute_and_write(path: Path, contacts: list[ContactCase]) -> None:
+    """Compute the exact forces of contacts and write them to a CSV file."""
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("ratio", "kind", "level", *ANSWER_COLUMNS))
+        writer.writerow(("ratio", "kind", "level", *RESULT_COLUMNS))
         for case in map(with_exact_forces, contacts):
-            numbers = (f"{getattr(case, name):.6f}" for name in ANSWER_COLUMNS)
+            numbers = (f"{getattr(case, name):.6f}" for name in RESULT_COLUMNS)
             writer.writerow((round(case.a / case.b, 9), case.kind, round(case.level, 9), *numbers))
             file.flush()
 
 
 if __name__ == "__main__":
-    write(FORCES_FILE, regular_contacts())
-    write(DRAWN_FILE, drawn_contacts(FITTED_PART) + drawn_contacts(JUDGED_PART))
-    write(WIDE_FILE, wide_contacts(FITTED_PART) + wide_contacts(JUDGED_PART))
+    compute_and_write(FORCES_FILE, regular_contacts())
+    compute_and_write(DRAWN_FILE, drawn_contacts(FITTED_PART) + drawn_contacts(JUDGED_PART))
+    compute_and_write(WIDE_FILE, wide_contacts(FITTED_PART) + wide_contacts(JUDGED_PART))

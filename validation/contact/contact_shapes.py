@@ -1,4 +1,4 @@
-"""Undeformed distances that are no ellipsoids, or very long ones, and the exact contact to compare a theory with."""
+"""Shapes of contacting bodies that are not ellipsoids, or very long ones, and their exact contact solutions."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -19,9 +19,9 @@ from models.core.errors import InputError, RunFailed
 MATERIAL_PAIR = MaterialPair()
 FRICTION = 0.3
 CURVATURE = 1.0 / 0.92
-"""A of a wheel of 0.46 m radius (1/m)."""
+"""Half the longitudinal curvature (1/m) of a wheel of 0.46 m radius: the distance is CURVATURE x^2."""
 CREEPAGE_SIZES = (0.5, 2.0)
-"""Creepages by the linear scale mu N / (4 G c^2), c the radius of a circle of the exact area."""
+"""Creepages divided by the linear scale mu N / (4 G c^2), where c is the radius of a circle of the exact area."""
 CREEPAGE_KINDS = {
     "x": (1.0, 0.0, 0.0),
     "y": (0.0, 1.0, 0.0),
@@ -36,8 +36,8 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Shape:
-    """Undeformed distance of two bodies, load (N), and rectangle x0, x1, y0, y1 (m) for the exact grid (None: to be
-    found)."""
+    """A pair of bodies in contact: their undeformed distance, the load (N), and the rectangle x0, x1, y0, y1 (m) of the
+    exact grid (None: to be determined)."""
 
     name: str
     distance: Distance
@@ -46,7 +46,7 @@ class Shape:
 
 
 def _shape_of_formula(name: str, height: Callable[[Array, Array], Array], load: float, x: float, y: float) -> Shape:
-    """A shape given by a formula, whose exact contact area lies within -x..x and -y..y."""
+    """A shape whose undeformed distance is a formula, and whose exact contact area lies within -x..x and -y..y (m)."""
     distance = from_function(height, (-2.0 * x, 2.0 * x), (-2.0 * y, 2.0 * y))
     return Shape(name, distance, load, (-x, x, -y, y))
 
@@ -55,20 +55,22 @@ def _hertz_shape(name: str, ratio: float, x: float, y: float) -> Shape:
     return _shape_of_formula(name, lambda u, v: CURVATURE * (u**2 + ratio * v**2), 1e5, x, y)
 
 
-def _two_grooves(name: str, ridge: float, load: float, half: float = 3e-3, tilt: float = 0.0) -> Shape:
-    """Two parallel grooves at a distance ``half`` (m) on both sides of the middle, with a ridge (m) between; one is
-    ``tilt`` (m) higher."""
+def _two_grooves(name: str, ridge: float, load: float, half_spacing: float = 3e-3, tilt: float = 0.0) -> Shape:
+    """A shape with two parallel grooves at -half_spacing and half_spacing (m) in y, with a ridge (m) between them; the
+    second groove is ``tilt`` (m) higher."""
     return _shape_of_formula(
         name,
-        lambda u, v: CURVATURE * u**2 + ridge * ((v / half) ** 2 - 1.0) ** 2 + tilt * (v / half + 1.0) / 2.0,
+        lambda u, v: (
+            CURVATURE * u**2 + ridge * ((v / half_spacing) ** 2 - 1.0) ** 2 + tilt * (v / half_spacing + 1.0) / 2.0
+        ),
         load,
         0.0135,
-        2.2 * half + 9e-4,
+        2.2 * half_spacing + 9e-4,
     )
 
 
 def shapes_by_formula() -> list[Shape]:
-    """Shapes whose distance is given by a formula."""
+    """Shapes whose undeformed distance is a formula: ellipses, a quartic, an egg, two patches."""
     apart = 8e-3
     return [
         _hertz_shape("circle", 1.0, 0.0078, 0.0078),
@@ -89,8 +91,8 @@ def shapes_by_formula() -> list[Shape]:
 
 
 def merged_shapes() -> list[Shape]:
-    """Shapes whose contact areas have merged, with ridges and distances of many sizes; in the last ones along x, and of
-    three areas."""
+    """Shapes whose contact areas have merged over ridges of many heights and spacings; the last shapes have grooves
+    along x and three merged areas."""
     wells = (
         (2, 3, 100, 0),
         (5, 2, 50, 0),
@@ -154,8 +156,8 @@ def profile_shapes() -> list[Shape]:
 
 @dataclass(frozen=True)
 class PlacedWheelset:
-    """A wheelset on a track: lateral shift (m), yaw (rad), load on the right wheel (N), and the contact points of this
-    wheel."""
+    """A wheelset on a track: lateral shift (m), yaw (rad), load on the right wheel (N), and this wheel's contact
+    points."""
 
     shift: float
     yaw: float
@@ -164,9 +166,10 @@ class PlacedWheelset:
 
 
 def placed_wheelsets() -> list[PlacedWheelset]:
-    """Placements of S1002 on UIC 60, with and without yaw, at which the contact normals are nearly vertical.
+    """Wheelsets with S1002 on UIC 60, with and without yaw, at shifts at which the contact normals are nearly vertical
+    or a single patch is in contact.
 
-    Half-spaces are joined along the contour there; flange and tread lie on none.
+    There, patches can be joined to one half-space along the contour; flange and tread cannot.
     """
     wheelsets = []
     for yaw in (0.0, 0.01, -0.02):
@@ -178,15 +181,15 @@ def placed_wheelsets() -> list[PlacedWheelset]:
 
 
 JOINED_ANGLE = 0.15
-"""Angle (rad) between patch and track up to which several patches are joined to one half-space."""
+"""Largest angle (rad) between patch and track at which several patches are joined to one half-space."""
 
 
 GRID_MARGINS = (1.4, 2.0, 3.0)
-"""Sides of the exact grid divided by those of the simplified theory's area."""
+"""Side lengths of the exact grid divided by those of the simplified theory's contact area, tried in turn."""
 
 
-def exact_placed(wheelset: PlacedWheelset, normal_contact: NormalContact, cells: int) -> NormalSolution:
-    """Exact normal contact of a wheel on a rail; the heights of all patches count along the track's vertical."""
+def exact_contact_of_wheelset(wheelset: PlacedWheelset, normal_contact: NormalContact, cells: int) -> NormalSolution:
+    """Exact normal contact of a wheel with all its patches on a rail, with heights along the track's vertical."""
     boxes = np.array(
         [
             np.add(part.box, (0.0, 0.0, part.patch.contour_position, part.patch.contour_position))
@@ -198,7 +201,7 @@ def exact_placed(wheelset: PlacedWheelset, normal_contact: NormalContact, cells:
     for margin in GRID_MARGINS:
         step_x, step_y = margin * (x1 - x0) / cells, margin * (y1 - y0 + 2e-3) / (2 * cells)
         x, y = (x0 + x1) / 2 + centres(cells, step_x), (y0 + y1) / 2 + centres(2 * cells, step_y)
-        heights = np.min([_height(touch.patch, x, y) for touch in wheelset.touches], axis=0)
+        heights = np.min([_heights_of_patch(touch.patch, x, y) for touch in wheelset.touches], axis=0)
         try:
             return solve_normal(heights * slope, step_x, step_y, MATERIAL_PAIR, load=wheelset.load / slope)
         except InputError as error:  # the contact reaches the edge of the grid
@@ -207,11 +210,11 @@ def exact_placed(wheelset: PlacedWheelset, normal_contact: NormalContact, cells:
 
 
 UNKNOWN_HEIGHT = 1e-3
-"""Height (m) where a distance is not known."""
+"""Height (m) assumed where the undeformed distance is not known."""
 
 
-def _height(patch: Patch, x: Array, y: Array) -> Array:
-    """Heights (ny, nx) of a patch along the track's vertical, on a grid that all patches share."""
+def _heights_of_patch(patch: Patch, x: Array, y: Array) -> Array:
+    """Heights (ny, nx) in m of a patch along the track's vertical, on the grid that all patches share."""
     known, across = patch.distance, y - patch.contour_position
     over = (across >= known.y[0]) & (across <= known.y[-1])
     heights = np.full((y.size, x.size), UNKNOWN_HEIGHT)
@@ -230,7 +233,7 @@ def exact_normal(contact_shape: Shape, cells: int, box: Box) -> NormalSolution:
 
 
 def creepages(area: float, load: float) -> dict[tuple[str, float], tuple[float, float, float]]:
-    """Creepages and spin (1/m) of every kind and level for a contact of this area (m^2) and load (N)."""
+    """Kind and level -> creepages xi_x, xi_y and spin (1/m) for a contact of an area (m^2) and a load (N)."""
     c = np.sqrt(area / np.pi)
     scale = FRICTION * load / (4.0 * MATERIAL_PAIR.G * c**2)
     return {
@@ -241,7 +244,7 @@ def creepages(area: float, load: float) -> dict[tuple[str, float], tuple[float, 
 
 
 def exact_rolling(normal: NormalSolution, creepage: tuple[float, float, float]) -> RollingSolution | None:
-    """Exact rolling solution; None if the exact solver did not converge."""
+    """Exact rolling solution for creepages xi_x, xi_y and spin (1/m); None if the exact solver did not converge."""
     try:
         return solve_rolling(normal, FRICTION, *creepage, MATERIAL_PAIR)
     except RunFailed:

@@ -1,4 +1,4 @@
-"""Wheelsets with parameters at random, and the critical speed of any by every implementation."""
+"""Wheelsets with random parameters, and critical speeds of wheelsets by every implementation."""
 
 from collections.abc import Callable
 from functools import partial
@@ -11,11 +11,11 @@ from models.rail.linear import LOWEST_SPEED, critical_or_why
 from models.rail.wheelset import CHOSEN_WHEELSET, GRAVITY, Wheelset
 from models.systems.wheelset.of_scene import IMPLEMENTATION_MODULES, implementation
 
-Speeds = dict[str, dict[str, float | None]]
-"""Critical speeds (m/s) by wheelset and implementation, None where there is none."""
+CriticalSpeeds = dict[str, dict[str, float | None]]
+"""Wheelset -> implementation -> critical speed (m/s); None where there is none."""
 SEED = 2026
 DRAWN_COUNT = 6
-"""Wheelsets with parameters at random, beside the chosen one, one unstable at every speed and one at none."""
+"""Number of wheelsets with random parameters."""
 PARAMETER_RANGES = {
     "mass": (800.0, 2000.0),
     "spin_inertia": (50.0, 200.0),
@@ -36,13 +36,15 @@ PARAMETER_RANGES = {
 }
 STIFF_WHEELSET = CHOSEN_WHEELSET.changed(stiffness_x=1e8, stiffness_y=1e8, damping_x=1e5, damping_y=1e5)
 HEAVY_WHEELSET = free_wheelset(CHOSEN_WHEELSET).changed(mass=1e4, yaw_inertia=3e4)
-"""So heavy without suspension that the weight's own stiffness does not hold it even at 1 m/s."""
+"""Wheelset stable at every speed, by its stiff suspension; wheelset without suspension, so heavy that it is unstable
+even at 1 m/s."""
 HALF_BRACKET, LOWER_SPEEDS = 0.02, 5
-"""Half the bracket of a critical speed that is only looked up again, by the speed; lower speeds that are tried."""
+"""Half width of the interval about a known critical speed in which an engine's is searched, divided by the speed;
+number of lower speeds that are tried."""
 
 
 def drawn_wheelsets() -> dict[str, Wheelset]:
-    """Wheelsets with random parameters, distributed evenly in the logarithm over PARAMETER_RANGES."""
+    """Name -> wheelset with random parameters, uniform in the logarithm over PARAMETER_RANGES."""
     draw, wheelsets = np.random.default_rng(SEED), dict[str, Wheelset]()
     while len(wheelsets) < DRAWN_COUNT:
         values = {key: float(np.exp(draw.uniform(*np.log(ends)))) for key, ends in PARAMETER_RANGES.items()}
@@ -52,8 +54,8 @@ def drawn_wheelsets() -> dict[str, Wheelset]:
 
 
 def critical_speeds(wheelset: Wheelset, search_nearby: bool) -> dict[str, float | None]:
-    """Critical speed (m/s) in each implementation; None where there is none. With ``search_nearby`` the engines search
-    near the reference's critical speed."""
+    """Implementation -> critical speed (m/s) of a wheelset; None where there is none. With ``search_nearby`` the
+    engines search near the reference's critical speed."""
     speeds: dict[str, float | None] = {}
     for engine in IMPLEMENTATION_MODULES:
         of, first = partial(largest_growth, implementation(engine)), speeds.get("reference")
@@ -66,8 +68,8 @@ def critical_speeds(wheelset: Wheelset, search_nearby: bool) -> dict[str, float 
 
 
 def _critical_speed_near(growth: Callable[[float], float], speed: float) -> float:
-    """Critical speed (m/s) within HALF_BRACKET of ``speed``. If it is not in this interval, a lower speed with growth
-    or the upper end."""
+    """Critical speed (m/s) at which ``growth`` (1/s) crosses zero, within HALF_BRACKET of ``speed``. If there is none
+    in this interval, a lower speed with growth, or the interval's upper end."""
     low, high = (1.0 - HALF_BRACKET) * speed, (1.0 + HALF_BRACKET) * speed
     for below in np.geomspace(LOWEST_SPEED, low, LOWER_SPEEDS):
         if growth(float(below)) >= 0.0:

@@ -1,4 +1,4 @@
-"""Cost of FASTSIM beside the least that its arithmetic can take: one root and one division per cell."""
+"""Computing time of FASTSIM against a lower bound of its arithmetic: a square root and a division per cell."""
 
 import time
 from collections.abc import Callable
@@ -23,15 +23,18 @@ CONTACTS = 400
 TIMING_NOTE = "median of interleaved rounds, seconds of the processor"
 
 
-def speed(material_pair: MaterialPair, load: float, mu: float, axis: float) -> tuple[list[Row], list[list[str]]]:
-    """Rows on the time of a call and of a cell, and a table (what, time, ratio to the bound)."""
+def speed_rows_and_table(
+    material_pair: MaterialPair, load: float, mu: float, semi_axis: float
+) -> tuple[list[Row], list[list[str]]]:
+    """Report rows on FASTSIM's time per call and per cell, and a table (job, time, ratio to the arithmetic bound).
+    load in N, semi_axis in m."""
     draw = np.random.default_rng(5)
     blocks = _aligned_blocks(1)
     for name in ("u", "v0", "v1"):
         blocks[name] = draw.normal(0.0, 0.3, LANES)
     (_, cells), values = grid(CELLS, CELLS + 1, "intermediate").records, draw.uniform(1.0, 2.0, CELLS * LANES)
     along, across = (draw.normal(0.0, 2e-3, CONTACTS) for _ in range(2))
-    many = RollingEllipse(axis, axis, load, mu, along, across, draw.normal(0.0, 0.3, CONTACTS))
+    many = RollingEllipse(semi_axis, semi_axis, load, mu, along, across, draw.normal(0.0, 0.3, CONTACTS))
     calls = {n: Ellipse(1.0, material_pair, cells=n) for n in (12, CELLS)}
     marched = REPEATS * CELLS * LANES
     jobs: dict[str, tuple[Callable[[], Any], float]] = {
@@ -39,7 +42,7 @@ def speed(material_pair: MaterialPair, load: float, mu: float, axis: float) -> t
         "plain": (partial(_plain_loop, blocks, cells, REPEATS), marched),
         "second": (partial(_repeat_second_order, blocks, cells, REPEATS), marched),
         **{
-            f"call {n}": (partial(_call_kernel, e, (axis, load, mu, 1e-3, 5e-4, 0.2)), REPEATS)
+            f"call {n}": (partial(_call_kernel, e, (semi_axis, load, mu, 1e-3, 5e-4, 0.2)), REPEATS)
             for n, e in calls.items()
         },
         **{
@@ -78,7 +81,7 @@ def _call_kernel(ellipse: Ellipse, values: tuple[float, ...]) -> None:
 
 
 def _processor_times(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.ndarray]:
-    """Processor time (s) per unit of every job; the jobs take turns over several rounds."""
+    """Job -> processor times (rounds,) in s per call or cell; the jobs take turns over several rounds."""
     for job, _ in jobs.values():
         job()
     seconds = np.empty((TIMING_ROUNDS, len(jobs)))
@@ -92,8 +95,8 @@ def _processor_times(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[s
 
 @compiled
 def _arithmetic_bound(values, repeats):
-    """Lower bound for FASTSIM's arithmetic: one square root and one division per element, all independent, in vector
-    registers."""
+    """Loop that is timed as the lower bound of FASTSIM's arithmetic: a square root and a division per element, all
+    independent, in vector registers."""
     total = 0.0
     for _ in range(repeats):
         for i in range(values.size):
@@ -103,7 +106,7 @@ def _arithmetic_bound(values, repeats):
 
 
 def _aligned_blocks(count: int) -> np.ndarray:
-    """Array of zero blocks that is aligned to a vector register; without this the march takes half as long again."""
+    """Array of zero blocks aligned to the vector registers; without alignment the march takes 1.5 times as long."""
     room = np.zeros(count * BLOCK.itemsize // 8 + 8)
     first = -room.ctypes.data % 64 // 8
     return room[first : first + room.size - 8].view(BLOCK)

@@ -1,4 +1,4 @@
-"""Random contacts up to the extremes, and how far creep forces are from what must always hold of them.
+"""Random contacts up to extreme values, and violations of the invariants of their creep forces.
 
 Tractions of at most g = mu times the pressure that they are bounded by have, about the normal through the centre, at
 most the moment of the sum of g r dA over the cells, r the distance of a cell's centre from there. With the forces that
@@ -27,16 +27,17 @@ COMPUTED_OPTIONS: tuple[dict[str, Any], ...] = (
     {"cells": 9, "bound": "elliptic", "march": "plain", "flexibilities": "one"},
     {"cells": 12, "bound": "elliptic", "flexibilities": "three"},
 )
-"""What the contacts are computed with, in turn."""
+"""Options of FASTSIM with which the random contacts are computed, in turn."""
 KIND_COUNT = 8
 SIMILAR_CONTACTS: dict[str, tuple[dict[str, float], tuple[float, ...]]] = {
     "reversal": ({"xi_x": -1.0, "xi_y": -1.0, "spin": -1.0}, (-1.0, -1.0, -1.0)),
     "mirror": ({"xi_y": -1.0, "spin": -1.0}, (1.0, -1.0, -1.0)),
     "similarity": ({"a": 2.0, "b": 2.0, "load": 8.0, "xi_x": 2.0, "xi_y": 2.0}, (8.0, 8.0, 16.0)),
 }
-"""What changes in a contact, and fx, fy and mz by what they were; the last is the similar contact of twice the size."""
+"""Symmetry -> factors on the inputs of a contact, and factors by which fx, fy and mz must then change; "similarity" is
+the contact of twice the size."""
 SUM_ROUNDING = 1e-12
-"""Of sums over some hundred cells, each right to 1e-16."""
+"""Relative rounding error of sums over some hundred cells, each accurate to 1e-16."""
 
 
 def random_contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
@@ -66,8 +67,8 @@ def random_contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
 def worst_violation(
     columns: Mapping[str, Any], options: Mapping[str, Any], material_pair: MaterialPair
 ) -> dict[str, float]:
-    """Largest violation of each invariant, divided by mu N (and by the creepages where these scale it); infinite for
-    values that are not finite."""
+    """Invariant -> its largest violation over contacts, divided by mu N (and by the creepages where these scale it);
+    infinite for values that are not finite."""
     creep = fastsim(RollingEllipse(**columns), material_pair, **options)
     limit = columns["mu"] * np.maximum(columns["load"], 0.0)
     least, arm = np.maximum(limit, np.finfo(float).tiny), np.maximum(columns["a"], columns["b"])
@@ -75,40 +76,40 @@ def worst_violation(
     still, power = (motion == 0.0) | (limit == 0.0), least * np.where(motion > 0.0, motion, 1.0)
     net = {name: options[name] for name in ("cells", "bound") if name in options}
 
-    def relative(values: Creep, value_sizes: tuple[float, ...]) -> Array:
+    def scaled_forces(values: Creep, value_sizes: tuple[float, ...]) -> Array:
         parts = zip((values.fx, values.fy, values.mz), value_sizes, (least, least, least * arm), strict=True)
         return np.array([value / size / unit for value, size, unit in parts])
 
-    def unlike(name: str) -> float:
+    def difference_of_similar(name: str) -> float:
         factors, sizes = SIMILAR_CONTACTS[name]
         changed = {key: value * factors.get(key, 1.0) for key, value in columns.items()}
         return _largest_finite(
-            np.abs(forces - relative(fastsim(RollingEllipse(**changed), material_pair, **options), sizes))
+            np.abs(forces - scaled_forces(fastsim(RollingEllipse(**changed), material_pair, **options), sizes))
         )
 
-    forces = relative(creep, (1.0, 1.0, 1.0))
+    forces = scaled_forces(creep, (1.0, 1.0, 1.0))
     return {
         "finite": 0.0 if all(np.isfinite(values).all() for values in vars(creep).values()) else np.inf,
         "bound": _largest_finite(np.hypot(forces[0], forces[1]) - 1.0),
-        "moment": _largest_finite((np.abs(creep.mz) - most_moment(columns, **net)) / (least * arm)),
-        "limit": _largest_finite((creep.dissipation - most_power(columns, **net)) / power),
-        "reversal": unlike("reversal"),
-        "mirror": unlike("mirror"),
+        "moment": _largest_finite((np.abs(creep.mz) - moment_bound(columns, **net)) / (least * arm)),
+        "limit": _largest_finite((creep.dissipation - power_bound(columns, **net)) / power),
+        "reversal": difference_of_similar("reversal"),
+        "mirror": difference_of_similar("mirror"),
         "power": _largest_finite(-creep.dissipation / power),
         "zero": _largest_finite(np.abs(forces[:, still])),
-        "similarity": unlike("similarity"),
+        "similarity": difference_of_similar("similarity"),
         "stick": _largest_finite(np.abs(creep.stick - 0.5) - 0.5),
     }
 
 
 def _largest_finite(values: Array) -> float:
-    """The largest value; infinite if a value is not finite; 0 if there are no values or all are negative."""
+    """Largest of the values and 0; infinite if a value is not finite."""
     if not values.size:
         return 0.0
     return float(max(0.0, np.where(np.isfinite(values), values, np.inf).max()))
 
 
-def most_moment(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
+def moment_bound(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
     """Upper bound (n,) of the spin moment (N m) for contacts with arrays (n,) of semi-axes a, b (m), load (N) and
     friction mu."""
     pure = {
@@ -116,10 +117,10 @@ def most_moment(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "int
         "xi_y": np.zeros_like(columns["a"]),
         "spin": np.ones_like(columns["a"]),
     }
-    return most_power({**columns, **pure}, cells, bound)
+    return power_bound({**columns, **pure}, cells, bound)
 
 
-def most_power(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
+def power_bound(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
     """Upper bound (n,) of the power that friction dissipates, divided by the rolling speed (N). The columns hold a, b,
     load, mu, and creepages xi_x, xi_y, spin."""
     a, b, xi_x, xi_y, spin = (columns[name][:, None, None] for name in ("a", "b", "xi_x", "xi_y", "spin"))

@@ -1,4 +1,4 @@
-"""Published results of the Manchester contact benchmark, and second ways to the same figures.
+"""Published results of the Manchester contact benchmark, and independent computations of the same figures.
 
 Published are the reference outputs mbench_a22_right and mbench_a22_left that CONTACT comes with (revision 2447 of
 2023-11-04, Vtech CMCC, Apache 2.0): case A-2.2, exact half-space contact on one plane for all patches, cells of 0.2 mm.
@@ -26,64 +26,72 @@ SCENE = build(
         "cases": {"A-1": {}, "A-2": {"yaw": 2.4, "friction": 0.3}},
     }
 )
-"""New S1002 wheels on new UIC 60 rails at 1:40 with 10 kN on each; A-1 is pressed, A-2 rolls at 2 m/s with yaw."""
-CONTACT = np.loadtxt(Path(__file__).with_name("manchester_contact.csv"), delimiter=",", skiprows=1)
-"""Shift (mm), roll (mrad), then of the right and of the left wheel the mean place of contact across the track (mm), the
-normal force (N) and the largest pressure (MPa)."""
-PLANE = (5.0e-3, 727.0855e-3, -0.2905)
-"""Shift (m) at which CONTACT joins two patches, and its plane there: place across the track (m), angle (rad)."""
-CELL, DEEPEST = 1e-4, 1e-3
-"""m: of the exact theory on this plane, and more than the bodies reach into each other."""
+"""Benchmark scene: new S1002 wheels on new UIC 60 rails at 1:40 with 10 kN on each wheel. In case A-1 they are pressed
+together, in case A-2 they roll at 2 m/s with yaw."""
+PUBLISHED_CONTACT = np.loadtxt(Path(__file__).with_name("manchester_contact.csv"), delimiter=",", skiprows=1)
+"""Published output of CONTACT (rows, 8): shift (mm), roll (mrad), then for the right and the left wheel the mean
+lateral position of contact (mm), the normal force (N) and the largest pressure (MPa)."""
+CONTACT_PLANE = (5.0e-3, 727.0855e-3, -0.2905)
+"""Shift (m) at which CONTACT joins two patches, and its contact plane there: lateral position (m), angle (rad)."""
+CELL_SIZE, LARGEST_PENETRATION = 1e-4, 1e-3
+"""Cell size (m) of the exact theory on CONTACT's plane; an upper limit (m) of the penetration of the bodies."""
 PATCH_LOAD_TOLERANCE, SINKING_TOLERANCE = 1e-4, 1e-8
-"""Of the load, to which two patches that sink each other are followed; m, to which their approach is found."""
-SEARCH_REACH, SEARCH_GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
-"""Reach of the search along the profile (m) and round the axle (rad), its grid, how often it shrinks to a quarter; step
-(m) over which the rail's angle is taken."""
+"""Tolerance of the loads of two patches that deform each other, divided by the load; tolerance (m) of their
+approach."""
+SEARCH_REACH, SEARCH_GRID, SEARCH_ROUNDS, SLOPE_STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
+"""Search for the contact point: range along the profile (m) and about the axle (rad), grid, number of times that it
+shrinks to a quarter; distance (m) over which the rail's angle is measured."""
 
 
 @cache
 def contact_of(case: str) -> WheelsetContact:
-    """Contact of wheelset and track in a case of the benchmark."""
+    """Contact model of wheelset and track in a case ("A-1", "A-2") of the benchmark."""
     return SCENE.contact(SCENE.cases[case])
 
 
-def placed_at(case: str, shift: float) -> WheelsetPlacement:
-    """Contact of a case at a lateral displacement (m)."""
+def placement_at(case: str, shift: float) -> WheelsetPlacement:
+    """Wheelset placed at a lateral shift (m) in a case of the benchmark, with its contact patches."""
     return contact_of(case).at(shift, SCENE.cases[case].yaw * shift)
 
 
-def patch_sums(placed: WheelsetPlacement, wheel: str) -> tuple[float, float, float]:
-    """Sums over the contact patches of one wheel: load-weighted lateral position (mm), normal force (N), and largest
-    pressure (MPa)."""
+def wheel_sums(placed: WheelsetPlacement, wheel: str) -> tuple[float, float, float]:
+    """Load-weighted lateral position (mm), normal force (N) and largest pressure (MPa) over all contact patches of the
+    "right" or "left" wheel."""
     places = getattr(placed, wheel)
     normal = sum(place.normal for place in places)
     mean = sum(place.normal * place.y for place in places) / normal
     return 1e3 * mean, normal, max(place.peak for place in places) / 1e6
 
 
-def on_one_plane(contact: WheelsetContact, placed: WheelsetPlacement) -> tuple[float, float, list[float]]:
-    """The right wheel with its gap measured along CONTACT's plane: mean position (mm), largest pressure (MPa), forces
-    of both patches (N)."""
-    side, (_, y, angle) = contact.side, PLANE
+def exact_on_contact_plane(contact: WheelsetContact, placed: WheelsetPlacement) -> tuple[float, float, list[float]]:
+    """Exact contact of the right wheel with its gap measured along CONTACT's plane: mean lateral position (mm), largest
+    pressure (MPa), forces of both patches (N)."""
+    side, (_, y, angle) = contact.side, CONTACT_PLANE
     normal, pose = sum(touch.normal for touch in placed.right), _lowered_pose(side, placed)
     place = np.array([-7e-3, y, float(side.rail.curve(y))])
-    x, s = centres(140, CELL), 5e-3 + centres(180, CELL)
+    x, s = centres(140, CELL_SIZE), 5e-3 + centres(180, CELL_SIZE)
 
     def pressed(depth: float) -> NormalSolution:
         distance = distance_over(side, replace(pose, fall=pose.fall + depth), place, angle, (-5e-3, 15e-3))
-        return solve_normal(distance.at(x[None, :], s[:, None]) + DEEPEST, CELL, CELL, contact.pair, approach=DEEPEST)
+        return solve_normal(
+            distance.at(x[None, :], s[:, None]) + LARGEST_PENETRATION,
+            CELL_SIZE,
+            CELL_SIZE,
+            contact.pair,
+            approach=LARGEST_PENETRATION,
+        )
 
     depth = brentq(lambda depth: pressed(depth).load - normal, 2e-5, 4e-5, xtol=1e-9)
     solved = pressed(depth)
-    rows = solved.pressure.sum(axis=1) * CELL**2
+    rows = solved.pressure.sum(axis=1) * CELL_SIZE**2
     loads = [float(rows[part].sum()) for part in (s < 5e-3, s >= 5e-3)]
     return 1e3 * float(rows @ (y + s * math.cos(angle)) / rows.sum()), float(solved.pressure.max()) / 1e6, loads
 
 
 def patch_forces(contact: WheelsetContact, placed: WheelsetPlacement) -> list[float]:
-    """Normal forces (N) of the right wheel's patches, each computed with a half-space of its own.
+    """Normal forces (N) of the right wheel's patches, each computed on a separate half-space.
 
-    Each patch sinks under the other one's resultant as Boussinesq's point force sinks a half-space at that distance.
+    Each patch is lowered by the other patch's resultant, as by Boussinesq's point force at that distance.
     """
     side = contact.side
     touches = touches_of(side, _lowered_pose(side, placed))[: len(placed.right)]
@@ -121,14 +129,15 @@ def _lowered_pose(wheel_and_rail: WheelAndRail, placed: WheelsetPlacement) -> Po
 def first_touch(
     wheel_and_rail: WheelAndRail, placed: WheelsetPlacement, sign: float, position_guess: float
 ) -> tuple[float, float, float]:
-    """First contact point of a wheel near a guess (m from the taping line), by a search over points of its surface.
+    """Contact point of a wheel on a rail near a guess (m from the taping line), by a search over points of the wheel's
+    surface. Returns its lateral position in the track (m), its position on the wheel (m), and the rail's angle there
+    (rad).
 
-    sign : 1 for the right wheel, -1 for the left one in its mirror. Both profiles are straight between their points.
-    Returns the place across the track and that on the wheel (m), and the rail's angle there (rad).
+    sign : 1 for the right wheel, -1 for the mirrored left wheel. Both profiles are straight between their points.
     """
     roll, yaw = sign * placed.roll, sign * placed.yaw
     ahead, reach_u, reach_a = 0.0, SEARCH_REACH[0], SEARCH_REACH[1]
-    for _ in range(HALVINGS):
+    for _ in range(SEARCH_ROUNDS):
         u, a = np.meshgrid(position_guess + reach_u * SEARCH_GRID, ahead + reach_a * SEARCH_GRID)
         radius = wheel_and_rail.wheelset.radius + np.interp(u, wheel_and_rail.wheel.y, wheel_and_rail.wheel.z)
         x, y, z = radius * np.sin(a), wheel_and_rail.wheelset.arm + u, radius * np.cos(a)
@@ -137,5 +146,5 @@ def first_touch(
         k = np.argmin(np.interp(y, wheel_and_rail.rail.y, wheel_and_rail.rail.z) - z)
         place, position_guess, ahead = float(y.flat[k]), float(u.flat[k]), float(a.flat[k])
         reach_u, reach_a = reach_u / 4.0, reach_a / 4.0
-    low, high = np.interp([place - STEP, place + STEP], wheel_and_rail.rail.y, wheel_and_rail.rail.z)
-    return place, position_guess, math.atan(float(high - low) / (2.0 * STEP))
+    low, high = np.interp([place - SLOPE_STEP, place + SLOPE_STEP], wheel_and_rail.rail.y, wheel_and_rail.rail.z)
+    return place, position_guess, math.atan(float(high - low) / (2.0 * SLOPE_STEP))

@@ -1,4 +1,4 @@
-"""FASTSIM, Hertz' ellipse and Kalker's coefficients in plain Python: the other side of the compiled contact.
+"""FASTSIM, Hertz' ellipse and Kalker's coefficients in plain Python, for comparison with the compiled contact.
 
 One cell after the other, tractions as complex numbers (real part along x), the slipping traction turned by its angle.
 Of ``models.contact`` it takes tables and calibrated constants, and no function. Units, axes and signs are those of
@@ -34,19 +34,19 @@ LOG_RATIOS = np.log(RATIOS)
 LOGARITHMS = np.log(TABLE)
 NODES = CubicHermiteSpline(LOG_RATIOS, LOGARITHMS, np.gradient(LOGARITHMS, LOG_RATIOS, axis=0, edge_order=2))
 LONG_NODES = make_interp_spline(np.log(LONG_RATIOS), np.log(LONG_C33), k=1)
-Left = Callable[[float], float]
-"""Share of the friction that is left at a slip velocity divided by the rolling speed."""
+FrictionFactor = Callable[[float], float]
+"""Function of the slip velocity divided by the rolling speed; returns friction divided by friction without slip."""
 
 
 def coulomb_friction(slip: float) -> float:
-    """Coulomb friction: the friction coefficient does not fall with the slip."""
+    """Friction factor 1 at every slip (Coulomb friction)."""
     return 1.0
 
 
 @dataclass(frozen=True)
 class PlainEllipse:
-    """One rolling elliptic contact: a, b (m), load (N), mu, xi_x, xi_y, spin (1/m), flexibilities along x, y and in
-    spin (m^3/N)."""
+    """A rolling elliptic contact: semi-axes a along and b across rolling (m), load (N), friction coefficient mu,
+    creepages xi_x, xi_y, spin (1/m), flexibilities along x, y and in spin (m^3/N)."""
 
     a: float
     b: float
@@ -64,9 +64,9 @@ class PlainEllipse:
 
 
 @dataclass(frozen=True)
-class Program:
-    """Settings of FASTSIM: cells per strip; traction bound; flexibilities "one", "three" or "blended"; march
-    "second-order" (half a first step, and turning slip direction) or "plain" (neither)."""
+class FastsimSettings:
+    """Settings of FASTSIM: cells per strip; shape of the traction bound; flexibilities "one", "three" or "blended";
+    march "second-order" (first step of half length, turning slip direction) or "plain" (neither)."""
 
     cells: int
     bound: Bound = "intermediate"
@@ -74,23 +74,27 @@ class Program:
     march: str = "second-order"
 
 
-def hertz_ellipse(small: float, large: float, elastic: float, load: float) -> tuple[float, float, float]:
-    """Long and short semi-axis and approach (m) from curvatures (1/m), E* (Pa) and load (N); Johnson, section 4.2."""
+def hertz_ellipse(
+    small_curvature: float, large_curvature: float, modulus: float, load: float
+) -> tuple[float, float, float]:
+    """Long and short semi-axis and approach (m) of Hertz' contact from curvatures (1/m), contact modulus E* (Pa) and
+    load (N); Johnson, section 4.2."""
 
     def ratio_of(log_short: float) -> float:
         g2 = math.exp(2.0 * log_short)
         k, e = ellipk(1.0 - g2), ellipe(1.0 - g2)
-        return math.log((k - e) / (e / g2 - k) * large / small)
+        return math.log((k - e) / (e / g2 - k) * large_curvature / small_curvature)
 
     g = math.exp(brentq(ratio_of, math.log(1e-6), math.log(0.9999), xtol=1e-15))
     k, e = ellipk(1.0 - g * g), ellipe(1.0 - g * g)
     # curvature along the long axis: p0 short (K - E) / (E* e^2 long^2), p0 = 3 N / (2 pi long short)
-    long = (1.5 * load * (k - e) / (math.pi * elastic * (1.0 - g * g) * small)) ** (1.0 / 3.0)
-    return long, g * long, 1.5 * load * k / (math.pi * long * elastic)
+    long = (1.5 * load * (k - e) / (math.pi * modulus * (1.0 - g * g) * small_curvature)) ** (1.0 / 3.0)
+    return long, g * long, 1.5 * load * k / (math.pi * long * modulus)
 
 
 def coefficients(ratio: float, nu: float) -> Array:
-    """Kalker's C11, C22, C23, C33 (4,) at a/b and Poisson's ratio, see ``linear_theory.coefficients``."""
+    """Kalker's coefficients C11, C22, C23, C33 (4,) at a/b and Poisson's ratio nu, as in
+    ``linear_theory.coefficients``."""
     inner = min(max(ratio, 0.1), 10.0)
     nodes = np.exp(NODES(math.log(inner)))
     answer = np.array([_parabola_in_nu(values, power, nu) for values, power in zip(nodes, OF_NU, strict=True)])
@@ -102,20 +106,22 @@ def coefficients(ratio: float, nu: float) -> Array:
 
 
 def _parabola_in_nu(values: Array, power: float, nu: float) -> float:
-    """Parabola in nu through the values at nu = 0, 1/4, 1/2, which are raised to a power before."""
+    """Interpolates ``values`` at Poisson's ratios 0, 1/4, 1/2 to nu by a parabola through the values raised to a
+    power."""
     return float(barycentric_interpolate([0.0, 0.25, 0.5], values**power, nu)) ** (1.0 / power)
 
 
 def narrow_coefficients(g: float, nu: float) -> Array:
-    """First row of Kalker's table E.3 (1990): a/b = g to 0."""
+    """Kalker's coefficients C11, C22, C23, C33 (4,) for narrow ellipses, a/b = g to 0, by the first row of his table
+    E.3 (1990)."""
     across, log_16 = math.pi**2 / (4.0 * (1.0 - nu)), math.log(16.0 / g**2)
     spun = math.pi * math.sqrt(g) / (3.0 * (1.0 - nu)) * (1.0 + nu * (0.5 * log_16 + math.log(4.0) - 5.0))
     return np.array([across, math.pi**2 / 4.0, spun, across / (4.0 * g)])
 
 
 def long_coefficients(ratio: float, nu: float) -> Array:
-    """Last row of the same table, b/a = g to 0. C33 is interpolated linearly in logarithms between its nodes, and
-    extrapolated beyond them."""
+    """Kalker's coefficients C11, C22, C23, C33 (4,) for long ellipses, b/a to 0, by the last row of his table E.3
+    (1990). C33 is interpolated linearly in logarithms between its nodes, and extrapolated beyond."""
     g, log_16 = 1.0 / ratio, math.log(16.0 * ratio**2)
     rest = 3.0 - math.log(4.0)
     c11 = 2.0 * math.pi / ((log_16 - 2.0 * nu) * g) * (1.0 + rest / (log_16 - 2.0 * nu))
@@ -134,7 +140,8 @@ def flexibilities(a: float, b: float, shear: float, nu: float) -> tuple[float, f
 
 
 def stiffnesses(ellipse: PlainEllipse, peak: float, flexibility_kind: str) -> Array:
-    """1/L along x, along y and in spin (3,); peak : bound in the middle (Pa)."""
+    """Stiffnesses 1/L (Pa/m) of the bed of springs along x, along y and in spin (3,); peak: largest traction bound
+    (Pa)."""
     three, creep = (
         1.0 / np.array(ellipse.flexible),
         np.array([ellipse.xi_x, ellipse.xi_y, ellipse.spin * ellipse.mean_semi_axis]),
@@ -148,9 +155,9 @@ def stiffnesses(ellipse: PlainEllipse, peak: float, flexibility_kind: str) -> Ar
     return three + _flexibility_share(ellipse, creep * ellipse.a * three / peak) * (mean - three)
 
 
-def _flexibility_share(ellipse: PlainEllipse, reach: Array) -> float:
-    """Weight of the common flexibility relative to the three separate ones, from the scaled creepages (3,)."""
-    x, y, z = reach
+def _flexibility_share(ellipse: PlainEllipse, scaled_creepage: Array) -> float:
+    """Weight (0 to 1) of the common flexibility against the three separate ones, from the scaled creepages (3,)."""
+    x, y, z = scaled_creepage
     shape = min(max(ellipse.a / ellipse.b, 0.1), 10.0)
     turns = SPIN_WEIGHT * shape**SPIN_BY_RATIO * z
     rolling = (X_WEIGHT * x) ** 2 + y**2 + turns**2 + 2.0 * OPPOSING_SPIN_SHARE * y * turns
@@ -159,10 +166,12 @@ def _flexibility_share(ellipse: PlainEllipse, reach: Array) -> float:
     return 1.0 - math.exp(-begun - slides**3)
 
 
-def fastsim(ellipse: PlainEllipse, program: Program, left: Left = coulomb_friction) -> tuple[Array, Array]:
-    """Forces fx, fy (N), moment mz (N m) and share of the area that sticks (4,); complex tractions (Pa) of all cells
-    (strips, cells)."""
-    a, b, n, power = ellipse.a, ellipse.b, program.cells, POWERS[program.bound]
+def fastsim(
+    ellipse: PlainEllipse, settings: FastsimSettings, friction_factor: FrictionFactor = coulomb_friction
+) -> tuple[Array, Array]:
+    """FASTSIM: forces fx, fy (N), moment mz (N m) and share of the area that sticks (4,); complex tractions (strips,
+    cells) in Pa."""
+    a, b, n, power = ellipse.a, ellipse.b, settings.cells, POWERS[settings.bound]
     strips = 2 * math.ceil(n * min(max((b / (2.0 * a)) ** 0.6, 1.0), MOST_STRIPS) / 2.0 - 1e-9)
     y = b * (strips - 1.0 - 2.0 * np.arange(strips)) / strips
     half = a * np.sqrt(1.0 - (y / b) ** 2)
@@ -170,24 +179,31 @@ def fastsim(ellipse: PlainEllipse, program: Program, left: Left = coulomb_fricti
     area = (2.0 * half / n * 2.0 * b / strips)[:, None] * np.ones(n)
     shape = (1.0 - (x / a) ** 2 - (y[:, None] / b) ** 2) ** power
     peak = ellipse.mu * ellipse.load / np.sum(shape * area)
-    k = stiffnesses(ellipse, peak, program.flexibilities)
-    rows = [_strip_tractions(ellipse, program, (yy, hh), k, peak, left) for yy, hh in zip(y, half, strict=True)]
+    k = stiffnesses(ellipse, peak, settings.flexibilities)
+    rows = [
+        _strip_tractions(ellipse, settings, (yy, hh), k, peak, friction_factor) for yy, hh in zip(y, half, strict=True)
+    ]
     p, slips = (np.array([row[i] for row in rows]) for i in range(2))
     force, turn = np.sum(p * area), np.sum((x * p.imag - y[:, None] * p.real) * area)
     return np.array([force.real, force.imag, turn, np.sum(area[~slips]) / np.sum(area)]), p
 
 
 def _strip_tractions(
-    ellipse: PlainEllipse, program: Program, place: tuple[float, float], k: Array, peak: float, left: Left
+    ellipse: PlainEllipse,
+    settings: FastsimSettings,
+    strip: tuple[float, float],
+    stiffness: Array,
+    peak: float,
+    friction_factor: FrictionFactor,
 ) -> tuple[list[complex], list[bool]]:
-    """Tractions of one strip at y, with a half length (m), from the leading to the trailing edge, and whether each cell
-    slips."""
-    (y, half), n, power = place, program.cells, POWERS[program.bound]
-    dx, turns = 2.0 * half / n, program.march == "second-order"
+    """Complex tractions (Pa) of a strip from the leading to the trailing edge, and whether each cell slips. strip:
+    its y and half length (m)."""
+    (y, half), n, power = strip, settings.cells, POWERS[settings.bound]
+    dx, turns = 2.0 * half / n, settings.march == "second-order"
 
     def bound(x: float) -> float:
         slip = complex(ellipse.xi_x - ellipse.spin * y, ellipse.xi_y + ellipse.spin * x)
-        return peak * left(abs(slip)) * (1.0 - (x / ellipse.a) ** 2 - (y / ellipse.b) ** 2) ** power
+        return peak * friction_factor(abs(slip)) * (1.0 - (x / ellipse.a) ** 2 - (y / ellipse.b) ** 2) ** power
 
     p, slipping, tractions, slips = 0j, False, list[complex](), list[bool]()
     for i in range(n):
@@ -195,13 +211,14 @@ def _strip_tractions(
         go = 0.5 * dx if turns and i == 0 else dx
         middle = x + 0.5 * go if turns else x
         rigid = complex(
-            k[0] * ellipse.xi_x - k[2] * ellipse.spin * y, k[1] * ellipse.xi_y + k[2] * ellipse.spin * middle
+            stiffness[0] * ellipse.xi_x - stiffness[2] * ellipse.spin * y,
+            stiffness[1] * ellipse.xi_y + stiffness[2] * ellipse.spin * middle,
         )
         trial = p - rigid * go
         if abs(trial) <= bound(x):
             p, slipping = trial, False
         elif turns and slipping and i > 0:
-            p = bound(x) * _direction_after_step(p, rigid, k[2] * ellipse.spin, dx, bound(middle))
+            p = bound(x) * _direction_after_step(p, rigid, stiffness[2] * ellipse.spin, dx, bound(middle))
         else:
             p, slipping = bound(x) * trial / abs(trial), True
         tractions.append(p)

@@ -1,4 +1,4 @@
-"""A wheel's profile on a rail's in plain numpy: the other side of ``models.rail.profile_contact``.
+"""Contact of a wheel's profile with a rail's in plain numpy, for comparison with ``models.rail.profile_contact``.
 
 Both wheels are described as they lie, no mirror: every circle of the wheel in space, the point at which its surface's
 normal is square to the rail, how deep that point lies; then means over the circles in contact. Patches that press each
@@ -15,11 +15,11 @@ from models.contact.inputs import Array
 from models.rail.profile_contact import SHARPEST_CURVATURE, TOUCH, LaidProfile, Pose
 from validation.contact.plain_fastsim import hertz_ellipse
 
-SETTLED = 1e-12
-"""Share of a patch's load by which loads and depths may disagree."""
+LOAD_TOLERANCE = 1e-12
+"""Largest residual of the patches' loads against their penetrations, divided by the load."""
 
 
-def rail_of(profile: LaidProfile) -> PPoly:
+def right_rail_depth(profile: LaidProfile) -> PPoly:
     """Depth of the right rail's surface below its top (m) over y (m) from the middle of the track."""
     knots = profile.knots
     return PPoly(np.array([knots[name][:-1] for name in ("c3", "c2", "c1", "c0")]), knots["y"], extrapolate=False)
@@ -28,7 +28,7 @@ def rail_of(profile: LaidProfile) -> PPoly:
 def circle_contacts(wheel_side: int, pose: Pose, profile: LaidProfile) -> tuple[Array, Array, Array]:
     """For each circle of the wheel: penetration (n,), and its nearest point relative to the wheelset's centre and the
     rail's normal there, both (n, 3)."""
-    head, nodes, rail = profile.head[0], profile.nodes, rail_of(profile)
+    head, nodes, rail = profile.head[0], profile.nodes, right_rail_depth(profile)
     turn = Rotation.from_euler("ZX", [pose.yaw, pose.roll]).as_matrix()
     # A point (r sin phi, side (arm + y), r cos phi) has the normal (sin phi, -side slope, cos phi) in the wheelset.
     along, across, down = turn[0]
@@ -44,8 +44,8 @@ def circle_contacts(wheel_side: int, pose: Pose, profile: LaidProfile) -> tuple[
     return np.where(np.isfinite(depth), depth, -1.0), points, normals
 
 
-def touches_of(wheel_side: int, pose: Pose, profile: LaidProfile, modulus: float) -> Array:
-    """Contacts TOUCH (zones,) of a wheel; modulus : E* (Pa)."""
+def contacts_of_wheel(wheel_side: int, pose: Pose, profile: LaidProfile, modulus: float) -> Array:
+    """Contact patches of a wheel, records TOUCH (zones,); modulus: contact modulus E* (Pa)."""
     depth, points, normals = circle_contacts(wheel_side, pose, profile)
     zone, length = profile.nodes["zone"], np.arange(depth.size) * profile.head[0].spacing
     radial = Rotation.from_euler("ZX", [pose.yaw, pose.roll]).as_matrix()[:, 2]
@@ -68,8 +68,8 @@ def touches_of(wheel_side: int, pose: Pose, profile: LaidProfile, modulus: float
 
 
 def hertz_force(depth: float, along: float, across: float, modulus: float) -> tuple[float, float, float]:
-    """Normal force (N) and semi-axes along and across (m) by Hertz for a penetration (m); zeros where there is a
-    gap."""
+    """Normal force (N) and semi-axes along and across rolling (m) by Hertz for a penetration (m) and curvatures (1/m);
+    zeros where there is a gap."""
     if depth <= 0.0:
         return 0.0, 0.0, 0.0
     long, short, approach = hertz_ellipse(min(along, across), max(along, across), modulus, 1.0)
@@ -79,7 +79,7 @@ def hertz_force(depth: float, along: float, across: float, modulus: float) -> tu
 
 
 def settled_penetrations(touches: Array, modulus: float) -> Array:
-    """Penetrations (n,) of contact patches, reduced by the surface deformation that the other patches cause."""
+    """Penetrations (n,) in m of contact patches, reduced by the surface deformation that the other patches cause."""
     alone = touches["depth"].copy()
     loads, axes = np.array([hertz_force(t.depth, t.along, t.across, modulus)[:2] for t in touches]).T
     places = np.column_stack([touches[name] for name in ("x", "y", "z")])
@@ -92,11 +92,11 @@ def settled_penetrations(touches: Array, modulus: float) -> Array:
     def depths(load: Array) -> Array:
         return alone - pushes @ load
 
-    def off(share: Array) -> Array:
+    def residual(share: Array) -> Array:
         left = np.where(loaded, np.maximum(depths(share * loads), 0.0) / np.where(loaded, alone, 1.0), 0.0)
         return share - left**1.5
 
-    share = fsolve(off, np.ones(alone.size), xtol=1e-14, full_output=True)[0]  # which no processor need reach
-    if not np.abs(off(share)).max() < SETTLED:
-        raise ArithmeticError(f"the loads of touching patches do not settle: {off(share)}")
+    share = fsolve(residual, np.ones(alone.size), xtol=1e-14, full_output=True)[0]  # which no processor need reach
+    if not np.abs(residual(share)).max() < LOAD_TOLERANCE:
+        raise ArithmeticError(f"the loads of touching patches do not settle: {residual(share)}")
     return depths(share * loads)

@@ -1,4 +1,5 @@
-"""Kalker's theory of 1983 for one patch in plain Python: the other side of ``models.contact.simplified_kernels``.
+"""Kalker's simplified theory of 1983 for a contact patch in plain Python, for comparison with
+``models.contact.simplified_kernels``.
 
 Cubic convolution is a Hermite spline whose slopes are central differences (scipy has such splines, and their roots);
 sums over the half-space are convolutions with ``half_space.influence``; fits are numpy's weighted covariances; the
@@ -25,13 +26,13 @@ Box = tuple[float, float, float, float]
 
 
 def hermite_spline(nodes: Array, padded: Array) -> CubicHermiteSpline:
-    """Cubic spline along the first axis through values at equally spaced nodes; the values include one extra node at
-    each end."""
+    """Cubic spline along the first axis through values at equally spaced nodes; ``padded`` contains the values and an
+    extra value at each end."""
     return CubicHermiteSpline(nodes, padded[1:-1], (padded[2:] - padded[:-2]) / (nodes[2] - nodes[0]))
 
 
 def extrapolated_rows(rows: Array) -> Array:
-    """Rows with an extra row at each end, extrapolated by the parabola through the three outermost."""
+    """The rows with an extra row at each end, extrapolated by the parabola through the three outermost rows."""
     return np.concatenate([[3 * rows[0] - 3 * rows[1] + rows[2]], rows, [3 * rows[-1] - 3 * rows[-2] + rows[-3]]])
 
 
@@ -51,17 +52,17 @@ class PlainBodies:
         return extrapolated_rows(extrapolated_rows(self.height).T).T
 
     def line(self, y: float, order: int = 0) -> CubicHermiteSpline:
-        """Distance at a position y as a function of x, or its y derivative of the given order."""
+        """Spline over x of the undeformed distance at a position y, or of its y derivative of an order."""
         return hermite_spline(self.x, hermite_spline(self.y, self.padded)(y, order))
 
     def at(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        """Distance and its slopes in x and y on the grid of x (nx,) and y (ny,)."""
+        """Undeformed distance (m) and its slopes in x and y, each (ny, nx), on the grid of x (nx,) and y (ny,)."""
         lines, steep = [self.line(each) for each in y], [self.line(each, 1) for each in y]
         return np.array([f(x) for f in lines]), np.array([f(x, 1) for f in lines]), np.array([f(x) for f in steep])
 
     @cached_property
     def low(self) -> float:
-        """Distance (m) at the bottom."""
+        """Undeformed distance (m) at the lowest point."""
         return float(self.line(self.bottom[1])(self.bottom[0]))
 
     @cached_property
@@ -90,25 +91,25 @@ class PlainBodies:
 
 
 def _lowest_value(spline: CubicHermiteSpline) -> float:
-    """Least value of a spline within its nodes."""
+    """Smallest value of a spline between its first and last node."""
     turning = spline.derivative().roots(extrapolate=False)
     return float(min(spline(spline.x).min(), spline(turning[np.isfinite(turning)]).min(initial=np.inf)))
 
 
 def interval_midpoints(low: float, high: float, count: int) -> Array:
-    """Midpoints of equal intervals."""
+    """Midpoints (count,) of equal intervals between low and high."""
     return low + (np.arange(count) + 0.5) * (high - low) / count
 
 
 def pressure_from_heights(depth: float, low: float, height: Array, options: SimplifiedOptions) -> Array:
-    """Pressure times W (m) at heights (m), for a contact of the given depth."""
+    """Pressure times flexibility W (m) at heights (m), for a contact whose area lies below a depth (m)."""
     over = np.maximum(depth - height, 0.0)
     return over if options.shape == "parabolic" else np.sqrt(over * (depth - low))
 
 
 def surface_displacement(values: Array, step: tuple[float, float], material_pair: MaterialPair, parts: Array) -> Array:
-    """Displacement (m) on a square grid due to one component of traction (Pa) on it; parts : indices of displacement
-    and traction component."""
+    """Surface displacement (m) on a square grid due to a traction component (Pa) on it. parts: indices of the
+    displacement and traction components."""
     n = len(values)
     kernel = influence(offsets(n, step[0]), offsets(n, step[1])[:, None], *step, material_pair)[(..., *parts)]
     return convolve2d(kernel, values, mode="valid")
@@ -116,8 +117,8 @@ def surface_displacement(values: Array, step: tuple[float, float], material_pair
 
 @dataclass(frozen=True)
 class PlainPatch:
-    """One contact patch at a depth: integral of W times pressure (m^3), stiffness 1/W (Pa/m), approach and box (m), and
-    covered share of each cell."""
+    """A contact patch whose area lies below a depth (m): integral of flexibility W times pressure (m^3), stiffness 1/W
+    (Pa/m), approach (m), bounding box (m), and covered share of each cell."""
 
     depth: float
     volume: float
@@ -128,12 +129,14 @@ class PlainPatch:
 
     @property
     def load(self) -> float:
-        """Load (N)."""
+        """Normal load (N) of the patch."""
         return self.stiffness * self.volume
 
 
-def at_depth(bodies: PlainBodies, depth: float, material_pair: MaterialPair, options: SimplifiedOptions) -> PlainPatch:
-    """The patch at a depth, with its stiffness fitted on the coarse grid."""
+def patch_at_depth(
+    bodies: PlainBodies, depth: float, material_pair: MaterialPair, options: SimplifiedOptions
+) -> PlainPatch:
+    """The contact patch below a depth (m), with its stiffness fitted on the coarse grid."""
     box, n = bodies.box(depth), options.net
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
     height, slope_x, slope_y = bodies.at(interval_midpoints(*box[:2], n), interval_midpoints(*box[2:], n))
@@ -155,8 +158,8 @@ def at_depth(bodies: PlainBodies, depth: float, material_pair: MaterialPair, opt
 def fitted_slopes(
     u: Array, p: Array, cover: Array, step: tuple[float, float], options: SimplifiedOptions, by_height: bool = False
 ) -> float:
-    """Slope of u (k, n, n) over p by weighted least squares, common to all k components; or the same with differences
-    of u and p between neighbouring cells. ``by_height``: p is fitted over u, with differences along y, too."""
+    """Slope of displacement u (k, n, n) over traction p by weighted least squares, common to all k components, or with
+    differences of u and p between neighbouring cells. by_height: p is fitted over u, also with differences along y."""
     if options.fit == "displacement":
         parts = np.array(
             [np.cov(a.ravel(), b.ravel(), aweights=cover.ravel(), ddof=0) for a, b in zip(u, p, strict=True)]
@@ -173,20 +176,22 @@ def fitted_slopes(
     return float(squares / products if by_height else products / squares)
 
 
-def press(bodies: PlainBodies, approach: float, material_pair: MaterialPair, options: SimplifiedOptions) -> PlainPatch:
-    """The patch at a rigid approach (m)."""
+def patch_at_approach(
+    bodies: PlainBodies, approach: float, material_pair: MaterialPair, options: SimplifiedOptions
+) -> PlainPatch:
+    """The contact patch at a rigid approach (m) of the bodies."""
     over = approach - bodies.low
 
-    def off(part: float) -> float:
-        return at_depth(bodies, bodies.low + part * over, material_pair, options).approach - approach
+    def residual(part: float) -> float:
+        return patch_at_depth(bodies, bodies.low + part * over, material_pair, options).approach - approach
 
-    return at_depth(bodies, bodies.low + brentq(off, 0.2, 1.0, xtol=1e-15) * over, material_pair, options)
+    return patch_at_depth(bodies, bodies.low + brentq(residual, 0.2, 1.0, xtol=1e-15) * over, material_pair, options)
 
 
 @dataclass(frozen=True, eq=False)
 class Strips:
-    """Strips of a contact: positions y, ends in x (s,) and width (m), and pressure (s, n) in Pa from the leading edge
-    back."""
+    """Strips of a contact area along rolling: positions y and ends in x, each (strips,), and width (m); pressure
+    (strips, cells) in Pa from the leading edge back."""
 
     y: Array
     low: Array
@@ -196,8 +201,8 @@ class Strips:
 
 
 def strips(bodies: PlainBodies, patch: PlainPatch, cells: int, options: SimplifiedOptions) -> Strips:
-    """Strips between the two points at which the distance equals the depth. Strips too short to contain a node, or a
-    midpoint between nodes, are left out, as the package looks for contact at these."""
+    """Strips of a patch, between the two points at which the undeformed distance equals the depth. Strips too short to
+    contain a node or a midpoint between nodes are left out, as twinrig searches contact at these points."""
     box, ends = patch.box, []
     for y in interval_midpoints(*box[2:], cells):
         line = bodies.line(float(y))
@@ -213,8 +218,11 @@ def strips(bodies: PlainBodies, patch: PlainPatch, cells: int, options: Simplifi
     return Strips(y, low, high, width, pressure * patch.load / carried)
 
 
-def march(net: Strips, mu: float, flexibility: float, motion: tuple[float, float, float]) -> tuple[Array, Array]:
-    """Complex tractions (s, n) in Pa, and whether each cell slips."""
+def strip_tractions(
+    net: Strips, mu: float, flexibility: float, motion: tuple[float, float, float]
+) -> tuple[Array, Array]:
+    """Complex tractions (strips, cells) in Pa by the march along each strip, and whether each cell slips. motion:
+    creepages xi_x, xi_y, spin (1/m)."""
     xi_x, xi_y, spin = motion
     tractions, slips = np.zeros(net.pressure.shape, complex), np.zeros(net.pressure.shape, bool)
     for s, (y, low, high) in enumerate(zip(net.y, net.low, net.high, strict=True)):
@@ -237,7 +245,8 @@ def march(net: Strips, mu: float, flexibility: float, motion: tuple[float, float
 
 
 def mean_tractions(net: Strips, tractions: Array, box: Box, n: int) -> Array:
-    """Mean tractions (2, n, n) in the cells of the coarse grid, weighted by the common area of both kinds of cells."""
+    """Mean tractions (2, n, n) in Pa in the cells of the coarse grid, weighted by the area that its cells and the
+    strips' cells have in common."""
     across = _common_lengths(net.y - 0.5 * net.width, net.y + 0.5 * net.width, np.linspace(*box[2:], n + 1))
     cells = net.high[:, None] - np.arange(tractions.shape[1] + 1) * (net.high - net.low)[:, None] / tractions.shape[1]
     along = np.array([_common_lengths(row[1:], row[:-1], np.linspace(*box[:2], n + 1)) for row in cells])
@@ -248,7 +257,7 @@ def mean_tractions(net: Strips, tractions: Array, box: Box, n: int) -> Array:
 def fitted_flexibility(
     patch: PlainPatch, net: Strips, tractions: Array, material_pair: MaterialPair, options: SimplifiedOptions
 ) -> float:
-    """Flexibility W_1 = W_2 (m/Pa), fitted to the tractions of a march."""
+    """Tangential flexibility W_1 = W_2 (m/Pa), fitted to the displacements that the tractions cause."""
     n, box = options.net, patch.box
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
     p = mean_tractions(net, tractions, box, n)
@@ -259,7 +268,7 @@ def fitted_flexibility(
 
 
 def _common_lengths(low: Array, high: Array, edges: Array) -> Array:
-    """Common lengths (m, n) of intervals (m,) and of the n segments between edges (n + 1,)."""
+    """Lengths (m, n) that m intervals and the n segments between edges (n + 1,) have in common."""
     return np.maximum(np.minimum(high[:, None], edges[1:]) - np.maximum(low[:, None], edges[:-1]), 0.0)
 
 
@@ -272,11 +281,12 @@ def roll(
     cells: int,
     options: SimplifiedOptions,
 ) -> tuple[Array, float]:
-    """Forces fx, fy (N), moment mz (N m) and share of the area that sticks (4,), and flexibility W_1 (m/Pa)."""
+    """Rolling contact of a patch: forces fx, fy (N), moment mz (N m) and share of the area that sticks (4,), and
+    tangential flexibility W_1 (m/Pa)."""
     net = strips(bodies, patch, cells, options)
-    first, _ = march(net, mu, 1.0 / patch.stiffness, motion)
+    first, _ = strip_tractions(net, mu, 1.0 / patch.stiffness, motion)
     flexibility = fitted_flexibility(patch, net, first, material_pair, options)
-    p, slips = march(net, mu, flexibility, motion)
+    p, slips = strip_tractions(net, mu, flexibility, motion)
     area = ((net.high - net.low) / cells * net.width)[:, None] * np.ones(cells)
     x = np.array([interval_midpoints(b, a, cells) for a, b in zip(net.low, net.high, strict=True)])
     force, turn = np.sum(p * area), np.sum((x * p.imag - net.y[:, None] * p.real) * area)

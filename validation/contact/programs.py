@@ -1,4 +1,4 @@
-"""Kalker's programs of 1982 and 1983 side by side on ellipses, as the paper compares them, but measured."""
+"""Kalker's contact programs of 1982 and 1983 compared on ellipses, as in his paper, with measured figures."""
 
 from functools import partial
 from typing import Any
@@ -15,35 +15,38 @@ from models.systems.contact.work_precision import ContactCase
 from validation.common.rows import Table
 
 TIMING_ROUNDS = 5
-"""Of timing."""
+"""Number of rounds in which computing times are measured."""
 
 
-def compare(cases: list[ContactCase]) -> dict[str, Any]:
-    """Errors of the programs of 1982 and 1983 divided by mu N, errors of the 1983 normal contact relative to Hertz, and
-    computing time (s) of an evaluation."""
+def compare_programs(cases: list[ContactCase]) -> dict[str, Any]:
+    """Force errors of Kalker's programs of 1982 and 1983 divided by mu N, relative errors of the 1983 normal contact
+    against Hertz, and computing times (s) of a call."""
     pressed = {(c.a, c.b): _normal_contact(c) for c in cases}
 
-    def old(case: ContactCase) -> Creep:
+    def program_1982(case: ContactCase) -> Creep:
         return fastsim(
             RollingEllipse(case.a, case.b, case.load, case.friction, *case.motion), case.pair, **PROGRAM_OF_1982
         )
 
-    def new(case: ContactCase) -> Rolling:
+    def program_1983(case: ContactCase) -> Rolling:
         return roll(pressed[case.a, case.b], case.friction, *case.motion)
 
     def error(case: ContactCase, forces: Creep | Rolling) -> float:
         return float(np.hypot(*(np.array([forces.fx, forces.fy]) / case.limit - case.force)))
 
-    errors = {"1982": [error(case, old(case)) for case in cases], "1983": [error(case, new(case)) for case in cases]}
+    errors = {
+        "1982": [error(case, program_1982(case)) for case in cases],
+        "1983": [error(case, program_1983(case)) for case in cases],
+    }
     normal = [_normal_errors(case, pressed[case.a, case.b]) for case in {(c.a, c.b): c for c in cases}.values()]
-    ways = {"1982": old, "press": _normal_contact, "1983": new}
+    ways = {"1982": program_1982, "press": _normal_contact, "1983": program_1983}
     jobs = [partial(way, cases[len(cases) // 2]) for way in ways.values()]
     seconds = dict(zip(ways, interleave(jobs, TIMING_ROUNDS).tolist(), strict=True))
     return {"errors": errors, "normal": normal, "seconds": seconds}
 
 
 PROGRAM_OF_1982: dict[str, Any] = {"cells": FINE_CELLS, "march": "plain", "flexibilities": "one", "bound": "parabolic"}
-"""The program of 1982, on as many cells as the fine net of the other one has."""
+"""FASTSIM options of the program of 1982, with as many cells as the fine grid of the program of 1983."""
 
 
 def _normal_contact(case: ContactCase) -> NormalContact:
@@ -51,14 +54,14 @@ def _normal_contact(case: ContactCase) -> NormalContact:
 
 
 def _normal_errors(case: ContactCase, pressed: NormalContact) -> dict[str, float]:
-    """Relative errors of approach, area and largest pressure."""
+    """Relative errors of approach, contact area and largest pressure against Hertz."""
     hertz = by_axes(case.a, case.b, case.pair, load=case.load)
     exact = {"approach": float(hertz.approach), "area": np.pi * case.a * case.b, "peak": float(hertz.p0)}
     return {name: getattr(pressed, name) / value - 1 for name, value in exact.items()}
 
 
 def table(comparison: dict[str, Any]) -> Table:
-    """Table of the paper's comparison of both programs, with our figures."""
+    """Table of the paper's comparison of both programs, with measured figures."""
     error = {
         name: f"mean {100 * np.mean(e):.1f}, largest {100 * max(e):.0f} % of mu N"
         for name, e in comparison["errors"].items()

@@ -1,4 +1,4 @@
-"""Wheels at low speed in Exudyn: what an explicit and an implicit integrator need for the same decaying motion."""
+"""Rolling wheels at low speed in Exudyn: steps and force calls of explicit and implicit integrators."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,18 +15,18 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
 SYSTEM: System = "rolling-vehicle"
 DURATION = 0.2
-"""s, two periods and more of the suspension."""
+"""Duration of the runs (s), more than two periods of the suspension."""
 SPEEDS = (1.0, 0.1, 0.05, 0.0)
 METHODS = ("GeneralizedAlpha", "TrapezoidalIndex2")
 STEP_RATIO = 20
-"""Times the explicit limit that an implicit step is to be, at 1 m/s."""
+"""Implicit step divided by the longest stable explicit step, at 1 m/s."""
 STEPS = {1.0: (1e-3, 2e-3, 4e-3), 0.1: (1e-3, 4e-3), 0.05: (1e-3, 4e-3), 0.0: (1e-3, 4e-3)}
 
 
 @dataclass(frozen=True)
 class SlowWheelsRun:
-    """One run with slow wheels: speed, method, step (s), numbers of steps and force calls, and its error divided by the
-    largest remaining displacement."""
+    """A run with a slow wheel: speed (m/s), integrator, step (s), numbers of steps and force calls, and error divided
+    by the largest remaining displacement."""
 
     speed: float
     method: str
@@ -36,13 +36,13 @@ class SlowWheelsRun:
     error: float
 
 
-def wheel(speed: float) -> tuple[Wheels, tuple[Array, Array]]:
-    """A wheel with FASTSIM at a speed, and the displaced state from which it is released."""
+def wheel_and_start(speed: float) -> tuple[Wheels, tuple[Array, Array]]:
+    """A wheel with FASTSIM at a speed (m/s), and the displaced positions and rates from which it is released."""
     return Wheels(1, speed=speed), (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
 
 
 def counting_calls(function: Callable[..., Any], calls: list[int], increment: int = 1) -> Callable[..., Any]:
-    """The function, wrapped so that every call adds ``increment`` to ``calls``."""
+    """Returns the function wrapped so that every call adds ``increment`` to ``calls[0]``."""
 
     def counted(*arguments: Any) -> Any:
         calls[0] += increment
@@ -51,36 +51,38 @@ def counting_calls(function: Callable[..., Any], calls: list[int], increment: in
     return counted
 
 
-def march(speed: float, method: str, steps: int, with_slopes: bool = True) -> tuple[Array, int]:
-    """Final positions and number of force calls; raises RunFailed or Refused if the method cannot take the steps."""
-    (wheels, start), calls = wheel(speed), [0]
+def end_positions(speed: float, method: str, step_count: int, with_slopes: bool = True) -> tuple[Array, int]:
+    """Simulate a released wheel: returns final positions and number of force calls. Raises RunFailed or Refused if the
+    integrator cannot take the steps."""
+    (wheels, start), calls = wheel_and_start(speed), [0]
     forces = Forces(wheels)
     slopes = forces.slopes if with_slopes and method in METHODS else None
     rolling = Rolling(wheels, counting_calls(forces.of, calls), slopes=slopes)
-    return rolling.run(*start, steps, DURATION / steps, method)[: wheels.size], calls[0]
+    return rolling.run(*start, step_count, DURATION / step_count, method)[: wheels.size], calls[0]
 
 
 def longest_step(speed: float) -> float:
-    """Longest stable step (s) of RK44."""
-    return limit("RK44", 1e-3, LONG_RUN * 1e-3, linear(wheel(speed)[0]))
+    """Longest stable step (s) of the explicit RK44 for a wheel at a speed (m/s)."""
+    return limit("RK44", 1e-3, LONG_RUN * 1e-3, linear(wheel_and_start(speed)[0]))
 
 
-def runs(speed: float, steps: tuple[float, ...]) -> list[SlowWheelsRun]:
-    """One explicit run at nearly its longest stable step, and implicit runs with several steps (s). Their errors are
-    relative to an explicit run with half the step."""
+def runs(speed: float, implicit_steps: tuple[float, ...]) -> list[SlowWheelsRun]:
+    """Runs of a wheel at a speed (m/s): an explicit run near its longest stable step, and implicit runs with several
+    steps (s). Errors are relative to an explicit run with half the step."""
     coarse = int(np.ceil(1.05 * DURATION / longest_step(speed)))
-    true, _ = march(speed, "RK44", 2 * coarse)
+    true, _ = end_positions(speed, "RK44", 2 * coarse)
     done = []
-    for method, count in [("RK44", coarse)] + [(name, round(DURATION / step)) for name in METHODS for step in steps]:
-        end, calls = march(speed, method, count)
+    for method, count in [("RK44", coarse)] + [
+        (name, round(DURATION / step)) for name in METHODS for step in implicit_steps
+    ]:
+        end, calls = end_positions(speed, method, count)
         error = float(np.abs(end - true).max() / np.abs(true).max())
         done.append(SlowWheelsRun(speed, method, DURATION / count, count, calls, error))
     return done
 
 
 def rows(quick: bool) -> tuple[list[Row], list[SlowWheelsRun]]:
-    """Rows and runs: implicit methods at 1 m/s compared with explicit ones, and the messages where a step cannot be
-    taken."""
+    """Report rows and runs: errors of implicit integrators at 1 m/s, and the refusals where a step cannot be taken."""
     done = runs(1.0, (STEP_RATIO * longest_step(1.0), *(() if quick else STEPS[1.0])))
     if not quick:
         done += [run for speed in SPEEDS[1:] for run in runs(speed, STEPS[speed])]
@@ -108,7 +110,7 @@ def rows(quick: bool) -> tuple[list[Row], list[SlowWheelsRun]]:
         ("explicit", "RK44", True, "refused"),
     ):
         try:
-            march(0.1, method, 200, with_slopes)
+            end_positions(0.1, method, 200, with_slopes)
             said = "an answer"
         except (Refused, RunFailed) as error:
             said = "refused" if isinstance(error, Refused) else "raised"
@@ -118,8 +120,8 @@ def rows(quick: bool) -> tuple[list[Row], list[SlowWheelsRun]]:
     return judged, done
 
 
-def table(saved: list[dict[str, Any]]) -> Table:
-    """Table of all runs."""
+def table(saved_runs: list[dict[str, Any]]) -> Table:
+    """Table of steps, force calls and errors of all runs."""
     lines = tuple(
         (
             f"{run['speed']:g}",
@@ -129,7 +131,7 @@ def table(saved: list[dict[str, Any]]) -> Table:
             str(run["calls"]),
             f"{run['error']:.1e}",
         )
-        for run in saved
+        for run in saved_runs
     )
     note = (
         f"One wheel pulled aside by 0.1 mm and let go, {DURATION:g} s; error of its place by the largest "

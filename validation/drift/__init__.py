@@ -1,1 +1,1 @@
-"""Experiments that cases and tests of drift share."""
+"""Experiments on attitude and pitch estimation that the validation cases and tests of drift share."""

@@ -1,4 +1,4 @@
-"""Attitudes of bodies that turn, measured by a noisy gyro: what cases of the inertial unit share."""
+"""Attitudes of rotating bodies measured by a noisy gyro, for the validation cases of the inertial unit."""
 
 import math
 
@@ -15,20 +15,23 @@ from models.sensors.rotations import (
 
 SEED = 30
 PATHS_IN_MEMORY = 500
-"""Paths that stand side by side in memory."""
+"""Number of noise paths that are computed at a time."""
 START_ATTITUDE = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def turning_rates(sample_count: int, sample_period: float) -> np.ndarray:
-    """Local rates (sample_count, 3) in rad/s of a body that turns about all axes by one or two radians in two
-    seconds.
+    """Angular velocities (sample_count, 3) in rad/s, in body axes, of a body that turns about all axes by one or two
+    radians in two seconds.
     """
     t = sample_period * np.arange(sample_count)
     return np.column_stack([0.5 + 0.4 * np.sin(2.1 * t), 0.2 - 0.3 * np.cos(1.7 * t), 0.8 + 0.2 * np.cos(1.3 * t)])
 
 
 def coning_motion(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Local rates (n, 3) and attitude (n, 4) of S = Rz(W t) Rx(c) Rz(-W t), W = 2 rad/s, c = 0.3: W (S^T e_z - e_z)."""
+    """Angular velocity in body axes (n, 3) in rad/s and attitude quaternion (n, 4) of a coning motion at times t (s).
+
+    The rotation is S = Rz(W t) Rx(c) Rz(-W t) with W = 2 rad/s and c = 0.3, its angular velocity W (S^T e_z - e_z).
+    """
     spin, half = 2.0, 0.3
     turn_about_vertical = exponential(spin * t[:, None] * np.array([0.0, 0.0, 1.0]))
     tilt = exponential(np.array([half, 0.0, 0.0]))
@@ -40,22 +43,23 @@ def coning_motion(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def largest_angle(first: np.ndarray, other_attitudes: np.ndarray) -> float:
-    """Largest angle (rad) between attitudes (..., 4)."""
-    return float(np.abs(rotation_vector(quaternion_product(conjugate_quaternion(first), other_attitudes))).max())
+def largest_angle(attitudes: np.ndarray, other_attitudes: np.ndarray) -> float:
+    """Largest angle (rad) between two arrays of attitude quaternions (..., 4)."""
+    return float(np.abs(rotation_vector(quaternion_product(conjugate_quaternion(attitudes), other_attitudes))).max())
 
 
-def attitude_errors(rates: np.ndarray, sample_period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
-    """Rotations (paths, 4) between true and noisy attitude at the end, for noisy paths of one true motion."""
+def attitude_errors(rates: np.ndarray, sample_period: float, deviation: np.ndarray, path_count: int) -> np.ndarray:
+    """Rotation quaternions (path_count, 4) between the true attitude and the attitudes from noisy rates at the end of a
+    motion. deviation: of the noise of each rate sample (rad/s)."""
     true = true_attitude(rates, sample_period, START_ATTITUDE)[-1]
-    chunks = [range(first, min(first + PATHS_IN_MEMORY, paths)) for first in range(0, paths, PATHS_IN_MEMORY)]
+    chunks = [range(first, min(first + PATHS_IN_MEMORY, path_count)) for first in range(0, path_count, PATHS_IN_MEMORY)]
     ends = [measured_attitude(rates, sample_period, deviation, START_ATTITUDE, chunk, SEED)[-1] for chunk in chunks]
     return error_rotation(np.concatenate(ends), true)
 
 
-def standard_errors(attitudes: np.ndarray, law: np.ndarray) -> float:
-    """Largest difference between the mean rotation matrix of quaternions (n, 4) and its law, in standard errors of the
-    entry."""
+def standard_errors(attitudes: np.ndarray, expected_matrix: np.ndarray) -> float:
+    """Largest difference between the mean rotation matrix of quaternions (n, 4) and the expected matrix (3, 3), divided
+    by the standard error of the entry."""
     samples = rotation_matrix(attitudes)
     error = samples.std(axis=0, ddof=1) / math.sqrt(len(samples))
-    return float((np.abs(samples.mean(axis=0) - law) / error).max())
+    return float((np.abs(samples.mean(axis=0) - expected_matrix) / error).max())

@@ -1,4 +1,4 @@
-"""Experiments on the Kalman filter of the pitch: scenes, consistency, the linear closed loop, gaps, damage."""
+"""Experiments on the Kalman filter of the pitch: scenes, consistency, linear closed loop, missing samples, damage."""
 
 from dataclasses import replace
 from functools import cache
@@ -36,19 +36,19 @@ from models.vehicles.parameters.itwm_drift import PARAMETERS
 from validation.common.scenes import force_scene, road_scene
 
 ANGLE_DEVIATION = float(np.deg2rad(0.1))
-"""Deviation (rad) of the inertial unit, white at 1 kHz."""
+"""Standard deviation (rad) of the inertial unit's pitch samples, white noise at 1 kHz."""
 GYRO_DEVIATION = 0.1
-"""Deviation (rad/s) of the gyro, white at 1 kHz."""
+"""Standard deviation (rad/s) of the gyro's samples, white noise at 1 kHz."""
 FORCE_NOISE_SHARE = 0.002
-"""Deviation of the force noise by the largest force, at 1 kHz."""
+"""Standard deviation of the force noise divided by the largest force, at 1 kHz."""
 COARSE_PERIOD = 5e-3
-"""Sampling period (s) of the statistics; deviations per sample then keep the intensity of those at 1 kHz."""
+"""Sampling period (s) of the statistics; deviations per sample are scaled to the noise intensity at 1 kHz."""
 JUDGED_BAND = 15.0
-"""Hz, up to which the artificial moment is judged."""
+"""Frequency (Hz) up to which the artificial moment is judged."""
 
 
-def at_period(deviation: float, sample_period: float) -> float:
-    """Standard deviation per sample at a sampling period, such that the noise intensity is that of ``deviation`` at 1
+def deviation_at_period(deviation: float, sample_period: float) -> float:
+    """Standard deviation of samples at a sampling period (s) that has the same noise intensity as ``deviation`` at 1
     kHz."""
     return deviation * float(np.sqrt(1e-3 / sample_period))
 
@@ -64,22 +64,23 @@ def measured_drive(folder: Path, duration: float, sample_period: float) -> Resul
 
 
 def force_deviation(true_run: Result) -> float:
-    """Standard deviation of the force noise: 0.2 % of the largest wheel force (N)."""
+    """Standard deviation (N) of the force noise: 0.2 % of the largest wheel force of a run."""
     return FORCE_NOISE_SHARE * float(max(np.abs(true_run["f1"]).max(), np.abs(true_run["f2"]).max()))
 
 
-def driven_vehicle(
-    folder: Path, duration: float, effects: dict[str, Any], *, wrong: bool = False, geometry: str = "exact"
+def force_driven_scene(
+    folder: Path, duration: float, effects: dict[str, Any], *, perturbed: bool = False, geometry: str = "exact"
 ) -> Scene:
-    """Scene of the vehicle driven by the forces in the folder, with steps of 1 ms."""
-    override = perturbed_parameters(PARAMETERS) if wrong else {}
+    """Scene of the vehicle under the wheel forces in the folder, with steps of 1 ms. perturbed: whether the model's
+    parameters are wrong."""
+    override = perturbed_parameters(PARAMETERS) if perturbed else {}
     return changed_scene(
         force_scene(folder, duration=duration, override=override, effects=effects), vehicle={"geometry": geometry}
     )
 
 
-def noise_of(deviation: float, seed: int) -> dict[str, Any]:
-    """Settings of the effect that adds noise to the forces."""
+def force_noise_settings(deviation: float, seed: int) -> dict[str, Any]:
+    """Scene table of the effect that adds noise of a standard deviation (N) to the wheel forces."""
     return {"force_noise": {"deviation": deviation, "seed": seed}}
 
 
@@ -89,21 +90,27 @@ def free_run(assembly: Assembly, duration: float, sample_period: float) -> np.nd
     return states[:: round(sample_period / 1e-3)]
 
 
-def consistency(folder: Path, duration: float, seed: int, scales: dict[str, tuple[float, float]]) -> dict[str, Any]:
-    """NEES, NIS and innovations of filters in a run without model error, by name; ``scales`` multiplies their Q and R.
+def filter_consistency(
+    folder: Path, duration: float, seed: int, scales: dict[str, tuple[float, float]]
+) -> dict[str, Any]:
+    """Filter name -> normalised estimation errors squared (NEES), normalised innovations squared (NIS) and innovations
+    in a run without model error. ``scales``: factors of each filter's process and measurement noise.
 
     The true vehicle starts turned by a random angle, which the filter knows the deviation of. NEES (6 states) is
     taken once a second from the second one on, far beyond the estimate's memory of some 0.2 s.
     """
     true = measured_drive(folder, duration, COARSE_PERIOD)
-    force, angle = at_period(force_deviation(true), COARSE_PERIOD), at_period(ANGLE_DEVIATION, COARSE_PERIOD)
-    clean = assembly_of_scene(driven_vehicle(folder, duration, {}))
+    force, angle = (
+        deviation_at_period(force_deviation(true), COARSE_PERIOD),
+        deviation_at_period(ANGLE_DEVIATION, COARSE_PERIOD),
+    )
+    clean = assembly_of_scene(force_driven_scene(folder, duration, {}))
     turn = START_DEVIATION * float(normal_samples(seed, 1, 1, 1, source=PITCH_SENSOR)[0, 0])
     p, start = clean.parameters, clean.initial.copy()
     start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
     states = free_run(replace(clean, initial=start), duration, COARSE_PERIOD)
     measured_pitch = states[:, 3] + angle * normal_samples(seed, 0, len(states), 1, source=PITCH_SENSOR)[:, 0]
-    noisy = assembly_of_scene(driven_vehicle(folder, duration, noise_of(force, seed)))
+    noisy = assembly_of_scene(force_driven_scene(folder, duration, force_noise_settings(force, seed)))
     figures = {}
     for name, (q, r) in scales.items():
         measurement = Measurement(measured_pitch[:, None], COARSE_PERIOD, (PITCH,), (angle * np.sqrt(r),))
@@ -118,19 +125,19 @@ def consistency(folder: Path, duration: float, seed: int, scales: dict[str, tupl
 
 
 START_DEVIATION = 0.02
-"""Deviation (rad) of the start in the runs on consistency."""
+"""Standard deviation (rad) of the initial pitch in the runs on filter consistency."""
 
 
 def normalised_estimation_error(estimated: PitchEstimate, states: np.ndarray) -> np.ndarray:
-    """Normalised estimation error squared of the six states, once a second from the second one on."""
+    """Normalised estimation error squared (NEES) of the six relative states, once a second from 2 s on."""
     rows = np.arange(round(2 / estimated.period), len(states), round(1 / estimated.period))
     wrong = (estimated.states[rows, :6] - states[rows] @ RELATIVE_STATES.T)[:, :, None]
     return (wrong.transpose(0, 2, 1) @ np.linalg.solve(estimated.errors()[rows, :6, :6], wrong))[:, 0, 0]
 
 
-def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]:
-    """Linearised loop of filter and vehicle: transition (14, 14) and stationary covariance of the filter's error, the
-    run's error and the force noise.
+def closed_loop_covariance(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]:
+    """Transition matrix (14, 14) and stationary covariance (14, 14) of the linearised loop of filter and vehicle. Its
+    states are the filter's error (6), the run's error (6) and the force noise (2).
 
     Errors are those of the six relative states at the samples, estimate after its update, ``COARSE_PERIOD`` apart.
     Exact: exponentials of the vehicle's and of the held vehicle's matrices under inputs that are linear between
@@ -139,8 +146,8 @@ def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]
     """
     import control
 
-    force, angle = deviation, at_period(ANGLE_DEVIATION, COARSE_PERIOD)
-    assembly = assembly_of_scene(driven_vehicle(folder, 1.0, {}, geometry="linear"))
+    force, angle = deviation, deviation_at_period(ANGLE_DEVIATION, COARSE_PERIOD)
+    assembly = assembly_of_scene(force_driven_scene(folder, 1.0, {}, geometry="linear"))
     stiffness, damping = spring_of(assembly.parameters, PULL_BANDWIDTH, 0.7)
     free, pushes = relative_state_matrices(assembly)
     lever = np.zeros((6, 6))
@@ -163,8 +170,8 @@ def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def relative_state_matrices(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
-    """Matrices A (6, 6) and B (6, 2) of the states relative to the chassis under wheel forces, linearised about zero
-    pitch."""
+    """State matrix A (6, 6) and input matrix B (6, 2) for wheel forces of the vehicle's states relative to the chassis,
+    linearised about zero pitch."""
     p = assembly.parameters
     pushes = np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
@@ -172,8 +179,8 @@ def relative_state_matrices(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]
 
 
 def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Discretisation over COARSE_PERIOD with linearly interpolated input: transition matrix, and input matrices of the
-    samples at start and end."""
+    """Discretises x' = a x + b u over COARSE_PERIOD with linearly interpolated input: transition matrix, and input
+    matrices for the samples at start and end."""
     n, m = b.shape
     block = np.zeros((n + 2 * m, n + 2 * m))
     block[:n, :n], block[:n, n : n + m] = a, b
@@ -184,8 +191,8 @@ def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> np.ndarray:
-    """Errors (n, 12) of the estimate and of the run, ordered as in ``closed_loop``, from 2 s on, by the effect itself
-    on the linearised vehicle.
+    """Errors (n, 12) of the estimate and of the run, from 2 s on, ordered as in ``closed_loop_covariance``, simulated
+    with the effect ``kalman_filter`` on the linearised vehicle.
 
     deviation : N, at COARSE_PERIOD. The true vehicle rests, because the interpolation of a moving estimate between its
     samples would add an error that is no noise.
@@ -193,17 +200,22 @@ def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> n
     rest_assembly = assembly_of_scene(
         build_scene({"title": "kalman", "vehicle": {"geometry": "linear"}, "run": {"duration": 1.0}})
     )
-    p, start, angle = rest_assembly.parameters, rest_assembly.initial, at_period(ANGLE_DEVIATION, COARSE_PERIOD)
+    p, start, angle = (
+        rest_assembly.parameters,
+        rest_assembly.initial,
+        deviation_at_period(ANGLE_DEVIATION, COARSE_PERIOD),
+    )
     count = round(duration / COARSE_PERIOD) + 1
     write_wheel_forces(folder, np.full(count, p.k1 * start[0]), np.full(count, p.k2 * start[1]), COARSE_PERIOD)
     measured_pitch = start[3] + angle * normal_samples(seed, 0, count, 1, source=PITCH_SENSOR)[:, 0]
     write_time_series(folder / "read.csv", {"pitch": ("rad", measured_pitch)}, COARSE_PERIOD)
     effect = {"file": "read.csv", "force_deviation": deviation, "pitch_deviation": angle}
-    noise = noise_of(deviation, seed)
-    drawn = driven_vehicle(folder, duration, noise | {"kalman_filter": effect}, geometry="linear")
+    noise = force_noise_settings(deviation, seed)
+    drawn = force_driven_scene(folder, duration, noise | {"kalman_filter": effect}, geometry="linear")
     run = free_run(assembly_of_scene(drawn), duration, COARSE_PERIOD)
     guide = guide_of(
-        assembly_of_scene(driven_vehicle(folder, duration, noise, geometry="linear")), drawn.effects["kalman_filter"]
+        assembly_of_scene(force_driven_scene(folder, duration, noise, geometry="linear")),
+        drawn.effects["kalman_filter"],
     )
     errors = np.hstack([guide.states[:, :6] - RELATIVE_STATES @ start, (run - start) @ RELATIVE_STATES.T])
     return errors[round(2 / COARSE_PERIOD) :]
@@ -222,10 +234,10 @@ def spread_of_mean_square(step: np.ndarray, covariance: np.ndarray, sample_count
 
 
 def scores_of_stabilised(
-    folder: Path, duration: float, seed: int, engines: tuple[str, ...], wrong: bool = True
+    folder: Path, duration: float, seed: int, engines: tuple[str, ...], perturbed: bool = True
 ) -> dict[str, dict[str, float]]:
-    """Scores of the runs of each engine that the Kalman filter stabilises, for one noise sample: damage ratios, shares
-    of the artificial moment, and pitch error."""
+    """Engine -> scores of a run that the Kalman filter stabilises, for a noise path: damage ratios, shares of the
+    artificial moment, and largest pitch error (rad)."""
     true = measured_drive(folder, duration, 1e-3)
     measured_pitch = (
         true["pitch"] + ANGLE_DEVIATION * normal_samples(seed, 0, len(true.times), 1, source=PITCH_SENSOR)[:, 0]
@@ -238,12 +250,14 @@ def scores_of_stabilised(
         "pitch_deviation": ANGLE_DEVIATION,
         "inertia_deviation": INERTIA_UNCERTAINTY,
     }
-    scene = driven_vehicle(folder, duration, noise_of(force, seed) | {"kalman_filter": effect}, wrong=wrong)
+    scene = force_driven_scene(
+        folder, duration, force_noise_settings(force, seed) | {"kalman_filter": effect}, perturbed=perturbed
+    )
     return {engine: _scores_of_run(true, simulate(scene, engine)) for engine in engines}
 
 
 INERTIA_UNCERTAINTY = 0.05
-"""What the filter is told of the model: its inertia may be 5 % wrong."""
+"""Standard deviation of the relative error of the model's inertia that the filter assumes: 5 %."""
 
 
 def _scores_of_run(true_run: Result, run: Result) -> dict[str, float]:
@@ -263,9 +277,9 @@ def _scores_of_run(true_run: Result, run: Result) -> dict[str, float]:
     return scores
 
 
-def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
-    """Standard deviation of the pitch (rad) after a long run on a gyro alone, and the value that its averaged
-    instability predicts.
+def gyro_only_pitch_error(folder: Path, duration: float, seed: int) -> dict[str, float]:
+    """Pitch error (rad) after a long run with a gyro as the only sensor: rms error, the filter's stated deviation, the
+    deviation that the averaged instability predicts, and a random walk.
 
     The law: the stationary Riccati equation of pitch'' = lambda^2 pitch + noise with the rate measured. About a
     vehicle that stands level, A(0), the same gyro leaves a random walk.
@@ -273,8 +287,11 @@ def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
     import control
 
     true = measured_drive(folder, duration, COARSE_PERIOD)
-    force, gyro = at_period(force_deviation(true), COARSE_PERIOD), at_period(GYRO_DEVIATION, COARSE_PERIOD)
-    assembly = assembly_of_scene(driven_vehicle(folder, duration, noise_of(force, seed)))
+    force, gyro = (
+        deviation_at_period(force_deviation(true), COARSE_PERIOD),
+        deviation_at_period(GYRO_DEVIATION, COARSE_PERIOD),
+    )
+    assembly = assembly_of_scene(force_driven_scene(folder, duration, force_noise_settings(force, seed)))
     clean = true.states
     measured_rate = clean[:, 7] + gyro * normal_samples(seed, 0, len(clean), 1, source=PITCH_SENSOR)[:, 0]
     estimated = estimate(assembly, Measurement(measured_rate[:, None], COARSE_PERIOD, (PITCH_RATE,), (gyro,)), force)
@@ -293,7 +310,7 @@ def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
     }
 
 
-def with_gaps(
+def run_with_missing_samples(
     folder: Path,
     duration: float,
     seed: int,
@@ -301,27 +318,29 @@ def with_gaps(
     random_gaps: float,
     outage: tuple[float, float] | None,
 ) -> dict[str, float]:
-    """Figures of a stabilised run on a file with missing samples: largest ratio of the pitch error to the deviation
-    that the filter states, and counts of missing samples."""
+    """Figures of a stabilised run on a file with missing samples: largest pitch error (rad), largest pitch error
+    divided by the deviation that the filter states, and counts of missing samples."""
     true = measured_drive(folder, duration, COARSE_PERIOD)
     deviations = {
-        PITCH: at_period(ANGLE_DEVIATION, COARSE_PERIOD),
-        PITCH_RATE: at_period(GYRO_DEVIATION, COARSE_PERIOD),
+        PITCH: deviation_at_period(ANGLE_DEVIATION, COARSE_PERIOD),
+        PITCH_RATE: deviation_at_period(GYRO_DEVIATION, COARSE_PERIOD),
     }
-    clean = free_run(assembly_of_scene(driven_vehicle(folder, duration, {})), duration, COARSE_PERIOD)
+    clean = free_run(assembly_of_scene(force_driven_scene(folder, duration, {})), duration, COARSE_PERIOD)
     noise = normal_samples(seed, 0, len(clean), 3, source=PITCH_SENSOR)
     lost = np.abs(noise[:, 2]) < random_gaps
     if outage is not None:
         lost[round(outage[0] / COARSE_PERIOD) : round(outage[1] / COARSE_PERIOD)] = True
     names = {PITCH: ("pitch", "rad", 3, "pitch_deviation"), PITCH_RATE: ("pitch_rate", "rad/s", 7, "rate_deviation")}
-    table, force = {}, at_period(force_deviation(true), COARSE_PERIOD)
+    table, force = {}, deviation_at_period(force_deviation(true), COARSE_PERIOD)
     effect: dict[str, Any] = {"file": "read.csv", "force_deviation": force}
     for i, column in enumerate(columns):
         name, unit, state, key = names[column]
         table[name] = (unit, np.where(lost, np.nan, clean[:, state] + deviations[column] * noise[:, i]))
         effect[key] = deviations[column]
     write_time_series(folder / "read.csv", table, COARSE_PERIOD)
-    run = simulate(driven_vehicle(folder, duration, noise_of(force, seed) | {"kalman_filter": effect}), "reference")
+    run = simulate(
+        force_driven_scene(folder, duration, force_noise_settings(force, seed) | {"kalman_filter": effect}), "reference"
+    )
     stride = round(COARSE_PERIOD / 1e-3)
     wrong = run["pitch_estimate"][::stride] - clean[:, 3]
     sure = run["pitch_deviation"][::stride]

@@ -1,4 +1,5 @@
-"""The paper's ten minutes of noisy rates: their numbers, their table, and the figures of them and of a recording."""
+"""The paper's example of ten minutes of noisy gyro rates: its parameters, table and figure, and a recording's
+figure."""
 
 import math
 
@@ -8,11 +9,11 @@ from models.sensors.inertial_unit import random_walk
 from validation.common.rows import Drawn, Saved, Table
 
 TEN_MINUTES, SAMPLING_RATE, RATE_DEVIATION = 600.0, 1000.0, 0.1
-"""s, Hz, rad/s per sample: the paper's own example."""
+"""Duration (s), sampling rate (Hz) and standard deviation (rad/s) of each rate sample in the paper's example."""
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Table of the ten-minute example's angle errors over time."""
+    """Table of the rms angle errors over time in the ten-minute example; none where it was not measured."""
     if not case_data["ten minutes"]:
         return []
     rms, walk = case_data["ten minutes"]["rms"], math.degrees(random_walk(RATE_DEVIATION, SAMPLING_RATE))
@@ -25,7 +26,8 @@ def tables(case_data: Saved) -> list[Table]:
 
 
 def draw(case_data: Saved) -> Drawn:
-    """Draw errors like the paper's Figure 2, and the recorded minute, where they were measured."""
+    """Figures of the attitude errors as in the paper's Figure 2, and of a recorded minute in a real car, where they
+    were measured."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, add_heading, subplots
 
     figures = []

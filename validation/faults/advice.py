@@ -1,6 +1,7 @@
-"""Faults of the recommendation of a setting, one at a time, and the checks that see them.
+"""Faults planted in the recommendation of engine, method and step, and the checks that see them.
 
-The scene has a closed form, y' = y cos t, hence y = exp(sin t), so what each setting does is known without a search.
+The test problem has a closed form, y' = y cos t, y = exp(sin t), so that the error of each setting is known without a
+search.
 """
 
 import math
@@ -26,16 +27,17 @@ METHOD_STAGES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
     "midpoint": ((0.0, 0.5), (0.0, 1.0)),
     "RK4": ((0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
 }
-"""Places of stages within a step, each from the one before, and weights."""
+"""Integrator -> times of its stages within a step (divided by the step), and weights of the stages. Each stage uses the
+slope of the previous one."""
 LOOSE_TOLERANCE, TIGHT_TOLERANCE = 0.03, 6e-7
-"""Tolerances: the first is met most cheaply by the default method as it comes, the second by another one."""
+"""Tolerance that the default setting meets with the fewest force calls, and tolerance that another method does."""
 CALL_SECONDS = 1e-6
-"""s, of a force call by the clock of these checks."""
+"""Duration (s) of a force call by the simulated clock of these checks."""
 
 
 class _Clock:
-    """Simulated clock that advances with force calls only, so that the setting recommended by time is the same on any
-    machine."""
+    """Simulated clock that advances with force calls only, so that the setting recommended by computing time is the
+    same on any machine."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -52,15 +54,15 @@ CLOCK = _Clock()
 
 @dataclass(frozen=True)
 class Swing:
-    """Test problem y' = y cos t for ``models.advice.price.PricedScene``. Its error goes on growing after the part of
-    the run that is searched."""
+    """Test problem y' = y cos t in the form of ``models.advice.price.PricedScene``. Its error keeps growing after the
+    part of the run in which settings are searched."""
 
     title, quantity, unit, kink_period, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
     full_duration, searched_duration = 8.0, 2.0
 
     def ladders(self) -> list[SettingLadder]:
-        """Settings of four methods of one engine: the default has order 2, and one method breaks down at a finer
-        step."""
+        """Settings (step sizes) of four methods of an engine: the default has order 2, and the method "broken" gives
+        NaN."""
         return [
             SettingLadder("mujoco", "RK4", STEPS_TRIED, 4),
             SettingLadder("mujoco", "midpoint", STEPS_TRIED, 2, default=STEPS_TRIED[0]),
@@ -69,15 +71,15 @@ class Swing:
         ]
 
     def reference(self) -> SettingLadder:
-        """RK4 with halved steps; the accuracy of the coarsest one is no better than that of some settings to be
-        judged."""
+        """Settings of the reference: RK4 with successively halved steps. The coarsest is no more accurate than some
+        settings to be judged."""
         return SettingLadder("reference", "RK4", tuple(0.1 / 2**k for k in range(8)), 4)
 
     def second_setting(self, reference_setting: Setting) -> None:
-        """None, as no second method is needed: the checks know the closed form."""
+        """Returns no second reference method, as the checks know the closed form."""
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
-        """Times and values of the solution, and number of force calls."""
+        """Times (s) and values y of the solution with a setting, and number of force calls."""
         n = round(duration / setting.value)
         stage_positions, weights = METHOD_STAGES.get(setting.method, METHOD_STAGES["Euler"])
         values = [1.0]
@@ -91,12 +93,12 @@ class Swing:
         return sample_times, np.array(swing), len(stage_positions) * n
 
     def priced_run(self, solution: tuple[np.ndarray, np.ndarray, int]) -> PricedRun:
-        """The quantity y of a solution."""
+        """A solution as a priced run: times, values y and number of force calls."""
         times, values, calls = solution
         return PricedRun(times, values[:, None], {"force calls": calls})
 
     def lines(self, setting: Setting) -> list[str]:
-        """Lines for a scene file: the setting's name."""
+        """Lines of a scene file that select a setting; here its label."""
         return [setting.label()]
 
 
@@ -110,7 +112,7 @@ def _step(t: float, y: float, step: float, stage_positions: tuple[float, ...], w
 
 @cache
 def _error(setting: Setting) -> float:
-    """True error over the complete run; infinite if a value is not finite."""
+    """Largest true error of a setting over the complete run; infinite if a value is not finite."""
     sample_times, values, _ = Swing().solve(setting, Swing.full_duration)
     worst = float(np.abs(values - np.exp(np.sin(sample_times))).max())
     return worst if math.isfinite(worst) else math.inf
@@ -118,7 +120,7 @@ def _error(setting: Setting) -> float:
 
 @cache
 def _fewest_calls(tolerance: float) -> int:
-    """Fewest force calls with which any setting keeps the tolerance, found by running all settings."""
+    """Fewest force calls with which a setting keeps the tolerance, by running all settings."""
     swing = Swing()
     return min(
         swing.solve(setting, swing.full_duration)[2]
@@ -136,18 +138,20 @@ def _choice_for(tolerance: float) -> Recommendation:
         return recommendation.recommend(Swing(), tolerance)
 
 
-def _largest_winner(
-    size_of: Callable[[SettingChoice, float], float], kind: str = "", tolerances: tuple[float, ...] = (TIGHT_TOLERANCE,)
+def _largest_over_recommended(
+    size_of: Callable[[SettingChoice, float], float],
+    cost_kind_prefix: str = "",
+    tolerances: tuple[float, ...] = (TIGHT_TOLERANCE,),
 ) -> float:
-    """Largest ``size_of`` among the recommended settings of one kind of cost, over all tolerances; infinite where none
-    is recommended.
+    """Largest ``size_of`` over tolerances and the settings recommended for a kind of cost ("calls" or "seconds");
+    infinite where none is recommended.
     """
     return max(
         max(
             (
                 size_of(choice, tolerance)
                 for (_, cost_kind), choice in _choice_for(tolerance).winners.items()
-                if cost_kind.startswith(kind)
+                if cost_kind.startswith(cost_kind_prefix)
             ),
             default=math.inf,
         )
@@ -168,29 +172,29 @@ def _excess_calls(choice: SettingChoice, tolerance: float) -> float:
 
 
 CHECKS = {
-    "held": Check("true error by the tolerance", "", 1.0, lambda: _largest_winner(_error_by_tolerance)),
+    "held": Check("true error by the tolerance", "", 1.0, lambda: _largest_over_recommended(_error_by_tolerance)),
     "told": Check(
         "logarithm of predicted by true error",
         "",
         0.1,
-        lambda: _largest_winner(_log_error_ratio, "", (LOOSE_TOLERANCE, TIGHT_TOLERANCE)),
+        lambda: _largest_over_recommended(_log_error_ratio, "", (LOOSE_TOLERANCE, TIGHT_TOLERANCE)),
     ),
     "calls": Check(
         "force calls beyond the fewest that hold the tolerance",
         "",
         1e-12,
-        lambda: _largest_winner(_excess_calls, "calls", (LOOSE_TOLERANCE, TIGHT_TOLERANCE)),
+        lambda: _largest_over_recommended(_excess_calls, "calls", (LOOSE_TOLERANCE, TIGHT_TOLERANCE)),
     ),
     "seconds": Check(
         "the same of the setting recommended by seconds, where a call costs the same in all",
         "",
         recommendation.SLOWER_RATIO - 1.0,
-        lambda: _largest_winner(_excess_calls, "seconds"),
+        lambda: _largest_over_recommended(_excess_calls, "seconds"),
     ),
 }
 
 
-def _in_module(name: str, change: Callable[[Any], Any], module: str = "recommendation") -> Patch:
+def _advice_patch(name: str, change: Callable[[Any], Any], module: str = "recommendation") -> Patch:
     return attribute_patch(f"models.advice.price.{module}:{name}", change)
 
 
@@ -204,7 +208,7 @@ def _tenfold_smaller_errors(original: Any) -> Any:
     return planted
 
 
-def _by_error(timed_choices: list[SettingChoice], engine: str, cost_kind: str) -> SettingChoice | None:
+def _most_accurate_choice(timed_choices: list[SettingChoice], engine: str, cost_kind: str) -> SettingChoice | None:
     return min(timed_choices, key=lambda choice: choice.error, default=None)
 
 
@@ -217,12 +221,12 @@ def _mean_error(self: ReferenceTruth, other_run: PricedRun) -> float:
     return float(np.abs(other_run.values - exact).mean()) if np.isfinite(other_run.values).all() else np.inf
 
 
-def _numbers_alone(self: ReferenceTruth, other_run: PricedRun) -> float:
+def _error_without_nan(self: ReferenceTruth, other_run: PricedRun) -> float:
     exact = values_at(self.run, other_run.times, self.kink_period)
     return float(np.nanmax(np.abs(other_run.values - exact)))
 
 
-def _first_rung(
+def _coarsest_reference(
     scene: Any, ladder: SettingLadder, tolerance: float, duration: float, first_rung: int, executor: object
 ) -> Any:
     return scene.priced_run(scene.solve(ladder.setting(0), duration)), 0, 0.0, 0.0, {}
@@ -232,18 +236,18 @@ FAULTS = (
     CampaignFault(
         "predicted error a tenth of what was measured",
         "recommendation",
-        _in_module("_with_finer_truth", _tenfold_smaller_errors),
+        _advice_patch("_with_finer_truth", _tenfold_smaller_errors),
     ),
     CampaignFault(
         "the most accurate setting wins, not the cheapest",
         "recommendation",
-        _in_module("_cheapest", lambda _: _by_error),
+        _advice_patch("_cheapest", lambda _: _most_accurate_choice),
     ),
-    CampaignFault("the dearest setting wins", "recommendation", _in_module("_cheapest", lambda _: _dearest_choice)),
+    CampaignFault("the dearest setting wins", "recommendation", _advice_patch("_cheapest", lambda _: _dearest_choice)),
     CampaignFault(
         "the engine's default dropped from the race",
         "recommendation",
-        _in_module(
+        _advice_patch(
             "_timed_settings",
             lambda real: lambda search: [timed for timed in real(search) if not timed.tried.setting.default],
         ),
@@ -251,33 +255,35 @@ FAULTS = (
     CampaignFault(
         "the default kept whatever it costs",
         "recommendation",
-        _in_module("_is_slower", lambda _: lambda rival, best: False),
+        _advice_patch("_is_slower", lambda _: lambda rival, best: False),
     ),
     CampaignFault(
         "judged over the part that is searched alone",
         "recommendation",
-        _in_module(
+        _advice_patch(
             "_confirmed_over_whole_run",
             lambda _: lambda search, timed, winners, _executor: (search.truth, timed, winners),
         ),
     ),
     CampaignFault(
-        "mean difference for the largest", "truth", _in_module("ReferenceTruth.error", lambda _: _mean_error, "truth")
+        "mean difference for the largest",
+        "truth",
+        _advice_patch("ReferenceTruth.error", lambda _: _mean_error, "truth"),
     ),
     CampaignFault(
         "what is no number left out of the error",
         "truth",
-        _in_module("ReferenceTruth.error", lambda _: _numbers_alone, "truth"),
+        _advice_patch("ReferenceTruth.error", lambda _: _error_without_nan, "truth"),
     ),
     CampaignFault(
         "the reference's first step taken for the truth",
         "truth",
-        _in_module("_settled_answer", lambda _: _first_rung, "truth"),
+        _advice_patch("_settled_answer", lambda _: _coarsest_reference, "truth"),
     ),
     CampaignFault(
         "a tolerance three times too wide",
         "search",
-        _in_module("Search.largest_allowed_error", lambda _: property(lambda self: 3.0 * self.tolerance), "search"),
+        _advice_patch("Search.largest_allowed_error", lambda _: property(lambda self: 3.0 * self.tolerance), "search"),
     ),
 )
 

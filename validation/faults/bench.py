@@ -1,4 +1,4 @@
-"""The bench on which an engine is judged with and without a fault: one vehicle in seven small situations.
+"""Test bench for an engine with and without a planted fault: a pitch-plane vehicle in seven short situations.
 
 Inputs are closed forms that start at rest in the static equilibrium, with different frequencies front
 and rear, so that nothing cancels by accident. Forces are sampled at 500 Hz and stepped at 1 kHz: a sample
@@ -20,7 +20,7 @@ from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
 from validation.common import checks
 from validation.common.checks import (
-    Make,
+    ModelBuilder,
     enforced_gap,
     equilibrium_gap,
     momentum_gap,
@@ -34,14 +34,14 @@ from validation.common.checks import (
 STEP = 1e-3
 SAMPLING_PERIOD = 2e-3
 ORDER_STEP = 2.5e-4
-"""Step of the order check (s), where the stiff wheels no longer bend the observed order of RK4."""
+"""Step (s) of the check of the convergence order, at which the stiff wheels no longer distort the order of RK4."""
 RUNGE_KUTTA = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
 CONSTRAINED_INTEGRATORS = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
 ROUNDING_BOUND = 1e-12
 
 
 def bench_scene(parameters: str, duration: float) -> Scene:
-    """The vehicle on the study road at 20 m/s."""
+    """Scene of the vehicle with a parameter set on the study road at 20 m/s."""
     return build_scene(
         {
             "title": "bench",
@@ -54,8 +54,7 @@ def bench_scene(parameters: str, duration: float) -> Scene:
 
 @dataclass(eq=False)
 class Bench:
-    """A vehicle, named by its parameter set, in several situations of ``duration`` (s), in which faults are looked
-    for."""
+    """A vehicle, named by its parameter set, in several situations of a duration (s), for checks on planted faults."""
 
     parameters: str
     duration: float
@@ -66,33 +65,33 @@ class Bench:
         return assembly_of_scene(bench_scene(self.parameters, self.duration))
 
     @cached_property
-    def flat(self) -> Assembly:
+    def flat_road(self) -> Assembly:
         """The vehicle on a flat road, at rest."""
         return replace(self.road, mode="free", input=None)
 
     @cached_property
-    def linear(self) -> Assembly:
+    def linear_forces(self) -> Assembly:
         """The vehicle under wheel forces that are linear between their samples."""
         return self.road.without_tyres().with_input("force", Sampled(self._forces(), SAMPLING_PERIOD, held=False))
 
     @cached_property
-    def held(self) -> Assembly:
+    def held_forces(self) -> Assembly:
         """The vehicle under wheel forces that are constant over each sample."""
         return self.road.without_tyres().with_input("force", Sampled(self._forces(), SAMPLING_PERIOD, held=True))
 
     @cached_property
-    def guided(self) -> Assembly:
+    def prescribed_pitch(self) -> Assembly:
         """The vehicle under wheel forces, with a prescribed pitch."""
         start = self.road.initial
-        pitch = Smooth((start[3] + 0.05 * self._swell(7.0))[:, None], SAMPLING_PERIOD, derivatives=2, degree=5)
+        pitch = Smooth((start[3] + 0.05 * self._oscillation(7.0))[:, None], SAMPLING_PERIOD, derivatives=2, degree=5)
         forces = Smooth(self._forces(), SAMPLING_PERIOD)
         return self.road.without_tyres().with_input("pitch", Stacked((forces, pitch)))
 
     @cached_property
-    def on_rails(self) -> Assembly:
+    def prescribed_heave_and_pitch(self) -> Assembly:
         """The vehicle under wheel forces, with heave and pitch prescribed."""
         start = self.road.initial
-        motion = start[2:4] + np.column_stack([0.01 * self._swell(9.0), 0.05 * self._swell(7.0)])
+        motion = start[2:4] + np.column_stack([0.01 * self._oscillation(9.0), 0.05 * self._oscillation(7.0)])
         parts = (Smooth(self._forces(), SAMPLING_PERIOD), Smooth(motion, SAMPLING_PERIOD, derivatives=2, degree=5))
         return self.road.without_tyres().with_input("heave-pitch", Stacked(parts))
 
@@ -100,76 +99,84 @@ class Bench:
     def stabilised(self) -> Assembly:
         """The vehicle under sampled wheel forces, with an added moment, and with a pitch spring whose dead band is
         exceeded."""
-        moment = Sampled(3e3 * self._swell(31.0)[:, None], SAMPLING_PERIOD, held=False)
+        moment = Sampled(3e3 * self._oscillation(31.0)[:, None], SAMPLING_PERIOD, held=False)
         spring = PitchSpring("chassis", 5e4, 500.0, 2e-3)
-        vehicle = replace(self.held.vehicle, pitch_springs=(spring,))
-        return replace(self.held, vehicle=vehicle).with_moment(moment)
+        vehicle = replace(self.held_forces.vehicle, pitch_springs=(spring,))
+        return replace(self.held_forces, vehicle=vehicle).with_moment(moment)
 
     @cached_property
-    def truth(self) -> Trajectory:
-        """The reference's run on the road at a sixteenth of the order check's step, which serves as truth."""
+    def fine_reference_run(self) -> Trajectory:
+        """The reference's run on the road at a sixteenth of the order check's step, which serves as the exact path."""
         return checks.engine("reference")(self.road, Settings("RK4", ORDER_STEP / 16, self.duration)).run()
 
     @cache  # noqa: B019 - a bench lives as long as its case
-    def path(self, situation: str) -> Trajectory:
-        """The reference's run of a situation, by the name of its attribute."""
+    def reference_run(self, situation: str) -> Trajectory:
+        """The reference's run of a situation, given by the name of its attribute."""
         return checks.engine("reference")(getattr(self, situation), self.settings("reference")).run()
 
     @cache  # noqa: B019
-    def accelerations(self, situation: str) -> np.ndarray:
-        """The reference's accelerations (100, 4) in a situation."""
+    def reference_accelerations(self, situation: str) -> np.ndarray:
+        """The reference's accelerations (100, 4) at random states in a situation."""
         reference, settings = checks.engine("reference"), self.settings("reference")
         return checks.accelerations(reference, getattr(self, situation), settings, random_states())
 
-    def _swell(self, frequency: float) -> np.ndarray:
+    def _oscillation(self, frequency: float) -> np.ndarray:
         """Samples that rise smoothly from 0 to 1 and fall back, periodically with a frequency in rad/s."""
         sample_times = SAMPLING_PERIOD * np.arange(round(self.duration / SAMPLING_PERIOD) + 4)
         return 0.5 * (1 - np.cos(frequency * sample_times))
 
     def _forces(self) -> np.ndarray:
-        """Wheel forces (n, 2) in N: the static ones, raised periodically by up to 20 % in front and 15 % behind."""
+        """Wheel forces (n, 2) in N: static forces, raised periodically by up to 20 % in front and 15 % at the rear."""
         p = self.road.parameters
         front, rear = p.m1 + p.m3 * p.a / (p.a + p.b), p.m2 + p.m3 * p.b / (p.a + p.b)
-        return p.g * np.column_stack([front * (1 + 0.2 * self._swell(20.0)), rear * (1 + 0.15 * self._swell(27.0))])
+        return p.g * np.column_stack(
+            [front * (1 + 0.2 * self._oscillation(20.0)), rear * (1 + 0.15 * self._oscillation(27.0))]
+        )
 
     def settings(self, engine: str) -> Settings:
-        """Classical Runge-Kutta at 1 ms in every engine."""
+        """Settings of an engine: classical Runge-Kutta method with steps of 1 ms."""
         return Settings(RUNGE_KUTTA[engine], STEP, self.duration)
 
 
 @dataclass(frozen=True)
 class Check:
-    """A check that looks for faults. measure(bench, engine name, make) returns an error; if this exceeds ``tolerance``,
-    the check has seen the fault."""
+    """A check for planted faults. measure(bench, engine name, model builder) returns an error; the check sees a fault
+    if the error exceeds tolerance(engine name)."""
 
     title: str
     unit: str
     tolerance: Callable[[str], float]
     why: str
-    measure: Callable[[Bench, str, Make], float]
+    measure: Callable[[Bench, str, ModelBuilder], float]
 
 
-def _acceleration_error(bench: Bench, engine: str, make_engine: Make) -> float:
+def _acceleration_error(bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
     settings, states = bench.settings(engine), random_states()
     return max(
         relative_difference(
-            checks.accelerations(make_engine, getattr(bench, name), settings, states), bench.accelerations(name)
+            checks.accelerations(make_engine, getattr(bench, name), settings, states),
+            bench.reference_accelerations(name),
         )
-        for name in ("road", "linear")
+        for name in ("road", "linear_forces")
     )
 
 
-def _order(bench: Bench, engine: str, make_engine: Make) -> float:
-    return order_gap(make_engine, bench.road, replace(bench.settings(engine), step=ORDER_STEP), bench.truth)
+def _order_error(bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
+    return order_gap(
+        make_engine, bench.road, replace(bench.settings(engine), step=ORDER_STEP), bench.fine_reference_run
+    )
 
 
-def _momentum_error(bench: Bench, engine: str, make_engine: Make) -> float:
-    return max(momentum_gap(make_engine, assembly, bench.settings(engine)) for assembly in (bench.linear, bench.held))
+def _momentum_error(bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
+    return max(
+        momentum_gap(make_engine, assembly, bench.settings(engine))
+        for assembly in (bench.linear_forces, bench.held_forces)
+    )
 
 
-def _enforced_force_check(situation: str) -> Callable[[Bench, str, Make], float]:
-    """A check's function: error of the enforced moment and force, compared with the form in which the pitch is
-    eliminated."""
+def _enforced_force_check(situation: str) -> Callable[[Bench, str, ModelBuilder], float]:
+    """Returns a check's function: error of the enforced moment and force in a situation, against the reference, which
+    eliminates the prescribed coordinates."""
     return lambda bench, engine, make: enforced_gap(
         make,
         getattr(bench, situation),
@@ -177,10 +184,10 @@ def _enforced_force_check(situation: str) -> Callable[[Bench, str, Make], float]
     )
 
 
-def _path_difference_check(situation: str) -> Callable[[Bench, str, Make], float]:
-    """A check's function: largest difference of an engine's path from the reference's."""
+def _path_difference_check(situation: str) -> Callable[[Bench, str, ModelBuilder], float]:
+    """Returns a check's function: largest difference of an engine's path from the reference's in a situation."""
     return lambda bench, engine, make: state_gap(
-        run(make, getattr(bench, situation), bench.settings(engine)), bench.path(situation)
+        run(make, getattr(bench, situation), bench.settings(engine)), bench.reference_run(situation)
     )
 
 
@@ -200,9 +207,11 @@ CHECKS: dict[str, Check] = {
         "path on the road", "SI", _rounding_error, "same tableau, same step: rounding", _path_difference_check("road")
     ),
     "linear twin": Check(
-        "path under linear forces", "SI", _rounding_error, "the same", _path_difference_check("linear")
+        "path under linear forces", "SI", _rounding_error, "the same", _path_difference_check("linear_forces")
     ),
-    "held twin": Check("path under held forces", "SI", _rounding_error, "the same", _path_difference_check("held")),
+    "held twin": Check(
+        "path under held forces", "SI", _rounding_error, "the same", _path_difference_check("held_forces")
+    ),
     "stabilised twin": Check(
         "path with an added moment and a dead band",
         "SI",
@@ -215,14 +224,14 @@ CHECKS: dict[str, Check] = {
         "",
         lambda engine: 0.15,
         "the stiff wheels still bend it by 0.06 at these steps",
-        _order,
+        _order_error,
     ),
     "equilibrium": Check(
         "drift off the static equilibrium",
         "SI",
         _rounding_error,
         "the closed form is exact",
-        lambda bench, engine, make: equilibrium_gap(make, bench.flat, bench.settings(engine)),
+        lambda bench, engine, make: equilibrium_gap(make, bench.flat_road, bench.settings(engine)),
     ),
     "momentum": Check(
         "vertical momentum against impulse",
@@ -236,21 +245,21 @@ CHECKS: dict[str, Check] = {
         "of its rms",
         lambda engine: 1e-4 if engine == "exudyn" else ROUNDING_BOUND,
         "generalised-alpha at 0.5 ms leaves 4e-5; MuJoCo's inverse dynamics is exact",
-        _enforced_force_check("guided"),
+        _enforced_force_check("prescribed_pitch"),
     ),
     "rails": Check(
         "enforced force and moment against the eliminated form",
         "of their rms",
         lambda engine: 1e-4 if engine == "exudyn" else ROUNDING_BOUND,
         "the same",
-        _enforced_force_check("on_rails"),
+        _enforced_force_check("prescribed_heave_and_pitch"),
     ),
 }
-"""What every fault is put to, in the order of the table."""
+"""Name -> check that is run under every fault, in the order of the report's table."""
 
 
-def size_of_error(check: Check, bench: Bench, engine: str, make_engine: Make) -> float:
-    """Error that a check measures; infinite where the engine refuses or fails."""
+def size_of_error(check: Check, bench: Bench, engine: str, make_engine: ModelBuilder) -> float:
+    """Error that a check measures on an engine; infinite where the engine refuses or fails."""
     try:
         return check.measure(bench, engine, make_engine)
     except (InputError, RunFailed):

@@ -1,7 +1,7 @@
-"""Faults planted in a braked vehicle, one at a time, and the checks that see them.
+"""Faults planted in a braked vehicle, and the checks that see them.
 
-Compiled code cannot be patched, so faults are planted in what it is given: the vehicle's numbers, tables, brakes,
-signals; and the force of the start of a step by the scheme that is written so.
+Compiled code cannot be patched, so faults are planted in its inputs: the vehicle's parameters, tyre tables, brakes,
+signals. The fault of a tyre force taken at the start of a step is planted by running another integration scheme.
 """
 
 from collections.abc import Callable
@@ -28,9 +28,9 @@ from validation.faults.patches import Patch, attribute_patch
 SPLIT_ROAD, STEP = road([Stretch(0.0, 1, 0)]), 5.5e-3
 
 
-def _first_step(course: Road, steer: float = 0.0) -> RollingTruck:
-    """The truck after one step with all wheels locked, or steered with rolling wheels. On SPLIT_ROAD the left side is
-    dry and the right side ice; else all is ice."""
+def _truck_after_first_step(course: Road, steer: float = 0.0) -> RollingTruck:
+    """The truck after a time step with all wheels locked, or, if steered, with rolling wheels. On SPLIT_ROAD the left
+    side is dry and the right side ice; else the road is ice."""
     tables = tyre_table.stacked_tables([stops.friction_table("ice")[0], stops.friction_table("dry")[0]])
     truck = RollingTruck(
         on_road(plane_vehicle.plane_of_truck(PAPER_TRUCK), tables, course), 10.0, steer=steer, step_function=advance
@@ -43,12 +43,12 @@ def _first_step(course: Road, steer: float = 0.0) -> RollingTruck:
 
 DRY = stops.friction_table("dry")[0]
 LIGHT_TORQUE = stops.steady_torque(stops.FRONT_WHEEL, DRY, 0.004)[1]
-"""Torque (N m) of light braking."""
+"""Brake torque (N m) of light braking, at a slip of 0.4 % on dry road."""
 
 
 def _light_stop_error() -> float:
-    """Light braking of a quarter vehicle on dry road: relative difference of the stopping distance from the exact
-    one."""
+    """Relative difference of a quarter vehicle's stopping distance from the exact one, for light braking on dry
+    road."""
     return abs(
         stops.constant_torque_stop(stops.FRONT_WHEEL, stops.friction_table("dry"), LIGHT_TORQUE, 11.11).distance
         / _exact_distance()
@@ -58,13 +58,14 @@ def _light_stop_error() -> float:
 
 @cache
 def _exact_distance() -> float:
-    """The exact stopping distance (m)."""
+    """Exact stopping distance (m) of the quarter vehicle for light braking on dry road."""
     return exact_distance(stops.FRONT_WHEEL, DRY, LIGHT_TORQUE, 11.11)
 
 
 def _load_transfer_error() -> float:
-    """All wheels locked on even friction: relative difference of the front wheels' load from W (b + mu h) / (2 L)."""
-    report = _first_step(UNIFORM_ROAD).report
+    """Relative difference of the front wheels' loads from W (b + mu h) / (2 L), with all wheels locked on even
+    friction."""
+    report = _truck_after_first_step(UNIFORM_ROAD).report
     slide = float(stops.friction_table("ice")[0].mu_x[0, 0, -1])
     base = 1.42 + 2.19
     wanted = 5640.0 * GRAVITY * (2.19 + slide * 1.2) / (2.0 * base)
@@ -72,28 +73,28 @@ def _load_transfer_error() -> float:
 
 
 def _split_friction_error() -> float:
-    """All wheels locked, dry on the left side only: difference of the yaw acceleration from that by the reported
-    forces' moment."""
-    truck = _first_step(SPLIT_ROAD)
+    """Relative difference of the yaw acceleration from the one by the reported forces' moment, with all wheels locked
+    and the left side dry."""
+    truck = _truck_after_first_step(SPLIT_ROAD)
     x, y = np.array([1.42, 1.42, -2.19, -2.19]), np.array([0.95, -0.95, 0.9, -0.9])
     moment = float(x @ truck.report.force_y - y @ truck.report.force_x)
     return float(abs(truck.state[1, 2] / (STEP * moment / 25000.0) - 1.0))
 
 
-def _turns_left() -> float:
-    """The truck is steered to the left: 1 if it does not yaw to the left, plus 1 if its left side is not unloaded."""
-    truck = _first_step(UNIFORM_ROAD, 0.05)
+def _left_turn_sign_error() -> float:
+    """Error of the signs in a left turn: 1 if the truck does not yaw to the left, plus 1 if its left side is not
+    unloaded."""
+    truck = _truck_after_first_step(UNIFORM_ROAD, 0.05)
     return float(not truck.state[1, 2] > 0.0) + float(not truck.report.load[0] < truck.report.load[1])
 
 
-def _pulls_left() -> float:
-    """The left side is dry: 1 if the truck does not yaw to the left."""
-    return float(not _first_step(SPLIT_ROAD).state[1, 2] > 0.0)
+def _split_road_sign_error() -> float:
+    """Error of the sign on a road that is dry on the left: 1 if the braked truck does not yaw to the left, else 0."""
+    return float(not _truck_after_first_step(SPLIT_ROAD).state[1, 2] > 0.0)
 
 
 def _hysteresis_area_error() -> float:
-    """Relative error of the area of a brake's hysteresis loop from 0 to 5 bar and back, compared with the closed
-    form."""
+    """Relative error of the area of a brake's hysteresis loop from 0 to 5 bar and back, against the closed form."""
     brakes = brake.of_wheels(brake.Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
     pressures = np.concatenate((np.linspace(0.0, 5.0, 401), np.linspace(5.0, 0.0, 401)))
     torques = brake.torques_of_pressures(pressures, brakes)
@@ -103,8 +104,8 @@ def _hysteresis_area_error() -> float:
     return float(abs(-np.trapezoid(torques, pressures) / wanted - 1.0))
 
 
-def _push_out() -> float:
-    """Torque (N m) of the paper's front brake at 0.7 bar."""
+def _torque_below_push_out() -> float:
+    """Torque (N m) of the paper's front brake at 0.7 bar, below its push-out pressure; it should be 0."""
     return float(brake.torque(0, 0.7, 0.0, brake.of_wheels(brake.PAPER_FRONT)))
 
 
@@ -114,14 +115,13 @@ def _table_node_error() -> float:
     return float(np.abs(np.interp(DRY.slips, tables.slips, tables.mu_x[0, 0, 0]) - DRY.mu_x[0, 0]).max())
 
 
-def _distance_at_steady_slip() -> float:
-    """Quarter vehicle at constant slip: relative difference of the distance from m v^2 / (2 F), as in the hard case of
-    this name."""
-    return float(wheels.steady_slip_case(wheels.DRY, 0.02)("reference", Path()))
+def _constant_slip_distance_error() -> float:
+    """Relative difference of a quarter vehicle's stopping distance at constant slip from m v^2 / (2 F)."""
+    return float(wheels.constant_slip_case(wheels.DRY, 0.02)("reference", Path()))
 
 
 def _converter_error() -> float:
-    """Largest error of a ramp converted to 12 bits, compared with half a code; in units of this."""
+    """Relative difference between the largest error of a ramp converted to 12 bits and half a code."""
     ramp = np.linspace(0.0, 30.0, 100_001)
     channels = sensors.Channels(sensors.Conversion(bits=12, range=30.0), ramp.size, 0)
     return float(abs(np.abs(channels(0, ramp) - ramp).max() / (0.5 * 30.0 / (2**12 - 1)) - 1.0))
@@ -130,21 +130,21 @@ def _converter_error() -> float:
 CHECKS = {
     "light stop": Check("stopping distance, light braking, exact", "relative", 5e-4, _light_stop_error),
     "slip that stays": Check(
-        "stopping distance at a slip that stays, closed form", "relative", 1e-6, _distance_at_steady_slip
+        "stopping distance at a slip that stays, closed form", "relative", 1e-6, _constant_slip_distance_error
     ),
     "code": Check("largest error of converted signals, half a code", "relative", 1e-3, _converter_error),
     "transfer": Check("front loads of the locked truck, closed form", "relative", 1e-6, _load_transfer_error),
     "split": Check("yaw acceleration on split friction by its moment", "relative", 1e-6, _split_friction_error),
-    "turns left": Check("sign of yaw and roll in a left turn", "", 0.5, _turns_left),
-    "pulls left": Check("sign of yaw on split friction", "", 0.5, _pulls_left),
+    "turns left": Check("sign of yaw and roll in a left turn", "", 0.5, _left_turn_sign_error),
+    "pulls left": Check("sign of yaw on split friction", "", 0.5, _split_road_sign_error),
     "loop": Check("area of a brake's loop, closed form", "relative", 1e-3, _hysteresis_area_error),
-    "push-out": Check("torque below push-out", "N m", 1e-9, _push_out),
+    "push-out": Check("torque below push-out", "N m", 1e-9, _torque_below_push_out),
     "nodes": Check("tables at the tyre's own nodes", "", 1e-12, _table_node_error),
 }
 
 
 def _truck_patch(**change: Callable[[np.ndarray], np.ndarray]) -> Patch:
-    """Patch that changes the numbers of every truck."""
+    """Patch that changes parameters of every truck: name -> function of the original array."""
     return attribute_patch(
         "models.brake.plane_vehicle:plane_of_truck",
         lambda real: lambda *arguments: _changed_plane(real(*arguments), change),
@@ -161,7 +161,7 @@ def _brakes_patch(change: Callable[[Any], Any]) -> Patch:
 
 
 def _force_of_step_start(original: Any) -> Any:
-    """Fault: each step of the vehicle uses the tyre force at the step's start."""
+    """Fault: the vehicle's speed is integrated with the tyre force at the start of each step."""
 
     def stop(quarter_car: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
         distance = stopping_distance(LITERAL, quarter_car, tyre[0], torque, speed, STEP)[0]
@@ -197,7 +197,7 @@ def _spin_inertia_patch(factor: float) -> Patch:
     return attribute_patch("models.brake.quarter:Quarter.plane", change)
 
 
-def _one_bit_less(original: Any) -> Any:
+def _coarser_conversion(original: Any) -> Any:
     """Fault: a signal is converted with one bit less than stated."""
     return lambda table, *further: original(table.model_copy(update={"bits": table.bits - 1}), *further)
 
@@ -225,7 +225,7 @@ FAULTS = (
         attribute_patch("validation.faults.braking:advance", _mirrored_steering),
     ),
     CampaignFault(
-        "conversion with a bit less", "port", attribute_patch("models.brake.port.sensors:Channels", _one_bit_less)
+        "conversion with a bit less", "port", attribute_patch("models.brake.port.sensors:Channels", _coarser_conversion)
     ),
     CampaignFault("front and rear swapped", "vehicle", _truck_patch(place=lambda p: p * np.array([-1.0, 1.0]))),
     CampaignFault(

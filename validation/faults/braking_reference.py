@@ -1,6 +1,6 @@
-"""Faults planted in what the compiled step of braking on the suspension is given, noticed by the independent reference.
+"""Faults planted in the inputs of the compiled step of braking on the suspension, which the independent reference sees.
 
-Agreement of the engines sees none of them: both march the same compiled forces.
+A comparison of the engines sees none of them, as both use the same compiled forces.
 """
 
 from collections.abc import Callable
@@ -17,41 +17,46 @@ from models.tyre.tyre_table import Tables
 from models.vehicles.spatial_linear import Preloads
 from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
-from validation.braking.compiled_brakes import wheel_forces_in
+from validation.braking.compiled_brakes import wheel_force_views
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
 
 ENGINE, STATES_COMPARED, DURATION = "exudyn", 20, 0.05
-"""Engine, whose steps Python calls, so that they can be patched; states; s of a stop."""
+"""Engine with the faults (Python calls its steps, so that they can be patched); number of states compared; duration of
+a run (s)."""
 DIFFERENCE_BOUND = 1e-10
 
 
 def _law_difference_check(
     sides: Callable[[int], tuple[np.ndarray, np.ndarray]], state_count: int = 60
 ) -> Callable[[], float]:
-    """Check's function: largest difference between compiled and plain code at ``state_count`` states."""
+    """Returns a check's function: largest difference between compiled and plain code at ``state_count`` random
+    states."""
     return lambda: laws.largest_difference(*sides(state_count))
 
 
-def _accelerations() -> float:
-    """Largest difference between the accelerations of both codes for a vehicle that is built with the fault."""
+def _acceleration_difference() -> float:
+    """Largest relative difference of accelerations between the engine and plain code, for a vehicle built with the
+    fault."""
     accelerations = whole.accelerations(whole.car_with_stops.__wrapped__(), ENGINE, STATES_COMPARED)
     return whole.relative_difference(accelerations, whole.plain_accelerations("bent", STATES_COMPARED))
 
 
 def _stop_difference() -> float:
-    return whole.paths_apart(
+    return whole.path_difference(
         whole.run(whole.car_with_stops.__wrapped__(), ENGINE, DURATION), whole.plain_run("bent", DURATION)
     )
 
 
 def _lagging_difference() -> float:
     path = whole.run(whole.car(), ENGINE, DURATION, lags=True)
-    return whole.paths_apart(path, whole.plain_run("car", DURATION, lags=True))
+    return whole.path_difference(path, whole.plain_run("car", DURATION, lags=True))
 
 
 CHECKS = {
-    "accelerations": Check("accelerations at random states beside plain code", "by the largest", 1e-12, _accelerations),
+    "accelerations": Check(
+        "accelerations at random states beside plain code", "by the largest", 1e-12, _acceleration_difference
+    ),
     "stop": Check("a piece of a stop beside plain code", "m, rad, per s", DIFFERENCE_BOUND, _stop_difference),
     "lagging": Check("the same on tyres that lag", "m, rad, per s", DIFFERENCE_BOUND, _lagging_difference),
     "friction": Check(
@@ -69,8 +74,8 @@ CHECKS = {
 }
 
 
-def _table(change: Callable[[Handling], None]) -> Patch:
-    """Fault: the car's table of numbers is changed after it was filled."""
+def _table_patch(change: Callable[[Handling], None]) -> Patch:
+    """Fault: the car's parameter table is changed after it was filled."""
 
     def packed(original: Any) -> Any:
         def make(*given: Any, **more: Any) -> Handling:
@@ -84,8 +89,8 @@ def _table(change: Callable[[Handling], None]) -> Patch:
 
 
 def _section_rows(handling: Handling, first: int, count_index: int, width: int) -> np.ndarray:
-    """View of the rows (count_index, width) of one section of the car's table; ``first`` and ``count_index`` are the
-    places in the table's head that hold its start and number of rows.
+    """View of the rows (number of rows, width) of a section of the car's parameter table. ``first`` and ``count_index``
+    are the positions in the table's head of the section's start and number of rows.
     """
     begin, rows = int(handling.numbers[first]), int(handling.numbers[count_index])
     return handling.numbers[begin : begin + width * rows].reshape(rows, width)
@@ -106,7 +111,7 @@ def _without_bars(handling: Handling) -> None:
 
 
 def _shift_stiffnesses(handling: Handling) -> None:
-    """Fault: every spring has the stiffness of the one before it in the table."""
+    """Fault: every spring has the stiffness of the previous spring in the table."""
     parts = _rows_of_parts(handling)
     parts[:, STIFFNESS] = np.roll(parts[:, STIFFNESS], 1)
 
@@ -139,8 +144,8 @@ def _preload_patch(change: Callable[[Preloads], Preloads]) -> Patch:
     return attribute_patch("models.multibody.numbers:preloads", lambda real: lambda vehicle: change(real(vehicle)))
 
 
-def _first_larger(values: dict[str, float]) -> dict[str, float]:
-    """The values, with the first one 1 % larger."""
+def _first_value_larger(values: dict[str, float]) -> dict[str, float]:
+    """Copy of the values with the first value 1 % larger."""
     name = next(iter(values))
     return values | {name: 1.01 * values[name]}
 
@@ -151,27 +156,28 @@ def _march_patch(change: Callable[[Any, Any, np.ndarray, np.ndarray], Any]) -> P
 
 
 def _euler_step(march: Any, engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
-    """Fault: the engine makes a step with the accelerations at its start (explicit Euler)."""
+    """Fault: the engine's step uses the accelerations at its start (explicit Euler) instead of Runge-Kutta."""
     rates = engine.acceleration(0.0, q, v)
     q += engine.step * v
     v += engine.step * rates
     return True
 
 
-def _spun_more(march: Any, engine: Any, *state: np.ndarray) -> Any:
-    wheel_forces_in(engine.numbers).spin_moments[:] *= 1.01
+def _larger_spin_moment(march: Any, engine: Any, *state: np.ndarray) -> Any:
+    wheel_force_views(engine.numbers).spin_moments[:] *= 1.01
     return march(engine, *state)
 
 
 def _forces_exchanged(march: Any, engine: Any, *state: np.ndarray) -> Any:
     """Fault: the forces of the front wheels are exchanged."""
-    forces = wheel_forces_in(engine.numbers).forces
+    forces = wheel_force_views(engine.numbers).forces
     forces[:2] = forces[1::-1].copy()
     return march(engine, *state)
 
 
 def _stacked_tables_patch(change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Patch:
-    """Patch that gives the stacked friction tables for compiled code other mu_x and h."""
+    """Patch that replaces longitudinal friction mu_x and lateral friction h in the stacked tyre tables for compiled
+    code."""
 
     def stack(original: Any) -> Any:
         return lambda tyres: _with_friction(original(tyres), change)
@@ -193,7 +199,7 @@ def _heavy_wheel(original: Any) -> Any:
     )
 
 
-def _other_share(original: Any) -> Any:
+def _exchanged_shares(original: Any) -> Any:
     """Fault: the shares of the first and second stretch of road are exchanged."""
 
     def under(*arguments: Any) -> np.ndarray:
@@ -205,8 +211,8 @@ def _other_share(original: Any) -> Any:
     return under
 
 
-def _more_torque(original: Any) -> Any:
-    """Fault: torques are 1 % too large."""
+def _larger_torque(original: Any) -> Any:
+    """Fault: brake torques are 1 % too large."""
 
     def planted(*arguments: Any) -> None:
         original(*arguments)
@@ -216,7 +222,7 @@ def _more_torque(original: Any) -> Any:
 
 
 def _late_torque(original: Any) -> Any:
-    """Fault: torques at a step's end are those at its start."""
+    """Fault: brake torques at a step's end equal those at its start."""
 
     def planted(*arguments: Any) -> None:
         original(*arguments)
@@ -225,7 +231,7 @@ def _late_torque(original: Any) -> Any:
     return planted
 
 
-def _quick_valves(original: Any) -> Any:
+def _valves_without_delay(original: Any) -> Any:
     """Fault: valves have no delay within a sample."""
 
     def planted(states: Any, sample: Any, air: Any, chambers: Any, *further: Any) -> None:
@@ -241,21 +247,21 @@ def _longer_relaxation(original: Any) -> Any:
 
 
 def _relaxation_patch(change: Callable[..., tuple[Any, ...]]) -> Patch:
-    """Patch that changes how the slip lag of tyres is advanced on a suspension."""
+    """Patch that changes the inputs by which lagging slip angles are advanced for a vehicle on its suspension."""
     return attribute_patch(
         "models.brake.sprung_relaxation:relax", lambda real: lambda *arguments: real(*change(*arguments))
     )
 
 
-def _half_as_far(contacts: Any, half: float, *further: Any) -> tuple[Any, ...]:
-    """Fault: the lag is advanced without the half of the step before."""
+def _lag_over_half_step(contacts: Any, half: float, *further: Any) -> tuple[Any, ...]:
+    """Fault: lagging slip angles are advanced without the half of the previous step."""
     lag = further[1]
     lag.behind[0] = 0.0
     return contacts, half, *further
 
 
 def _faster_lag(contacts: Any, *further: Any) -> tuple[Any, ...]:
-    """Fault: the lag is advanced by speeds along the wheels that are 1 % too large."""
+    """Fault: lagging slip angles are advanced with wheel speeds that are 1 % too large."""
     return contacts._replace(along=1.01 * contacts.along), *further
 
 
@@ -264,35 +270,35 @@ FAULTS = (
     CampaignFault(
         "preload of a spring 1 % too large",
         "vehicle",
-        _preload_patch(lambda p: p._replace(parts=_first_larger(p.parts))),
+        _preload_patch(lambda p: p._replace(parts=_first_value_larger(p.parts))),
     ),
     CampaignFault(
         "static load of a tyre 1 % too large",
         "vehicle",
-        _preload_patch(lambda p: p._replace(tyres=_first_larger(p.tyres))),
+        _preload_patch(lambda p: p._replace(tyres=_first_value_larger(p.tyres))),
     ),
-    CampaignFault("stiffness and damping of a spring exchanged", "table", _table(_exchange_spring_numbers)),
-    CampaignFault("stiffness of a spring's neighbour", "table", _table(_shift_stiffnesses)),
-    CampaignFault("anti-roll bars without stiffness", "table", _table(_without_bars)),
-    CampaignFault("a spring's point 10 mm ahead", "table", _table(_moved_point)),
-    CampaignFault("springs without dry friction", "table", _table(_remove_dry_friction)),
-    CampaignFault("springs without curves of travel", "table", _table(_remove_curves)),
-    CampaignFault("drag twice as large", "table", _table(_double_drag)),
-    CampaignFault("damping of a tyre 30 % too large", "table", _table(_damped_tyre)),
-    CampaignFault("stiffness of a tyre 1 % too small", "table", _table(_softer_tyre)),
+    CampaignFault("stiffness and damping of a spring exchanged", "table", _table_patch(_exchange_spring_numbers)),
+    CampaignFault("stiffness of a spring's neighbour", "table", _table_patch(_shift_stiffnesses)),
+    CampaignFault("anti-roll bars without stiffness", "table", _table_patch(_without_bars)),
+    CampaignFault("a spring's point 10 mm ahead", "table", _table_patch(_moved_point)),
+    CampaignFault("springs without dry friction", "table", _table_patch(_remove_dry_friction)),
+    CampaignFault("springs without curves of travel", "table", _table_patch(_remove_curves)),
+    CampaignFault("drag twice as large", "table", _table_patch(_double_drag)),
+    CampaignFault("damping of a tyre 30 % too large", "table", _table_patch(_damped_tyre)),
+    CampaignFault("stiffness of a tyre 1 % too small", "table", _table_patch(_softer_tyre)),
     CampaignFault(
         "brake torque of the step's start", "step", attribute_patch("models.brake.samples:by_valves", _late_torque)
     ),
     CampaignFault("Euler's step for Runge and Kutta's", "step", _march_patch(_euler_step)),
-    CampaignFault("moment on turning wheels 1 % too large", "step", _march_patch(_spun_more)),
+    CampaignFault("moment on turning wheels 1 % too large", "step", _march_patch(_larger_spin_moment)),
     CampaignFault("forces of the front tyres exchanged", "step", _march_patch(_forces_exchanged)),
-    CampaignFault("slip angles that lag over half of each step", "lagging", _relaxation_patch(_half_as_far)),
+    CampaignFault("slip angles that lag over half of each step", "lagging", _relaxation_patch(_lag_over_half_step)),
     CampaignFault("slip angles that lag by a speed 1 % too large", "lagging", _relaxation_patch(_faster_lag)),
     CampaignFault(
-        "brake torque 1 % too large", "brake", attribute_patch("models.brake.samples:by_valves", _more_torque)
+        "brake torque 1 % too large", "brake", attribute_patch("models.brake.samples:by_valves", _larger_torque)
     ),
     CampaignFault(
-        "valves that answer at once", "brake", attribute_patch(f"{PLAIN_BENCH_MODULE}:by_valves", _quick_valves)
+        "valves that answer at once", "brake", attribute_patch(f"{PLAIN_BENCH_MODULE}:by_valves", _valves_without_delay)
     ),
     CampaignFault("cornering stiffness 30 % too large", "tyre", _stacked_tables_patch(lambda t: (t.mu_x, 1.3 * t.h))),
     CampaignFault(
@@ -305,7 +311,9 @@ FAULTS = (
         "inertia of a wheel 1 % too large", "wheel", attribute_patch(f"{COMPILED_MODULE}:tyre", _heavy_wheel)
     ),
     CampaignFault(
-        "shares of two stretches exchanged", "road", attribute_patch(f"{COMPILED_MODULE}:under_wheels", _other_share)
+        "shares of two stretches exchanged",
+        "road",
+        attribute_patch(f"{COMPILED_MODULE}:under_wheels", _exchanged_shares),
     ),
     CampaignFault(
         "relaxation length 1 % too long", "tyre", attribute_patch(f"{COMPILED_MODULE}:lag_on", _longer_relaxation)

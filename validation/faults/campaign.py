@@ -1,6 +1,6 @@
-"""Faults planted one at a time, checks that see them or not, and what a report says of both.
+"""Campaigns of faults that are planted one at a time: the checks that see them, and the report's rows and tables.
 
-What a check compares with is computed once without a fault, by a route that the fault does not touch.
+The value that a check compares with is computed once, without a fault, by code that the fault does not change.
 """
 
 import math
@@ -14,12 +14,12 @@ from validation.faults.patches import Patch
 
 Record = dict[str, Any]
 FAULT_SYSTEM: System = "hard-cases"
-"""Where the report has all rows of planted faults; a campaign's own system is that of the thing that they are in."""
+"""System under which the report lists all rows of planted faults. A campaign's ``system`` is that of its subject."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """A check by which faults are looked for: it sees a fault if ``measure()`` exceeds ``tolerance``."""
+    """A check for planted faults: it sees a fault if ``measure()`` exceeds ``tolerance``."""
 
     title: str
     unit: str
@@ -27,7 +27,7 @@ class Check:
     measure: Callable[[], float]
 
     def size(self) -> float:
-        """Measured error; infinite if the fault makes a run fail."""
+        """Error that the check measures; infinite if the fault makes a run fail."""
         try:
             return self.measure()
         except RunFailed:
@@ -36,46 +36,47 @@ class Check:
 
 @dataclass(frozen=True)
 class CampaignFault:
-    """A planted fault: its description, where it is planted, and the patch that plants it."""
+    """A fault to be planted: its description, the part of the code that it is planted in, and the patch that plants
+    it."""
 
     name: str
-    place: str
-    inside: Patch
+    planted_in: str
+    patch: Patch
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """Faults in one subject, named ``what``, and the checks that are run under each fault. The ids of its rows begin
-    with ``id``."""
+    """Faults in a subject, such as "braking", and the checks that are run under each fault. The ids of its report rows
+    begin with ``id``."""
 
     id: str
-    what: str
+    subject: str
     system: System
     checks: dict[str, Check]
     faults: tuple[CampaignFault, ...]
 
-    def measure(self, every: int = 1) -> list[Record]:
-        """Ratio of error to tolerance for every check: first without a fault, then with each planted fault, or with
-        every ``every``-th one."""
+    def measure(self, stride: int = 1) -> list[Record]:
+        """Records with the ratio of error to tolerance of every check: first without a fault, then with every
+        ``stride``-th fault planted."""
         clean = {"fault": "no fault", "place": "nowhere", "ratios": self._error_ratios()}
-        planted = self.faults[::every]
+        planted = self.faults[::stride]
         return [
             clean,
             *(
-                {"fault": fault.name, "place": fault.place, "ratios": self._ratios_with_fault(fault)}
+                {"fault": fault.name, "place": fault.planted_in, "ratios": self._ratios_with_fault(fault)}
                 for fault in planted
             ),
         ]
 
     def _ratios_with_fault(self, fault: CampaignFault) -> dict[str, float]:
-        with fault.inside()():
+        with fault.patch()():
             return self._error_ratios()
 
     def _error_ratios(self) -> dict[str, float]:
         return {name: check.size() / check.tolerance for name, check in self.checks.items()}
 
     def rows(self, records: list[Record]) -> list[Row]:
-        """Rows: faults caught, false alarms, and faults that only a single check catches."""
+        """Report rows: numbers of faults caught, of false alarms, and of faults that a single check catches."""
         clean, *faulty = records
         single = [
             f"{record['fault']} ({seeing_checks(record)[0]})" for record in faulty if len(seeing_checks(record)) == 1
@@ -84,7 +85,7 @@ class Campaign:
             Observed(
                 f"{self.id}.caught",
                 FAULT_SYSTEM,
-                f"faults planted in {self.what} that a check catches",
+                f"faults planted in {self.subject} that a check catches",
                 sum(bool(seeing_checks(record)) for record in faulty),
                 "faults",
             ).within(
@@ -96,21 +97,21 @@ class Campaign:
             Observed(
                 f"{self.id}.false_alarms",
                 FAULT_SYSTEM,
-                f"false alarms of the checks of {self.what} (no fault planted)",
+                f"false alarms of the checks of {self.subject} (no fault planted)",
                 len(seeing_checks(clean)),
                 "alarms",
             ).within(0, 0, "a check that cries without a fault is no check", "native"),
             Observed(
                 f"{self.id}.single",
                 FAULT_SYSTEM,
-                f"faults planted in {self.what} that a single check catches",
+                f"faults planted in {self.subject} that a single check catches",
                 len(single),
                 "faults",
             ).beside("few", "what would pass if that check were dropped: " + (", ".join(single) or "none"), "native"),
         ]
 
     def table(self, records: list[Record]) -> Table:
-        """Table of every fault with the checks that see it."""
+        """Table of every planted fault with the checks that see it and their errors."""
         lines = tuple(
             (
                 record["fault"],
@@ -122,19 +123,18 @@ class Campaign:
         )
         checks = (f"{name}: {check.title} (allowed {check.tolerance:g})" for name, check in self.checks.items())
         return Table(
-            f"Faults of {self.what}, one at a time",
+            f"Faults of {self.subject}, one at a time",
             f"Sizes as each check takes them: {'; '.join(checks)}.",
             ("fault", "planted in", "caught by", "not seen by"),
             lines,
         )
 
     def lines(self, records: list[Record]) -> list[tuple[str, ...]]:
-        """Table lines, one for each fault: system, the part with the fault, fault, checks that see it, checks that had
-        missed it."""
+        """Table lines, one for each fault: system, subject, fault, checks that see it, checks that do not."""
         return [
             (
                 self.system,
-                self.what,
+                self.subject,
                 record["fault"],
                 ", ".join(seeing_checks(record)) or "none",
                 ", ".join(name for name in self.checks if name not in seeing_checks(record)),
@@ -149,5 +149,5 @@ class Campaign:
 
 
 def seeing_checks(record: Record) -> list[str]:
-    """Names of the checks that see a fault."""
+    """Names of the checks that see the fault of a record: their error exceeds the tolerance."""
     return [name for name, ratio in record["ratios"].items() if not ratio <= 1.0]

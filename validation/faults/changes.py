@@ -1,4 +1,4 @@
-"""Changes that plant a fault in what an engine is given: the description of the vehicle, or its input."""
+"""Changes that plant a fault in an engine's inputs: the description of the pitch-plane vehicle, or its excitation."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -10,40 +10,41 @@ from models.engines.assembly import Assembly
 from models.road.iso8608 import iso8608_road
 from models.vehicles.description import Body, PitchSpring, Point, Strut, Vehicle
 
-Change = Callable[[Assembly], Assembly]
+AssemblyChange = Callable[[Assembly], Assembly]
 
 
 def unchanged(assembly: Assembly) -> Assembly:
-    """The assembly itself, as a control without a fault."""
+    """Returns the assembly unchanged, as a control without a fault."""
     return assembly
 
 
-def vehicle(change: Callable[[Vehicle], Vehicle]) -> Change:
+def changed_vehicle_of(change: Callable[[Vehicle], Vehicle]) -> AssemblyChange:
     """Fault: the vehicle's description is changed."""
     return lambda assembly: replace(assembly, vehicle=change(assembly.vehicle))
 
 
-def replaced_struts(change: Callable[[Strut, dict[str, Strut]], Strut]) -> Change:
-    """Fault: change(strut, struts) replaces each strut; it knows all struts of the vehicle by name."""
+def replaced_struts(change: Callable[[Strut, dict[str, Strut]], Strut]) -> AssemblyChange:
+    """Fault: each strut is replaced by change(strut, struts), where ``struts`` are all struts of the vehicle by
+    name."""
 
     def changed(original_vehicle: Vehicle) -> Vehicle:
         named = {strut.name: strut for strut in original_vehicle.struts}
         return replace(original_vehicle, struts=tuple(change(strut, named) for strut in original_vehicle.struts))
 
-    return vehicle(changed)
+    return changed_vehicle_of(changed)
 
 
-def bodies(change: Callable[[Body, dict[str, Body]], Body]) -> Change:
-    """Fault: change(body, bodies) replaces each body; it knows all bodies of the vehicle by name."""
+def replaced_bodies(change: Callable[[Body, dict[str, Body]], Body]) -> AssemblyChange:
+    """Fault: each body is replaced by change(body, bodies), where ``bodies`` are all bodies of the vehicle by name."""
 
     def changed(original_vehicle: Vehicle) -> Vehicle:
         named = {body.name: body for body in original_vehicle.bodies}
         return replace(original_vehicle, bodies=tuple(change(body, named) for body in original_vehicle.bodies))
 
-    return vehicle(changed)
+    return changed_vehicle_of(changed)
 
 
-def with_moved_points(position_of: Callable[[float, float, float], float]) -> Change:
+def with_moved_points(position_of: Callable[[float, float, float], float]) -> AssemblyChange:
     """Fault: suspension points and axles are at position_of(x, a, b) instead of x (m)."""
 
     def changed(assembly: Assembly) -> Assembly:
@@ -62,17 +63,17 @@ def _point_moved_to(point: Point, x: float) -> Point:
     return replace(point, x=x) if point.body == "chassis" else point
 
 
-def swapped_struts(first: str, other_strut: str) -> Change:
+def swapped_struts(first_strut: str, other_strut: str) -> AssemblyChange:
     """Fault: stiffness and damping of two struts are exchanged."""
 
     def change(strut: Strut, struts: dict[str, Strut]) -> Strut:
-        source = struts.get({first: other_strut, other_strut: first}.get(strut.name, strut.name), strut)
+        source = struts.get({first_strut: other_strut, other_strut: first_strut}.get(strut.name, strut.name), strut)
         return replace(strut, stiffness=source.stiffness, damping=source.damping)
 
     return replaced_struts(change)
 
 
-def stiffened_strut(name: str, factor: float) -> Change:
+def stiffened_strut(name: str, factor: float) -> AssemblyChange:
     """Fault: the stiffness of one strut is multiplied by a factor."""
     return replaced_struts(lambda s, named: replace(s, stiffness=factor * s.stiffness) if s.name == name else s)
 
@@ -101,7 +102,7 @@ def inertia_about_axle(assembly: Assembly) -> Assembly:
         axle_inertia = None if body.pitch_inertia is None else body.pitch_inertia + body.mass * b**2
         return replace(body, pitch_inertia=axle_inertia)
 
-    return bodies(change)(assembly)
+    return replaced_bodies(change)(assembly)
 
 
 def unstressed_start(assembly: Assembly) -> Assembly:
@@ -111,40 +112,41 @@ def unstressed_start(assembly: Assembly) -> Assembly:
     return replace(assembly, initial=start)
 
 
-def body_fixed(assembly: Assembly) -> Assembly:
+def body_fixed_forces(assembly: Assembly) -> Assembly:
     """Fault: wheel forces turn with the chassis, although vertical forces were specified."""
     return replace(assembly, mode="force-body") if assembly.mode == "force" else assembly
 
 
-Values = Callable[[np.ndarray], np.ndarray]
+SignalChange = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
 class AlteredSignal:
-    """Fault: a signal is delayed by ``late`` (s), and its values (n, channels) are replaced by change(values)."""
+    """Fault: a signal has a delay (s), and its values (n, channels) are replaced by change(values)."""
 
     signal: Any
-    late: float = 0.0
-    change: Values = field(default=lambda values: values)
+    delay: float = 0.0
+    change: SignalChange = field(default=lambda values: values)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.signal, name)
 
     def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
-        """Values at start_time + i step, shape (sample_count, channels)."""
-        return self.change(self.signal.sample(start_time - self.late, step, sample_count))
+        """Values (sample_count, channels) of the altered signal at start_time + i step (s)."""
+        return self.change(self.signal.sample(start_time - self.delay, step, sample_count))
 
     def at(self, time: float) -> np.ndarray:
-        """Values at one time (s), shape (channels,)."""
-        return self.change(self.signal.at(time - self.late)[None, :])[0]
+        """Values (channels,) of the altered signal at a time (s)."""
+        return self.change(self.signal.at(time - self.delay)[None, :])[0]
 
 
 @dataclass(frozen=True)
 class HeldStages(AlteredSignal):
-    """Fault: a signal's value in the middle of a step is that at the step's start."""
+    """Fault: a signal's value in the middle of a step equals its value at the step's start."""
 
     def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
-        """Values (sample_count, channels) at start_time + i step, where every second one repeats the one before."""
+        """Values (sample_count, channels) at start_time + i step (s), where every second value repeats the previous
+        one."""
         values = self.signal.sample(start_time, step, sample_count)
         values[1::2] = values[:-1:2]
         return values
@@ -152,24 +154,25 @@ class HeldStages(AlteredSignal):
 
 @dataclass(frozen=True)
 class OtherTrack(AlteredSignal):
-    """Fault: the road is one track instead of the mean of both; it differs from the mean by a class A road."""
+    """Fault: the road is a single track instead of the mean of both; it differs from the mean by a class A road."""
 
     def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
-        """Values (sample_count, 4) of the road at start_time + i step: heights, then their rates."""
+        """Road (sample_count, 4) at start_time + i step (s): heights under the front and the rear wheel (m), then their
+        rates (m/s)."""
         return self.signal.sample(start_time, step, sample_count) + self._other_profile().sample(
             start_time, step, sample_count
         )
 
     def at(self, time: float) -> np.ndarray:
-        """Road at one time (s), shape (4,): heights under the front and the rear wheel (m), then their rates (m/s)."""
+        """Road (4,) at a time (s): heights under the front and the rear wheel (m), then their rates (m/s)."""
         return self.signal.at(time) + self._other_profile().at(time)
 
     def _other_profile(self) -> Any:
         return replace(self.signal, profile=iso8608_road("A", 1))
 
 
-def replaced_input(modes: tuple[str, ...], change: Callable[[Any], Any]) -> Change:
-    """Fault: the input signal is replaced, if the vehicle is driven in one of the modes."""
+def replaced_input(modes: tuple[str, ...], change: Callable[[Any], Any]) -> AssemblyChange:
+    """Fault: the input signal is replaced by change(signal), if the vehicle is excited in one of the modes."""
 
     def changed(assembly: Assembly) -> Assembly:
         if assembly.input is None or assembly.mode not in modes:
@@ -179,13 +182,13 @@ def replaced_input(modes: tuple[str, ...], change: Callable[[Any], Any]) -> Chan
     return changed
 
 
-def replaced_channels(modes: tuple[str, ...], change: Values) -> Change:
+def replaced_channels(modes: tuple[str, ...], change: SignalChange) -> AssemblyChange:
     """Fault: the input's values are replaced by change(values)."""
     return replaced_input(modes, lambda signal: AlteredSignal(signal, 0.0, change))
 
 
-def multiplied_channels(factors: dict[int, float]) -> Values:
-    """Function that multiplies some channels, given by number, by a factor; other channels stay."""
+def multiplied_channels(factors: dict[int, float]) -> SignalChange:
+    """Returns a function that multiplies channels of a signal by factors (channel number -> factor)."""
 
     def change(values: np.ndarray) -> np.ndarray:
         changed_values = values.copy()
@@ -196,39 +199,39 @@ def multiplied_channels(factors: dict[int, float]) -> Values:
     return change
 
 
-def replaced_springs(change: Callable[[PitchSpring], PitchSpring]) -> Change:
-    """Fault: every pitch spring is replaced."""
-    return vehicle(
+def replaced_springs(change: Callable[[PitchSpring], PitchSpring]) -> AssemblyChange:
+    """Fault: every pitch spring is replaced by change(spring)."""
+    return changed_vehicle_of(
         lambda original: replace(original, pitch_springs=tuple(change(spring) for spring in original.pitch_springs))
     )
 
 
-def front_twice(values: np.ndarray) -> np.ndarray:
-    """Fault: the rear channel has the values of the front one."""
+def front_values_at_rear(values: np.ndarray) -> np.ndarray:
+    """Fault: the rear channel has the values of the front channel."""
     return values[:, [0, 0, *range(2, values.shape[1])]]
 
 
-def moment(periods: float, change: Values = lambda values: values) -> Change:
+def changed_moment(delay_periods: float, change: SignalChange = lambda values: values) -> AssemblyChange:
     """Fault: the added moment is delayed by a fraction of its sampling period, and its values are changed."""
 
     def changed(assembly: Assembly) -> Assembly:
         signal = assembly.moment
         if signal is None:
             return assembly
-        return replace(assembly, moment=AlteredSignal(signal, periods * (signal.period or 0.0), change))
+        return replace(assembly, moment=AlteredSignal(signal, delay_periods * (signal.period or 0.0), change))
 
     return changed
 
 
-def with_late_input(periods: float, step: float = 1e-3) -> Change:
+def with_late_input(delay_periods: float, step: float = 1e-3) -> AssemblyChange:
     """Fault: the input is delayed by a fraction of its sampling period, or of a 1 ms step if it is not sampled."""
     return replaced_input(
-        ("road", "force", "pitch"), lambda signal: AlteredSignal(signal, periods * (signal.period or step))
+        ("road", "force", "pitch"), lambda signal: AlteredSignal(signal, delay_periods * (signal.period or step))
     )
 
 
-def road(**factors: float) -> Change:
-    """Fault: numbers of the road signal (speed, wheelbase) are multiplied by a factor."""
+def scaled_road(**factors: float) -> AssemblyChange:
+    """Fault: parameters of the road signal (speed, wheelbase) are multiplied by factors."""
     return replaced_input(
         ("road",),
         lambda signal: replace(signal, **{name: factor * getattr(signal, name) for name, factor in factors.items()}),

@@ -1,7 +1,7 @@
-"""Faults of the choice among effects, planted one at a time, and the checks that see them.
+"""Faults planted in the automatic choice of effects, and the checks that see them.
 
-The linear scene is one in which a change of deviations is large enough to be told from its prediction, and in which
-more would be left out if the tolerance did not bound it.
+In the linear scene a change of the deviations is large enough to differ from its prediction, and more effects would be
+left out without the tolerance.
 """
 
 from collections.abc import Callable
@@ -18,18 +18,24 @@ from models.advice.ride_choice.choose import RideChoice
 from models.advice.ride_choice.screen import Screen as LinearScreen
 from validation.choice.drawn_scenes import ChoiceQuestion
 from validation.choice.drawn_scenes import draw_scene as drawn_run
-from validation.choice.judged import JudgedByRuns, asked_speeds, changes_by_frequency, judged_of, worst_nearby
+from validation.choice.judged import (
+    ChoiceCheckedByRuns,
+    changes_by_frequency,
+    choice_checked_by_runs,
+    chooser_over_speeds,
+    worst_nearby,
+)
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import attribute_patch
 from validation.ride.drawn_rides import LinearRide, random_linear_ride
 
 SEED, HALF_CAR_SEED = 61, 4
-"""Of the linear scene, and of the half car that is run."""
+"""Seeds of the random linear scene and of the random half car that is simulated."""
 DRAWN_RIDES = 32
-"""Random parameters at which the linear choice is looked at."""
+"""Number of random parameter sets at which the linear choice is checked."""
 
 TOLERANCE = 1e-3
-"""Asked of that run: its gyro and its pitch spring change more."""
+"""Tolerance of the half car's choice, which omitting its gyro or its pitch spring would exceed."""
 
 
 @cache
@@ -38,87 +44,91 @@ def _linear_ride() -> LinearRide:
 
 
 @cache
-def _run() -> ChoiceQuestion:
+def _half_car_question() -> ChoiceQuestion:
     run = drawn_run("pitch-plane", HALF_CAR_SEED)
     return replace(run, table={**run.table, "run": {**run.table["run"], "duration": 0.5}}, tolerance=TOLERANCE)
 
 
-def _by_frequency() -> tuple[RideChoice, np.ndarray, float]:
-    """The choice for the linear scene with the functions that are in place now (faulty or not), its changes
-    (quantities,) by frequency responses, and the largest change near the scene."""
+def _linear_choice_and_changes() -> tuple[RideChoice, np.ndarray, float]:
+    """Effects chosen for the linear scene by the present (perhaps faulty) functions; the changes (number of
+    quantities,) by frequency responses; and the largest change at nearby speeds and parameters."""
     return _linear_choice_with_functions(
         LinearChooser.__init__, LinearChooser.confirmed_changes, LinearChooser.off, LinearScreen.predicted_variances
     )
 
 
-def _choice_by_runs() -> JudgedByRuns:
-    """The choice by runs for the half car, judged by two further runs."""
+def _choice_by_runs() -> ChoiceCheckedByRuns:
+    """Effects chosen for the half car by simulation, checked by two further runs."""
     return _choice_with_functions(Chooser.__init__, Chooser.confirmed_changes, Screen.relative_changes)
 
 
 @cache
 def _linear_choice_with_functions(*functions: Any) -> tuple[RideChoice, np.ndarray, float]:
-    chooser = asked_speeds(_linear_ride())
+    chooser = chooser_over_speeds(_linear_ride())
     choice = chooser.choose()
     nearby = worst_nearby(chooser, frozenset(choice.left_out), DRAWN_RIDES, DRAWN_RIDES) * chooser.tolerance
     return choice, changes_by_frequency(chooser, choice), nearby
 
 
 @cache
-def _choice_with_functions(*functions: Any) -> JudgedByRuns:
-    return judged_of(_run(), "pitch-plane", "reference")
+def _choice_with_functions(*functions: Any) -> ChoiceCheckedByRuns:
+    return choice_checked_by_runs(_half_car_question(), "pitch-plane", "reference")
 
 
-def _variances() -> float:
-    """Largest difference of the reported changes from those by sums over frequencies."""
-    choice, by_frequency, _ = _by_frequency()
+def _reported_change_error() -> float:
+    """Largest difference between the reported changes and the changes by frequency responses."""
+    choice, by_frequency, _ = _linear_choice_and_changes()
     return float(np.abs(by_frequency - choice.confirmed_change).max())
 
 
 def _reported_change() -> float:
-    """Ratio of the largest change by frequency responses to the tolerance, if the choice is reported as within it."""
-    choice, by_frequency, _ = _by_frequency()
+    """Largest change by frequency responses divided by the tolerance; 0 if the choice is not reported as within the
+    tolerance."""
+    choice, by_frequency, _ = _linear_choice_and_changes()
     return choice.within_tolerance * float(np.abs(by_frequency).max()) / _linear_ride().tolerance
 
 
 def _prediction_difference() -> float:
-    """Largest difference in octaves between predicted changes and those by frequency responses; infinite if the sign is
+    """Largest difference (octaves) between predicted changes and changes by frequency responses; infinite if a sign is
     wrong."""
-    choice, by_frequency, _ = _by_frequency()
+    choice, by_frequency, _ = _linear_choice_and_changes()
     with np.errstate(invalid="ignore", divide="ignore"):
         octaves = np.abs(np.log2(choice.predicted_change / by_frequency)).max()
     return float(np.nan_to_num(octaves, nan=np.inf))
 
 
 def _unreported_change() -> float:
-    """Ratio of the largest change at random speeds and parameters to the largest change that is reported."""
-    choice, _, nearby = _by_frequency()
+    """Largest change at random speeds and parameters divided by the largest reported change."""
+    choice, _, nearby = _linear_choice_and_changes()
     return nearby / float(np.abs(choice.change_with_parameters_off).max())
 
 
 def _reported_difference() -> float:
-    """Largest difference of the reported changes of a half car from those by two further runs."""
+    """Largest difference between the reported changes of a half car and the changes by two further runs."""
     by_runs = _choice_by_runs()
     return float(np.abs(by_runs.repeated_changes - by_runs.choice.confirmed_change).max())
 
 
-def _runs_kept() -> float:
-    """Ratio of the largest change by two further runs to the tolerance, if the choice is reported as within it."""
+def _change_by_runs_ratio() -> float:
+    """Largest change by two further runs divided by the tolerance; 0 if the choice is not reported as within the
+    tolerance."""
     by_runs = _choice_by_runs()
-    return by_runs.choice.within_tolerance * float(by_runs.repeated_changes.max()) / _run().tolerance
+    return by_runs.choice.within_tolerance * float(by_runs.repeated_changes.max()) / _half_car_question().tolerance
 
 
 CHECKS = {
-    "frequencies": Check("quarter car: confirmed changes, spectra summed", "of a deviation", 1e-6, _variances),
+    "frequencies": Check(
+        "quarter car: confirmed changes, spectra summed", "of a deviation", 1e-6, _reported_change_error
+    ),
     "tolerance": Check("quarter car: its change by the tolerance asked for", "times", 1.01, _reported_change),
     "predictions": Check("quarter car: predictions by the changes", "octaves", 1.0, _prediction_difference),
     "nearby": Check("quarter car: its change nearby by the largest one reported", "times", 1.01, _unreported_change),
     "two runs": Check("half car: confirmed changes, run once more", "of a deviation", 1e-9, _reported_difference),
-    "tolerance of runs": Check("half car: its change by the tolerance asked for", "times", 1.0, _runs_kept),
+    "tolerance of runs": Check("half car: its change by the tolerance asked for", "times", 1.0, _change_by_runs_ratio),
 }
 
 
-def _other_sign(original: Any) -> Any:
+def _opposite_prediction(original: Any) -> Any:
     def predicted(linear_screen: LinearScreen, reduced: Any) -> np.ndarray:
         C = linear_screen.base.system.C[linear_screen.rows]
         full = np.einsum("ki,ij,kj->k", C, linear_screen.P, C)
@@ -127,7 +137,7 @@ def _other_sign(original: Any) -> Any:
     return predicted
 
 
-def _any_tolerance(original: Any) -> Any:
+def _tolerance_ignored(original: Any) -> Any:
     def init(chooser: Any, first: Any, second_argument: Any, quantities: Any, tolerance: float, *further: Any) -> None:
         original(chooser, first, second_argument, quantities, 0.9, *further)
 
@@ -151,7 +161,7 @@ FAULTS = (
     CampaignFault(
         "sign of the predicted change",
         "screen of linear scenes",
-        attribute_patch(f"{LINEAR_MODULES}.screen:Screen.predicted_variances", _other_sign),
+        attribute_patch(f"{LINEAR_MODULES}.screen:Screen.predicted_variances", _opposite_prediction),
     ),
     CampaignFault(
         "predictions reported as confirmed",
@@ -172,7 +182,7 @@ FAULTS = (
     CampaignFault(
         "tolerance ignored",
         "choice of linear scenes",
-        attribute_patch(f"{LINEAR_MODULES}.choose:Chooser.__init__", _any_tolerance),
+        attribute_patch(f"{LINEAR_MODULES}.choose:Chooser.__init__", _tolerance_ignored),
     ),
     CampaignFault(
         "parameters that are off taken as they stand",
@@ -199,7 +209,9 @@ FAULTS = (
         ),
     ),
     CampaignFault(
-        "tolerance ignored", "choice by runs", attribute_patch(f"{RUN_MODULES}.choose:Chooser.__init__", _any_tolerance)
+        "tolerance ignored",
+        "choice by runs",
+        attribute_patch(f"{RUN_MODULES}.choose:Chooser.__init__", _tolerance_ignored),
     ),
     CampaignFault(
         "the least change of all quantities taken for each",

@@ -1,4 +1,4 @@
-"""Faults of contact, planted one at a time into pressure, creep law and exact theory, and what sees them."""
+"""Faults planted in contact pressure, creep law and exact contact theory, and the checks that see them."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -22,26 +22,28 @@ MATERIAL_PAIR = MaterialPair()
 LOAD, RADIUS, FRICTION = 1e4, 0.3, 0.3
 A, B = 6e-3, 4e-3
 CELLS, CELL_LENGTH, CELL_WIDTH = (21, 31), 3.0e-4, 4.2e-4
-"""Rows and columns, sizes (m) of cells that are not square: what is exchanged then shows."""
+"""Number of rows and columns, length and width (m) of the cells; they are not square, so that an exchange of both
+directions shows."""
 PUBLISHED_COEFFICIENTS = (4.12, 3.67, 1.47)
-"""C11, C22, C23 of Kalker's table for a = b, nu = 0.25."""
+"""Kalker's published coefficients C11, C22, C23 for a = b and Poisson's ratio 0.25."""
 
 
 def _ball_contact() -> tuple[float, float, float]:
-    """Radius (m) of the contact, approach (m) and peak pressure (Pa) of a ball on a plane, in closed form."""
+    """Contact radius (m), approach (m) and peak pressure (Pa) of a ball on a plane, in closed form."""
     stiff = STEEL.E / (2.0 * (1.0 - STEEL.nu**2))
     a = (0.75 * LOAD * RADIUS / stiff) ** (1.0 / 3.0)
     return a, a * a / RADIUS, 1.5 * LOAD / (np.pi * a * a)
 
 
 def _hertz_errors() -> float:
-    """Errors of Hertz's theory for a ball on a plane: radius, approach, peak pressure."""
+    """Largest relative error of the computed contact radius, approach and peak pressure of a ball on a plane."""
     answer = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, LOAD, MATERIAL_PAIR)
     return largest_relative_difference(np.array([answer.a, answer.approach, answer.p0]) / _ball_contact(), np.ones(3))
 
 
 def _ellipse_errors() -> float:
-    """Errors for an ellipse: its load against the integral of its pressure, 2/3 pi a b p0, and which axis is longer."""
+    """Relative error of an elliptic contact's load against the integral of its pressure, 2/3 pi a b p0; infinite if the
+    wrong axis is longer."""
     answer = hertz.by_load(2.0, 1.0, LOAD, MATERIAL_PAIR)
     balanced = abs(float(2.0 / 3.0 * np.pi * answer.a * answer.b * answer.p0) / LOAD - 1.0)
     return balanced if answer.b > answer.a else np.inf
@@ -54,7 +56,7 @@ def _normal_solution() -> NormalSolution:
 
 
 def _normal_solution_errors() -> float:
-    """Errors of the numerical normal solution for a ball: approach and peak pressure against the closed form."""
+    """Largest relative error of the numerical normal solution's approach and peak pressure for a ball."""
     answer = _normal_solution()
     return largest_relative_difference(
         np.array([answer.approach, answer.pressure.max()]) / _ball_contact()[1:], np.ones(2)
@@ -62,7 +64,7 @@ def _normal_solution_errors() -> float:
 
 
 def _kalker_errors() -> float:
-    """Errors of forces at small creepages and spin, against Kalker's published coefficients."""
+    """Largest relative error of creep forces at small creepages and spin, against Kalker's published coefficients."""
     soft = MaterialPair(Material(E=2.5e11, nu=0.25), Material(E=2.5e11, nu=0.25))
     a, shear = 5e-3, 1e11
     motion = np.array([[1e-7, 0.0, 0.0], [0.0, 1e-7, 0.0], [0.0, 0.0, 1e-4]])
@@ -72,8 +74,8 @@ def _kalker_errors() -> float:
     return largest_relative_difference(np.array([answer.fx[0], answer.fy[1], answer.fy[2]]) / wanted, np.ones(3))
 
 
-def _against_linear_theory() -> float:
-    """Errors of forces on an ellipse with 41 cells at small creepages, against the linear theory."""
+def _linear_theory_errors() -> float:
+    """Relative error of FASTSIM's creep forces on an ellipse at small creepages, against the linear theory."""
     motion = (1e-7, 0.7e-7, 2e-5)
     answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, FRICTION, *motion), MATERIAL_PAIR, cells=41)
     return largest_relative_difference(
@@ -82,13 +84,13 @@ def _against_linear_theory() -> float:
 
 
 def _sliding_errors() -> float:
-    """Errors in gross sliding: force against mu N, and its direction."""
+    """Relative error of the creep force in gross sliding, against mu N opposite to the creepage."""
     answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, FRICTION, 0.03, 0.04, 0.0), MATERIAL_PAIR)
     return largest_relative_difference(np.array([answer.fx, answer.fy]), -FRICTION * LOAD * np.array([0.6, 0.8]))
 
 
 def _theory_difference() -> float:
-    """Difference between exact theory and FASTSIM for contacts that slip in part, divided by mu N."""
+    """Difference between the creep forces by exact theory and by FASTSIM in partial slip, divided by mu N."""
     pressed, a = _normal_solution(), _ball_contact()[0]
     motion = (1.2e-3, -0.8e-3, 0.2)
     exact = rolling_problem.solve_rolling(pressed, FRICTION, *motion, MATERIAL_PAIR)
@@ -102,8 +104,8 @@ def _forces_at_small_creepage() -> Array:
     return np.array(forces(a, a, 2e-5, 1e-5, 0.0, MATERIAL_PAIR)[:2])
 
 
-def _exact_against_linear() -> float:
-    """Difference between the exact theory at small creepages and the linear theory."""
+def _exact_theory_error() -> float:
+    """Relative difference between the creep forces by exact theory at small creepages and by linear theory."""
     exact = rolling_problem.solve_rolling(_normal_solution(), FRICTION, 2e-5, 1e-5, 0.0, MATERIAL_PAIR)
     return largest_relative_difference(np.array([exact.fx, exact.fy]), _forces_at_small_creepage())
 
@@ -113,15 +115,15 @@ CHECKS = {
     "ellipse": Check("load of an ellipse by its pressure", "relative", 1e-9, _ellipse_errors),
     "cells": Check("pressure of a ball on cells in closed form", "relative", 2e-3, _normal_solution_errors),
     "Kalker's table": Check("creep forces by published coefficients", "relative", 0.015, _kalker_errors),
-    "linear": Check("creep forces of small creepages by linear theory", "of the largest", 5e-3, _against_linear_theory),
+    "linear": Check("creep forces of small creepages by linear theory", "of the largest", 5e-3, _linear_theory_errors),
     "sliding": Check("sliding by mu N", "relative", 1e-6, _sliding_errors),
-    "exact small": Check("exact theory by linear theory", "of the largest", 0.08, _exact_against_linear),
+    "exact small": Check("exact theory by linear theory", "of the largest", 0.08, _exact_theory_error),
     "theories": Check("exact theory beside FASTSIM", "mu N", 0.04, _theory_difference),
 }
 
 
 def _contacts_patch(change: Callable[[Array], None]) -> Patch:
-    """Patch that changes FASTSIM's input CONTACT (n,) in place."""
+    """Patch that changes FASTSIM's input records CONTACT (n,) in place."""
 
     def contacts(original: Any) -> Any:
         def planted(*given: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Figure: which check sees which fault, and by how much."""
+"""Figure of the checks that see each planted fault, and by how much their errors exceed the tolerance."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from models.drawing.figures import COLUMN_WIDTH, SMALL_TEXT, add_heading, subplots
 
 SCALE_DECADES = 12
-"""End of the colour scale; a refused run counts as this."""
+"""Decades at the end of the colour scale; a refused run counts as this many."""
 BLUE_COLOUR_MAP = LinearSegmentedColormap.from_list("seen", ("#d6e6f4", "#6aaed6", "#08488e"))
 
 

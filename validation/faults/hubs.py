@@ -1,4 +1,4 @@
-"""Faults of measured hub forces, planted where a vehicle's table takes them up; what sees them."""
+"""Faults planted where a vehicle's table reads measured hub forces, and the checks that see them."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,12 +17,13 @@ from validation.spatial.cars import hub_forces_by_jacobians, r19, static_forces
 
 
 def _driven_model(hubs: np.ndarray) -> HubModel:
-    """R19-free in MuJoCo, driven by these wrenches (3, 6 h) on its hubs."""
+    """The vehicle R19-free in MuJoCo under hub forces and moments (3, 6 number of hubs) in N, N m."""
     return build("mujoco", r19(), HubInputs(hubs), 1e-3, 1e-3)
 
 
 def _jacobian_difference() -> float:
-    """Relative difference of the generalised forces of hub wrenches from those by MuJoCo's Jacobians, far from rest."""
+    """Relative difference between the generalised forces of hub forces and moments and those by MuJoCo's Jacobians, in
+    a state far from rest."""
     vehicle, rows = r19(), static_forces(r19(), 3).hubs
     rows += np.random.default_rng(4).normal(0.0, 500.0, rows.shape[1])
     q = np.random.default_rng(5).uniform(-0.03, 0.03, vehicle.size)
@@ -45,13 +46,15 @@ CHECKS = {
 }
 
 
-def read(change: Callable[[np.ndarray], np.ndarray] | None = None, frame: str = "hub") -> Patch:
-    """Fault: wrenches (rows, hubs, 6) are changed as they are read, or read in another frame."""
+def wrench_reading_patch(
+    change_wrenches: Callable[[np.ndarray], np.ndarray] | None = None, frame: str = "hub"
+) -> Patch:
+    """Fault: hub forces and moments (samples, hubs, 6) are changed as they are read, or read in a wrong frame."""
 
     def table(original: Any) -> Any:
         def planted(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> Any:
             parts = hub_inputs.hubs.reshape(len(hub_inputs.hubs), -1, WRENCH)
-            rows = parts if change is None else change(parts)
+            rows = parts if change_wrenches is None else change_wrenches(parts)
             return original(vehicle, replace(hub_inputs, hubs=rows.reshape(hub_inputs.hubs.shape), frame=frame), step)
 
         return planted
@@ -60,15 +63,19 @@ def read(change: Callable[[np.ndarray], np.ndarray] | None = None, frame: str = 
 
 
 FAULTS = (
-    CampaignFault("left and right hubs swapped", "input", read(lambda parts: parts[:, [1, 0, 3, 2]])),
-    CampaignFault("front and rear hubs swapped", "input", read(lambda parts: parts[:, [2, 3, 0, 1]])),
-    CampaignFault("forces read along axes of the road", "input", read(frame="inertial")),
-    CampaignFault("y turned round", "input", read(lambda parts: parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0]))),
-    CampaignFault("moments left out", "input", read(lambda parts: parts * np.repeat([1.0, 0.0], 3))),
+    CampaignFault("left and right hubs swapped", "input", wrench_reading_patch(lambda parts: parts[:, [1, 0, 3, 2]])),
+    CampaignFault("front and rear hubs swapped", "input", wrench_reading_patch(lambda parts: parts[:, [2, 3, 0, 1]])),
+    CampaignFault("forces read along axes of the road", "input", wrench_reading_patch(frame="inertial")),
+    CampaignFault(
+        "y turned round",
+        "input",
+        wrench_reading_patch(lambda parts: parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])),
+    ),
+    CampaignFault("moments left out", "input", wrench_reading_patch(lambda parts: parts * np.repeat([1.0, 0.0], 3))),
     CampaignFault(
         "one force 1 % off",
         "input",
-        read(lambda parts: parts * np.r_[1.01, np.ones(parts[0].size - 1)].reshape(parts[0].shape)),
+        wrench_reading_patch(lambda parts: parts * np.r_[1.01, np.ones(parts[0].size - 1)].reshape(parts[0].shape)),
     ),
 )
 

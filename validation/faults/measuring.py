@@ -1,4 +1,5 @@
-"""Faults of what surrounds a vehicle, one at a time: noise, sensors, units, clocks, counting, sections, roads."""
+"""Faults planted in noise, sensors, units, resampling, cycle counting, section forces and roads, and the checks that
+see them."""
 
 from collections.abc import Callable
 from functools import cache
@@ -20,8 +21,9 @@ from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
 
 STANDARD_LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
-"""Figure 6 of ASTM E1049-85, whose cycles are printed there: 0.5 of 3, 1.5 of 4, 0.5 of 6, 1 of 8, 0.5 of 9."""
+"""Load history of figure 6 in ASTM E1049-85, whose cycles are printed there."""
 PRINTED_CYCLES = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
+"""Range of a cycle in that load history -> printed number of cycles."""
 SENSOR_PLACES = {"a": (1.2, 0.3, 0.1), "b": (-0.9, 0.5, 0.4), "c": (0.2, -0.8, -0.3), "d": (0.1, 0.2, 0.9)}
 SAMPLE_PERIOD, SAMPLE_COUNT = 5e-3, 400
 UNIT_FACTORS = {
@@ -46,20 +48,21 @@ def _stream_correlation() -> float:
     )
 
 
-def _variance() -> float:
+def _variance_error() -> float:
     """Difference of a noise stream's variance from 1, in standard errors."""
     stream = noise.normal_samples(3, 0, noise.SAMPLES_PER_BLOCK, 1)
     return abs(float(np.mean(stream**2)) - 1.0) * (noise.SAMPLES_PER_BLOCK / 2.0) ** 0.5
 
 
 def _stream_difference() -> float:
-    """Difference between a noise stream read in pieces and as a whole."""
+    """Largest difference between a noise stream read in two pieces and read at once."""
     parts = [noise.normal_samples(3, 0, 50, 1, first=first) for first in (0, 50)]
     return float(np.abs(np.concatenate(parts) - noise.normal_samples(3, 0, 100, 1)).max())
 
 
 def _damage_error() -> float:
-    """Error of the damage of the standard's load at slopes 1 and 5, against that of its printed cycles."""
+    """Largest relative error of the damage of the standard's load at Wöhler slopes 1 and 5, against the damage of its
+    printed cycles."""
     return max(
         abs(
             damage.pseudo_damage(STANDARD_LOAD, slope) / sum(n * size**slope for size, n in PRINTED_CYCLES.items())
@@ -70,7 +73,7 @@ def _damage_error() -> float:
 
 
 def _range_pair_error() -> float:
-    """Error of the range pairs of the standard's load, against its printed cycles."""
+    """Relative error of the range-pair counts of the standard's load, against its printed cycles."""
     counts = counting.range_pairs(
         np.array(list(PRINTED_CYCLES)), np.array(list(PRINTED_CYCLES.values())), np.array([3.5, 4.0, 8.5])
     )
@@ -78,14 +81,14 @@ def _range_pair_error() -> float:
 
 
 def _crossing_error() -> float:
-    """Error of the level crossings of the standard's load at 0, 2 and 4.5, against counts by hand."""
+    """Relative error of the level crossings of the standard's load at 0, 2 and 4.5, against counts by hand."""
     return largest_relative_difference(
         counting.level_crossings(STANDARD_LOAD, np.array([0.0, 2.0, 4.5])), np.array([4.0, 3.0, 1.0])
     )
 
 
 def _unit_errors() -> float:
-    """Errors of unit conversion factors."""
+    """Largest relative error of the unit conversion factors in UNIT_FACTORS."""
     return max(
         abs(units.factor_to_si(unit, quantity, "", "") / wanted - 1.0)  # type: ignore[arg-type]
         for (unit, quantity), wanted in UNIT_FACTORS.items()
@@ -93,7 +96,7 @@ def _unit_errors() -> float:
 
 
 def _resampling_error() -> float:
-    """Error, relative to the amplitude, of a 2 Hz sine resampled from 200 Hz and from 4 kHz to 1 kHz."""
+    """Largest error, divided by the amplitude, of a 2 Hz sine resampled from 200 Hz and from 4 kHz to 1 kHz."""
     grid, worst = np.arange(1000) / 1000.0 + 0.2, 0.0
     for rate in (200.0, 4000.0):
         sample_times = np.arange(round(1.5 * rate)) / rate
@@ -110,8 +113,8 @@ def _points_in_gap() -> float:
 
 
 def _section_force_error() -> float:
-    """Error of the section forces in the body's axes for an upward force, with the body standing on its tail and with
-    its nose 30 degrees up."""
+    """Relative error of the section forces in the body's axes for an upward force, at pitch angles of 90 and 30
+    degrees."""
     forces = score.section_forces(np.array([100.0, 200.0]), np.array([50.0, 0.0]), np.array([np.pi / 2, np.pi / 6]))
     have = np.concatenate([forces[name] for name in score.SECTION_FORCE_CHANNELS])
     return largest_relative_difference(have, np.array([100.0, 100.0, 0.0, 200.0 * 3**0.5 / 2, 50.0, 0.0, 0.0, 0.0]))
@@ -119,8 +122,8 @@ def _section_force_error() -> float:
 
 @cache
 def _turning_body() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
-    """Sensors on a body that pitches and heaves: their array, readings (n, 4, 3), pitch (n,) and vertical
-    acceleration."""
+    """Accelerometers on a body that pitches and heaves: sensor array, readings (n, 4, 3) in m/s^2, pitch (n,) in rad
+    and vertical acceleration (n,) in m/s^2."""
     t = SAMPLE_PERIOD * np.arange(SAMPLE_COUNT)
     pitch, rate, turn = (0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t))
     heave = 2.0 * np.cos(3 * t)
@@ -132,7 +135,8 @@ def _turning_body() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _recovered_motion_error() -> float:
-    """Larger relative error of the rates and the vertical acceleration of this body, recovered from the readings."""
+    """Relative error of the pitch rate and vertical acceleration recovered from the readings of accelerometers on a
+    moving body; the larger of both."""
     array, read, _, heave = _turning_body()
     moved_body = body.recovered_motion(array, read, SAMPLE_PERIOD, body.StartState(rates=(0.0, 0.6, 0.0)))
     rate = 0.6 * np.cos(2 * SAMPLE_PERIOD * np.arange(SAMPLE_COUNT))
@@ -143,26 +147,26 @@ def _recovered_motion_error() -> float:
 
 
 def _unexplained_share() -> float:
-    """Share of the readings that no rigid motion explains."""
+    """Share of the accelerometers' readings that no rigid-body motion explains."""
     array, read, *_ = _turning_body()
     return body.fit_quality(array, read).share
 
 
-def _road() -> float:
-    """Error of the variance of a class C road, against the standard's density integrated by hand."""
+def _road_variance_error() -> float:
+    """Relative error of the variance of a class C road, against the standard's spectral density integrated by hand."""
     road = iso8608.iso8608_road("C", 1, waves=400)
     wanted = 256e-6 * 0.1**2 * (1.0 / 0.011 - 1.0 / 2.83)
     return abs(0.5 * float(np.sum(road.amplitude**2)) / wanted - 1.0)
 
 
 def _road_level_error() -> float:
-    """Error of the two-sided level of class C over rad/m, which is pi n0^2 Gd."""
+    """Relative error of the two-sided spectral level of a class C road over rad/m, against pi n0^2 Gd."""
     return abs(iso8608.level_of_class("C") / (np.pi * 0.01 * 256e-6) - 1.0)
 
 
 CHECKS = {
     "streams": Check("streams of two paths and sources are uncorrelated", "standard errors", 4.5, _stream_correlation),
-    "variance": Check("variance of a stream is 1", "standard errors", 4.5, _variance),
+    "variance": Check("variance of a stream is 1", "standard errors", 4.5, _variance_error),
     "pieces": Check("a stream in pieces is the whole", "", 1e-15, _stream_difference),
     "damage": Check("damage by the cycles that the standard prints", "relative", 1e-12, _damage_error),
     "pairs": Check("range pairs by the same", "of the largest", 1e-12, _range_pair_error),
@@ -173,13 +177,13 @@ CHECKS = {
     "sections": Check("forces along a turned body", "of the largest", 1e-12, _section_force_error),
     "motion": Check("rate and acceleration from accelerometers", "of the largest", 1e-4, _recovered_motion_error),
     "rigid": Check("a rigid body is found rigid", "share", 1e-9, _unexplained_share),
-    "road": Check("variance of a road of class C", "relative", 1e-9, _road),
+    "road": Check("variance of a road of class C", "relative", 1e-9, _road_variance_error),
     "levels": Check("two-sided level of class C", "relative", 1e-9, _road_level_error),
 }
 
 
 def _noise_block_patch(change: Callable[..., tuple[int, ...]]) -> Patch:
-    """Fault: noise blocks are drawn for changed values of (seed, path, block, channels, source)."""
+    """Fault: noise blocks are generated for changed values of (seed, path, block, channels, source)."""
     return attribute_patch(
         "models.core.noise:normal_block",
         lambda real: (
@@ -205,7 +209,7 @@ def _factor_patch(name: str, factor: float) -> Patch:
 
 
 def _change_rainflow(change: Callable[[Any], Any]) -> Patch:
-    """Fault: spans, means and counts of the cycles are changed."""
+    """Fault: ranges, means and counts of rainflow cycles are changed."""
     return attribute_patch(
         "models.fatigue.rainflow_cycles:rainflow_cycles", lambda real: lambda turns: change(real(turns))
     )
@@ -223,11 +227,11 @@ def _readings_patch(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     )
 
 
-def _second_scaled(readings: np.ndarray) -> np.ndarray:
+def _second_sensor_scaled(readings: np.ndarray) -> np.ndarray:
     return readings * np.array([1.0, 1.01, 1.0, 1.0])[:, None]
 
 
-def _every_way(original: Any) -> Any:
+def _crossings_both_ways(original: Any) -> Any:
     return lambda load, levels: original(load, levels) + original(-np.asarray(load), -np.asarray(levels)[::-1])[::-1]
 
 
@@ -271,7 +275,9 @@ FAULTS = (
         ),
     ),
     CampaignFault(
-        "levels crossed either way", "counting", attribute_patch("models.fatigue.counting:level_crossings", _every_way)
+        "levels crossed either way",
+        "counting",
+        attribute_patch("models.fatigue.counting:level_crossings", _crossings_both_ways),
     ),
     CampaignFault("kN taken for N", "units", _factor_patch("kN", 1e-3)),
     CampaignFault("degrees taken for rad", "units", _factor_patch("deg/s", 180.0 / np.pi)),
@@ -310,7 +316,7 @@ FAULTS = (
         attribute_patch("models.sensors.rigid_body_motion:GRAVITY", lambda real: -real),
     ),
     CampaignFault("readings of two sensors exchanged", "motion", _readings_patch(lambda read: read[:, [1, 0, 2, 3]])),
-    CampaignFault("one sensor 1 % off", "motion", _readings_patch(_second_scaled)),
+    CampaignFault("one sensor 1 % off", "motion", _readings_patch(_second_sensor_scaled)),
     CampaignFault(
         "lever of the sensors left out",
         "motion",

@@ -1,6 +1,7 @@
-"""Faults in one engine's springs, mounts and bars of a vehicle on hub forces; what sees them.
+"""Faults planted in an engine's native springs, mounts and anti-roll bars of a vehicle on hub forces, and the checks
+that see them.
 
-Both engines are put beside the compiled forces, which take nothing from their builders, at states far from rest.
+Both engines are compared with compiled forces, which use nothing of the engines' builders, at states far from rest.
 """
 
 from collections.abc import Callable
@@ -19,19 +20,20 @@ STATE_COUNT = 3
 EXUDYN_MODULE = "models.engines.native_exudyn"
 
 
-def _beside_compiled(engine: str) -> Callable[[], float]:
-    """Largest difference of an engine's accelerations from those by compiled forces."""
+def _compiled_difference_check(engine: str) -> Callable[[], float]:
+    """Returns a check's function: relative difference between an engine's accelerations and those by compiled
+    forces."""
     return lambda: native_acceleration_difference(engine, rough_car(), random_states(rough_car(), STATE_COUNT))
 
 
 CHECK_TITLE = "accelerations of {} beside compiled forces"
 CHECKS = {
-    engine: Check(CHECK_TITLE.format(engine), "of the largest", 1e-12, _beside_compiled(engine))
+    engine: Check(CHECK_TITLE.format(engine), "of the largest", 1e-12, _compiled_difference_check(engine))
     for engine in ("exudyn", "mujoco")
 }
 
 
-def _in_model(change: Callable[[Any], None]) -> Patch:
+def _mujoco_model_patch(change: Callable[[Any], None]) -> Patch:
     """Fault: MuJoCo's compiled model is changed after its force laws were written into it."""
 
     def set_laws(original: Any) -> Any:
@@ -46,22 +48,22 @@ def _in_model(change: Callable[[Any], None]) -> Patch:
 
 
 def _scale_patch(array: str) -> Patch:
-    """Fault: the first row of an array of the model is 1 % larger."""
+    """Fault: the first row of an array of MuJoCo's model is 1 % too large."""
 
     def change(model: Any) -> None:
         getattr(model, array)[:1] *= 1.01
 
-    return _in_model(change)
+    return _mujoco_model_patch(change)
 
 
-def _bar_tendon(model: Any) -> None:
+def _larger_bar_coefficient(model: Any) -> None:
     """Fault: the coefficient of the first coordinate in the first anti-roll bar's tendon is 1 % too large."""
     bar = next(i for i in range(model.ntendon) if model.tendon(i).name.endswith("bar"))
     model.wrap_prm[model.tendon_adr[bar]] *= 1.01
 
 
 def _site_actuator(model: Any) -> int:
-    """Number of the first actuator that acts between two sites."""
+    """Number of the first actuator in a MuJoCo model that acts between two sites."""
     return int(np.argmax(model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE))
 
 
@@ -71,7 +73,7 @@ def _swap_sites(model: Any) -> None:
     sites[:] = sites[::-1].copy()
 
 
-def _mount_preload(model: Any) -> None:
+def _larger_mount_preload(model: Any) -> None:
     sited = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
     actuator = int(np.argmax(sited * (model.actuator_forcelimited == 0) * abs(model.actuator_biasprm[:, 0])))
     model.actuator_biasprm[actuator, 0] *= 1.01
@@ -96,7 +98,7 @@ def _element_law_patch(**factors: float) -> Patch:
     return attribute_patch("models.engines.free_vehicle_exudyn:add_parts", add_parts)
 
 
-def _bar_factor(original: Any) -> Any:
+def _larger_bar_factor(original: Any) -> Any:
     """Fault: the coefficient of the first coordinate in a bar is 1 % too large."""
 
     def add(self: Any, element: Any, travel: Any) -> None:
@@ -107,7 +109,7 @@ def _bar_factor(original: Any) -> Any:
     return add
 
 
-def _in_space(original: Any) -> Any:
+def _axes_fixed_in_space(original: Any) -> Any:
     """Fault: mounts are measured along axes fixed in space, since the connector belongs to the vehicle's tree."""
 
     def tree(self: Any, frame: str) -> Any:
@@ -120,16 +122,20 @@ FAULTS = (
     CampaignFault("a stiffness 1 % off", "MuJoCo", _scale_patch("tendon_stiffness")),
     CampaignFault("a damping 1 % off", "MuJoCo", _scale_patch("tendon_damping")),
     CampaignFault("a preload 1 % off", "MuJoCo", _scale_patch("tendon_lengthspring")),
-    CampaignFault("a bar's factor 1 % off", "MuJoCo", _in_model(_bar_tendon)),
-    CampaignFault("a mount's axis fixed in the engine", "MuJoCo", _in_model(_swap_sites)),
-    CampaignFault("a mount's preload 1 % off", "MuJoCo", _in_model(_mount_preload)),
-    CampaignFault("a curve without its corner", "MuJoCo", _in_model(_shift_corner)),
+    CampaignFault("a bar's factor 1 % off", "MuJoCo", _mujoco_model_patch(_larger_bar_coefficient)),
+    CampaignFault("a mount's axis fixed in the engine", "MuJoCo", _mujoco_model_patch(_swap_sites)),
+    CampaignFault("a mount's preload 1 % off", "MuJoCo", _mujoco_model_patch(_larger_mount_preload)),
+    CampaignFault("a curve without its corner", "MuJoCo", _mujoco_model_patch(_shift_corner)),
     CampaignFault("a stiffness 1 % off", "Exudyn", _element_law_patch(stiffness=1.01)),
     CampaignFault("a damping 1 % off", "Exudyn", _element_law_patch(damping=1.01)),
     CampaignFault("a preload 1 % off", "Exudyn", _element_law_patch(held=1.01)),
-    CampaignFault("a bar's factor 1 % off", "Exudyn", attribute_patch(f"{EXUDYN_MODULE}:Coordinates.add", _bar_factor)),
     CampaignFault(
-        "mounts' axes fixed in the space", "Exudyn", attribute_patch(f"{EXUDYN_MODULE}:_Trees._tree", _in_space)
+        "a bar's factor 1 % off", "Exudyn", attribute_patch(f"{EXUDYN_MODULE}:Coordinates.add", _larger_bar_factor)
+    ),
+    CampaignFault(
+        "mounts' axes fixed in the space",
+        "Exudyn",
+        attribute_patch(f"{EXUDYN_MODULE}:_Trees._tree", _axes_fixed_in_space),
     ),
 )
 

@@ -1,6 +1,6 @@
-"""Patches that plant a fault in the code of an engine's adapter or in the equations, for a block only.
+"""Patches that plant a fault in an engine's adapter or in the reference's equations, within a ``with`` block.
 
-Each is called once per built model and gives a context that can be entered again and again.
+A patch is called once for each built model and returns a context that can be entered repeatedly.
 """
 
 import math
@@ -16,8 +16,8 @@ from models.vehicles import pitch_plane_equations as equations
 
 Context = Callable[[], AbstractContextManager[Any]]
 Patch = Callable[[], Context]
-Pair = tuple[float, float]
-"""Forces (N) at the front and the rear."""
+FrontRearForces = tuple[float, float]
+"""Forces (N) at the front and the rear wheel or strut."""
 
 
 def no_fault() -> Context:
@@ -47,7 +47,7 @@ def _owner_and_name(path: str) -> tuple[Any, str]:
 
 
 def with_globals(function: Callable[..., Any], **other_globals: Any) -> Callable[..., Any]:
-    """A copy of the function with other globals; each must be one that its file has."""
+    """A copy of a function in which some of its module's global names are replaced."""
     if unknown := other_globals.keys() - function.__globals__.keys():
         raise AttributeError(f"{function.__module__} has no {', '.join(sorted(unknown))}")
     return FunctionType(function.__code__, function.__globals__ | other_globals, function.__name__)
@@ -56,8 +56,8 @@ def with_globals(function: Callable[..., Any], **other_globals: Any) -> Callable
 # Exudyn
 
 
-def index_of_the_end(original: Any) -> Any:
-    """Fault: with held samples, a step reads the sample at its end."""
+def sample_of_step_end(original: Any) -> Any:
+    """Fault: with samples that are constant over a step, a step reads the sample at its end."""
 
     def advance(clock: Any, mbs: Any, t: float) -> bool:
         clock.step = min(round(t * clock.per_time / 2), len(clock.steps[0]) - 1)
@@ -67,7 +67,7 @@ def index_of_the_end(original: Any) -> Any:
 
 
 def truncated_time(original: Any) -> Any:
-    """Fault: in the table of half steps the row number is truncated instead of rounded."""
+    """Fault: the row number in the table of input samples at half steps is truncated instead of rounded."""
 
     def reader(clock: Any, column: int, time_scale: float) -> Any:
         if not clock.table:
@@ -78,8 +78,8 @@ def truncated_time(original: Any) -> Any:
 
 
 def reset_accelerations(original: Any) -> Any:
-    """Fault: a constrained run starts with accelerations that Exudyn finds without the constraint's own
-    acceleration."""
+    """Fault: a constrained run starts with accelerations that Exudyn computes without the acceleration of the
+    prescribed motion."""
 
     def start(model: Any, options: Any) -> None:
         original(model, options)
@@ -114,7 +114,7 @@ def turning_reference(original: Any) -> Any:
     return suspension
 
 
-def misprinted_row(original: Any) -> Any:
+def reversed_pitch_row(original: Any) -> Any:
     """Fault: with a prescribed pitch, the chassis' row of eq. (39) has the wrong sign."""
 
     def guidance(*arguments: Any) -> np.ndarray:
@@ -125,7 +125,7 @@ def misprinted_row(original: Any) -> Any:
     return guidance
 
 
-def not_installed(original: Any) -> Any:
+def callback_not_installed(original: Any) -> Any:
     """Fault: the context that installs a callback does not install it."""
     return lambda law: nullcontext()
 
@@ -171,7 +171,7 @@ def moment_without_cosine() -> Any:
     """Fault: the moment is b f3 - a f4 instead of cos(beta) (b f3 - a f4)."""
     original = equations.newton_euler
 
-    def newton_euler(y: Any, wheels: Pair, struts: Pair, cosine: float, p: Any, dy: Any) -> None:
+    def newton_euler(y: Any, wheels: FrontRearForces, struts: FrontRearForces, cosine: float, p: Any, dy: Any) -> None:
         original(y, wheels, struts, 1.0, p, dy)
 
     return newton_euler
@@ -181,7 +181,7 @@ def no_reaction() -> Any:
     """Fault: the suspension force acts on the chassis, but not on the front wheel."""
     original = equations.newton_euler
 
-    def newton_euler(y: Any, wheels: Pair, struts: Pair, cosine: float, p: Any, dy: Any) -> None:
+    def newton_euler(y: Any, wheels: FrontRearForces, struts: FrontRearForces, cosine: float, p: Any, dy: Any) -> None:
         original(y, wheels, struts, cosine, p, dy)
         dy[4] -= struts[0] / p[2]
 

@@ -1,4 +1,4 @@
-"""Faults of the pitch-plane vehicle: whether the checks see what they are there to see, on both vehicles."""
+"""Planted faults of the pitch-plane vehicle: which checks see them, on a symmetric and an asymmetric vehicle."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from validation.faults.planting import (
 
 ASYMMETRIC_SET, SYMMETRIC_SET = "asymmetric_twin", "itwm_drift"
 RUN_DURATION = 0.1
-"""s of every run: what is planted shows at once."""
+"""Duration (s) of every run; the faults show at once."""
 HIDDEN_BY_SYMMETRY = (
     "a and b swapped",
     "front and rear suspension swapped",
@@ -27,7 +27,8 @@ HIDDEN_BY_SYMMETRY = (
     "front and rear wheel mass swapped",
     "chassis row of eq. (39) with the other sign",
 )
-"""What a vehicle with equal halves cannot show: exchanges of the halves, and terms in k3 b - k4 a."""
+"""Faults that a vehicle with equal front and rear halves cannot show: exchanges of the halves, and terms in k3 b - k4
+a."""
 
 
 def measure(
@@ -35,7 +36,8 @@ def measure(
     clean: Sequence[EngineFault] = CONTROLS_WITHOUT_FAULT,
     vehicles: Sequence[str] = (ASYMMETRIC_SET, SYMMETRIC_SET),
 ) -> Saved:
-    """Records of engines without faults and with each planted fault, for every check on every vehicle."""
+    """Records with the ratio of error to tolerance of every check on every vehicle: "clean" without faults, "faults"
+    with each fault planted."""
     benches = [Bench(name, RUN_DURATION) for name in vehicles]
     return {
         name: [_error_ratios(fault, benches) for fault in planted_here]
@@ -44,7 +46,7 @@ def measure(
 
 
 def _error_ratios(fault: EngineFault, benches: list[Bench]) -> Saved:
-    """Ratio of error to tolerance for every check, by vehicle and engine; None for a refused or failed run."""
+    """Record of a fault: ratio of error to tolerance by vehicle, engine and check; None for a refused or failed run."""
     ratios = {
         bench.parameters: {
             engine: {name: _error_ratio(fault, engine, name, bench) for name in CHECKS} for engine in fault.engines
@@ -70,12 +72,12 @@ FAULTS_BY_PLACE = {
 
 
 def is_seen(record: Saved, check: str, vehicle: str = ASYMMETRIC_SET) -> bool:
-    """Whether a check sees the fault in every engine in which it is planted."""
+    """Whether a check sees the fault of a record on a vehicle, in every engine in which it is planted."""
     return all(ratio is None or ratio > 1 for ratio in _ratios_of_check(record, check, vehicle))
 
 
 def smallest_ratio(record: Saved, check: str, vehicle: str) -> float:
-    """Smallest ratio of error to tolerance among the engines; infinite for refused runs."""
+    """Smallest ratio of error to tolerance of a check on a vehicle, over the engines; infinite for refused runs."""
     return min(math.inf if ratio is None else ratio for ratio in _ratios_of_check(record, check, vehicle))
 
 
@@ -84,14 +86,14 @@ def _ratios_of_check(record: Saved, check: str, vehicle: str) -> list[float | No
 
 
 def is_caught(record: Saved, vehicle: str = ASYMMETRIC_SET) -> bool:
-    """Whether in every engine at least one check sees the fault."""
+    """Whether at least one check sees the fault of a record on a vehicle, in every engine in which it is planted."""
     engines = record["ratios"][vehicle].values()
     return all(any(ratio is None or ratio > 1 for ratio in ratios.values()) for ratios in engines)
 
 
 def rows(case_data: Saved) -> list[Row]:
-    """Rows: faults caught, false alarms, faults that the symmetric vehicle hides (if both vehicles ran), and faults
-    that only one check catches."""
+    """Report rows: numbers of faults caught, of false alarms, of faults that the symmetric vehicle hides (if both
+    vehicles ran), and of faults that a single check catches."""
     clean, faulty = case_data["clean"], case_data["faults"]
     alarms = sum(
         ratio is None or ratio > 1
@@ -131,7 +133,7 @@ def rows(case_data: Saved) -> list[Row]:
 
 
 def _has_symmetric_vehicle(case_data: Saved) -> bool:
-    """Whether the symmetric vehicle ran, too."""
+    """Whether the faults were measured on the symmetric vehicle, too."""
     return all(SYMMETRIC_SET in record["ratios"] for record in case_data["faults"])
 
 
@@ -148,8 +150,8 @@ def _hidden_faults_row(faulty: list[Saved]) -> Row:
 
 
 def lines(case_data: Saved) -> list[tuple[str, ...]]:
-    """Table lines, one for each fault: system, the part with the fault, fault, checks that see it, checks that had
-    missed it."""
+    """Table lines, one for each fault: system, the part with the fault, fault, checks that see it, checks that do
+    not."""
     return [
         (
             "pitch-plane",
@@ -163,7 +165,7 @@ def lines(case_data: Saved) -> list[tuple[str, ...]]:
 
 
 def tables(case_data: Saved) -> list[Table]:
-    """Tables of the checks with their tolerances, and of every fault with the checks that see it."""
+    """Report tables of the checks with their tolerances, and of every fault with the checks that see it."""
     return [_check_table(case_data), _fault_table(case_data)]
 
 
@@ -218,7 +220,7 @@ def _fault_table(case_data: Saved) -> Table:
 
 
 def _size_text(record: Saved, name: str) -> str:
-    """Text with the check's smallest error among the engines, from its ratio to the tolerance."""
+    """Text with a check's smallest error over the engines on the asymmetric vehicle, or "refused"."""
     sizes = [
         math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
         for engine, ratios in record["ratios"][ASYMMETRIC_SET].items()
@@ -234,7 +236,7 @@ def _size_text(record: Saved, name: str) -> str:
 
 
 def draw(case_data: Saved) -> Drawn:
-    """Plot how far above its tolerance each check's error is for every fault, on both vehicles if both ran."""
+    """Figure of each check's error divided by its tolerance for every fault; none unless both vehicles ran."""
     if not _has_symmetric_vehicle(case_data):
         return []
     from validation.faults.figure import fault_map

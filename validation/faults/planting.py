@@ -1,7 +1,7 @@
-"""Faults, planted one at a time into what one engine is given, into its adapter or into the equations.
+"""Faults of the pitch-plane vehicle, planted in an engine's inputs, in its adapter or in the reference's equations.
 
-A check that has never seen a fault proves nothing. Each fault here is a mistake that is easily made in
-such code; ``planted_builder`` gives an engine with it, and outside of the engine's work nothing is changed.
+A check that has never seen a fault proves nothing. Each fault here is a mistake that is easily made in such code.
+``planted_builder`` returns an engine with a fault, which is active only while the engine computes.
 """
 
 import math
@@ -14,10 +14,10 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.model import Model
 from models.engines.protocol import build
-from validation.common.checks import Make
+from validation.common.checks import ModelBuilder
 from validation.faults import changes as change
 from validation.faults import patches
-from validation.faults.changes import Change
+from validation.faults.changes import AssemblyChange
 from validation.faults.patches import Context, Patch, attribute_patch, rewritten_reference
 
 BOTH_ENGINES = ("exudyn", "mujoco")
@@ -25,19 +25,20 @@ EXUDYN_ONLY, MUJOCO_ONLY, REFERENCE_ONLY = ("exudyn",), ("mujoco",), ("reference
 FORCE_FUNCTIONS = ("force", "pitch")
 
 
-def _as_asked(settings: Settings) -> Settings:
+def _unchanged_settings(settings: Settings) -> Settings:
     return settings
 
 
 @dataclass(frozen=True)
 class EngineFault:
-    """A fault: its description, the engines in which it is planted, and what it changes before or during a run."""
+    """A fault: its description, the engines in which it is planted, its change of the assembly, its patch of the code,
+    and its change of the run's settings."""
 
     name: str
     engines: tuple[str, ...]
-    change: Change = change.unchanged
-    inside: Patch = patches.no_fault
-    settings: Callable[[Settings], Settings] = _as_asked
+    change: AssemblyChange = change.unchanged
+    patch: Patch = patches.no_fault
+    settings: Callable[[Settings], Settings] = _unchanged_settings
 
 
 @dataclass
@@ -48,25 +49,25 @@ class PlantedModel:
     model: Model
 
     def run(self) -> Trajectory:
-        """The engine's run, with the fault."""
+        """Trajectory of the engine's run with the fault."""
         with self.context():
             return self.model.run()
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """The engine's accelerations (4,), with the fault."""
+        """Accelerations (4,) of the engine with the fault, at a time (s), coordinates q and rates v."""
         with self.context():
             return self.model.acceleration(time, q, v)
 
     def plan(self) -> dict[str, int]:
-        """Counts of what the engine with the planted fault built."""
+        """Numbers of elements, callbacks and states that the engine with the planted fault built."""
         return self.model.plan()
 
 
-def planted_builder(fault: EngineFault, engine: str) -> Make:
-    """A function that builds models with the fault in an engine, in the form that the checks expect."""
+def planted_builder(fault: EngineFault, engine: str) -> ModelBuilder:
+    """Returns a function (assembly, settings) -> model that builds models with the fault in an engine."""
 
     def make(assembly: Assembly, settings: Settings) -> PlantedModel:
-        context = fault.inside()
+        context = fault.patch()
         with context():
             return PlantedModel(context, build(engine, fault.change(assembly), fault.settings(settings)))
 
@@ -81,7 +82,7 @@ def _first_order_settings(settings: Settings) -> Settings:
 
 CONTROLS_WITHOUT_FAULT = (
     EngineFault("no fault", (*BOTH_ENGINES, *REFERENCE_ONLY)),
-    EngineFault("no fault, equations interpreted", REFERENCE_ONLY, inside=rewritten_reference()),
+    EngineFault("no fault, equations interpreted", REFERENCE_ONLY, patch=rewritten_reference()),
 )
 
 DESCRIPTION_FAULTS = (
@@ -89,8 +90,10 @@ DESCRIPTION_FAULTS = (
     EngineFault("sign of pitch mirrored", BOTH_ENGINES, change.with_moved_points(lambda x, a, b: -x)),
     EngineFault("front and rear suspension swapped", BOTH_ENGINES, change.swapped_struts("suspension3", "suspension4")),
     EngineFault("front and rear tyre swapped", BOTH_ENGINES, change.swapped_struts("tyre1", "tyre2")),
-    EngineFault("front and rear wheel mass swapped", BOTH_ENGINES, change.bodies(change.swapped_wheel)),
-    EngineFault("mass and pitch inertia of the chassis exchanged", BOTH_ENGINES, change.bodies(change.mixed_inertia)),
+    EngineFault("front and rear wheel mass swapped", BOTH_ENGINES, change.replaced_bodies(change.swapped_wheel)),
+    EngineFault(
+        "mass and pitch inertia of the chassis exchanged", BOTH_ENGINES, change.replaced_bodies(change.mixed_inertia)
+    ),
     EngineFault("pitch inertia about the front axle", BOTH_ENGINES, change.inertia_about_axle),
     EngineFault("front suspension 1 % too stiff", BOTH_ENGINES, change.stiffened_strut("suspension3", 1.01)),
     EngineFault("front suspension in N/mm", BOTH_ENGINES, change.stiffened_strut("suspension3", 1e-3)),
@@ -98,10 +101,12 @@ DESCRIPTION_FAULTS = (
     EngineFault(
         "linear geometry where exact was asked for",
         BOTH_ENGINES,
-        change.vehicle(lambda v: replace(v, geometry="linear")),
+        change.changed_vehicle_of(lambda v: replace(v, geometry="linear")),
     ),
-    EngineFault("gravity upward", BOTH_ENGINES, change.vehicle(lambda v: replace(v, gravity=-v.gravity))),
-    EngineFault("gravity 9.80665 for 9.81", BOTH_ENGINES, change.vehicle(lambda v: replace(v, gravity=9.80665))),
+    EngineFault("gravity upward", BOTH_ENGINES, change.changed_vehicle_of(lambda v: replace(v, gravity=-v.gravity))),
+    EngineFault(
+        "gravity 9.80665 for 9.81", BOTH_ENGINES, change.changed_vehicle_of(lambda v: replace(v, gravity=9.80665))
+    ),
     EngineFault("start from zero heave", BOTH_ENGINES, change.unstressed_start),
     EngineFault(
         "dead band missing", BOTH_ENGINES, change.replaced_springs(lambda spring: replace(spring, dead_band=0.0))
@@ -112,15 +117,15 @@ DESCRIPTION_FAULTS = (
         change.replaced_springs(lambda s: replace(s, dead_band=s.dead_band / 2)),
     ),
 )
-"""In the description that an engine is built from."""
+"""Faults in the vehicle's description that an engine is built from."""
 
 INPUT_FAULTS = (
     EngineFault("input half a sample late", BOTH_ENGINES, change.with_late_input(0.5)),
     EngineFault("input a whole sample late", BOTH_ENGINES, change.with_late_input(1.0)),
     EngineFault("road held at the middle stages", BOTH_ENGINES, change.replaced_input(("road",), change.HeldStages)),
-    EngineFault("rear wheel ahead of the front one", BOTH_ENGINES, change.road(wheelbase=-1.0)),
-    EngineFault("rear delay missing", BOTH_ENGINES, change.road(wheelbase=0.0)),
-    EngineFault("speed in km/h", BOTH_ENGINES, change.road(speed=3.6)),
+    EngineFault("rear wheel ahead of the front one", BOTH_ENGINES, change.scaled_road(wheelbase=-1.0)),
+    EngineFault("rear delay missing", BOTH_ENGINES, change.scaled_road(wheelbase=0.0)),
+    EngineFault("speed in km/h", BOTH_ENGINES, change.scaled_road(speed=3.6)),
     EngineFault(
         "rate of the road missing",
         BOTH_ENGINES,
@@ -138,9 +143,11 @@ INPUT_FAULTS = (
         change.replaced_channels(FORCE_FUNCTIONS, change.multiplied_channels({0: -1.0, 1: -1.0})),
     ),
     EngineFault(
-        "front wheel force at both wheels", BOTH_ENGINES, change.replaced_channels(FORCE_FUNCTIONS, change.front_twice)
+        "front wheel force at both wheels",
+        BOTH_ENGINES,
+        change.replaced_channels(FORCE_FUNCTIONS, change.front_values_at_rear),
     ),
-    EngineFault("wheel forces along the chassis, not vertical", BOTH_ENGINES, change.body_fixed),
+    EngineFault("wheel forces along the chassis, not vertical", BOTH_ENGINES, change.body_fixed_forces),
     EngineFault(
         "prescribed pitch in degrees",
         BOTH_ENGINES,
@@ -162,75 +169,77 @@ INPUT_FAULTS = (
         change.replaced_channels(("heave-pitch",), change.multiplied_channels(dict.fromkeys((2, 4, 6), -1.0))),
     ),
     EngineFault(
-        "added moment with the other sign", BOTH_ENGINES, change.moment(0.0, change.multiplied_channels({0: -1.0}))
+        "added moment with the other sign",
+        BOTH_ENGINES,
+        change.changed_moment(0.0, change.multiplied_channels({0: -1.0})),
     ),
-    EngineFault("added moment half a sample late", BOTH_ENGINES, change.moment(0.5)),
+    EngineFault("added moment half a sample late", BOTH_ENGINES, change.changed_moment(0.5)),
     EngineFault("Euler where Runge-Kutta was asked for", BOTH_ENGINES, settings=_first_order_settings),
 )
-"""In the input or the settings that an engine is run with."""
+"""Faults in the input or the settings that an engine is run with."""
 
 ADAPTER_FAULTS = (
     EngineFault(
         "held sample of the step's end",
         EXUDYN_ONLY,
-        inside=attribute_patch("models.engines.exudyn:SignalClock.advance", patches.index_of_the_end),
+        patch=attribute_patch("models.engines.exudyn:SignalClock.advance", patches.sample_of_step_end),
     ),
     EngineFault(
         "time cut off instead of rounded",
         EXUDYN_ONLY,
-        inside=attribute_patch("models.engines.exudyn:SignalClock.reader", patches.truncated_time),
+        patch=attribute_patch("models.engines.exudyn:SignalClock.reader", patches.truncated_time),
     ),
     EngineFault(
         "constraint starts without its acceleration",
         EXUDYN_ONLY,
-        inside=attribute_patch("models.engines.exudyn:ExudynModel._consistent_start", patches.reset_accelerations),
+        patch=attribute_patch("models.engines.exudyn:ExudynModel._consistent_start", patches.reset_accelerations),
     ),
     EngineFault(
         "enforced moment with the other sign",
         EXUDYN_ONLY,
-        inside=attribute_patch("models.engines.exudyn:ExudynModel._enforced", patches.negated_result),
+        patch=attribute_patch("models.engines.exudyn:ExudynModel._enforced", patches.negated_result),
     ),
     EngineFault(
         "gravity missing on one wheel",
         MUJOCO_ONLY,
-        inside=attribute_patch("models.engines.mujoco:specification", patches.weightless_wheel),
+        patch=attribute_patch("models.engines.mujoco:specification", patches.weightless_wheel),
     ),
     EngineFault(
         "strut measured along the rotating body",
         MUJOCO_ONLY,
-        inside=attribute_patch("models.engines.mujoco:_suspension", patches.turning_reference),
+        patch=attribute_patch("models.engines.mujoco:_suspension", patches.turning_reference),
     ),
     EngineFault(
         "chassis row of eq. (39) with the other sign",
         MUJOCO_ONLY,
-        inside=attribute_patch("models.engines.mujoco:_guidance", patches.misprinted_row),
+        patch=attribute_patch("models.engines.mujoco:_guidance", patches.reversed_pitch_row),
     ),
     EngineFault(
         "callback never installed",
         MUJOCO_ONLY,
-        inside=attribute_patch("models.engines.mujoco:installed", patches.not_installed),
+        patch=attribute_patch("models.engines.mujoco:installed", patches.callback_not_installed),
     ),
 )
-"""In the code of an engine's adapter."""
+"""Faults in the code of an engine's adapter."""
 
 EQUATIONS_FAULTS = (
     EngineFault(
         "cos(pitch) missing in the moment",
         REFERENCE_ONLY,
-        inside=rewritten_reference(newton_euler=patches.moment_without_cosine),
+        patch=rewritten_reference(newton_euler=patches.moment_without_cosine),
     ),
     EngineFault(
         "cos(pitch) missing in the damper",
         REFERENCE_ONLY,
-        inside=rewritten_reference(suspension=patches.damper_without_cosine),
+        patch=rewritten_reference(suspension=patches.damper_without_cosine),
     ),
     EngineFault(
-        "forces from the state before", REFERENCE_ONLY, inside=rewritten_reference(suspension=patches.stale_state)
+        "forces from the state before", REFERENCE_ONLY, patch=rewritten_reference(suspension=patches.stale_state)
     ),
     EngineFault(
-        "no reaction on the front wheel", REFERENCE_ONLY, inside=rewritten_reference(newton_euler=patches.no_reaction)
+        "no reaction on the front wheel", REFERENCE_ONLY, patch=rewritten_reference(newton_euler=patches.no_reaction)
     ),
 )
-"""In the hand-written equations."""
+"""Faults in the hand-written equations of the reference."""
 
 FAULTS = (*DESCRIPTION_FAULTS, *INPUT_FAULTS, *ADAPTER_FAULTS, *EQUATIONS_FAULTS)

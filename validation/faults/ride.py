@@ -1,4 +1,4 @@
-"""Faults of ride, planted one at a time into road, vehicle, covariance and weighting, and the checks that see them."""
+"""Faults planted in road, vehicle, covariance and frequency weighting of rides, and the checks that see them."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,7 +24,7 @@ from validation.ride.rides import R19_FREQUENCIES, STANDARD_WEIGHTINGS, largest_
 
 SPEED = 17.0
 PUBLISHED_INERTIA = np.diag([207.26524557936952, 1565.8178787125541, 1791.5995300122856])
-"""Published inertia (kg m^2) of the whole sprung mass of R19, which body and engine share."""
+"""Published inertia (kg m^2) of the sprung mass of the vehicle R19, body and engine together."""
 
 
 def _system(name: str, road: Callable[[LinearVehicle], Excitation]) -> tuple[LinearVehicle, Excitation, DelayedSystem]:
@@ -35,24 +35,26 @@ def _system(name: str, road: Callable[[LinearVehicle], Excitation]) -> tuple[Lin
     return vehicle, met, excited.vehicle_with_road(vehicle, met, SPEED)
 
 
-def _one_track(vehicle: LinearVehicle) -> Excitation:
+def _single_track_road(vehicle: LinearVehicle) -> Excitation:
     return two_track.road_excitation(two_track.road_of_level(1.0), two_track.on_track(vehicle.wheels, 1.0))
 
 
 @cache
-def _by_frequency() -> np.ndarray:
-    vehicle, road, _ = _system("half_car", _one_track)
+def _variances_by_spectra() -> np.ndarray:
+    vehicle, road, _ = _system("half_car", _single_track_road)
     return variances_by_quadrature(vehicle, road, SPEED).variance
 
 
 def _quadrature_errors() -> float:
-    """Errors of the half car's variances against integrals over its spectra."""
-    return largest_relative_error(stationary_covariance(_system("half_car", _one_track)[2]).variance, _by_frequency())
+    """Largest relative error of the half car's variances against integrals over its spectra."""
+    return largest_relative_error(
+        stationary_covariance(_system("half_car", _single_track_road)[2]).variance, _variances_by_spectra()
+    )
 
 
-def _closed_form() -> float:
-    """Error of the quarter car's body acceleration on a first-order road, against a closed form with the values of its
-    file."""
+def _closed_form_error() -> float:
+    """Relative error of the variance of the quarter car's body acceleration on a first-order road, against its closed
+    form."""
     q, corner = 1e-4, 0.3
     road = Excitation(np.array([[-corner]]), np.array([[q**0.5]]), (np.ones((1, 1)),), (0.0,))
     variance = stationary_covariance(_system("quarter_car", lambda vehicle: road)[2]).variance[0]
@@ -62,7 +64,8 @@ def _closed_form() -> float:
 
 @cache
 def _covariance_of_heights() -> np.ndarray:
-    """Variances of the road heights under each wheel of R19-ride, and of the sum of the left ones."""
+    """Variances of the road heights under each wheel of the vehicle R19-ride, and of the sum of the left heights, in
+    closed form."""
     wheels = spatial_linear.wheels(vehicle_file.load_vehicle("r19_ride"))
     P = two_track.input_covariance(two_track.road_of_level(two_track.half_track(wheels)), wheels)
     left = [i for i, wheel in enumerate(wheels) if wheel.y > 0]
@@ -70,8 +73,8 @@ def _covariance_of_heights() -> np.ndarray:
 
 
 def _road_height_errors() -> float:
-    """Errors of the road heights under the wheels of R19-ride by filters and delays, against their covariance in closed
-    form."""
+    """Largest relative error of the variances of road heights under the wheels of R19-ride by filters and delays,
+    against their closed form."""
     vehicle = spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride"))
     no, unit = np.zeros(len(vehicle.mass)), np.eye(len(vehicle.wheels))
     left = sum(unit[i] for i, wheel in enumerate(vehicle.wheels) if wheel.y > 0)
@@ -84,21 +87,21 @@ def _road_height_errors() -> float:
     return largest_relative_error(variance, _covariance_of_heights())
 
 
-def _published_road() -> float:
-    """Error of the variance of one track of the paper's road, against pi S0 / 2 (1 / 0.3 + 1 / 1.5)."""
+def _paper_road_error() -> float:
+    """Relative error of the variance of a track of the paper's road, against pi S0 / 2 (1 / 0.3 + 1 / 1.5)."""
     covariance = float(two_track.road_of_level(0.7).covariance(np.array(0.0), 0.7, 0.7))
     return largest_relative_error(covariance, np.pi * 1.6e-5 / 2.0 * (1.0 / 0.3 + 1.0 / 1.5))
 
 
-def _frequencies() -> float:
-    """Errors of the 19 eigenfrequencies of R19-ride, against those that belong to its data."""
+def _eigenfrequency_errors() -> float:
+    """Largest relative error of the 19 eigenfrequencies of R19-ride, against values computed from its data."""
     rates = poles(spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride")))
     return largest_relative_error(np.sort(np.abs(rates))[::2] / (2 * np.pi), R19_FREQUENCIES)
 
 
-def _whole_inertia() -> float:
-    """Error of the inertia of R19-free's body and engine about their common centre of mass, relative to the largest
-    entry."""
+def _sprung_inertia_error() -> float:
+    """Error of the inertia of R19-free's body and engine about their common centre of mass, divided by the largest
+    published entry."""
     vehicle = vehicle_file.load_vehicle("r19_free")
     parts = [vehicle.body(name) for name in ("body", "engine")]
     centre = sum(body_part.mass * np.array(body_part.position) for body_part in parts) / sum(
@@ -118,13 +121,14 @@ def _hand_written_accelerations(name: str) -> np.ndarray:
 
 
 def _small_state(vehicle: SpatialVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A small state with coordinates, rates and road that are all different, so that no errors cancel."""
+    """Small coordinates, rates and road heights with rates that are all different, so that no errors cancel."""
     n, w = len(vehicle.coordinates()), len(vehicle.tyres)
     return 1e-7 * np.cos(np.arange(n)), 1e-6 * np.sin(1.0 + np.arange(n)), 1e-7 * np.cos(0.7 * np.arange(2 * w))
 
 
 def _acceleration_errors() -> float:
-    """Errors of the accelerations of R19-ride and R19-free at a small state, against equations written by hand."""
+    """Largest relative error of the accelerations of R19-ride and R19-free at a small state, against equations written
+    by hand."""
     sizes = []
     for name in ("r19_ride", "r19_free"):
         vehicle = vehicle_file.load_vehicle(name)
@@ -136,48 +140,51 @@ def _acceleration_errors() -> float:
     return max(sizes)
 
 
-def _states_of_weighting() -> float:
-    """Errors of the filter states of Wk at eight frequencies, against the formulas of its sections."""
+def _filter_state_errors() -> float:
+    """Largest relative error of the weighting filter Wk's state-space response at eight frequencies, against the
+    formulas of its sections."""
     A, B, C = WEIGHTINGS["Wk"].matrices()
     frequency = np.geomspace(0.3, 200.0, 8)
     response = np.array([C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) for f in frequency])
     return largest_relative_error(response, WEIGHTINGS["Wk"].response(frequency))
 
 
-def _table_of_weighting() -> float:
-    """Relative errors of Wk against the standard's table."""
+def _standard_table_error() -> float:
+    """Largest relative error of the frequency weighting Wk against the standard's table."""
     frequency, wk, _ = np.array(STANDARD_WEIGHTINGS).T
     return largest_relative_error(1e3 * np.abs(WEIGHTINGS["Wk"].response(frequency)), wk)
 
 
 CHECKS = {
     "quadrature": Check("half car: variances, spectra integrated", "relative", 1e-9, _quadrature_errors),
-    "closed form": Check("quarter car: body acceleration in closed form", "relative", 1e-10, _closed_form),
+    "closed form": Check("quarter car: body acceleration in closed form", "relative", 1e-10, _closed_form_error),
     "heights": Check("R19-ride: road under its wheels in closed form", "relative", 1e-10, _road_height_errors),
-    "paper's road": Check("variance of a track of the paper's road", "relative", 1e-12, _published_road),
-    "frequencies": Check("R19-ride: 19 eigenfrequencies of its data", "relative", 1e-5, _frequencies),
-    "whole inertia": Check("R19-free: published inertia of body with engine", "of the largest", 1e-9, _whole_inertia),
+    "paper's road": Check("variance of a track of the paper's road", "relative", 1e-12, _paper_road_error),
+    "frequencies": Check("R19-ride: 19 eigenfrequencies of its data", "relative", 1e-5, _eigenfrequency_errors),
+    "whole inertia": Check(
+        "R19-free: published inertia of body with engine", "of the largest", 1e-9, _sprung_inertia_error
+    ),
     "equations": Check("R19: accelerations by hand-written equations", "of the largest", 1e-5, _acceleration_errors),
-    "Wk's formula": Check("Wk: states against its sections", "relative", 1e-12, _states_of_weighting),
-    "Wk's table": Check("Wk: the standard's table", "relative", 5e-3, _table_of_weighting),
+    "Wk's formula": Check("Wk: states against its sections", "relative", 1e-12, _filter_state_errors),
+    "Wk's table": Check("Wk: the standard's table", "relative", 5e-3, _standard_table_error),
 }
 
 
-def _vehicle(change: Callable[[SpatialVehicle], SpatialVehicle]) -> Patch:
-    """Fault: every vehicle is changed as it is loaded."""
+def _vehicle_patch(change: Callable[[SpatialVehicle], SpatialVehicle]) -> Patch:
+    """Fault: every vehicle is replaced by change(vehicle) as it is loaded."""
     return attribute_patch(
         "models.vehicles.vehicle_file:load_vehicle", lambda real: lambda *arguments: change(real(*arguments))
     )
 
 
 def _excited_patch(change: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
-    """Fault: change(system, speed) replaces every excited linear system."""
+    """Fault: every linear system of vehicle and road is replaced by change(system, speed)."""
     return attribute_patch(
         "models.ride.excited:vehicle_with_road", lambda real: lambda v, e, speed: change(real(v, e, speed), speed)
     )
 
 
-def _reversed(original: Any) -> Any:
+def _reversed_delays(original: Any) -> Any:
     def hits(system: DelayedSystem) -> Any:
         met = original(system)
         delays = [met.delays[-1] - delay for delay in met.delays[::-1]]
@@ -194,19 +201,19 @@ def _on_front_track(original: Any) -> Any:
     return row
 
 
-def _other_twist(original: Any) -> Any:
+def _opposite_twist(original: Any) -> Any:
     return lambda motion, bar: 2.0 * motion.coordinate(bar.body, "rx") - original(motion, bar)
 
 
 def _mirrored_body(vehicle: SpatialVehicle) -> SpatialVehicle:
-    """Fault: the heaviest body's centre of mass is as far behind the middle as it was ahead of it."""
+    """Fault: the heaviest body's centre of mass is mirrored about the middle between the axles (a and b swapped)."""
     heavy = max(vehicle.bodies, key=lambda body: body.mass)
     x, y, z = heavy.position
     moved_body = replace(heavy, position=(vehicle.axles[0] + vehicle.axles[-1] - x, y, z))
     return replace(vehicle, bodies=tuple(moved_body if body is heavy else body for body in vehicle.bodies))
 
 
-def _other_products(vehicle: SpatialVehicle) -> SpatialVehicle:
+def _opposite_products_of_inertia(vehicle: SpatialVehicle) -> SpatialVehicle:
     """Fault: products of inertia have the opposite sign."""
 
     def tensor(inertia: Any) -> Any:
@@ -219,7 +226,7 @@ def _wrong_wk(original: Any) -> Any:
     return {**original, "Wk": weighting_of_standard("Wk", (12.5, 12.5, 0.63), (3.35, 0.91, 2.37, 0.91))}
 
 
-def _lossy(original: Any) -> Any:
+def _missing_coupling(original: Any) -> Any:
     def matrices(weighting: Any) -> Any:
         A, B, C = original(weighting)
         A = A.copy()
@@ -233,7 +240,7 @@ FAULTS = (
     CampaignFault(
         "rear axle ahead of the front one",
         "covariance",
-        attribute_patch("models.ride.covariance:noise_arrivals", _reversed),
+        attribute_patch("models.ride.covariance:noise_arrivals", _reversed_delays),
     ),
     CampaignFault(
         "cross terms of the axles missing",
@@ -269,15 +276,17 @@ FAULTS = (
             lambda real: lambda y, level=two_track.TRACK_DENSITY_LEVEL, **others: real(y, 2.0 * level, **others),
         ),
     ),
-    CampaignFault("a and b swapped", "vehicle", _vehicle(_mirrored_body)),
-    CampaignFault("sign of the products of inertia", "vehicle", _vehicle(_other_products)),
+    CampaignFault("a and b swapped", "vehicle", _vehicle_patch(_mirrored_body)),
+    CampaignFault("sign of the products of inertia", "vehicle", _vehicle_patch(_opposite_products_of_inertia)),
     CampaignFault(
-        "sign of the anti-roll bar", "vehicle", attribute_patch("models.vehicles.spatial_linear:_twist", _other_twist)
+        "sign of the anti-roll bar",
+        "vehicle",
+        attribute_patch("models.vehicles.spatial_linear:_twist", _opposite_twist),
     ),
     CampaignFault(
         "tyre stiffness per axle for per wheel",
         "vehicle",
-        _vehicle(lambda car: replace(car, tyres=tuple(replace(t, stiffness=2 * t.stiffness) for t in car.tyres))),
+        _vehicle_patch(lambda car: replace(car, tyres=tuple(replace(t, stiffness=2 * t.stiffness) for t in car.tyres))),
     ),
     CampaignFault(
         "Wk: upward step turned round", "weighting", attribute_patch("validation.faults.ride:WEIGHTINGS", _wrong_wk)
@@ -285,7 +294,7 @@ FAULTS = (
     CampaignFault(
         "Wk: a section hears too little",
         "weighting",
-        attribute_patch("models.ride.weighting:Weighting.matrices", _lossy),
+        attribute_patch("models.ride.weighting:Weighting.matrices", _missing_coupling),
     ),
 )
 

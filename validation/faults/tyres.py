@@ -1,4 +1,5 @@
-"""Faults of a car on rolling tyres, planted in the table that its compiled forces read; what sees them."""
+"""Faults planted in the parameter table of a car on rolling tyres, which its compiled forces read, and the checks that
+see them."""
 
 from functools import cache
 from typing import Any
@@ -17,7 +18,8 @@ from validation.spatial.cars import cornering_error, mirrored_coordinates
 
 
 def car_in_a_turn(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray]:
-    """The vehicle R19-free steered into a turn at 25 m/s, and a state within the turn."""
+    """The vehicle R19-free with a steer angle (rad) at 25 m/s, and coordinates and rates of a state within the
+    turn."""
     car = Handling(load_vehicle("r19_free"), controls=Controls(steer=((0.0, steer),)))
     q, v = car.straight(25.0)
     coordinates, direction = car.vehicle.coordinates(), np.sign(steer)
@@ -38,7 +40,7 @@ def _accelerations(engine: str, steer: float = 0.05) -> np.ndarray:
 
 
 @cache
-def _by_exudyn() -> np.ndarray:
+def _accelerations_by_exudyn() -> np.ndarray:
     return _accelerations("exudyn")
 
 
@@ -55,7 +57,7 @@ def _read_report(car: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarra
 
 
 def _energy_balance_error() -> float:
-    """Error of the energy balance along the motion, divided by the largest power of a tyre."""
+    """Error of the car's energy balance along its motion, divided by the largest power of a tyre."""
     car, q, v = car_in_a_turn()
     a, (report, ledger) = build("mujoco", car).acceleration(0.0, q, v), _read_report(car, q, v)
     ends = [
@@ -67,7 +69,7 @@ def _energy_balance_error() -> float:
 
 
 def _locked_wheel_error() -> float:
-    """Error of the force on locked wheels, which should be mu N against the sliding velocity."""
+    """Relative error of the force on locked wheels, which should be mu N against the sliding velocity."""
     car = Handling(load_vehicle("r19_free"), Tyres(cells=11, fixed=("fl", "fr", "rl", "rr")))
     report, _ = _read_report(car, *car.straight(15.0))
     return float(np.abs(report[:, at.FX] / (car.tyres.friction * report[:, at.PRESS]) + 1.0).max())
@@ -78,7 +80,7 @@ CHECKS = {
         "accelerations in a turn by Exudyn",
         "of the largest",
         1e-10,
-        lambda: largest_relative_difference(_accelerations("mujoco"), _by_exudyn()),
+        lambda: largest_relative_difference(_accelerations("mujoco"), _accelerations_by_exudyn()),
     ),
     "mirror": Check("accelerations of the mirror image", "of the largest", 1e-10, _mirror_error),
     "balance": Check("change of energy by the powers", "of the tyres'", 1e-6, _energy_balance_error),
@@ -92,13 +94,13 @@ CHECKS = {
 ALL_WHEELS = (0, 1, 2, 3)
 
 
-def tyre(column: int, factor: float, index: tuple[int, ...] = (0,), shift: float = 0.0) -> Patch:
-    """Fault: a number of the tyres is multiplied by a factor and shifted by an offset in the table."""
+def tyre_table_patch(column: int, factor: float, tyre_numbers: tuple[int, ...] = (0,), shift: float = 0.0) -> Patch:
+    """Fault: a parameter (column of the table) of some tyres is multiplied by a factor and shifted."""
 
     def table(original: Any) -> Any:
         def planted(car: Handling) -> np.ndarray:
             numbers: np.ndarray = original(car)
-            for i in index:
+            for i in tyre_numbers:
                 index_in_table = int(numbers[at.OF_TYRES]) + at.PER_TYRE * i + column
                 numbers[index_in_table] = factor * numbers[index_in_table] + shift
             return numbers
@@ -111,12 +113,12 @@ def tyre(column: int, factor: float, index: tuple[int, ...] = (0,), shift: float
 FAULTS = tuple(
     CampaignFault(name, "tyre", patch)
     for name, patch in (
-        ("bristles of one tyre 1 % stiffer", tyre(at.BRISTLES, 1.01)),
-        ("bristles of all tyres 1 % stiffer", tyre(at.BRISTLES, 1.01, ALL_WHEELS)),
-        ("friction of all tyres 1 % off", tyre(at.GRIP, 1.01, ALL_WHEELS)),
-        ("one wheel steered the other way", tyre(at.STEERED, -1.0)),
-        ("load of one tyre at rest 1 % off", tyre(at.STATIC, 1.01)),
-        ("inclination of one wheel, which has none, by half a degree", tyre(at.INCLINED, 1.0, shift=9e-3)),
+        ("bristles of one tyre 1 % stiffer", tyre_table_patch(at.BRISTLES, 1.01)),
+        ("bristles of all tyres 1 % stiffer", tyre_table_patch(at.BRISTLES, 1.01, ALL_WHEELS)),
+        ("friction of all tyres 1 % off", tyre_table_patch(at.GRIP, 1.01, ALL_WHEELS)),
+        ("one wheel steered the other way", tyre_table_patch(at.STEERED, -1.0)),
+        ("load of one tyre at rest 1 % off", tyre_table_patch(at.STATIC, 1.01)),
+        ("inclination of one wheel, which has none, by half a degree", tyre_table_patch(at.INCLINED, 1.0, shift=9e-3)),
     )
 )
 

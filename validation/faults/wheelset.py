@@ -1,4 +1,5 @@
-"""Faults of a wheelset, planted in the written equations, which run as plain Python meanwhile; what sees them."""
+"""Faults planted in the reference's equations of a wheelset, which run as plain Python for this, and the checks that
+see them."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -22,42 +23,42 @@ from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Context, Patch, attribute_patch, with_globals
 
-Law = Literal["linear", "fastsim"]
+CreepLaw = Literal["linear", "fastsim"]
 STATES = np.array(
     [
         [3e-3, 4e-5, -1e-4, 4e-3, 0.0, 0.02, 0.01, 0.2, 0.3, 0.5],
         [-4e-3, 2e-5, 2e-4, 1e-2, 0.0, -0.05, 0.0, 0.1, -0.4, 2.0],
     ]
 )
-"""Moved from rest (m, rad, m/s, rad/s): the second one slides all over."""
+"""Displacements of two states from rest (m, rad, m/s, rad/s); in the second state the wheels slide fully."""
 MIRROR_SIGNS = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
 SPEED, SLIDING_STATE = 60.0, 1
 HALF_DIFFERENCE_TIME = 1e-6
-"""s: half the time over which energies are differentiated."""
+"""Half the time difference (s) over which energies are differentiated."""
 
 
-def equations(law: Law = "fastsim") -> Equations:
-    """Equations of the chosen wheelset, with few contact cells."""
+def equations(law: CreepLaw = "fastsim") -> Equations:
+    """The reference's equations of the chosen wheelset, with few contact cells."""
     return Equations(CHOSEN_WHEELSET, SPEED, law, 7)
 
 
 @cache
 def states() -> Array:
-    """Two states (2, 10) near rest."""
+    """Two states (2, 10) of the wheelset near rest."""
     return equations().rest + STATES
 
 
 @cache
-def by_engine() -> Array:
-    """Time derivatives (2, 10) of these states by MuJoCo."""
+def rates_by_mujoco() -> Array:
+    """Time derivatives (2, 10) of the two states of ``states`` by MuJoCo."""
     built = MujocoWheelset(CHOSEN_WHEELSET, SPEED, cells=7)
     return np.array([built.rates(state) for state in states()])
 
 
-def _engine() -> float:
+def _engine_difference() -> float:
     return max(
         largest_relative_difference(equations().rates(state), rates)
-        for state, rates in zip(states(), by_engine(), strict=True)
+        for state, rates in zip(states(), rates_by_mujoco(), strict=True)
     )
 
 
@@ -69,7 +70,7 @@ def _mirror_error() -> float:
 
 
 def _energy_balance_error() -> float:
-    """Largest error of the balance of energy, divided by the largest power.
+    """Largest error of the wheelset's energy balance, divided by the largest power.
 
     The change of kinetic, spring and potential energy is taken by central differences along the motion.
     """
@@ -84,11 +85,11 @@ def _energy_balance_error() -> float:
     return float(np.abs(missing).max() / np.abs(powers).max())
 
 
-def _contact_report(state: Array, law: Law = "fastsim") -> Array:
+def _contact_report(state: Array, law: CreepLaw = "fastsim") -> Array:
     return equations(law).at(state[None])[1][0]
 
 
-def _friction() -> float:
+def _sliding_force_error() -> float:
     """Relative difference of the creep forces of fully sliding wheels from mu N; infinite if a contact gains energy."""
     report = _contact_report(states()[SLIDING_STATE])
     if report["power"].max() > 0.0:
@@ -98,8 +99,8 @@ def _friction() -> float:
 
 
 def _spin_and_load_at_rest() -> float:
-    """Larger relative error of the speed of turning, -V / r, and of the carried load, of a wheelset that rolls in the
-    middle of the track."""
+    """Relative error of the spin -V / r and of the carried load of a wheelset that rolls in the middle of the track;
+    the larger of both."""
     rest_state = equations().rest
     report = _contact_report(rest_state)
     vertical_force = report["load"] * np.cos(report["angle"]) - report["fy"] * np.sin(report["angle"])
@@ -110,7 +111,8 @@ def _spin_and_load_at_rest() -> float:
 
 
 def _linear_law_error() -> float:
-    """Error of the linear law's creep forces and moment against Kalker's theory at the reported creepages."""
+    """Largest relative error of the linear law's creep forces and moment against Kalker's theory at the reported
+    creepages."""
     report = _contact_report(states()[0], "linear")
     a, b, x, y, spin = (report[name] for name in ("a", "b", "xi_x", "xi_y", "spin"))
     wanted = kalker(a, b, x, y, spin, CHOSEN_WHEELSET.pair)
@@ -120,10 +122,12 @@ def _linear_law_error() -> float:
 
 
 CHECKS = {
-    "engine": Check("rates at two states by MuJoCo", "of the largest", 1e-10, _engine),
+    "engine": Check("rates at two states by MuJoCo", "of the largest", 1e-10, _engine_difference),
     "mirror": Check("rates of the mirror image", "of the largest", 1e-12, _mirror_error),
     "balance": Check("change of energy by the powers", "of the largest", 1e-6, _energy_balance_error),
-    "friction": Check("force of sliding wheels by mu N, little of it by spin, no power", "relative", 1e-3, _friction),
+    "friction": Check(
+        "force of sliding wheels by mu N, little of it by spin, no power", "relative", 1e-3, _sliding_force_error
+    ),
     "wave": Check(
         "Klingel's wavelength in closed form",
         "relative",
@@ -136,7 +140,7 @@ CHECKS = {
 
 
 def plain_python_patch(**functions: Any) -> Patch:
-    """Patch that runs the equations as plain Python, contact by contact, with some functions replaced."""
+    """Patch that runs the wheelset's equations as plain Python, contact by contact, with some functions replaced."""
 
     def prepare() -> Context:
         @contextmanager
@@ -153,7 +157,7 @@ def plain_python_patch(**functions: Any) -> Patch:
 
 
 def after_rates_patch(change: Callable[..., None]) -> Patch:
-    """Patch that changes the time derivatives after their computation by change(state, body, rates)."""
+    """Patch that changes the state's time derivatives by change(state, body, rates) after their computation."""
 
     def with_change(original: Any) -> Any:
         def rates(state: Any, speed: Any, body: Any, *further: Any) -> None:
@@ -166,8 +170,8 @@ def after_rates_patch(change: Callable[..., None]) -> Patch:
 
 
 def creep_law_patch(change: Callable[[Any, Any], None], speed: float = 1.0) -> Patch:
-    """Patch of the creep law: contacts and slip are changed by change(contacts, slip) before it, or the speed is
-    multiplied by a factor."""
+    """Patch of the creep law: its inputs are changed by change(contacts, slip), and its rolling speed is multiplied by
+    the factor ``speed``."""
 
     def creep(contacts: Any, slip: Any, velocity: float, *further: Any) -> None:
         contacts, slip = contacts.copy(), slip.copy()
@@ -178,7 +182,7 @@ def creep_law_patch(change: Callable[[Any, Any], None], speed: float = 1.0) -> P
 
 
 def contact_point_patch(change: Callable[[Any], None]) -> Patch:
-    """Patch that changes the contact points."""
+    """Patch that changes the wheels' contact points by change(touches) after their computation."""
 
     def contact_points(pose: Any, rails: Any, touches: Any) -> None:
         wf.contact_points(pose, rails, touches)
@@ -188,7 +192,8 @@ def contact_point_patch(change: Callable[[Any], None]) -> Patch:
 
 
 def multiplied_field(name: str, factor: float, field_index: int = 0) -> Callable[..., None]:
-    """Function that multiplies a field of one of its arrays by a factor."""
+    """Returns a function that multiplies a field of its argument number ``field_index``, an array of records, by a
+    factor."""
 
     def change(*arrays: Any) -> None:
         arrays[field_index][name] *= factor
@@ -199,11 +204,11 @@ def multiplied_field(name: str, factor: float, field_index: int = 0) -> Callable
 spin_reversed = multiplied_field("turn", -1.0, field_index=1)
 
 
-def _share_contact(contacts: Any, slip: Any) -> None:
+def _mean_load_on_both_wheels(contacts: Any, slip: Any) -> None:
     contacts["load"] = contacts["load"].mean()
 
 
-def _turned_back(contacts: Any, slip: Any, *further: Any) -> None:
+def _opposite_spin_moment(contacts: Any, slip: Any, *further: Any) -> None:
     """Fault: the creep law gives the spin moment the opposite sign."""
     wf.fill_creep_forces(contacts, slip, *further)
     further[-1].forces["mz"] *= -1.0
@@ -227,7 +232,7 @@ def _one_gyroscope(state: Any, body: Any, rates: Any) -> None:
     rates[eq.ROLL_RATE] -= body.along * state[eq.SPIN] / body.across * state[eq.YAW_RATE]
 
 
-def _damped_twice(original: Any) -> Any:
+def _doubled_damping(original: Any) -> Any:
     def rates(state: Any, speed: Any, body: Any, *further: Any) -> None:
         body_record = eq.Body(*body)
         x, y, z = body_record.damping
@@ -238,9 +243,11 @@ def _damped_twice(original: Any) -> Any:
 
 FAULTS = (
     CampaignFault("sign of the spin creepage", "creep law", creep_law_patch(spin_reversed)),
-    CampaignFault("sign of the spin moment", "creep law", plain_python_patch(fill_creep_forces=_turned_back)),
+    CampaignFault("sign of the spin moment", "creep law", plain_python_patch(fill_creep_forces=_opposite_spin_moment)),
     CampaignFault("creepage by a speed 2 % off", "creep law", creep_law_patch(lambda contacts, slip: None, 1.02)),
-    CampaignFault("load not distributed: both wheels have the mean", "creep law", creep_law_patch(_share_contact)),
+    CampaignFault(
+        "load not distributed: both wheels have the mean", "creep law", creep_law_patch(_mean_load_on_both_wheels)
+    ),
     CampaignFault("friction 1 % off", "creep law", creep_law_patch(multiplied_field("mu", 1.01))),
     CampaignFault(
         "depth, place and radius of left and right contact swapped", "contact", contact_point_patch(_swap_contacts)
@@ -250,7 +257,7 @@ FAULTS = (
     CampaignFault("no gyroscopic moments", "body", after_rates_patch(_no_gyroscope)),
     CampaignFault("one gyroscopic moment missing", "body", after_rates_patch(_one_gyroscope)),
     CampaignFault(
-        "dampers twice as strong", "suspension", attribute_patch("models.rail.equations:rates", _damped_twice)
+        "dampers twice as strong", "suspension", attribute_patch("models.rail.equations:rates", _doubled_damping)
     ),
 )
 

@@ -1,6 +1,7 @@
-"""Faults in what both engines share: table, preloads, road, inertia; the plain equations of a car see them.
+"""Faults planted in what both engines share (parameter table, preloads, road, inertia), which the plain equations of a
+car see.
 
-Two engines that read one table and call one force agree to rounding under every one of these.
+Two engines that read the same table and call the same forces agree to rounding under each of these faults.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,14 +23,14 @@ from models.vehicles.spatial_linear import Preloads
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
-from validation.faults.tyres import ALL_WHEELS, tyre
+from validation.faults.tyres import ALL_WHEELS, tyre_table_patch
 from validation.spatial.written_equations import STEP, cut_cars, cut_state, hub_input_sets, rolling_cars, rolling_states
 
 DIFFERENCE_BOUND = 1e-12
 
 
-def _on_tyres(name: str = "twin") -> float:
-    """Relative difference between the accelerations of a steered and braked car on a rough slope by MuJoCo and by the
+def _car_difference(name: str = "twin") -> float:
+    """Relative difference of the accelerations of a steered and braked car on a rough slope, between MuJoCo and the
     plain equations."""
     car = rolling_cars()[name]
     ((t, q, v),) = islice(rolling_states(car, 3), 2, 3)
@@ -37,7 +38,8 @@ def _on_tyres(name: str = "twin") -> float:
 
 
 def _hub_twin_difference(choose: Callable[[list[HubInputs]], HubInputs]) -> float:
-    """Relative difference between the accelerations of the twin on hub forces by MuJoCo and by the plain equations."""
+    """Relative difference of the accelerations of the asymmetric twin under hub forces, between MuJoCo and the plain
+    equations. choose: picks the hub forces."""
     vehicle = cut_cars()["twin"]
     hub_inputs, (q, v) = choose(hub_input_sets(vehicle)), cut_state(vehicle, 3)
     return largest_relative_difference(
@@ -47,13 +49,13 @@ def _hub_twin_difference(choose: Callable[[list[HubInputs]], HubInputs]) -> floa
 
 CHECKS = {
     "tyres": Check(
-        "accelerations of a car on tyres by its plain equations", "of the largest", DIFFERENCE_BOUND, _on_tyres
+        "accelerations of a car on tyres by its plain equations", "of the largest", DIFFERENCE_BOUND, _car_difference
     ),
     "towing": Check(
         "accelerations of a train on tyres by its plain equations",
         "of the largest",
         DIFFERENCE_BOUND,
-        lambda: _on_tyres("train"),
+        lambda: _car_difference("train"),
     ),
     "hubs": Check(
         "accelerations of a cut car on hub forces",
@@ -107,8 +109,8 @@ def _raised_sample(original: Any) -> Any:
     return planted
 
 
-def _of_towed(section: int, count_index: int, per_row: int, column: int) -> Callable[[Any], Any]:
-    """Fault: for all tyres or parts, the table's column that marks what belongs to a trailer is 0."""
+def _towed_marks_cleared(section: int, count_index: int, per_row: int, column: int) -> Callable[[Any], Any]:
+    """Fault: the table's column that marks the tyres or springs of a trailer is set to 0."""
 
     def changed(original: Any) -> Any:
         def planted(car: Any) -> np.ndarray:
@@ -159,8 +161,8 @@ def _turned_bar(original: Any) -> Any:
     return planted
 
 
-def _other_inertia(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Any], Any]:
-    """Fault: the heaviest body has another inertia in the engine."""
+def _changed_inertia(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Any], Any]:
+    """Fault: in the engine, the inertia of the heaviest body is replaced by change(inertia)."""
 
     def changed(original: Any) -> Any:
         def planted(vehicle: SpatialVehicle, *arguments: Any) -> Any:
@@ -181,8 +183,8 @@ def _turned_products(inertia: np.ndarray) -> np.ndarray:
 
 TABLE_WRITER, CUT_TABLE = "models.multibody.numbers", "models.multibody.cut_table"
 FAULTS = (
-    CampaignFault("bristles of all tyres 30 % stiffer", "tyre", tyre(at.BRISTLES, 1.3, ALL_WHEELS)),
-    CampaignFault("half widths of patches 1 % off", "tyre", tyre(at.HALF_WIDTH, 1.01, ALL_WHEELS)),
+    CampaignFault("bristles of all tyres 30 % stiffer", "tyre", tyre_table_patch(at.BRISTLES, 1.3, ALL_WHEELS)),
+    CampaignFault("half widths of patches 1 % off", "tyre", tyre_table_patch(at.HALF_WIDTH, 1.01, ALL_WHEELS)),
     CampaignFault("preload of a spring 1 % off, on tyres", "preload", _preload_patch(TABLE_WRITER)),
     CampaignFault("preload of a spring 1 % off, cut", "preload", _preload_patch("models.vehicles.cut_vehicle")),
     CampaignFault("one wave of the road 1 % higher", "road", attribute_patch(f"{TABLE_WRITER}:table", _scaled_wave)),
@@ -197,24 +199,24 @@ FAULTS = (
     CampaignFault(
         "wheels of a trailer keep to the car's heading",
         "towing",
-        attribute_patch(f"{TABLE_WRITER}:table", _of_towed(at.OF_TYRES, at.TYRES, at.PER_TYRE, at.TOWED)),
+        attribute_patch(f"{TABLE_WRITER}:table", _towed_marks_cleared(at.OF_TYRES, at.TYRES, at.PER_TYRE, at.TOWED)),
     ),
     CampaignFault(
         "springs of a trailer keep to the car's heading",
         "towing",
-        attribute_patch(f"{TABLE_WRITER}:table", _of_towed(at.OF_PARTS, at.PARTS, PER_PART, FRAME)),
+        attribute_patch(f"{TABLE_WRITER}:table", _towed_marks_cleared(at.OF_PARTS, at.PARTS, PER_PART, FRAME)),
     ),
     CampaignFault("bars 1 % stiffer, on tyres", "bar", attribute_patch(f"{TABLE_WRITER}:_bars", _stiff_bars)),
     CampaignFault("a bar turned round, cut", "bar", attribute_patch(f"{CUT_TABLE}:_element", _turned_bar)),
     CampaignFault(
         "inertia of the chassis 1 % off, on tyres",
         "inertia",
-        attribute_patch("models.systems.handling.run:Driven", _other_inertia(lambda inertia: 1.01 * inertia)),
+        attribute_patch("models.systems.handling.run:Driven", _changed_inertia(lambda inertia: 1.01 * inertia)),
     ),
     CampaignFault(
         "products of inertia with the other sign, cut",
         "inertia",
-        attribute_patch("models.engines.cut_vehicle:Driven", _other_inertia(_turned_products)),
+        attribute_patch("models.engines.cut_vehicle:Driven", _changed_inertia(_turned_products)),
     ),
     CampaignFault(
         "shares of brake and drive swapped in the table",

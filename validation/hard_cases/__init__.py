@@ -1,4 +1,5 @@
-"""Hard cases: what is hard, the invariant or exact answer, and what each implementation makes of it.
+"""Hard cases: inputs at which codes of this kind fail, each with an invariant or exact answer that judges every
+implementation.
 
 One file per family, each with ``CASES``, found by listing. A case is judged per implementation as **right** (its error
 is within the tolerance), **refused** (before the run, with a reason), **raised** (the run failed and said so)
@@ -15,7 +16,7 @@ FAMILIES = tuple(module.name for module in iter_modules(__path__) if module.name
 
 
 def cases_by_family() -> tuple[tuple[str, Case], ...]:
-    """All hard cases as pairs (family, case), in the order of the table."""
+    """All hard cases as pairs (family, case), in the order of the report's table."""
     return tuple(
         (family, case) for family in FAMILIES for case in import_module(f"validation.hard_cases.{family}").CASES
     )

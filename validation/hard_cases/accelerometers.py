@@ -1,4 +1,5 @@
-"""Accelerometers on the chassis: arrangements, mounts, readings and attitudes that mislead without a word."""
+"""Hard cases of accelerometers on the chassis: sensors in a plane, loose mounts, missing readings, vertical
+attitudes."""
 
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,8 @@ def _readings_of_run(
     noise: float = 0.0,
     initial: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Readings (n, sensors, 3), states (n, 8) and pitch accelerations (n,) of a run of 0.3 s.
+    """Accelerometer readings (n, sensors, 3) in m/s^2, states (n, 8) and pitch accelerations (n,) in rad/s^2 of a run
+    of 0.3 s.
 
     After a kick on a flat road, or in free fall from an initial state.
     """
@@ -72,20 +74,22 @@ def _readings_of_run(
 
 
 def _angular_velocities(states: np.ndarray) -> np.ndarray:
-    """Angular velocities (n, 3) in body axes of a vehicle that only pitches."""
+    """Angular velocities (n, 3) in rad/s, in body axes, of a vehicle that only pitches."""
     return states[:, 7:] * [0.0, 1.0, 0.0]
 
 
 def _pitch_acceleration(sensor_positions: dict[str, Any], specific_forces: np.ndarray) -> np.ndarray:
-    """Pitch acceleration by eq. (18) as printed, by numpy's pseudo-inverse without any checks."""
+    """Pitch acceleration (n,) in rad/s^2 by the paper's eq. (18) as printed, by numpy's pseudo-inverse without any
+    checks."""
     positions = np.array(list(sensor_positions.values()))
     relative = np.swapaxes(specific_forces - specific_forces[:, -1:], 1, 2)[:, :, :-1]
     m = relative @ np.linalg.pinv((positions[:-1] - positions[-1]).T)
     return 0.5 * (m[:, 0, 2] - m[:, 2, 0])
 
 
-def plane(engine: str, folder: Path) -> float:
-    """Case: all sensors lie on a flat floor, and the pitch axis lies in their plane."""
+def flat_floor_error(engine: str, folder: Path) -> float:
+    """Case: all sensors lie on a flat floor, and the pitch axis lies in their plane. Error: that of the pitch
+    acceleration, divided by its largest value."""
     felt, states, true = _readings_of_run(engine, FLOOR_SENSORS)
     computed = angular_acceleration(spin_from_readings(sensor_array(FLOOR_SENSORS), felt), _angular_velocities(states))[
         :, 1
@@ -93,16 +97,16 @@ def plane(engine: str, folder: Path) -> float:
     return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
-def plane_naive(folder: Path) -> str:
-    """The printed formula on the same readings."""
+def flat_floor_naive(folder: Path) -> str:
+    """Result of the printed formula on the readings of sensors on a flat floor, as text."""
     felt, _, true = _readings_of_run("reference", FLOOR_SENSORS)
     ratio = root_mean_square(_pitch_acceleration(FLOOR_SENSORS, felt)) / root_mean_square(true)
     return f"the printed formula gives {ratio:.2f} of the pitch acceleration"
 
 
-def nearly_plane(engine: str, folder: Path) -> float:
+def nearly_flat_floor_error(engine: str, folder: Path) -> float:
     """Case: noisy sensors, the fifth only 3 cm above the plane of the others. Error: rms error of the pitch
-    acceleration, divided by the least that this noise can cause."""
+    acceleration divided by the smallest that this noise can cause."""
     felt, states, true = _readings_of_run(engine, LIFTED_SENSORS, noise=NOISE)
     array = sensor_array(LIFTED_SENSORS)
     computed = angular_acceleration(spin_from_readings(array, felt), _angular_velocities(states))[:, 1]
@@ -110,15 +114,16 @@ def nearly_plane(engine: str, folder: Path) -> float:
     return root_mean_square(computed - true) / (NOISE * least_gain)
 
 
-def nearly_plane_naive(folder: Path) -> str:
-    """The printed formula on the same readings."""
+def nearly_flat_floor_naive(folder: Path) -> str:
+    """Result of the printed formula on the readings of sensors nearly in a plane, as text."""
     felt, _, true = _readings_of_run("reference", LIFTED_SENSORS, noise=NOISE)
     error = root_mean_square(_pitch_acceleration(LIFTED_SENSORS, felt) - true)
     return f"the printed formula errs by {error:.1f} rad/s^2 for {NOISE:g} m/s^2 of noise"
 
 
-def bracket(engine: str, folder: Path) -> float:
-    """Case: five rigid sensors and one on a flexible bracket, which must be left out."""
+def loose_bracket_error(engine: str, folder: Path) -> float:
+    """Case: five rigid sensors and a sixth on a flexible bracket, which must be left out. Error: that of the pitch
+    acceleration, divided by its largest value."""
     felt, states, true = _readings_of_run(engine, ROOF_SENSORS, BRACKET_SENSORS)
     sensor_positions = ROOF_SENSORS | {"battery": (0.6, 0.3, 0.0)}
     loose = fit_quality(sensor_array(sensor_positions), felt).suspect
@@ -128,8 +133,8 @@ def bracket(engine: str, folder: Path) -> float:
     return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
-def bracket_naive(folder: Path) -> str:
-    """Without the guard: the printed formula with all six sensors."""
+def loose_bracket_naive(folder: Path) -> str:
+    """Result without the guard, as text: the printed formula with all six sensors."""
     felt, _, true = _readings_of_run("reference", ROOF_SENSORS, BRACKET_SENSORS)
     wrong = largest_magnitude(
         _pitch_acceleration(ROOF_SENSORS | {"battery": (0.6, 0.3, 0.0)}, felt) - true
@@ -137,8 +142,8 @@ def bracket_naive(folder: Path) -> str:
     return f"all six together are wrong by {100 * wrong:.0f} % of the largest pitch acceleration"
 
 
-def gap(engine: str, folder: Path) -> float:
-    """Case: one reading is NaN. Error: largest error of the rates."""
+def missing_reading_error(engine: str, folder: Path) -> float:
+    """Case: one reading is NaN, which must be refused. Error: largest error of the recovered rates (rad/s)."""
     felt, states, _ = _readings_of_run(engine, ROOF_SENSORS)
     felt[100, 2, 0] = np.nan
     return largest_magnitude(
@@ -146,8 +151,9 @@ def gap(engine: str, folder: Path) -> float:
     )
 
 
-def gap_naive(folder: Path) -> str:
-    """Without the guard: how much of a sum over the printed formula's values is lost by one NaN."""
+def missing_reading_naive(folder: Path) -> str:
+    """Result without the guard, as text: share of the record for which a sum over the printed formula's values is lost
+    by one NaN."""
     felt, _, _ = _readings_of_run("reference", ROOF_SENSORS)
     felt[100, 2, 0] = np.nan
     lost = np.isnan(np.cumsum(_pitch_acceleration(ROOF_SENSORS, felt))).mean()
@@ -155,15 +161,15 @@ def gap_naive(folder: Path) -> str:
 
 
 def _free_fall(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.ndarray, StartState]:
-    """A rotating vehicle in free fall with unstressed struts: readings, states and initial state."""
+    """Accelerometer readings, states and initial state of a rotating vehicle in free fall with unstressed struts."""
     p, sine, speed = vehicle().parameters, np.sin(pitch), np.cos(pitch) * rate
     start = np.array([-p.b * sine, p.a * sine, 0, pitch, -p.b * speed, p.a * speed, 0, rate])
     felt, states, _ = _readings_of_run(engine, ROOF_SENSORS, initial=start)
     return felt, states, StartState.pitched(pitch, rate)
 
 
-def tumbling(engine: str, folder: Path) -> float:
-    """Case: the nose passes through the vertical, which an orientation by matrices must stand."""
+def vertical_nose_error(engine: str, folder: Path) -> float:
+    """Case: the nose passes through the vertical. Error: largest difference of an entry of the rotation matrix."""
     felt, states, start = _free_fall(engine, 1.4, 3.0)
     orientation = recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD, start).orientation
     no_angles = np.zeros(len(states))
@@ -172,17 +178,17 @@ def tumbling(engine: str, folder: Path) -> float:
     )
 
 
-def locked(engine: str, folder: Path) -> float:
-    """Case: the nose points straight up, where roll and yaw are not unique. Error: largest roll or yaw that is
-    given."""
+def gimbal_lock_error(engine: str, folder: Path) -> float:
+    """Case: the nose points straight up, where roll and yaw are not unique; it must be refused. Error: largest roll or
+    yaw (rad) that is returned."""
     felt, _, start = _free_fall(engine, np.pi / 2, 0.0)
     return largest_magnitude(
         recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD, start).angles()[:, [0, 2]]
     )
 
 
-def locked_naive(folder: Path) -> str:
-    """Without the guard: roll by the textbook's formula at this attitude."""
+def gimbal_lock_naive(folder: Path) -> str:
+    """Result without the guard, as text: roll angle by the textbook's formula at gimbal lock."""
     s = rotation_matrix(from_cardan(0.3, np.pi / 2, 0.0))
     roll = np.arctan2(s[2, 1], s[2, 2])
     return f"the textbook's formula gives a roll of {roll:.2f} rad for 0.30, out of rounding errors"
@@ -196,9 +202,9 @@ CASES = (
         "of its largest",
         1e-12,
         "the formula for a plane is exact: rounding only",
-        plane,
+        flat_floor_error,
         {},
-        plane_naive,
+        flat_floor_naive,
     ),
     Case(
         "accelerometers nearly in a plane",
@@ -207,9 +213,9 @@ CASES = (
         "of that noise",
         1.2,
         "300 samples: 4 % standard error",
-        nearly_plane,
+        nearly_flat_floor_error,
         {},
-        nearly_plane_naive,
+        nearly_flat_floor_naive,
     ),
     Case(
         "accelerometer on a bracket",
@@ -218,9 +224,9 @@ CASES = (
         "of its largest",
         1e-12,
         "five rigid sensors: rounding only",
-        bracket,
+        loose_bracket_error,
         {},
-        bracket_naive,
+        loose_bracket_naive,
     ),
     Case(
         "accelerometer reading that is no number",
@@ -229,9 +235,9 @@ CASES = (
         "",
         0.0,
         "no answer is wanted",
-        gap,
+        missing_reading_error,
         REFUSED,
-        gap_naive,
+        missing_reading_naive,
     ),
     Case(
         "attitude through the vertical",
@@ -240,7 +246,7 @@ CASES = (
         "",
         1e-6,
         "quaternions pass; order 4 at 1 ms, across wheel modes of 700 1/s",
-        tumbling,
+        vertical_nose_error,
     ),
     Case(
         "Cardan angles at gimbal lock",
@@ -249,8 +255,8 @@ CASES = (
         "",
         0.0,
         "no answer is wanted",
-        locked,
+        gimbal_lock_error,
         REFUSED,
-        locked_naive,
+        gimbal_lock_naive,
     ),
 )

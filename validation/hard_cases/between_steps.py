@@ -1,5 +1,5 @@
-"""What goes on between the steps of a run, or between the samples of a signal: springs, stops and drivers that are too
-fast for them, waves that are too short, filters that are too slow.
+"""Hard cases of what happens between the steps of a run or the samples of a signal: stiff springs and stops, fast
+drivers, short waves, slow filters.
 
 Each was answered once by finite numbers that were wrong by a hundredth to all of themselves.
 """
@@ -25,48 +25,48 @@ from models.systems.handling.scene import HandlingScene, build
 from models.systems.hub_forces.run import run as run_on_hubs
 from models.systems.hub_forces.scene import build as build_hubs
 from validation.braking.braked_trucks import braking_scene
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
 from validation.hard_cases.rolling import STEP, built_wheelset
 
-HANDLING_OUTCOMES: dict[str, Word] = {"reference": "refused"}
-"""Handling has two implementations."""
+HANDLING_OUTCOMES: dict[str, OutcomeWord] = {"reference": "refused"}
+"""Expected outcome of the reference in handling cases, which only the engines can run."""
 
 
-def wheelset(speed: float = 60.0, yaw: float = 0.0, **changed: float) -> Callable[[str, Path], float]:
+def released_wheelset_case(speed: float = 60.0, yaw: float = 0.0, **changed: float) -> Callable[[str, Path], float]:
     """Case: a wheelset is released 5 mm off centre and runs for 0.2 s. Error: difference of its final lateral position
-    and yaw (m, rad) from those with a quarter of the step."""
+    and yaw (m, rad) from a run with a quarter of the step."""
 
     def error(implementation: str, folder: Path) -> float:
-        wheelset = built_wheelset(implementation, CHOSEN_WHEELSET.changed(**changed), speed)
-        start = wheelset.displaced_state(5e-3)
+        released_wheelset_case = built_wheelset(implementation, CHOSEN_WHEELSET.changed(**changed), speed)
+        start = released_wheelset_case.displaced_state(5e-3)
         start[3] = yaw
-        ends = [wheelset.run(start, 0.2, step).states[-1] for step in (STEP, STEP / 4.0)]
+        ends = [released_wheelset_case.run(start, 0.2, step).states[-1] for step in (STEP, STEP / 4.0)]
         return float(np.abs(ends[1] - ends[0])[[0, 3]].max())
 
     return error
 
 
-def car(step: float = 1e-3, **manoeuvre: Any) -> HandlingScene:
-    """Scene of a car with 19 freedoms in a manoeuvre of 0.2 s, in steps of 1 ms by default."""
+def car_scene(step: float = 1e-3, **manoeuvre: Any) -> HandlingScene:
+    """Scene of a car with 19 degrees of freedom in a manoeuvre of 0.2 s; step in s."""
     driven = {"hard": {"speed": 20.0, "duration": 0.2} | manoeuvre}
     return build({"title": "hard", "system": "handling", "run": {"step": step}, "manoeuvres": driven})
 
 
-def handled(**manoeuvre: Any) -> Callable[[str, Path], float]:
-    """Case: a car in a manoeuvre. Error: difference of its final coordinates (m, rad) from those with a quarter of the
+def manoeuvre_case(**manoeuvre: Any) -> Callable[[str, Path], float]:
+    """Case: a car in a manoeuvre. Error: difference of its final coordinates (m, rad) from a run with a quarter of the
     step."""
 
     def error(implementation: str, folder: Path) -> float:
         if implementation == "reference":
             raise InputError("", "engine", implementation, "handling is marched by engines")
-        ends = [run(car(step, **manoeuvre), implementation)["positions"][-1] for step in (1e-3, 2.5e-4)]
+        ends = [run(car_scene(step, **manoeuvre), implementation)["positions"][-1] for step in (1e-3, 2.5e-4)]
         return float(np.abs(ends[1] - ends[0]).max())
 
     return error
 
 
 def refused_case(answer_anyway: Callable[[], Any]) -> Callable[[str, Path], float]:
-    """Case that must be refused; any answer is wrong."""
+    """Case: ``answer_anyway`` must raise a refusal. Error: infinite if it returns."""
 
     def error(implementation: str, folder: Path) -> float:
         answer_anyway()
@@ -76,7 +76,8 @@ def refused_case(answer_anyway: Callable[[], Any]) -> Callable[[str, Path], floa
 
 
 def hubs_over_waves(implementation: str, folder: Path) -> float:
-    """Case: hub forces of a road at 60 m/s in steps of 20 ms, each of which passes three waves."""
+    """Case: hub forces of a road at 60 m/s in steps of 20 ms, each of which passes three waves; it must fail. Error:
+    infinite if it does not."""
     table = {
         "title": "hard",
         "system": "hub-forces",
@@ -90,39 +91,40 @@ def hubs_over_waves(implementation: str, folder: Path) -> float:
 
 
 def driven_over_waves(implementation: str, folder: Path) -> float:
-    """Case: a car on a rough road at 1000 m/s in steps of 1 ms. Error: ratio of the true error (against a tenth of the
-    step) to the stated one in the worst channel; infinite unless the stated error is a warning."""
+    """Case: a car on a rough road at 1000 m/s in steps of 1 ms. Error: true error (against a tenth of the step) divided
+    by the stated error in the worst channel; infinite unless the stated error is a warning."""
     if implementation == "reference":
         raise InputError("", "engine", implementation, "handling is marched by engines")
-    stated_run = run(car(speed=1000.0, rough=True), implementation, error=True)
+    stated_run = run(car_scene(speed=1000.0, rough=True), implementation, error=True)
     name, estimate = max(errors_of(stated_run).items(), key=lambda each: each[1].share)
-    fine = principal_series(run(car(1e-4, speed=1000.0, rough=True), implementation).detail).channels[name][::10]
+    fine = principal_series(run(car_scene(1e-4, speed=1000.0, rough=True), implementation).detail).channels[name][::10]
     error_of_values = principal_series(stated_run.detail).channels[name] - fine
     return float(np.sqrt(np.mean(error_of_values**2))) / estimate.error if estimate.warned else np.inf
 
 
-def crossings(implementation: str, folder: Path) -> float:
-    """Case: level crossings counted for levels in any order. Error: difference from counting level by level."""
+def level_crossing_error(implementation: str, folder: Path) -> float:
+    """Case: level crossings counted for unsorted levels. Error: difference from counting level by level."""
     load, levels = np.array([0.0, 3.0, 1.0, 5.0, 0.0, 2.0, 1.0, 4.0]), np.array([2.5, 0.5, 3.5, 1.5])
     rises = [sum(a < level <= b for a, b in pairwise(load)) for level in levels]
     return float(np.abs(level_crossings(load, levels) - rises).max())
 
 
-def far_seeds(implementation: str, folder: Path) -> float:
-    """Number of noise seeds near 2^63 and at the end of the range that give the same stream as another seed."""
+def equal_seed_streams(implementation: str, folder: Path) -> float:
+    """Case: noise seeds near 2^63 and at the end of the range. Error: number of seeds with the same stream as another
+    seed."""
     seeds = (2**63 - 1, 2**63, 2**63 + 1, 2**64 - 2, 2**64 - 1)
     return float(len(seeds) - len({float(normal_samples(seed, 0, 1, 1)[0, 0]) for seed in seeds}))
 
 
-def line_through_a_low_pass(implementation: str, folder: Path) -> float:
-    """Case: a straight line of 2 s through the slowest low-pass that is allowed. Error: largest change, relative to the
-    line's rise."""
+def low_passed_line_error(implementation: str, folder: Path) -> float:
+    """Case: a straight line of 2 s through the slowest low-pass filter that is allowed. Error: largest change divided
+    by the line's rise."""
     line = np.linspace(0.0, 1.0, 2001)[:, None]
     return float(np.abs(low_passed(line, 1e-3, 0.5, "", "bandwidth") - line).max())
 
 
-def slow_naive(folder: Path) -> str:
-    """Without the guard: the filter alone, with a fiftieth of its period in the record."""
+def slow_filter_naive(folder: Path) -> str:
+    """Result without the guard, as text: the filter alone, with a fiftieth of its period in the record."""
     from scipy.signal import butter, sosfiltfilt
 
     line = np.linspace(0.0, 1.0, 2001)
@@ -133,11 +135,11 @@ def slow_naive(folder: Path) -> str:
 STRAIGHT_LINE = np.arange(5.0)[:, None]
 SPINNING_RATES = np.tile([0.0, 0.0, 400.0], (50, 1)) + np.sin(np.arange(50.0))[:, None]
 NO_ROTATION = np.array([1.0, 0.0, 0.0, 0.0])
-REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
-RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
+REFUSED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+RAISED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 CASES = (
     *(
-        Case(name, hard, "fails, and says when", "", 0.0, "exact", wheelset(**changes), RAISED)
+        Case(name, hard, "fails, and says when", "", 0.0, "exact", released_wheelset_case(**changes), RAISED)
         for name, hard, changes in (
             ("suspension of 1e9 N/m on rails", "ten steps for a swing, which dies of them", {"stiffness_y": 1e9}),
             (
@@ -155,7 +157,7 @@ CASES = (
         "m, rad",
         1e-6,
         "error of the step",
-        wheelset(speed=90.0, flange_stiffness=1e8),
+        released_wheelset_case(speed=90.0, flange_stiffness=1e8),
     ),
     Case(
         "brake of 100 kN m",
@@ -164,7 +166,7 @@ CASES = (
         "",
         0.0,
         "exact",
-        handled(brake=[[0.0, 0.0], [0.05, 1e5]]),
+        manoeuvre_case(brake=[[0.0, 0.0], [0.05, 1e5]]),
         HANDLING_OUTCOMES | dict.fromkeys(("exudyn", "mujoco"), "raised"),
     ),
     Case(
@@ -174,7 +176,7 @@ CASES = (
         "",
         0.0,
         "exact",
-        handled(steer=[[0.001 * i, 0.02 * (i % 2)] for i in range(1, 200)]),
+        manoeuvre_case(steer=[[0.001 * i, 0.02 * (i % 2)] for i in range(1, 200)]),
         HANDLING_OUTCOMES | dict.fromkeys(("exudyn", "mujoco"), "raised"),
     ),
     Case(
@@ -184,7 +186,7 @@ CASES = (
         "m, rad",
         1e-4,
         "error of the step",
-        handled(speed=300.0, rough=True),
+        manoeuvre_case(speed=300.0, rough=True),
         HANDLING_OUTCOMES,
     ),
     Case(
@@ -214,11 +216,18 @@ CASES = (
         "",
         0.0,
         "exact",
-        crossings,
-        once=True,
+        level_crossing_error,
+        without_engine=True,
     ),
     Case(
-        "seeds beyond 2^63", "whole numbers become doubles", "a stream for each", "", 0.0, "exact", far_seeds, once=True
+        "seeds beyond 2^63",
+        "whole numbers become doubles",
+        "a stream for each",
+        "",
+        0.0,
+        "exact",
+        equal_seed_streams,
+        without_engine=True,
     ),
     Case(
         "low-pass of one period",
@@ -227,17 +236,17 @@ CASES = (
         "of its rise",
         0.02,
         "0.7 % found",
-        line_through_a_low_pass,
-        naive=slow_naive,
-        once=True,
+        low_passed_line_error,
+        naive=slow_filter_naive,
+        without_engine=True,
     ),
     *(
-        Case(name, hard, "refused", "", 0.0, "exact", refused_case(answer), REFUSED, once=True)
+        Case(name, hard, "refused", "", 0.0, "exact", refused_case(answer), REFUSED, without_engine=True)
         for name, hard, answer in (
             (
                 "driver who steers within 0.5 ms",
                 "steps of 1 ms see no change, or a constant one",
-                lambda: car(steer=[[0.0005 * i, 0.02 * (i % 2)] for i in range(1, 200)]),
+                lambda: car_scene(steer=[[0.0005 * i, 0.02 * (i % 2)] for i in range(1, 200)]),
             ),
             ("braking in steps of 0.1 s", "stops 3 % short", lambda: braking_scene(run={"sample": 0.1, "substeps": 1})),
             (

@@ -1,4 +1,4 @@
-"""A brake's loop of pressure and torque, at steps that hit none of its corners."""
+"""Hard cases of a brake's hysteresis loop of pressure and torque, with steps that miss its corners."""
 
 from pathlib import Path
 
@@ -10,9 +10,9 @@ from validation.hard_cases.case import Case
 LOOPED = of_wheels(Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
 
 
-def ways(implementation: str, folder: Path) -> float:
-    """Case: a random pressure path, traversed in 1, 7 and 50 steps between its turning points. Error: largest
-    difference of the torque (N m) at these."""
+def step_split_error(implementation: str, folder: Path) -> float:
+    """Case: a random pressure path in 1, 7 and 50 steps between its turning points. Error: largest difference of the
+    torque (N m) at the turning points."""
     turns = np.concatenate(([0.0], np.random.default_rng(2).uniform(0.0, 6.0, 60)))
     levels = []
     for parts in (1, 7, 50):
@@ -21,7 +21,7 @@ def ways(implementation: str, folder: Path) -> float:
     return float(max(np.abs(walk - levels[0]).max() for walk in levels))
 
 
-def loops(implementation: str, folder: Path) -> float:
+def negative_loop_area(implementation: str, folder: Path) -> float:
     """Case: hysteresis loops between random pressures, in 1000 steps each way. Error: magnitude of the most negative
     area (N m bar) or torque (N m)."""
     worst = 0.0
@@ -41,8 +41,8 @@ CASES = (
         "N m",
         1e-9,
         "rounding of kN m",
-        ways,
-        once=True,
+        step_split_error,
+        without_engine=True,
     ),
     Case(
         "small loops of a brake",
@@ -51,7 +51,7 @@ CASES = (
         "N m bar",
         1e-9,
         "rounding of kN m bar",
-        loops,
-        once=True,
+        negative_loop_area,
+        without_engine=True,
     ),
 )

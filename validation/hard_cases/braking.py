@@ -1,4 +1,5 @@
-"""Braked wheels: standstill, locking, falling friction, hardly any of it or much, steps and answers at their ends.
+"""Hard cases of braked wheels and trucks: standstill, locking, falling friction, very small and large friction, invalid
+controllers.
 
 Every implementation carries the chassis by itself; tyres and wheels are the same compiled ones.
 """
@@ -17,12 +18,12 @@ from models.core.errors import InputError
 from models.tyre.tyre_table import stacked_tables
 from validation.braking import braked_trucks as trucks
 from validation.braking import braked_wheels as wheels
-from validation.braking.braked_wheels import DRY, bent_friction
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.braking.braked_wheels import DRY, piecewise_linear_friction
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
 
 
-def refused(run: Callable[[], Any]) -> wheels.Error:
-    """Case that must be refused."""
+def refusal_case(run: Callable[[], Any]) -> wheels.Error:
+    """Case: ``run`` must raise a refusal. Error: infinite if it returns."""
 
     def error(implementation: str, folder: Path) -> float:
         run()
@@ -31,45 +32,47 @@ def refused(run: Callable[[], Any]) -> wheels.Error:
     return error
 
 
-def slippery_brake() -> None:
-    """Make a brake whose release pressure is above its push-out pressure; raises InputError."""
+def inconsistent_brake() -> None:
+    """Builds a brake whose release pressure is above its push-out pressure; raises InputError."""
     try:
         Brake(push_out=0.5, release=0.7, rising=1000.0, falling=1000.0)
     except ValueError as error:
         raise InputError("", "release", 0.7, str(error)) from None
 
 
-def stops(name: str, difficulty: str, error: wheels.Error, tolerance: float = 1e-6) -> Case:
-    """Case of a wheel that is held at constant slip."""
+def constant_slip_case(name: str, difficulty: str, error: wheels.Error, tolerance: float = 1e-6) -> Case:
+    """Hard case of a wheel at constant slip, judged by the stopping distance m v^2 / (2 F)."""
     return Case(name, difficulty, "m v^2 / (2 F)", "", tolerance, "the step in which it stops", error)
 
 
-def fails(name: str, difficulty: str, error: wheels.Error) -> Case:
-    """Case in which every implementation must raise an error."""
+def failure_case(name: str, difficulty: str, error: wheels.Error) -> Case:
+    """Hard case in which every implementation must raise an error during the run."""
     return Case(
         name, difficulty, "fails, and says when", "", 0.0, "exact", error, dict.fromkeys(IMPLEMENTATIONS, "raised")
     )
 
 
-LINE = bent_friction((0.0, 0.0), (1.0, 0.9))
-REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+LINE = piecewise_linear_friction((0.0, 0.0), (1.0, 0.9))
+REFUSED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 CASES = (
-    stops(
+    constant_slip_case(
         "light braking to a stop",
         "slip has the speed in its denominator, which ends at 0",
-        wheels.steady_slip_case(DRY, 0.02),
+        wheels.constant_slip_case(DRY, 0.02),
         1e-7,
     ),
-    stops(
+    constant_slip_case(
         "light braking to a stop, 20 ms",
         "50 time constants of the wheel in a step",
-        wheels.steady_slip_case(DRY, 0.004, 2e-2),
+        wheels.constant_slip_case(DRY, 0.004, 2e-2),
     ),
-    stops("table of a single cell", "slip 0 and 1 are its only nodes", wheels.steady_slip_case(LINE, 0.5)),
-    stops(
+    constant_slip_case(
+        "table of a single cell", "slip 0 and 1 are its only nodes", wheels.constant_slip_case(LINE, 0.5)
+    ),
+    constant_slip_case(
         "slip that settles on a node",
         "the slope of friction jumps there",
-        wheels.steady_slip_case(bent_friction((0.0, 0.0), (0.05, 0.5), (0.2, 0.8), (1.0, 0.6)), 0.05),
+        wheels.constant_slip_case(piecewise_linear_friction((0.0, 0.0), (0.05, 0.5), (0.2, 0.8), (1.0, 0.6)), 0.05),
     ),
     Case(
         "from rolling, 20 ms",
@@ -78,7 +81,7 @@ CASES = (
         "",
         5e-4,
         "asked for",
-        wheels.from_rolling(DRY, 0.05, 2e-2),
+        wheels.rolling_start_case(DRY, 0.05, 2e-2),
     ),
     Case(
         "torque just above the peak",
@@ -87,7 +90,7 @@ CASES = (
         "",
         5e-4,
         "asked for",
-        wheels.beyond_the_peak,
+        wheels.locking_torque_error,
     ),
     Case(
         "torque exactly at the peak",
@@ -96,7 +99,7 @@ CASES = (
         "",
         1e-6,
         "the step in which it stops",
-        wheels.at_the_peak,
+        wheels.peak_torque_error,
     ),
     Case(
         "locked from the start",
@@ -132,7 +135,7 @@ CASES = (
         "m, m/s",
         0.0,
         "exact",
-        wheels.at_rest,
+        wheels.standing_vehicle_error,
     ),
     Case("wheel thrown backwards", "slip above 1", "rolls", "", 1e-6, "25 time constants", wheels.backwards_spin_error),
     Case(
@@ -151,7 +154,7 @@ CASES = (
         "",
         1e-12,
         "rounding",
-        trucks.energy_grows((5.0, 8.0, 0.0), 2e4),
+        trucks.energy_gain_case((5.0, 8.0, 0.0), 2e4),
     ),
     Case(
         "truck spinning on ice",
@@ -160,7 +163,7 @@ CASES = (
         "",
         1e-12,
         "rounding",
-        trucks.energy_grows((8.0, 0.0, 3.0), 2e4),
+        trucks.energy_gain_case((8.0, 0.0, 3.0), 2e4),
     ),
     Case(
         "truck on even friction",
@@ -169,7 +172,7 @@ CASES = (
         "m, rad, rad/s",
         0.0,
         "exact",
-        trucks.on_even_friction,
+        trucks.asymmetry_on_even_friction,
     ),
     Case(
         "truck on split friction in a mirror",
@@ -196,7 +199,7 @@ CASES = (
         "m, m/s",
         0.0,
         "exact",
-        trucks.lagging_at_rest,
+        trucks.motion_after_rest_on_lagging_tyres,
     ),
     Case(
         "wheel exactly on the line",
@@ -205,7 +208,7 @@ CASES = (
         "m",
         0.0,
         "exact",
-        wheels.on_the_line,
+        wheels.surface_line_error,
     ),
     Case(
         "no friction on one side",
@@ -214,7 +217,7 @@ CASES = (
         "",
         1e-4,
         "it has begun to yaw",
-        trucks.no_friction_on_one_side,
+        trucks.split_friction_error,
     ),
     Case(
         "slope of friction changes within a step",
@@ -223,7 +226,7 @@ CASES = (
         "",
         1e-4,
         "the wheel takes up another slip",
-        wheels.slope_changes,
+        wheels.surface_change_error,
     ),
     Case(
         "valves open for ever",
@@ -241,7 +244,7 @@ CASES = (
         "N m",
         0.0,
         "exact",
-        trucks.below_push_out,
+        trucks.torque_below_push_out,
     ),
     Case(
         "slow wheel at the edge of locking",
@@ -250,7 +253,7 @@ CASES = (
         "m/s, rad/s",
         0.0,
         "exact",
-        trucks.rest_error_of_scene(**trucks.AT_THE_EDGE_OF_LOCKING),
+        trucks.rest_error_of_scene(**trucks.J_TURN_AT_LOCKING_LIMIT),
     ),
     Case(
         "one wheel of four lifted",
@@ -259,21 +262,29 @@ CASES = (
         "N, N m",
         1e-9,
         "rounding",
-        trucks.one_wheel_lifted,
-        once=True,
+        trucks.load_sharing_error,
+        without_engine=True,
     ),
-    fails("truck that rolls over", "both wheels of a side bear nothing", trucks.turned_over),
-    fails("299 bar of a supply of 6", "more than there is", trucks.nonsense_answers(6.0, pressures=np.full(4, 299.0))),
-    fails("truck that lifts its rear wheels", "the plane has no lift-off", trucks.lifting_truck_error),
-    fails(
+    failure_case("truck that rolls over", "both wheels of a side bear nothing", trucks.overturning_truck_error),
+    failure_case(
+        "299 bar of a supply of 6",
+        "more than there is",
+        trucks.impossible_command_case(6.0, pressures=np.full(4, 299.0)),
+    ),
+    failure_case("truck that lifts its rear wheels", "the plane has no lift-off", trucks.lifting_truck_error),
+    failure_case(
         "controller answers not a number",
         "would spread to every state",
-        trucks.nonsense_answers(pressures=np.array([1.0, np.nan, 1.0, 1.0])),
+        trucks.impossible_command_case(pressures=np.array([1.0, np.nan, 1.0, 1.0])),
     ),
-    fails("controller answers for three wheels", "of four", trucks.nonsense_answers(valves=np.ones(3, dtype=np.int64))),
-    fails("controller answers nothing", "neither valves nor pressures", trucks.nonsense_answers()),
+    failure_case(
+        "controller answers for three wheels",
+        "of four",
+        trucks.impossible_command_case(valves=np.ones(3, dtype=np.int64)),
+    ),
+    failure_case("controller answers nothing", "neither valves nor pressures", trucks.impossible_command_case()),
     *(
-        Case(name, "a number from senseless input", "refused", "", 0.0, "exact", refused(run), REFUSED)
+        Case(name, "a number from senseless input", "refused", "", 0.0, "exact", refusal_case(run), REFUSED)
         for name, run in (
             (
                 "torque that drives the wheel",
@@ -281,13 +292,13 @@ CASES = (
                     wheels.QUARTER, stacked_tables([DRY]), UNIFORM_ROAD, np.full(3, -1.0), wheels.STEP, wheels.SPEED
                 ),
             ),
-            ("table that ends before it locks", lambda: bent_friction((0.0, 0.0), (0.9, 0.8))),
-            ("table with friction at no slip", lambda: bent_friction((0.0, 0.1), (1.0, 0.8))),
+            ("table that ends before it locks", lambda: piecewise_linear_friction((0.0, 0.0), (0.9, 0.8))),
+            ("table with friction at no slip", lambda: piecewise_linear_friction((0.0, 0.1), (1.0, 0.8))),
             (
                 "stretches shorter than a step",
                 lambda: check_way(road([Stretch(0.0, 0, 0), Stretch(1.0, 1, 1), Stretch(1.01, 0, 0)]), 0.1),
             ),
-            ("brake that lets go too early", slippery_brake),
+            ("brake that lets go too early", inconsistent_brake),
             ("vehicle lighter than its wheels", lambda: plane_of_truck(PAPER_TRUCK.model_copy(update={"mass": 100.0}))),
             (
                 "roll shares that do not add up",

@@ -1,4 +1,4 @@
-"""Definition of a hard case, and how an implementation's answer to it is judged."""
+"""Definition of a hard case, and how the outcome of an implementation is judged."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -8,64 +8,68 @@ from typing import Literal, get_args
 from models.core.errors import InputError, RunFailed
 from validation.common.rows import Independence
 
-Word = Literal["right", "refused", "raised", "SILENT"]
-WORDS: tuple[Word, ...] = get_args(Word)
+OutcomeWord = Literal["right", "refused", "raised", "SILENT"]
+WORDS: tuple[OutcomeWord, ...] = get_args(OutcomeWord)
 IMPLEMENTATIONS = ("reference", "exudyn", "mujoco")
 
 
 @dataclass(frozen=True)
 class Case:
-    """One hard case.
+    """A hard case, judged in each implementation.
 
     Attributes
     ----------
-    hard : what makes it hard; check : the invariant or the exact answer, as a phrase
-    unit, tolerance, why : of the error, and the reason for the tolerance
-    error : (implementation, folder for input files) -> the measured error
-    expected : the outcome where it is not "right"
-    against : how far the answer it is judged by is from the implementations
-    naive : measures what an obvious build without the guard or rule does, as a phrase; None if nothing is shown
-    once : whether no implementation has a part in it, so that it is judged once for all of them
+    difficulty, exact_answer : why the case is hard, and the invariant or exact answer, as phrases
+    unit, tolerance, tolerance_reason : unit and tolerance of the error, and the reason for the tolerance
+    error : function of the implementation and a folder for input files that returns the error
+    expected : outcomes other than "right", by implementation
+    naive : function that returns, as a phrase, what code without the guard or rule does; None if there is no such test
+    answer_independence : how independent the exact answer is of the implementations
+    without_engine : whether no implementation takes part, so that the case is judged only once
     """
 
     name: str
-    hard: str
-    check: str
+    difficulty: str
+    exact_answer: str
     unit: str
     tolerance: float
-    why: str
+    tolerance_reason: str
     error: Callable[[str, Path], float]
-    expected: Mapping[str, Word] = field(default_factory=dict)
+    expected: Mapping[str, OutcomeWord] = field(default_factory=dict)
     naive: Callable[[Path], str] | None = None
-    against: Independence = "closed form"
-    once: bool = False
+    answer_independence: Independence = "closed form"
+    without_engine: bool = False
 
-    def wanted(self, implementation: str) -> Word:
+    def wanted(self, implementation: str) -> OutcomeWord:
         """The outcome that an implementation must have in this case."""
         return self.expected.get(implementation, "right")
 
     def judged(self) -> tuple[str, ...]:
-        """The implementations in which this case is judged."""
-        return IMPLEMENTATIONS[:1] if self.once else IMPLEMENTATIONS
+        """Names of the implementations in which this case is judged."""
+        return IMPLEMENTATIONS[:1] if self.without_engine else IMPLEMENTATIONS
 
     def independence(self, implementation: str) -> Independence:
-        """How independent the expected answer is of an implementation. The tight solution uses the reference's
-        equations, so it is shared for the reference only."""
-        return "shared kernel" if self.against == "native" and implementation == "reference" else self.against
+        """How independent the exact answer is of an implementation. The tight-tolerance solution uses the reference's
+        equations, so that for the reference it is a shared kernel."""
+        return (
+            "shared kernel"
+            if self.answer_independence == "native" and implementation == "reference"
+            else self.answer_independence
+        )
 
 
 @dataclass(frozen=True)
 class CaseOutcome:
-    """Outcome of a hard case. word : how it ended; error : in the case's unit, None if there is no answer; message :
-    text of the exception."""
+    """Outcome of a hard case. word: "right", "refused", "raised" or "SILENT"; error: in the case's unit, None without a
+    result; message: text of the exception."""
 
-    word: Word
+    word: OutcomeWord
     error: float | None = None
     message: str = ""
 
 
 def judge(case: Case, implementation: str, folder: Path) -> CaseOutcome:
-    """Outcome of a case in one implementation; only the project's own exceptions count as outcomes, all others pass
+    """Outcome of a case in an implementation. Only InputError and RunFailed count as outcomes; other exceptions pass
     through."""
     try:
         error = float(case.error(implementation, folder))

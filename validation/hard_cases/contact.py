@@ -1,4 +1,5 @@
-"""Rolling contact: no creepage, next to none, spin against lateral creepage, lift-off, cells that flip.
+"""Hard cases of rolling contact: no creepage, tiny creepage, spin against lateral creepage, lift-off, cells that begin
+to slip.
 
 No engine takes part: forces are plain functions of the creepages, so each case has one answer for all.
 """
@@ -18,21 +19,21 @@ MATERIAL_PAIR = MaterialPair()
 A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
 
 
-def no_creepage(implementation: str, folder: Path) -> float:
-    """Case: no creepage. Error: largest force; infinite if a derivative is not finite."""
+def force_without_creepage(implementation: str, folder: Path) -> float:
+    """Case: no creepage. Error: largest creep force (N); infinite if a derivative is not finite."""
     answer = derivatives(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 0.0), MATERIAL_PAIR)
     return float(np.abs(answer.forces).max() + (0.0 if np.isfinite(answer.slopes).all() else np.inf))
 
 
 def no_creepage_naive(folder: Path) -> str:
-    """Without the guard: the weighted flexibility of 1982 without creepage is 0/0."""
+    """Result without the guard, as text: the weighted flexibility of 1982 without creepage is 0/0."""
     with np.errstate(invalid="ignore"):
         weighted = np.float64(0.0) / np.float64(0.0)
     return f"the weighted flexibility of 1982 is 0/0 there: {weighted}"
 
 
-def next_to_none(implementation: str, folder: Path) -> float:
-    """Case: creepages from 1e-300 to 1e-12. Error: difference from the linear theory."""
+def tiny_creepage_error(implementation: str, folder: Path) -> float:
+    """Case: creepages from 1e-300 to 1e-12. Error: relative difference of the creep forces from the linear theory."""
     small = 10.0 ** np.arange(-300.0, -11.0, 12.0)
     motion = (small, -0.5 * small, 30.0 * small)
     answer, linear = (
@@ -43,17 +44,17 @@ def next_to_none(implementation: str, folder: Path) -> float:
     return float(np.abs(relative_errors).max())
 
 
-def against(implementation: str, folder: Path) -> float:
-    """Case: spin whose pole lies anywhere in the ellipse. Error: largest difference of the force with 21 cells from
-    that with 201, divided by mu N."""
+def opposed_spin_error(implementation: str, folder: Path) -> float:
+    """Case: spin against lateral creepage, with its pole anywhere in the ellipse. Error: largest difference between the
+    forces with 21 and with 201 cells, divided by mu N."""
     pole = np.linspace(-1.0, 1.0, 41)
     motion = (np.zeros(41), -0.5 * A * pole, np.full(41, 0.5))
     coarse, fine = (fastsim(RollingEllipse(A, B, LOAD, MU, *motion), MATERIAL_PAIR, cells=cells) for cells in (21, 201))
     return float(np.hypot(coarse.fx - fine.fx, coarse.fy - fine.fy).max() / (MU * LOAD))
 
 
-def against_naive(folder: Path) -> str:
-    """Without the remedy: the march of 1982 on the same cells."""
+def opposed_spin_naive(folder: Path) -> str:
+    """Result without the remedy, as text: the march of 1982 on the same cells."""
     motion = (0.0, -0.25 * A, 0.5)
     plain, fine = (
         fastsim(RollingEllipse(A, B, LOAD, MU, *motion), MATERIAL_PAIR, march="plain"),
@@ -62,7 +63,7 @@ def against_naive(folder: Path) -> str:
     return f"the plain march is {100 * abs(plain.fy - fine.fy) / (MU * LOAD):.1f} % of mu N off on as many cells"
 
 
-def lift_off(implementation: str, folder: Path) -> float:
+def lift_off_error(implementation: str, folder: Path) -> float:
     """Case: loads from large to zero and negative in full sliding. Error: difference of the force from mu N, or from 0
     without load, divided by the largest mu N."""
     load = np.concatenate((10.0 ** np.arange(-12.0, 5.0), [0.0, -1.0, -1e3]))
@@ -71,17 +72,17 @@ def lift_off(implementation: str, folder: Path) -> float:
     return float(np.abs(answer.fx + MU * np.maximum(load, 0.0)).max() / (MU * load.max()))
 
 
-def flipping(implementation: str, folder: Path) -> float:
-    """Case: a creep curve at 2001 creepages. Error: largest second difference divided by mu N, which is small for a
-    smooth curve."""
+def creep_curve_roughness(implementation: str, folder: Path) -> float:
+    """Case: a creep curve at 2001 creepages. Error: largest second difference of the force divided by mu N, which is
+    small for a smooth curve."""
     creep = np.linspace(0.0, 4e-3, 2001)
     force = fastsim(RollingEllipse(A, B, LOAD, MU, creep, 0.5 * creep, 50.0 * creep), MATERIAL_PAIR).fx / (MU * LOAD)
     return float(np.abs(np.diff(force, 2)).max())
 
 
-def locked(implementation: str, folder: Path) -> float:
-    """Case: a locked wheel, and a spin of 1000 per metre. Error: amount by which the force exceeds mu N, relative to
-    it."""
+def locked_wheel_excess(implementation: str, folder: Path) -> float:
+    """Case: a locked wheel, and a spin of 1000 per metre. Error: amount by which the creep force exceeds mu N, divided
+    by mu N."""
     ellipses = RollingEllipse(A, B, LOAD, [1e-6, 0.3, 1.0], [[1.0], [0.0], [-1.0]], [[0.0], [1.0], [1.0]], 1e3)
     answer = fastsim(ellipses, MATERIAL_PAIR)
     return float(np.max(np.hypot(answer.fx, answer.fy) / (np.array([1e-6, 0.3, 1.0]) * LOAD) - 1.0, initial=0.0))
@@ -95,10 +96,18 @@ CASES = (
         "N",
         0.0,
         "exact",
-        no_creepage,
+        force_without_creepage,
         naive=no_creepage_naive,
     ),
-    Case("creepage of 1e-300", "squares underflow", "linear theory", "of it", 4e-3, "error of 21 cells", next_to_none),
+    Case(
+        "creepage of 1e-300",
+        "squares underflow",
+        "linear theory",
+        "of it",
+        4e-3,
+        "error of 21 cells",
+        tiny_creepage_error,
+    ),
     Case(
         "spin against lateral creepage",
         "forces nearly cancel, tractions turn about a pole",
@@ -106,11 +115,13 @@ CASES = (
         "mu N",
         4e-3,
         "error of 21 cells",
-        against,
-        against="none",
-        naive=against_naive,
+        opposed_spin_error,
+        answer_independence="none",
+        naive=opposed_spin_naive,
     ),
-    Case("lift-off", "axes and stiffness vanish", "mu N to 1e-12 N, then none", "mu N", 1e-12, "rounding", lift_off),
+    Case(
+        "lift-off", "axes and stiffness vanish", "mu N to 1e-12 N, then none", "mu N", 1e-12, "rounding", lift_off_error
+    ),
     Case(
         "cells that begin to slip",
         "a cell sticks or slips, nothing between",
@@ -118,8 +129,8 @@ CASES = (
         "mu N",
         1e-3,
         "a tenth of a per cent, and the curve itself bends by 1e-5",
-        flipping,
-        against="none",
+        creep_curve_roughness,
+        answer_independence="none",
     ),
     Case(
         "locked wheel with spin",
@@ -128,6 +139,6 @@ CASES = (
         "mu N",
         1e-12,
         "rounding",
-        locked,
+        locked_wheel_excess,
     ),
 )

@@ -1,4 +1,5 @@
-"""Contact at its limits: few cells, mirrors, nothing but spin, patches that separate, merge or reach the grid's edge.
+"""Hard cases of rolling contact at its limits: few cells, mirrored contacts, pure spin, patches that separate, merge or
+reach the grid's edge.
 
 No engine takes part: forces are plain functions of the creepages, so each case has one answer for all.
 """
@@ -17,8 +18,8 @@ from validation.hard_cases.case import IMPLEMENTATIONS, Case
 MATERIAL_PAIR = MaterialPair()
 A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
 SMALL_CREEPAGE = 1e-7
-CELL, RADIUS, SPHERE = 1.5e-4, 0.3, 1e4
-"""m, m, N: two balls of that radius, each pressed by that load, on a grid of such cells."""
+CELL, RADIUS, BALL_LOAD = 1.5e-4, 0.3, 1e4
+"""Cell size (m), radius (m) of two balls, load (N) on each."""
 
 
 def _linear_error(cells: int, march_name: March) -> float:
@@ -28,19 +29,20 @@ def _linear_error(cells: int, march_name: March) -> float:
     return abs(float(answer.fx / forces(A, B, SMALL_CREEPAGE, 0.0, 0.0, MATERIAL_PAIR)[0]) - 1.0)
 
 
-def few_cells(implementation: str, folder: Path) -> float:
-    """Largest ratio, for 8, 16 and 32 cells, of the error of the force at small creepage to the bound
-    1.7 (8 / cells)^1.9 per cent."""
+def few_cells_error(implementation: str, folder: Path) -> float:
+    """Case: small creepage on 8, 16 and 32 cells. Error: largest relative error of the force divided by the bound 1.7
+    (8 / cells)^1.9 per cent."""
     return max(_linear_error(n, "second-order") / (0.017 * (8.0 / n) ** 1.9) for n in (8, 16, 32))
 
 
 def few_cells_naive(folder: Path) -> str:
-    """Without the remedy: error on few cells if the first step at the leading edge is a complete one."""
+    """Result without the remedy, as text: error on few cells if the first step at the leading edge is a complete
+    one."""
     return f"a whole first step makes the force {100 * _linear_error(8, 'plain'):.1f} % too large by 8 cells"
 
 
 def _draw_creepages(draw_count: int = 400) -> np.ndarray:
-    """Random creepages and spin (3, count), from sticking to full sliding."""
+    """Random creepages xi_x, xi_y and spin (1/m), shape (3, draw_count), from sticking to full sliding."""
     draw = np.random.default_rng(8)
     return (
         draw.uniform(-1.0, 1.0, (3, draw_count))
@@ -49,17 +51,18 @@ def _draw_creepages(draw_count: int = 400) -> np.ndarray:
     )
 
 
-def reversed_signs(implementation: str, folder: Path) -> float:
-    """Case: all creepages reversed. Error: largest deviation of the forces from the reversed ones, divided by mu N."""
+def reversal_error(implementation: str, folder: Path) -> float:
+    """Case: all creepages reversed. Error: largest difference between the forces and the reversed forces, divided by mu
+    N."""
     creepage_along, across, spin = _draw_creepages()
     ellipses = (RollingEllipse(A, B, LOAD, MU, s * creepage_along, s * across, s * spin) for s in (1.0, -1.0))
     first, second = (fastsim(ellipse, MATERIAL_PAIR) for ellipse in ellipses)
     return float(max(np.abs(first.fx + second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
-def mirrored(implementation: str, folder: Path) -> float:
+def mirror_error(implementation: str, folder: Path) -> float:
     """Case: left and right exchanged, so that lateral creepage, spin and lateral force change sign. Error: largest
-    deviation divided by mu N."""
+    difference of the forces divided by mu N."""
     creepage_along, across, spin = _draw_creepages()
     first, second = (
         fastsim(RollingEllipse(A, B, LOAD, MU, creepage_along, s * across, s * spin), MATERIAL_PAIR)
@@ -69,14 +72,15 @@ def mirrored(implementation: str, folder: Path) -> float:
 
 
 def power_gained(implementation: str, folder: Path) -> float:
-    """Largest energy that a contact gains per metre, divided by mu N times the creepage, on 21 cells."""
+    """Case: random creepages on 21 cells. Error: largest energy that a contact gains per metre, divided by mu N times
+    the creepage."""
     creepage_along, across, spin = _draw_creepages()
     size = MU * LOAD * (np.hypot(creepage_along, across) + A * np.abs(spin))
     lost = fastsim(RollingEllipse(A, B, LOAD, MU, creepage_along, across, spin), MATERIAL_PAIR).dissipation
     return float(max(np.max(-lost / size), 0.0))
 
 
-def only_spin(implementation: str, folder: Path) -> float:
+def pure_spin_error(implementation: str, folder: Path) -> float:
     """Case: pure spin. Error: the larger of the longitudinal force divided by mu N and, for small spin, the relative
     error of the lateral force against the linear theory."""
     small = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 1e-6), MATERIAL_PAIR)
@@ -92,28 +96,31 @@ def _balls(centre_distance: float, load: float, cells: tuple[int, int] = (41, 10
     return solve_normal(away / (2.0 * RADIUS), CELL, CELL, MATERIAL_PAIR, load=load)
 
 
-def two_patches(implementation: str, folder: Path) -> float:
-    """Case: two separate contact patches. Error: relative error of one patch's load, or difference of the area from
-    that of single balls beyond the cells along the edges."""
-    draw = _balls(9e-3, 2.0 * SPHERE)
+def two_patch_error(implementation: str, folder: Path) -> float:
+    """Case: two separate contact patches. Error: the larger of the relative error of a patch's load and of the
+    difference of the area from that of single balls beyond the cells along the edges."""
+    draw = _balls(9e-3, 2.0 * BALL_LOAD)
     left = float(draw.pressure[:, : draw.x.size // 2].sum() * CELL**2)
-    single_contact = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, SPHERE, MATERIAL_PAIR)
+    single_contact = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, BALL_LOAD, MATERIAL_PAIR)
     edge = CELL * 2.0 * np.pi * float(single_contact.a)
-    return max(abs(left / SPHERE - 1.0), abs(draw.area / 2.0 - np.pi * float(single_contact.a) ** 2) / edge - 1.0, 0.0)
+    return max(
+        abs(left / BALL_LOAD - 1.0), abs(draw.area / 2.0 - np.pi * float(single_contact.a) ** 2) / edge - 1.0, 0.0
+    )
 
 
-def merging(implementation: str, folder: Path) -> float:
+def merging_patch_error(implementation: str, folder: Path) -> float:
     """Case: two balls approach each other in steps of a fifth of a cell. Error: largest second difference of the
-    approach, relative to it."""
+    approach, divided by the approach."""
     answer = [
-        _balls(ball_distance, 2.0 * SPHERE, (41, 81)).approach for ball_distance in np.linspace(4.0e-3, 3.4e-3, 21)
+        _balls(ball_distance, 2.0 * BALL_LOAD, (41, 81)).approach for ball_distance in np.linspace(4.0e-3, 3.4e-3, 21)
     ]
     return float(np.abs(np.diff(answer, 2)).max() / answer[0])
 
 
-def at_the_edge(implementation: str, folder: Path) -> float:
-    """Case: a contact patch that the grid's edge cuts off."""
-    return _balls(9e-3, 2.0 * SPHERE, (41, 61)).load
+def load_at_grid_edge(implementation: str, folder: Path) -> float:
+    """Case: a contact patch that the grid's edge cuts off, which must be refused. Error: the load (N) that is
+    returned."""
+    return _balls(9e-3, 2.0 * BALL_LOAD, (41, 61)).load
 
 
 CASES = (
@@ -124,9 +131,9 @@ CASES = (
         "of the error allowed",
         1.0,
         "second order; measured 1.67 % by 8 cells",
-        few_cells,
+        few_cells_error,
         naive=few_cells_naive,
-        once=True,
+        without_engine=True,
     ),
     Case(
         "all creepages turned round",
@@ -135,8 +142,8 @@ CASES = (
         "mu N",
         0.0,
         "every operation is odd",
-        reversed_signs,
-        once=True,
+        reversal_error,
+        without_engine=True,
     ),
     Case(
         "contact in a mirror",
@@ -145,8 +152,8 @@ CASES = (
         "mu N",
         1e-12,
         "sums in another order",
-        mirrored,
-        once=True,
+        mirror_error,
+        without_engine=True,
     ),
     Case(
         "power of a contact",
@@ -156,7 +163,7 @@ CASES = (
         1e-5,
         "what 21 cells leave",
         power_gained,
-        once=True,
+        without_engine=True,
     ),
     Case(
         "nothing but spin",
@@ -165,8 +172,8 @@ CASES = (
         "relative",
         4e-3,
         "error of 21 cells",
-        only_spin,
-        once=True,
+        pure_spin_error,
+        without_engine=True,
     ),
     Case(
         "two patches under one load",
@@ -175,8 +182,8 @@ CASES = (
         "relative, beyond a row of cells",
         0.01,
         "one ball deforms the other's ground by 1 %",
-        two_patches,
-        once=True,
+        two_patch_error,
+        without_engine=True,
     ),
     Case(
         "patches that merge",
@@ -185,9 +192,9 @@ CASES = (
         "of the approach",
         1e-3,
         "a twentieth of what merging changes",
-        merging,
-        against="none",
-        once=True,
+        merging_patch_error,
+        answer_independence="none",
+        without_engine=True,
     ),
     Case(
         "patch cut off by the grid",
@@ -196,8 +203,8 @@ CASES = (
         "N",
         0.0,
         "a part of a contact is none",
-        at_the_edge,
+        load_at_grid_edge,
         dict.fromkeys(IMPLEMENTATIONS, "refused"),
-        once=True,
+        without_engine=True,
     ),
 )

@@ -1,4 +1,4 @@
-"""Massless contact points: first-order states with a time constant of 1 ms, or of none at all."""
+"""Hard cases of massless contact points of tyres: first-order states with a time constant of 1 ms or of zero."""
 
 from pathlib import Path
 
@@ -22,8 +22,9 @@ def _compressions(assembly: Assembly, path: Trajectory) -> np.ndarray:
     return path.states[:, :2] - np.column_stack([channels["zeta1"][2], channels["zeta2"][2]])
 
 
-def step_answer(engine: str, folder: Path) -> float:
-    """Case: a force step from 0 to 1 kN, with time steps from a tenth to twenty times the tyre's time constant."""
+def step_response_error(engine: str, folder: Path) -> float:
+    """Case: a wheel force that steps from 0 to 1 kN, with time steps from a tenth to twenty times the tyre's time
+    constant. Error: largest error of the tyre compression divided by f/k."""
     base = vehicle()
     values = np.zeros((10, 2))
     values[1:] = LOAD
@@ -40,8 +41,9 @@ def step_answer(engine: str, folder: Path) -> float:
     return worst
 
 
-def step_answer_naive(folder: Path) -> str:
-    """Without the remedy: response to a step by MuJoCo's own activation with its usual filter."""
+def step_response_naive(folder: Path) -> str:
+    """Result without the remedy, as text: response to a step by a native MuJoCo activation with its first-order
+    filter."""
     ends = []
     for integrator in ("Euler", "RK4"):
         model = mujoco.MjModel.from_xml_string(
@@ -56,13 +58,15 @@ def step_answer_naive(folder: Path) -> str:
     return f"a native MuJoCo activation at 5.5 ms reaches {', '.join(ends)} times its load in 20 steps, unwarned"
 
 
-def linear_load(engine: str, folder: Path) -> float:
-    """Case: a load ramp of 1 kN in 20 ms. Error: difference from the closed form, in which the compression lags."""
+def ramp_response_error(engine: str, folder: Path) -> float:
+    """Case: a wheel force that rises by 1 kN in 20 ms. Error: largest difference of the tyre compression from the
+    closed form, divided by f/k."""
     return max(_ramp_error(engine, step, IMPLICIT_INTEGRATORS[engine]) for step in (1e-3, 5e-3, 2e-2))
 
 
 def _ramp_error(engine: str, step: float, integrator: str) -> float:
-    """Largest difference of the compression from the ramp's closed form at the time of each row, divided by f/k."""
+    """Largest difference of the tyre compression from the ramp's closed form at the time of each row, divided by
+    f/k."""
     base, rising = vehicle(), LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
     assembly, p = driven_by_forces(base, Sampled(rising, 2e-2, held=False)), base.parameters
     path = run(engine, assembly, step, 0.1, integrator)
@@ -72,7 +76,7 @@ def _ramp_error(engine: str, step: float, integrator: str) -> float:
 
 
 def _compression_under_ramp(times: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
-    """Compression (n,) in m under a load that rises to LOAD in 20 ms, as the difference of two ramps."""
+    """Tyre compression (n,) in m under a load that rises to LOAD in 20 ms, as the difference of two ramps."""
     lag = damping / stiffness
 
     def ramp(t: np.ndarray) -> np.ndarray:
@@ -81,14 +85,15 @@ def _compression_under_ramp(times: np.ndarray, stiffness: float, damping: float)
     return LOAD / stiffness / 2e-2 * (ramp(times) - ramp(times - 2e-2))
 
 
-def stamps(engine: str, folder: Path) -> float:
-    """Case: the ramp in an adaptive run with rows at any times. Error: difference from the closed form at these
-    times."""
+def adaptive_ramp_error(engine: str, folder: Path) -> float:
+    """Case: the ramp in an adaptive run with rows at any times. Error: largest difference of the tyre compression from
+    the closed form at these times, divided by f/k."""
     return _ramp_error(engine, 1e-3, {"reference": "DOP853", "exudyn": "DOPRI5"}.get(engine, "RK4"))
 
 
-def undamped(engine: str, folder: Path) -> float:
-    """Case: a tyre without damping, whose contact point has no state and follows its force at once."""
+def undamped_contact_error(engine: str, folder: Path) -> float:
+    """Case: a tyre without damping, whose contact point has no state and follows its force at once. Error: that of the
+    compression divided by f/k."""
     base = vehicle(d1=0.0, d2=0.0)
     values = LOAD * np.random.default_rng(4).standard_normal((100, 2))
     assembly = driven_by_forces(base, Sampled(values, 1e-3, held=True))
@@ -105,9 +110,9 @@ CASES = (
         "of f/k",
         1e-12,
         "an exact filter: rounding only",
-        step_answer,
+        step_response_error,
         {},
-        step_answer_naive,
+        step_response_naive,
     ),
     Case(
         "contact point under a ramp",
@@ -116,7 +121,7 @@ CASES = (
         "of f/k",
         1e-12,
         "an exact filter: rounding only",
-        linear_load,
+        ramp_response_error,
     ),
     Case(
         "contact point along an adaptive run",
@@ -125,7 +130,7 @@ CASES = (
         "of f/k",
         1e-12,
         "an exact filter: rounding only",
-        stamps,
+        adaptive_ramp_error,
     ),
     Case(
         "contact point without damping",
@@ -134,6 +139,6 @@ CASES = (
         "of f/k",
         1e-12,
         "one division",
-        undamped,
+        undamped_contact_error,
     ),
 )

@@ -1,4 +1,5 @@
-"""Covariance of force noise beside a stiff pole: the recursion along the path, and what van Loan's block form does."""
+"""Hard case of the covariance of force noise with a stiff pole: recursion along the path, against van Loan's block
+form."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,19 +14,19 @@ from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 
 SAMPLE_PERIOD, SAMPLES, STEP = 0.05, 10, 1e-3
-"""Of the held samples (s), their number, and the step (s): 35 times the decay time of the fastest pole per sample."""
+"""Period (s) of the held force samples, 35 times the decay time of the fastest pole; number of samples; step (s)."""
 
 
 def _base_assembly(values: np.ndarray) -> Assembly:
-    """The linearised vehicle under its weight, with these errors (n, 2) in N added to its force samples."""
+    """The linearised vehicle under its weight, with ``values`` (n, 2) in N added to its wheel force samples."""
     base = setups.vehicle(geometry="linear")
     forces = setups.static_forces(base, SAMPLES, SAMPLE_PERIOD)
     return setups.driven_by_forces(base, replace(forces, values=forces.values + values))
 
 
-def held_noise(engine: str, folder: Path) -> float:
-    """Case: an error of 1 N in each single sample is run through the engine. Error: relative difference of the summed
-    squares of the responses from the covariance recursion."""
+def covariance_error(engine: str, folder: Path) -> float:
+    """Case: a force error of 1 N in each single sample is simulated. Error: relative difference between the sum of
+    squared responses and the covariance recursion."""
     quiet = setups.run(engine, _base_assembly(np.zeros((SAMPLES, 2))), STEP, SAMPLE_PERIOD * SAMPLES).states[-1]
     responses = []
     for sample in range(SAMPLES):
@@ -46,7 +47,8 @@ def _covariance_recursion() -> np.ndarray:
 
 
 def van_loan_naive(folder: Path) -> str:
-    """Without the remedy: process noise over one and over twenty periods by filterpy's van Loan discretisation."""
+    """Result without the remedy, as text: process noise over one and over twenty periods by filterpy's van Loan
+    discretisation."""
     from filterpy.common import van_loan_discretization
 
     from models.engines.stability import first_order, linearised
@@ -74,8 +76,8 @@ CASES = (
         "",
         1e-9,
         "the same sum in another order, rounding aside",
-        held_noise,
+        covariance_error,
         naive=van_loan_naive,
-        against="native",
+        answer_independence="native",
     ),
 )

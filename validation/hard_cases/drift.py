@@ -1,4 +1,4 @@
-"""Drift: runs that look right by the wrong figure, and scores of loads that are none."""
+"""Hard cases of drift: drifted runs that look right by a wrong figure, and damage of invalid loads."""
 
 from functools import cache
 from pathlib import Path
@@ -20,51 +20,53 @@ from validation.hard_cases.setups import REFUSED, largest_magnitude
 
 DURATION = 8.0
 WRONG_PITCH_RATE = 0.1
-"""Pitch rate (rad/s) by which a drifted run starts wrong: at a growth of 0.4 1/s it has turned over in 8 s."""
+"""Error (rad/s) of a drifted run's initial pitch rate; at a growth rate of 0.4 1/s it turns over in 8 s."""
 SOFT_STIFFNESS = 50.0
-"""N m/rad: 82 hold on this road."""
+"""Stiffness (N m/rad) of a pitch spring that is too soft; 82 are needed on this road."""
 DRIFTED_PITCH = 0.05
-"""Pitch error (rad) beyond which no two runs are compared."""
+"""Pitch error (rad) beyond which runs are not compared."""
 HEAVY_NOISE = 300.0
-"""Noise (N) on the forces with which a run has drifted off after some seconds."""
+"""Standard deviation (N) of force noise with which a run drifts off after some seconds."""
 
 
 @cache
-def measured(grade: float = 0.0) -> Result:
-    """Virtual measurement on the study road, or on the road with a grade (rad)."""
+def true_run(grade: float = 0.0) -> Result:
+    """Virtual measurement on the study road with a grade (rad): the true run."""
     road = STUDY_ROAD | ({"grade": grade} if grade else {})
     return simulate(road_scene(duration=DURATION, road=road), "reference")
 
 
-def follow(folder: Path, truth: Result, effects: dict[str, Any] | None = None, tilt: float = 0.0) -> Scene:
-    """Scene driven by the forces of the true run, with a wrong initial pitch rate (rad/s)."""
+def scene_on_true_forces(
+    folder: Path, truth: Result, effects: dict[str, Any] | None = None, tilt: float = 0.0
+) -> Scene:
+    """Scene under the wheel forces of the true run, with a wrong initial pitch rate ``tilt`` (rad/s)."""
     write_measurement(truth, folder, 1e-3)
     scene = force_scene(folder, duration=DURATION, effects=effects)
     return scene.model_copy(update={"start": {"pitch_rate": tilt}} if tilt else {})
 
 
 def figures_and_errors(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, Errors]:
-    """Figures of a run that need no true run, and its errors relative to the true run."""
+    """Figures of a run that can be computed without the true run, and errors of the run against the true run."""
     return figures_of_run(run, scene.vehicle_parameters()), errors_of_run(run, truth)
 
 
 def verdict_words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
-    """Words of the verdicts on a run, with and without knowledge of the true run."""
+    """Words of the verdicts on a run in an engine, with and without knowledge of the true run."""
     scores, wrong = figures_and_errors(simulate(scene, engine), truth, scene)
     known = blind_verdict(scores, scene.effects, DURATION, Limits())
     return verdict_on_run(scores, wrong, scene.effects, Limits()).word, known.word
 
 
-def tumbled(engine: str, folder: Path) -> float:
-    """Case: a free run that has turned over must be rejected."""
-    judged = verdict_words(engine, follow(folder, measured(), tilt=WRONG_PITCH_RATE), measured())
+def tumbled_verdict_error(engine: str, folder: Path) -> float:
+    """Case: a free run that has turned over must be rejected, with and without the true run. Error: 1 if it is not."""
+    judged = verdict_words(engine, scene_on_true_forces(folder, true_run(), tilt=WRONG_PITCH_RATE), true_run())
     return float(judged != ("rejected", "rejected"))
 
 
 def tumbled_naive(folder: Path) -> str:
-    """Without the guard: damage of a tumbled run from its vertical forces alone."""
-    scene = follow(folder, measured(), tilt=WRONG_PITCH_RATE)
-    scores, wrong = figures_and_errors(simulate(scene, "reference"), measured(), scene)
+    """Result without the guard, as text: damage of a tumbled run from its vertical forces alone."""
+    scene = scene_on_true_forces(folder, true_run(), tilt=WRONG_PITCH_RATE)
+    scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(), scene)
     return (
         f"at a pitch of {scores.pitch_max:.1f} rad its vertical f3 does {wrong.vertical_damage['f3']:.3f} times the "
         f"true damage, its f3 along the chassis {wrong.damage['f3x']:.0e} times"
@@ -75,34 +77,35 @@ SOFT_SPRING = {"pitch_spring": {"stiffness": SOFT_STIFFNESS, "damping": 250.0}}
 FIRM_SPRING = {"pitch_spring": {"stiffness": 300.0, "damping": 600.0}}
 
 
-def soft_spring(engine: str, folder: Path) -> float:
-    """Case: a holding spring that is too soft."""
+def soft_spring_verdict_error(engine: str, folder: Path) -> float:
+    """Case: a run with a stabilising spring that is too soft must be rejected. Error: 1 if it is not."""
     return float(
-        verdict_words(engine, follow(folder, measured(), SOFT_SPRING, WRONG_PITCH_RATE), measured())[0] != "rejected"
+        verdict_words(engine, scene_on_true_forces(folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE), true_run())[0]
+        != "rejected"
     )
 
 
-def soft_naive(folder: Path) -> str:
-    """Without the guard: figures of the run itself, which do not show that the spring is too soft."""
-    scene = follow(folder, measured(), SOFT_SPRING, WRONG_PITCH_RATE)
-    scores, wrong = figures_and_errors(simulate(scene, "reference"), measured(), scene)
+def soft_spring_naive(folder: Path) -> str:
+    """Result without the guard, as text: figures of the run itself, which do not show that the spring is too soft."""
+    scene = scene_on_true_forces(folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE)
+    scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(), scene)
     return (
         f"its artificial moment is {scores.moment_share_band:.1%} of I pitch'' and its vertical f3 does "
         f"{wrong.vertical_damage['f3']:.3f} times the true damage; its pitch is {wrong.pitch_max:.2f} rad wrong"
     )
 
 
-def graded(engine: str, folder: Path) -> float:
-    """Case: a holding spring on a grade, which gives wrong results. Error: 0 if it is rejected, and not accepted
-    without the true run either; else 1."""
-    judged = verdict_words(engine, follow(folder, measured(0.1), FIRM_SPRING), measured(0.1))
+def graded_verdict_error(engine: str, folder: Path) -> float:
+    """Case: a stabilising spring on a grade, which gives wrong results. Error: 0 if the run is rejected with the true
+    run and not accepted without it, else 1."""
+    judged = verdict_words(engine, scene_on_true_forces(folder, true_run(0.1), FIRM_SPRING), true_run(0.1))
     return float(judged != ("rejected", "stabilise"))
 
 
 def graded_naive(folder: Path) -> str:
-    """Figures of the run itself on a graded road."""
-    scene = follow(folder, measured(0.1), FIRM_SPRING)
-    scores, wrong = figures_and_errors(simulate(scene, "reference"), measured(0.1), scene)
+    """Figures of a run with a stabilising spring on a graded road, as text."""
+    scene = scene_on_true_forces(folder, true_run(0.1), FIRM_SPRING)
+    scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(0.1), scene)
     return (
         f"its artificial moment is {scores.moment_share_band:.1%} of I pitch''; its pitch is {wrong.pitch_max:.2f} "
         f"rad wrong, f3 along the chassis does {wrong.damage['f3x']:.2f} times the true damage"
@@ -114,15 +117,15 @@ def _random_walk() -> np.ndarray:
     return np.random.default_rng(2).standard_normal(500).cumsum()
 
 
-def broken_load(engine: str, folder: Path) -> float:
-    """Case: a load with one sample that is NaN."""
+def damage_with_nan(engine: str, folder: Path) -> float:
+    """Case: a load with one sample that is NaN must be refused. Error: the damage that is returned."""
     load = _random_walk().copy()
     load[250] = np.nan
     return pseudo_damage(load)
 
 
-def broken_load_naive(folder: Path) -> str:
-    """Without the guard: damage of a load with a NaN by the rainflow library."""
+def damage_with_nan_naive(folder: Path) -> str:
+    """Result without the guard, as text: damage of a load with a NaN by the rainflow library."""
     from rainflow import extract_cycles
 
     load = _random_walk().copy()
@@ -131,65 +134,68 @@ def broken_load_naive(folder: Path) -> str:
     return f"rainflow alone finds {damage / pseudo_damage(_random_walk()):.2g} times the damage of the whole load"
 
 
-def empty_load(engine: str, folder: Path) -> float:
-    """Case: a load without samples."""
+def damage_without_samples(engine: str, folder: Path) -> float:
+    """Case: a load without samples must be refused. Error: the damage that is returned."""
     return pseudo_damage(np.empty(0))
 
 
-def constant_truth(engine: str, folder: Path) -> float:
-    """Case: a true load that is constant and has no damage to compare with."""
+def ratio_to_constant_load(engine: str, folder: Path) -> float:
+    """Case: a damage ratio to a constant true load, which has no damage, must be refused. Error: the ratio that is
+    returned."""
     return damage_ratio(_random_walk(), np.full(500, 3.0))
 
 
-def huge_load(engine: str, folder: Path) -> float:
-    """Case: a ratio of two damages that both exceed the range of floating point."""
+def ratio_of_huge_loads(engine: str, folder: Path) -> float:
+    """Case: a ratio of two damages beyond the range of floating-point numbers must be refused. Error: the ratio that is
+    returned."""
     load = np.array([0.0, 1e200, 0.0])
     return damage_ratio(load, load)
 
 
-def no_slope(engine: str, folder: Path) -> float:
-    """Case: the damage exponent (Woehler slope) is NaN, which a power of 1 would hide."""
+def damage_with_nan_slope(engine: str, folder: Path) -> float:
+    """Case: a Wöhler slope that is NaN, which a range of 1 would hide, must be refused. Error: the damage that is
+    returned."""
     return pseudo_damage(np.array([0.0, 1.0, 0.0]), np.nan)
 
 
-def no_intensity(engine: str, folder: Path) -> float:
-    """Case: drift-off time under noise of negative intensity."""
+def negative_intensity_drift_off(engine: str, folder: Path) -> float:
+    """Case: drift-off time under noise of negative intensity must be refused. Error: the time that is returned."""
     return drift_off_time(1.0, -1.0, 0.05)
 
 
-def two_points(engine: str, folder: Path) -> float:
-    """Case: a load with two samples, which is a single rise."""
+def two_point_damage_error(engine: str, folder: Path) -> float:
+    """Case: a load with two samples, which is half a cycle. Error: difference of its damage from 0.5 range^5."""
     return abs(pseudo_damage(np.array([0.0, 2.0]), 5.0) - 0.5 * 2.0**5)
 
 
 def two_points_naive(folder: Path) -> str:
-    """Without the guard: damage of a load with two samples by the rainflow library."""
+    """Result without the guard, as text: damage of a load with two samples by the rainflow library."""
     from rainflow import extract_cycles
 
     return f"rainflow alone finds {len(list(extract_cycles([0.0, 2.0])))} cycles in it"
 
 
-def before_drift(engine: str, folder: Path) -> float:
-    """Case: noisy run compared with another implementation until drift-off. Error: largest difference relative to the
-    largest state."""
-    scene = follow(folder, measured(), {"force_noise": {"deviation": HEAVY_NOISE}})
+def difference_before_drift(engine: str, folder: Path) -> float:
+    """Case: a noisy run compared with another implementation until drift-off. Error: largest difference of the states
+    divided by the largest state."""
+    scene = scene_on_true_forces(folder, true_run(), {"force_noise": {"deviation": HEAVY_NOISE}})
     other_engine = "mujoco" if engine == "reference" else "reference"
     first, second_run = (simulate(scene, name) for name in (engine, other_engine))
-    rows_before = slice(None, _first_row_off(first, measured()))
+    rows_before = slice(None, _first_row_off(first, true_run()))
     return largest_magnitude(first.states[rows_before] - second_run.states[rows_before]) / largest_magnitude(
         second_run.states[rows_before]
     )
 
 
 def _first_row_off(run: Result, truth: Result) -> int | None:
-    """First row at which the run's pitch differs from the measured pitch by more than DRIFTED_PITCH; None if it never
+    """First row at which the pitch of a run differs from the true pitch by more than DRIFTED_PITCH; None if it never
     does."""
     far = np.flatnonzero(np.abs(run["pitch"] - truth["pitch"]) > DRIFTED_PITCH)
     return int(far[0]) if len(far) else None
 
 
 def before_drift_naive(folder: Path) -> str:
-    """Without the guard: two step sizes of the reference compared over 30 s, beyond drift-off."""
+    """Result without the guard, as text: two step sizes of the reference compared over 30 s, beyond drift-off."""
     truth = simulate(road_scene(duration=30.0), "reference")
     write_measurement(truth, folder, 1e-3)
     scene = force_scene(folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY_NOISE}})
@@ -207,7 +213,7 @@ CASES = (
         "wrong verdicts",
         0.0,
         "a word is right or wrong",
-        tumbled,
+        tumbled_verdict_error,
         naive=tumbled_naive,
     ),
     Case(
@@ -217,8 +223,8 @@ CASES = (
         "wrong verdicts",
         0.0,
         "a word is right or wrong",
-        soft_spring,
-        naive=soft_naive,
+        soft_spring_verdict_error,
+        naive=soft_spring_naive,
     ),
     Case(
         "spring on a grade",
@@ -227,7 +233,7 @@ CASES = (
         "wrong verdicts",
         0.0,
         "a word is right or wrong",
-        graded,
+        graded_verdict_error,
         naive=graded_naive,
     ),
     Case(
@@ -237,9 +243,9 @@ CASES = (
         "N^5",
         0.0,
         "no damage is right",
-        broken_load,
+        damage_with_nan,
         REFUSED,
-        broken_load_naive,
+        damage_with_nan_naive,
     ),
     Case(
         "load without a sample",
@@ -248,7 +254,7 @@ CASES = (
         "N^5",
         0.0,
         "no damage is right",
-        empty_load,
+        damage_without_samples,
         REFUSED,
     ),
     Case(
@@ -258,9 +264,9 @@ CASES = (
         "",
         0.0,
         "there is no answer",
-        huge_load,
+        ratio_of_huge_loads,
         REFUSED,
-        once=True,
+        without_engine=True,
     ),
     Case(
         "Woehler exponent that is no number",
@@ -269,9 +275,9 @@ CASES = (
         "",
         0.0,
         "there is no answer",
-        no_slope,
+        damage_with_nan_slope,
         REFUSED,
-        once=True,
+        without_engine=True,
     ),
     Case(
         "drift-off by noise of negative intensity",
@@ -280,9 +286,9 @@ CASES = (
         "",
         0.0,
         "there is no answer",
-        no_intensity,
+        negative_intensity_drift_off,
         REFUSED,
-        once=True,
+        without_engine=True,
     ),
     Case(
         "true load that never varies",
@@ -291,7 +297,7 @@ CASES = (
         "",
         0.0,
         "no ratio is right",
-        constant_truth,
+        ratio_to_constant_load,
         REFUSED,
     ),
     Case(
@@ -301,7 +307,7 @@ CASES = (
         "N^5",
         0.0,
         "exact in doubles",
-        two_points,
+        two_point_damage_error,
         naive=two_points_naive,
     ),
     Case(
@@ -311,8 +317,8 @@ CASES = (
         "of the largest state",
         1e-9,
         "rounding of 1e-15 to 1e-13 that grows by less than 100",
-        before_drift,
+        difference_before_drift,
         naive=before_drift_naive,
-        against="native",
+        answer_independence="native",
     ),
 )

@@ -1,4 +1,4 @@
-"""Extreme parameters: no damping, mass ratios of 1e6, stiffnesses of 1e9 N/m."""
+"""Hard cases of extreme parameters: no damping, mass ratios of 1e6, stiffnesses of 1e9 N/m."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,9 +11,11 @@ from validation.hard_cases.case import Case
 from validation.hard_cases.setups import REFUSED, exact_states, largest_magnitude, run, unchecked_run, vehicle
 
 IMPLICIT_INTEGRATORS = {**setups.IMPLICIT_INTEGRATORS, "reference": "LSODA"}
-"""Radau takes minutes here: its error estimate chases the rounding of kN on a wheel of a gram."""
+"""Implementation -> implicit integrator. Radau would take minutes in the reference, as its error estimate reacts to the
+rounding of kN on a wheel of a gram."""
 TOLERANCE = 1e-6
-"""Of the adaptive solvers; at a tenth of it LSODA, too, chases that rounding, in 140,000 steps instead of 300."""
+"""Tolerance of the adaptive solvers; at a tenth of it LSODA reacts to rounding, too, and needs 140,000 steps instead of
+300."""
 
 
 def _raised_vehicle(base_assembly: Assembly) -> Assembly:
@@ -22,13 +24,14 @@ def _raised_vehicle(base_assembly: Assembly) -> Assembly:
 
 
 def _distance_from_equilibrium(engine: str, base_assembly: Assembly, integrator: str = "") -> float:
-    """Distance from the equilibrium after 3 s, relative to the initial distance."""
+    """Distance of the state from the equilibrium after 3 s, divided by the initial displacement."""
     end = run(engine, _raised_vehicle(base_assembly), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
     return largest_magnitude(end - base_assembly.initial) / 0.01
 
 
-def undamped(engine: str, folder: Path) -> float:
-    """Case: a vehicle without any dampers for 1 s. Error: difference from the matrix exponential."""
+def undamped_error(engine: str, folder: Path) -> float:
+    """Case: a vehicle without any dampers for 1 s. Error: difference of the states from the matrix exponential, divided
+    by the largest motion."""
     return _ringing_error(engine)
 
 
@@ -40,13 +43,13 @@ def _ringing_error(engine: str, integrator: str = "") -> float:
 
 
 def _undamped_vehicle() -> tuple[Assembly, np.ndarray]:
-    """The vehicle without dampers, displaced from equilibrium, and its exact states over 1 s."""
+    """The vehicle without dampers, displaced from equilibrium, and its exact states (1001, 8) over 1 s."""
     base = _raised_vehicle(vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
     return base, exact_states(base, 1e-3, 1000)
 
 
 def undamped_unchecked_euler(folder: Path) -> str:
-    """Without the guard: explicit Euler with the check bypassed, by which every mode grows."""
+    """Result without the guard, as text: explicit Euler with the check bypassed, by which every mode grows."""
     base, truth = _undamped_vehicle()
     states = unchecked_run("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
     return (
@@ -55,33 +58,38 @@ def undamped_unchecked_euler(folder: Path) -> str:
     )
 
 
-def undamped_euler(engine: str, folder: Path) -> float:
-    """Case: undamped oscillation by an explicit first-order method, which makes it grow."""
+def undamped_euler_error(engine: str, folder: Path) -> float:
+    """Case: undamped oscillation by an explicit first-order method, which makes it grow. Error: difference of the
+    states from the matrix exponential, divided by the largest motion."""
     return _ringing_error(engine, {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine])
 
 
-def light_wheel(engine: str, folder: Path) -> float:
-    """Case: wheels of 0.75 g under 750 kg, with poles of -1.4e7 1/s, at the recommended setting."""
+def light_wheel_error(engine: str, folder: Path) -> float:
+    """Case: wheels of 0.75 g under 750 kg, with poles of -1.4e7 1/s, at the recommended settings. Error: distance from
+    equilibrium after 3 s divided by the initial displacement."""
     return _distance_from_equilibrium(engine, vehicle(m1=7.5e-4, m2=7.5e-4))
 
 
-def light_wheel_implicit(engine: str, folder: Path) -> float:
-    """Error of the light wheel by an implicit integrator."""
+def light_wheel_implicit_error(engine: str, folder: Path) -> float:
+    """Case: wheels of 0.75 g under 750 kg by an implicit integrator. Error: distance from equilibrium after 3 s divided
+    by the initial displacement."""
     return _distance_from_equilibrium(engine, vehicle(m1=7.5e-4, m2=7.5e-4), IMPLICIT_INTEGRATORS[engine])
 
 
-def stiff_tyre(engine: str, folder: Path) -> float:
-    """Case: tyres of 1e9 N/m, so that the wheels oscillate at 8,200 rad/s, at the recommended setting."""
+def stiff_tyre_error(engine: str, folder: Path) -> float:
+    """Case: tyres of 1e9 N/m, so that the wheels oscillate at 8,200 rad/s, at the recommended settings. Error: distance
+    from equilibrium after 3 s divided by the initial displacement."""
     return _distance_from_equilibrium(engine, vehicle(k1=1e9, k2=1e9))
 
 
-def stiff_tyre_implicit(engine: str, folder: Path) -> float:
-    """Error on the stiff tyre by an implicit integrator."""
+def stiff_tyre_implicit_error(engine: str, folder: Path) -> float:
+    """Case: tyres of 1e9 N/m by an implicit integrator. Error: distance from equilibrium after 3 s divided by the
+    initial displacement."""
     return _distance_from_equilibrium(engine, vehicle(k1=1e9, k2=1e9), IMPLICIT_INTEGRATORS[engine])
 
 
 def stiff_tyre_naive(folder: Path) -> str:
-    """Without the guard: two steps with the check bypassed."""
+    """Result without the guard, as text: two steps with the check bypassed."""
     base = vehicle(k1=1e9, k2=1e9)
     end = unchecked_run("mujoco", _raised_vehicle(base), 1e-3, 2e-3).states[-1]
     return f"MuJoCo past the check: {largest_magnitude(end - base.initial):.0f} m/s after 2 ms, finite and unwarned"
@@ -98,7 +106,7 @@ CASES = (
         "of the motion",
         1e-3,
         "RK4 at 1 ms and 121 rad/s: a phase error of 2e-7 per step",
-        undamped,
+        undamped_error,
         {},
         undamped_unchecked_euler,
     ),
@@ -109,7 +117,7 @@ CASES = (
         "of the motion",
         0.25,
         "first order: h omega / 2 of 121 rad/s is a phase of 6 %",
-        undamped_euler,
+        undamped_euler_error,
         {"exudyn": "refused"},
     ),
     Case(
@@ -119,7 +127,7 @@ CASES = (
         "of the push",
         1e-6,
         DECAYED_REASON,
-        light_wheel,
+        light_wheel_error,
         REFUSED,
     ),
     Case(
@@ -129,7 +137,7 @@ CASES = (
         "of the push",
         1e-6,
         DECAYED_REASON,
-        light_wheel_implicit,
+        light_wheel_implicit_error,
     ),
     Case(
         "stiffness 1e9",
@@ -138,7 +146,7 @@ CASES = (
         "of the push",
         1e-6,
         DECAYED_REASON,
-        stiff_tyre,
+        stiff_tyre_error,
         REFUSED,
         stiff_tyre_naive,
     ),
@@ -149,6 +157,6 @@ CASES = (
         "of the push",
         1e-6,
         DECAYED_REASON,
-        stiff_tyre_implicit,
+        stiff_tyre_implicit_error,
     ),
 )

@@ -1,4 +1,5 @@
-"""Wheel forces and vehicles that cannot be: refused, or doubted before the run; true forces raise nothing.
+"""Hard cases of impossible wheel forces and vehicles, which must be refused or doubted before the run; true forces
+raise nothing.
 
 Forces of the asymmetric vehicle on hills for 20 s are spoilt; the error counts what is not named as it must be.
 """
@@ -16,13 +17,13 @@ from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters.asymmetric_twin import PARAMETERS as TWIN
 from models.vehicles.plausible_plane import plausible_plane
 from validation.common.scenes import road_scene
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
 
 SAMPLE_PERIOD, DURATION = 1e-3, 20.0
 WHEELS = np.array([TWIN.m1, TWIN.m2]) * TWIN.g
 LOADS = TWIN.m3 * TWIN.g * np.array([TWIN.a, TWIN.b]) / (TWIN.a + TWIN.b) + WHEELS
-Change = Callable[[np.ndarray], np.ndarray]
-REFUSED: dict[str, Change] = {
+ForceChange = Callable[[np.ndarray], np.ndarray]
+REFUSED: dict[str, ForceChange] = {
     "wheel forces with the other sign": lambda f: -f,
     "front wheel force with the other sign": lambda f: f * [-1, 1],
     "rear wheel force with the other sign": lambda f: f * [1, -1],
@@ -36,7 +37,7 @@ REFUSED: dict[str, Change] = {
     "wheel forces of one side": lambda f: f / 2,
     "wheel forces 15 % low": lambda f: f * 0.85,
 }
-DOUBTED: dict[str, Change] = {
+DOUBTED: dict[str, ForceChange] = {
     "wheel forces 5 % low": lambda f: f * 0.95,
     "wheel forces 2 % high": lambda f: f * 1.02,
     "front wheel force 2 % high": lambda f: f * [1.02, 1],
@@ -55,14 +56,15 @@ QUERIED: dict[str, dict[str, float]] = {
 
 @cache
 def true_forces() -> np.ndarray:
-    """Wheel forces (n, 2) in N of the asymmetric vehicle on hills."""
+    """True wheel forces (n, 2) in N of the asymmetric vehicle on hills."""
     road = {"source": "hills", "speed": 20.0}
     run = simulate(road_scene("asymmetric_twin", SAMPLE_PERIOD, DURATION, road), "reference")
     return np.column_stack([run["f1"], run["f2"]])
 
 
-def error_texts(change: Change) -> list[str]:
-    """Texts of errors and doubts that are found in changed forces; raises InputError if there is an error."""
+def error_texts(change: ForceChange) -> list[str]:
+    """Texts of the doubts that the input check finds in changed wheel forces. Raises InputError if it finds an
+    error."""
     front, rear = (
         Signal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
     )
@@ -74,16 +76,18 @@ def error_texts(change: Change) -> list[str]:
     return [finding.text for finding in findings if finding.weight == "doubt"]
 
 
-def _forces(change: Change, doubted: bool, _: str, folder: Path) -> float:
+def _missed_doubts(change: ForceChange, doubted: bool, _: str, folder: Path) -> float:
     return abs(len(error_texts(change)) - doubted)
 
 
-def _vehicle(change: dict[str, float], _: str, folder: Path) -> float:
+def _unqueried_vehicle(change: dict[str, float], _: str, folder: Path) -> float:
     return float(not plausible_plane(TWIN.model_copy(update=change)))
 
 
-def _case(name: str, error: Callable[[str, Path], float], expected_ending: Word, message: str) -> Case:
-    expected: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, expected_ending) if expected_ending != "right" else {}
+def _case(name: str, error: Callable[[str, Path], float], expected_ending: OutcomeWord, message: str) -> Case:
+    expected: dict[str, OutcomeWord] = (
+        dict.fromkeys(IMPLEMENTATIONS, expected_ending) if expected_ending != "right" else {}
+    )
     return Case(
         name,
         "engines run it without a word",
@@ -93,22 +97,27 @@ def _case(name: str, error: Callable[[str, Path], float], expected_ending: Word,
         "it is named or it is not",
         error,
         expected,
-        once=True,
+        without_engine=True,
     )
 
 
 CASES = (
     *(
-        _case(name, partial(_forces, change, True), "refused", "refused before the run, with what is wrong")
+        _case(name, partial(_missed_doubts, change, True), "refused", "refused before the run, with what is wrong")
         for name, change in REFUSED.items()
     ),
     *(
-        _case(name, partial(_forces, change, True), "right", "one doubt before the run, with the fall or turn to come")
+        _case(
+            name,
+            partial(_missed_doubts, change, True),
+            "right",
+            "one doubt before the run, with the fall or turn to come",
+        )
         for name, change in DOUBTED.items()
     ),
-    _case("true wheel forces", partial(_forces, lambda f: f, False), "right", "nothing is said"),
+    _case("true wheel forces", partial(_missed_doubts, lambda f: f, False), "right", "nothing is said"),
     *(
-        _case(name, partial(_vehicle, change), "right", "queried, with the value and what is usual")
+        _case(name, partial(_unqueried_vehicle, change), "right", "queried, with the value and what is usual")
         for name, change in QUERIED.items()
     ),
 )

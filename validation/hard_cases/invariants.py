@@ -1,4 +1,4 @@
-"""Invariants: rest, signs, momentum, free motion, tumbling, the frame of the forces."""
+"""Hard cases judged by invariants: rest, signs, momentum, free motion, tumbling, the frame of the forces."""
 
 from dataclasses import replace
 from functools import cache
@@ -28,8 +28,8 @@ G = 9.81
 
 
 def motion_at_rest(engine: str, folder: Path) -> float:
-    """Case: both vehicles in exact and linear geometry start in their static equilibrium. Error: largest motion in
-    2 s."""
+    """Case: both vehicles, in exact and linear geometry, start in their static equilibrium. Error: largest motion (m,
+    rad, m/s, rad/s) in 2 s."""
     worst = 0.0
     for parameters in VEHICLES:
         for geometry in ("exact", "linear"):
@@ -39,15 +39,14 @@ def motion_at_rest(engine: str, folder: Path) -> float:
 
 
 def rest_naive(folder: Path) -> str:
-    """Without the remedy: motion of a vehicle that starts at zero, with unstressed springs."""
+    """Result without the remedy, as text: motion of a vehicle that starts at zero, with unstressed springs."""
     base = vehicle(initial=np.zeros(8))
     fall = largest_magnitude(run("reference", base, 1e-3, 2.0).states[:, 4:7])
     return f"a start from the coordinates' zero falls at up to {fall:.2f} m/s"
 
 
 def loads_at_rest(engine: str, folder: Path) -> float:
-    """Error of the tyre loads at rest against closed forms: half of the weights of 750 kg and wheels of 30 kg each, and
-    lever arms for the asymmetric vehicle."""
+    """Case: both vehicles at rest. Error: difference (N) of the tyre loads from the closed form."""
     worst = 0.0
     for parameters in VEHICLES:
         base = vehicle(parameters)
@@ -60,9 +59,9 @@ def loads_at_rest(engine: str, folder: Path) -> float:
     return worst
 
 
-def nose_up(engine: str, folder: Path) -> float:
-    """Error of the accelerations with the nose raised by 0.01 rad, against values written by hand for the linear
-    geometry."""
+def nose_up_error(engine: str, folder: Path) -> float:
+    """Case: the nose is raised by 0.01 rad. Error: relative difference of the accelerations from values written by hand
+    for the linear geometry."""
     base, tilt = vehicle("asymmetric_twin", "linear"), 0.01
     p, state = base.parameters, base.initial.copy()
     state[3] += tilt
@@ -74,9 +73,9 @@ def nose_up(engine: str, folder: Path) -> float:
     return largest_magnitude(acceleration - hand) / largest_magnitude(hand)
 
 
-def push(engine: str, folder: Path) -> float:
-    """Error of the accelerations if each wheel is pushed up by 100 N in addition to its static load, against 100 N /
-    mass."""
+def push_error(engine: str, folder: Path) -> float:
+    """Case: each wheel is pushed up by 100 N in addition to its static load. Error: relative difference of the
+    accelerations from 100 N / mass."""
     base = vehicle("asymmetric_twin")
     p, worst = base.parameters, 0.0
     for wheel, mass in enumerate((p.m1, p.m2)):
@@ -91,9 +90,9 @@ def push(engine: str, folder: Path) -> float:
     return worst
 
 
-def raised_front(engine: str, folder: Path) -> float:
-    """Case: 500 N more on the front wheel for 50 ms. Error: relative difference from the tight solution; infinite
-    unless front and pitch rise."""
+def raised_front_error(engine: str, folder: Path) -> float:
+    """Case: 500 N more on the front wheel for 50 ms. Error: relative difference from the tight-tolerance solution;
+    infinite unless front and pitch rise."""
     base = vehicle("asymmetric_twin")
     forces = static_forces(base, 51, 1e-3)
     forces.values[:, 0] += 500.0
@@ -104,9 +103,9 @@ def raised_front(engine: str, folder: Path) -> float:
     return largest_magnitude(end - truth) / largest_magnitude(truth)
 
 
-def momentum(engine: str, folder: Path) -> float:
-    """Error of linear momentum sum m z' and angular momentum I b' - m1 b z1' + m2 a z2' against the integrals of noisy
-    forces, in linear geometry."""
+def momentum_error(engine: str, folder: Path) -> float:
+    """Case: noisy wheel forces in linear geometry. Error: relative difference of linear momentum sum m z' and angular
+    momentum I b' - m1 b z1' + m2 a z2' from the integrals of the forces."""
     base = vehicle("asymmetric_twin", "linear")
     p = base.parameters
     forces = static_forces(base, 1000, 1e-3, noise=800.0)
@@ -123,9 +122,9 @@ def momentum(engine: str, folder: Path) -> float:
     )
 
 
-def free_heave(engine: str, folder: Path) -> float:
-    """Error of the centre of mass' acceleration against the external forces, at 50 random states with pitch up to 3
-    rad."""
+def free_heave_error(engine: str, folder: Path) -> float:
+    """Case: 50 random states with pitch up to 3 rad. Error: relative difference of the centre of mass' acceleration
+    from the external forces divided by the mass."""
     base = vehicle("asymmetric_twin")
     p = base.parameters
     forces = static_forces(base, 100, 1e-3, noise=2000.0)
@@ -142,7 +141,7 @@ def free_heave(engine: str, folder: Path) -> float:
 
 
 def _spinning_assembly(geometry: str) -> Assembly:
-    """The twin under its own weight, rotating at 6 rad/s."""
+    """The asymmetric twin under its weight, rotating in pitch at 6 rad/s."""
     base = vehicle("asymmetric_twin", geometry)
     start = base.initial.copy()
     start[7] = 6.0
@@ -154,9 +153,9 @@ def _tumbled_states() -> np.ndarray:
     return tight_solution(_spinning_assembly("exact"), 2.5e-4, 1.0).states
 
 
-def tumbling(engine: str, folder: Path) -> float:
-    """Case: a vehicle that rotates at 6 rad/s turns over, for 1 s in steps of 0.25 ms. Error: difference from a
-    solution of order 8."""
+def tumbling_error(engine: str, folder: Path) -> float:
+    """Case: a vehicle that pitches at 6 rad/s turns over, for 1 s in steps of 0.25 ms. Error: difference of the states
+    from a solution of order 8."""
     states = run(engine, _spinning_assembly("exact"), 2.5e-4, 1.0).states
     truth = _tumbled_states()
     if truth[:, 3].max() < np.pi / 2:
@@ -165,7 +164,7 @@ def tumbling(engine: str, folder: Path) -> float:
 
 
 def tumbling_naive(folder: Path) -> str:
-    """Without the remedy: the same scene in linear geometry."""
+    """Result without the remedy, as text: the same scene in linear geometry."""
     ends = [run("reference", _spinning_assembly(geometry), 1e-3, 1.0).states[-1, 3] for geometry in ("exact", "linear")]
     return f"exact geometry turns to {ends[0]:.2f} rad, the linear one says {ends[1]:.2f} rad"
 
@@ -183,8 +182,8 @@ def _measured_forces() -> Sampled:
     return Sampled(np.column_stack([result["f1"], result["f2"]]), 1e-3, held=False)
 
 
-def growth(engine: str, drive_mode: Mode) -> float:
-    """Factor by which a pitch error of 1e-6 rad grows over the drive."""
+def pitch_error_growth(engine: str, drive_mode: Mode) -> float:
+    """Factor by which a pitch error of 1e-6 rad grows over a drive with measured wheel forces."""
     base = vehicle()
     start = base.initial.copy()
     start[3] += 1e-6
@@ -197,14 +196,16 @@ def growth(engine: str, drive_mode: Mode) -> float:
     return abs(ends[1] - ends[0]) / 1e-6
 
 
-def body_frame(engine: str, folder: Path) -> float:
-    """Case: forces along the chassis' own axis, under which a pitch error must not grow. Error: its growth factor."""
-    return growth(engine, "force-body")
+def body_frame_growth(engine: str, folder: Path) -> float:
+    """Case: wheel forces along the chassis' axis, under which a pitch error must not grow. Error: growth factor of the
+    pitch error."""
+    return pitch_error_growth(engine, "force-body")
 
 
 def body_frame_naive(folder: Path) -> str:
-    """Without the remedy: the body-fixed forces are applied as vertical ones."""
-    return f"vertical forces let the error grow {growth('reference', 'force'):.0f}-fold in {DRIVE_DURATION:.0f} s"
+    """Result without the remedy, as text: the body-fixed forces are applied as vertical ones."""
+    factor = pitch_error_growth("reference", "force")
+    return f"vertical forces let the error grow {factor:.0f}-fold in {DRIVE_DURATION:.0f} s"
 
 
 CASES = (
@@ -235,7 +236,7 @@ CASES = (
         "of the largest",
         1e-11,
         "a preload of 4 kN cancels to 10 N",
-        nose_up,
+        nose_up_error,
     ),
     Case(
         "nothing but what is described",
@@ -244,7 +245,7 @@ CASES = (
         "of the acceleration",
         1e-11,
         "a preload of 4 kN cancels to nothing",
-        push,
+        push_error,
     ),
     Case(
         "more force in front",
@@ -253,8 +254,8 @@ CASES = (
         "of the motion",
         1e-4,
         "RK4 at 1 ms over the jump at the start",
-        raised_front,
-        against="native",
+        raised_front_error,
+        answer_independence="native",
     ),
     Case(
         "momentum",
@@ -263,7 +264,7 @@ CASES = (
         "of the impulse",
         1e-12,
         "a thousand additions of doubles",
-        momentum,
+        momentum_error,
     ),
     Case(
         "unconstrained heave",
@@ -272,7 +273,7 @@ CASES = (
         "of the largest acceleration",
         1e-12,
         "internal forces of 1e5 N cancel",
-        free_heave,
+        free_heave_error,
     ),
     Case(
         "tumbling",
@@ -281,10 +282,10 @@ CASES = (
         "m, rad, m/s, rad/s",
         1e-3,
         "RK4 at 0.25 ms; the wheels start 8 m/s off the struts' ends and are caught within 1.5 ms",
-        tumbling,
+        tumbling_error,
         {},
         tumbling_naive,
-        against="native",
+        answer_independence="native",
     ),
     Case(
         "forces in the body's frame",
@@ -293,9 +294,9 @@ CASES = (
         "growth",
         2.0,
         "1 for massless wheels; the wheels' own mass holds the pitch weakly, so an error may also shrink",
-        body_frame,
+        body_frame_growth,
         {},
         body_frame_naive,
-        against="none",
+        answer_independence="none",
     ),
 )

@@ -1,4 +1,5 @@
-"""The Kalman filter of the pitch: holes in the measurement, a wrong start, a vehicle too stiff for its samples."""
+"""Hard cases of the Kalman filter of the pitch: missing measurements, a wrong start, a vehicle too stiff for its
+samples."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,15 +23,15 @@ from validation.hard_cases.setups import REFUSED, driven_by_forces, largest_magn
 
 SAMPLE_PERIOD, DURATION = 5e-3, 6.0
 FORCE, ANGLE, START_TURN = 16.0, 8e-4, 0.2
-"""Deviations: N per force sample, rad per angle, rad of a start that is not known."""
+"""Standard deviations of each force sample (N), of each measured angle (rad) and of the unknown initial pitch (rad)."""
 SLOW_PERIOD = 0.1
-"""s between force samples that are 70 time constants of the wheels apart."""
+"""Period (s) of force samples that is 70 time constants of the wheels."""
 
 
 def _largest_pitch_error(
     engine: str, folder: Path, lost_samples: slice, turn_deviation: float = 0.0, **options: Any
 ) -> float:
-    """Ratio of the largest pitch error to its stated deviation for a vehicle at rest, with the pitch missing in the
+    """Largest pitch error divided by its stated deviation for a vehicle at rest, with the pitch missing in the
     ``lost_samples`` samples.
 
     The filter starts from a pitch that is ``turn_deviation`` (rad) wrong.
@@ -64,27 +65,28 @@ def _largest_pitch_error(
     return largest_magnitude(((run["pitch"] - base.initial[3]) / run["pitch_deviation"])[late & (run.times > 0.1)])
 
 
-def outage(engine: str, folder: Path) -> float:
-    """Case: no pitch measurement for 3.5 s."""
+def outage_error(engine: str, folder: Path) -> float:
+    """Case: no pitch measurement for 3.5 s. Error: largest pitch error divided by its stated deviation."""
     return _largest_pitch_error(engine, folder, slice(200, 900))
 
 
 def outage_naive(folder: Path) -> str:
-    """Without the guard: the filter library's own update with a NaN."""
+    """Result without the guard, as text: the filter library's own update with a NaN."""
     kalman = ExtendedKalmanFilter(2, 1)
     kalman.x = np.zeros(2)
     kalman.update(np.array([np.nan]), lambda x: np.eye(2)[:1], lambda x: x[:1])
     return f"filterpy takes the NaN in without a word: its state is {kalman.x[0]} for ever after"
 
 
-def wrong_start(engine: str, folder: Path) -> float:
-    """Case: the initial pitch is wrong by one stated deviation."""
+def wrong_start_error(engine: str, folder: Path) -> float:
+    """Case: the initial pitch is wrong by one stated deviation. Error: largest pitch error divided by its stated
+    deviation."""
     return _largest_pitch_error(engine, folder, slice(0, 0), START_TURN, start_deviation=START_TURN)
 
 
-def certain_start(engine: str, folder: Path) -> float:
-    """Case: angles measured to 1e-9 rad after an initial uncertainty of 1 rad. Error: ratio of the pitch error to its
-    stated deviation; infinite for a negative variance."""
+def certain_start_error(engine: str, folder: Path) -> float:
+    """Case: angles measured to 1e-9 rad after an initial uncertainty of 1 rad. Error: largest pitch error divided by
+    its stated deviation; infinite for a negative variance."""
     count, exact = 400, 1e-9
     base = vehicle()
     forces = static_forces(base, count + 1, SAMPLE_PERIOD, is_held=False)
@@ -108,22 +110,24 @@ def certain_start(engine: str, folder: Path) -> float:
     return float(np.abs(error_of_values / np.sqrt(P[1:, PITCH, PITCH])).max())
 
 
-def empty_column(engine: str, folder: Path) -> float:
-    """Case: a column of measurements without any number."""
+def empty_column_error(engine: str, folder: Path) -> float:
+    """Case: a pitch measurement without any number must be refused. Error: largest pitch error divided by its stated
+    deviation."""
     return _largest_pitch_error(engine, folder, slice(None))
 
 
 def _exact_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Matrices A (6, 6) and B (6, 2) of the relative states, and their exact response (6, 2) to forces held over
-    SLOW_PERIOD."""
+    """State matrix A (6, 6) and input matrix B (6, 2) of the relative states, and their exact response (6, 2) to forces
+    held constant over SLOW_PERIOD."""
     a, b = relative_state_matrices(vehicle(geometry="linear").without_tyres())
     block = np.zeros((8, 8))
     block[:6, :6], block[:6, 6:] = a, b
     return a, b, expm(block * SLOW_PERIOD)[:6, 6:]
 
 
-def stiff_process_noise(engine: str, folder: Path) -> float:
-    """Case: process noise of a filter with forces at 10 Hz, for a vehicle with a pole at -697 1/s."""
+def stiff_process_noise_error(engine: str, folder: Path) -> float:
+    """Case: process noise of a filter with forces at 10 Hz, for a vehicle with a pole at -697 1/s. Error: relative
+    difference from the exact covariance."""
     base = vehicle(geometry="linear")
     forces = Sampled(static_forces(base, 2, SLOW_PERIOD).values, SLOW_PERIOD, held=True)
     step = PitchStep(driven_by_forces(base, forces), SLOW_PERIOD, 1)
@@ -133,7 +137,7 @@ def stiff_process_noise(engine: str, folder: Path) -> float:
 
 
 def stiff_naive(folder: Path) -> str:
-    """Without the remedy: this process noise by filterpy's discretisation."""
+    """Result without the remedy, as text: process noise of the stiff vehicle by filterpy's discretisation."""
     a, b, wanted = _exact_response()
     noise = van_loan_discretization(a, b * np.sqrt(SLOW_PERIOD), SLOW_PERIOD)[1]
     variance_ratio, least_eigenvalue = (
@@ -154,7 +158,7 @@ CASES = (
         "deviations",
         5.0,
         "Gaussian: 5 deviations are left once in 1.7 million",
-        outage,
+        outage_error,
         {},
         outage_naive,
     ),
@@ -165,7 +169,7 @@ CASES = (
         "deviations",
         5.0,
         "Gaussian: 5 deviations are left once in 1.7 million",
-        wrong_start,
+        wrong_start_error,
     ),
     Case(
         "filter told of angles to a billionth",
@@ -174,8 +178,8 @@ CASES = (
         "deviations",
         5.0,
         "Gaussian: 5 deviations are left once in 1.7 million",
-        certain_start,
-        once=True,
+        certain_start_error,
+        without_engine=True,
     ),
     Case(
         "pitch measurement without a number",
@@ -184,7 +188,7 @@ CASES = (
         "",
         0.0,
         "there is nothing to follow",
-        empty_column,
+        empty_column_error,
         REFUSED,
     ),
     Case(
@@ -194,7 +198,7 @@ CASES = (
         "of its norm",
         1e-6,
         "Runge-Kutta in substeps of 1 ms; the fast modes have settled",
-        stiff_process_noise,
+        stiff_process_noise_error,
         {},
         stiff_naive,
     ),

@@ -1,5 +1,5 @@
-"""Wheels that leave the road and land: both at once, from a height, on hard tyres, at the switch, on steps and on roads
-of few samples, in the first step, in space and above a cut.
+"""Hard cases of wheels that leave the road and land: from a height, on stiff tyres, at zero load, on kerbs and coarsely
+sampled roads, with a car in space and above cut hubs.
 
 The half car on a flat road has an exact path, piece by piece between the switches (``bounces``). Its error
 is a velocity, the coarsest of its states: a landing within a step costs the square of the step.
@@ -29,42 +29,44 @@ from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.bounces import Bounces, bounce_energy
+from validation.common.bounces import BouncingVehicle, bounce_energy
 from validation.hard_cases import setups
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
 
 TWIN = "asymmetric_twin"
 STEP, LONGEST_DURATION = 1e-4, 0.6
-"""s: of most runs, and how long they last: several landings of both wheels."""
+"""Step (s) of most runs, and their duration (s), which includes several landings of both wheels."""
 FALLING_STATE = np.array([-0.3, -0.2, -0.4, 0.05, 0.0, 0.0, 0.0, 0.0])
-"""Both wheels in the air, one higher."""
+"""Initial state with both wheels in the air, the front higher."""
 Error = Callable[[str, Path], float]
 
 
-def vehicle(start_state: np.ndarray, geometry: str, override: dict[str, float]) -> Assembly:
-    """The half car without symmetry on tyres that can lift off, above a flat road."""
+def lifting_half_car(start_state: np.ndarray, geometry: str, override: dict[str, float]) -> Assembly:
+    """The asymmetric half car on tyres that can lift off, above a flat road."""
     return setups.vehicle(TWIN, geometry, start_state, {"lift_off": {}}, **override)
 
 
-def exactly(step: float = STEP, start_state: np.ndarray = FALLING_STATE, **override: float) -> Error:
-    """Case: a bouncing vehicle. Error: largest difference (m, rad, m/s, rad/s) from the exact path."""
+def exact_path_case(step: float = STEP, start_state: np.ndarray = FALLING_STATE, **override: float) -> Error:
+    """Case: a bouncing vehicle. Error: largest difference of the states (m, rad, m/s, rad/s) from the exact path."""
 
     def error(engine: str, folder: Path) -> float:
-        assembly = vehicle(start_state, "linear", override)
+        assembly = lifting_half_car(start_state, "linear", override)
         states = setups.run(engine, assembly, step, LONGEST_DURATION).states
         stride = max(1, round(step / STEP))
-        exact = Bounces(assembly, STEP if stride > 1 else step).path(assembly.initial, stride * (len(states) - 1))
+        exact = BouncingVehicle(assembly, STEP if stride > 1 else step).path(
+            assembly.initial, stride * (len(states) - 1)
+        )
         return setups.largest_magnitude(states - exact[::stride])
 
     return error
 
 
-def gained(**override: float) -> Error:
-    """Case: a vehicle that falls and bounces. Error: ratio of the largest gain of energy to the range of its vertical
+def energy_gain_case(**override: float) -> Error:
+    """Case: a vehicle that falls and bounces. Error: largest gain of energy divided by the range of its vertical
     kinetic energy."""
 
     def error(engine: str, folder: Path) -> float:
-        assembly = vehicle(FALLING_STATE, "exact", override)
+        assembly = lifting_half_car(FALLING_STATE, "exact", override)
         states = setups.run(engine, assembly, STEP, LONGEST_DURATION).states
         energies = bounce_energy(assembly, states)
         return float(
@@ -74,21 +76,21 @@ def gained(**override: float) -> Error:
     return error
 
 
-def at_the_switch(engine: str, folder: Path) -> float:
+def motion_at_zero_load(engine: str, folder: Path) -> float:
     """Case: without gravity, wheels just touch the road at zero load. Error: largest motion, which must be 0, without
     growth of rounding errors."""
-    assembly = vehicle(np.zeros(8), "linear", {"g": 0.0})
+    assembly = lifting_half_car(np.zeros(8), "linear", {"g": 0.0})
     return setups.largest_magnitude(setups.run(engine, assembly, 1e-3, 1.0).states)
 
 
-def thrown_up(engine: str, folder: Path) -> float:
-    """Case: wheels thrown up from rest at 5 m/s."""
+def thrown_up_error(engine: str, folder: Path) -> float:
+    """Case: wheels thrown up from rest at 5 m/s. Error: largest difference of the states from the exact path."""
     start = setups.vehicle(TWIN, "linear").initial + np.array([0, 0, 0, 0, -5.0, -5.0, 0, 0])
-    return exactly(start_state=start)(engine, folder)
+    return exact_path_case(start_state=start)(engine, folder)
 
 
-def on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -> Assembly:
-    """The half car without symmetry on the road of a scene."""
+def half_car_on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -> Assembly:
+    """The asymmetric half car with lift-off on a road given as a scene's table."""
     return assembly_of_scene(
         build_scene(
             {
@@ -103,8 +105,8 @@ def on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -
     )
 
 
-def beside_tight(engine: str, assembly: Assembly, step: float, duration: float) -> float:
-    """Largest difference of a run from the solution at tight tolerance; infinite if no wheel left the road."""
+def tight_solution_error(engine: str, assembly: Assembly, step: float, duration: float) -> float:
+    """Largest difference of a run's states from the solution at tight tolerance; infinite if no wheel left the road."""
     states, exact = (
         setups.run(engine, assembly, step, duration).states,
         setups.tight_solution(assembly, step, duration).states,
@@ -114,31 +116,33 @@ def beside_tight(engine: str, assembly: Assembly, step: float, duration: float) 
 
 
 def _road_heights(road: Signal | None, step: float, sample_count: int) -> np.ndarray:
-    """Road heights (m, down) under the front wheel."""
+    """Road heights (sample_count,) in m, positive down, under the front wheel."""
     return np.zeros(sample_count) if road is None else road.sample(0.0, step, sample_count)[:, 0]
 
 
-def coarse_road(engine: str, folder: Path) -> float:
-    """Case: bumps of 80 mm at 25 m/s, from a file with a sample every 0.5 m."""
+def coarse_road_error(engine: str, folder: Path) -> float:
+    """Case: bumps of 80 mm at 25 m/s, from a file with a sample every 0.5 m. Error: difference of the states from the
+    solution at tight tolerance."""
     s = 0.5 * np.arange(121)
     height = 0.08 * np.maximum(np.sin(2 * np.pi * s / 7.3), 0.0) * (s > 3.0)
     write_table(folder / "bumps.csv", {"s": ("m", s), "left": ("m", height), "right": ("m", height)})
     road = {"source": "csv", "file": "bumps.csv", "track": "left", "speed": 25.0, "beyond_end": "refused"}
-    return beside_tight(engine, on_road(road, folder, STEP, 1.0), STEP, 1.0)
+    return tight_solution_error(engine, half_car_on_road(road, folder, STEP, 1.0), STEP, 1.0)
 
 
-def step_in_road(engine: str, folder: Path) -> float:
+def kerb_error(engine: str, folder: Path) -> float:
     """Case: a ramp of 0.1 m height over 0.1 m length with sharp corners, at 15 m/s, which throws the front wheel off
-    the road."""
+    the road. Error: difference of the states from the solution at tight tolerance."""
     profile = PolylineProfile.through([-5.0, 3.0, 3.1, 20.0], [0.0, 0.0, -0.1, -0.1])
-    base = vehicle(setups.vehicle(TWIN).initial, "exact", {})
+    base = lifting_half_car(setups.vehicle(TWIN).initial, "exact", {})
     road = RoadUnderWheels(profile, 15.0, base.parameters.a + base.parameters.b, (3.0, 3.1))
-    return beside_tight(engine, base.with_input("road", road), STEP, 0.5)
+    return tight_solution_error(engine, base.with_input("road", road), STEP, 0.5)
 
 
-def in_space(engine: str, folder: Path) -> float:
-    """Case: a car with 19 freedoms dropped from 0.5 m. Error: relative difference of an engine's accelerations along
-    its path from the written equations; for these, of the centre of mass' acceleration from gravity."""
+def dropped_car_error(engine: str, folder: Path) -> float:
+    """Case: a car with 19 degrees of freedom dropped from 0.5 m. Error: relative difference of an engine's
+    accelerations along its path from the hand-written equations; for these, of the centre of mass' acceleration from
+    gravity."""
     car = replace(load_vehicle("r19_ride"), gravity=9.81).with_tyres(pushes_only=True)
     n = len(car.coordinates())
     start = np.array(
@@ -158,9 +162,9 @@ def in_space(engine: str, folder: Path) -> float:
     return worst
 
 
-def above_a_cut(engine: str, folder: Path) -> float:
-    """Case: hub forces on a class F road. Error: largest force (N) on a hub whose wheel is in the air; infinite if none
-    is."""
+def hub_force_in_air(engine: str, folder: Path) -> float:
+    """Case: hub forces on a class F road. Error: largest force (N) or moment on a hub whose wheel is in the air;
+    infinite if no wheel is."""
     car = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body")
     left, right = (iso8608_road("F", seed) for seed in (1, 2))
     drive = two_tracks(car, left, right, 20.0, 1e-3, 1500)
@@ -169,42 +173,42 @@ def above_a_cut(engine: str, folder: Path) -> float:
     return float(np.abs(wrenches[air]).max()) if air.any() else np.inf
 
 
-def linear_naive(folder: Path) -> str:
-    """Without the remedy: the paper's linear tyre in the same fall."""
+def linear_tyre_naive(folder: Path) -> str:
+    """Result without the remedy, as text: the paper's linear tyre in the same fall."""
     assembly = setups.vehicle(TWIN, "linear", FALLING_STATE)
     states, p = setups.run("reference", assembly, STEP, LONGEST_DURATION).states, assembly.parameters
     return f"the linear tyre pulls with up to {-(p.k1 * states[:, 0] + p.d1 * states[:, 4]).min():.0f} N"
 
 
-def hard_naive(folder: Path) -> str:
-    """Without the guard: a stable step that jumps over landings, without the check after the run."""
+def hard_tyre_naive(folder: Path) -> str:
+    """Result without the guard, as text: a stable step that jumps over landings, without the check after the run."""
     with mock.patch.object(protocol, "check_resolved", lambda *_: None):
-        velocity_error = exactly(2e-3, k1=2e7, k2=2e7)("reference", folder)
+        velocity_error = exact_path_case(2e-3, k1=2e7, k2=2e7)("reference", folder)
     return f"stable, finite, a wheel's velocity off by {velocity_error:.2g} m/s"
 
 
 THROWN_REASON = "a corner of the force within a step costs its square"
-RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
+RAISED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 PATH, STATES = "exact path, piece by piece", "m, rad, m/s, rad/s"
 UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
 HIGH_START = np.array([-5.0, -5.0, -5.0, 0.0, 12.0, 12.0, 12.0, 0.0])
 EXACT: tuple[tuple[str, str, float, Error], ...] = (
-    ("both wheels in the air", "no tyre holds anything", 1e-4, exactly()),
+    ("both wheels in the air", "no tyre holds anything", 1e-4, exact_path_case()),
     (
         "fall from five metres",
         "lands at 15 m/s, many times the tyres' depth at rest",
         1e-3,
-        exactly(start_state=HIGH_START),
+        exact_path_case(start_state=HIGH_START),
     ),
-    ("tyres without damping", "every landing is thrown back", 1e-4, exactly(d1=0.0, d2=0.0)),
+    ("tyres without damping", "every landing is thrown back", 1e-4, exact_path_case(d1=0.0, d2=0.0)),
     (
         "tyre dampers of 5 kN s/m",
         "would pull before the spring lets go, and jump where it lands",
         1e-4,
-        exactly(d1=5e3, d2=5e3),
+        exact_path_case(d1=5e3, d2=5e3),
     ),
-    ("tyres of 20 kN/mm", "a landing lasts 3 ms", 2e-3, exactly(5e-5, k1=2e7, k2=2e7)),
-    ("thrown up in the first step", "the tyres let go at once", 1e-5, thrown_up),
+    ("tyres of 20 kN/mm", "a landing lasts 3 ms", 2e-3, exact_path_case(5e-5, k1=2e7, k2=2e7)),
+    ("thrown up in the first step", "the tyres let go at once", 1e-5, thrown_up_error),
 )
 CASES = (
     *(
@@ -216,7 +220,7 @@ CASES = (
             tolerance,
             THROWN_REASON,
             error,
-            naive=linear_naive if error is EXACT[0][3] else None,
+            naive=linear_tyre_naive if error is EXACT[0][3] else None,
         )
         for name, hard, tolerance, error in EXACT
     ),
@@ -227,7 +231,7 @@ CASES = (
         "of the motion",
         1e-4,
         THROWN_REASON,
-        gained(**UNDAMPED),
+        energy_gain_case(**UNDAMPED),
     ),
     Case(
         "tyres of 20 kN/mm, step of 2 ms",
@@ -236,9 +240,9 @@ CASES = (
         "",
         0.0,
         "exact",
-        exactly(2e-3, k1=2e7, k2=2e7),
+        exact_path_case(2e-3, k1=2e7, k2=2e7),
         RAISED,
-        hard_naive,
+        hard_tyre_naive,
     ),
     Case(
         "at rest at the switch",
@@ -247,7 +251,7 @@ CASES = (
         STATES,
         1e-15,
         "exact",
-        at_the_switch,
+        motion_at_zero_load,
     ),
     Case(
         "kerb with corners",
@@ -256,8 +260,8 @@ CASES = (
         STATES,
         2e-2,
         "a jump of the rate within a step costs the step itself",
-        step_in_road,
-        against="native",
+        kerb_error,
+        answer_independence="native",
     ),
     Case(
         "bumps in a file of few samples",
@@ -266,8 +270,8 @@ CASES = (
         STATES,
         1e-4,
         THROWN_REASON,
-        coarse_road,
-        against="native",
+        coarse_road_error,
+        answer_independence="native",
     ),
     Case(
         "car dropped in space",
@@ -276,7 +280,7 @@ CASES = (
         "of the largest",
         1e-11,
         "the order of additions, large forces on light wheels",
-        in_space,
+        dropped_car_error,
     ),
     Case(
         "wheels in the air above a cut",
@@ -285,6 +289,6 @@ CASES = (
         "N",
         1e-9,
         "the law has a zero there",
-        above_a_cut,
+        hub_force_in_air,
     ),
 )

@@ -1,4 +1,5 @@
-"""Measurement files that are damaged or odd: read right, read as far as they go and said, or refused; never silent."""
+"""Hard cases of damaged or odd measurement files, which must be read correctly, read in part with a doubt, or
+refused."""
 
 from pathlib import Path
 
@@ -8,7 +9,7 @@ from models.measured.formats.mdf4 import opened_mdf as mdf4_opened
 from models.measured.formats.tdms import BoundedFile, opened_tdms
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 from validation.measured.measured_files import csv, csv_forms, kinds, mdf4, rpc3, tdms
-from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, CutSweep, OddFile, raw
+from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, CutSweep, OddFile, file_of_bytes
 
 CHECKS = {
     "right": "times, values and names as they were written",
@@ -17,66 +18,66 @@ CHECKS = {
 }
 
 
-def cut_number(folder: Path) -> str:
-    """What numpy reads in place of a number that was cut off."""
-    path = raw(csv.whole()[:-3].encode())(folder)
+def numpy_on_cut_number(folder: Path) -> str:
+    """Text on the value that numpy reads from a file that was cut off within a number."""
+    path = file_of_bytes(csv.usual_text()[:-3].encode())(folder)
     last_value = np.genfromtxt(path, delimiter=",", skip_header=1)[-1, 2]
     return f"numpy reads the last value as {last_value:g}, which was {FX[-1]:g}"
 
 
-def invalid_samples(folder: Path) -> str:
-    """What asammdf reads in place of samples that are marked as invalid."""
+def asammdf_on_invalid_samples(folder: Path) -> str:
+    """Text on what asammdf returns for samples that are marked as invalid."""
     path = next(odd_file for odd_file in mdf4.FILES if odd_file.name == "MDF 4 with invalid samples").make(folder)
     with mdf4_opened(path) as file:
         samples = file.get(group=0, index=1, samples_only=True, data=next(file._mdf._load_data(file.groups[0])))[0]
     return f"asammdf hands over {len(samples)} of {len(FZ)} samples of a block, those after a gap moved up"
 
 
-def cut_segment(folder: Path) -> str:
-    """What npTDMS reads from a file that was cut off."""
+def nptdms_on_cut_segment(folder: Path) -> str:
+    """Text on what npTDMS reads from a file that was cut off."""
     with BoundedFile(tdms.cut_by(100)(folder)) as file:
         lengths = [len(channel) for group in opened_tdms(folder, file).groups() for channel in group.channels()]
     return f"npTDMS hands over channels of {' and '.join(map(str, lengths))} samples"
 
 
 NAIVE = {
-    "CSV cut within a number": cut_number,
-    "MDF 4 with invalid samples": invalid_samples,
-    "TDMS cut in its samples": cut_segment,
+    "CSV cut within a number": numpy_on_cut_number,
+    "MDF 4 with invalid samples": asammdf_on_invalid_samples,
+    "TDMS cut in its samples": nptdms_on_cut_segment,
 }
 
 
-def of_file(odd: OddFile) -> Case:
-    """The hard case for one odd file."""
+def case_of_file(odd: OddFile) -> Case:
+    """Hard case made from an odd measurement file."""
     return Case(
         name=odd.name,
-        hard=odd.hard,
-        check=CHECKS[odd.wanted],
+        difficulty=odd.difficulty,
+        exact_answer=CHECKS[odd.expected_outcome],
         unit="s or N",
         tolerance=TOLERANCE,
-        why="values have bits that every format keeps; CSV writes times with 15 digits",
+        tolerance_reason="values have bits that every format keeps; CSV writes times with 15 digits",
         error=lambda _, folder: odd.error(folder / "odd"),
-        expected=dict.fromkeys(IMPLEMENTATIONS, "refused") if odd.wanted == "refused" else {},
+        expected=dict.fromkeys(IMPLEMENTATIONS, "refused") if odd.expected_outcome == "refused" else {},
         naive=NAIVE.get(odd.name),
-        once=True,
+        without_engine=True,
     )
 
 
-def of_sweep(sweep: CutSweep) -> Case:
-    """The hard case for a file that is cut off at many places."""
+def case_of_sweep(sweep: CutSweep) -> Case:
+    """Hard case made from a file that is cut off at many positions."""
     return Case(
         name=f"{sweep.extension} cut off at {sweep.cuts} places",
-        hard="a library reads what is left, or what is not there",
-        check="every cut is refused, or what is left is right and the cut named",
+        difficulty="a library reads what is left, or what is not there",
+        exact_answer="every cut is refused, or what is left is right and the cut named",
         unit="silent cuts",
         tolerance=0.0,
-        why="no file that was cut off may be used without a word",
-        error=lambda _, folder: sweep.silent(folder / "cut"),
-        once=True,
+        tolerance_reason="no file that was cut off may be used without a word",
+        error=lambda _, folder: sweep.silent_cuts(folder / "cut"),
+        without_engine=True,
     )
 
 
 CASES = (
-    *(of_file(odd) for module in (csv, csv_forms, kinds, mdf4, rpc3, tdms) for odd in module.FILES),
-    *(of_sweep(CutSweep(extension)) for extension in (".csv", ".mf4", ".rsp", ".tdms")),
+    *(case_of_file(odd) for module in (csv, csv_forms, kinds, mdf4, rpc3, tdms) for odd in module.FILES),
+    *(case_of_sweep(CutSweep(extension)) for extension in (".csv", ".mf4", ".rsp", ".tdms")),
 )

@@ -1,5 +1,5 @@
-"""Values at the edge of what an engineer would write: a road that begins metres above, slender contacts, tiny
-intensities, points and samples that are none.
+"""Hard cases of values at the edge of what an engineer would enter: a road that begins metres above zero, slender
+contacts, tiny intensities, invalid points and samples.
 
 Each was answered once by finite numbers that were wrong, or by an error of the machinery.
 """
@@ -40,9 +40,9 @@ from validation.hard_cases.case import Case
 FRICTION, CELLS = 0.3, 15
 
 
-def far_below(implementation: str, folder: Path) -> float:
+def long_wave_error(implementation: str, folder: Path) -> float:
     """Case: nonlinear quarter cars on two roads that differ only in waves longer than 60 m. Error: largest relative
-    difference of the deviations.
+    difference of the standard deviations.
 
     The longer waves reach up to 10 m, from which cars that began at 0 would fall.
     """
@@ -69,9 +69,9 @@ def _vehicle_and_road(corner: float) -> tuple[SpatialVehicle, Excitation]:
     return vehicle, excitation_of(scene, wheels(vehicle))
 
 
-def slender(a: float, b: float) -> Callable[[str, Path], float]:
-    """Case: a contact ellipse under spin. Error: ratio of FASTSIM's difference from the exact theory to the error that
-    it states."""
+def slender_ellipse_case(a: float, b: float) -> Callable[[str, Path], float]:
+    """Case: a contact ellipse with semi-axes a, b (m) under spin. Error: difference of FASTSIM from the exact theory
+    divided by its stated error."""
 
     def error(implementation: str, folder: Path) -> float:
         pair = MaterialPair()
@@ -90,17 +90,17 @@ def slender(a: float, b: float) -> Callable[[str, Path], float]:
     return error
 
 
-def tiny_noise(implementation: str, folder: Path) -> float:
-    """Case: drift-off times if noise and angle are scaled together over 300 decades. Error: relative difference of the
+def scaled_drift_off_error(implementation: str, folder: Path) -> float:
+    """Case: drift-off times with noise and angle scaled together over 300 decades. Error: relative difference of the
     times, which must be equal."""
     off_time = drift_off_time(0.3, 1e-5, 1e-3)
     scaled = [drift_off_time(0.3, 1e-5 * s * s, 1e-3 * s) for s in (1e-145, 1e-100, 1e145)]
     return float(np.abs(np.array(scaled) / off_time - 1.0).max())
 
 
-def certain_filter(implementation: str, folder: Path) -> float:
+def overconfident_filter_ratio(implementation: str, folder: Path) -> float:
     """Case: a tilt filter with stated deviations of 1e-12 for angles and rates, and force noise of 1 N or 8 N. Error:
-    ratio of its deviations to those stated."""
+    the filter's deviations divided by the stated ones."""
     vehicle, angles = cut(load_vehicle("r19_free"), "body"), Angles(np.zeros((5000, 4)), 2e-3)
     forces = HubForces(np.zeros((5000, 6 * len(vehicle.hubs))), 2e-3, "hub")
     fits = [
@@ -110,8 +110,9 @@ def certain_filter(implementation: str, folder: Path) -> float:
     return max(float(np.nan_to_num(fit.deviations / 1e-12, nan=np.inf).max()) for fit in fits)
 
 
-def flipped(implementation: str, folder: Path) -> float:
-    """Case: one bit of a saved result was changed on the disk."""
+def flipped_bit_error(implementation: str, folder: Path) -> float:
+    """Case: a bit of a saved result was changed on the disk; loading must be refused. Error: largest change of the
+    values."""
     heave = np.linspace(1.0, 2.0, 64)
     Result(xr.Dataset({"z3": ("time", heave)}, {"time": ("time", np.arange(64.0))})).save(folder / "run.nc")
     content = bytearray((folder / "run.nc").read_bytes())
@@ -120,14 +121,15 @@ def flipped(implementation: str, folder: Path) -> float:
     return float(np.abs(load(folder / "run.nc")["z3"] - heave).max())
 
 
-def spiked() -> Any:
-    """A rail profile with one point measured 1 mm too low."""
+def profile_with_spike() -> Any:
+    """A rail profile with a point measured 1 mm too low, which must be refused."""
     rail = built_in("UIC60")
     return profile(rail.y, rail.z + 1e-3 * (np.arange(rail.z.size) == rail.z.size // 2))
 
 
-def rounded() -> Any:
-    """A rail profile with points rounded to 0.1 mm, so that its steep sides go back and forth."""
+def rounded_profile() -> Any:
+    """A rail profile with points rounded to 0.1 mm, so that its steep sides go back and forth, which must be
+    refused."""
     rail = built_in("UIC60")
     return profile(rail.y.round(4), rail.z.round(4))
 
@@ -143,8 +145,8 @@ CASES = (
         "relative",
         0.02,
         "waves of 60 m at 0.1 Hz",
-        far_below,
-        once=True,
+        long_wave_error,
+        without_engine=True,
     ),
     Case(
         "narrow contact",
@@ -153,8 +155,8 @@ CASES = (
         "of it",
         1.0,
         "exact",
-        slender(5e-4, 1e-2),
-        once=True,
+        slender_ellipse_case(5e-4, 1e-2),
+        without_engine=True,
     ),
     Case(
         "drift-off time under tiny noise",
@@ -163,8 +165,8 @@ CASES = (
         "relative",
         1e-12,
         "rounding",
-        tiny_noise,
-        once=True,
+        scaled_drift_off_error,
+        without_engine=True,
     ),
     Case(
         "filter of tilts told of them to 1e-12",
@@ -173,8 +175,8 @@ CASES = (
         "of the deviations told",
         1.0 + 1e-9,
         "rounding",
-        certain_filter,
-        once=True,
+        overconfident_filter_ratio,
+        without_engine=True,
     ),
     Case(
         "saved result with a flipped bit",
@@ -183,15 +185,15 @@ CASES = (
         "",
         0.0,
         "exact",
-        flipped,
+        flipped_bit_error,
         REFUSED,
-        once=True,
+        without_engine=True,
     ),
     *(
-        Case(name, hard, "refused", "", 0.0, "exact", refused_case(answer), REFUSED, once=True)
+        Case(name, hard, "refused", "", 0.0, "exact", refused_case(answer), REFUSED, without_engine=True)
         for name, hard, answer in (
-            ("profile with a spike", "a spline swings about it", spiked),
-            ("profile rounded to 0.1 mm", "the half beyond the first step back would be lost", rounded),
+            ("profile with a spike", "a spline swings about it", profile_with_spike),
+            ("profile rounded to 0.1 mm", "the half beyond the first step back would be lost", rounded_profile),
             ("masked samples", "would be counted", lambda: pseudo_damage(MASKED)),
             ("load below 0 under a wheel", "its factor would be negative", lambda: dynamic_load_factor(100.0, -4000.0)),
             ("limit below 0", "a share of time above 1", lambda: share_beyond(1.0, -1.0)),

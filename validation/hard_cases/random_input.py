@@ -1,4 +1,4 @@
-"""Random input: noise that belongs to its samples and streams, filters at any step, laws at their limits.
+"""Hard cases of random input: noise streams, shape filters at any step, closed laws at their limits.
 
 No engine takes part except where a model is asked: noise is drawn before a run and is the same for all.
 """
@@ -34,14 +34,15 @@ from validation.hard_cases.case import Case
 from validation.hard_cases.setups import driven_by_forces, largest_magnitude, settings, static_forces
 
 NORMAL_LIMIT = 3.29
-"""Standard errors that a normal value exceeds once in a thousand."""
+"""Number of standard errors that a normal value exceeds once in a thousand."""
 CORNER, Q, SPEED = 0.3, 1e-4, 31.0
 WALK, PATHS, SAMPLES, SAMPLING_RATE = 0.5, 600, 100, 50.0
-"""Angle random walk (rad/sqrt(s)), paths, samples of each and their rate (Hz): E[tr E] falls from 3 to 1.8."""
+"""Angle random walk (rad/sqrt(s)), number of paths, samples in each and their rate (Hz); the mean trace of the error
+rotation falls from 3 to 1.8."""
 
 
-def asked_again(engine: str, folder: Path) -> float:
-    """Case: accelerations with force noise of 800 N evaluated forwards, backwards and twice in time. Error: largest
+def repeated_call_difference(engine: str, folder: Path) -> float:
+    """Case: accelerations with force noise of 800 N, evaluated forwards, backwards and twice in time. Error: largest
     difference, which must be 0."""
     base = setups.vehicle("asymmetric_twin")
     forces = static_forces(base, 200, 1e-3, noise=800.0)
@@ -53,8 +54,9 @@ def asked_again(engine: str, folder: Path) -> float:
     return largest_magnitude(np.array(once) - reversed_answers)
 
 
-def streams(implementation: str, folder: Path) -> float:
-    """Largest correlation between any two noise streams, divided by the size that chance allows among so many pairs."""
+def stream_correlation(implementation: str, folder: Path) -> float:
+    """Case: noise streams of several seeds, paths and sources. Error: largest correlation between two streams, divided
+    by the size that chance allows among so many pairs."""
     paths = [
         normal_samples(seed, path, SAMPLES_PER_BLOCK, 1, source=source)[:, 0]
         for seed in (0, 1)
@@ -71,7 +73,7 @@ def streams(implementation: str, folder: Path) -> float:
     return worst / 4.75  # one pair of 105 beyond 4.75 errors once in 5000
 
 
-def pieces_of_stream(implementation: str, folder: Path) -> float:
+def stream_piece_error(implementation: str, folder: Path) -> float:
     """Case: a noise stream read in pieces of odd lengths, the last first. Error: difference from the complete
     stream."""
     complete_stream, edges = (
@@ -94,8 +96,9 @@ def _one_state() -> Excitation:
     return Excitation(np.array([[-CORNER]]), np.array([[Q**0.5]]), (np.ones((1, 1)),), (0.0,))
 
 
-def any_step(implementation: str, folder: Path) -> float:
-    """Error of the road's variance q / (2 corner) for half steps of 1e-3 to 30 corner lengths, in standard errors."""
+def road_variance_error(implementation: str, folder: Path) -> float:
+    """Case: roads with half steps of 1e-3 to 30 corner lengths. Error: difference of the variance from q / (2 corner),
+    in standard errors."""
     worst = 0.0
     for step_share in (1e-3, 0.1, 0.9, 2.5, 30.0):
         keeps = np.exp(
@@ -108,13 +111,13 @@ def any_step(implementation: str, folder: Path) -> float:
 
 
 def any_step_naive(folder: Path) -> str:
-    """Without the remedy: variance by explicit Euler, which is 1 / (1 - part / 2) of the true one."""
+    """Result without the remedy, as text: variance by explicit Euler, which is 1 / (1 - part / 2) of the true one."""
     return f"explicit Euler at 0.9 corner lengths has {1.0 / (1.0 - 0.45):.2f} times the variance, at 2.5 none at all"
 
 
-def odd_delay(implementation: str, folder: Path) -> float:
-    """Relative difference between the delay of the rear axle, in half steps, and the wheelbase; infinite if the axles'
-    heights differ."""
+def axle_delay_error(implementation: str, folder: Path) -> float:
+    """Case: a wheelbase that is no multiple of the steps. Error: relative difference between the delay of the rear axle
+    and the wheelbase; infinite if the axles' heights differ."""
     worst = 0.0
     for length, speed, longest in ((2.7, 31.0, 0.02), (3.1415926, 17.3, 0.0055), (1.234567, 0.37, 0.001)):
         heights = (np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]]))
@@ -127,15 +130,15 @@ def odd_delay(implementation: str, folder: Path) -> float:
 
 
 def odd_delay_naive(folder: Path) -> str:
-    """Without the remedy: correlation of the axles if the delay is rounded to steps of 20 ms."""
+    """Result without the remedy, as text: distance between the axles if the delay is rounded to steps of 20 ms."""
     length, speed, step = 2.7, SPEED, 0.02
     lag = round(length / (speed * step)) * speed * step
     return f"rounded to steps of 20 ms the axles stand {lag:.2f} m apart in place of {length} m"
 
 
-def attitude(implementation: str, folder: Path) -> float:
-    """Error of the mean trace of a noisy gyro's attitude error on a rotating body, against 3 exp(-s^2 t), in standard
-    errors."""
+def attitude_error(implementation: str, folder: Path) -> float:
+    """Case: a noisy gyro on a rotating body. Error: difference of the mean trace of its attitude error from 3 exp(-s^2
+    t), in standard errors."""
     rates = np.tile([0.0, 0.0, 2.0], (SAMPLES, 1))
     start, deviation = np.array([1.0, 0.0, 0.0, 0.0]), np.full(3, WALK * SAMPLING_RATE**0.5)
     attitudes = measured_attitude(rates, 1.0 / SAMPLING_RATE, deviation, start, range(PATHS), seed=5)[-1]
@@ -146,7 +149,7 @@ def attitude(implementation: str, folder: Path) -> float:
 
 
 def attitude_naive(folder: Path) -> str:
-    """Without the remedy: norm of a quaternion that is integrated by explicit Euler."""
+    """Result without the remedy, as text: norm of a quaternion that is integrated by explicit Euler."""
     turns = WALK / SAMPLING_RATE**0.5 * np.stack([normal_samples(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
     q = euler_quaternions(turns, np.array([1.0, 0.0, 0.0, 0.0]))
     return (
@@ -155,9 +158,9 @@ def attitude_naive(folder: Path) -> str:
     )
 
 
-def no_growth(implementation: str, folder: Path) -> float:
-    """Relative error of the pitch variance for 2 lambda t of 1e-12 to 600, below and above the switch to its series,
-    against 60 digits."""
+def growth_law_error(implementation: str, folder: Path) -> float:
+    """Case: the pitch variance for 2 lambda t of 1e-12 to 600, below and above the switch to its series. Error:
+    relative difference from values with 60 digits."""
     worst = 0.0
     for x in (1e-12, 1e-6, 1e-3, 0.0999, SERIES_LIMIT, np.nextafter(SERIES_LIMIT, 1.0), 0.1001, 0.5, 1.0, 10.0, 600.0):
         variance = float(pitch_variance(2.0, x / 4.0, 0.7))
@@ -173,14 +176,14 @@ def _exact_law(x: Decimal) -> float:
 
 
 def no_growth_naive(folder: Path) -> str:
-    """Without the remedy: the variance without growth by the formula as printed."""
+    """Result without the remedy, as text: the variance without growth by the formula as printed."""
     x = 1e-8
     return f"the closed law as printed is {6.0 * (np.sinh(x) - x) / x**3:.2f} times the truth at 2 lambda t = 1e-8"
 
 
-def indefinite(implementation: str, folder: Path) -> float:
-    """Ratio of the most negative to the largest eigenvalue of the half car's covariance, with states scaled by their
-    deviations, at 2 to 60 m/s."""
+def negative_eigenvalue_share(implementation: str, folder: Path) -> float:
+    """Case: the half car's covariance at 2 to 60 m/s. Error: magnitude of its most negative eigenvalue divided by the
+    largest, with states scaled by their deviations."""
     vehicle = linear_vehicle(load_vehicle("half_car"), implementation)
     worst = 0.0
     for speed in (2.0, 7.0, 20.0, 60.0):
@@ -202,7 +205,7 @@ CASES = (
         "m/s^2",
         0.0,
         "a function has no memory",
-        asked_again,
+        repeated_call_difference,
     ),
     Case(
         "streams of noise",
@@ -211,9 +214,9 @@ CASES = (
         "of 4.75 standard errors",
         1.0,
         "once in 5000 by chance, fixed seeds",
-        streams,
-        against="none",
-        once=True,
+        stream_correlation,
+        answer_independence="none",
+        without_engine=True,
     ),
     Case(
         "stream in pieces",
@@ -222,9 +225,9 @@ CASES = (
         "",
         0.0,
         "the same numbers",
-        pieces_of_stream,
-        against="none",
-        once=True,
+        stream_piece_error,
+        answer_independence="none",
+        without_engine=True,
     ),
     Case(
         "shape filter at any step",
@@ -233,9 +236,9 @@ CASES = (
         "standard errors",
         NORMAL_LIMIT + 0.6,
         "once in a thousand by chance in five lengths, fixed seed",
-        any_step,
+        road_variance_error,
         naive=any_step_naive,
-        once=True,
+        without_engine=True,
     ),
     Case(
         "delay between steps",
@@ -244,9 +247,9 @@ CASES = (
         "of the wheelbase",
         1e-3,
         "the tolerance of the cells of the path",
-        odd_delay,
+        axle_delay_error,
         naive=odd_delay_naive,
-        once=True,
+        without_engine=True,
     ),
     Case(
         "white noise on a gyro",
@@ -255,9 +258,9 @@ CASES = (
         "standard errors",
         NORMAL_LIMIT,
         "once in a thousand, fixed seed",
-        attitude,
+        attitude_error,
         naive=attitude_naive,
-        once=True,
+        without_engine=True,
     ),
     Case(
         "growth law at no growth",
@@ -266,9 +269,9 @@ CASES = (
         "relative",
         1e-12,
         "rounding of sinh x - x at x = 0.1 is 6e-14",
-        no_growth,
+        growth_law_error,
         naive=no_growth_naive,
-        once=True,
+        without_engine=True,
     ),
     Case(
         "delayed axle in Lyapunov's equation",
@@ -277,7 +280,7 @@ CASES = (
         "of the largest eigenvalue",
         1e-12,
         "rounding; scaled by the states' own deviations",
-        indefinite,
-        against="none",
+        negative_eigenvalue_share,
+        answer_independence="none",
     ),
 )

@@ -1,4 +1,4 @@
-"""Recordings that are plausible and wrong: units, signs, sides, clocks, gaps, clipped and dead channels.
+"""Hard cases of recordings that are plausible and wrong: units, signs, sides, clocks, gaps, clipped and dead channels.
 
 A virtual measurement of 5 s on a rough road is spoilt; the check must name the fault at its place. The error is the
 size found against the size planted, relative; infinite where nothing is named, or another channel is.
@@ -17,11 +17,11 @@ ROAD: bench.Ride = ("C", 1, 20.0, 5.0)
 SIZE = 0.2
 
 
-def spoilt(
+def planted_fault_case(
     check: str, expected_place: str, fault_size: float | None, spoil: bench.Spoil | None = None, **faults: Any
 ) -> Callable[[str, Path], float]:
-    """Case: a recording with one fault. Error: that of the size found; infinite unless ``check`` reports it first, and
-    all findings name ``expected_place``."""
+    """Case: a recording with one planted fault. Error: relative error of the size that the check finds; infinite unless
+    ``check`` reports the fault first, and all findings name ``expected_place``."""
 
     def error(implementation: str, folder: Path) -> float:
         findings = bench.planted_findings(bench.measurement(road=ROAD), folder, spoil, **faults)
@@ -36,8 +36,8 @@ def spoilt(
     return error
 
 
-def clean(implementation: str, folder: Path) -> float:
-    """Number of errors and doubts found in a clean recording."""
+def clean_recording_findings(implementation: str, folder: Path) -> float:
+    """Case: a recording without faults. Error: number of errors and doubts that the check reports."""
     return float(len(bench.planted_findings(bench.measurement(road=ROAD), folder)))
 
 
@@ -49,65 +49,65 @@ CASES = (
         "findings",
         0.0,
         "noise as stated, nothing planted",
-        clean,
-        once=True,
+        clean_recording_findings,
+        without_engine=True,
     ),
     *(
-        Case(name, hard, check, "of its size", SIZE, "what was planted, 20 %", error, once=True)
+        Case(name, hard, check, "of its size", SIZE, "what was planted, 20 %", error, without_engine=True)
         for name, hard, check, error in (
             (
                 "wheel force in kN read as N",
                 "a vehicle that flies off, or a plausible bias",
                 "unit named at its channel",
-                spoilt("unit", "fl_fz", 1e-3, bench.scaled_channels(1e-3, "fl_fz")),
+                planted_fault_case("unit", "fl_fz", 1e-3, bench.scaled_channels(1e-3, "fl_fz")),
             ),
             (
                 "wheel force with the other sign",
                 "its mean is that of another load",
                 "sign named at its channel",
-                spoilt("sign", "rr_fz", -1.0, bench.scaled_channels(-1.0, "rr_fz")),
+                planted_fault_case("sign", "rr_fz", -1.0, bench.scaled_channels(-1.0, "rr_fz")),
             ),
             (
                 "clipped wheel force",
                 "the worst loads are missing, the mean hardly changes",
                 "clipping, 3 % of samples",
-                spoilt("clipped", "fl_fz", 3.0, bench.clipped_channel("fl_fz", 0.03)),
+                planted_fault_case("clipped", "fl_fz", 3.0, bench.clipped_channel("fl_fz", 0.03)),
             ),
             (
                 "spike of one sample",
                 "its damage is that of the whole recording; the mean hardly changes",
                 "its height",
-                spoilt("spikes", "fl_fz", 5e3, bench.spiked_channel("fl_fz", 2.0, 5e3)),
+                planted_fault_case("spikes", "fl_fz", 5e3, bench.spiked_channel("fl_fz", 2.0, 5e3)),
             ),
             (
                 "value held for 0.06 s",
                 "shorter than a gap that is bridged: a straight line at any height",
                 "length and place",
-                spoilt("clipped", "fl_fz", 0.06, bench.hold_sample("fl_fz", 2.0, 0.06)),
+                planted_fault_case("clipped", "fl_fz", 0.06, bench.hold_sample("fl_fz", 2.0, 0.06)),
             ),
             (
                 "dead channel",
                 "a constant is a valid number",
                 "named as dead",
-                spoilt("clipped", "fr_fz", None, bench.scaled_channels(0.0, "fr_fz", add=3e3)),
+                planted_fault_case("clipped", "fr_fz", None, bench.scaled_channels(0.0, "fr_fz", add=3e3)),
             ),
             (
                 "front wheels exchanged",
                 "loads are alike left and right",
                 "the sides named",
-                spoilt("swapped", "fl with fr", None, bench.exchanged_hubs(("fl", "fr"))),
+                planted_fault_case("swapped", "fl with fr", None, bench.exchanged_hubs(("fl", "fr"))),
             ),
             (
                 "one channel 3 ms late",
                 "a phantom moment of pitch",
                 "the delay and its channel",
-                spoilt("shift", "fl_fz", 3e-3, delay={"fl_fz": 3e-3}),
+                planted_fault_case("shift", "fl_fz", 3e-3, delay={"fl_fz": 3e-3}),
             ),
             (
                 "gap of half a second",
                 "interpolated it is a road without roughness",
                 "length and place",
-                spoilt("gaps", "rr_fz", 0.5, bench.drop_samples("rr_fz", 3.0, 0.5)),
+                planted_fault_case("gaps", "rr_fz", 0.5, bench.drop_samples("rr_fz", 3.0, 0.5)),
             ),
         )
     ),

@@ -1,5 +1,4 @@
-"""Ride: roads without a finite variance, motions without stiffness or damping, eigenvalues many decades apart, invalid
-vehicles.
+"""Hard cases of rides: roads without finite variance, no stiffness or damping, stiff systems, invalid vehicles.
 
 Where an implementation takes part, the linear vehicle is its own; the covariance behind it is the same for all.
 """
@@ -22,7 +21,7 @@ from models.ride.varying_speed import varying_speed
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.vehicles.linear_vehicle import LinearVehicle, poles
 from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
 from validation.ride.hard_rides import (
     QUARTER_CAR_NUMBERS,
     SPEED,
@@ -38,9 +37,9 @@ from validation.ride.rides import ROAD_INTENSITY, largest_relative_error, one_tr
 Change = Callable[[dict[str, Any]], object]
 
 
-def damped_tyre(implementation: str, folder: Path) -> float:
-    """Error of the body acceleration with a damped tyre, against quadrature; the tyre's force alone must be reported as
-    infinite."""
+def damped_tyre_error(implementation: str, folder: Path) -> float:
+    """Error of the body's variances with a damped tyre, against quadrature; infinite unless the tyre force is reported
+    as infinite."""
     vehicle, road = (
         linear_equations(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), implementation),
         one_track((0.0,), 0.3),
@@ -52,8 +51,8 @@ def damped_tyre(implementation: str, folder: Path) -> float:
 
 
 def damped_tyre_naive(folder: Path) -> str:
-    """Without the guard: variances by the Lyapunov equation if the white noise that reaches outputs directly is
-    ignored."""
+    """Result without the guard, as text: variances by the Lyapunov equation if the white noise that reaches outputs
+    directly is ignored."""
     system = vehicle_with_road(
         linear_equations(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), "reference"), one_track((0.0,), 0.3), SPEED
     )
@@ -61,9 +60,9 @@ def damped_tyre_naive(folder: Path) -> str:
     return f"C P C' gives the tyre force a standard deviation of {stationary_covariance(silent).deviation[2]:.0f} N"
 
 
-def free_accelerations(implementation: str, folder: Path) -> float:
-    """Relative error of R19-free's accelerations against the exact covariance one hour after rest, with independent
-    axles."""
+def free_car_error(implementation: str, folder: Path) -> float:
+    """Relative error of R19-free's acceleration variances, with independent axles, against the exact covariance one
+    hour after rest."""
     vehicle = linear_equations(load_vehicle("r19_free"), implementation)
     system = vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     rows = [i for i, output in enumerate(vehicle.outputs) if "acceleration" in output.kind]
@@ -71,9 +70,9 @@ def free_accelerations(implementation: str, folder: Path) -> float:
     return largest_relative_error(covariance.variance[rows], wanted[rows])
 
 
-def drifting(implementation: str, folder: Path) -> float:
-    """Errors of the growth rates of heading variance (as t) and lateral position variance (as t^3) against the exact
-    covariance after 1 and 2 hours, with independent axles."""
+def growth_rate_error(implementation: str, folder: Path) -> float:
+    """Relative error of the growth rates of heading variance (as t) and lateral position variance (as t^3), against the
+    exact covariance after 1 and 2 hours."""
     vehicle = linear_equations(roll_steered_vehicle(), implementation)
     system = vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     covariance = stationary_covariance(system)
@@ -84,7 +83,7 @@ def drifting(implementation: str, folder: Path) -> float:
     return largest_relative_error(grown, covariance.rate)
 
 
-def undamped(corner: float) -> Callable[..., float]:
+def undamped_case(corner: float) -> Callable[..., float]:
     """Case: a body on an undamped tyre. Error: that of the growth rates of its variances, against S(w) / 2 w^2."""
 
     def error(implementation: str, folder: Path) -> float:
@@ -101,9 +100,9 @@ def undamped(corner: float) -> Callable[..., float]:
     return error
 
 
-def triple(implementation: str, folder: Path) -> float:
-    """Case: a critically damped body whose frequency is that of the road's corner. Error: relative difference of the
-    variances from 3 q w^3 / 16 and 3 q / 16 w."""
+def triple_pole_error(implementation: str, folder: Path) -> float:
+    """Case: a critically damped body at the frequency of the road's corner. Error: relative difference of the variances
+    from 3 q w^3 / 16 and 3 q / 16 w."""
     w = 6.0
     covariance = stationary_covariance(
         vehicle_with_road(
@@ -116,7 +115,7 @@ def triple(implementation: str, folder: Path) -> float:
 
 
 def triple_naive(folder: Path) -> str:
-    """Without the remedy: condition number of the eigenvectors in this case."""
+    """Result without the remedy, as text: condition number of the eigenvectors in this case."""
     system = vehicle_with_road(
         linear_equations(single_body(300.0, 10800.0, 3600.0), "reference"), one_track((0.0,), 0.3), SPEED
     )
@@ -125,12 +124,12 @@ def triple_naive(folder: Path) -> str:
     return f"sums over eigenvectors have a condition of {condition:.0e} there"
 
 
-def unstable(implementation: str, folder: Path) -> float:
+def unstable_car(implementation: str, folder: Path) -> float:
     """Case: a damper with the wrong sign must be refused, with the growth rate of the fastest motion."""
     return _refused_by_growth(linear_equations(quarter_car(300.0, 40.0, 2e4, -1500.0, 2e5), implementation))
 
 
-def toppling(implementation: str, folder: Path) -> float:
+def toppling_car(implementation: str, folder: Path) -> float:
     """Case: a body 30 m above its springs must be refused, with the rate at which it topples under gravity."""
     car = load_vehicle("seven_freedoms")
     x, y, _ = car.bodies[0].position
@@ -155,15 +154,16 @@ def _refused_by_growth(vehicle: LinearVehicle) -> float:
     raise refusal
 
 
-def crawling(implementation: str, folder: Path) -> float:
+def long_delay_error(implementation: str, folder: Path) -> float:
     """Case: a delay of 26,000 s between the axles. Error: relative difference from independent axles."""
     vehicle = linear_equations(load_vehicle("half_car"), implementation)
     late, independent = (_deviations_of_ride(vehicle, 1e-4, word) for word in ("delayed", "uncorrelated"))
     return largest_relative_error(late, independent)
 
 
-def axles_at_one_place(implementation: str, folder: Path) -> float:
-    """Case: two axles at the same x, without delay. Error: relative difference from one common input."""
+def no_delay_error(implementation: str, folder: Path) -> float:
+    """Case: two axles at the same x, without delay. Error: relative difference of the deviations from a common
+    input."""
     vehicle = linear_equations(load_vehicle("half_car"), implementation)
     at_one_place = replace(vehicle, wheels=tuple(replace(wheel, x=0.0) for wheel in vehicle.wheels))
     delayed, equal = (_deviations_of_ride(at_one_place, SPEED, word) for word in ("delayed", "equal"))
@@ -176,9 +176,9 @@ def _deviations_of_ride(vehicle: LinearVehicle, speed: float = SPEED, axles: str
     ).deviation
 
 
-def mirrored(implementation: str, folder: Path) -> float:
-    """Case: the left springs, then the right ones, are twice as stiff. Error: relative difference of the outputs on the
-    centre line."""
+def mirror_error(implementation: str, folder: Path) -> float:
+    """Case: the left springs, then the right springs, are twice as stiff. Error: relative difference of the deviations
+    of outputs on the centre line."""
     car = load_vehicle("seven_freedoms")
     deviations = []
     for side in (1.0, -1.0):
@@ -191,8 +191,8 @@ def mirrored(implementation: str, folder: Path) -> float:
     return largest_relative_error(deviations[0], deviations[1])
 
 
-def slow_weighting(implementation: str, folder: Path) -> float:
-    """Relative error of the body acceleration weighted by Wk at 1 mm/s, against quadrature."""
+def slow_weighting_error(implementation: str, folder: Path) -> float:
+    """Relative error of the body acceleration's variance weighted by Wk at 1 mm/s, against quadrature."""
     vehicle = linear_equations(quarter_car(*QUARTER_CAR_NUMBERS), implementation)
     road, name = one_track((0.0,), 0.3), vehicle.outputs[0].name
     variance = stationary_covariance(
@@ -202,7 +202,7 @@ def slow_weighting(implementation: str, folder: Path) -> float:
     return largest_relative_error(variance, wanted)
 
 
-def standstill(implementation: str, folder: Path) -> float:
+def standstill_error(implementation: str, folder: Path) -> float:
     """Case: a drive that starts and ends with a stop. Error: largest relative change of the road height's variance
     under each wheel."""
     vehicle = linear_equations(load_vehicle("half_car"), implementation)
@@ -211,7 +211,7 @@ def standstill(implementation: str, folder: Path) -> float:
     return largest_relative_error((height / height[0]) ** 2, 1.0)
 
 
-def no_speed(implementation: str, folder: Path) -> float:
+def invalid_speeds(implementation: str, folder: Path) -> float:
     """Case: speeds of -1, NaN, infinity and 0 must each be refused."""
     vehicle = linear_equations(load_vehicle("half_car"), implementation)
     for speed in (-1.0, float("nan"), float("inf"), 0.0):
@@ -224,8 +224,8 @@ def no_speed(implementation: str, folder: Path) -> float:
     raise refusal
 
 
-def bad(change: Change, expected_place: str) -> Callable[..., float]:
-    """Case: the half car's file with one wrong entry must be refused with the entry's name."""
+def wrong_entry_case(change: Change, expected_place: str) -> Callable[..., float]:
+    """Case: the half car's file with a wrong entry must be refused with the entry's name."""
 
     def error(implementation: str, folder: Path) -> float:
         table = parse(SHIPPED / "half_car.toml")
@@ -245,7 +245,7 @@ def _unconnected(table: dict[str, Any]) -> None:
     table["bodies"].append({"name": "box", "mass": 5.0, "position": [0.0, 0.0, 1.0], "freedoms": ["z"]})
 
 
-REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+REFUSED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 CLOSED, ROUNDED = "closed form", "rounding, and that of an engine's differences"
 CASES = (
     Case(
@@ -255,7 +255,7 @@ CASES = (
         "",
         1e-9,
         ROUNDED,
-        damped_tyre,
+        damped_tyre_error,
         naive=damped_tyre_naive,
     ),
     Case(
@@ -283,7 +283,7 @@ CASES = (
         "",
         1e-6,
         "rounding, doubled twenty times",
-        free_accelerations,
+        free_car_error,
     ),
     Case(
         "roll steer on a free car",
@@ -292,7 +292,7 @@ CASES = (
         "",
         1e-3,
         "what is left of its first seconds",
-        drifting,
+        growth_rate_error,
     ),
     Case(
         "no damping at all",
@@ -301,7 +301,7 @@ CASES = (
         "",
         1e-9,
         ROUNDED,
-        undamped(0.3),
+        undamped_case(0.3),
     ),
     Case(
         "no damping, road that next to walks",
@@ -310,7 +310,7 @@ CASES = (
         "",
         1e-9,
         ROUNDED,
-        undamped(1e-9),
+        undamped_case(1e-9),
     ),
     Case(
         "next to no damping",
@@ -328,7 +328,7 @@ CASES = (
         "",
         1e-9,
         ROUNDED,
-        triple,
+        triple_pole_error,
         naive=triple_naive,
     ),
     Case(
@@ -365,10 +365,10 @@ CASES = (
         "",
         1e-9,
         ROUNDED,
-        slow_weighting,
+        slow_weighting_error,
     ),
-    Case("delay of hours", "e^(A tau) underflows", "independent axles", "", 1e-12, "rounding", crawling),
-    Case("two axles at one place", "a delay of nothing", "one input", "", 0.0, "exact", axles_at_one_place),
+    Case("delay of hours", "e^(A tau) underflows", "independent axles", "", 1e-12, "rounding", long_delay_error),
+    Case("two axles at one place", "a delay of nothing", "one input", "", 0.0, "exact", no_delay_error),
     Case(
         "left springs twice the right ones",
         "roll and heave are coupled",
@@ -376,7 +376,7 @@ CASES = (
         "",
         1e-10,
         ROUNDED,
-        mirrored,
+        mirror_error,
     ),
     Case(
         "drive from stop to stop",
@@ -385,7 +385,7 @@ CASES = (
         "",
         1e-10,
         "rounding",
-        standstill,
+        standstill_error,
     ),
     Case(
         "damper of the wrong sign",
@@ -394,7 +394,7 @@ CASES = (
         "",
         0.0,
         "exact",
-        unstable,
+        unstable_car,
         REFUSED,
     ),
     Case(
@@ -404,10 +404,10 @@ CASES = (
         "",
         0.0,
         "exact",
-        toppling,
+        toppling_car,
         REFUSED,
     ),
-    Case("no speed", "0, below 0, not a number", "refused by name", "", 0.0, "exact", no_speed, REFUSED),
+    Case("no speed", "0, below 0, not a number", "refused by name", "", 0.0, "exact", invalid_speeds, REFUSED),
     *(
         Case(
             name,
@@ -416,7 +416,7 @@ CASES = (
             "",
             0.0,
             "exact",
-            bad(change, place),
+            wrong_entry_case(change, place),
             REFUSED,
         )
         for name, place, change in (

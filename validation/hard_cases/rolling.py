@@ -1,4 +1,4 @@
-"""Wheels on rails: standstill, reversal, lift-off, hardly any load or friction, speeds and steps at their ends.
+"""Hard cases of wheels on rails: standstill, reversal, lift-off, tiny loads and friction, extreme speeds and steps.
 
 Every implementation marches the equations of motion that it writes itself; creep forces are the same compiled ones.
 """
@@ -18,27 +18,27 @@ from models.rail.equations import Equations
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.wheelset import CHOSEN_WHEELSET, GRAVITY, Wheelset
 from models.systems.wheelset.of_scene import implementation as kind_of
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
 
 KINDS = {name: kind_of(name) for name in IMPLEMENTATIONS}
 STEP = 5e-4
 FREE_WHEELSET = free_wheelset(CHOSEN_WHEELSET)
 HEAVY_WHEELSET = FREE_WHEELSET.changed(mass=8000.0, spin_inertia=2500.0, yaw_inertia=8000.0)
-"""Without suspension; so heavy and hard to turn that it stands still in steps of 0.08 ms."""
+"""Wheelsets without suspension, the second so heavy that it is stable at standstill in steps of 0.08 ms."""
+STEEP_WHEELSET = CHOSEN_WHEELSET.changed(conicity=0.5)
 MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
-"""What left and right exchanged make of a state; its spin is about the same axle."""
+"""Signs of a state's entries in the mirror image of a wheelset."""
 
 
 def built_wheelset(
     implementation: str, wheelset: Wheelset = CHOSEN_WHEELSET, speed: float = 40.0, **options: Any
 ) -> Equations:
-    """The equations of a wheelset in an implementation, with few contact cells."""
+    """Equations of motion of a wheelset in an implementation, with few contact cells."""
     return KINDS[implementation](wheelset, speed, **({"cells": 7} | options))
 
 
 def displaced_state(equations: Equations, **values: float) -> np.ndarray:
-    """State of equilibrium, to which each value is added at the index that has its name in ``models.rail.equations``,
-    as Y."""
+    """Rest state with values added to entries named as in ``models.rail.equations``, such as Y."""
     state = equations.rest.copy()
     for name, value in values.items():
         state[getattr(eq, name)] += value
@@ -46,8 +46,7 @@ def displaced_state(equations: Equations, **values: float) -> np.ndarray:
 
 
 def beyond_friction(motion: Motion, mu: float) -> float:
-    """Largest ratio of the tangential force to mu N, minus 1; infinite if a force adds energy, or acts at zero
-    friction."""
+    """Largest tangential force divided by mu N, minus 1; infinite if a force adds energy or acts at zero friction."""
     force = np.hypot(motion.contacts["fx"], motion.contacts["fy"])
     bound = mu * motion.contacts["load"]
     if motion.contacts["power"].max() > 0.0 or (force[bound == 0.0] > 0.0).any():
@@ -56,7 +55,7 @@ def beyond_friction(motion: Motion, mu: float) -> float:
     return float(np.max(force[loaded] / bound[loaded] - 1.0, initial=0.0))
 
 
-def standing(implementation: str, folder: Path) -> float:
+def creep_at_standstill(implementation: str, folder: Path) -> float:
     """Case: a wheelset stands under a lateral force of a third of the friction limit. Error: its lateral creep speed
     (m/s)."""
     equations = built_wheelset(implementation, HEAVY_WHEELSET, 0.0, lean=0.1)
@@ -64,15 +63,15 @@ def standing(implementation: str, folder: Path) -> float:
     return float(abs(motion.states[-1, eq.Y] - motion.states[-2, eq.Y]) / 0.02)
 
 
-def standing_naive(folder: Path) -> str:
-    """Without the remedy: creepage by a speed of travel that is not regularised."""
+def standstill_naive(folder: Path) -> str:
+    """Result without the remedy, as text: creepage by a speed of travel that is not regularised."""
     with np.errstate(divide="ignore"):
         return f"creepage by the speed of travel: {np.float64(1e-4) / np.float64(0.0)}"
 
 
-def reversal(implementation: str, folder: Path) -> float:
-    """Largest jump of an acceleration, divided by mu N / m, where the speed passes 0 and the limits of its
-    regularisation."""
+def reversal_jump(implementation: str, folder: Path) -> float:
+    """Case: the speed passes 0 and the limits of its regularisation. Error: largest jump of an acceleration divided by
+    mu N / m."""
     jumps = []
     for middle in (-wf.REGULAR, 0.0, wf.REGULAR):
         rates_below, rates_above = (
@@ -83,9 +82,9 @@ def reversal(implementation: str, folder: Path) -> float:
     return float(max(jumps) * CHOSEN_WHEELSET.mass / (CHOSEN_WHEELSET.friction * CHOSEN_WHEELSET.load))
 
 
-def through_zero(implementation: str, folder: Path) -> float:
-    """Case: runs at falling speed through 0. Error: relative amount by which the kinetic energy of lateral motion and
-    yaw exceeds the initial one."""
+def gain_through_zero(implementation: str, folder: Path) -> float:
+    """Case: runs at speeds that fall through 0. Error: relative gain of the kinetic energy of lateral motion and
+    yaw."""
     state, energies = None, []
     for speed in np.linspace(0.06, -0.06, 7):
         equations = built_wheelset(implementation, HEAVY_WHEELSET, float(speed))
@@ -101,31 +100,30 @@ def through_zero(implementation: str, folder: Path) -> float:
     return float(np.max(energies) / energies[0][0] - 1.0)
 
 
-def energies(motion: Motion, w: Wheelset) -> np.ndarray:
-    """Energy (J) of a wheelset without suspension on elastic contacts: sum of kinetic energy, weight and contact
-    energy."""
+def total_energy(motion: Motion, w: Wheelset) -> np.ndarray:
+    """Energy (n,) in J of a wheelset without suspension: kinetic energy, weight and contact energy."""
     _, z, roll, _, _, vy, vz, roll_rate, yaw_rate, spin = motion.states.T
     turning = w.yaw_inertia * (roll_rate**2 + (yaw_rate * np.cos(roll)) ** 2) + w.spin_inertia * spin**2
     pressed = 0.4 * (motion.contacts["load"] * motion.contacts["depth"]).sum(axis=1)
     return 0.5 * (w.mass * (vy**2 + vz**2) + turning) - w.load * z + pressed
 
 
-def falling(implementation: str, folder: Path, **displacements: float) -> float:
-    """Case: an elastic wheelset without friction is released above its rails. Error: gained energy, divided by that of
-    a fall by 1 mm."""
+def gain_of_fall(implementation: str, folder: Path, **displacements: float) -> float:
+    """Case: an elastic, frictionless wheelset falls on its rails. Error: gained energy divided by that of a fall by 1
+    mm."""
     elastic = FREE_WHEELSET.changed(friction=0.0, contact_damping=0.0, flange_clearance=0.1)
     wheelset = built_wheelset(implementation, elastic)
     motion = wheelset.run(displaced_state(wheelset, **displacements), 0.06, 5e-5)
     loads = motion.contacts["load"]
     if not ((loads == 0.0).any(axis=0) & (loads > 0.0).any(axis=0)).all():
         return np.inf  # nothing has lifted off, or nothing has landed
-    gained = energies(motion, elastic)
+    gained = total_energy(motion, elastic)
     return float((gained - gained[0]).max() / (elastic.load * 1e-3))
 
 
-def bouncing(implementation: str, folder: Path) -> float:
-    """Case: a rolling wheelset with friction and damping is released 1 mm above its rails. Error: ratio of the height
-    by which it rises above the release point to 1 mm."""
+def bounce_height(implementation: str, folder: Path) -> float:
+    """Case: a rolling wheelset with friction and damping is released 1 mm above its rails. Error: height by which it
+    rises above the release point, divided by 1 mm."""
     wheelset = built_wheelset(implementation, FREE_WHEELSET)
     start = displaced_state(wheelset, Z=-1e-3)
     motion = wheelset.run(start, 0.2, 1e-4)
@@ -147,8 +145,8 @@ def light_wheelset_load(implementation: str, folder: Path, mass: float) -> float
     return float(abs(vertical_force.sum() / toy.load - 1.0))
 
 
-def frictions(implementation: str, folder: Path) -> float:
-    """Largest relative excess of a force over mu N for friction coefficients from 0 to 1."""
+def friction_excess(implementation: str, folder: Path) -> float:
+    """Case: friction coefficients from 0 to 1. Error: largest relative excess of a creep force over mu N."""
     shares = []
     for mu in (0.0, 1e-6, 1e-3, 1.0):
         wheelset = built_wheelset(implementation, CHOSEN_WHEELSET.changed(friction=mu), 60.0)
@@ -156,29 +154,28 @@ def frictions(implementation: str, folder: Path) -> float:
     return max(shares)
 
 
-def pure_spin(implementation: str, folder: Path) -> float:
-    """Case: steep cones roll without displacement, so that creepage is spin alone. Error: sum of both lateral forces,
-    and moments about the axle, divided by mu N and mu N r."""
-    spinning = CHOSEN_WHEELSET.changed(conicity=0.5)
-    wheelset = built_wheelset(implementation, spinning, 20.0)
+def spin_force(implementation: str, folder: Path) -> float:
+    """Case: steep cones roll without displacement, in pure spin. Error: sum of both lateral forces divided by mu N, and
+    moments about the axle divided by mu N r."""
+    wheelset = built_wheelset(implementation, STEEP_WHEELSET, 20.0)
     contact = wheelset.run(wheelset.rest, 1e-4, 1e-4).contacts[0]
-    bound = spinning.friction * contact["load"]
+    bound = STEEP_WHEELSET.friction * contact["load"]
     if np.abs(contact["fy"] / bound).min() < 0.1:
         return np.inf
     moment = contact["fx"] * contact["z"] - contact["mz"] * np.sin(contact["angle"])
-    return float(max(np.abs(moment / (bound * spinning.radius)).max(), abs(contact["fy"].sum()) / bound[0]))
+    return float(max(np.abs(moment / (bound * STEEP_WHEELSET.radius)).max(), abs(contact["fy"].sum()) / bound[0]))
 
 
-def halved(implementation: str, folder: Path, wheelset: Wheelset, speed: float, step: float) -> float:
-    """Largest difference (m) of a run from a run with half the step."""
+def halving_error(implementation: str, folder: Path, wheelset: Wheelset, speed: float, step: float) -> float:
+    """Case: a displaced wheelset at a speed (m/s). Error: largest difference (m, rad) from half the step (s)."""
     equations = built_wheelset(implementation, wheelset, speed)
     start = equations.displaced_state(1e-3)
     ends = [equations.run(start, 100 * step, h).states[-1] for h in (step, step / 2.0)]
     return float(np.abs(ends[1] - ends[0])[: eq.ANGLE].max())
 
 
-def crawling(implementation: str, folder: Path) -> float:
-    """Relative difference of the displacement at a speed of 1e-6 m/s from that of a standing wheelset."""
+def crawling_error(implementation: str, folder: Path) -> float:
+    """Case: a speed of 1e-6 m/s. Error: relative difference of the displacement from a standing wheelset's."""
     rest_state = built_wheelset(implementation, HEAVY_WHEELSET, 0.0).rest
     runs = (
         built_wheelset(implementation, HEAVY_WHEELSET, speed, lean=0.1).run(rest_state, 0.01, 8e-5)
@@ -188,14 +185,14 @@ def crawling(implementation: str, folder: Path) -> float:
     return float(abs(slow / still - 1.0))
 
 
-def symmetric(implementation: str, folder: Path) -> float:
+def centred_motion(implementation: str, folder: Path) -> float:
     """Case: a wheelset in the middle of the track above its critical speed. Error: displacement, roll and yaw, which
     must stay 0."""
     equations = built_wheelset(implementation, CHOSEN_WHEELSET, 80.0)
     return float(np.abs(equations.run(equations.rest, 0.3, STEP).states[:, [eq.Y, eq.ROLL, eq.YAW]]).max())
 
 
-def mirrored(implementation: str, folder: Path) -> float:
+def mirror_error(implementation: str, folder: Path) -> float:
     """Case: a start and its mirror image, with one wheel in the air. Error: difference of the mirrored paths."""
     equations = built_wheelset(implementation)
     start = displaced_state(equations, Y=2e-3, Z=-7e-4, ROLL=1e-3, YAW=2e-3, ROLL_RATE=0.05, YAW_RATE=0.1)
@@ -203,8 +200,8 @@ def mirrored(implementation: str, folder: Path) -> float:
     return float(np.abs(straight - MIRROR * other_path).max())
 
 
-def refused(implementation: str, folder: Path, expected_place: str, run: Callable[[str], Any]) -> float:
-    """Case that must be refused with the name ``expected_place``."""
+def refusal_error(implementation: str, folder: Path, expected_place: str, run: Callable[[str], Any]) -> float:
+    """Case: ``run`` must be refused with the name ``expected_place``. Error: infinite if it is not."""
     try:
         run(implementation)
     except InputError as refusal:
@@ -213,7 +210,7 @@ def refused(implementation: str, folder: Path, expected_place: str, run: Callabl
     return np.inf
 
 
-def ran(
+def moved_run(
     implementation: str,
     *,
     duration: float = 0.01,
@@ -222,15 +219,16 @@ def ran(
     speed: float = 40.0,
     **displacements: float,
 ) -> Motion:
-    """A run that starts displaced from rest."""
+    """Motion of the chosen wheelset that starts displaced from rest; speed in m/s, duration and step in s."""
     wheelset = built_wheelset(implementation, speed=speed)
     return wheelset.run(displaced_state(wheelset, **displacements), duration, step, stride)
 
 
-def fails(implementation: str, folder: Path, **displacements: Any) -> float:
-    """A hard case whose run must fail within its first half, with the time in the message."""
+def failing_run(implementation: str, folder: Path, **displacements: Any) -> float:
+    """Case: a run that must fail within its first half, with the time in the message. Error: infinite if it does
+    not."""
     try:
-        ran(implementation, duration=0.1, **displacements)
+        moved_run(implementation, duration=0.1, **displacements)
     except RunFailed as failure:
         if failure.time is not None and 0.0 <= failure.time < 0.05:
             raise
@@ -241,7 +239,8 @@ LANDING: dict[str, Any] = {"Z": -5e-3, "Y_RATE": 0.01, "YAW": 1e-3}
 
 
 def too_large_naive(folder: Path) -> str:
-    """Without the guard: difference of a path without the check of loads from the path with an eighth of the step."""
+    """Result without the guard, as text: difference of a path without the check of loads from the path with an eighth
+    of the step."""
     equations, ends = built_wheelset("reference"), []
     for step in (STEP, STEP / 8.0):
         states, contacts = np.empty((1, eq.STATE_COUNT)), equations.empty_contacts(1)
@@ -251,8 +250,9 @@ def too_large_naive(folder: Path) -> str:
     return f"displaced by {1e3 * abs(ends[1][eq.Y] - ends[0][eq.Y]):.2g} mm more or less after 0.1 s"
 
 
-REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
-RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
+REFUSED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+RAISED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "raised")
+FAST_RUN, STEEP_RUN = dict[str, Any](speed=200.0, step=2e-4), dict[str, Any](speed=20.0, step=1e-4)
 CASES = (
     Case(
         "wheelset that stands on a slope",
@@ -261,8 +261,8 @@ CASES = (
         "m/s",
         1e-3,
         "asked for; creepage is regularised below 0.1 m/s",
-        standing,
-        naive=standing_naive,
+        creep_at_standstill,
+        naive=standstill_naive,
     ),
     Case(
         "speed that changes its sign",
@@ -271,7 +271,7 @@ CASES = (
         "mu N / m",
         1e-5,
         "slope times 2e-9 m/s",
-        reversal,
+        reversal_jump,
     ),
     Case(
         "reversal",
@@ -280,10 +280,10 @@ CASES = (
         "of it",
         0.0,
         "creep forces have no power",
-        through_zero,
+        gain_through_zero,
     ),
     *(
-        Case(name, hard, "gains no energy", "of 1 mm", 1e-3, why, partial(falling, Z=-1e-3, ROLL=roll))
+        Case(name, hard, "gains no energy", "of 1 mm", 1e-3, why, partial(gain_of_fall, Z=-1e-3, ROLL=roll))
         for name, hard, why, roll in (
             (
                 "wheelset dropped on its rails",
@@ -306,7 +306,7 @@ CASES = (
         "of it",
         0.0,
         "damped",
-        bouncing,
+        bounce_height,
     ),
     Case(
         "wheelset of a kilogram",
@@ -334,7 +334,7 @@ CASES = (
         "mu N",
         1e-12,
         "rounding",
-        frictions,
+        friction_excess,
     ),
     Case(
         "steep cones at rest",
@@ -343,13 +343,13 @@ CASES = (
         "mu N",
         1e-9,
         "rounding of the height of rest",
-        pure_spin,
+        spin_force,
     ),
     *(
-        Case(name, hard, "half the step", "m", 1e-8, "error of the step", partial(halved, wheelset=w, speed=v, step=h))
-        for name, hard, w, v, h in (
-            ("wheelset at 200 m/s", "far above its critical speed", CHOSEN_WHEELSET, 200.0, 2e-4),
-            ("conicity of 0.5", "geometry far from linear", CHOSEN_WHEELSET.changed(conicity=0.5), 20.0, 1e-4),
+        Case(name, hard, "half the step", "m", 1e-8, "error of the step", partial(halving_error, wheelset=w, **run))
+        for name, hard, w, run in (
+            ("wheelset at 200 m/s", "far above its critical speed", CHOSEN_WHEELSET, FAST_RUN),
+            ("conicity of 0.5", "geometry far from linear", STEEP_WHEELSET, STEEP_RUN),
         )
     ),
     Case(
@@ -359,7 +359,7 @@ CASES = (
         "",
         1e-4,
         "1e-5 of the mixture",
-        crawling,
+        crawling_error,
     ),
     Case(
         "wheelset in the middle of the track",
@@ -368,7 +368,7 @@ CASES = (
         "m, rad",
         1e-12,
         "rounding",
-        symmetric,
+        centred_motion,
     ),
     Case(
         "wheelset in a mirror",
@@ -377,10 +377,10 @@ CASES = (
         "SI",
         1e-11,
         "rounding",
-        mirrored,
+        mirror_error,
     ),
     *(
-        Case(name, hard, "fails, and says when", "", 0.0, "exact", partial(fails, **moved), RAISED, naive=naive)
+        Case(name, hard, "fails, and says when", "", 0.0, "exact", partial(failing_run, **moved), RAISED, naive=naive)
         for name, hard, moved, naive in (
             ("wheelset that derails", "geometry has no sense any more", {"YAW_RATE": 50.0}, None),
             (
@@ -400,18 +400,18 @@ CASES = (
             "",
             0.0,
             "exact",
-            partial(refused, expected_place=place, run=run),
+            partial(refusal_error, expected_place=place, run=run),
             REFUSED,
         )
         for name, place, run in (
-            ("step of 4 ms on rails", "step", partial(ran, step=4e-3, duration=0.04)),
-            ("step of 0.5 ms at standstill", "step", partial(ran, speed=0.0)),
-            ("wheelset somewhere unknown", "state[0]", partial(ran, Y=np.nan)),
-            ("spin that is infinite", "state[9]", partial(ran, SPIN=np.inf)),
-            ("duration between two steps on rails", "duration", partial(ran, duration=0.0013)),
-            ("wheelset that runs for no time", "duration", partial(ran, duration=0.0)),
-            ("every third of twenty steps", "every", partial(ran, stride=3)),
-            ("wheelset at 300 m/s", "speed", partial(ran, speed=300.0)),
+            ("step of 4 ms on rails", "step", partial(moved_run, step=4e-3, duration=0.04)),
+            ("step of 0.5 ms at standstill", "step", partial(moved_run, speed=0.0)),
+            ("wheelset somewhere unknown", "state[0]", partial(moved_run, Y=np.nan)),
+            ("spin that is infinite", "state[9]", partial(moved_run, SPIN=np.inf)),
+            ("duration between two steps on rails", "duration", partial(moved_run, duration=0.0013)),
+            ("wheelset that runs for no time", "duration", partial(moved_run, duration=0.0)),
+            ("every third of twenty steps", "every", partial(moved_run, stride=3)),
+            ("wheelset at 300 m/s", "speed", partial(moved_run, speed=300.0)),
             ("wheelset without a mass", "mass", lambda _: CHOSEN_WHEELSET.changed(mass=np.nan)),
             ("strips of two cells", "cells", lambda name: built_wheelset(name, cells=2).rest),
             ("strips of 2000 cells in an engine", "cells", lambda name: built_wheelset(name, cells=2000).rest),

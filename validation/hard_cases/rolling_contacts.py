@@ -1,4 +1,5 @@
-"""Rolling contacts: wheels of the callback rig, a contact that jumps to another patch, a car on four tyres.
+"""Hard cases of rolling contacts: wheels of the callback rig, a contact that jumps to another patch, a car on four
+tyres.
 
 Of the rig, the reference is the compiled kernel called alone; a car has none, and its reference is Runge and Kutta's
 method written out about MuJoCo's accelerations.
@@ -34,15 +35,15 @@ from validation.hard_cases.case import Case
 from validation.hard_cases.rolling import built_wheelset, displaced_state
 
 SLIDES = np.array([[0.02, 0.01, 0.0, 0.3], [-0.3, 0.1, 0.0, -2.0], [1e-6, -2e-6, 0.0, 1e-4], [0.0, 0.0, 0.0, 1.0]])
-"""Rates of four wheels: x', y', z' (m/s), yaw' (rad/s)."""
+"""Velocities (4, 4) of four wheels: x', y', z' (m/s), yaw' (rad/s)."""
 LOCKED = Tyres(cells=11, fixed=("fl", "fr", "rl", "rr"))
 RAMP = np.array([[2.0 * np.pi / 10.0, 0.0, -0.08, 0.0], [0.0, 0.0, 0.08, 0.0]])
-"""A hill 16 cm high and 10 m long, flat at the start."""
+"""Road waves of a hill 16 cm high and 10 m long, flat at the start."""
 R19 = replace(load_vehicle("r19_free"), drags=())
 
 
-def on_rig(implementation: str, wheels: Wheels, rates: np.ndarray) -> np.ndarray:
-    """Forces (count, 4) on wheels that are held in position and have velocities (count, 4)."""
+def rig_forces(implementation: str, wheels: Wheels, rates: np.ndarray) -> np.ndarray:
+    """Contact forces (4, 4) on the rig's wheels, which are at fixed positions and have velocities (4, 4)."""
     q, v, f = np.zeros(wheels.size), rates.ravel(), np.zeros(wheels.size)
     if implementation == "exudyn":
         f = np.array(Forces(wheels).of(list(q), list(v)))
@@ -59,43 +60,44 @@ def on_rig(implementation: str, wheels: Wheels, rates: np.ndarray) -> np.ndarray
 
 
 def beyond_friction_share(wheels: Wheels, forces: np.ndarray) -> float:
-    """Largest ratio of the force to mu N, minus 1; infinite if a contact gains energy."""
+    """Largest tangential force divided by mu N, minus 1; infinite if a contact gains energy."""
     if (forces * SLIDES).sum(axis=1).max() > 0.0 or not np.isfinite(forces).all():
         return np.inf
     return max(0.0, float(np.hypot(forces[:, 0], forces[:, 1]).max() / (wheels.mu * wheels.load) - 1.0))
 
 
-def bounded(implementation: str, folder: Path, **changes: Any) -> float:
-    """Largest relative excess of the force over mu N at three speeds, zero included, for both theories with a friction
-    limit."""
+def friction_excess(implementation: str, folder: Path, **changes: Any) -> float:
+    """Case: wheels at three speeds, zero included, for both theories with a friction limit. Error: largest excess of
+    the force over mu N, divided by mu N."""
     shares = []
     for theory in ("fastsim", "simplified"):
         for speed in (20.0, 0.0, -20.0):
             wheels = Wheels(theory=theory, cells=7, speed=speed, **changes)
-            shares.append(beyond_friction_share(wheels, on_rig(implementation, wheels, SLIDES)))
+            shares.append(beyond_friction_share(wheels, rig_forces(implementation, wheels, SLIDES)))
     return max(shares)
 
 
-def jumps(implementation: str, folder: Path) -> float:
-    """Largest change of a force, divided by mu N, where the speed passes 0 and the limits of the regularisation."""
+def reversal_force_jump(implementation: str, folder: Path) -> float:
+    """Case: the speed passes 0 and the limits of the regularisation. Error: largest change of a force divided by mu
+    N."""
     shares = []
     for middle in (-REGULAR, 0.0, REGULAR):
         backwards, forwards_wheels = (Wheels(cells=7, speed=middle + speed_offset) for speed_offset in (-1e-9, 1e-9))
-        change = on_rig(implementation, forwards_wheels, SLIDES) - on_rig(implementation, backwards, SLIDES)
+        change = rig_forces(implementation, forwards_wheels, SLIDES) - rig_forces(implementation, backwards, SLIDES)
         shares.append(np.abs(change[:, :2]).max() / (backwards.mu * backwards.load))
     return float(max(shares))
 
 
-def spinning(implementation: str, folder: Path) -> float:
+def spin_force(implementation: str, folder: Path) -> float:
     """Case: wheels with pure spin. Error: longitudinal force divided by mu N; infinite if there is no lateral force."""
     wheels = Wheels(cells=7)
-    shares = on_rig(implementation, wheels, SLIDES[[3, 3, 3, 3]]) / (wheels.mu * wheels.load)
+    shares = rig_forces(implementation, wheels, SLIDES[[3, 3, 3, 3]]) / (wheels.mu * wheels.load)
     return float(np.abs(shares[:, 0]).max()) if np.abs(shares[:, 1]).min() > 1e-3 else np.inf
 
 
-def too_long(implementation: str, folder: Path) -> float:
-    """Case: a step of 1 ms at 0.1 m/s, explicit or implicit without slopes of the contact forces, which must be
-    refused."""
+def too_long_step(implementation: str, folder: Path) -> float:
+    """Case: a step of 1 ms at 0.1 m/s, explicit or implicit without slopes of the contact forces, which must be refused
+    or fail. Error: infinite if it does not."""
     wheels = Wheels(1, speed=0.1)
     start = (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
     if implementation == "exudyn":
@@ -107,9 +109,9 @@ def too_long(implementation: str, folder: Path) -> float:
     return np.inf
 
 
-def jumping(implementation: str, folder: Path) -> float:
-    """Error of the energy balance of a wheelset whose contacts open and close, divided by the energy that creep
-    dissipates."""
+def patch_jump_energy_error(implementation: str, folder: Path) -> float:
+    """Case: a wheelset whose contacts open and close. Error: that of its energy balance divided by the energy that
+    creep dissipates."""
     equations = built_wheelset(implementation, CHOSEN_WHEELSET.changed(profiles=Profiles()), 30.0)
     motion = equations.run(displaced_state(equations, Y=3e-3, Y_RATE=0.2), 0.03, 1e-4)
     carries = motion.contacts["load"] > 0.0
@@ -119,8 +121,8 @@ def jumping(implementation: str, folder: Path) -> float:
     return float(np.abs(book.residual).max() / book.creep[-1])
 
 
-def drive(implementation: str, handling: Handling, speed: float, duration: float, step: float) -> Drive:
-    """A run of the car."""
+def car_run(implementation: str, handling: Handling, speed: float, duration: float, step: float) -> Drive:
+    """Run of a car on its tyres in an implementation, from a speed (m/s); duration and step in s."""
     if implementation != "reference":
         return drive_run(implementation, handling, speed, duration, step)
     model, start = build("mujoco", handling), handling.straight(speed)
@@ -128,13 +130,13 @@ def drive(implementation: str, handling: Handling, speed: float, duration: float
     return read_run(handling, Trajectory(step * np.arange(len(states)), states))
 
 
-def is_wrong(run: Drive) -> bool:
-    """Whether a contact gains energy, or its force exceeds mu N."""
+def violates_friction(run: Drive) -> bool:
+    """Whether a tyre contact of a run gains energy, or its force exceeds mu N."""
     force = np.hypot(run["fx"], run["fy"])
     return bool(run["power"].max() > 0.0 or (force > run.grip() * (1.0 + 1e-9)).any())
 
 
-def left_open(run: Drive) -> float:
+def energy_balance_error(run: Drive) -> float:
     """Error of the energy balance over a run with equal steps, divided by the initial energy."""
     run_times, ends = run.run.times, [0, -1]
     run_ends = Trajectory(run_times[ends], run.run.states[ends])
@@ -142,42 +144,44 @@ def left_open(run: Drive) -> float:
     return float(abs(last_energy - first_energy - simpson(run.power(), x=run_times)) / first_energy)
 
 
-def leaping(implementation: str, folder: Path) -> float:
-    """Case: a car leaves a ramp with all wheels and lands. Error: that of its energy balance."""
-    run = drive(implementation, Handling(R19, Tyres(cells=7), waves=RAMP), 25.0, 0.5, 5e-4)
+def ramp_jump_error(implementation: str, folder: Path) -> float:
+    """Case: a car leaves a ramp with all wheels and lands. Error: that of its energy balance divided by the initial
+    energy."""
+    run = car_run(implementation, Handling(R19, Tyres(cells=7), waves=RAMP), 25.0, 0.5, 5e-4)
     loads = run["load"]
     in_air = (loads == 0.0).all(axis=1)
-    if is_wrong(run) or not in_air.any() or (loads[-1] == 0.0).any():
+    if violates_friction(run) or not in_air.any() or (loads[-1] == 0.0).any():
         return np.inf
-    return left_open(run)
+    return energy_balance_error(run)
 
 
-def parked(implementation: str, folder: Path) -> float:
+def creep_when_parked(implementation: str, folder: Path) -> float:
     """Case: a car parked on a slope with locked wheels. Error: its mean speed (m/s) after the first swing."""
-    run = drive(implementation, Handling(R19, LOCKED, slope=0.1), 0.0, 0.05, 1e-4)
-    return np.inf if is_wrong(run) else float(np.abs(run["slip_x"][-250:].mean(axis=0)).max())
+    run = car_run(implementation, Handling(R19, LOCKED, slope=0.1), 0.0, 0.05, 1e-4)
+    return np.inf if violates_friction(run) else float(np.abs(run["slip_x"][-250:].mean(axis=0)).max())
 
 
-def locked(implementation: str, folder: Path) -> float:
-    """Error of the force on locked wheels, divided by mu N; it should be mu N against the sliding."""
-    run = drive(implementation, Handling(R19, LOCKED), 15.0, 0.03, 1e-3)
+def locked_wheel_error(implementation: str, folder: Path) -> float:
+    """Case: a car with locked wheels. Error: relative difference of the tyre forces from mu N against the sliding."""
+    run = car_run(implementation, Handling(R19, LOCKED), 15.0, 0.03, 1e-3)
     return float(np.abs(run["fx"] / run.grip() + 1.0).max())
 
 
-def back(implementation: str, folder: Path) -> float:
-    """Case: a car rolls up a slope, stops and rolls back. Error: that of its energy balance."""
-    run = drive(implementation, Handling(R19, Tyres(cells=7), slope=0.3), 0.005, 0.006, 4e-5)
+def roll_back_error(implementation: str, folder: Path) -> float:
+    """Case: a car rolls up a slope, stops and rolls back. Error: that of its energy balance divided by the initial
+    energy."""
+    run = car_run(implementation, Handling(R19, Tyres(cells=7), slope=0.3), 0.005, 0.006, 4e-5)
     forward_speed = run.velocity()[:, 0]
-    if is_wrong(run) or not forward_speed[0] > 0.0 > forward_speed[-1]:
+    if violates_friction(run) or not forward_speed[0] > 0.0 > forward_speed[-1]:
         return np.inf
-    return left_open(run)
+    return energy_balance_error(run)
 
 
 Error = Callable[[str, Path], float]
 RIG: tuple[tuple[str, str, Error], ...] = (
-    ("rig with friction of 1e-6", "next to nothing holds", partial(bounded, mu=1e-6)),
-    ("rig with friction of 1", "all that can hold", partial(bounded, mu=1.0)),
-    ("rig with a load of a micronewton", "patches of micrometres", partial(bounded, load=1e-6)),
+    ("rig with friction of 1e-6", "next to nothing holds", partial(friction_excess, mu=1e-6)),
+    ("rig with friction of 1", "all that can hold", partial(friction_excess, mu=1.0)),
+    ("rig with a load of a micronewton", "patches of micrometres", partial(friction_excess, load=1e-6)),
 )
 CASES = (
     *(
@@ -191,10 +195,16 @@ CASES = (
         "mu N",
         1e-5,
         "slope times 2e-9 m/s",
-        jumps,
+        reversal_force_jump,
     ),
     Case(
-        "rig that only spins", "no creepage", "no force along the rail, some across", "mu N", 1e-9, "rounding", spinning
+        "rig that only spins",
+        "no creepage",
+        "no force along the rail, some across",
+        "mu N",
+        1e-9,
+        "rounding",
+        spin_force,
     ),
     Case(
         "rig at 0.1 m/s in steps of 1 ms",
@@ -203,7 +213,7 @@ CASES = (
         "",
         0.0,
         "exact",
-        too_long,
+        too_long_step,
         {"reference": "refused", "mujoco": "refused", "exudyn": "raised"},
     ),
     Case(
@@ -213,7 +223,7 @@ CASES = (
         "of creep's",
         1e-3,
         "error of the step",
-        jumping,
+        patch_jump_energy_error,
     ),
     Case(
         "car off a ramp",
@@ -222,12 +232,26 @@ CASES = (
         "of it",
         1e-6,
         "error of the step",
-        leaping,
+        ramp_jump_error,
     ),
     Case(
-        "car parked on a slope", "creepage by no speed", "creeps by less than 1 mm/s", "m/s", 1e-3, "asked for", parked
+        "car parked on a slope",
+        "creepage by no speed",
+        "creeps by less than 1 mm/s",
+        "m/s",
+        1e-3,
+        "asked for",
+        creep_when_parked,
     ),
-    Case("car with locked wheels", "all bristles slide", "mu N against the sliding", "mu N", 1e-9, "rounding", locked),
+    Case(
+        "car with locked wheels",
+        "all bristles slide",
+        "mu N against the sliding",
+        "mu N",
+        1e-9,
+        "rounding",
+        locked_wheel_error,
+    ),
     Case(
         "car that rolls back",
         "tyres' speed passes 0",
@@ -235,6 +259,6 @@ CASES = (
         "of it",
         1e-6,
         "error of the step",
-        back,
+        roll_back_error,
     ),
 )

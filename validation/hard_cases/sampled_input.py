@@ -1,4 +1,4 @@
-"""Sampled input: which sample is read when, held against linear, roads with kinks, damaged files."""
+"""Hard cases of sampled input: which sample is read when, held against linear, roads with kinks, damaged files."""
 
 import math
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ from validation.hard_cases.setups import (
 
 
 def momentum_error(engine: str, interpolation: str, values: np.ndarray, sample_period: float, step: float) -> float:
-    """Error of the momentum sum m z' against the exact impulse of the forces, divided by the largest impulse."""
+    """Error of the momentum sum m z' against the exact impulse of the wheel forces, divided by the largest impulse."""
     base = vehicle("asymmetric_twin")
     forces = Sampled(values, sample_period, held=interpolation == "held")
     steps = round((len(values) - 1) * sample_period / step)
@@ -46,19 +46,20 @@ def momentum_error(engine: str, interpolation: str, values: np.ndarray, sample_p
     masses = np.array([p.m1, p.m2, p.m3])
     total = values.sum(axis=1)
     impulse_so_far = np.concatenate(([0.0], np.cumsum(total[:-1] * sample_period)))
-    impulse = impulse_so_far if forces.held else impulse_so_far + sample_period * (total - total[0]) / 2
-    truth = masses.sum() * p.g * sample_period * np.arange(len(values)) - impulse
-    return largest_magnitude(path.states[::stride, 4:7] @ masses - truth) / largest_magnitude(impulse)
+    noise_impulse_error = impulse_so_far if forces.held else impulse_so_far + sample_period * (total - total[0]) / 2
+    truth = masses.sum() * p.g * sample_period * np.arange(len(values)) - noise_impulse_error
+    return largest_magnitude(path.states[::stride, 4:7] @ masses - truth) / largest_magnitude(noise_impulse_error)
 
 
-def ramp(engine: str, folder: Path) -> float:
-    """Case: forces that rise by 1 N per sample, so that a sample read too early or too late is seen."""
+def ramp_momentum_error(engine: str, folder: Path) -> float:
+    """Case: forces that rise by 1 N per sample, so that a wrong sample shows. Error: that of ``momentum_error``."""
     values = np.add.outer(np.arange(1001.0), np.array([0.0, 100.0]))
     return max(momentum_error(engine, "held", values, period, period) for period in (1e-3, 2e-3))
 
 
 def ramp_naive(folder: Path) -> str:
-    """Without the remedy: share of steps that read the wrong sample if the accumulated time is truncated."""
+    """Result without the remedy, as text: share of steps that read the wrong sample if the accumulated time is
+    truncated."""
     shares = []
     for step in (1e-3, 2e-3, 5.5e-3):
         accumulated_times = np.cumsum(np.full(2000, step)) - step
@@ -70,14 +71,14 @@ def ramp_naive(folder: Path) -> str:
     )
 
 
-def impulse(engine: str, folder: Path) -> float:
-    """Case: force noise, held and interpolated, with two steps per sample. Error: that of the impulse sum f dt."""
+def noise_impulse_error(engine: str, folder: Path) -> float:
+    """Case: force noise, held and interpolated, in two steps per sample. Error: that of ``momentum_error``."""
     values = 3800.0 + 800.0 * np.random.default_rng(3).standard_normal((251, 2))
     return max(momentum_error(engine, rule, values, 2e-3, 1e-3) for rule in ("held", "linear"))
 
 
 def impulse_naive(folder: Path) -> str:
-    """Difference of the pitch between both interpolations of an impulse."""
+    """Difference of the final pitch between held and linearly interpolated forces, as text."""
     base = vehicle()
     values = static_forces(base, 1002, 2e-3, noise=800.0).values
     ends = [
@@ -87,9 +88,9 @@ def impulse_naive(folder: Path) -> str:
     return f"held and linear end {abs(ends[0] - ends[1]) / abs(ends[0]):.1%} apart in pitch: half a sample of shift"
 
 
-def halved(engine: str, folder: Path) -> float:
-    """Case: held noise sampled every 2 ms, in steps of 1 and 0.5 ms. Error: difference from the matrix exponential on
-    the samples."""
+def halving_ratio(engine: str, folder: Path) -> float:
+    """Case: held noise sampled every 2 ms, in steps of 1 and 0.5 ms. Error: error of the finer steps, against the
+    matrix exponential, divided by that of the coarser."""
     base = vehicle(geometry="linear")
     forces = static_forces(base, 250, 2e-3, noise=500.0)
     truth = exact_states(setups.driven_by_forces(base, forces), 2e-3, 250, forces.values)
@@ -98,22 +99,22 @@ def halved(engine: str, folder: Path) -> float:
 
 
 @dataclass(frozen=True)
-class ByTime(Sampled):
-    """Faulty held samples: every stage reads the sample at its own time, so that the last stage of a step reads the
-    next sample."""
+class StageTimeSamples(Sampled):
+    """Faulty held samples: every stage reads the sample at its time, so that the last stage of a step reads the next
+    sample."""
 
     def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
-        """Values at start_time + i step."""
+        """Values (sample_count, channels) of the samples at start_time + i step."""
         periods = (start_time + step * np.arange(sample_count)) / self.period
         return self.values[np.floor(periods + SNAP_SHARE).astype(int).clip(0, len(self.values) - 1)]
 
 
-def halved_naive(folder: Path) -> str:
-    """Without the remedy: pitch under a force that is read at the time of each stage."""
+def halving_naive(folder: Path) -> str:
+    """Result without the remedy, as text: pitch under a force that is read at the time of each stage."""
     base = vehicle(geometry="linear")
     values = static_forces(base, 251, 2e-3, noise=500.0).values
     truth = exact_states(setups.driven_by_forces(base, Sampled(values, 2e-3, True)), 2e-3, 250, values[:250])
-    forces = ByTime(values, 2e-3, held=False)
+    forces = StageTimeSamples(values, 2e-3, held=False)
     errors = [
         largest_magnitude(
             run("reference", setups.driven_by_forces(base, forces), h, 0.5).states[:: round(2e-3 / h)] - truth
@@ -125,13 +126,13 @@ def halved_naive(folder: Path) -> str:
 
 @cache
 def _profile_points() -> tuple[np.ndarray, np.ndarray]:
-    """Profile points of a smooth road every 0.237 m, none of which falls on a step."""
+    """Positions and heights (m) of a smooth road every 0.237 m, none of which falls on a step."""
     s = 0.237 * np.arange(-20, 100)
     rise = np.clip(s / 3.0, 0, 1) ** 3
     return s, -0.02 * rise * np.sin(1.7 * s) - 0.004 * rise * np.sin(7.1 * s)
 
 
-def order(engine: str, profile: SplineProfile) -> float:
+def observed_order(engine: str, profile: SplineProfile) -> float:
     """Observed order of convergence over steps of 2, 1 and 0.5 ms, from the largest state differences over 1 s."""
     base = vehicle()
     road = base.with_input("road", RoadUnderWheels(profile, 20.0, 2.0))
@@ -140,19 +141,19 @@ def order(engine: str, profile: SplineProfile) -> float:
     return float(np.log2(largest_magnitude(first) / largest_magnitude(second)))
 
 
-def c2_road(engine: str, folder: Path) -> float:
-    """Observed order on a road that is a C2 spline through the points."""
-    return max(0.0, 4.0 - order(engine, SplineProfile.through(*_profile_points())))
+def orders_lost(engine: str, folder: Path) -> float:
+    """Case: a road that is a C2 spline through its points. Error: 4 minus the observed order of convergence."""
+    return max(0.0, 4.0 - observed_order(engine, SplineProfile.through(*_profile_points())))
 
 
 def polyline_naive(folder: Path) -> str:
-    """Without the remedy: observed order on straight lines through the points."""
-    observed = order("reference", PolylineProfile.through(*_profile_points()))
+    """Result without the remedy, as text: observed order on straight lines through the points."""
+    observed = observed_order("reference", PolylineProfile.through(*_profile_points()))
     return f"straight lines through the same points: order {observed:.1f}"
 
 
-def noise_adaptive(engine: str, folder: Path) -> float:
-    """Case: an adaptive solver with held noise must restart at each sample, or be refused."""
+def adaptive_noise_error(engine: str, folder: Path) -> float:
+    """Case: an adaptive solver on held noise must restart at each sample, or be refused. Error: that of the states."""
     name = {"reference": "DOP853"}.get(engine, "DOPRI5")
     build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
     base = vehicle(geometry="linear")
@@ -164,7 +165,7 @@ def noise_adaptive(engine: str, folder: Path) -> float:
 
 
 def noise_adaptive_naive(folder: Path) -> str:
-    """Without the remedy: error of scipy's RK45 that integrates across the jumps of noisy forces."""
+    """Result without the remedy, as text: error of scipy's RK45 that integrates across the jumps of noisy forces."""
     base = vehicle(geometry="linear")
     forces = static_forces(base, 200, 1e-3, noise=500.0)
     driven = setups.driven_by_forces(base, forces)
@@ -180,8 +181,8 @@ def noise_adaptive_naive(folder: Path) -> str:
     return f"RK45 straight across the jumps: {solution.nfev} force calls for 200 samples, error {error:.0e}"
 
 
-def damaged(engine: str, folder: Path) -> float:
-    """Case: the 58th sample of a force file is NaN; the message must name its line."""
+def damaged_file(engine: str, folder: Path) -> float:
+    """Case: the 58th sample of a force file is NaN; it must be refused with its line. Error: largest state."""
     values = np.full(301, 3825.9)
     values[57] = np.nan
     write_time_series(folder / "forces.csv", {"front": ("N", values), "rear": ("N", values)}, 1e-3)
@@ -203,15 +204,15 @@ def damaged(engine: str, folder: Path) -> float:
 
 
 def damaged_past_reader(engine: str, folder: Path) -> float:
-    """Case: a NaN is passed around the file reader; the guard after the run must see it."""
+    """Case: a NaN bypasses the file reader; the guard after the run must raise. Error: largest state."""
     base = vehicle()
     forces = static_forces(base, 200, 1e-3)
     forces.values[57, 0] = np.nan
     return largest_magnitude(run(engine, setups.driven_by_forces(base, forces), 1e-3, 0.2).states)
 
 
-def uneven(engine: str, folder: Path) -> float:
-    """Case: steps of 0.7 ms with samples every 1 ms."""
+def uneven_steps(engine: str, folder: Path) -> float:
+    """Case: steps of 0.7 ms with samples every 1 ms must be refused. Error: largest state."""
     base = vehicle()
     forces = static_forces(base, 211, 1e-3, noise=500.0)
     return largest_magnitude(run(engine, setups.driven_by_forces(base, forces), 0.7e-3, 0.21).states)
@@ -225,9 +226,9 @@ def _road_with_bump() -> RoadUnderWheels:
     return RoadUnderWheels(run_in(SplineProfile.through(station, height, "bump")), 20.0, 2.0)
 
 
-def bump(engine: str, folder: Path) -> float:
-    """Case: an adaptive solver, after ten seconds of flat road, must not step over the bump (MuJoCo has no adaptive
-    solver)."""
+def bump_error(engine: str, folder: Path) -> float:
+    """Case: an adaptive solver, after ten seconds of flat road, must not step over a bump (MuJoCo has no adaptive
+    solver). Error: relative difference of the largest pitch."""
     name = {"reference": "LSODA", "exudyn": "DOPRI5", "mujoco": "RK4"}[engine]
     assembly = vehicle().with_input("road", _road_with_bump())
     path = run(engine, assembly, 1e-3, 10.5, name)
@@ -236,7 +237,7 @@ def bump(engine: str, folder: Path) -> float:
 
 
 def bump_naive(folder: Path) -> str:
-    """Without the remedy: the bump by scipy's LSODA with default settings."""
+    """Result without the remedy, as text: the bump by scipy's LSODA with default settings."""
     assembly = vehicle().with_input("road", _road_with_bump())
     model = build("reference", assembly, settings("reference", 5e-4, 10.5))
     solution = solve_ivp(
@@ -247,11 +248,11 @@ def bump_naive(folder: Path) -> str:
         rtol=1e-6,
         atol=1e-9,
     )
-    return f"LSODA ends 'successfully' after {len(solution.t) - 1} steps with a pitch of {largest_pitch(solution.y)}"
+    return f"LSODA ends 'successfully' after {len(solution.t) - 1} steps with a pitch of {pitch_text(solution.y)}"
 
 
-def largest_pitch(states: np.ndarray) -> str:
-    """Text with the largest pitch of states (8, n)."""
+def pitch_text(states: np.ndarray) -> str:
+    """Text with the largest pitch (rad) of states (8, n)."""
     return f"{np.abs(states[3]).max():.0e} rad"
 
 
@@ -264,9 +265,10 @@ def _over_waves(engine: str, step: float, error: bool = False) -> Result:
     return run_away(build_scene({"title": "", "vehicle": damped, "run": run, "effects": road}), engine, error)
 
 
-def passed_over(engine: str, folder: Path) -> float:
-    """Case: the study road at 560 m/s in steps of 2 ms, or 1.1 m. Error: ratio of the true to the stated error.
-    Infinite unless this error is a warning, and the steps that the warnings name lead to a run without one."""
+def passed_waves_ratio(engine: str, folder: Path) -> float:
+    """Case: the study road at 560 m/s in steps of 2 ms, or 1.1 m. Error: true error divided by the stated error;
+    infinite unless the stated error is a warning, and the steps that the warnings name lead to a run without a
+    warning."""
     stated_run = _over_waves(engine, 2e-3, error=True)
     name, estimate = max(errors_of(stated_run).items(), key=lambda each: each[1].share)
     cured: Estimate | None = estimate
@@ -278,8 +280,9 @@ def passed_over(engine: str, folder: Path) -> float:
     return float(np.sqrt(np.mean(error_of_values**2))) / estimate.error
 
 
-def passed_over_naive(folder: Path) -> str:
-    """Without the guard: error of a run whose steps miss waves of the road, against steps that resolve every wave."""
+def passed_waves_naive(folder: Path) -> str:
+    """Result without the guard, as text: error of a run whose steps miss waves of the road, against steps that resolve
+    every wave."""
     ends = [_over_waves("reference", step)["z1_rate"][-1] for step in (2e-3, 1e-4)]
     return f"without its error the front wheel ends at {ends[0]:.2f} m/s, in steps of 0.1 ms at {ends[1]:.2f} m/s"
 
@@ -292,7 +295,7 @@ CASES = (
         "of the impulse",
         1e-12,
         "a thousand additions of doubles",
-        ramp,
+        ramp_momentum_error,
         {},
         ramp_naive,
     ),
@@ -303,7 +306,7 @@ CASES = (
         "of the impulse",
         1e-12,
         "a thousand additions of doubles",
-        impulse,
+        noise_impulse_error,
         {},
         impulse_naive,
     ),
@@ -314,9 +317,9 @@ CASES = (
         "of the error at the double step",
         0.1,
         "order 4 gives 1/16; a force that is looked up per stage gives 1/2",
-        halved,
+        halving_ratio,
         {},
-        halved_naive,
+        halving_naive,
     ),
     Case(
         "measured road between its points",
@@ -325,10 +328,10 @@ CASES = (
         "orders lost",
         0.5,
         "the third derivative still jumps at each point",
-        c2_road,
+        orders_lost,
         {},
         polyline_naive,
-        against="none",
+        answer_independence="none",
     ),
     Case(
         "adaptive solver on held noise",
@@ -337,7 +340,7 @@ CASES = (
         "m, rad, m/s, rad/s",
         1e-6,
         "tolerance 1e-9, restarted at each sample",
-        noise_adaptive,
+        adaptive_noise_error,
         {"exudyn": "refused", "mujoco": "refused"},
         noise_adaptive_naive,
     ),
@@ -348,7 +351,7 @@ CASES = (
         "of it",
         1e-2,
         "rows of an adaptive run miss the very peak; a bump that is missed is off by 1",
-        bump,
+        bump_error,
         {},
         bump_naive,
     ),
@@ -359,7 +362,7 @@ CASES = (
         "",
         0.0,
         "there is no answer",
-        damaged,
+        damaged_file,
         REFUSED,
     ),
     Case(
@@ -379,7 +382,7 @@ CASES = (
         "",
         0.0,
         "there is no answer",
-        uneven,
+        uneven_steps,
         REFUSED,
     ),
     Case(
@@ -389,8 +392,8 @@ CASES = (
         "of the error told",
         3.0,
         "an estimate by longer steps may be so wrong",
-        passed_over,
+        passed_waves_ratio,
         {},
-        passed_over_naive,
+        passed_waves_naive,
     ),
 )

@@ -1,4 +1,4 @@
-"""Vehicles, inputs and exact answers that the hard cases share."""
+"""Vehicles, inputs and exact solutions that the hard cases share."""
 
 from dataclasses import replace
 from typing import Any
@@ -15,14 +15,14 @@ from models.engines.protocol import unchecked as build_unchecked
 from models.engines.stability import first_order, linearised
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
-from validation.hard_cases.case import IMPLEMENTATIONS, Word
+from validation.hard_cases.case import IMPLEMENTATIONS, OutcomeWord
 
 IMPLICIT_INTEGRATORS = {"reference": "Radau", "exudyn": "GeneralizedAlpha", "mujoco": "discrete"}
-"""For each implementation an integrator that no step makes unstable."""
+"""Implementation -> integrator that is stable at every step."""
 CONSTRAINED_INTEGRATORS = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
-REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
-RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
-"""In every implementation."""
+REFUSED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+RAISED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "raised")
+"""Expected outcomes: refused, or raised, in every implementation."""
 
 
 def vehicle(
@@ -32,7 +32,7 @@ def vehicle(
     effects: dict[str, Any] | None = None,
     **override: float,
 ) -> Assembly:
-    """The vehicle on a flat road, at rest or in a given state (8,)."""
+    """The pitch-plane vehicle on a flat road, at rest or in an initial state (8,)."""
     scene = build_scene(
         {
             "title": "hard case",
@@ -46,12 +46,12 @@ def vehicle(
 
 
 def driven_by_forces(base_assembly: Assembly, forces: Signal, drive_mode: Mode = "force") -> Assembly:
-    """The vehicle without its road, driven by two wheel forces (N)."""
+    """The vehicle without its road, under two wheel forces (N)."""
     return base_assembly.without_tyres().with_input(drive_mode, forces)
 
 
 def guided_vehicle(base_assembly: Assembly, forces: Signal, pitch: Signal) -> Assembly:
-    """The vehicle driven by forces, with a prescribed pitch signal that has two derivatives; its start is
+    """The vehicle under wheel forces, with a prescribed pitch signal that has two derivatives; its initial state is
     consistent."""
     start = base_assembly.initial.copy()
     start[[3, 7]] = pitch.at(0.0)[:2]
@@ -59,7 +59,7 @@ def guided_vehicle(base_assembly: Assembly, forces: Signal, pitch: Signal) -> As
 
 
 def smooth_pitch(angles: np.ndarray, sample_period: float) -> Smooth:
-    """Pitch samples (rad) in the form in which a scene reads them: a quintic spline with two derivatives."""
+    """Pitch samples (rad) as the signal that a scene makes of them: a quintic spline with two derivatives."""
     return Smooth(angles[:, None], sample_period, derivatives=2, degree=5)
 
 
@@ -71,7 +71,8 @@ def static_forces(
     noise: float = 0.0,
     seed: int = 1,
 ) -> Sampled:
-    """Wheel forces (N) that carry the vehicle, with independent noise of a standard deviation (N) on each sample."""
+    """Wheel forces (sample_count, 2) in N that carry the vehicle, with independent noise of a standard deviation (N) on
+    each sample."""
     p, z = base_assembly.parameters, base_assembly.initial
     carried = np.array([p.k1 * z[0], p.k2 * z[1]])
     return Sampled(
@@ -80,33 +81,33 @@ def static_forces(
 
 
 def settings(engine: str, step: float, duration: float, integrator: str = "", **options: float) -> Settings:
-    """Settings of a run; the recommended integrator is the default."""
+    """Settings of a run in an engine; the recommended integrator is the default; step and duration in s."""
     return Settings(integrator or RECOMMENDED[engine], step, duration, **options)
 
 
 def run(
     engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **options: float
 ) -> Trajectory:
-    """A run with all checks that a user's run has, so that it may be refused."""
+    """Trajectory of a run with all checks that a user's run has, so that it may be refused."""
     return build(engine, assembly, settings(engine, step, duration, integrator, **options)).run()
 
 
 def unchecked_run(
     engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **options: float
 ) -> Trajectory:
-    """A run without the checks before it; only the guard after the run is active."""
+    """Trajectory of a run without the checks before it; only the guard after the run is active."""
     engine_settings = settings(engine, step, duration, integrator, **options)
     return build_unchecked(engine, assembly, engine_settings).run()
 
 
 def tight_solution(assembly: Assembly, step: float, duration: float) -> Trajectory:
-    """Independent solution of the paper's equations by order 8 at a relative tolerance of 1e-12, with rows every
+    """Independent trajectory by the paper's equations with order 8 at a relative tolerance of 1e-12, with rows every
     ``step`` (s)."""
     return run("reference", assembly, step, duration, "DOP853", tolerance=1e-12)
 
 
 def exact_states(assembly: Assembly, step: float, step_count: int, forces: np.ndarray | None = None) -> np.ndarray:
-    """Exact states (count + 1, 8) of the linearised vehicle, by the matrix exponential.
+    """Exact states (step_count + 1, 8) of the linearised vehicle, by the matrix exponential.
 
     forces (step_count, 2) in N are held over each step; None is the vehicle on the flat road.
     """
@@ -126,7 +127,7 @@ def exact_states(assembly: Assembly, step: float, step_count: int, forces: np.nd
 
 
 def exact_decay(assembly: Assembly, times: np.ndarray) -> np.ndarray:
-    """Exact states (n, 8) of the linearised vehicle on a flat road at any times (n,) in s."""
+    """Exact states (n, 8) of the linearised vehicle on a flat road, at any times (n,) in s."""
     poles, shapes = np.linalg.eig(first_order(linearised(assembly.vehicle)))
     rest_state = vehicle(geometry="linear").initial
     shares = np.linalg.solve(shapes, assembly.initial - rest_state)
@@ -134,10 +135,10 @@ def exact_decay(assembly: Assembly, times: np.ndarray) -> np.ndarray:
 
 
 def largest_magnitude(difference: np.ndarray) -> float:
-    """Largest magnitude of any entry."""
+    """Largest magnitude of an array's entries."""
     return float(np.abs(difference).max())
 
 
 def root_mean_square(values: np.ndarray) -> float:
-    """Root of the mean square."""
+    """Root mean square of an array's entries."""
     return float(np.sqrt(np.mean(np.square(values))))

@@ -1,4 +1,5 @@
-"""Stabilisers: a law with a kink, a moment beside held forces, what a prescribed motion reveals, and its data."""
+"""Hard cases of stabilisers: a pitch spring with a kink, an added moment with held forces, prescribed heave and
+pitch."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -34,12 +35,13 @@ from validation.hard_cases.setups import (
 
 STEP, DURATION = 1e-3, 0.5
 DEAD_BAND, STIFFNESS = 0.02, 1e5
-"""rad, N m/rad: the pitch crosses the band in 0.1 s and turns round within 0.1 s."""
+"""Dead band (rad) and stiffness (N m/rad) of the pitch spring; the pitch crosses the band in 0.1 s and turns round
+within 0.1 s."""
 NOISE = 1e-6
 
 
-def sprung(band: float) -> Assembly:
-    """The vehicle under its weight, rotating at 0.4 rad/s, with a pitch spring that has a dead band (rad)."""
+def vehicle_with_pitch_spring(band: float) -> Assembly:
+    """The vehicle under its weight, pitching at 0.4 rad/s, with a pitch spring that has a dead band (rad)."""
     base = vehicle("asymmetric_twin")
     start = base.initial.copy()
     start[7] = 0.4
@@ -48,21 +50,21 @@ def sprung(band: float) -> Assembly:
     return replace(assembly, initial=start, vehicle=replace(assembly.vehicle, pitch_springs=(spring,)))
 
 
-def kink(engine: str, folder: Path) -> float:
-    """Error of the pitch after many crossings of the dead band's edges."""
-    path = run(engine, sprung(DEAD_BAND), STEP, DURATION)
+def dead_band_edge_error(engine: str, folder: Path) -> float:
+    """Case: the pitch crosses the edges of a spring's dead band many times. Error: largest error of the pitch (rad)."""
+    path = run(engine, vehicle_with_pitch_spring(DEAD_BAND), STEP, DURATION)
     return largest_magnitude((path.states - _kink_truth().states)[:, 3])
 
 
 @cache
 def _kink_truth() -> Trajectory:
-    return tight_solution(sprung(DEAD_BAND), STEP, DURATION)
+    return tight_solution(vehicle_with_pitch_spring(DEAD_BAND), STEP, DURATION)
 
 
 def kink_naive(folder: Path) -> str:
-    """Without the remedy: error of Exudyn's limit stops in place of the force law."""
+    """Result without the remedy, as text: error of Exudyn's limit stops in place of the force law."""
     with mock.patch.object(exudyn_engine, "_pitch_spring", _limit_stop):
-        pitch_error = kink("exudyn", folder)
+        pitch_error = dead_band_edge_error("exudyn", folder)
     return f"Exudyn's limit stops, asked once per step: pitch off by {pitch_error:.1e} rad"
 
 
@@ -81,58 +83,59 @@ def _limit_stop(build: exudyn_engine.Build, spring: PitchSpring) -> None:
     )
 
 
-def never_left(engine: str, folder: Path) -> float:
-    """Case: a dead band wider than the motion. Error: difference from a run without the spring."""
-    tied = sprung(1.0)
+def wide_dead_band_error(engine: str, folder: Path) -> float:
+    """Case: a dead band wider than the motion. Error: difference of the states from a run without the spring."""
+    tied = vehicle_with_pitch_spring(1.0)
     free = replace(tied, vehicle=replace(tied.vehicle, pitch_springs=()))
     between, free_states = (run(engine, assembly, STEP, DURATION).states for assembly in (tied, free))
     return largest_magnitude(between - free_states)
 
 
-def beside_held(moment_held: bool = False) -> Assembly:
-    """The vehicle under held noisy forces and a moment of 2 kN m at 20 Hz, both sampled every 4 ms."""
+def vehicle_under_held_forces(moment_held: bool = False) -> Assembly:
+    """The vehicle under noisy forces that are constant over each sample and a moment of 2 kN m at 20 Hz, both sampled
+    every 4 ms."""
     base = vehicle("asymmetric_twin")
     assembly = driven_by_forces(base, static_forces(base, 126, 4e-3, noise=300.0))
     samples = 2e3 * np.sin(2 * np.pi * 20.0 * 4e-3 * np.arange(126))[:, None]
     return replace(assembly, moment=Sampled(samples, 4e-3, moment_held))
 
 
-def moving_moment(engine: str, folder: Path) -> float:
-    """Error of the pitch under held forces and a moment that is interpolated."""
-    path = run(engine, beside_held(), STEP, DURATION)
+def moving_moment_error(engine: str, folder: Path) -> float:
+    """Case: forces constant over each sample and an interpolated moment. Error: largest error of the pitch (rad)."""
+    path = run(engine, vehicle_under_held_forces(), STEP, DURATION)
     return largest_magnitude((path.states - _moving_truth().states)[:, 3])
 
 
 @cache
 def _moving_truth() -> Trajectory:
-    return tight_solution(beside_held(), STEP, DURATION)
+    return tight_solution(vehicle_under_held_forces(), STEP, DURATION)
 
 
 def moving_moment_naive(folder: Path) -> str:
-    """Without the remedy: error if the moment is held over a sample like the forces."""
-    path = unchecked_run("reference", beside_held(moment_held=True), STEP, DURATION)
+    """Result without the remedy, as text: error if the moment is held over a sample like the forces."""
+    path = unchecked_run("reference", vehicle_under_held_forces(moment_held=True), STEP, DURATION)
     return f"held as well: pitch off by {largest_magnitude((path.states - _moving_truth().states)[:, 3]):.1e} rad"
 
 
 def moment_off_the_grid(engine: str, folder: Path) -> float:
-    """Case: a moment sampled every 1.5 ms in a run with steps of 1 ms must be refused; returns 0 if it is not."""
+    """Case: a moment sampled every 1.5 ms in a run with steps of 1 ms must be refused."""
     moment = Sampled(np.zeros((400, 1)), 1.5e-3, held=False)
-    run(engine, replace(beside_held(), moment=moment), STEP, DURATION)
+    run(engine, replace(vehicle_under_held_forces(), moment=moment), STEP, DURATION)
     return 0.0
 
 
 @cache
 def _free_motion() -> np.ndarray:
-    """States every 0.25 ms of the vehicle under its weight, released from a tilted position."""
+    """States (n, 8) every 0.25 ms of the vehicle under its weight, released from a tilted position."""
     base = vehicle("asymmetric_twin")
     base.initial[[2, 3]] += 0.02, 0.05
     assembly = driven_by_forces(base, static_forces(vehicle("asymmetric_twin"), 2, DURATION, is_held=False))
     return tight_solution(assembly, 2.5e-4, DURATION).states
 
 
-def on_rails(noise: float = 0.0, mass: float = 1.0) -> Assembly:
-    """Assembly of a vehicle with prescribed heave and pitch. ``noise`` (m, rad) is added to the samples; the chassis'
-    mass is multiplied by ``mass``."""
+def guided_assembly(noise: float = 0.0, mass: float = 1.0) -> Assembly:
+    """The vehicle with prescribed heave and pitch. noise (m, rad) is added to the samples; the chassis' mass is
+    multiplied by ``mass``."""
     states = _free_motion()
     motion = states[:, 2:4] + noise * np.random.default_rng(7).standard_normal((len(states), 2))
     base = vehicle("asymmetric_twin")
@@ -147,36 +150,43 @@ def _guided_run(engine: str, assembly: Assembly) -> Trajectory:
     return run(engine, assembly, 2.5e-4, DURATION, CONSTRAINED_INTEGRATORS[engine])
 
 
-def missing_mass(engine: str, folder: Path) -> float:
-    """Mean stabilising force of a model whose chassis is 5 % too light, relative to 0.05 m3 (g - z3'')."""
+def missing_mass_error(engine: str, folder: Path) -> float:
+    """Case: a model whose chassis is 5 % too light. Error: relative difference of the mean stabilising force from 0.05
+    m3 (g - z3'')."""
     p, states = vehicle("asymmetric_twin").parameters, _free_motion()
-    force = _guided_run(engine, on_rails(mass=0.95)).force
+    force = _guided_run(engine, guided_assembly(mass=0.95)).force
     assert force is not None
     wanted = 0.05 * p.m3 * (p.g - (states[-1, 6] - states[0, 6]) / DURATION)
     return abs(float(force.mean()) / wanted - 1)
 
 
 def missing_mass_naive(folder: Path) -> str:
-    """Difference between the states of guided runs with the true and a wrong mass, as a sentence."""
-    states_of_true, states_of_wrong = (_guided_run("reference", on_rails(mass=mass)).states for mass in (1.0, 0.95))
+    """Difference between the states of guided runs with the true and a wrong mass, as text."""
+    states_of_true, states_of_wrong = (
+        _guided_run("reference", guided_assembly(mass=mass)).states for mass in (1.0, 0.95)
+    )
     return (
         f"the states of the guided run differ by {largest_magnitude(states_of_true - states_of_wrong):.1e}: "
         "only the force can tell"
     )
 
 
-def rough_rails(engine: str, folder: Path) -> float:
+def guided_noise_gain(engine: str, folder: Path) -> float:
     """Case: noise of 1e-6 m and rad on prescribed heave and pitch. Error: rms change of enforced force and moment,
     divided by the finite-difference values."""
     p = vehicle("asymmetric_twin").parameters
-    enforced, clean = (_guided_run(engine, on_rails(NOISE)).enforced, _guided_run("reference", on_rails()).enforced)
+    enforced, clean = (
+        _guided_run(engine, guided_assembly(NOISE)).enforced,
+        _guided_run("reference", guided_assembly()).enforced,
+    )
     assert enforced is not None and clean is not None
     sizes = np.array([p.m3, p.I]) * NOISE * np.sqrt(6) / 2.5e-4**2
     return float((np.sqrt(np.mean((enforced - clean) ** 2, axis=0)) / sizes).max())
 
 
 def measured_pitch(folder: Path, **values: float) -> Assembly:
-    """Write the files of a scene whose pitch is prescribed with the noise of an inertial unit: 0.1 degrees at 1 kHz."""
+    """Writes the files of a scene whose prescribed pitch has the noise of an inertial unit, 0.1 degrees at 1 kHz, and
+    returns its assembly."""
     t = STEP * np.arange(1001)
     noise = np.deg2rad(0.1) * np.random.default_rng(8).standard_normal(len(t))
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", 0.05 * np.sin(6.0 * t) + noise)}, STEP)
@@ -190,9 +200,9 @@ def measured_pitch(folder: Path, **values: float) -> Assembly:
     )
 
 
-def smoothed(engine: str, folder: Path) -> float:
-    """Case: a pitch smoothed to 5 Hz is prescribed. Error: difference of the enforced moment from the form in which the
-    pitch is eliminated, divided by its rms."""
+def smoothed_pitch_error(engine: str, folder: Path) -> float:
+    """Case: a pitch smoothed to 5 Hz is prescribed. Error: difference of the enforced moment from the solution in which
+    the pitch is eliminated, divided by its rms."""
     assembly = measured_pitch(folder, bandwidth=5.0)
     moment = run(engine, assembly, STEP, 1.0, CONSTRAINED_INTEGRATORS[engine]).moment
     true = run("reference", assembly, STEP / 8, 1.0).moment
@@ -201,7 +211,7 @@ def smoothed(engine: str, folder: Path) -> float:
 
 
 def smoothed_naive(folder: Path) -> str:
-    """Without the remedy: the noisy pitch is used without smoothing."""
+    """Result without the remedy, as text: the noisy pitch is used without smoothing."""
     raw = run("reference", measured_pitch(folder), STEP, 1.0).moment
     assert raw is not None
     return f"without a bandwidth the moment is {root_mean_square(raw):.1e} N m rms, and Exudyn's multiplier raises"
@@ -214,7 +224,7 @@ def beyond_nyquist(engine: str, folder: Path) -> float:
 
 
 def _refused_scene(effects: dict[str, Any]) -> Callable[[str, Path], float]:
-    """Case: a scene under wheel forces with these effects must be refused."""
+    """Case: a scene under wheel forces with the effects must be refused."""
 
     def error(engine: str, folder: Path) -> float:
         measured_pitch(folder)  # writes the files
@@ -234,10 +244,10 @@ CASES = (
         "rad",
         5e-7,
         "three crossings; what a step across an edge leaves falls as h^2 to h^3, from 2.3e-7 here",
-        kink,
+        dead_band_edge_error,
         {},
         kink_naive,
-        against="native",
+        answer_independence="native",
     ),
     Case(
         "dead band that is never left",
@@ -246,7 +256,7 @@ CASES = (
         "SI",
         0.0,
         "nothing added is nothing",
-        never_left,
+        wide_dead_band_error,
     ),
     Case(
         "added moment beside held forces",
@@ -255,10 +265,10 @@ CASES = (
         "rad",
         1e-7,
         "RK4's own error at 1 ms",
-        moving_moment,
+        moving_moment_error,
         {},
         moving_moment_naive,
-        against="native",
+        answer_independence="native",
     ),
     Case(
         "added moment sampled off the steps",
@@ -269,7 +279,7 @@ CASES = (
         "a corner within a step costs Runge-Kutta its order",
         moment_off_the_grid,
         REFUSED,
-        against="none",
+        answer_independence="none",
     ),
     Case(
         "5 % of the chassis missing",
@@ -278,7 +288,7 @@ CASES = (
         "of that force",
         1e-3,
         "generalised-alpha's start rings for 20 of 2,000 rows",
-        missing_mass,
+        missing_mass_error,
         {},
         missing_mass_naive,
     ),
@@ -289,9 +299,9 @@ CASES = (
         "m s sqrt(6) / dt^2",
         3.0,
         "the finite-difference value; the spline's own gain is below 3",
-        rough_rails,
+        guided_noise_gain,
         {"exudyn": "raised"},
-        against="native",
+        answer_independence="native",
     ),
     Case(
         "measured pitch, smoothed",
@@ -300,10 +310,10 @@ CASES = (
         "of its rms",
         1e-3,
         "second order at 5 Hz and 1 ms: (2 pi f h)^2 / 12 = 8e-5, and the start's rest",
-        smoothed,
+        smoothed_pitch_error,
         {},
         smoothed_naive,
-        against="native",
+        answer_independence="native",
     ),
     Case(
         "bandwidth above half the sampling rate",
@@ -314,7 +324,7 @@ CASES = (
         "the filter does not exist",
         beyond_nyquist,
         REFUSED,
-        against="none",
+        answer_independence="none",
     ),
     Case(
         "high-pass stiffer than the step",
@@ -325,7 +335,7 @@ CASES = (
         "an error would grow",
         _refused_scene({"high_pass": {"cut_off": 1000.0}}),
         REFUSED,
-        against="none",
+        answer_independence="none",
     ),
     Case(
         "spring beside a prescribed pitch",
@@ -336,6 +346,6 @@ CASES = (
         "a scene that says two things",
         _refused_scene({"pitch_spring": {"stiffness": 1e3}, "prescribed_pitch": {"file": "pitch.csv"}}),
         REFUSED,
-        against="none",
+        answer_independence="none",
     ),
 )

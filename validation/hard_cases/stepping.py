@@ -1,4 +1,5 @@
-"""Steps: at the edge of stability and beyond it, resets, sudden loads, repeats, restarts, adaptive stamps."""
+"""Hard cases of time steps: at and beyond the stability limit, resets, sudden loads, repeated and continued runs, times
+of adaptive runs."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -36,33 +37,36 @@ EULER = {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}
 
 
 def _displaced_vehicle(geometry: str = "linear"):
-    """The vehicle with one wheel displaced by 1 mm from equilibrium."""
+    """The vehicle with its front wheel displaced by 1 mm from equilibrium."""
     base = vehicle(geometry=geometry)
     return replace(base, initial=base.initial + np.array([1e-3, 0, 0, 0, 0, 0, 0, 0]))
 
 
-def inside_limit(engine: str, folder: Path) -> float:
-    """Case: RK4 with 300 steps of 3.9 ms, just inside the stability limit; the fastest mode must have decayed."""
+def inside_limit_error(engine: str, folder: Path) -> float:
+    """Case: RK4 with 300 steps of 3.9 ms, just inside the stability limit; the fastest mode must have decayed. Error:
+    difference of the final state from the exact one divided by the displacement."""
     assembly = _displaced_vehicle()
     path = run(engine, assembly, 3.9e-3, 1.17)
     return largest_magnitude(path.states[-1] - exact_states(assembly, 3.9e-3, 300)[-1]) / 1e-3
 
 
-def beyond_limit(engine: str, folder: Path) -> float:
-    """Case: RK4 with eight steps of 5 ms, beyond the stability limit, so that all values are still small and finite."""
+def beyond_limit_error(engine: str, folder: Path) -> float:
+    """Case: RK4 with eight steps of 5 ms, beyond the stability limit, so that all values are still small and finite; it
+    must be refused. Error: relative difference from the tight-tolerance solution."""
     assembly = vehicle(effects=ROAD)
     path = run(engine, assembly, 5e-3, 0.04)
     return _against_tight(assembly, path.states, 5e-3)
 
 
 def _against_tight(assembly, states, step: float) -> float:
-    """Largest difference of the states from the tight solution, divided by its largest displacement."""
+    """Largest difference of the states from the tight-tolerance solution, divided by the solution's largest
+    displacement."""
     truth = tight_solution(assembly, step, (len(states) - 1) * step).states
     return largest_magnitude(states - truth) / largest_magnitude(truth - truth[0])
 
 
 def beyond_limit_naive(folder: Path) -> str:
-    """Without the guard: the run beyond the stability limit."""
+    """Result without the guard, as text: the run beyond the stability limit."""
     assembly = vehicle(effects=ROAD)
     shares = [
         _against_tight(assembly, unchecked_run(engine, assembly, 5e-3, 0.04).states, 5e-3) for engine in IMPLEMENTATIONS
@@ -70,14 +74,15 @@ def beyond_limit_naive(folder: Path) -> str:
     return f"unchecked, all three answer, finite, off by {min(shares):.0%} to {max(shares):.0%} of the motion"
 
 
-def reset(engine: str, folder: Path) -> float:
-    """Case: RK4 at 8 ms with checks bypassed, so that only the guard after the run remains."""
+def reset_error(engine: str, folder: Path) -> float:
+    """Case: RK4 at 8 ms without the checks before the run, so that only the guard after the run remains. Error:
+    relative difference from the tight-tolerance solution."""
     assembly = vehicle(effects=ROAD)
     return _against_tight(assembly, unchecked_run(engine, assembly, 8e-3, 2.0).states, 8e-3)
 
 
 def reset_naive(folder: Path) -> str:
-    """Without the guard: MuJoCo resets the state, and its time starts again."""
+    """Result without the guard, as text: MuJoCo resets the state, and its time starts again."""
     model = mujoco_engine.MujocoModel(_displaced_vehicle("exact"), settings("mujoco", 8e-3, 2.0)).model
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     data = mujoco.MjData(model)
@@ -90,14 +95,15 @@ def reset_naive(folder: Path) -> str:
     return f"MuJoCo resets itself {resets} times, ends at t = {data.time:.3f} s of 2 s, all finite, no exception"
 
 
-def huge(engine: str, folder: Path) -> float:
-    """Case: a first-order explicit method at 5 ms with checks bypassed."""
+def huge_states_error(engine: str, folder: Path) -> float:
+    """Case: a first-order explicit method at 5 ms without the checks before the run. Error: relative difference from
+    the tight-tolerance solution."""
     assembly = vehicle(effects=ROAD)
     return _against_tight(assembly, unchecked_run(engine, assembly, 5e-3, 2.0, EULER[engine]).states, 5e-3)
 
 
 def huge_naive(folder: Path) -> str:
-    """Without the guard: Exudyn's own success flag, and the largest finite state."""
+    """Result without the guard, as text: Exudyn's own success flag, and the largest finite state."""
     assembly = vehicle(geometry="linear", initial=_displaced_vehicle().initial)
     model = exudyn_engine.build(assembly, settings("exudyn", 5e-3, 2.0, "ExplicitEuler"))
     flag = not solve(model.built.mbs, model.settings)
@@ -105,8 +111,9 @@ def huge_naive(folder: Path) -> str:
     return f"Exudyn returns {flag} with states of up to {largest_magnitude(states[np.isfinite(states)]):.0e}"
 
 
-def sudden(engine: str, folder: Path) -> float:
-    """Case: the front force rises by 1 kN from one sample to the next, in steps of 1 ms."""
+def sudden_load_error(engine: str, folder: Path) -> float:
+    """Case: the front force rises by 1 kN from one sample to the next, in steps of 1 ms. Error: difference of the
+    states from the exact ones divided by the largest wheel velocity."""
     assembly, forces = _step_force()
     path = run(engine, assembly, 1e-3, 0.2)
     truth = exact_states(assembly, 1e-3, 200, forces.sample(0.0, 1e-3, 200))
@@ -122,7 +129,7 @@ def _step_force():
 
 
 def sudden_naive(folder: Path) -> str:
-    """Without the remedy: generalised-alpha with a step that does not resolve the fast pole."""
+    """Result without the remedy, as text: generalised-alpha with a step that does not resolve the fast pole."""
     assembly, forces = _step_force()
     path = unchecked_run("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
     truth = exact_states(assembly, 10e-3, 20, forces.values)
@@ -133,7 +140,7 @@ def sudden_naive(folder: Path) -> str:
     )
 
 
-def repeat(engine: str, folder: Path) -> float:
+def repeated_run_difference(engine: str, folder: Path) -> float:
     """Case: a model is run twice, with an acceleration evaluated in between. Error: difference of the runs, which must
     be 0."""
     base = vehicle()
@@ -148,9 +155,9 @@ def repeat(engine: str, folder: Path) -> float:
     return worst
 
 
-def restart(engine: str, folder: Path) -> float:
-    """Case: a run is stopped at half its time and continued from the saved state. Error: difference from the
-    uninterrupted run."""
+def restart_difference(engine: str, folder: Path) -> float:
+    """Case: a run is stopped at half its time and continued from the saved state. Error: difference of the states from
+    the uninterrupted run."""
     base = vehicle()
     forces = static_forces(base, 400, 1e-3, noise=500.0)
     full_states = run(engine, driven_by_forces(base, forces), 1e-3, 0.4).states
@@ -160,8 +167,9 @@ def restart(engine: str, folder: Path) -> float:
     return largest_magnitude(run(engine, second_half, 1e-3, 0.2).states - full_states[200:])
 
 
-def stamps(engine: str, folder: Path) -> float:
-    """Error of an adaptive run, with each row compared at its own time."""
+def adaptive_time_error(engine: str, folder: Path) -> float:
+    """Case: an adaptive run, whose rows lie at other times than asked for. Error: difference of each row from the exact
+    state at its time."""
     name = {"reference": "DOP853"}.get(engine, "DOPRI5")
     build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
     assembly = _displaced_vehicle()
@@ -170,7 +178,7 @@ def stamps(engine: str, folder: Path) -> float:
 
 
 def stamps_naive(folder: Path) -> str:
-    """Without the remedy: error if row numbers are used as times."""
+    """Result without the remedy, as text: error if row numbers are used as times."""
     assembly = _displaced_vehicle()
     path = run("exudyn", assembly, 1e-3, 0.2, "DOPRI5")
     time_errors = np.abs(path.times - 1e-3 * np.arange(len(path.times)))
@@ -184,8 +192,9 @@ def stamps_naive(folder: Path) -> str:
 ORDERS = {"reference": 4.0, "exudyn": 2.0, "mujoco": 4.0}
 
 
-def keeps_order(engine: str, folder: Path) -> float:
-    """Amount by which the observed order falls below the declared one, over four halvings of a step of 2 ms."""
+def lost_order(engine: str, folder: Path) -> float:
+    """Case: four halvings of a step of 2 ms. Error: amount by which the observed order of convergence is below the
+    declared one."""
     base = vehicle("asymmetric_twin", "linear")
     base = replace(base, initial=base.initial - np.array([0, 0, 0.01, 0.02, 0, 0, 0, 0]))
     truth, errors = exact_states(base, 0.1, 2)[-1], []
@@ -203,7 +212,7 @@ CASES = (
         "of the push",
         1e-4,
         "the fast mode has shrunk by 0.87 per step; what is left is RK4's error of the slow ones",
-        inside_limit,
+        inside_limit_error,
     ),
     Case(
         "stiff damper, step just beyond the limit",
@@ -212,7 +221,7 @@ CASES = (
         "of the motion",
         0.1,
         "a tenth of the motion is no answer",
-        beyond_limit,
+        beyond_limit_error,
         REFUSED,
         beyond_limit_naive,
     ),
@@ -223,7 +232,7 @@ CASES = (
         "of the motion",
         0.1,
         "a tenth of the motion is no answer",
-        reset,
+        reset_error,
         RAISED,
         reset_naive,
     ),
@@ -234,7 +243,7 @@ CASES = (
         "of the motion",
         0.1,
         "a tenth of the motion is no answer",
-        huge,
+        huge_states_error,
         RAISED,
         huge_naive,
     ),
@@ -245,7 +254,7 @@ CASES = (
         "of the peak wheel velocity",
         5e-3,
         "RK4 at 1 ms meets the pole -691 1/s with h lambda = 0.7: (0.7)^5 / 120 = 1.4e-3 per step at the jump",
-        sudden,
+        sudden_load_error,
         {},
         sudden_naive,
     ),
@@ -256,8 +265,8 @@ CASES = (
         "m, rad, m/s, rad/s",
         0.0,
         "the same operations in the same order",
-        repeat,
-        against="none",
+        repeated_run_difference,
+        answer_independence="none",
     ),
     Case(
         "restart from a saved state",
@@ -266,8 +275,8 @@ CASES = (
         "m, rad, m/s, rad/s",
         1e-12,
         "times are counted anew: only rounding may differ",
-        restart,
-        against="none",
+        restart_difference,
+        answer_independence="none",
     ),
     Case(
         "adaptive output stamps",
@@ -276,7 +285,7 @@ CASES = (
         "m, rad, m/s, rad/s",
         1e-6,
         "tolerance 1e-9 per step; DOP853 reads its rows from a polynomial between steps, two digits worse",
-        stamps,
+        adaptive_time_error,
         {"mujoco": "refused"},
         stamps_naive,
     ),
@@ -287,6 +296,6 @@ CASES = (
         "by which the order falls short",
         0.25,
         "the first halvings still see the next order",
-        keeps_order,
+        lost_order,
     ),
 )

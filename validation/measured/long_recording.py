@@ -1,4 +1,5 @@
-"""A recording of any length with 60 channels: a virtual measurement repeated with soft seams, noise never twice."""
+"""A recording of any length with 60 channels: a short virtual measurement is repeated with gradual transitions, and its
+noise never repeats."""
 
 import subprocess
 import sys
@@ -21,7 +22,7 @@ from validation.common.peak_memory import peak_memory
 from validation.spatial.cars import r19
 
 SAMPLE_PERIOD, SEAM_SAMPLES, BLOCK = 1e-3, 1000, 60_000
-"""s; samples over which a repetition fades into the next; samples made at once."""
+"""Sampling period (s), number of samples in the transition between repetitions, number of samples made at a time."""
 SENSOR_PLACES = {
     "acc fl": (1.2, 0.6, 0.6),
     "acc fr": (1.2, -0.6, 0.6),
@@ -29,13 +30,14 @@ SENSOR_PLACES = {
     "acc roof": (0.0, 0.0, 1.4),
 }
 NOISE = {"force": 8.0, "moment": 1.0, "angle": 1.75e-3, "angular rate": 5e-3, "acceleration": 0.01, "travel": 1e-5}
-"""Standard deviations on every sample, SI."""
+"""Standard deviation of the noise on every sample, by quantity, in SI units."""
 SEED = 81
 
 
 @cache
 def repeated_pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
-    """Signals and their true samples (n, 60), for one repetition of the recording and the transition to the next."""
+    """Signals, and their samples without noise (n, 60): one repetition of the recording, with the transition to the
+    next one."""
     car = r19()
     names = [element.name for element in car.elements]
     table = VirtualTable(
@@ -50,7 +52,7 @@ def repeated_pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndar
 
 
 def sample_blocks(seconds: float, pattern_seconds: float = 20.0) -> Iterator[np.ndarray]:
-    """Samples (n, 60) of a recording of a length (s), one block after the other."""
+    """Samples (n, 60) of a recording of a given length (s), returned block by block."""
     signals, pattern = repeated_pattern(pattern_seconds)
     deviation = np.array([NOISE[signal.quantity] for signal in signals])
     length, count = len(pattern) - SEAM_SAMPLES, round(seconds / SAMPLE_PERIOD) + 1
@@ -66,8 +68,8 @@ def sample_blocks(seconds: float, pattern_seconds: float = 20.0) -> Iterator[np.
 
 
 def long_recording(seconds: float, path: Path, pattern_seconds: float = 20.0) -> Recording:
-    """The long recording as an object, with no files read or mapped. Its samples are at ``path``, and are made if they
-    are missing."""
+    """The long recording as an object, without any measurement files. Its samples are stored at ``path`` and are
+    created if they are missing."""
     signals, _ = repeated_pattern(pattern_seconds)
     columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / SAMPLE_PERIOD) + 1)
     for values in sample_blocks(seconds, pattern_seconds) if columns.done == 0 else ():
@@ -77,7 +79,7 @@ def long_recording(seconds: float, path: Path, pattern_seconds: float = 20.0) ->
 
 
 def recorded_sections() -> Sections:
-    """All sections in which forces are computed, and the positions of the accelerometers."""
+    """Sections of the car: forces are computed in all of them. Includes the positions of the accelerometers."""
     return Sections(
         r19(),
         points=tuple(
@@ -86,7 +88,7 @@ def recorded_sections() -> Sections:
     )
 
 
-def run_of(
+def section_run_of_recording(
     folder: Path,
     seconds: float,
     pattern_seconds: float = 20.0,
@@ -94,23 +96,24 @@ def run_of(
     hold: AttitudeHold | None = None,
     step: float | None = None,
 ) -> SectionRun:
-    """A run of a recording in this folder; the recording is made if it is missing."""
+    """A run that computes section forces from the long recording in this folder. The recording is created if it is
+    missing."""
     recording = long_recording(seconds, folder / "recording.f64", pattern_seconds)
     return SectionRun(r19(), recording, recorded_sections(), engine, hold or AttitudeHold(), step)
 
 
-def answers_of(folder: Path, name: str = "run") -> bytes:
-    """All computed channels of a run, as bytes."""
+def computed_channel_bytes(folder: Path, name: str = "run") -> bytes:
+    """All computed channels of a finished run, as bytes."""
     return (folder / name / "run.f64").read_bytes()
 
 
 def run_killed_process(
-    folder: Path, seconds: float, pattern_seconds: float, block: float, kill_count: int, lasting: float = 1.0
+    folder: Path, seconds: float, pattern_seconds: float, block: float, kill_count: int, kill_window: float = 1.0
 ) -> int:
-    """Run in a separate process, which is killed (signal 9) ``kill_count`` times at random moments and restarted until
-    it ends; returns the number of starts.
+    """Do the run in a separate process that is killed (signal 9) ``kill_count`` times at random moments and restarted
+    each time. Returns the number of starts.
 
-    Moments are drawn from the ``lasting`` s after the first line of progress.
+    Each moment is drawn from the first ``kill_window`` s after the first line of progress.
     """
     rng, kills, runs = np.random.default_rng(SEED), 0, 0
     command = [
@@ -125,7 +128,7 @@ def run_killed_process(
             assert process.stdout is not None
             process.stdout.readline()
             if kills < kill_count:
-                time.sleep(float(rng.uniform(0.0, lasting)))
+                time.sleep(float(rng.uniform(0.0, kill_window)))
                 process.kill()
                 kills += 1
             elif process.wait() == 0:
@@ -135,12 +138,15 @@ def run_killed_process(
 
 
 def _main(folder: str, seconds: str, pattern_seconds: str, block: str, step: str = "") -> None:
-    """Start or continue a run. Prints a line per block: seconds done, peak memory (bytes), processor time (s)."""
+    """Start or continue a run. For every block, print the seconds completed, the peak memory (bytes) and the processor
+    time (s)."""
 
     def report_block(completed: float, total: float) -> None:
         print(completed, peak_memory(), time.process_time(), flush=True)
 
-    job = run_of(Path(folder), float(seconds), float(pattern_seconds), step=float(step) if step else None)
+    job = section_run_of_recording(
+        Path(folder), float(seconds), float(pattern_seconds), step=float(step) if step else None
+    )
     run(job, Path(folder) / "run", report_block, float(block))
 
 

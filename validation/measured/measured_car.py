@@ -1,6 +1,8 @@
-"""The moving car of ``validation.measured.recording`` as an engineer's recording: accelerometers, gyros, angles.
+"""The public recording of ``validation.measured.recording``, prepared like a measurement by an engineer:
+accelerometers, gyros and angles.
 
-Nobody publishes wheel forces: in its files the static load stands at the hubs, so that nothing here judges a run.
+No public recording contains wheel forces. The files contain the static load at each hub instead, so that no computed
+force can be judged with them.
 """
 
 from pathlib import Path
@@ -27,16 +29,16 @@ CHANNELS: tuple[tuple[str, Quantity, str], ...] = (
     ("pitch", "angle", "pitch"),
 )
 TELEPHONE_TO_CAR = np.array([1.0, -1.0, -1.0])
-"""The telephone's x forward, y right, z down into x forward, y left, z up."""
+"""Signs that turn the telephone's axes (x forward, y right, z down) into the car's (x forward, y left, z up)."""
 
 
 def samples(path: Path) -> np.ndarray:
-    """Samples (n, channels) in SI units and ISO 8855 axes: of the telephone's sensors, and roll and pitch of its
-    camera.
+    """Samples (n, channels) of the telephone's sensors, and of the roll and pitch angles from its camera, in SI units
+    and ISO 8855 axes.
 
-    Roll and pitch are those of the vertical at the place where the car was, by the earth's centre.
+    Roll and pitch are angles to the vertical at the place of the car, which points away from the earth's centre.
     """
-    read_car = car.read(path)
+    read_car = car.read_recording(path)
     with np.load(path) as data:
         begin, end = (side([data["gyro_t"][i], data["frame_t"][i]]) for side, i in ((max, 0), (min, -1)))
         clock = np.arange(begin, end, car.SAMPLE_PERIOD)
@@ -56,8 +58,8 @@ def samples(path: Path) -> np.ndarray:
     )
 
 
-def recording(values: np.ndarray, path: Path) -> Recording:
-    """A recording object for samples (n, channels), which are written to ``path``."""
+def phone_recording(values: np.ndarray, path: Path) -> Recording:
+    """A recording object for samples (n, channels). They are written to ``path``."""
     columns = Columns(path, tuple(name for name, *_ in CHANNELS), len(values))
     columns.write(0, values)
     signals = tuple(
@@ -67,10 +69,10 @@ def recording(values: np.ndarray, path: Path) -> Recording:
     return Recording(signals, columns, car.SAMPLE_PERIOD)
 
 
-def scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredScene:
-    """A scene of the public recording, with three files that have different clocks.
+def recording_scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredScene:
+    """A scene made of the public recording, with three files that have different clocks.
 
-    Its map turns x forward, y right, z down into the axes of ISO 8855.
+    The signs in its channel table turn the telephone's axes (x forward, y right, z down) into those of ISO 8855.
     """
     folder.mkdir(parents=True)
     with np.load(path) as data:

@@ -1,4 +1,5 @@
-"""A moving car for a minute: gyro of a telephone and pose of its camera (comma2k19, MIT licence), where it is there."""
+"""A public recording of a moving car, one minute long: a telephone's gyro, and the pose from its camera (comma2k19, MIT
+licence). It is optional."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,27 +11,28 @@ from models.sensors.rotations import conjugate_quaternion, integrate, quaternion
 from validation.common.scenes import data_folder
 
 RECORDING_FILE = "comma2k19_example_60s.npz"
-"""Not part of the repository. Both frames are x forward, y right, z down; the pose turns them to the earth's."""
+"""Not part of the repository. The axes of both frames are x forward, y right, z down. The pose turns them into the
+frame of the earth."""
 SAMPLE_PERIOD = 0.01
-"""s; the clock of the recording wanders by 0.6 % and is read on this one."""
+"""Sampling period, s. The clock of the recording varies by 0.6 %, so it is interpolated to this period."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """A public recording: angular rates (n, 3) in rad/s without the telephone's bias; pose (n, 4) by the camera, as
-    quaternions from local to global axes."""
+    """The public recording: angular rates (n, 3) in rad/s, corrected for the gyro's bias, and pose (n, 4) from the
+    camera, as quaternions that turn local into global axes."""
 
     rates: np.ndarray
     pose: np.ndarray
 
 
-def find() -> Path | None:
-    """Path of the recording; None if TWINRIG_DATA does not lead to it."""
+def find_recording() -> Path | None:
+    """Path of the recording, or None if it is not in the folder that TWINRIG_DATA names."""
     folder = data_folder()
     return folder / RECORDING_FILE if folder and (folder / RECORDING_FILE).is_file() else None
 
 
-def read(path: Path) -> Recording:
+def read_recording(path: Path) -> Recording:
     """Rates and poses on a common clock. Rates are interpolated linearly, poses along the shortest rotation."""
     with np.load(path) as data:
         gyro_times, frame_times = data["gyro_t"], data["frame_t"]
@@ -42,6 +44,7 @@ def read(path: Path) -> Recording:
 
 
 def gyro_error(recording: Recording) -> np.ndarray:
-    """Angle (n,) in rad between the attitude by the gyro alone, started at the camera's attitude, and the camera's."""
+    """Angle (n,) in rad between the camera's attitude and the attitude integrated from the gyro, which starts at the
+    camera's."""
     attitudes = integrate(recording.rates, SAMPLE_PERIOD, recording.pose[0], "mean")
     return np.linalg.norm(rotation_vector(quaternion_product(conjugate_quaternion(recording.pose), attitudes)), axis=1)

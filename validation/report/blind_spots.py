@@ -5,7 +5,7 @@ from collections import Counter
 from pathlib import Path
 
 from validation.blind_spots.shared import compiled_functions
-from validation.blind_spots.table import LIST_SEPARATOR, TABLE_FILE, Line, read, uncovered_functions
+from validation.blind_spots.table import LIST_SEPARATOR, TABLE_FILE, Line, read_table, uncovered_functions
 from validation.common.rows import Saved
 
 SHOWN_IDS = 3
@@ -18,7 +18,7 @@ def blind_spots(path: Path = TABLE_FILE) -> Saved:
 
     A compiled function that the sources share now and that has no line is not covered: it was not audited.
     """
-    lines = read(path)
+    lines = read_table(path)
     names = dict.fromkeys((*(line.function for line in lines), *compiled_functions()))
     return {
         "lines": [_function_record(line) for line in lines],
@@ -50,6 +50,6 @@ def _counts_by_module(audit_lines: list[Line]) -> list[tuple[str, int, int, int]
     for line in audit_lines:
         of.setdefault(line.function.partition(":")[0], []).append(line)
     return [
-        (module, len(same), sum(line.is_covered for line in same), sum(line.noticed > 0 for line in same))
+        (module, len(same), sum(line.is_covered for line in same), sum(line.noticing_count > 0 for line in same))
         for module, same in sorted(of.items())
     ]

@@ -18,7 +18,7 @@ from typing import Any, get_args
 from models.core.errors import InputError
 from models.core.whole_files import write_whole
 from models.drawing.pages import environment_of
-from validation.common.rows import STATUSES, Independence, Saved, System, of_saved
+from validation.common.rows import STATUSES, Independence, Saved, System, row_of_saved
 from validation.report.blind_spots import blind_spots
 from validation.report.numbers import (
     docstring_markup,
@@ -201,7 +201,7 @@ def read(path: Path) -> Saved:
         results = json.loads(path.read_text(encoding="utf-8"))
         return {
             "provenance": {**BLANK_PROVENANCE, **results["provenance"]},
-            "rows": [of_saved(row) for row in results["rows"]],
+            "rows": [row_of_saved(row) for row in results["rows"]],
             "against": results.get("against"),
         }
     except FileNotFoundError:

@@ -1,5 +1,6 @@
-"""Spoils or traces in every process of an audit, its workers too: Python imports this file before all else."""
+"""Start-up file that Python imports first in every process of an audit: installs the import hook for planted
+faults."""
 
 from validation.blind_spots import planting
 
-planting.start()
+planting.install_import_hook()

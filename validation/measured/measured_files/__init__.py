@@ -1,1 +1,1 @@
-"""Measurement files that are damaged or odd, one module per format, each file written from code with its truth."""
+"""Damaged or unusual measurement files, one module per format. Code writes each file and knows the correct values."""

@@ -1,4 +1,5 @@
-"""An odd measurement file: how it is made, what must become of it, and how far what is read is from the truth."""
+"""Damaged or unusual measurement files: how a file is made, what reading it must give, and the error of what is
+read."""
 
 import hashlib
 import time
@@ -15,79 +16,85 @@ from models.measured.channel import Source
 from models.measured.formats import open_source, write
 from models.measured.formats.writing import ChannelGroup
 
-Wanted = Literal["right", "named", "refused"]
-"""Read right, read right as far as it goes with a sentence about it, or refused with a reason."""
+ExpectedOutcome = Literal["right", "named", "refused"]
+"""The file is read correctly; it is read as far as possible and a message names the problem; or it is refused with a
+reason."""
 Truth = Mapping[str, tuple[np.ndarray, np.ndarray]]
-Make = Callable[[Path], Path]
-"""Writes a file into a folder, and returns its path."""
+FileMaker = Callable[[Path], Path]
+"""Function that writes a file into a folder and returns its path."""
 Files = dict[str, tuple[Any, ...]]
-"""By name: what makes a file hard, how it is made, a phrase of what is said of it, and its truth unless the usual one;
-nothing is said of those that are read right."""
+"""For each file name: why it is difficult, the function that makes it, a phrase that the message must contain, and the
+expected values unless they are the usual ones. Files that are read correctly have no phrase."""
 SAMPLE_COUNT, SAMPLE_PERIOD = 40, 0.01
-"""Samples of the usual file, s between them."""
+"""Number of samples of the usual file, and its sampling period (s)."""
 SAMPLE_TIMES = SAMPLE_PERIOD * np.arange(SAMPLE_COUNT)
 FZ, FX = 1000.0 + 2.0**-6 * np.arange(SAMPLE_COUNT), -2.5 * np.arange(SAMPLE_COUNT)
-"""Values with a few bits, which every format keeps exactly."""
+"""Values of the two channels. They need so few bits that every format stores them exactly."""
 SLOW_PERIOD = 0.05
-"""s between samples of a channel of another rate."""
+"""Sampling period (s) of a channel with a lower rate."""
 TWO_RATES = {"Fz": (SAMPLE_TIMES, FZ), "Fx": (SLOW_PERIOD * np.arange(SAMPLE_COUNT), FX)}
 MANY_CHANNELS = {f"c{i}": (SAMPLE_TIMES, FZ + i) for i in range(300)}
-"""Truth of files of two rates, and of 300 channels."""
+"""Expected values of the file with 300 channels."""
 REPEATED_NAME = {"Fz (1)": (SAMPLE_TIMES, FZ), "Fz (2)": (SAMPLE_TIMES, FX)}
-"""Truth of a file that has the same name twice."""
+"""Expected values of a file in which two channels have the same name."""
 TOLERANCE = 1e-12
-"""Of times and values alike: CSV writes times with 15 digits, the values are kept to the last bit."""
+"""Tolerance of times (s) and values. CSV stores times with 15 digits; values must be exact to the last bit."""
 MEMORY, SECONDS = 5e7, 10.0
-"""Bytes and seconds that no file of some kilobytes may take, whatever it claims."""
+"""Memory (bytes) and time (s) that reading a small file may take at most, whatever size the file states."""
 
 
-def usual(**changed: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Expected times and values of the two channels of the usual file, or other values under a channel's name."""
+def usual_truth(**changed: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Expected times and values of the usual file's two channels. Keywords replace the values of a channel."""
     return {name: (SAMPLE_TIMES, changed.get(name, values)) for name, values in (("Fz", FZ), ("Fx", FX))}
 
 
 @dataclass(frozen=True)
 class OddFile:
-    """An unusual or damaged file, and what reading it should give.
+    """A damaged or unusual file, and what reading it must give.
 
-    make : writes it into a folder and returns its path. wanted, says : what must become of it, and a phrase of the
-    refusal or of what is noticed. truth : channel -> times and values; a named file may give the first of them.
-    greedy : whether it claims a size that must not be taken.
+    difficulty : why it is hard to read. make : function that writes it. expected_outcome : see ``ExpectedOutcome``.
+    expected_text : phrase that the refusal or the message must contain. truth : for each channel, times and values; a
+    file whose outcome is "named" may give only the first of them. greedy : whether the file states a huge size, for
+    which no memory may be allocated.
     """
 
     name: str
-    hard: str
-    make: Make
-    wanted: Wanted
-    says: str = ""
-    truth: Truth = field(default_factory=usual)
+    difficulty: str
+    make: FileMaker
+    expected_outcome: ExpectedOutcome
+    expected_text: str = ""
+    truth: Truth = field(default_factory=usual_truth)
     greedy: bool = False
 
     def error(self, folder: Path) -> float:
-        """Largest difference of the values read from the expected ones; infinite if a channel or sample is missing. The
-        reader's refusal passes through. Raises AssertionError where a refusal does not name the reason, the folder was
-        changed, or reading took too much time or memory."""
+        """Largest difference between the values read and the expected ones; infinite if a channel or a sample is
+        missing. If the file is refused, the reader's exception is raised. AssertionError is raised if the refusal does
+        not give the reason, if the folder was changed, or if reading took too much time or memory."""
         folder.mkdir(parents=True, exist_ok=True)
         path = self.make(folder)
-        state_before = _state(folder)
+        state_before = _file_digests(folder)
         try:
             return self._measured(path)
         except InputError as refusal:
-            if path.name not in str(refusal) or self.says not in str(refusal) or "\n" in str(refusal):
-                raise AssertionError(f"{self.name}: {refusal} does not say {self.says!r}") from refusal
+            if path.name not in str(refusal) or self.expected_text not in str(refusal) or "\n" in str(refusal):
+                raise AssertionError(f"{self.name}: {refusal} does not say {self.expected_text!r}") from refusal
             raise
         finally:
-            if _state(folder) != state_before:
+            if _file_digests(folder) != state_before:
                 raise AssertionError(f"{self.name}: something was written beside {path} or into it")
 
     def _measured(self, path: Path) -> float:
-        """Error of the values read, with a check that time and memory are those of a small file."""
+        """Error of the values read. For a greedy file, time and memory are limited to those of a small file."""
         if not self.greedy:
-            return difference(open_source(path), self.truth, self.says if self.wanted == "named" else "")
+            return reading_error(
+                open_source(path), self.truth, self.expected_text if self.expected_outcome == "named" else ""
+            )
         tracemalloc.start()
         began = time.perf_counter()
         try:
-            return difference(open_source(path), self.truth, self.says if self.wanted == "named" else "")
+            return reading_error(
+                open_source(path), self.truth, self.expected_text if self.expected_outcome == "named" else ""
+            )
         finally:
             peak = tracemalloc.get_traced_memory()[1]
             tracemalloc.stop()
@@ -95,33 +102,43 @@ class OddFile:
                 raise AssertionError(f"{self.name}: {peak / 1e6:.0f} MB, {time.perf_counter() - began:.1f} s")
 
 
-def every(
+def odd_files(
     refused: Files | None = None,
     named_files: Files | None = None,
     right_files: Files | None = None,
     greedy: Sequence[str] = (),
 ) -> tuple[OddFile, ...]:
-    """All files of these three tables; greedy : names of files that claim a huge size, for which no memory may be
+    """All files of the three tables. ``greedy``: names of the files that state a huge size, for which no memory may be
     allocated."""
-    tables: tuple[tuple[Wanted, Files], ...] = (
+    tables: tuple[tuple[ExpectedOutcome, Files], ...] = (
         ("refused", refused or {}),
         ("named", named_files or {}),
         ("right", right_files or {}),
     )
-    odds = list[OddFile]()
-    for wanted, files in tables:
-        for name, (hard, make, *expectation) in files.items():
-            says, *truth = expectation if wanted != "right" else ("", *expectation)
-            odds.append(OddFile(name, hard, make, wanted, says, truth[0] if truth else usual(), name in greedy))
-    return tuple(odds)
+    collected_files = list[OddFile]()
+    for expected_outcome, files in tables:
+        for name, (difficulty, make, *expectation) in files.items():
+            expected_text, *truth = expectation if expected_outcome != "right" else ("", *expectation)
+            collected_files.append(
+                OddFile(
+                    name,
+                    difficulty,
+                    make,
+                    expected_outcome,
+                    expected_text,
+                    truth[0] if truth else usual_truth(),
+                    name in greedy,
+                )
+            )
+    return tuple(collected_files)
 
 
-def _state(folder: Path) -> dict[str, str]:
-    """Digest of all files below a folder, to see whether any of them changed."""
+def _file_digests(folder: Path) -> dict[str, str]:
+    """Digest of every file below a folder. It shows whether a file was changed."""
     return {str(p): hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
-def read(measurement_source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def read_channels(measurement_source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Times and values of every channel, read in several blocks."""
     channels: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for group in {channel.group for channel in measurement_source.channels}:
@@ -135,11 +152,11 @@ def read(measurement_source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]
     return channels
 
 
-def difference(measurement_source: Source, truth: Truth, expected_text: str) -> float:
-    """Largest difference between a file and the expected values; infinite if a channel, a sample or the reader's
-    message is missing."""
+def reading_error(measurement_source: Source, truth: Truth, expected_text: str) -> float:
+    """Largest difference between what is read from a file and the expected values; infinite if a channel, a sample or
+    the reader's message is missing."""
     channels, finding_texts = (
-        read(measurement_source),
+        read_channels(measurement_source),
         [finding.text for finding in measurement_source.noticed if finding.weight != "note" or expected_text],
     )
     if set(channels) != set(truth) or not (
@@ -152,7 +169,8 @@ def difference(measurement_source: Source, truth: Truth, expected_text: str) -> 
 def _largest_difference(
     read_channel: tuple[np.ndarray, np.ndarray], truth: tuple[np.ndarray, np.ndarray], partial_allowed: bool
 ) -> float:
-    """Largest difference of times and values. With ``partial_allowed`` the first samples alone may have been read."""
+    """Largest difference of times and values of a channel. With ``partial_allowed``, it is enough that the first
+    samples were read."""
     count = len(read_channel[0])
     if count == 0 or count > len(truth[0]) or (count < len(truth[0]) and not partial_allowed):
         return np.inf
@@ -164,15 +182,15 @@ def _largest_difference(
     )
 
 
-def written(path: Path, names: tuple[str, ...] = ("Fz", "Fx"), values: np.ndarray | None = None) -> Path:
-    """Write channels (by default those of the usual file) in the format that the extension of ``path`` names."""
+def write_usual_file(path: Path, names: tuple[str, ...] = ("Fz", "Fx"), values: np.ndarray | None = None) -> Path:
+    """Write channels (by default those of the usual file) in the format given by the extension of ``path``."""
     table = np.column_stack((FZ, FX)) if values is None else values
     group = ChannelGroup(names, ("N",) * len(names), ("",) * len(names), SAMPLE_PERIOD, len(table), [table])
     return write(path, [group])
 
 
-def raw(raw_bytes: bytes, name: str = "odd.csv") -> Make:
-    """Make a file of bytes."""
+def file_of_bytes(raw_bytes: bytes, name: str = "odd.csv") -> FileMaker:
+    """Make a file with this content."""
 
     def make(folder: Path) -> Path:
         (folder / name).write_bytes(raw_bytes)
@@ -181,19 +199,19 @@ def raw(raw_bytes: bytes, name: str = "odd.csv") -> Make:
     return make
 
 
-def plain(file_extension: str) -> Make:
-    """Make the usual file."""
-    return lambda folder: written(folder / f"odd{file_extension}")
+def usual_file(file_extension: str) -> FileMaker:
+    """Make the usual file in the format of an extension."""
+    return lambda folder: write_usual_file(folder / f"odd{file_extension}")
 
 
-def wide(file_extension: str) -> Make:
-    """Make a file of 300 channels."""
+def file_of_300_channels(file_extension: str) -> FileMaker:
+    """Make a file of 300 channels in the format of an extension."""
     table = np.column_stack([values for _, values in MANY_CHANNELS.values()])
-    return lambda folder: written(folder / f"odd{file_extension}", tuple(MANY_CHANNELS), table)
+    return lambda folder: write_usual_file(folder / f"odd{file_extension}", tuple(MANY_CHANNELS), table)
 
 
-def altered(make_file: Make, change: Callable[[bytes], bytes], name: str = "") -> Make:
-    """Function that makes a file with changed bytes or another name."""
+def altered_file_maker(make_file: FileMaker, change: Callable[[bytes], bytes], name: str = "") -> FileMaker:
+    """Function that makes a file, changes its bytes and optionally gives it another name."""
 
     def altered_file(folder: Path) -> Path:
         path = make_file(folder)
@@ -203,13 +221,13 @@ def altered(make_file: Make, change: Callable[[bytes], bytes], name: str = "") -
     return altered_file
 
 
-def patched(raw_bytes: bytes, byte_offset: int, new_bytes: bytes) -> bytes:
-    """Bytes of a file, in which ``new_bytes`` replaces those from an offset on."""
+def patched_bytes(raw_bytes: bytes, byte_offset: int, new_bytes: bytes) -> bytes:
+    """Bytes of a file with some of them replaced: ``new_bytes`` are written at an offset."""
     return raw_bytes[:byte_offset] + new_bytes + raw_bytes[byte_offset + len(new_bytes) :]
 
 
-def two_rates(file_extension: str) -> Make:
-    """Make a file of two groups of different rates."""
+def file_of_two_rates(file_extension: str) -> FileMaker:
+    """Make a file of two groups that have different sampling rates."""
     clocks = (("Fz", SAMPLE_PERIOD, FZ), ("Fx", SLOW_PERIOD, FX))
 
     def make(folder: Path) -> Path:
@@ -222,28 +240,28 @@ def two_rates(file_extension: str) -> Make:
     return make
 
 
-def called(file_extension: str, name: str) -> Make:
+def usual_file_called(file_extension: str, name: str) -> FileMaker:
     """Make the usual file under another name."""
-    return altered(plain(file_extension), bytes, name)
+    return altered_file_maker(usual_file(file_extension), bytes, name)
 
 
 @dataclass(frozen=True)
 class CutSweep:
-    """A file cut off at many places. Each must be refused, or its remaining samples must be read right and reported as
-    incomplete.
+    """The usual file, cut off at many places. Each cut file must be refused, or its samples must be read correctly and
+    reported as incomplete.
 
-    cuts : number of places, spread evenly over the file; 0 for every byte.
+    cuts : number of places, evenly distributed over the file; 0 to cut at every byte.
     """
 
     extension: str
     cuts: int = 40
 
-    def silent(self, folder: Path) -> int:
-        """Number of cuts after which wrong values are read, or the cut is not reported."""
+    def silent_cuts(self, folder: Path) -> int:
+        """Number of cuts after which the reader returns wrong values or does not report that the file is cut off."""
         folder.mkdir(parents=True, exist_ok=True)
         count = 7000 if self.extension == ".rsp" else SAMPLE_COUNT  # three groups of RPC III and a half
         table = np.column_stack((FZ, FX)) if count == SAMPLE_COUNT else np.arange(float(count))[:, None] * [1.0, -2.5]
-        path = written(folder / f"cut{self.extension}", values=table)
+        path = write_usual_file(folder / f"cut{self.extension}", values=table)
         truth = {
             name: (SAMPLE_PERIOD * np.arange(count), column) for name, column in zip(("Fz", "Fx"), table.T, strict=True)
         }
@@ -254,13 +272,13 @@ class CutSweep:
         return sum(self._is_silent(path, data[:cut_length], truth) for cut_length in cut_lengths)
 
     def _is_silent(self, path: Path, raw_bytes: bytes, truth: Truth) -> bool:
-        """Whether one cut is not noticed by the reader."""
+        """Whether the reader fails to report that this file is cut off, or reads it wrongly."""
         path.write_bytes(raw_bytes)
         try:
             source = open_source(path)
             complete_truth = {
                 name: truth[name] for name in truth if name in {channel.name for channel in source.channels}
             }
-            return difference(source, complete_truth, "cut off") > TOLERANCE
+            return reading_error(source, complete_truth, "cut off") > TOLERANCE
         except InputError as refusal:
             return path.name not in str(refusal)

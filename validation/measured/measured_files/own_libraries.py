@@ -1,4 +1,5 @@
-"""Contents of a file by its format's own library, or numpy: channel -> values and unit, in the file's own words."""
+"""Reads a file with the library of its format (CSV with numpy): values and unit of each channel, as the file states
+them."""
 
 import csv
 from collections.abc import Callable
@@ -6,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-Read = dict[str, tuple[np.ndarray, str]]
+ChannelValues = dict[str, tuple[np.ndarray, str]]
 
 
-def by_numpy(path: Path) -> Read:
-    """Read a CSV file by numpy."""
+def by_numpy(path: Path) -> ChannelValues:
+    """Read a CSV file with numpy."""
     with path.open(encoding="utf-8") as file:
         headings = next(csv.reader(line for line in file if not line.startswith("#")))
         table = np.genfromtxt(file, delimiter=",")
@@ -18,34 +19,34 @@ def by_numpy(path: Path) -> Read:
     return {name: (table[:, i], unit) for i, (name, _, unit) in enumerate(names) if name != "time"}
 
 
-def by_asammdf(path: Path) -> Read:
-    """Read an MDF 4 file by asammdf."""
+def by_asammdf(path: Path) -> ChannelValues:
+    """Read an MDF 4 file with asammdf."""
     from asammdf import MDF
 
     with MDF(path) as file:
         return {signal.name: (signal.samples, signal.unit) for signal in file.iter_channels()}
 
 
-def by_rpc3(path: Path) -> Read:
-    """Read an RPC III file by rpc3."""
+def by_rpc3(path: Path) -> ChannelValues:
+    """Read an RPC III file with rpc3."""
     import rpc3
 
     rpc3.rpc3.progressbar = False
     return {channel.name: (np.asarray(channel.data), channel.unit) for channel in rpc3.read(str(path))[0]}
 
 
-def by_nptdms(path: Path) -> Read:
-    """Read a TDMS file by npTDMS."""
+def by_nptdms(path: Path) -> ChannelValues:
+    """Read a TDMS file with npTDMS."""
     from nptdms import TdmsFile
 
     channels = [channel for group in TdmsFile.read(path).groups() for channel in group.channels()]
     return {channel.name: (channel[:], channel.properties["unit_string"]) for channel in channels}
 
 
-LIBRARIES: dict[str, tuple[str, Callable[[Path], Read]]] = {
+LIBRARIES: dict[str, tuple[str, Callable[[Path], ChannelValues]]] = {
     ".csv": ("numpy", by_numpy),
     ".mf4": ("asammdf", by_asammdf),
     ".rsp": ("rpc3-file", by_rpc3),
     ".tdms": ("npTDMS", by_nptdms),
 }
-"""Extension -> name of the library and its reading."""
+"""For each file extension: name of the library, and the function that reads with it."""

@@ -1,4 +1,4 @@
-"""Odd files of MTS RPC III."""
+"""Damaged and unusual MTS RPC III files."""
 
 from typing import Any
 
@@ -11,84 +11,86 @@ from validation.measured.measured_files.odd import (
     SAMPLE_COUNT,
     SAMPLE_PERIOD,
     SAMPLE_TIMES,
+    FileMaker,
     Files,
-    Make,
-    altered,
-    every,
-    patched,
-    plain,
-    raw,
-    usual,
+    altered_file_maker,
+    file_of_bytes,
+    odd_files,
+    patched_bytes,
+    usual_file,
+    usual_truth,
 )
 
 KEY, RECORD, BLOCK, POINTS = 32, 128, 512, 2048
 
 
-RPC = plain(".rsp")
+RPC = usual_file(".rsp")
 
 
-def with_parameters(make_file: Make = RPC, **changed: str | None) -> Make:
-    """Function that makes a file with some header parameters changed (``_`` stands for ``.``) or, for None, removed."""
+def with_parameters(make_file: FileMaker = RPC, **changed: str | None) -> FileMaker:
+    """Make a file with some header parameters changed or, if None, removed. In the keywords, ``_`` stands for ``.``."""
 
     def change(raw_bytes: bytes) -> bytes:
-        values = _values(raw_bytes)
+        values = _header_parameters(raw_bytes)
         size = BLOCK * int(values["NUM_HEADER_BLOCKS"])
         names = {name.replace(".", "_"): name for name in values}
         values |= {names.get(key, key): value for key, value in changed.items()}
         given_parameters = {name: value for name, value in values.items() if value is not None}
         given_parameters["NUM_PARAMS"] = changed.get("NUM_PARAMS") or str(len(given_parameters))
-        latin = [(name.encode().ljust(KEY, b"\0"), value.encode("latin-1")) for name, value in given_parameters.items()]
+        records = [
+            (name.encode().ljust(KEY, b"\0"), value.encode("latin-1")) for name, value in given_parameters.items()
+        ]
         return (
-            b"".join(key + value.ljust(RECORD - KEY, b"\0") for key, value in latin).ljust(size, b"\0")
+            b"".join(key + value.ljust(RECORD - KEY, b"\0") for key, value in records).ljust(size, b"\0")
             + raw_bytes[size:]
         )
 
-    return altered(make_file, change)
+    return altered_file_maker(make_file, change)
 
 
-def _values(raw_bytes: bytes) -> dict[str, Any]:
+def _header_parameters(raw_bytes: bytes) -> dict[str, Any]:
     """Header parameters of a file, by name."""
     count = int(raw_bytes[2 * RECORD + KEY : 3 * RECORD].rstrip(b"\0"))
     records = [raw_bytes[i * RECORD : (i + 1) * RECORD] for i in range(count)]
-    texts = [
+    key_value_texts = [
         [header_part.rstrip(b"\0").decode("latin-1") for header_part in (record[:KEY], record[KEY:])]
         for record in records
     ]
-    return dict(texts)
+    return dict(key_value_texts)
 
 
 DIGITS = np.pad(np.tile(np.arange(SAMPLE_COUNT, dtype="<i2"), (2, 1)), ((0, 0), (0, POINTS - SAMPLE_COUNT)))
-"""Samples of 16 bits: 2^-6 per digit and an offset that fits, -2.5 per digit."""
+"""Samples as 16-bit integers. One step is 2^-6 in the first channel (with an offset) and -2.5 in the second."""
 SCALED = with_parameters(DATA_TYPE="SHORT_INTEGER", SCALE_CHAN_1="0.015625", SCALE_CHAN_2="-2.5")
 
 
-def sample(sample_value: float) -> Make:
-    """Make the usual file with another value at sample 5 of the first channel."""
-    new = np.array([sample_value], "<f4").tobytes()
-    return altered(RPC, lambda data: patched(data, len(data) - 2 * POINTS * 4 + 5 * 4, new))
+def with_sample_value(sample_value: float) -> FileMaker:
+    """Make the usual file with another value at sample 5 of its first channel."""
+    new_bytes = np.array([sample_value], "<f4").tobytes()
+    return altered_file_maker(RPC, lambda data: patched_bytes(data, len(data) - 2 * POINTS * 4 + 5 * 4, new_bytes))
 
 
-def padded(sample_count: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Expected values, with the last one repeated up to ``sample_count`` samples."""
+def padded_truth(sample_count: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Expected values, with the last one repeated until there are ``sample_count`` samples."""
     sample_times, padding = SAMPLE_PERIOD * np.arange(sample_count), (0, sample_count - SAMPLE_COUNT)
-    return {name: (sample_times, np.pad(values, padding, mode="edge")) for name, (_, values) in usual().items()}
+    return {name: (sample_times, np.pad(values, padding, mode="edge")) for name, (_, values) in usual_truth().items()}
 
 
 WHOLE_NUMBERS = {"Fz": (SAMPLE_TIMES, 2.0**-6 * np.arange(SAMPLE_COUNT)), "Fx": (SAMPLE_TIMES, FX)}
 REFUSED: Files = {
     "RPC III cut in its header": (
         "the parameters are incomplete",
-        altered(RPC, lambda data: data[:700]),
+        altered_file_maker(RPC, lambda data: data[:700]),
         "ends in its header",
     ),
     "RPC III cut in its first group": (
         "samples of the second channel are missing",
-        altered(RPC, lambda data: data[:20_000]),
+        altered_file_maker(RPC, lambda data: data[:20_000]),
         "first group",
     ),
     "RPC III with another beginning": (
         "FORMAT is spelt otherwise",
-        altered(RPC, lambda data: b"f" + data[1:]),
+        altered_file_maker(RPC, lambda data: b"f" + data[1:]),
         "no known format",
     ),
     "RPC III of big-endian numbers": (
@@ -135,21 +137,21 @@ REFUSED: Files = {
         with_parameters(PTS_PER_FRAME="800"),
         "whole frames",
     ),
-    "RPC III with inf": ("an overflow of the amplifier", sample(np.inf), "channel 'Fz', sample 5"),
-    "RPC III of one word": ("a header of 6 bytes", raw(b"FORMAT", "odd.rsp"), "header"),
+    "RPC III with inf": ("an overflow of the amplifier", with_sample_value(np.inf), "channel 'Fz', sample 5"),
+    "RPC III of one word": ("a header of 6 bytes", file_of_bytes(b"FORMAT", "odd.rsp"), "header"),
 }
 NAMED: Files = {
     "RPC III without its number of samples": (
         "padding at the end looks like a constant force",
         with_parameters(PTS_PER_FRAME="16", FRAMES="3", SAMPLES=None),
         "padding",
-        padded(48),
+        padded_truth(48),
     ),
     "RPC III of a huge number of frames": (
         "a reader makes room for all",
         with_parameters(FRAMES="900000000000", SAMPLES=None),
         "cut off",
-        padded(POINTS),
+        padded_truth(POINTS),
     ),
     "RPC III with the same name twice": (
         "the last one hides the first",
@@ -170,14 +172,14 @@ NAMED: Files = {
     ),
     "RPC III with bytes after its end": (
         "a second recording, or rubbish",
-        altered(RPC, lambda data: data + bytes(100)),
+        altered_file_maker(RPC, lambda data: data + bytes(100)),
         "100 bytes",
     ),
 }
 RIGHT: Files = {
     "RPC III of 16 bits": (
         "digits times a scale of either sign",
-        altered(SCALED, lambda data: data[: -2 * POINTS * 4] + DIGITS.tobytes()),
+        altered_file_maker(SCALED, lambda data: data[: -2 * POINTS * 4] + DIGITS.tobytes()),
         WHOLE_NUMBERS,
     ),
     "RPC III with umlauts": (
@@ -188,9 +190,9 @@ RIGHT: Files = {
     "RPC III without units": ("kN or N, nobody knows", with_parameters(UNITS_CHAN_1=None)),
     "RPC III with NaN": (
         "nothing was measured at one sample",
-        sample(np.nan),
-        usual(Fz=np.where(np.arange(SAMPLE_COUNT) == 5, np.nan, FZ)),
+        with_sample_value(np.nan),
+        usual_truth(Fz=np.where(np.arange(SAMPLE_COUNT) == 5, np.nan, FZ)),
     ),
 }
 GREEDY = ("RPC III of a huge number of frames", "RPC III of a huge number of channels", "RPC III of a huge header")
-FILES = every(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)
+FILES = odd_files(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)

@@ -1,4 +1,4 @@
-"""Odd TDMS files."""
+"""Damaged and unusual TDMS files."""
 
 import struct
 from pathlib import Path
@@ -16,31 +16,31 @@ from validation.measured.measured_files.odd import (
     SAMPLE_TIMES,
     SLOW_PERIOD,
     TWO_RATES,
+    FileMaker,
     Files,
-    Make,
     Truth,
-    altered,
-    called,
-    every,
-    patched,
-    plain,
-    raw,
-    two_rates,
-    usual,
-    wide,
-    written,
+    altered_file_maker,
+    file_of_300_channels,
+    file_of_bytes,
+    file_of_two_rates,
+    odd_files,
+    patched_bytes,
+    usual_file,
+    usual_file_called,
+    usual_truth,
+    write_usual_file,
 )
 
 LEAD = 28
-"""Bytes that lead in a segment."""
+"""Length (bytes) of the lead-in of a segment."""
 CLOCK = {"wf_increment": SAMPLE_PERIOD, "wf_start_offset": 0.0}
 
 
-TDMS = plain(".tdms")
+TDMS = usual_file(".tdms")
 
 
-def channels(*columns: tuple[str, str, Any, dict[str, Any]]) -> Make:
-    """Make a file of channels: group, name, samples, properties."""
+def tdms_file(*columns: tuple[str, str, Any, dict[str, Any]]) -> FileMaker:
+    """Make a TDMS file. Each column gives group, name, samples and properties of a channel."""
 
     def make(folder: Path) -> Path:
         from nptdms import ChannelObject, TdmsWriter
@@ -52,30 +52,31 @@ def channels(*columns: tuple[str, str, Any, dict[str, Any]]) -> Make:
     return make
 
 
-def changed(byte_offset: int, new_bytes: bytes, length: int | None = None) -> Make:
-    """Make the usual file with changed bytes, or cut off; the offset counts from the start of its last segment."""
+def with_changed_bytes(byte_offset: int, new_bytes: bytes, length: int | None = None) -> FileMaker:
+    """Make the usual file with bytes replaced, or cut off at ``length``. Both offsets count from the start of its last
+    segment."""
 
     def change(raw_bytes: bytes) -> bytes:
         begin = raw_bytes.rindex(b"TDSm")
-        return patched(raw_bytes, begin + byte_offset, new_bytes)[: None if length is None else begin + length]
+        return patched_bytes(raw_bytes, begin + byte_offset, new_bytes)[: None if length is None else begin + length]
 
-    return altered(TDMS, change)
-
-
-def cut_by(byte_count: int) -> Make:
-    """Make the usual file without its last bytes."""
-    return altered(TDMS, lambda data: data[:-byte_count])
+    return altered_file_maker(TDMS, change)
 
 
-def claims(stated_count: int) -> Make:
-    """Make the usual file with a wrong number of samples stated for the first channel."""
+def cut_by(byte_count: int) -> FileMaker:
+    """Make the usual file without its last ``byte_count`` bytes."""
+    return altered_file_maker(TDMS, lambda data: data[:-byte_count])
+
+
+def with_stated_count(stated_count: int) -> FileMaker:
+    """Make the usual file with a wrong number of samples stated for its first channel."""
     index, number = struct.pack("<LLLQ", 20, 10, 1, SAMPLE_COUNT), struct.pack("<Q", stated_count)
-    return altered(TDMS, lambda data: patched(data, data.rindex(index) + 12, number))
+    return altered_file_maker(TDMS, lambda data: patched_bytes(data, data.rindex(index) + 12, number))
 
 
 def beside_old_index(folder: Path) -> Path:
-    """Write the usual TDMS file beside an index file that belongs to another file."""
-    other_path = written(folder / "other.tdms", ("a", "b", "c"), np.ones((5, 3)))
+    """Write the usual file next to an index file that belongs to another TDMS file."""
+    other_path = write_usual_file(folder / "other.tdms", ("a", "b", "c"), np.ones((5, 3)))
     data = other_path.read_bytes()
     other_path.unlink()
     (folder / "odd.tdms_index").write_bytes(data.replace(b"TDSm", b"TDSh"))
@@ -83,92 +84,100 @@ def beside_old_index(folder: Path) -> Path:
 
 
 def channel_named(name: str, values: Any, **properties: Any) -> tuple[str, str, Any, dict[str, Any]]:
-    """A channel with the usual clock: group, name, values, properties."""
+    """A channel with the usual clock, as group, name, samples and properties."""
     return "g", name, values, CLOCK | properties
 
 
-def at(hour: int) -> np.datetime64:
-    """Start time of a recording at an hour."""
+def start_time(hour: int) -> np.datetime64:
+    """Start time of a recording that begins at a given hour."""
     return np.datetime64(f"2026-11-21T{hour:02d}:00:00")
 
 
-def prefix(**values: np.ndarray) -> Truth:
-    """Expected values of some channels with the usual clock."""
+def usual_truth_of(**values: np.ndarray) -> Truth:
+    """Expected times and values of channels that have the usual clock."""
     return {name: (SAMPLE_TIMES, samples) for name, samples in values.items()}
 
 
 REFUSED: Files = {
-    "TDMS cut in its first lead-in": ("not a segment is whole", altered(TDMS, lambda data: data[:20]), "cut off"),
-    "TDMS cut in a description": ("channels without samples", changed(0, b"", 60), "cut off"),
+    "TDMS cut in its first lead-in": (
+        "not a segment is whole",
+        altered_file_maker(TDMS, lambda data: data[:20]),
+        "cut off",
+    ),
+    "TDMS cut in a description": ("channels without samples", with_changed_bytes(0, b"", 60), "cut off"),
     "TDMS with another beginning": (
-        "channel_named letter is wrong",
-        altered(TDMS, lambda data: patched(data, 0, b"tDSm")),
+        "one letter is wrong",
+        altered_file_maker(TDMS, lambda data: patched_bytes(data, 0, b"tDSm")),
         "no known format",
     ),
     "TDMS whose second segment begins wrongly": (
         "what follows is not where it should be",
-        changed(0, b"XXXX"),
+        with_changed_bytes(0, b"XXXX"),
         "a segment of TDMS must begin here",
     ),
     "TDMS whose samples begin after their end": (
         "an offset too large",
-        changed(20, struct.pack("<Q", 2**40)),
+        with_changed_bytes(20, struct.pack("<Q", 2**40)),
         "after the end",
     ),
-    "TDMS of a huge number of samples": ("a reader makes room for them", claims(2**60), ""),
+    "TDMS of a huge number of samples": ("a reader makes room for them", with_stated_count(2**60), ""),
     "TDMS of a huge number of channels": (
         "a reader looks for them to the end",
-        changed(LEAD, b"\xff\xff\xff\x7f"),
+        with_changed_bytes(LEAD, b"\xff\xff\xff\x7f"),
         "damaged",
     ),
-    "TDMS of a huge name": ("a reader makes room for it", changed(LEAD + 4, b"\xff\xff\xff\x7f"), "damaged"),
-    "TDMS without a clock": ("no increment and no channel of times", channels(("g", "Fz", FZ, {})), "no clock"),
+    "TDMS of a huge name": ("a reader makes room for it", with_changed_bytes(LEAD + 4, b"\xff\xff\xff\x7f"), "damaged"),
+    "TDMS without a clock": ("no increment and no channel of times", tdms_file(("g", "Fz", FZ, {})), "no clock"),
     "TDMS with an increment below zero": (
         "time runs backwards",
-        channels(channel_named("Fz", FZ, wf_increment=-SAMPLE_PERIOD)),
+        tdms_file(channel_named("Fz", FZ, wf_increment=-SAMPLE_PERIOD)),
         "no clock",
     ),
     "TDMS with an increment of nan": (
         "it passes every comparison",
-        channels(channel_named("Fz", FZ, wf_increment=np.nan)),
+        tdms_file(channel_named("Fz", FZ, wf_increment=np.nan)),
         "no clock",
     ),
     "TDMS over a path": (
         "the increment is in m",
-        channels(channel_named("Fz", FZ, wf_xunit_string="m")),
+        tdms_file(channel_named("Fz", FZ, wf_xunit_string="m")),
         "does not count seconds",
     ),
-    "TDMS of no samples": ("channels that were never written to", channels(channel_named("Fz", FZ[:0])), "no samples"),
+    "TDMS of no samples": ("channels that were never written to", tdms_file(channel_named("Fz", FZ[:0])), "no samples"),
     "TDMS with inf": (
         "an overflow of the amplifier",
-        channels(channel_named("Fz", np.where(FX < -50, np.inf, FZ))),
+        tdms_file(channel_named("Fz", np.where(FX < -50, np.inf, FZ))),
         "channel 'Fz', sample 21",
     ),
-    "index of a TDMS file": ("it has no samples", raw(b"TDSh" + bytes(200), "odd.tdms_index"), "beside it"),
+    "index of a TDMS file": ("it has no samples", file_of_bytes(b"TDSh" + bytes(200), "odd.tdms_index"), "beside it"),
 }
 NAMED: Files = {
     "TDMS cut in its samples": ("the last channel has fewer samples than the first", cut_by(100), "cut off"),
     "TDMS never finished": (
         "the recorder lost power: the length of the segment is missing",
-        changed(12, b"\xff" * 8),
+        with_changed_bytes(12, b"\xff" * 8),
         "cut off",
     ),
-    "TDMS of a huge segment": ("a reader makes room for it", changed(12, struct.pack("<Q", 2**50)), "cut off"),
+    "TDMS of a huge segment": (
+        "a reader makes room for it",
+        with_changed_bytes(12, struct.pack("<Q", 2**50)),
+        "cut off",
+    ),
     "TDMS with texts": (
         "remarks of the driver in a channel",
-        channels(channel_named("Fz", FZ), channel_named("remark", ["a"] * SAMPLE_COUNT)),
+        tdms_file(channel_named("Fz", FZ), channel_named("remark", ["a"] * SAMPLE_COUNT)),
         "no numbers: 'remark'",
-        prefix(Fz=FZ),
+        usual_truth_of(Fz=FZ),
     ),
     "TDMS with the same name twice": (
-        "channel_named in each group",
-        channels(("a", "Fz", FZ, CLOCK), ("b", "Fz", FX, CLOCK)),
+        "one in each group",
+        tdms_file(("a", "Fz", FZ, CLOCK), ("b", "Fz", FX, CLOCK)),
         "2 channels are called 'Fz'",
-        prefix(**{"a/Fz": FZ, "b/Fz": FX}),
+        usual_truth_of(**{"a/Fz": FZ, "b/Fz": FX}),
     ),
     "TDMS whose groups are wheels": (
         "every wheel has an Fz",
-        channels(
+        tdms_file(
             *(
                 (group, name, values, CLOCK)
                 for group in ("WFT VL", "WFT HR")
@@ -176,58 +185,60 @@ NAMED: Files = {
             )
         ),
         "'WFT HR/Fz'",
-        prefix(
+        usual_truth_of(
             **{f"{group}/{name}": values for group in ("WFT VL", "WFT HR") for name, values in (("Fz", FZ), ("Fx", FX))}
         ),
     ),
-    "TDMS called odd.rsp": ("the extension says otherwise", called(".tdms", "odd.rsp"), "extension"),
+    "TDMS called odd.rsp": ("the extension says otherwise", usual_file_called(".tdms", "odd.rsp"), "extension"),
 }
 RIGHT: Files = {
     "TDMS with a channel of times": (
         "the clock is a channel like any other",
-        channels(("g", "time", SAMPLE_TIMES, {"unit_string": "s"}), ("g", "Fz", FZ, {}), ("g", "Fx", FX, {})),
+        tdms_file(("g", "time", SAMPLE_TIMES, {"unit_string": "s"}), ("g", "Fz", FZ, {}), ("g", "Fx", FX, {})),
     ),
     "TDMS whose clock goes back": (
         "sorting would hide it",
-        channels(("g", "time", BACK, {}), ("g", "Fz", FZ, {})),
+        tdms_file(("g", "time", BACK, {}), ("g", "Fz", FZ, {})),
         {"Fz": (BACK, FZ)},
     ),
-    "TDMS of two rates": ("a common clock does not exist", two_rates(".tdms"), TWO_RATES),
+    "TDMS of two rates": ("a common clock does not exist", file_of_two_rates(".tdms"), TWO_RATES),
     "TDMS of two rates in channel_named group": (
         "the clock belongs to the channel",
-        channels(channel_named("Fz", FZ), channel_named("Fx", FX, wf_increment=SLOW_PERIOD)),
+        tdms_file(channel_named("Fz", FZ), channel_named("Fx", FX, wf_increment=SLOW_PERIOD)),
         TWO_RATES,
     ),
     "TDMS of two starts": (
-        "channel_named amplifier was switched on an hour later",
-        channels(channel_named("Fz", FZ, wf_start_time=at(8)), channel_named("Fx", FX, wf_start_time=at(9))),
+        "one amplifier was switched on an hour later",
+        tdms_file(
+            channel_named("Fz", FZ, wf_start_time=start_time(8)), channel_named("Fx", FX, wf_start_time=start_time(9))
+        ),
         {"Fz": (SAMPLE_TIMES, FZ), "Fx": (3600.0 + SAMPLE_TIMES, FX)},
     ),
     "TDMS with a start offset": (
         "the trigger came later",
-        channels(channel_named("Fz", FZ, wf_start_offset=-2.5)),
+        tdms_file(channel_named("Fz", FZ, wf_start_offset=-2.5)),
         {"Fz": (SAMPLE_TIMES - 2.5, FZ)},
     ),
     "TDMS of two lengths": (
-        "channel_named channel has half the samples",
-        channels(channel_named("Fz", FZ), channel_named("Fx", FX[:20])),
+        "one channel has half the samples",
+        tdms_file(channel_named("Fz", FZ), channel_named("Fx", FX[:20])),
         {"Fz": (SAMPLE_TIMES, FZ), "Fx": (SAMPLE_TIMES[:20], FX[:20])},
     ),
     "TDMS of whole numbers": (
         "16 bits of a converter",
-        channels(channel_named("Fz", (1000 + np.arange(SAMPLE_COUNT)).astype("i2"))),
-        prefix(Fz=1000.0 + np.arange(SAMPLE_COUNT)),
+        tdms_file(channel_named("Fz", (1000 + np.arange(SAMPLE_COUNT)).astype("i2"))),
+        usual_truth_of(Fz=1000.0 + np.arange(SAMPLE_COUNT)),
     ),
     "TDMS with umlauts and quotes": (
         "paths within the file are quoted",
-        channels(("Größe 'a'", "Kraft 'Räder'/Ω", FZ, CLOCK)),
-        prefix(**{"Kraft 'Räder'/Ω": FZ}),
+        tdms_file(("Größe 'a'", "Kraft 'Räder'/Ω", FZ, CLOCK)),
+        usual_truth_of(**{"Kraft 'Räder'/Ω": FZ}),
     ),
-    "TDMS of 300 channels": ("a long description", wide(".tdms"), MANY_CHANNELS),
+    "TDMS of 300 channels": ("a long description", file_of_300_channels(".tdms"), MANY_CHANNELS),
     "TDMS with NaN": (
         "nothing was measured for a while",
-        channels(channel_named("Fz", np.where(FX < -50, np.nan, FZ)), channel_named("Fx", FX)),
-        usual(Fz=np.where(FX < -50, np.nan, FZ)),
+        tdms_file(channel_named("Fz", np.where(FX < -50, np.nan, FZ)), channel_named("Fx", FX)),
+        usual_truth(Fz=np.where(FX < -50, np.nan, FZ)),
     ),
     "TDMS beside an old index": ("the index describes another file", beside_old_index),
 }
@@ -238,4 +249,4 @@ GREEDY = (
     "TDMS of a huge number of channels",
     "TDMS of a huge name",
 )
-FILES = every(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)
+FILES = odd_files(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)

@@ -25,8 +25,8 @@ from models.core.errors import RunFailed
 from models.systems.braking.march import BrakedVehicle, on_tyres
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import stacked_tables
-from validation.braking.quarter_stops import FRONT_WHEEL, FrictionChange, FrictionCurve, marched_quarter
-from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
+from validation.braking.quarter_stops import FRONT_WHEEL, FrictionChange, FrictionCurve, stop_by_scheme
+from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, reference_distance_on_stretches
 
 SURFACES, SURFACE_CHANGE, SPEED = ("snow", "wet"), 10.0, 11.11
 """Surfaces of the road, distance (m) at which the second begins, and initial speed (m/s)."""
@@ -167,7 +167,7 @@ class BrakingStop:
     def _distance_by_scipy(self, method: str, tolerance: float) -> float:
         """Stopping distance (m) by an adaptive method of scipy; changes of friction, locking and release are events."""
         stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, self.change))]
-        return tight_distance(
+        return reference_distance_on_stretches(
             FRONT_WHEEL, PAPER_FRONT, stretches, ReplayedController(self.valves), self.speed, tolerance, method
         )
 
@@ -205,7 +205,7 @@ class BrakingStop:
         friction = FrictionChange(
             FrictionCurve(self.slips, self.mu[0]), FrictionCurve(self.slips, self.mu[1]), self.change
         )
-        distance, steps, _ = marched_quarter(number, FRONT_WHEEL, torques, friction, self.speed, step)
+        distance, steps, _ = stop_by_scheme(number, FRONT_WHEEL, torques, friction, self.speed, step)
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return StopResult(distance, {"steps": steps, "force calls": CALLS_PER_STEP[method] * steps})
