@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.discretisation import of_chance
+from models.core.discretisation import with_sampling_error
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, result
 from models.core.strict import Strict, quantity, read
@@ -92,7 +92,9 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         scatters = _means_of_stops(fitted, options, options.last, pool, options.seed + 1)
     columns = zip(QUANTITIES_OF_ROUND.items(), np.array(steps).T, strict=True)
     rounds = {name: Channel("round", values, unit) for (name, unit), values in columns}
-    by_rounds = of_chance(result(scene, rounds, {}, engine="reference"), statistical_errors(means), options.runs)
+    by_rounds = with_sampling_error(
+        result(scene, rounds, {}, engine="reference"), statistical_errors(means), options.runs
+    )
     by_rounds.save(folder / "rounds.nc")
     heads = (f"{name} [{unit}]" if unit else name for name, unit in QUANTITIES_OF_ROUND.items())
     rows = [",".join(heads), *(",".join(f"{value:.9g}" for value in step) for step in steps)]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.discretisation import of_chance
+from models.core.discretisation import with_sampling_error
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
@@ -84,7 +84,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     ):
         channels = {key: Channel("stop", arrays[key], unit) for key, unit in units.items()}
         stops = joined_result(result(scene_of_ensemble, channels, {}, engine="reference"), {"one stop": single})
-        results[name] = of_chance(stops, statistical_errors(means), options.runs)
+        results[name] = with_sampling_error(stops, statistical_errors(means), options.runs)
         stops.save(folder / f"{name}.nc")
         stops.save_table(folder / f"{name}.csv")
     tests = (

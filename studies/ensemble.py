@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from models.core.assumptions import Watched, with_assumptions
-from models.core.discretisation import by_chance, of_chance
+from models.core.discretisation import by_chance, with_sampling_error
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.steps import divides
@@ -175,7 +175,7 @@ def _with_errors(
             "end the runs before, or hold their pitch (kalman_filter)", lambda run: _largest_pitch(statistics)
         )
     ]
-    return of_chance(
+    return with_sampling_error(
         with_assumptions(result, assumed),
         {f"deviation of {name}": breach for name, breach in worst.items()},
         options.paths,

@@ -14,7 +14,7 @@ from pydantic import Field
 from scipy.interpolate import CubicSpline
 
 from models.core.assumptions import Assumption, with_assumptions
-from models.core.discretisation import by_chance, of_chance
+from models.core.discretisation import by_chance, with_sampling_error
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result
 from models.core.result import result as labelled
@@ -159,7 +159,7 @@ def _errors_of_grades(scene: Scene, paths: UnitPaths, options: Options, curve: C
         f"damage error at {grade:g} deg/h": by_chance((high - low) / (2 * ERRORS_95), middle, "", options.samples)
         for grade, (middle, low, high) in zip(options.grades, bounds_of_grades, strict=True)
     }
-    return of_chance(units, chances, options.samples)
+    return with_sampling_error(units, chances, options.samples)
 
 
 def angle_law(seconds: np.ndarray, options: Options, grade: int) -> np.ndarray:

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import by_chance, of_chance
+from models.core.discretisation import by_chance, with_sampling_error
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
@@ -163,7 +163,7 @@ def _with_errors(result: Result, quiet_run: Result, drift_off_times: dict[str, n
     if not math.isfinite(high):
         return result
     error = by_chance((high - low) / (2.0 * ERRORS_95), middle, "s", options.paths)
-    return of_chance(result, {"median drift-off by noise": error}, options.paths)
+    return with_sampling_error(result, {"median drift-off by noise": error}, options.paths)
 
 
 def _saved_paths(scene: Scene, rows: list[Row], drift_off_times: dict[str, np.ndarray]) -> Result:

@@ -17,10 +17,10 @@ from models.core.discretisation import (
     estimate,
     estimated,
     finite_rms,
+    nearest_rows,
     not_estimated,
-    of_chance,
     root_mean_square,
-    rows_at,
+    with_sampling_error,
     with_stated_errors,
 )
 from models.core.errors import RunFailed
@@ -72,7 +72,7 @@ def test_the_error_is_told_at_the_order_that_is_seen(order, declared):
 def test_an_order_that_is_taken_for_granted_would_be_caught():
     """Planted fault: a rough road lowers the order, and who does not observe it tells a twentieth of the error."""
     fine, coarse = (marched(factor * STEP, 1, 1.0).channels["heave"] for factor in (1, 2))
-    rows = rows_at(marched(STEP, 1, 1.0).times, marched(2 * STEP, 1, 1.0).times)
+    rows = nearest_rows(marched(STEP, 1, 1.0).times, marched(2 * STEP, 1, 1.0).times)
     blind = estimate(fine[rows], coarse, 4.0, STEP)
     assert blind.error < 0.2 * errors_of(told(1, 1.0, 4))["heave"].error
 
@@ -140,7 +140,7 @@ def test_reasons_and_chance_are_told():
     run = run_of(marched(STEP, 4, 0.0))
     not_estimated(run, "the switches of the controller do not repeat")
     assert error_lines(run) == ["error not estimated: the switches of the controller do not repeat"]
-    of_chance(run, {"heave": by_chance(0.1, 1.0, "m", 100)}, 100)
+    with_sampling_error(run, {"heave": by_chance(0.1, 1.0, "m", 100)}, 100)
     assert error_lines(run)[1] == "standard error of 100 paths at most 10 % (heave: 0.1 m)"
     assert json.loads(run.data.attrs["error"])["chance"]["channels"]["heave"]["step"] == 2500
 

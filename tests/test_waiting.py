@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from models.core.waiting import SHARES_OF_MARCHES, marching
+from models.core.waiting import PROGRESS_FUNCTIONS, marching
 from models.engines.assembly import Settings
 from models.engines.protocol import build
 from models.systems.pitch_plane.scene import assembly_of_scene
@@ -118,7 +118,7 @@ def test_a_march_tells_how_far_it_is(engine, monkeypatch):
             ends.append(share())
             super().remove(share)
 
-    monkeypatch.setattr("models.core.waiting.SHARES_OF_MARCHES", Told())
+    monkeypatch.setattr("models.core.waiting.PROGRESS_FUNCTIONS", Told())
     scene = road_scene(duration=0.5)
     build(engine, assembly_of_scene(scene), Settings({"exudyn": "RK44", "mujoco": "RK4"}[engine], 1e-3, 0.5)).run()
     assert ends == [pytest.approx(1.0, abs=1e-9)]
@@ -144,6 +144,6 @@ def test_time_left_follows_the_share_and_leaves_out_compiling(monkeypatch):
         shown.state()
         now[0] += 8.0
         assert shown.state() == ("six runs", 0.5, "8 s left")
-    assert not SHARES_OF_MARCHES
+    assert not PROGRESS_FUNCTIONS
     with marching(lambda: 1 / 0):
         assert shown.state()[1] == 0.0

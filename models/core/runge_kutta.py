@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 RK4_STAGES = 4
-"""Evaluations of the rates in a step."""
+"""Evaluations of the right-hand side per step of the classical Runge-Kutta method."""
 
 
 def step_on(rate: Callable[[float, np.ndarray], np.ndarray], time: float, state: np.ndarray, step: float) -> np.ndarray:

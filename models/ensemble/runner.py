@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.core.whole_files import DISK_FULL_ERRORS, reason_of
+from models.core.whole_files import DISK_FULL_ERRORS, write_error_phrase
 from models.ensemble.store import Arrays, Store
 
 PATHS_PER_BLOCK = 50
@@ -357,7 +357,7 @@ def _save_block(store: Store | _Memory, block: int, arrays: Arrays) -> None:
     except OSError as error:
         if error.errno not in DISK_FULL_ERRORS:
             raise
-        raise _disk_full(reason_of(error), store) from None
+        raise _disk_full(write_error_phrase(error), store) from None
 
 
 def _disk_full(reason: str, store: Store | _Memory) -> RunFailed:

@@ -19,7 +19,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.result import RECORDED_PACKAGES
-from models.core.whole_files import drop_parts, write_whole
+from models.core.whole_files import remove_partial_files, write_whole
 
 Arrays = dict[str, np.ndarray]
 JOB_FILE = "job.json"
@@ -42,7 +42,7 @@ class Store:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with exclusive_folder(self.folder):
-            drop_parts(self.folder)
+            remove_partial_files(self.folder)
             self._write_job(fingerprint(facts))
             yield
 

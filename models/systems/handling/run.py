@@ -13,8 +13,8 @@ from models.core.assumptions import with_assumptions
 from models.core.discretisation import (
     Estimate,
     Series,
-    by_cells,
     by_steps,
+    grid_error,
     not_estimated,
     size_of,
     summed_error,
@@ -268,7 +268,7 @@ class ManoeuvreRerun:
         for name in names:
             values = base.channels[name]
             gap = share * float(np.sqrt(np.mean((values - coarse.channels[name]) ** 2)))
-            net = by_cells(gap, size_of(values), UNIT_OF_CHANNEL[name], cells, NET_ORDER, MOST_CELLS)
+            net = grid_error(gap, size_of(values), UNIT_OF_CHANNEL[name], cells, NET_ORDER, MOST_CELLS)
             estimates[name] = replace(net, of=CELLS_KEY)
         return estimates
 

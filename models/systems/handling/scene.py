@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr
 
 from models.core.errors import InputError
-from models.core.scene_effects import extended_by_effects, with_own
+from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.steps import MOST_STEPS, divides, fitting
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
@@ -191,7 +191,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
         for control, limits in CONTROL_LIMITS.items():
             _check_knots(scene, f"{key_path}.{control}", getattr(manoeuvre, control), *limits)
     check_engines(scene.file, scene.engines)
-    return with_own(scene)
+    return with_effect_tables(scene)
 
 
 def _with_measured(scene: HandlingScene) -> HandlingScene:

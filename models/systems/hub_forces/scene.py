@@ -8,13 +8,13 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.scene_effects import extended_by_effects, with_own
+from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.signals import Interpolation
 from models.core.steps import divides, fitting
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
-from models.core.time_series import CHASSIS_SAMPLE_TIME, other_unit, read_time_series
+from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, wrong_time_unit_hint
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import FIXED, Route
 from models.engines.error_control import Adaptive, check_engines
@@ -177,7 +177,7 @@ class HubScene(SceneFile):
             )
         last_time = period * (min(len(forces), len(angles)) - 1)
         if last_time < self.run.duration * (1 - 1e-9):
-            allowed = f"the files end at {last_time:g} s{other_unit(last_time, self.run.duration)}"
+            allowed = f"the files end at {last_time:g} s{wrong_time_unit_hint(last_time, self.run.duration)}"
             raise InputError(self.file, "run.duration", self.run.duration, allowed)
         if self.forces.interpolation == "held" and not divides(self.run.step, period):
             allowed = f"must divide the period of {period:g} s over which samples are held"
@@ -203,7 +203,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
         raise InputError(file, "run.forces", scene.run.forces, allowed)
     _check_steps(file, scene)
     check_engines(file, scene.engines)
-    return with_own(scene)
+    return with_effect_tables(scene)
 
 
 def _check_file_only(file: str, scene: HubScene) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import FINE_WINDOW, Series, estimated, of_tolerance, size_of
+from models.core.discretisation import FINE_WINDOW, Series, estimated, size_of, with_tolerance_error
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
@@ -95,7 +95,7 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
 
     if method.adaptive:
         looser = _with_longer_engine_step(rerun, replace(settings, tolerance=TOLERANCE_FACTOR * settings.tolerance))
-        return of_tolerance(run, fine, looser, TOLERANCE_FACTOR, settings.tolerance, sizes)
+        return with_tolerance_error(run, fine, looser, TOLERANCE_FACTOR, settings.tolerance, sizes)
 
     def longer(step_factor: float, share: float) -> Series:
         return rerun(_settings_of_longer_step(settings, step_factor, share))

@@ -43,9 +43,9 @@ def check_end(scene: Scene, key_path: str, file: str, end_time: float) -> None:
     """Refuse a file whose data end at a time ``end_time`` (s) before the run does."""
     length = scene.run.duration
     if end_time < length * (1 - 1e-9):
-        from models.core.time_series import other_unit
+        from models.core.time_series import wrong_time_unit_hint
 
-        remedy = f"shorten run.duration{other_unit(end_time, length)}"
+        remedy = f"shorten run.duration{wrong_time_unit_hint(end_time, length)}"
         allowed = f"ends at {end_time:g} s, but the run lasts {length:g} s: {remedy}"
         raise InputError(scene.file, key_path, file, allowed)
 

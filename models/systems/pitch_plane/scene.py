@@ -10,7 +10,7 @@ from pydantic import Field
 
 from models.core.errors import InputError
 from models.core.scene_effects import check_combination, module_of, read_tables
-from models.core.scene_file import SceneFile, checked, existing, parse
+from models.core.scene_file import SceneFile, checked, existing_file, parse
 from models.core.steps import MOST_STEPS, divides, fitting
 from models.core.strict import Query, Strict, accepted_queries_field, quantity, read
 from models.core.systems import DEFAULT_SYSTEM
@@ -93,7 +93,7 @@ class Scene(SceneFile):
 def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
     """A published parameter set by its name, or the user's own from a TOML file."""
     if name.endswith(".toml"):
-        return read(pitch_plane.Parameters, parse(existing(name, folder, file, "vehicle.parameters")), name)
+        return read(pitch_plane.Parameters, parse(existing_file(name, folder, file, "vehicle.parameters")), name)
     if name not in parameter_sets():
         allowed = "must be a TOML file with all parameters, or a published set"
         raise InputError(file, "vehicle.parameters", name, allowed, parameter_sets())

@@ -11,8 +11,8 @@ from models.core.discretisation import (
     estimated,
     not_estimated,
     observed_order,
-    of_chance,
     root_mean_square,
+    with_sampling_error,
     with_stated_errors,
 )
 from models.core.errors import RunFailed
@@ -138,7 +138,7 @@ def with_error_of_copies(
         for i, name in enumerate(first.names)
         if size[i] > 0.0
     }
-    return of_chance(run, scatter, len(first.moments[0]))
+    return with_sampling_error(run, scatter, len(first.moments[0]))
 
 
 def _over_speeds(rows: Sequence[np.ndarray]) -> np.ndarray:

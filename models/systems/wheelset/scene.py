@@ -7,7 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.scene_effects import with_own
+from models.core.scene_effects import with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.speeds import Speeds, check_speeds
 from models.core.steps import MOST_STEPS, divides, fitting
@@ -102,7 +102,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Wh
     _check_conicity(scene)
     if scene.contact.law == "linear" and "cells" in scene.contact.model_fields_set:
         raise InputError(file, "contact.cells", scene.contact.cells, "has no meaning for the linear law: drop it")
-    return with_own(scene)
+    return with_effect_tables(scene)
 
 
 def _check_speeds(scene: WheelsetScene) -> None:

@@ -16,10 +16,10 @@ from models.core.discretisation import (
     FINE_WINDOW,
     Estimate,
     Series,
-    by_cells,
     estimated,
+    grid_error,
+    nearest_rows,
     not_estimated,
-    rows_at,
     size_of,
     with_stated_errors,
 )
@@ -70,7 +70,7 @@ def with_error(run: Result, scene: WheelsetScene, march_scene: March) -> Result:
     estimates = _of_steps(scene, march_scene, fine, coarse, sizes)
     for name, unit in UNIT_OF_CHANNEL.items():
         gap = _rms_difference(fine, coarse, name)
-        estimates[f"{name} of cells"] = by_cells(gap, sizes[name], unit, cells, OF_CELLS, MOST_CELLS)
+        estimates[f"{name} of cells"] = grid_error(gap, sizes[name], unit, cells, OF_CELLS, MOST_CELLS)
     return with_stated_errors(run, estimates, f"a path on {other_cells} cells and some steps of other length")
 
 
@@ -148,7 +148,7 @@ def _rms_difference(fine_series: Series, other_series: Series, name: str, end_ti
     """
     long, short = sorted((fine_series, other_series), key=lambda series: -series.times[min(1, len(series.times) - 1)])
     shared_times = long.times[long.times <= min(end_time, short.times[-1]) * (1.0 + 1e-9)]
-    gap = long.channels[name][: len(shared_times)] - short.channels[name][rows_at(short.times, shared_times)]
+    gap = long.channels[name][: len(shared_times)] - short.channels[name][nearest_rows(short.times, shared_times)]
     return float(np.sqrt(np.mean(gap**2)))
 
 
@@ -173,7 +173,7 @@ def with_error_of_cycles(
         if coarse_orbits:
             gaps = [getattr(orbits[k], name) - getattr(coarse_orbit, name) for k, coarse_orbit in coarse_orbits.items()]
             left = LIKELY * float(np.sqrt(np.mean(np.square(gaps))))
-            estimates[f"{name} of cells"] = by_cells(left, size, unit, cells, OF_CELLS, MOST_CELLS)
+            estimates[f"{name} of cells"] = grid_error(left, size, unit, cells, OF_CELLS, MOST_CELLS)
     cells_text = (
         f", and half the cells at {len(coarse_orbits)} of {len(orbits)} cycles"
         if coarse_orbits
