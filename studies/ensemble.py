@@ -234,11 +234,11 @@ def _time_text(seconds: float) -> str:
 def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, results: Results, folder: Path) -> None:
     """Plot percentiles of the pitch error over time, and a histogram of the drift-off times."""
 
-    from models.drawing.drift import draw_fan
+    from models.drawing.drift import draw_quantile_bands
     from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, add_heading, save, subplots
 
     figure, (fan, histogram) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8), width_ratios=(3, 2))
-    draw_fan(fan, times[1:], statistics.fan[:, 1:])
+    draw_quantile_bands(fan, times[1:], statistics.fan[:, 1:])
     fan.axhline(
         options.threshold, color=DARK, linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"
     )
