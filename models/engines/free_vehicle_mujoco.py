@@ -10,7 +10,7 @@ from models.core.errors import RunFailed
 from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.mujoco_callback import kernel_law
-from models.engines.mujoco_layout import check
+from models.engines.mujoco_layout import check_offsets
 from models.engines.mujoco_march import GAVE_UP, Marcher
 from models.engines.mujoco_native import Native, native
 from models.engines.mujoco_quiet import installed, without_warnings
@@ -124,7 +124,7 @@ class FreeMujoco(FreeModel):
         self.data = mujoco.MjData(self.model)
         self.law = kernel_law(driven.kernel) if driven.has_kernel else None
         self._marcher = Marcher(self.model)
-        check(self.model, self.data)
+        check_offsets(self.model, self.data)
 
     @property
     def numbers(self) -> np.ndarray:

@@ -220,9 +220,9 @@ class MujocoModel:
         self.model = _compiled(assembly, settings, self.drive, self.guided)
         self.data = mujoco.MjData(self.model)
         if self.drive.law is not None:
-            from models.engines.mujoco_layout import check
+            from models.engines.mujoco_layout import check_offsets
 
-            check(self.model, self.data)
+            check_offsets(self.model, self.data)
 
     def run(self) -> Trajectory:
         """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""

@@ -91,7 +91,7 @@ def _all_digits() -> Iterator[None]:
         library._mjPRIVATE__set_xml_precision(before)
 
 
-def counts(model: mujoco.MjModel) -> Sequence[str]:
+def item_counts(model: mujoco.MjModel) -> Sequence[str]:
     """Texts with the numbers of bodies, joints, tendons and actuators in a MuJoCo model."""
     kinds = (("bodies", model.nbody - 1), ("joints", model.njnt), ("tendons", model.ntendon), ("actuators", model.nu))
     return [f"{count} {kind}" for kind, count in kinds if count]

@@ -64,7 +64,7 @@ def offsets(*fields: str) -> list[int]:
     return [offset("mjModel" if field == "numeric_data" else "mjData", field) for field in fields]
 
 
-def check(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+def check_offsets(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Compare offsets with the addresses of MuJoCo's arrays in Python; raises RuntimeError on a mismatch."""
     arrays = (("mjModel", model, ("numeric_data", "qpos0")), ("mjData", data, ("qfrc_passive", "qvel", "qpos")))
     for structure, owner, fields in arrays:

@@ -128,9 +128,9 @@ class SpatialExudyn:
             self._values_in_exudyn_order(rest if v is None else v),
         )
         note = solve(self.mbs, settings)
-        return sound("exudyn", settings, *self._recorded(settings), note, solver_counts(self.mbs))
+        return sound("exudyn", settings, *self._recorded_states(settings), note, solver_counts(self.mbs))
 
-    def _recorded(self, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+    def _recorded_states(self, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
         """Times (m,) and states (m, 2 n) from the sensors. Times are multiples of the step, as Exudyn's own sum ends
         1e-13 early.
         """

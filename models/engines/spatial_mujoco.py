@@ -10,7 +10,7 @@ import numpy as np
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.mujoco import INTEGRATORS
-from models.engines.mujoco_layout import check
+from models.engines.mujoco_layout import check_offsets
 from models.engines.mujoco_march import FORCE_CALLS, march
 from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
@@ -52,7 +52,7 @@ class SpatialMujoco:
         self.data = mujoco.MjData(self.model)
         self.numbers = MujocoIndices(vehicle, self.model)
         self.law: Any = spatial_law()
-        check(self.model, self.data)
+        check_offsets(self.model, self.data)
 
     @contextmanager
     def _hold_road(self) -> Iterator[np.ndarray]:

@@ -8,7 +8,7 @@ rounding, or for their tolerance.
 import numpy as np
 
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import ENGINES, FIXED, PLAIN, HubModel
+from models.engines.cut_vehicle import ENGINES, FIXED_STEP_METHOD, PLAIN, HubModel
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.multibody.plain.motion import PLACE, Bodies
@@ -71,7 +71,7 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
     ]
 
 
-def settings(integrator: str = FIXED) -> Settings:
+def settings(integrator: str = FIXED_STEP_METHOD) -> Settings:
     """Settings of a run over all force samples."""
     return Settings(integrator, STEP, (SAMPLES - 1) * STEPS_PER_SAMPLE * STEP, SOLVER_TOLERANCE)
 
@@ -83,7 +83,7 @@ def samples(vehicle: CutVehicle) -> HubForces:
     return HubForces(static_inputs.hubs, STEPS_PER_SAMPLE * STEP, "inertial").noisy(deviations, SEED)
 
 
-def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED) -> float:
+def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED_STEP_METHOD) -> float:
     """Largest error (m) of the centre of mass at the sample times, against the closed form, over all axes."""
     forces, run_settings = samples(vehicle), settings(integrator)
     run = HubModel(engine, vehicle, forces.hub_inputs(STEP, run_settings.steps, interpolation), run_settings).run()  # type: ignore[arg-type]
@@ -131,7 +131,7 @@ def path_gap(vehicle: CutVehicle, engine: str, integrator: str) -> float:
     """Largest difference of any coordinate or rate between a run by an adaptive integrator and one by Runge-Kutta 4
     with an eighth of the step; forces are linear between their samples."""
     forces, run_settings = samples(vehicle), settings(integrator)
-    fine = Settings(FIXED, STEP / 8.0, run_settings.duration)
+    fine = Settings(FIXED_STEP_METHOD, STEP / 8.0, run_settings.duration)
     hub_inputs, finer = (
         forces.hub_inputs(settings_of_run.step, settings_of_run.steps) for settings_of_run in (run_settings, fine)
     )

@@ -16,7 +16,7 @@ from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
 from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, wrong_time_unit_hint
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import FIXED, Route
+from models.engines.cut_vehicle import FIXED_STEP_METHOD, Route
 from models.engines.error_control import Adaptive, check_engines
 from models.own_model.scene_vehicle import scene_vehicle
 from models.systems.hub_forces.measurement import Angles, HubForces
@@ -136,7 +136,7 @@ class HubScene(SceneFile):
         """Settings of an engine's march: Runge-Kutta 4, or an integrator that picks its own steps."""
         step, duration, adaptive = self.run.step, self.run.duration, self.engines.get(engine)
         if adaptive is None:
-            return Settings(FIXED, step, duration)
+            return Settings(FIXED_STEP_METHOD, step, duration)
         return Settings(adaptive.integrator, step, duration, adaptive.tolerance)
 
     def forces_with(self, method: Method) -> Route:

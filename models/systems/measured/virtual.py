@@ -15,7 +15,7 @@ from models.core.steps import divides, fitting
 from models.core.strict import Strict, quantity
 from models.core.whole_files import write_whole
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import FIXED, HubRun
+from models.engines.cut_vehicle import FIXED_STEP_METHOD, HubRun
 from models.measured.channel import SAMPLES_PER_BLOCK
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults, measured_samples
@@ -111,7 +111,7 @@ def virtual_measurement(
         vehicle,
         virtual.road,
         virtual.frame,
-        (engine, Settings(FIXED, virtual.step, virtual.duration), "compiled"),
+        (engine, Settings(FIXED_STEP_METHOD, virtual.step, virtual.duration), "compiled"),
         error,
     )
     hubs = run.wrenches.reshape(len(run.times), -1)
