@@ -15,7 +15,7 @@ from models.core.errors import Refused, RunFailed
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.catalogue import ADAPTIVE
-from models.engines.free_vehicle import Driven, FreeModel, Plain, built_share, free_model
+from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model, native_elements_and_joints
 from models.engines.native_parts import Division, divide
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import check_divides, check_modes
@@ -252,7 +252,7 @@ def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
     callback."""
     division = divide(vehicle.tree, vehicle.elements, engine)
     driven = Driven(vehicle.tree, np.zeros(3), np.zeros(1), None, None, division.native)
-    elements, joints = built_share(engine, driven)
+    elements, joints = native_elements_and_joints(engine, driven)
     return NativeShare(elements, joints, division.reasons)
 
 

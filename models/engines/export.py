@@ -87,16 +87,16 @@ def export_free_vehicle(
 
         coordinates = {name: i for i, name in enumerate(coordinate_names(driven.vehicle))}
         return exported_exudyn_system(FreeExudyn(driven).mbs, coordinates, export_subject, omissions)
-    from models.engines.free_vehicle_mujoco import compiled, specified
+    from models.engines.free_vehicle_mujoco import compiled_from, specification_of
     from models.engines.mujoco_export import add_shapes
     from models.engines.mujoco_inertia import realisable
 
     vehicle, lowered = realisable(driven.vehicle)
     driven = replace(driven, vehicle=vehicle)
-    spec = specified(driven)
+    spec = specification_of(driven)
     add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))
     return exported_mujoco_model(
-        spec, compiled(spec, driven), names_of(vehicle), export_subject, [*omissions, *lowered]
+        spec, compiled_from(spec, driven), names_of(vehicle), export_subject, [*omissions, *lowered]
     )
 
 

@@ -17,10 +17,10 @@ from models.engines.assembly import Assembly, Settings
 from models.engines.exudyn_clock import SignalClock
 from models.engines.exudyn_system import (
     KINDS,
+    add_state_sensors,
     items,
     march_settings,
     mass_and_force,
-    recorders,
     set_start,
     solve,
     solver_counts,
@@ -262,7 +262,7 @@ class ExudynModel:
         p = assembly.parameters
         self._inertia = np.array([p.m1, p.m2, p.m3, p.I])[list(assembly.guided)]
         mbs, kept = self.built.mbs, {"storeInternal": True, "writeToFile": False}
-        self._sensors = recorders(mbs, self.built.nodes.values())
+        self._sensors = add_state_sensors(mbs, self.built.nodes.values())
         self._multipliers = [
             mbs.AddSensor(items.SensorObject(objectNumber=constraint, outputVariableType=KINDS.Force, **kept))
             for constraint in self.constraints

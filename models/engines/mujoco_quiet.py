@@ -1,4 +1,4 @@
-"""MuJoCo's state that is global to a process: its callbacks and its warnings."""
+"""Control of the MuJoCo state that is global to a process: its callbacks and its warnings."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +11,8 @@ from models.core.errors import RunFailed
 
 @contextmanager
 def without_warnings() -> Iterator[None]:
-    """Keep MuJoCo from printing warnings and writing a log into the user's folder: the guard reports them."""
+    """Context in which MuJoCo prints no warnings and writes no log into the user's folder; every run checks for
+    warnings itself."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: None)
     try:
@@ -22,7 +23,7 @@ def without_warnings() -> Iterator[None]:
 
 @contextmanager
 def installed(law: Any) -> Iterator[None]:
-    """Install a compiled callback, or none, within the block only: MuJoCo's callbacks are global to the process.
+    """Context in which a compiled MuJoCo callback, or none, is installed: MuJoCo's callbacks are global to the process.
 
     Meanwhile MuJoCo is quiet: what it would warn of is raised by whoever runs it. RunFailed where another one is.
     """

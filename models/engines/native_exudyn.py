@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from models.engines.exudyn_system import items, lists
-from models.engines.exudyn_tree import JOINTS, Build
+from models.engines.exudyn_tree import JOINT_TYPES, TreeBuild
 from models.engines.native_parts import (
     SLIDES,
     AxialTravel,
@@ -39,7 +39,7 @@ LAW, ROTORS, NEXT = "native law: ", "rotors: ", "; "
 """What names of objects begin with, and what stands between the names of several elements in it."""
 
 
-def add_parts(build: Build, node: Any, parts: Sequence[NativePart]) -> None:
+def add_parts(build: TreeBuild, node: Any, parts: Sequence[NativePart]) -> None:
     """Add all parts to a system with one tree, whose coordinates are in ``node``."""
     coordinates, trees, axial = Coordinates(build, node), _Trees(build, node), list[Axial]()
     for part in parts:
@@ -51,7 +51,7 @@ def add_parts(build: Build, node: Any, parts: Sequence[NativePart]) -> None:
         trees.add(group)
 
 
-def add_rotors(build: Build, node: Any, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
+def add_rotors(build: TreeBuild, node: Any, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
     """Add inertias that move with sums of coordinates, as one mass matrix in addition to the tree's."""
     size = build.size(node)
     mass = np.zeros((size, size))
@@ -68,7 +68,7 @@ def add_rotors(build: Build, node: Any, rotors: Sequence[tuple[str, CoordinateTr
         )
 
 
-def add_ground_spring(build: Build, spring: GroundSpring) -> None:
+def add_ground_spring(build: TreeBuild, spring: GroundSpring) -> None:
     """Add a spring-damper along the axes of space, and the spring's load."""
     foot, tip = build.marker(None, spring.anchor), build.marker(spring.body, spring.point)
     if any(spring.stiffness + spring.damping):
@@ -77,7 +77,7 @@ def add_ground_spring(build: Build, spring: GroundSpring) -> None:
         build.mbs.AddLoad(items.LoadForceVector(markerNumber=tip, loadVector=spring.load))
 
 
-def add_line_spring(build: Build, spring: LineSpring) -> None:
+def add_line_spring(build: TreeBuild, spring: LineSpring) -> None:
     """Add a spring-damper along the line between two points. Exudyn needs a length above 0; a constant force corrects
     for it.
     """
@@ -93,7 +93,7 @@ def add_line_spring(build: Build, spring: LineSpring) -> None:
     )
 
 
-def add_body_load(build: Build, load: BodyLoad) -> None:
+def add_body_load(build: TreeBuild, load: BodyLoad) -> None:
     """Add a force and a moment that turn with a body."""
     marker, axes = build.marker(load.body, load.point, True), {"bodyFixed": True}
     force, moment = (build.in_body_axes(load.body, vector) for vector in (load.force, load.moment))
@@ -103,7 +103,7 @@ def add_body_load(build: Build, load: BodyLoad) -> None:
         build.mbs.AddLoad(items.LoadTorqueVector(markerNumber=marker, loadVector=moment, **axes))
 
 
-def add_turning_spring(build: Build, spring: TurningSpring) -> None:
+def add_turning_spring(build: TreeBuild, spring: TurningSpring) -> None:
     """Add a connector for rotations alone between frames of both bodies; it measures the rotation as a vector, not by
     angles.
     """
@@ -120,7 +120,7 @@ def add_turning_spring(build: Build, spring: TurningSpring) -> None:
     )
 
 
-def add_connection(build: Build, connection: Connection) -> None:
+def add_connection(build: TreeBuild, connection: Connection) -> None:
     """Add a spherical joint, or a rigid one between frames of both bodies."""
     if connection.axes is None:
         markers = [build.marker(*end) for end in connection.ends]
@@ -185,7 +185,7 @@ def _along_axes(group: Sequence[Axial]) -> dict[str, Any]:
 class Coordinates:
     """Builder of connectors and constraints between coordinates of one node."""
 
-    def __init__(self, build: Build, node: Any) -> None:
+    def __init__(self, build: TreeBuild, node: Any) -> None:
         self.built, self.node, self.markers = build, node, dict[int, Any]()
 
     def add(self, element: Element, travel: CoordinateTravel) -> None:
@@ -261,7 +261,7 @@ class _Trees:
     them.
     """
 
-    def __init__(self, build: Build, node: Any) -> None:
+    def __init__(self, build: TreeBuild, node: Any) -> None:
         self.built, self.node, self.trees = build, node, dict[str, Any]()
 
     def add(self, group: Sequence[Axial]) -> None:
@@ -309,7 +309,7 @@ class _Trees:
         return items.ObjectKinematicTree(
             nodeNumber=self.node,
             gravity=[0, 0, 0],
-            jointTypes=[JOINTS[freedom] for _, freedom in places],
+            jointTypes=[JOINT_TYPES[freedom] for _, freedom in places],
             linkParents=parents.tolist(),
             jointTransformations=lists.Matrix3DList([np.eye(3)] * count),
             jointOffsets=lists.Vector3DList(list(offsets)),

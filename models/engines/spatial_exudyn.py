@@ -9,9 +9,9 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.exudyn_system import (
     KINDS,
+    add_state_sensors,
     mass_and_force,
     quiet_settings,
-    recorders,
     set_start,
     solve,
     solver_counts,
@@ -44,7 +44,7 @@ class SpatialExudyn:
         self.built = assemble(vehicle, speed, self.road)
         mbs = self.mbs = self.built.mbs
         places = [self.built.places[place] for place in vehicle.coordinates()]
-        self._sensors = recorders(mbs, dict.fromkeys(node for node, _ in places))
+        self._sensors = add_state_sensors(mbs, dict.fromkeys(node for node, _ in places))
         mbs.Assemble()
         self._columns = [mbs.GetNodeODE2Index(node) + index for node, index in places]
 

@@ -14,7 +14,7 @@ import exudyn as exu
 import numpy as np
 
 from models.engines.exudyn_system import KINDS, items
-from models.engines.exudyn_tree import Build, add_slider, add_tree
+from models.engines.exudyn_tree import TreeBuild, add_slider, add_tree
 from models.vehicles.spatial import (
     AntiRollBar,
     Body,
@@ -67,7 +67,7 @@ class RoadRows:
                 each.rows = rows
 
 
-def _spring(build: Build, spring: SpringDamper) -> None:
+def _spring(build: TreeBuild, spring: SpringDamper) -> None:
     """Add a spring-damper, native where Exudyn has an item for it: along a global axis, or along any axis of a body
     that never turns.
     """
@@ -122,7 +122,7 @@ def _law(
     return law
 
 
-def _bar(build: Build, bar: AntiRollBar) -> None:
+def _bar(build: TreeBuild, bar: AntiRollBar) -> None:
     """Add an anti-roll bar: vertical forces at its two points, and the moment on the body's roll coordinate."""
     left, right = build.marker(bar.left, bar.point_left), build.marker(bar.right, bar.point_right)
     roll, turning = build.reader(bar.body, "rx"), build.reader(bar.body, "rx", KINDS.Coordinates_t)
@@ -153,7 +153,7 @@ def _bar(build: Build, bar: AntiRollBar) -> None:
         build.callbacks += 1
 
 
-def _turning_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
+def _turning_tyre(build: TreeBuild, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
     """Add a tyre of a body that turns: a spring-damper to flat ground, and the road's force as a load; ``by_road`` (2
     w,) : factors of this force (N).
     """
@@ -172,7 +172,7 @@ def _turning_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows)
     build.callbacks += 1
 
 
-def _steady_tyres(build: Build, tyres: list[Tyre], by_road: np.ndarray, road: RoadRows) -> None:
+def _steady_tyres(build: TreeBuild, tyres: list[Tyre], by_road: np.ndarray, road: RoadRows) -> None:
     """Add all tyres of bodies that never turn: matrices over the coordinates that lift them, and one callback.
 
     by_road : (2 w, tyres), what the road adds to each (N).
@@ -206,7 +206,7 @@ def _steady_tyres(build: Build, tyres: list[Tyre], by_road: np.ndarray, road: Ro
     build.callbacks += 1
 
 
-def _pushing_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
+def _pushing_tyre(build: TreeBuild, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
     """Add a tyre that may leave the road, its whole law as a callback; ``by_road`` (2 w, 2) : columns of height and
     rate under it.
     """
@@ -223,7 +223,7 @@ def _pushing_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows)
     build.spring(on_road, build.marker(tyre.body, tyre.point), name=name, springForceUserFunction=law)
 
 
-def _tyres(build: Build, road: RoadRows) -> None:
+def _tyres(build: TreeBuild, road: RoadRows) -> None:
     """Add all tyres of the vehicle."""
     tyres, turns, count = build.vehicle.tyres, build.vehicle.turns, len(build.vehicle.tyres)
     by_road = np.vstack([np.diag([tyre.stiffness for tyre in tyres]), np.diag([tyre.damping for tyre in tyres])])
@@ -237,7 +237,7 @@ def _tyres(build: Build, road: RoadRows) -> None:
             _turning_tyre(build, tyre, by_road[:, i], road)
 
 
-def _side_force(build: Build, force: SideForce, speed: float) -> None:
+def _side_force(build: TreeBuild, force: SideForce, speed: float) -> None:
     roll, yaw = (build.reader(force.chassis, freedom) for freedom in ("rx", "rz"))
 
     def law(apart: Any, rate: Any) -> list[float]:
@@ -256,10 +256,10 @@ def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
     return list(trees.values())
 
 
-def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadRows) -> Build:
+def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadRows) -> TreeBuild:
     """Build the vehicle in a new Exudyn system, which is not assembled yet, so that sensors can be added."""
     mbs = exu.SystemContainer().AddSystem()
-    built = Build(vehicle, mbs, preloads(vehicle), mbs.AddObject(items.ObjectGround()))
+    built = TreeBuild(vehicle, mbs, preloads(vehicle), mbs.AddObject(items.ObjectGround()))
     for bodies in _trees(vehicle):
         if len(bodies) == 1 and bodies[0].freedoms in (("x",), ("y",), ("z",)):
             add_slider(built, bodies[0])

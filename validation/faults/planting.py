@@ -198,12 +198,12 @@ ADAPTER_FAULTS = (
     EngineFault(
         "strut measured along the rotating body",
         MUJOCO_ONLY,
-        inside=attribute_patch("models.engines.mujoco:_suspension", patches.turning_reference),
+        inside=attribute_patch("models.engines.mujoco:_add_suspension", patches.turning_reference),
     ),
     EngineFault(
         "chassis row of eq. (39) with the other sign",
         MUJOCO_ONLY,
-        inside=attribute_patch("models.engines.mujoco:_guidance", patches.misprinted_row),
+        inside=attribute_patch("models.engines.mujoco:_guidance_forces", patches.misprinted_row),
     ),
     EngineFault(
         "callback never installed",
