@@ -76,7 +76,7 @@ def test_step_matrix_of_the_guided_vehicle(engine, integrator):
 )
 def test_limits_are_the_textbook_ones(integrator, limit):
     linear = stability.linearised(setups.vehicle().vehicle)
-    assert stability.limit(integrator, 0.1, 1000.0, linear) == pytest.approx(limit, rel=2e-4)
+    assert stability.longest_stable_step(integrator, 0.1, 1000.0, linear) == pytest.approx(limit, rel=2e-4)
 
 
 @pytest.mark.parametrize(("engine", "integrator"), LIMITED)
@@ -84,7 +84,7 @@ def test_the_limit_separates_decay_from_growth(engine, integrator):
     assembly = setups.vehicle()
     pushed = replace(assembly, initial=assembly.initial + 1e-6)
     linear = stability.linearised(assembly.vehicle)
-    limit = stability.limit(integrator, 0.1, 300.0, linear)
+    limit = stability.longest_stable_step(integrator, 0.1, 300.0, linear)
     below, above = (float(f"{limit * part:.3g}") for part in (0.97, 1.03))
     end = setups.unchecked_run(engine, pushed, below, 400 * below, integrator).states[-1]
     assert np.abs(end - assembly.initial).max() < 1e-4

@@ -109,7 +109,7 @@ def test_an_equilibrium_off_by_a_micrometre_is_found(implementation, monkeypatch
 
 
 def test_without_the_growth_check_an_undamped_run_is_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(stability, "GROWTH", np.inf)
+    monkeypatch.setattr(stability, "ALLOWED_GROWTH", np.inf)
     assert found(extremes, "no damping, first order", "exudyn", tmp_path) == "SILENT"
 
 

@@ -40,7 +40,7 @@ from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.native_parts import joint_parts
 from models.engines.spatial_protocol import INTEGRATORS, check_modes
 from models.engines.stability import LONG_RUN
-from models.engines.towed_springs import divided, numbers_beside
+from models.engines.towed_springs import divided, shared_numbers
 from models.vehicles.spatial_linear import linearise, mass
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def driven(vehicle: Sprung, engine: str) -> Driven:
     handling = vehicle.handling
     division = divided(handling, engine)
     wheels = np.zeros(HELD * len(handling.vehicle.tyres))
-    table = np.concatenate((numbers_beside(handling, division), wheels))
+    table = np.concatenate((shared_numbers(handling, division), wheels))
     native = (*joint_parts(handling.vehicle), *division.native)
     return Driven(handling.vehicle, handling.gravity, table, held, set_held, native)
 

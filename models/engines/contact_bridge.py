@@ -32,7 +32,7 @@ from models.contact.material import MaterialPair
 from models.contact.simplified_theory import press
 from models.contact.undeformed_distance import Distance, quadratic
 from models.core.errors import InputError, Refused
-from models.engines.stability import GROWTH, LONG_RUN, Linear, growth, limit
+from models.engines.stability import ALLOWED_GROWTH, LONG_RUN, LinearMatrices, log_growth, longest_stable_step
 from models.machine.compiled import njit
 from models.machine.records import record, records, size_of
 from models.machine.stack import array, at, beyond, doubles, start
@@ -217,7 +217,7 @@ def slopes(numbers, q, v, by_q, by_v, sensitivity):
                 sensitivity[row, row - row % FREEDOMS + i] += by * (high[row] - low[row]) / (2.0 * step)
 
 
-def linear(wheels: Wheels) -> Linear:
+def linear(wheels: Wheels) -> LinearMatrices:
     """Matrices of the wheels linearised about rest, by the linear theory, whose forces rise most steeply with creepage;
     see ``stability``."""
     n, zeros = wheels.size, np.zeros(wheels.size)
@@ -238,8 +238,8 @@ def check_step(engine: str, wheels: Wheels, method: str, step: float, steps: int
     of ``Euler``.
     """
     about, like = linear(replace(wheels, count=1)), "Euler" if method == "discrete" else method
-    if growth(like, step, steps * step, about) > np.log(GROWTH):
-        longest = limit(like, step, LONG_RUN * step, about)
+    if log_growth(like, step, steps * step, about) > np.log(ALLOWED_GROWTH):
+        longest = longest_stable_step(like, step, LONG_RUN * step, about)
         raise Refused(
             engine,
             f"step {step:g} s exceeds the stability limit of {method}, {0.999 * longest:.3g} s, for "

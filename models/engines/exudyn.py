@@ -25,7 +25,7 @@ from models.engines.exudyn_system import (
     solve,
     solver_counts,
 )
-from models.engines.protocol import balanced, guard, landings_followed
+from models.engines.protocol import balanced, check_landings, guard
 from models.vehicles.description import PitchSpring, Point, Strut, Vehicle, matrices
 
 Reader = Callable[[Any, float, float], float]
@@ -318,7 +318,7 @@ class ExudynModel:
         times, states = self._recorded_states()
         enforced = self._enforced()
         guard("exudyn", times, states, self.settings.duration, note, enforced)
-        landings_followed("exudyn", self.assembly, self.settings, times, states)
+        check_landings("exudyn", self.assembly, self.settings, times, states)
         counts = solver_counts(self.built.mbs)
         if enforced is not None:
             balanced("exudyn", times, enforced, lambda i: self._balance(times[i], states[i]))

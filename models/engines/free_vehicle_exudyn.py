@@ -21,7 +21,7 @@ from models.engines.exudyn_system import (
 from models.engines.exudyn_tree import TreeBuild, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.native_exudyn import (
-    Coordinates,
+    CoordinateConnectors,
     add_body_load,
     add_connection,
     add_ground_spring,
@@ -70,11 +70,11 @@ class FreeExudyn(FreeModel):
             add_body_load(built, load)
         for turning in driven.turning_springs:
             add_turning_spring(built, turning)
-        coordinates = Coordinates(built, node)
+        coordinates = CoordinateConnectors(built, node)
         for friction in driven.frictions:
-            coordinates.rub(friction)
+            coordinates.add_friction(friction)
         for coupling in driven.couplings:
-            coordinates.couple(coupling)
+            coordinates.add_coupling(coupling)
         for connection in driven.connections:
             add_connection(built, connection)
         self._sensors = add_state_sensors(mbs, [node])

@@ -19,7 +19,7 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.mujoco_march import FORCE_CALLS, march
 from models.engines.mujoco_quiet import installed
-from models.engines.protocol import guard, landings_followed
+from models.engines.protocol import check_landings, guard
 from models.vehicles.description import Strut, Vehicle
 
 INTEGRATORS = {
@@ -236,7 +236,7 @@ class MujocoModel:
             inputs = self.signal.sample(0.0, self.settings.step, n + 1)
             states[:, [*self.guided, *(4 + i for i in self.guided)]] = inputs[:, 2 : 2 + 2 * len(self.guided)]
         guard("mujoco", times, states, self.settings.duration)
-        landings_followed("mujoco", self.assembly, self.settings, times, states)
+        check_landings("mujoco", self.assembly, self.settings, times, states)
         enforced = self._enforced(times, states) if self.guided else None
         guard("mujoco", times, states, self.settings.duration, enforced=enforced)
         calls = n * FORCE_CALLS.get(self.settings.integrator, 1)

@@ -14,7 +14,7 @@ from models.engines.export import (
     masses_of_shown_bodies,
     names_of,
 )
-from models.engines.spatial_protocol import check_whole
+from models.engines.spatial_protocol import check_buildable
 from models.systems.ride.of_scene import vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle
@@ -27,7 +27,7 @@ def exported(scene: RideScene, engine: str) -> Exported:
     reduced vehicles.
     """
     vehicle = vehicle_of(scene)
-    check_whole(engine, vehicle)
+    check_buildable(engine, vehicle)
     by_speed = [
         *(f"side force {force.name!r}" for force in vehicle.side_forces),
         *(f"drag of {drag.body!r}" for drag in vehicle.drags),

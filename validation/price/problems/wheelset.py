@@ -26,7 +26,7 @@ from models.engines.exudyn_system import solver_counts
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_march import Marcher
 from models.engines.mujoco_quiet import installed
-from models.engines.stability import LONG_RUN, limit
+from models.engines.stability import LONG_RUN, longest_stable_step
 from models.machine.compiled import njit
 from models.machine.stack import start
 from validation.contact.slow_wheels import counting_calls
@@ -157,7 +157,7 @@ class RollingWheels:
         curves = []
         for engine, method in ((engine, method) for engine, methods in EXPLICIT.items() for method in methods):
             like = "Euler" if method == "discrete" else method
-            fewest = math.ceil(1.02 * DURATION / limit(like, 10 * MS, LONG_RUN * MS, linear(self.wheels)))
+            fewest = math.ceil(1.02 * DURATION / longest_stable_step(like, 10 * MS, LONG_RUN * MS, linear(self.wheels)))
             curves.append(
                 ((engine, method), tuple(DURATION / round(step_ratio * fewest) for step_ratio in STEP_RATIOS))
             )
