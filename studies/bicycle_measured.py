@@ -24,7 +24,7 @@ from models.bicycle.suspects import (
 from models.bicycle.weave import Observation, observations
 from models.bicycle.whipple import Control, Whipple, load_bicycle
 from models.core.errors import InputError
-from models.identification.subsets import Choice
+from models.identification.subsets import SubsetChoice
 
 EXPERIMENT_FEEDBACK = Control(gain=2.0, until=6.5)
 """Of the experimenters during these runs."""
@@ -37,7 +37,7 @@ class BicycleObservations:
     each speed is predicted by a choice on all the others."""
 
     observations: list[Observation]
-    choice: Choice
+    choice: SubsetChoice
     predictions: dict[float, tuple[np.ndarray, np.ndarray]]
 
 

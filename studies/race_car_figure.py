@@ -8,13 +8,15 @@ import numpy as np
 from models.drawing.figures import BLUE, DARK, SKY, VERMILION, add_heading, save, subplots
 
 if TYPE_CHECKING:
-    from studies.race_car import Identified
+    pass
 
 SECONDS_SHOWN = 60.0
 """s of the prediction that are shown."""
 
 
-def draw(identified_full: "Identified", identified: dict[str, "Identified"], title: str, path: Path) -> Path:
+def draw(
+    identified_full: "IdentifiedVehicle", identified: dict[str, "IdentifiedVehicle"], title: str, path: Path
+) -> Path:
     """Plot channels over time with their prediction bands, and below them the errors of all vehicles."""
     problem = identified_full.bands.problem
     clock_times = problem.clock.times

@@ -109,7 +109,7 @@ class _Writer:
     mbs: Any
     lines: list[str] = field(default_factory=list)
     written: set[str] = field(default_factory=set)
-    item_counts: dict[str, int] = field(default_factory=lambda: {"node": 0, "object": 0, "marker": 0, "load": 0})
+    counts: dict[str, int] = field(default_factory=lambda: {"node": 0, "object": 0, "marker": 0, "load": 0})
 
     def system(self) -> list[str]:
         """All lines of the script; nodes come first, so that coordinates keep their order."""

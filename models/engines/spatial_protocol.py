@@ -1,8 +1,8 @@
 """The engine protocol of a spatial vehicle: the engine linearises the vehicle, and runs it in time on a given road.
 
 An engine's module ``spatial_NAME`` has a class ``SpatialName`` of (vehicle, settings, speed, road). Rides march in both
-with the same tableau, the classical Runge-Kutta one, so that they may be compared to rounding; ALLOWED_INTEGRATORS has the others.
-All read the road from one table at half steps. Nothing is integrated here.
+with the same tableau, the classical Runge-Kutta one, so that they may be compared to rounding; ALLOWED_INTEGRATORS has
+the others. All read the road from one table at half steps. Nothing is integrated here.
 """
 
 import math

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from models.core.whole_files import write_whole
-from models.ensemble.runner import in_order
+from models.ensemble.runner import values_in_order
 from models.ensemble.store import Store, named_files
 from models.ensemble.workers import Crew, places_of
 from models.identification.fit import Fit, fit
@@ -62,7 +62,7 @@ def profiles_of(
     ]
     with Crew.of(scene, default_workers=1).at_work(len(wanted), *places_of(scene)) as pool:
         for completed, (k, drawn_profile) in enumerate(
-            in_order(partial(likelihood_profile, uncertainty), iter(wanted), pool), start=1
+            values_in_order(partial(likelihood_profile, uncertainty), iter(wanted), pool), start=1
         ):
             report_progress(
                 f"profile of {uncertainty.fit.problem.parameters[k].name}", 0.9 + 0.1 * completed / len(wanted)

@@ -12,7 +12,7 @@ from models.bicycle.suspects import forecast_deviations, predicted_weave, ranked
 from models.bicycle.weave import Observation, observations
 from models.bicycle.whipple import Control, Whipple, load_bicycle
 from models.core.errors import RunFailed
-from models.identification.subsets import Choice
+from models.identification.subsets import SubsetChoice
 from models.systems.bicycle.run import engine_eigenvalues, run
 from models.systems.bicycle.scene import build
 from validation.common.bicycle_published import CAPSIZE_SPEED, PUBLISHED_EIGENVALUES, PUBLISHED_MATRICES, WEAVE_SPEED
@@ -213,7 +213,7 @@ def _unfitted_rows(bicycle: Whipple, observation: Observation) -> list[Row]:
     return [judged, frequency.beside(0.0, f"{why}; judged after the choice of suspects", "measured")]
 
 
-def _predicted_rows(bicycle: Whipple, choice: Choice, observation: Observation) -> list[Row]:
+def _predicted_rows(bicycle: Whipple, choice: SubsetChoice, observation: Observation) -> list[Row]:
     gaps = forecast_deviations(bicycle, FEEDBACK, choice, observation)
     why = (
         "scatter of the windows and error of the forecast; suspects chosen and fitted on the other speeds, by weights "
@@ -232,7 +232,7 @@ def _predicted_rows(bicycle: Whipple, choice: Choice, observation: Observation) 
     ]
 
 
-def _choice_rows(choice: Choice) -> list[Row]:
+def _choice_rows(choice: SubsetChoice) -> list[Row]:
     """Rows: suspects that the data call for at a significance level of 5 %, and what the experimenters suspected."""
     parameters_text = ", ".join(
         f"{name} {value:.3g}" for name, value in zip(choice.best_subset.names, choice.best_subset.values, strict=True)
@@ -254,7 +254,7 @@ def _choice_rows(choice: Choice) -> list[Row]:
     ]
 
 
-def _line(bicycle: Whipple, choice: Choice | None, observation: Observation) -> list[str]:
+def _line(bicycle: Whipple, choice: SubsetChoice | None, observation: Observation) -> list[str]:
     model, mean, deviation = predicted_weave(bicycle, FEEDBACK, observation), observation.mean, observation.deviation
     gaps = np.empty(0) if choice is None else forecast_deviations(bicycle, FEEDBACK, choice, observation)
     return [

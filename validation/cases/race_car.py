@@ -9,7 +9,7 @@ import numpy as np
 from models.core.tables import write_table
 from models.identification.bands import error_bands, error_model
 from models.identification.fit import fit
-from models.identification.held_out import Identified, Search, identified_vehicle
+from models.identification.held_out import IdentifiedVehicle, ParameterSearch, identified_vehicle
 from models.identification.of_scene import problem_of
 from models.identification.problem import FitClock, Problem
 from models.identification.uncertainty import Uncertainty, uncertainty
@@ -138,7 +138,7 @@ def _coverage(fits: list[Uncertainty]) -> float:
     return float(np.mean(shares, axis=0).min())
 
 
-def _race(file: Path, folder: Path) -> Identified:
+def _race(file: Path, folder: Path) -> IdentifiedVehicle:
     path = write_plain_table(file, folder / "race.csv")
     table = {"title": "race car", "system": "single-track", **RACE_CAR, "drive": {"file": path.name, "low_pass": 10.0}}
     times = read_drive(path).times
@@ -146,10 +146,10 @@ def _race(file: Path, folder: Path) -> Identified:
     scenes = []
     for ends in ([float(times[0]), middle], [middle, float(times[-1])]):
         scenes.append(build({**table, "drive": {**table["drive"], "stretch": ends}}, "race car", path.parent))  # type: ignore[dict-item]
-    return identified_vehicle(scenes[0], scenes[1], Search(IDENTIFIED_PARAMETERS, list(AIMS), 5.0))
+    return identified_vehicle(scenes[0], scenes[1], ParameterSearch(IDENTIFIED_PARAMETERS, list(AIMS), 5.0))
 
 
-def _race_rows(identified: Identified) -> list[Row]:
+def _race_rows(identified: IdentifiedVehicle) -> list[Row]:
     answer, rows = identified.bands, []
     figures = zip(AIMS.items(), answer.relative_error(), answer.share_inside(), answer.width(), strict=True)
     for (name, aim), error, inside, width in figures:
@@ -196,7 +196,7 @@ def _not_run(reason: str) -> list[Row]:
     return [not_run(f"race_car.{name.replace(' ', '_')}.error", SYSTEM, f"{name} predicted", reason) for name in AIMS]
 
 
-def _saved(identified: Identified) -> dict[str, Any]:
+def _saved(identified: IdentifiedVehicle) -> dict[str, Any]:
     known = identified.uncertainty
     return {
         "estimates": dict(zip([p.name for p in known.fit.problem.parameters], known.fit.values.tolist(), strict=True)),
