@@ -8,7 +8,7 @@ import numpy as np
 from models.drawing.figures import BLUE, DARK, SKY, VERMILION, add_heading, save, subplots
 
 if TYPE_CHECKING:
-    pass
+    from models.identification.held_out import IdentifiedVehicle
 
 SECONDS_SHOWN = 60.0
 """s of the prediction that are shown."""
