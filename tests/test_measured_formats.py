@@ -241,7 +241,7 @@ def test_numbers_in_other_hands(tmp_path):
     assert [(one.name, one.unit) for one in source.channels] == [("Kraft", "kN"), ("a, b", "")]
     found = read(source)
     assert np.array_equal(found["Kraft"][0], [0.0, 0.01]) and np.array_equal(found["Kraft"][1], [1500.0, -1e-3])
-    assert "tabs" in source.noticed[0].text
+    assert "tabs" in source.findings[0].text
 
 
 def test_shortest_and_longest_decimals_are_read_to_the_last_bit(tmp_path):

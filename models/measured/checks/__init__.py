@@ -62,7 +62,7 @@ def check(
 
 def findings_of_all_checks(evidence: Evidence) -> tuple[Finding, ...]:
     """Findings of all checks on a recording; the caller can use the same evidence for figures."""
-    said = list(evidence.recording.noticed)
+    said = list(evidence.recording.findings)
     for look in CHECKS:
         said += [finding for finding in look(evidence) if not _already_named(finding, said)]
     return tuple(sorted(said, key=lambda finding: WEIGHT_ORDER.index(finding.weight)))

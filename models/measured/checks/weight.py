@@ -9,11 +9,11 @@ from scipy.linalg import null_space
 
 from models.core.finding import Finding
 from models.measured import axle_forces
-from models.measured.axle_balance import axles
+from models.measured.axle_balance import axle_forces_of
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.response import component_index
 from models.measured.checks.spectra import windowed_means
-from models.measured.ratios import NEGLIGIBLE_MEAN_SHARE, cause_and_sentence, counted_from_load
+from models.measured.ratios import NEGLIGIBLE_MEAN_SHARE, cause_and_sentence, missing_load_sentence
 from models.measured.signal import Signal
 from models.multibody.cut_kernel import WRENCH
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, rigid
@@ -53,8 +53,8 @@ def check(evidence: Evidence) -> list[Finding]:
     """Findings on vertical forces compared with the weight. Sizes are shares of the load in %, or the ratio of recorded
     to true value where sign or unit is wrong."""
     if evidence.plane is not None:
-        forces = axles(evidence.recording, evidence.plane)
-        return axle_forces.check(forces) if forces else []
+        forces = axle_forces_of(evidence.recording, evidence.plane)
+        return axle_forces.check_axle_forces(forces) if forces else []
     vehicle, of_hub = evidence.vehicle, {evidence.hub(s): s for s in evidence.vertical().values()}
     if vehicle is None or set(of_hub) != set(vehicle.hubs):
         text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."
@@ -107,7 +107,7 @@ def _component_numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
 
 def _wrong_sign_or_unit(evidence: Evidence, signal: Signal, load: float, static: float) -> Finding | None:
     kind, text = (
-        ("size", counted_from_load(signal.name, load, static))
+        ("size", missing_load_sentence(signal.name, load, static))
         if abs(load) < NEGLIGIBLE_MEAN_SHARE * static and evidence.empty(signal)
         else cause_and_sentence(load / static, signal, f"the {static:.0f} N that rest on {signal.at} on average")
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 from models.core.errors import InputError, similar_file
 from models.core.finding import Finding
 from models.measured.channel import Source
-from models.measured.file_kinds import KNOWN_FORMATS, by_extension, format_of, usual_of
+from models.measured.file_kinds import KNOWN_FORMATS, extension_phrase, format_of, usual_kind_of_extension
 from models.measured.formats.csv import open_csv
 from models.measured.formats.mdf4 import open_mdf
 from models.measured.formats.opened import OpenFile, flaw_finding
@@ -44,16 +44,16 @@ def open_source(path: str | Path) -> Source:
     try:
         source = READER_OF_FORMAT[form](path)
     except InputError as error:  # what is said of text that is no CSV knows the extension
-        if form != "CSV" or not by_extension(path):
+        if form != "CSV" or not extension_phrase(path):
             raise
-        raise InputError(path, error.place, error.value, error.allowed + by_extension(path)) from None
-    usual, said = usual_of(path.suffix.lower(), form), list[Finding]()
+        raise InputError(path, error.place, error.value, error.allowed + extension_phrase(path)) from None
+    usual, said = usual_kind_of_extension(path.suffix.lower(), form), list[Finding]()
     if usual != form:
         text = f"the extension {path.suffix} is that of {usual}, but the file is read as {form}"
         said.append(flaw_finding(path, "doubt", text))
     if form == "RPC III" and path.suffix.lower() == ".drv":
         said.append(flaw_finding(path, "doubt", DRIVE_FILE_ADVICE))
-    return replace(source, noticed=(*said, *source.noticed))
+    return replace(source, findings=(*said, *source.findings))
 
 
 def write(path: str | Path, groups: Sequence[ChannelGroup], start: datetime | None = None, comment: str = "") -> Path:

@@ -32,7 +32,7 @@ class OpenFile(ABC):
     channels: tuple[Channel, ...]
     start: datetime | None
     comment: str
-    noticed: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
 
     def blocks(self, names: Sequence[str], length: int = SAMPLES_PER_BLOCK, first: int = 0) -> Iterator[SampleBlock]:
         """Blocks of channels of one group, as specified in ``models.measured.channel.Source``."""

@@ -19,7 +19,7 @@ from models.engines.cut_vehicle import FIXED_STEP_METHOD, HubRun
 from models.measured.channel import SAMPLES_PER_BLOCK
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults, measured_samples
-from models.measured.faults_of_measurement import check as check_faults
+from models.measured.faults_of_measurement import check_faults as check_faults
 from models.measured.formats import write
 from models.measured.formats.writing import ChannelGroup
 from models.measured.recording import Recording

@@ -61,7 +61,7 @@ def _doubts_about_forces(
     """Doubts about wheel forces (n, 2) in N that do not suit this vehicle, and assumptions that they carry its weight;
     InputError for impossible forces.
     """
-    from models.measured.axle_forces import IN_FILE, AxleForces, check
+    from models.measured.axle_forces import FILE_REMEDIES, AxleForces, check_axle_forces
     from models.measured.signal import Signal
 
     front, rear = (
@@ -75,11 +75,11 @@ def _doubts_about_forces(
         assembly.parameters,
         ((front,), (rear,)),
         scene.run.duration,
-        IN_FILE,
+        FILE_REMEDIES,
         starts_at_rest=not scene.start,
-        turn=assembly.mode == "force-body",
+        turns_with_chassis=assembly.mode == "force-body",
     )
-    looked = (*check(axles), *_samples((front, rear), values, sample_period))
+    looked = (*check_axle_forces(axles), *_samples((front, rear), values, sample_period))
     findings = tuple(
         finding for finding in looked if finding.weight != "note" and finding.check not in parameters.accept
     )
