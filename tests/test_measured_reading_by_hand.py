@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from models.measured.channel import Channel
-from models.measured.checks.spectra import noise
+from models.measured.checks.spectra import white_noise
 from models.measured.columns import Columns, MemoryColumns
 from models.measured.faults_of_measurement import Faults, measured_samples
 from models.measured.formats import open_source
@@ -141,7 +141,7 @@ def test_noise_of_an_impulse_is_that_of_its_flat_spectrum():
     window, squares = np.sin(angle) ** 2, 3.0 / 8.0 * (count + 1)
     expected = size * window / np.sqrt(np.log(2.0) * squares)
     impulse = size * (np.arange(count) == k)
-    assert noise(recording_of({force: impulse}), force) == pytest.approx(expected, rel=1e-6)
+    assert white_noise(recording_of({force: impulse}), force) == pytest.approx(expected, rel=1e-6)
 
 
 def test_noise_that_is_added_has_the_deviation_of_its_fault():

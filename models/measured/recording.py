@@ -24,9 +24,8 @@ def no_progress(*told: Any) -> None:
 class Recording:
     """Measured signals on one clock, in SI units.
 
-    period : s; count : samples, the first at t = 0. start : when that was, None if no file says. noticed : what was
-    found while reading and bringing onto one clock (gaps, repeated times, jitter, drift between clocks). comment : of
-    the files.
+    period : s; count : samples, the first at t = 0. start : when that was, None if no file says. findings : from
+    reading and bringing onto one clock (gaps, repeated times, jitter, drift between clocks). comment : of the files.
     """
 
     signals: tuple[Signal, ...]

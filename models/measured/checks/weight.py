@@ -1,4 +1,4 @@
-"""Mean vertical forces against the static load of every hub and against the weight: sign, unit and calibration."""
+"""Check of mean vertical forces against the static loads and the weight: sign, unit and calibration."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,29 +20,30 @@ from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, rigid
 
 NAME = "weight"
 LOAD_ERROR = 1e-3
-"""Part of each hub's load by which a vehicle that is not wrong may differ from its file: tilt alone takes 0.1 %."""
+"""Relative difference of a hub's load from the vehicle file that a correct vehicle may have: tilt alone takes 0.1 %."""
 NEGLIGIBLE_SHARE = 0.005
-"""Part of a load below which nothing is said."""
+"""Share of a load below which an error is not reported."""
 MOTION_SHARE = 0.35
-"""Part of an excess of the mean by which a factor may differ from 1 by the motion, for the excess to be an offset."""
+"""Largest ratio of a factor's error, as the motion shows it, to the excess of the mean for which the excess is an
+offset."""
 MOMENT_STANDARD_DEVIATIONS = 4.0
-"""Standard deviations by which a mean moment must differ from what the motion asks for."""
+"""Number of standard deviations by which a mean moment must differ from the one that the motion requires."""
 CHI_SQUARE_FALL = 25.0
 """Fall of chi square that a wrong channel must bring."""
 
 
 @dataclass(frozen=True)
-class Balance:
-    """Residual of the equilibrium, (e,): vertical force (N), moments about x and y (N m), and conditions from
-    elasticity alone. columns (e, h) : residual that an excess of one whole load at a hub would cause. inverse (e, e) :
-    of the covariance of the residual."""
+class EquilibriumResidual:
+    """Residual (e,) of the equilibrium of mean forces: vertical force (N), moments about x and y (N m), and conditions
+    from elasticity alone. columns (e, h) : residual that an excess of one whole load at each hub would cause. inverse
+    (e, e) : of the residual's covariance."""
 
     residual: np.ndarray
     columns: np.ndarray
     inverse: np.ndarray
 
     def fit(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Fit columns (e, p) to the residual by generalised least squares: their shares (p,), the covariance of these,
+        """Generalised least-squares fit of columns (e, p) to the residual: their factors (p,), the covariance of these,
         and the fall of chi square."""
         normal = columns.T @ self.inverse @ columns
         share = np.linalg.solve(normal, columns.T @ self.inverse @ self.residual)
@@ -50,8 +51,8 @@ class Balance:
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Findings on vertical forces compared with the weight. Sizes are shares of the load in %, or the ratio of recorded
-    to true value where sign or unit is wrong."""
+    """Findings on mean vertical forces compared with the weight. Sizes are shares of the load in %, or the ratio of
+    recorded to true value where sign or unit is wrong."""
     if evidence.plane is not None:
         forces = axle_forces_of(evidence.recording, evidence.plane)
         return axle_forces.check_axle_forces(forces) if forces else []
@@ -106,6 +107,7 @@ def _component_numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
 
 
 def _wrong_sign_or_unit(evidence: Evidence, signal: Signal, load: float, static: float) -> Finding | None:
+    """Finding on a vertical force whose mean shows a wrong sign or unit; None if it shows none."""
     kind, text = (
         ("size", missing_load_sentence(signal.name, load, static))
         if abs(load) < NEGLIGIBLE_MEAN_SHARE * static and evidence.empty(signal)
@@ -116,7 +118,9 @@ def _wrong_sign_or_unit(evidence: Evidence, signal: Signal, load: float, static:
     return Finding(NAME if kind == "size" else kind, "error", signal.name, text, load / static, "1", (signal.name,))
 
 
-def _balance_of_means(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread: np.ndarray) -> Balance:
+def _balance_of_means(
+    vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread: np.ndarray
+) -> EquilibriumResidual:
     """Equilibrium from mean signals (k,), or (k + 2,) with the mean angular accelerations of roll and pitch, whose
     inertia moments are then taken into account."""
     whole, hubs = rigid(vehicle), len(vehicle.hubs)
@@ -133,11 +137,11 @@ def _balance_of_means(vehicle: CutVehicle, numbers: list[int], centre: np.ndarra
     rest = np.concatenate([[whole.mass * GRAVITY, 0.0, 0.0], elastic @ vehicle.loads])
     columns = np.vstack([lift, elastic]) * vehicle.loads
     covariance = np.diag(np.diag(rows @ spread @ rows.T)) + LOAD_ERROR**2 * columns @ columns.T
-    return Balance(rows @ centre - rest, columns, np.linalg.inv(covariance))
+    return EquilibriumResidual(rows @ centre - rest, columns, np.linalg.inv(covariance))
 
 
 def _single_channel_error(
-    evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loads: np.ndarray
+    evidence: Evidence, balance: EquilibriumResidual, signals: tuple[Signal, ...], loads: np.ndarray
 ) -> Finding:
     """Finding on an offset or a wrong factor of one channel, or on a weight that differs from the vehicle file."""
     names, weight = tuple(s.name for s in signals), float(loads.sum())
