@@ -97,7 +97,7 @@ def test_a_contact_point_that_forgets_its_past_is_found(monkeypatch, tmp_path):
 
 
 def test_without_the_balance_a_noisy_multiplier_is_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(exudyn_engine, "balanced", lambda *_: None)
+    monkeypatch.setattr(exudyn_engine, "check_balance", lambda *_: None)
     assert found(prescribed_pitch, "noise of 1e-6 rad on the pitch", "exudyn", tmp_path) == "SILENT"
 
 

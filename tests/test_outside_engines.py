@@ -201,8 +201,8 @@ def test_wrong_integrators_are_told_in_a_run_and_right_ones_say_how_near_they_ar
 
 def test_the_comparison_with_the_reference_can_see(monkeypatch):
     """The fault to be seen: an allowance that explains everything."""
-    monkeypatch.setattr(outside, "_expected", lambda *given: 1e9)
-    monkeypatch.setattr(outside, "CEILING", 1e9)
+    monkeypatch.setattr(outside, "_expected_error", lambda *given: 1e9)
+    monkeypatch.setattr(outside, "LARGEST_BOUND", 1e9)
     assert len(wrong_engines.integrators_that_pass()) == len(wrong_engines.WRONG_ENGINES)
 
 

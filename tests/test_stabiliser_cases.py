@@ -46,7 +46,7 @@ def test_a_force_without_its_sign_fails_its_rows(monkeypatch, tmp_path, module, 
 
     monkeypatch.setattr(getattr(module, model), "_enforced", upward)
     if engine == "exudyn":
-        monkeypatch.setattr(exudyn, "balanced", lambda *_: None)  # which would raise before the row could see it
+        monkeypatch.setattr(exudyn, "check_balance", lambda *_: None)  # which would raise before the row could see it
     names = {f"stabilisers.mass.{engine}.{vehicle}" for vehicle in ("itwm_drift", "asymmetric_twin")}
     assert failed(case, tmp_path) == names
 
@@ -90,6 +90,6 @@ def test_exudyns_limit_stops_would_be_silent(monkeypatch, tmp_path):
 
 
 def test_without_the_balance_rough_rails_are_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(exudyn, "balanced", lambda *_: None)
+    monkeypatch.setattr(exudyn, "check_balance", lambda *_: None)
     rough = next(one for one in hard.CASES if one.name.startswith("noise of 1e-6 on prescribed"))
     assert judge(rough, "exudyn", tmp_path).word == "SILENT"

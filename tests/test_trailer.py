@@ -10,7 +10,7 @@ import pytest
 from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import named_effects, scene_without
 from models.engines.free_vehicle import free_model, native_elements_and_joints
-from models.engines.towed_springs import divided, shared_numbers
+from models.engines.towed_springs import shared_numbers, towed_division
 from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.systems.handling.energy import drive_energy, unaccounted
@@ -94,7 +94,7 @@ def test_a_file_of_ones_own_keeps_its_trailer(tmp_path):
 @pytest.mark.parametrize("engine", ["mujoco", "exudyn"])
 def test_springs_of_a_trailer_are_the_engines_own_and_bear_it(engine):
     car = rolling_cars()["train"]
-    division = divided(car, engine)
+    division = towed_division(car, engine)
     driven_by_both = replace(driven_by(car), numbers=shared_numbers(car, division), parts=division.native)
     names, _ = native_elements_and_joints(engine, driven_by_both)
     wanted = {spring.name for spring in car.given.springs if spring.frame in car.given.towed} | {"trailer's bar"}

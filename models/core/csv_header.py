@@ -58,9 +58,9 @@ class TableHead:
     names: tuple[str, ...]
     width: int
     titles: tuple[FileLine, ...]
-    between: tuple[FileLine, ...]
-    begin: int
-    line: int
+    rows_between: tuple[FileLine, ...]
+    numbers_begin: int
+    line_before_numbers: int
 
     def cells(self, line: FileLine) -> tuple[str, ...]:
         """Cells of a line, cut or filled up with empty ones to the number of headings."""
@@ -211,10 +211,10 @@ def plain_text(path: str | Path, text: str, wanted_headings: Collection[str]) ->
 
 def _plain_table(path: str | Path, lines: list[FileLine], header: TableHead) -> str:
     """Text of a CSV table with headings and rows in the plain form."""
-    rows = {line.number: split_cells(line.text, header.separator) for line in lines[header.line :]}
+    rows = {line.number: split_cells(line.text, header.separator) for line in lines[header.line_before_numbers :]}
     cells = [cell for row in rows.values() for cell in row]
-    sign = decimal_sign(path, header.line + 1, header.separator, cells)
-    new = {line.number: f"# {line.text}" if line.text.strip() else "" for line in lines[: header.line]}
+    sign = decimal_sign(path, header.line_before_numbers + 1, header.separator, cells)
+    new = {line.number: f"# {line.text}" if line.text.strip() else "" for line in lines[: header.line_before_numbers]}
     new[header.header.number] = ",".join(_headings_with_units(header))
     for number, row in rows.items():
         row_cells = row[: len(header.names)] if len(row) == header.width and not any(row[len(header.names) :]) else row
@@ -224,9 +224,9 @@ def _plain_table(path: str | Path, lines: list[FileLine], header: TableHead) -> 
 
 def _headings_with_units(header: TableHead) -> list[str]:
     """Column headings, completed by the units from the row beneath them if there is one."""
-    if len(header.between) != 1:
+    if len(header.rows_between) != 1:
         return list(header.names)
-    units = [cell.strip("[]() ") for cell in header.cells(header.between[0])]
+    units = [cell.strip("[]() ") for cell in header.cells(header.rows_between[0])]
     return [
         name if name_and_unit(name)[1] else f"{name} [{unit}]" for name, unit in zip(header.names, units, strict=True)
     ]

@@ -86,7 +86,7 @@ def size_of(values: np.ndarray) -> float:
     return deviation if deviation > UNMOVED_DEVIATION * largest else largest
 
 
-def observed_order(fine_difference: float, coarse_difference: float, declared: float) -> float:
+def observed_order(fine_difference: float, coarse_difference: float, declared_order: float) -> float:
     """Observed order of convergence, log2 of the ratio of the differences between successive runs with halved steps,
     limited to LEAST_ORDER up to the declared order."""
     if not (
@@ -95,30 +95,30 @@ def observed_order(fine_difference: float, coarse_difference: float, declared: f
         and math.isfinite(fine_difference)
         and math.isfinite(coarse_difference)
     ):
-        return declared if fine_difference == 0.0 else LEAST_ORDER
-    return float(np.clip(math.log2(coarse_difference / fine_difference), LEAST_ORDER, declared))
+        return declared_order if fine_difference == 0.0 else LEAST_ORDER
+    return float(np.clip(math.log2(coarse_difference / fine_difference), LEAST_ORDER, declared_order))
 
 
 def estimate(
     fine_values: np.ndarray,
     coarse_values: np.ndarray,
-    declared: float,
+    declared_order: float,
     step: float,
-    coarser: np.ndarray | None = None,
+    coarsest_values: np.ndarray | None = None,
     unit: str = "",
 ) -> Estimate:
     """Estimated error of ``fine_values`` (m, ...) from runs with twice and (over the first rows) four times the step,
     all read at the rows of the run with twice the step.
 
-    coarse_values : (m, ...); coarser : (k, ...) with k <= (m + 1) / 2, rows of every second one of these.
+    coarse_values : (m, ...); coarsest_values : (k, ...) with k <= (m + 1) / 2, rows of every second one of these.
     """
-    gap, order = root_mean_square(fine_values - coarse_values), declared
-    if coarser is not None and len(coarser) > 1:
-        window = slice(0, 2 * len(coarser) - 1, 2)
+    gap, order = root_mean_square(fine_values - coarse_values), declared_order
+    if coarsest_values is not None and len(coarsest_values) > 1:
+        window = slice(0, 2 * len(coarsest_values) - 1, 2)
         order = observed_order(
             root_mean_square((fine_values - coarse_values)[window]),
-            root_mean_square(coarse_values[window] - coarser),
-            declared,
+            root_mean_square(coarse_values[window] - coarsest_values),
+            declared_order,
         )
     largest = float(np.abs(fine_values).max(initial=0.0))
     error = max(gap / (2.0**order - 1.0), ONE_ROUNDING * largest * math.sqrt(len(fine_values)))
@@ -286,7 +286,7 @@ def _whole_divisor(minimum: float) -> int:
 def with_tolerance_error(
     run: Result,
     fine_run: Series,
-    looser: Series,
+    looser_run: Series,
     factor: float,
     tolerance: float,
     channel_sizes: Mapping[str, float] | None = None,
@@ -301,10 +301,10 @@ def with_tolerance_error(
 
     estimates = {}
     for name, values in fine_run.channels.items():
-        same_times = len(looser.times) == len(fine_run.times) and np.array_equal(looser.times, fine_run.times)
-        values_at_looser = values if same_times else CubicSpline(fine_run.times, values)(looser.times)
+        same_times = len(looser_run.times) == len(fine_run.times) and np.array_equal(looser_run.times, fine_run.times)
+        values_at_looser = values if same_times else CubicSpline(fine_run.times, values)(looser_run.times)
         error = max(
-            root_mean_square(values_at_looser - looser.channels[name]) / (factor**TOLERANCE_POWER - 1.0),
+            root_mean_square(values_at_looser - looser_run.channels[name]) / (factor**TOLERANCE_POWER - 1.0),
             LEAST_TOLERANCE_SHARE * tolerance * size_of(values),
         )
         estimate = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / TOLERANCE_POWER, tolerance)

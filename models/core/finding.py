@@ -60,9 +60,9 @@ def merged_findings(findings: Iterable[Finding]) -> list[Finding]:
     ]
 
 
-def _largest_finding(alike: list[Finding]) -> Finding:
+def _largest_finding(similar_findings: list[Finding]) -> Finding:
     """The finding of largest size among similar ones; its text states the number of channels or places concerned."""
-    worst = max(alike, key=lambda finding: abs(finding.size or 0.0))
-    names = {name for finding in alike for name in finding.signals or (finding.place,)}
+    worst = max(similar_findings, key=lambda finding: abs(finding.size or 0.0))
+    names = {name for finding in similar_findings for name in finding.signals or (finding.place,)}
     noun = "channels" if worst.signals else "places"
     return replace(worst, text=f"{worst.check!r} at {len(names)} {noun}, the worst: {worst.text}")

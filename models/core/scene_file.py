@@ -66,9 +66,9 @@ class SceneFile(Strict):
 Model = TypeVar("Model", bound=SceneFile)
 
 
-def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Path) -> Model:
+def checked(scene_class: type[Model], table: Mapping[str, Any], file: str, folder: Path) -> Model:
     """The scene of one system, built from nested tables; raises InputError for anything that is not understood."""
-    if "effects" in table and "effects" not in model.model_fields:
+    if "effects" in table and "effects" not in scene_class.model_fields:
         allowed = (
             "has no place in a scene of this system, which only shows or compares what others compute: put it "
             "into a scene of theirs, such as contact, wheelset or ride"
@@ -76,9 +76,11 @@ def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Pat
         raise InputError(file, "effects", None, allowed)
     for key in ("file", "folder"):
         if key in table:
-            raise InputError(file, key, table[key], "unknown key", tuple(set(model.model_fields) - {"file", "folder"}))
+            raise InputError(
+                file, key, table[key], "unknown key", tuple(set(scene_class.model_fields) - {"file", "folder"})
+            )
     checked_scene = read(
-        model, {**_table_with_chosen_effects(model, table, file), "file": file, "folder": str(folder)}, file
+        scene_class, {**_table_with_chosen_effects(scene_class, table, file), "file": file, "folder": str(folder)}, file
     )
     checked_scene.check_choice()
     return checked_scene
@@ -88,13 +90,15 @@ AUTOMATIC_EFFECTS = "auto"
 """Value of the key ``effects`` by which a scene has its effects chosen automatically."""
 
 
-def _table_with_chosen_effects(model: type[SceneFile], table: Mapping[str, Any], file: str) -> dict[str, Any]:
+def _table_with_chosen_effects(scene_class: type[SceneFile], table: Mapping[str, Any], file: str) -> dict[str, Any]:
     """The table of a scene with ``effects = "auto"``, rewritten as the study that chooses the effects."""
     plain = dict(table)
     if plain.get("effects") == AUTOMATIC_EFFECTS:
         del plain["effects"]
-        if plain.setdefault("study", model.CHOOSING) != model.CHOOSING:
-            raise InputError(file, "study", plain["study"], f'with effects = "auto" the study is {model.CHOOSING}')
+        if plain.setdefault("study", scene_class.CHOOSING) != scene_class.CHOOSING:
+            raise InputError(
+                file, "study", plain["study"], f'with effects = "auto" the study is {scene_class.CHOOSING}'
+            )
     return plain
 
 
@@ -199,11 +203,11 @@ def _table_of_key(table: dict[str, Any], key: str, new_value: Any, file: str) ->
     )
 
 
-def _list_index(entries: list[Any], index_text: str, written: tuple[str, str, Any]) -> int:
-    """Index in a list from its text, counted from 0 as in messages. written : file, key and value of the change, for
+def _list_index(items: list[Any], index_text: str, change: tuple[str, str, Any]) -> int:
+    """Index in a list from its text, counted from 0 as in messages. change : file, key and value of the change, for
     the message."""
-    if not (index_text.isdecimal() and int(index_text) < len(entries)):
-        raise InputError(*written, f"a list of {len(entries)} has no entry {index_text!r}: they count from 0")
+    if not (index_text.isdecimal() and int(index_text) < len(items)):
+        raise InputError(*change, f"a list of {len(items)} has no entry {index_text!r}: they count from 0")
     return int(index_text)
 
 

@@ -12,7 +12,7 @@ def divides(step: float, length: float) -> bool:
     return 0.5 <= ratio < math.inf and abs(ratio - round(ratio)) <= 1e-6 * max(1.0, ratio * 1e-3)
 
 
-def fitting(step: float, length: float) -> str:
+def dividing_step(step: float, length: float) -> str:
     """Largest short decimal up to ``step`` that divides ``length``, as text that a user would write."""
     count = max(1, math.ceil(length / step * (1.0 - 1e-9)))
     for n in range(count, 2 * count + 10_000):

@@ -46,25 +46,27 @@ def quantity(unit: str, meaning: str, *, default: Any = ..., zero: bool = False,
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def read(model: type[Model], values: Mapping[str, Any], file: object, key_path: str = "") -> Model:
-    """Build ``model`` from a user's table; raises InputError that names file, place, value and what is allowed.
+def read(table_class: type[Model], values: Mapping[str, Any], file: object, key_path: str = "") -> Model:
+    """Build ``table_class`` from a user's table; raises InputError that names file, place, value and what is allowed.
 
     Of several errors the first is told in full, an unknown key before all others, and the rest are named.
     """
     if not isinstance(values, Mapping):
         raise InputError(file, key_path, values, ERROR_SENTENCES["dict_type"])
     try:
-        return model.model_validate(dict(values))
+        return table_class.model_validate(dict(values))
     except ValidationError as error:
-        raise message(error, model, file, key_path) from None
+        raise input_error_from_faults(error, table_class, file, key_path) from None
 
 
-def message(error: ValidationError, model: type[BaseModel], file: object, key_path: str) -> InputError:
+def input_error_from_faults(
+    error: ValidationError, table_class: type[BaseModel], file: object, key_path: str
+) -> InputError:
     """One InputError from all faults that pydantic listed for a user's table."""
     first, *other_faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     keys = _keys_of_error(first)
     value = None if first["type"] == "missing" else first["input"]
-    allowed = _allowed_phrase(first, keys, _owning_model(model, keys))
+    allowed = _allowed_phrase(first, keys, _owning_model(table_class, keys))
     other_keys = [
         _dotted_key(key_path, _keys_of_error(fault))
         for fault in other_faults
@@ -106,22 +108,24 @@ def _inner_model(annotation: Any) -> type[BaseModel] | None:
     return next((o for o in options if isinstance(o, type) and issubclass(o, BaseModel)), None)
 
 
-def _allowed_phrase(first: Any, keys: tuple[str, ...], owning_model: type[BaseModel] | None) -> str:
+def _allowed_phrase(first_fault: Any, keys: tuple[str, ...], owning_model: type[BaseModel] | None) -> str:
     """Phrase that says which keys or values would have been accepted."""
     fields = {} if owning_model is None else owning_model.model_fields
     key = keys[-1] if keys else ""
-    kind, facts = first["type"], _unit_and_meaning(fields.get(key))
+    kind, facts = first_fault["type"], _unit_and_meaning(fields.get(key))
     if kind == "extra_forbidden":
         known = tuple(name for name, field in fields.items() if not field.exclude)
         return "unknown key" + (nearest_names_phrase(key, known) or ": this table takes none")
     if kind == "missing":
         return f"is missing{facts}"
     if kind == "literal_error":
-        names = tuple(phrase.strip().strip("'") for phrase in first["ctx"]["expected"].replace(" or ", ", ").split(","))
-        return f"must be {' or '.join(names)}{facts}{suggestion_phrase(first['input'], names)}"
+        names = tuple(
+            phrase.strip().strip("'") for phrase in first_fault["ctx"]["expected"].replace(" or ", ", ").split(",")
+        )
+        return f"must be {' or '.join(names)}{facts}{suggestion_phrase(first_fault['input'], names)}"
     if kind == "value_error":
-        return f"{first['ctx']['error']}{facts}"
-    return ERROR_SENTENCES.get(kind, "is not accepted here").format(**first.get("ctx", {})) + facts
+        return f"{first_fault['ctx']['error']}{facts}"
+    return ERROR_SENTENCES.get(kind, "is not accepted here").format(**first_fault.get("ctx", {})) + facts
 
 
 ERROR_SENTENCES = {

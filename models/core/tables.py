@@ -319,7 +319,7 @@ def _nearest_columns(header: str, columns: tuple[Columns, ...]) -> Columns:
 
 
 def _row_block(
-    path: Path, block: list[tuple[int, str]], names: list[str], factors: np.ndarray, titles: list[str]
+    path: Path, block: list[tuple[int, str]], names: list[str], factors: np.ndarray, headings: list[str]
 ) -> RowBlock:
     """Block of rows in SI units; a row that cannot be read is NaN, with a message."""
     lines, wrong = [line for line, _ in block], {}
@@ -328,7 +328,7 @@ def _row_block(
         values = np.full((len(block), len(names)), np.nan)
         for i, (line, text) in enumerate(block):
             try:
-                values[i] = _numbers_of_row(path, line, text, titles, (False,) * len(titles))
+                values[i] = _numbers_of_row(path, line, text, headings, (False,) * len(headings))
             except InputError as error:
                 wrong[i] = str(error).partition(f"line {line}")[2].lstrip(":, ")
     values = values * factors

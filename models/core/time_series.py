@@ -38,10 +38,10 @@ def read_time_series(
     return np.column_stack([table[name] for name in columns]), float(f"{period:.12g}")
 
 
-def wrong_time_unit_hint(lasts: float, needed_duration: float) -> str:
+def wrong_time_unit_hint(duration: float, needed_duration: float) -> str:
     """Hint that the times of a file may be in milliseconds, if the file lasts (s) a hundredth of the needed time (s) or
     less; else empty."""
-    wrong = lasts < needed_duration / SHORT_TIME_SHARE
+    wrong = duration < needed_duration / SHORT_TIME_SHARE
     return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
 
 

@@ -75,9 +75,9 @@ def figure_remarks(results: Results) -> list[str]:
     return [*steps[:LISTED_RESULTS], *(breach.brief() for _, breach in worst_breaches(results))]
 
 
-def joined_result(joined: Result, parts: Results) -> Result:
+def joined_result(joined: Result, results: Results) -> Result:
     """A result joined from other results, with all their stated errors and all assumptions that any of them broke."""
-    stored_errors = {name: json.loads(run.data.attrs["error"]) for name, run in parts.items()}
+    stored_errors = {name: json.loads(run.data.attrs["error"]) for name, run in results.items()}
     first = next(iter(stored_errors.values()))
     channels = {
         f"{name}, {channel}": values
@@ -85,12 +85,12 @@ def joined_result(joined: Result, parts: Results) -> Result:
         for channel, values in stored_error.get("channels", {}).items()
     }
     joined.data.attrs["error"] = json.dumps({**first, "channels": channels} if channels else first)
-    assumed = dict.fromkeys(text for run in parts.values() for text in assumption_sentences(run))
-    worst_breach = [replace(breach, where=f"{names}, {breach.where}") for names, breach in worst_breaches(parts)]
+    assumed = dict.fromkeys(text for run in results.values() for text in assumption_sentences(run))
+    worst_breach = [replace(breach, where=f"{names}, {breach.where}") for names, breach in worst_breaches(results)]
     joined.data.attrs["assumptions"] = json.dumps(
         {"assumed": list(assumed), "broken": [asdict(breach) for breach in worst_breach]}
     )
-    broke = (run.data.attrs["status"] for run in parts.values() if broken_of(run))
+    broke = (run.data.attrs["status"] for run in results.values() if broken_of(run))
     joined.data.attrs["status"] = next(broke, joined.data.attrs["status"])
     return joined
 

@@ -108,10 +108,10 @@ def _draw_run(axes: Any, row: Row, line: int) -> None:
         axis.plot(np.clip(row[name], *span), y, "o", color=colour, markersize=4, clip_on=False)
 
 
-def _prepare_panel(axis: Any, span: tuple[float, float], title: str, good: tuple[float, float]) -> None:
+def _prepare_panel(axis: Any, span: tuple[float, float], title: str, acceptable_range: tuple[float, float]) -> None:
     """Set a panel's logarithmic axis, its label, and the band of acceptable values."""
     axis.set(xscale="log", xlim=span, xlabel=title)
-    axis.axvspan(*good, color=ACCEPTED_COLOUR, alpha=0.16, linewidth=0)
+    axis.axvspan(*acceptable_range, color=ACCEPTED_COLOUR, alpha=0.16, linewidth=0)
     axis.grid(axis="y", alpha=0.25)
 
 
@@ -159,11 +159,11 @@ def _draw_legend(figure: Any, grade: float | None) -> None:
     figure.legend(handles=[*marks, *roads, good, *signs], loc="outside lower center", ncols=4)
 
 
-def stiffness(sweep: dict[str, np.ndarray], offset_level: Any, limits: Limits, grade: float | None) -> Any:
+def stiffness_figure(sweep: dict[str, np.ndarray], bench: Any, limits: Limits, grade: float | None) -> Any:
     """Figure of the largest pitch error and the worst damage ratio over the stiffness of the spring to the ground, for
     every road; the upper axis shows the cut-off of the equivalent high-pass.
 
-    sweep : per road what ``Bench.sweep`` gives; offset_level : the bench of the road without the grade
+    sweep : per road what ``Bench.sweep`` gives; bench : the bench of the road without the grade
     """
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.6))
     for road, curve in sweep.items():
@@ -180,13 +180,11 @@ def stiffness(sweep: dict[str, np.ndarray], offset_level: Any, limits: Limits, g
     axes[0].set(ylim=(low, 3.0), title="Largest pitch error [rad]")
     axes[1].set(ylim=(None, 1.5 * DAMAGE_AXIS[1]), title="Damage of the worst section force / true [-]")
     for axis in axes:
-        axis.axvline(
-            offset_level.holding, color=GREY, linewidth=0.8, linestyle="--", label="predicted to hold from here"
-        )
+        axis.axvline(bench.holding, color=GREY, linewidth=0.8, linestyle="--", label="predicted to hold from here")
         axis.set_xlabel("stiffness of the spring to the ground [N m/rad]")
         turning = (
-            lambda k: np.sqrt(np.maximum(k, 0.0) / offset_level.pitch_inertia) / (2 * math.pi),
-            lambda f: offset_level.pitch_inertia * (2 * math.pi * f) ** 2,
+            lambda k: np.sqrt(np.maximum(k, 0.0) / bench.pitch_inertia) / (2 * math.pi),
+            lambda f: bench.pitch_inertia * (2 * math.pi * f) ** 2,
         )
         cutoff_axis = axis.secondary_xaxis("top", functions=turning)
         cutoff_axis.set_xlabel("cut-off of the equivalent high-pass [Hz]")

@@ -25,7 +25,7 @@ UnitPaths = tuple[np.ndarray, np.ndarray]
 gyro bias of 1 rad/s."""
 
 
-def unit_paths(samples: int, rate: int, length: int, correlation_time: float, seed: int) -> UnitPaths:
+def unit_paths(path_count: int, rate: int, length: int, correlation_time: float, seed: int) -> UnitPaths:
     """Random angle error paths of a gyro of unit grade, two arrays (samples, length + 1) with a value per second: by
     white noise and by bias. They sum ``rate`` noise samples per second over ``length`` (s); the bias has a correlation
     time (s).
@@ -33,7 +33,7 @@ def unit_paths(samples: int, rate: int, length: int, correlation_time: float, se
     Every grade of gyro is a multiple of the same paths, so that grades are compared without scatter between them.
     """
     walks, drifts = list[np.ndarray](), list[np.ndarray]()
-    for path in range(samples):
+    for path in range(path_count):
         noise = normal_samples(seed, path, rate * length, 1, source=GYRO)[:, 0] / rate**0.5
         wander = bias_path(rate * length, 1 / rate, 0.0, 1.0, correlation_time, seed, path) / rate
         for paths, samples_of_paths in ((walks, noise), (drifts, wander)):

@@ -146,26 +146,26 @@ def figures_of_run(run: Result, parameters: Parameters) -> RunFigures:
     )
 
 
-def errors_of_run(run: Result, truth: Result, slope: float = WOEHLER_SLOPE) -> Errors:
+def errors_of_run(run: Result, true_run: Result, slope: float = WOEHLER_SLOPE) -> Errors:
     """Errors of a run relative to the true run, with rows at the same times; ``slope`` is the Woehler exponent.
 
     Raises InputError if the rows lie at different times, or if a load of the truth never turns.
     """
-    if len(run.times) != len(truth.times) or np.abs(run.times - truth.times).max() > 1e-9:
+    if len(run.times) != len(true_run.times) or np.abs(run.times - true_run.times).max() > 1e-9:
         raise InputError("", "times", None, "the run and the true one need rows at the same times")
-    loads, true = (section_forces(forces["f3"], forces["f4"], forces["pitch"]) for forces in (run, truth))
-    pitch = run["pitch"] - truth["pitch"]
+    loads, true = (section_forces(forces["f3"], forces["f4"], forces["pitch"]) for forces in (run, true_run))
+    pitch = run["pitch"] - true_run["pitch"]
     return Errors(
         damage={name: damage_ratio(loads[name], true[name], slope) for name in SECTION_FORCE_CHANNELS},
         force_rms={name: root_mean_square(loads[name] - true[name]) for name in SECTION_FORCE_CHANNELS},
-        vertical_damage={name: damage_ratio(run[name], truth[name], slope) for name in ("f3", "f4")},
+        vertical_damage={name: damage_ratio(run[name], true_run[name], slope) for name in ("f3", "f4")},
         pitch_max=float(np.abs(pitch).max()),
         pitch_rms=root_mean_square(pitch),
-        heave_max=float(np.abs(run["z3"] - truth["z3"]).max()),
+        heave_max=float(np.abs(run["z3"] - true_run["z3"]).max()),
     )
 
 
-def verdict_on_run(figures: RunFigures, deviations: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
+def verdict_on_run(figures: RunFigures, errors: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
     """Verdict on a virtual measurement with a true run, by damage, pitch error and artificial moment.
 
     ``accepted``: all within the limits. ``stabilise``: a run without any stabiliser (none of MEASURED_PITCH_EFFECTS or
@@ -173,7 +173,7 @@ def verdict_on_run(figures: RunFigures, deviations: Errors, effects: Iterable[st
     """
     if figures.pitch_max > TUMBLING_PITCH:
         return _tumbling_verdict(figures)
-    wrong = [*_exceeded_limits(deviations, limits), *_burden_sentences(figures, limits)]
+    wrong = [*_exceeded_limits(errors, limits), *_burden_sentences(figures, limits)]
     if not wrong:
         return Verdict("accepted", f"damage ratios within {limits.damage_error:.0%} of 1")
     stabilised = not set(effects).isdisjoint((*MEASURED_PITCH_EFFECTS, *LEVELLING_EFFECTS))
@@ -249,16 +249,14 @@ def _free_run_verdict(duration: float, trusted: float | None) -> Verdict:
     return Verdict("stabilise", f"free, and trusted for {trusted:.3g} s of {duration:.3g} s")
 
 
-def _exceeded_limits(deviations: Errors, limits: Limits) -> list[str]:
+def _exceeded_limits(errors: Errors, limits: Limits) -> list[str]:
     """Phrases on the errors relative to the true run that exceed their limits."""
     damage = [
         f"damage of {name} x {ratio:.3g}"
-        for name, ratio in deviations.damage.items()
+        for name, ratio in errors.damage.items()
         if not abs(ratio - 1.0) <= limits.damage_error
     ]
-    return damage + (
-        [] if deviations.pitch_max <= limits.pitch_error else [f"pitch wrong by {deviations.pitch_max:.2g} rad"]
-    )
+    return damage + ([] if errors.pitch_max <= limits.pitch_error else [f"pitch wrong by {errors.pitch_max:.2g} rad"])
 
 
 def _burden_sentences(figures: RunFigures, limits: Limits) -> list[str]:

@@ -40,7 +40,7 @@ from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.native_parts import joint_parts
 from models.engines.spatial_protocol import INTEGRATORS, check_modes
 from models.engines.stability import LONG_RUN
-from models.engines.towed_springs import divided, shared_numbers
+from models.engines.towed_springs import shared_numbers, towed_division
 from models.vehicles.spatial_linear import linearise, mass
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def driven(vehicle: Sprung, engine: str) -> Driven:
     """The free vehicle for "exudyn" or "mujoco": springs that the engine itself computes, and the table of all other
     forces."""
     handling = vehicle.handling
-    division = divided(handling, engine)
+    division = towed_division(handling, engine)
     wheels = np.zeros(HELD * len(handling.vehicle.tyres))
     table = np.concatenate((shared_numbers(handling, division), wheels))
     native = (*joint_parts(handling.vehicle), *division.native)

@@ -52,12 +52,12 @@ class Forces:
             law(numbers, np.array(positions), np.array(rates), forces)  # type: ignore[misc]
             return forces.tolist()
 
-        def moved(positions: Any, rates: Any, by_q: float, by_v: float) -> Array:
+        def steepest_jacobian(positions: Any, rates: Any, by_q: float, by_v: float) -> Array:
             slopes(sticking, np.array(positions), np.array(rates), by_q, by_v, jacobian)
             return jacobian
 
         self.of = by_law if law is not None else list_forces(size, numbers, set_forces)
-        self.slopes = moved
+        self.slopes = steepest_jacobian
 
 
 class Rolling:
@@ -121,19 +121,19 @@ class Rolling:
         """Add a load to every coordinate; the first load's callback computes the forces of all."""
         data, loads = self.mbs.systemData, [0.0] * self.wheels.size
 
-        def first(mbs: Any, t: float, load: float) -> float:
+        def first_load(mbs: Any, t: float, load: float) -> float:
             loads[:] = force_function(data.GetODE2Coordinates(), data.GetODE2Coordinates_t())
             return loads[0]
 
         for i, marker in enumerate(self._markers()):
-            function = (lambda mbs, t, load, i=i: loads[i]) if i else first
+            function = (lambda mbs, t, load, i=i: loads[i]) if i else first_load
             self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker, loadUserFunction=function))
 
     def _add_step_loads(self, force_function: ListForces) -> None:
         """Add loads that are constant over a step; their forces are computed at the beginning of the step."""
         loads = [self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker)) for marker in self._markers()]
 
-        def hold(mbs: Any, t: float) -> bool:
+        def set_loads(mbs: Any, t: float) -> bool:
             data, write = mbs.systemData, mbs.SetLoadParameter
             for load, value in zip(
                 loads, force_function(data.GetODE2Coordinates(), data.GetODE2Coordinates_t()), strict=True
@@ -141,7 +141,7 @@ class Rolling:
                 write(load, "load", value)
             return True
 
-        self.mbs.SetPreStepUserFunction(hold)
+        self.mbs.SetPreStepUserFunction(set_loads)
 
     def run(
         self, q: Array, v: Array, steps: int, step: float = 1e-4, solver: str = "ExplicitEuler", tolerance: float = 0.0

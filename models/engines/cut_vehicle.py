@@ -113,7 +113,7 @@ class HubModel:
         _check_settings(engine, vehicle, settings)
         self.numbers = table(vehicle, hub_inputs, step)
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
-        self.plain = _plain(vehicle, hub_inputs, step, self.adaptive) if engine == PLAIN else None
+        self.plain = _plain_hubs(vehicle, hub_inputs, step, self.adaptive) if engine == PLAIN else None
         division, numbers = Division((), vehicle.elements), self.numbers
         if forces == "native" and engine not in (PLAIN, "reference"):
             if hub_inputs.guide is not None and hub_inputs.pull is None:
@@ -230,7 +230,7 @@ def build(
     return HubModel(engine, vehicle, hub_inputs, Settings(FIXED_STEP_METHOD, step, duration), forces)
 
 
-def _plain(vehicle: CutVehicle, hub_inputs: HubInputs, step: float, any_time: bool) -> "PlainHubs":
+def _plain_hubs(vehicle: CutVehicle, hub_inputs: HubInputs, step: float, any_time: bool) -> "PlainHubs":
     """The cut vehicle by the independent plain code."""
     from models.multibody.plain.hubs import PlainHubs
 

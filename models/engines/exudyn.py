@@ -25,7 +25,7 @@ from models.engines.exudyn_system import (
     solve,
     solver_counts,
 )
-from models.engines.protocol import balanced, check_landings, guard
+from models.engines.protocol import check_balance, check_landings, guard
 from models.vehicles.description import PitchSpring, Point, Strut, Vehicle, matrices
 
 Reader = Callable[[Any, float, float], float]
@@ -36,12 +36,12 @@ Reader = Callable[[Any, float, float], float]
 class PitchPlaneBuild:
     """Exudyn's system of a pitch-plane vehicle while it is being built, with handles of its items.
 
-    places maps (body, "z" or "pitch") to a coordinate marker, nodes a body's name to its node.
+    coordinate_markers maps (body, "z" or "pitch") to a coordinate marker, nodes a body's name to its node.
     """
 
     container: Any
     mbs: Any
-    places: dict[tuple[str, str], Any] = field(default_factory=dict)
+    coordinate_markers: dict[tuple[str, str], Any] = field(default_factory=dict)
     nodes: dict[str, Any] = field(default_factory=dict)
     callbacks: int = 0
 
@@ -62,20 +62,20 @@ def _exact_bodies(assembly: Assembly) -> PitchPlaneBuild:
             item = items.RigidBody2D(nodeNumber=node, mass=body.mass, inertia=body.pitch_inertia)
         bodies[body.name] = mbs.AddObject(item)
         if body.pitch_inertia is not None:
-            built.places[body.name, "pitch"] = _marker(mbs, node, 2)
+            built.coordinate_markers[body.name, "pitch"] = _marker(mbs, node, 2)
         built.nodes[body.name] = node
-        built.places[body.name, "z"] = _marker(mbs, node, 1)
+        built.coordinate_markers[body.name, "z"] = _marker(mbs, node, 1)
         weight = body.mass * assembly.vehicle.gravity
-        mbs.AddLoad(items.LoadCoordinate(markerNumber=built.places[body.name, "z"], load=weight))
+        mbs.AddLoad(items.LoadCoordinate(markerNumber=built.coordinate_markers[body.name, "z"], load=weight))
 
-    def end(point: Point) -> Any:  # x is counted backward in Exudyn's plane
+    def end_marker(point: Point) -> Any:  # x is counted backward in Exudyn's plane
         return mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=bodies[point.body], localPosition=[-point.x, 0, 0]))
 
     for strut in (strut for strut in assembly.vehicle.struts if not strut.pushes_only):
         mbs.AddObject(
             items.CartesianSpringDamper(
                 name=f"strut {strut.name!r}",
-                markerNumbers=[end(strut.lower), end(strut.upper)],
+                markerNumbers=[end_marker(strut.lower), end_marker(strut.upper)],
                 stiffness=[0, strut.stiffness, 0],
                 damping=[0, strut.damping, 0],
             )
@@ -96,14 +96,14 @@ def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
 
 
 def _add_ground_spring(
-    build: PitchPlaneBuild, place: tuple[str, str], element: Strut | PitchSpring, law: Any = None
+    build: PitchPlaneBuild, coordinate: tuple[str, str], element: Strut | PitchSpring, law: Any = None
 ) -> None:
     """Add a spring and damper between a coordinate and the ground; ``law`` replaces their force."""
     keywords = {} if law is None else {"springForceUserFunction": law}
     build.callbacks += len(keywords)
     build.mbs.AddObject(
         items.CoordinateSpringDamper(
-            markerNumbers=[ground_marker(build.mbs), build.places[place]],
+            markerNumbers=[ground_marker(build.mbs), build.coordinate_markers[coordinate]],
             stiffness=element.stiffness,
             damping=element.damping,
             **keywords,
@@ -199,9 +199,11 @@ def _flat_road(mbs: Any, t: float, load: float) -> float:
     return 0.0
 
 
-def _add_load(build: PitchPlaneBuild, place: tuple[str, str], function: Any) -> None:
+def _add_load(build: PitchPlaneBuild, coordinate: tuple[str, str], function: Any) -> None:
     """Add a load on a coordinate whose value (N, N m) a function gives."""
-    build.mbs.AddLoad(items.LoadCoordinate(markerNumber=build.places[place], load=0.0, loadUserFunction=function))
+    build.mbs.AddLoad(
+        items.LoadCoordinate(markerNumber=build.coordinate_markers[coordinate], load=0.0, loadUserFunction=function)
+    )
     build.callbacks += 1
 
 
@@ -228,13 +230,13 @@ def _add_constraints(build: PitchPlaneBuild, assembly: Assembly, settings: Setti
 
 
 def _add_constraint(
-    build: PitchPlaneBuild, place: tuple[str, str], path: list[float], rate: list[float], per_time: float
+    build: PitchPlaneBuild, coordinate: tuple[str, str], path: list[float], rate: list[float], per_time: float
 ) -> Any:
     """Add a constraint by which a coordinate follows a path given at half steps."""
     build.callbacks += 2
     return build.mbs.AddObject(
         items.CoordinateConstraint(
-            markerNumbers=[ground_marker(build.mbs), build.places[place]],
+            markerNumbers=[ground_marker(build.mbs), build.coordinate_markers[coordinate]],
             offsetUserFunction=lambda mbs, t, item, offset: path[round(t * per_time)],
             offsetUserFunction_t=lambda mbs, t, item, offset: rate[round(t * per_time)],
         )
@@ -321,7 +323,7 @@ class ExudynModel:
         check_landings("exudyn", self.assembly, self.settings, times, states)
         counts = solver_counts(self.built.mbs)
         if enforced is not None:
-            balanced("exudyn", times, enforced, lambda i: self._balance(times[i], states[i]))
+            check_balance("exudyn", times, enforced, lambda i: self._balance(times[i], states[i]))
         return Trajectory(times, states, enforced, counts)
 
     def _balance(self, time: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -70,7 +70,7 @@ def python_script(mbs: Any, coordinates: dict[str, int], comment: str) -> str:
 
     coordinates : place of every coordinate in Exudyn's vectors, by its name; comment : for people, at its head.
     """
-    lines = _Writer(mbs).system()
+    lines = _Writer(mbs).script_lines()
     text = comment.replace("\\", "/").replace('"""', "'''")
     return SCRIPT_TEMPLATE.format(comment=text, coordinates=coordinates, lines="\n".join(lines))
 
@@ -78,7 +78,7 @@ def python_script(mbs: Any, coordinates: dict[str, int], comment: str) -> str:
 def item_counts(mbs: Any) -> Sequence[str]:
     """Texts with the numbers of nodes, objects, markers and loads that the exported script builds."""
     writer = _Writer(mbs)
-    writer.system()
+    writer.script_lines()
     return [f"{count} {kind}s" for kind, count in writer.counts.items() if count]
 
 
@@ -111,7 +111,7 @@ class _Writer:
     written: set[str] = field(default_factory=set)
     counts: dict[str, int] = field(default_factory=lambda: {"node": 0, "object": 0, "marker": 0, "load": 0})
 
-    def system(self) -> list[str]:
+    def script_lines(self) -> list[str]:
         """All lines of the script; nodes come first, so that coordinates keep their order."""
         data = self.mbs.systemData
         for kind, count in (

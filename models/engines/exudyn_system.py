@@ -93,15 +93,15 @@ def mass_and_force(mbs: Any, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]
     return mass, force
 
 
-def constraint_jacobians(mbs: Any, places: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Jacobians (c, n) of Exudyn's own c constraints with respect to the coordinates, one for each of ``places``
+def constraint_jacobians(mbs: Any, positions: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Jacobians (c, n) of Exudyn's own c constraints with respect to the coordinates, one for each of ``positions``
     (n,)."""
     solver: Any = exu.MainSolverImplicitSecondOrder()
     options = quiet_settings()
     solver.InitializeSolver(mbs, options)
     n, count = solver.GetODE2size(), solver.GetAEsize()
     nothing, rows = np.zeros((n + count, n + count)), list[np.ndarray]()
-    for q in places:
+    for q in positions:
         mbs.systemData.SetODE2Coordinates(q, exu.ConfigurationType.Current)
         solver.SetSystemJacobian(nothing)
         solver.ComputeJacobianAE(mbs)

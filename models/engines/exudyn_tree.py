@@ -34,16 +34,16 @@ SLIDER_AXES = {
 class TreeBuild:
     """Exudyn's system of a spatial vehicle while it is being built.
 
-    links: (object, last link or None, where its joint is) of every body; places: (node, index within it) of every
+    links: (object, last link or None, where its joint is) of every body; coordinate_nodes: (node, index within it) of every
     coordinate; markers by body and point; frames: axes (3, 3) of the last link of every body as columns.
     """
 
     vehicle: SpatialVehicle
     mbs: Any
-    held: Preloads
+    preloads: Preloads
     ground: Any
     links: dict[str, tuple[Any, int | None, Vector]] = field(default_factory=dict)
-    places: dict[tuple[str, str], tuple[Any, int]] = field(default_factory=dict)
+    coordinate_nodes: dict[tuple[str, str], tuple[Any, int]] = field(default_factory=dict)
     markers: dict[tuple[str | None, Vector, bool], Any] = field(default_factory=dict)
     frames: dict[str, np.ndarray] = field(default_factory=dict)
     callbacks: int = 0
@@ -82,16 +82,16 @@ class TreeBuild:
     def reader(self, body: str, freedom: str, kind: Any = KINDS.Coordinates) -> Callable[[], float]:
         """Function that reads a body's coordinate, or its rate, at the current stage; it returns 0 if the body does not
         have the coordinate."""
-        if (body, freedom) not in self.places:
+        if (body, freedom) not in self.coordinate_nodes:
             return lambda: 0.0
-        read, (node, index) = self.mbs.GetNodeOutput, self.places[body, freedom]
+        read, (node, index) = self.mbs.GetNodeOutput, self.coordinate_nodes[body, freedom]
         if self.size(node) == 1:  # Exudyn gives a number, no array
             return lambda: read(node, kind)
         return lambda: read(node, kind)[index]
 
     def size(self, node: Any) -> int:
         """Number of coordinates of a node."""
-        return sum(node == each for each, _ in self.places.values())
+        return sum(node == each for each, _ in self.coordinate_nodes.values())
 
     def in_body_axes(self, body: str | None, vector: np.ndarray) -> np.ndarray:
         """A vector (3,), given in the design position along the axes of space, in the axes that Exudyn uses for a
@@ -182,7 +182,7 @@ def add_tree(build: TreeBuild, bodies: list[Body]) -> None:
     )
     build.links |= {name: (tree, *end) for name, end in ends.items()}
     build.frames |= {name: axes[end[0]] for name, end in ends.items()}
-    build.places |= {place: (node, i) for i, place in enumerate(places)}
+    build.coordinate_nodes |= {place: (node, i) for i, place in enumerate(places)}
 
 
 def add_slider(build: TreeBuild, body: Body) -> None:
@@ -200,7 +200,7 @@ def add_slider(build: TreeBuild, body: Body) -> None:
             referenceRotation=SLIDER_AXES[freedom],
         )
     )
-    build.links[body.name], build.places[body.name, freedom] = (mass, None, body.position), (node, 0)
+    build.links[body.name], build.coordinate_nodes[body.name, freedom] = (mass, None, body.position), (node, 0)
     if freedom == "z" and build.vehicle.gravity:
         build.mbs.AddLoad(
             items.LoadCoordinate(markerNumber=build.coordinate(node, 0), load=-body.mass * build.vehicle.gravity)

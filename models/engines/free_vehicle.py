@@ -173,8 +173,8 @@ def native_elements_and_joints(engine: str, driven: Driven) -> tuple[tuple[str, 
 
     Counted in the model; it is built without its callback, for which numba would compile.
     """
-    share: tuple[tuple[str, ...], int] = _engine_module(engine).native_elements_and_joints(driven)
-    return share
+    elements_and_joints: tuple[tuple[str, ...], int] = _engine_module(engine).native_elements_and_joints(driven)
+    return elements_and_joints
 
 
 def native_share(

@@ -59,7 +59,7 @@ class FreeExudyn(FreeModel):
         if driven.has_kernel:
             forces = packed_forces(self.size, self._block, driven.block)
             mbs.SetObjectParameter(self.tree, "forceUserFunction", forces)
-        node = next(iter(built.places.values()))[0]
+        node = next(iter(built.coordinate_nodes.values()))[0]
         add_parts(built, node, driven.parts)
         add_rotors(built, node, rotors(driven.vehicle))
         for spring in driven.ground_springs:
@@ -100,10 +100,10 @@ class FreeExudyn(FreeModel):
         set_start(self.mbs, q, v)
         return mass_and_force(self.mbs, time)
 
-    def ties(self, places: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Jacobians (c, n) of Exudyn's own c constraints with respect to the coordinates, one for each of ``places``
+    def ties(self, positions: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Jacobians (c, n) of Exudyn's own c constraints with respect to the coordinates, one for each of the positions
         (n,)."""
-        return constraint_jacobians(self.mbs, places)
+        return constraint_jacobians(self.mbs, positions)
 
     def gaps(self, q: np.ndarray) -> np.ndarray:
         """Residuals (c,) of Exudyn's own c constraints at coordinates (n,)."""

@@ -177,13 +177,15 @@ def _guidance_forces(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
 
 
 def _compiled_model(
-    assembly: Assembly, settings: Settings, drive: ModelInput, guided: Collection[int] = ()
+    assembly: Assembly, settings: Settings, model_input: ModelInput, guided: Collection[int] = ()
 ) -> mujoco.MjModel:
     """The compiled MuJoCo model. Its numeric data hold the input table, after the numbers that ``mujoco_callback``
     reads."""
     spec = specification(assembly.vehicle, settings, guided)
-    gear = 0.0 if drive.arms is not None else -1.0
-    for axle in assembly.vehicle.axles if drive.controls is not None else ():  # motors for forces held over a step
+    gear = 0.0 if model_input.arms is not None else -1.0
+    for axle in (
+        assembly.vehicle.axles if model_input.controls is not None else ()
+    ):  # motors for forces held over a step
         spec.add_actuator(
             name=f"{axle.name} force",
             target=f"{axle.wheel} z",
@@ -191,15 +193,15 @@ def _compiled_model(
             gear=[gear, 0, 0, 0, 0, 0],
             gainprm=[1.0 if gear else 0.0, *[0] * 9],
         )
-    if drive.law is None:
+    if model_input.law is None:
         return spec.compile()
-    arms = (0.0, 0.0) if drive.arms is None else drive.arms
-    table = np.empty((0, 2)) if drive.table is None else drive.table
-    motors = len(spec.actuators) - 2 if drive.controls is not None else -1
+    arms = (0.0, 0.0) if model_input.arms is None else model_input.arms
+    table = np.empty((0, 2)) if model_input.table is None else model_input.table
+    motors = len(spec.actuators) - 2 if model_input.controls is not None else -1
     slack = [spring for spring in assembly.vehicle.pitch_springs if spring.dead_band]
     springs = [value for spring in slack for value in (spring.stiffness, spring.damping, spring.dead_band)]
     header = [2.0 / settings.step, table.shape[1], len(table), motors, *arms, len(springs), *springs]
-    content = np.concatenate((header, drive.tyres, table.ravel()))
+    content = np.concatenate((header, model_input.tyres, table.ravel()))
     spec.add_numeric(name="input", size=len(content), data=[0.0])
     model = spec.compile()
     model.numeric_data[:] = content

@@ -52,7 +52,7 @@ def _replace_by_equivalent(vehicle: SpatialVehicle, body: Body, tensors: dict[st
     elif len(_turning_freedoms(body)) == 1 and np.count_nonzero(tensor) == 1 and body.parent is not None:
         across = (0.5 + MARGIN) * (tensor.max() * np.eye(3) - tensor)
         tensors[body.name] = tensor + across
-        tensors[max(_parallel(vehicle, body.parent), key=lambda name: float(np.trace(tensors[name])))] -= across
+        tensors[max(_parallel_bodies(vehicle, body.parent), key=lambda name: float(np.trace(tensors[name])))] -= across
 
 
 def _turning_freedoms(body: Body) -> list[str]:
@@ -60,14 +60,14 @@ def _turning_freedoms(body: Body) -> list[str]:
     return [freedom for freedom in body.freedoms if freedom.startswith("r")]
 
 
-def _parallel(vehicle: SpatialVehicle, name: str) -> Sequence[str]:
+def _parallel_bodies(vehicle: SpatialVehicle, name: str) -> Sequence[str]:
     """Names of the bodies whose axes always remain parallel to those of ``name``."""
 
-    def leader(name: str) -> str:
+    def turning_ancestor(name: str) -> str:
         body = vehicle.body(name)
-        return name if _turning_freedoms(body) or body.parent is None else leader(body.parent)
+        return name if _turning_freedoms(body) or body.parent is None else turning_ancestor(body.parent)
 
-    return [body.name for body in vehicle.bodies if leader(body.name) == leader(name)]
+    return [body.name for body in vehicle.bodies if turning_ancestor(body.name) == turning_ancestor(name)]
 
 
 def _lower_largest_moment(name: str, tensors: dict[str, np.ndarray]) -> str:

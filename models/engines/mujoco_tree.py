@@ -42,7 +42,7 @@ def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = 
             pos=np.subtract(body.position, (0.0, 0.0, 0.0) if parent is None else vehicle.body(parent).position),
             ipos=[0, 0, 0],
             mass=1.0,
-            iquat=principal(body)[1],
+            iquat=principal_inertias(body)[1],
             inertia=[1.0, 1.0, 1.0],
             explicitinertial=True,
         )
@@ -63,7 +63,7 @@ def _merged(carriers: Mapping[str, str], name: str) -> str:
     return name
 
 
-def principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
+def principal_inertias(body: Body) -> tuple[np.ndarray, np.ndarray]:
     """Principal moments of inertia (3,) of a body and the quaternion (4,) of their axes, which is the identity if there
     are no products of inertia."""
     tensor, quaternion = np.array(body.inertia, float), np.array([1.0, 0.0, 0.0, 0.0])
@@ -102,11 +102,11 @@ def keep_small_turns(model: mujoco.MjModel) -> None:
         same[turn[:, 1:].any(axis=1) | (shift.any(axis=1) & (same != mujoco.mjtSameFrame.mjSAMEFRAME_BODYROT))] = 0
 
 
-def set_masses(model: mujoco.MjModel, numbers: MujocoIndices, bodies: Iterable[Body]) -> None:
+def set_masses(model: mujoco.MjModel, indices: MujocoIndices, bodies: Iterable[Body]) -> None:
     """Set masses and principal inertias in a MuJoCo model; merged bodies get the sum."""
     model.body_mass[1:] = model.body_inertia[1:] = 0.0
     for body in bodies:
-        number = numbers.bodies[body.name]
+        number = indices.bodies[body.name]
         model.body_mass[number] += body.mass
-        model.body_inertia[number] += principal(body)[0]
+        model.body_inertia[number] += principal_inertias(body)[0]
     mujoco.mj_setConst(model, mujoco.MjData(model))

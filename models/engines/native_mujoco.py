@@ -237,14 +237,14 @@ def built_elements(model: mujoco.MjModel) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name.split(NAME_SEPARATOR, 1)[1] for name in (*tendons, *actuators)))
 
 
-def affine_forces(element: NativePart) -> list[AffineForce]:
+def affine_forces(part: NativePart) -> list[AffineForce]:
     """Forces of actuators on the length L of a part, beyond the force of the tendon's own spring, with d = L less its
     design value.
 
     They draw it together: where the element presses with F, they are -F.
     """
-    axial, e = isinstance(element.travel, AxialTravel), element.element
-    design = element.travel.design if isinstance(element.travel, AxialTravel) else 0.0
+    axial, e = isinstance(part.travel, AxialTravel), part.element
+    design = part.travel.design if isinstance(part.travel, AxialTravel) else 0.0
     stiffness, damping = (e.stiffness, e.damping) if axial else (0.0, 0.0)
     held = e.held if axial or not e.stiffness else 0.0
     line = np.array([held, stiffness, damping]) + sum(_first_pieces(e), np.zeros(3))
@@ -253,10 +253,10 @@ def affine_forces(element: NativePart) -> list[AffineForce]:
     return [force for force in shifted if any(force[:3])]
 
 
-def _first_pieces(e: Element) -> Iterator[np.ndarray]:
+def _first_pieces(element: Element) -> Iterator[np.ndarray]:
     """Constant, slope and damping (3,) of the first straight piece of each of an element's two curves, over travel and
     rate."""
-    for curve, place in ((e.travel_force, 1), (e.rate_force, 2)):
+    for curve, place in ((element.travel_force, 1), (element.rate_force, 2)):
         if curve is not None:
             line = np.zeros(3)
             line[[0, place]] = curve.hinges()[:2]

@@ -109,25 +109,25 @@ def build(name: str, assembly: Assembly, settings: Settings) -> Model:
     return OutsideEngine(name, _call_engine(name, "building it", outside_class, assembly, settings), assembly, settings)
 
 
-def _call_engine(name: str, question: str, function: Callable, *arguments: Any) -> Any:
+def _call_engine(name: str, action: str, function: Callable, *arguments: Any) -> Any:
     """Result of a function of an outside engine; raises RunFailed for any exception other than the project's own."""
     try:
         return function(*arguments)
     except (InputError, RunFailed):
         raise
     except Exception as error:
-        raise RunFailed(name, f"{question} raised {_error_text(error)}") from error
+        raise RunFailed(name, f"{action} raised {_error_text(error)}") from error
 
 
-def _returned_array(name: str, question: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+def _returned_array(name: str, action: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """The value that an outside engine returned, as an array of this shape; raises RunFailed if it has no such
     shape."""
     try:
         numbers = np.asarray(value if value is not None else "nothing", dtype=float)
     except (TypeError, ValueError):
-        raise RunFailed(name, f"{question} gave {type(value).__name__} instead of numbers") from None
+        raise RunFailed(name, f"{action} gave {type(value).__name__} instead of numbers") from None
     if numbers.shape != shape:
-        raise RunFailed(name, f"{question} gave the shape {numbers.shape} instead of {shape}")
+        raise RunFailed(name, f"{action} gave the shape {numbers.shape} instead of {shape}")
     return numbers
 
 
@@ -153,7 +153,7 @@ class OutsideIntegrator(Reference):
         """States (n, 8) at the times (n,) in s, and the number of calls of the right-hand side."""
         states, calls = np.empty((len(times), 8)), [0]
         y = states[0] = self.assembly.initial
-        for start, end, inside in self._stretches(times, times[-1]):
+        for start, end, inside in self._pieces_between_knots(times, times[-1]):
             within = times[inside]
             last = [] if len(within) and within[-1] > end - 1e-9 * self.settings.step else [end]
             grid = np.array([start, *within, *last])
@@ -216,9 +216,9 @@ class OutsideEngine:
 
 REFERENCE_TOLERANCE = 1e-10
 """Tolerance of the reference run with which an outside engine is compared."""
-MARGIN, FLOOR, CEILING = 100.0, 1e-5, 0.1
-"""A run fails if its error exceeds ``MARGIN`` times the expected error. The bound, relative to the largest motion, is
-at least ``FLOOR`` (methods interpolate between steps to 3e-6) and at most ``CEILING``."""
+ERROR_MARGIN, SMALLEST_BOUND, LARGEST_BOUND = 100.0, 1e-5, 0.1
+"""A run fails if its error exceeds ERROR_MARGIN times the expected error. The bound, relative to the largest motion, is
+at least SMALLEST_BOUND (methods interpolate between steps to 3e-6) and at most LARGEST_BOUND."""
 
 
 def beside_reference(engine: str, assembly: Assembly, settings: Settings, run: Trajectory) -> str:
@@ -229,7 +229,7 @@ def beside_reference(engine: str, assembly: Assembly, settings: Settings, run: T
     except (InputError, RunFailed) as error:
         return f"nothing was compared with it: the reference gives no run of this scene ({error})"
     gap, where = relative_gap(run, truth)
-    allowed = min(max(MARGIN * _expected(engine, assembly, settings, truth), FLOOR), CEILING)
+    allowed = min(max(ERROR_MARGIN * _expected_error(engine, assembly, settings, truth), SMALLEST_BOUND), LARGEST_BOUND)
     if not gap <= allowed:
         raise RunFailed(
             engine,
@@ -259,7 +259,7 @@ def _reference_run(assembly: Assembly, settings: Settings) -> Trajectory:
     return protocol.build("reference", assembly, settings).run()
 
 
-def _expected(engine: str, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
+def _expected_error(engine: str, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
     """Relative error that the stated order and step of an outside engine make likely; its tolerance if it is
     adaptive."""
     if getattr(OUTSIDE[engine], "adaptive", False):
@@ -267,5 +267,5 @@ def _expected(engine: str, assembly: Assembly, settings: Settings, truth: Trajec
     try:
         gap, _ = relative_gap(_reference_run(assembly, replace(settings, integrator="RK4")), truth)
     except (InputError, RunFailed):
-        return CEILING  # too coarse for RK4: only what no step explains is told
+        return LARGEST_BOUND  # too coarse for RK4: only what no step explains is told
     return float(gap ** (min(CATALOGUE[engine][settings.integrator].order, 4) / 4))

@@ -11,7 +11,7 @@ import numpy as np
 from models.core.errors import Refused, RunFailed
 from models.core.resolved import check_resolved
 from models.core.signals import Signal
-from models.core.steps import divides, fitting
+from models.core.steps import divides, dividing_step
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE, Integrator
 from models.engines.model import Model
@@ -103,7 +103,8 @@ def _refuse_uneven_step(engine: str, step: float, multiple: str, length: float) 
     if not divides(step, length):
         raise Refused(
             engine,
-            f"the step {step:g} s does not divide {multiple} {length:g} s; use for example {fitting(step, length)} s",
+            f"the step {step:g} s does not divide {multiple} {length:g} s; "
+            f"use for example {dividing_step(step, length)} s",
         )
 
 
@@ -171,7 +172,7 @@ def check_landings(engine: str, assembly: Assembly, settings: Settings, times: n
     check_resolved(engine, times, states[:, :4], states[:, 4:], mass, integrator.order)
 
 
-def balanced(
+def check_balance(
     engine: str, times: np.ndarray, enforced: np.ndarray, balance: Callable[[int], tuple[np.ndarray, np.ndarray]]
 ) -> None:
     """Raise RunFailed unless multipliers (n, 1 or 2) agree with the balance of moments, the last column, and of forces.

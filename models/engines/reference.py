@@ -24,7 +24,7 @@ FLAT_ROAD_INPUT = np.zeros((1, 4))
 """Input of a vehicle on a flat road: one row of zeros."""
 
 
-def compiled(function: Any, key: tuple) -> Any:
+def compiled_closure(function: Any, key: tuple) -> Any:
     """A compiled closure with its own index in numba's cache, which closures of one factory would otherwise share."""
     function = named_closure(function, *key)
     return njit(cache=True, nogil=True, error_model="numpy")(function)  # no check for masses of zero: there are none
@@ -59,7 +59,7 @@ def _compile_fixed(rhs, key):
                 y[j] += step / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])
                 states[i + 1, j] = y[j]
 
-    return compiled(march, key)
+    return compiled_closure(march, key)
 
 
 def _compile_single(rhs, key):
@@ -70,10 +70,10 @@ def _compile_single(rhs, key):
         rhs(copy, u, p, dy)
         return dy
 
-    return compiled(derivative, key)
+    return compiled_closure(derivative, key)
 
 
-def _sum(rhs, added):
+def _summed_right_hand_side(rhs, added):
     """Right-hand side with the terms of ``added`` added to those of ``rhs``."""
 
     def total(y, u, p, dy):
@@ -166,7 +166,7 @@ class Reference:
         times, states = h * np.arange(n + 1), np.empty((n + 1, 8))
         y = states[0] = self.assembly.initial
         steps = calls = 0
-        for start, end, inside in self._stretches(times, self.settings.duration):
+        for start, end, inside in self._pieces_between_knots(times, self.settings.duration):
             within = times[inside]
             dense = bool(len(within)) and within[0] < end - 1e-9 * h  # else a row at the end at most, which is y there
             solution = self._march_piece(start, end, y, dense)
@@ -178,7 +178,7 @@ class Reference:
         self._guide(states)
         return times, states, {"steps": steps, "force calls": calls}
 
-    def _stretches(self, times: np.ndarray, last: float) -> Iterator[tuple[float, float, slice]]:
+    def _pieces_between_knots(self, times: np.ndarray, last: float) -> Iterator[tuple[float, float, slice]]:
         """Start and end (s) of each piece between knots of the input, and the slice of ``times`` (n,) within it."""
         knots = np.empty(0) if self._input is None else self._input.knots(self.settings.duration)
         small = 1e-9 * self.settings.step
@@ -244,7 +244,7 @@ _SINGLE: dict[tuple, Any] = {}
 
 def _right_hand_side(mode: str, geometry: str, *added: str):
     """Right-hand side of the equations for one mode and geometry, with the added terms."""
-    return reduce(_sum, (ADDED[name] for name in added), RIGHT_HAND_SIDES[mode, geometry])
+    return reduce(_summed_right_hand_side, (ADDED[name] for name in added), RIGHT_HAND_SIDES[mode, geometry])
 
 
 def march_of(mode: str, geometry: str, *added: str):

@@ -43,7 +43,7 @@ class SpatialExudyn:
         self.road = RoadRows(self._flat if road is None else road, per_time)
         self.built = assemble(vehicle, speed, self.road)
         mbs = self.mbs = self.built.mbs
-        places = [self.built.places[place] for place in vehicle.coordinates()]
+        places = [self.built.coordinate_nodes[place] for place in vehicle.coordinates()]
         self._sensors = add_state_sensors(mbs, dict.fromkeys(node for node, _ in places))
         mbs.Assemble()
         self._columns = [mbs.GetNodeODE2Index(node) + index for node, index in places]
@@ -59,7 +59,7 @@ class SpatialExudyn:
         ``road`` (2 w,) replaces the road's row at this time: heights (m), then rates (m/s) under w tyres."""
         if road is None:
             return np.linalg.solve(*self._mass_and_force(q, v, time))
-        with self.road.still(road):
+        with self.road.fixed_row(road):
             return np.linalg.solve(*self._mass_and_force(q, v))
 
     def _mass_and_force(self, q: np.ndarray, v: np.ndarray, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -76,12 +76,12 @@ class SpatialExudyn:
         """
         zero, h = np.zeros(self.size), difference_step(self.vehicle)
         set_start(self.mbs, zero, zero)
-        with self.road.still(self._flat[0]):
+        with self.road.fixed_row(self._flat[0]):
             parts = {i: self._linearised(i * h) for weight in DIFFERENCE_WEIGHTS for i in (weight, -weight)}
         stiffness, damping = (
             sum(w * i * (parts[i][part] + parts[-i][part]) for i, w in DIFFERENCE_WEIGHTS.items()) for part in (1, 2)
         )
-        motion = EngineKinematics(self.vehicle, self._shift, self._turn)
+        motion = EngineKinematics(self.vehicle, self._point_jacobian, self._rotation_jacobian)
         return linear_vehicle("exudyn", self.vehicle, motion, parts[1][0], damping, stiffness, self._road_columns())
 
     def _linearised(self, step: float) -> list[np.ndarray]:
@@ -100,16 +100,16 @@ class SpatialExudyn:
         these."""
         zero, forces = np.zeros(self.size), list[np.ndarray]()
         for row in (*self._flat, *np.eye(2 * len(self.vehicle.tyres))):
-            with self.road.still(row):
+            with self.road.fixed_row(row):
                 forces.append(self._mass_and_force(zero, zero)[1])
         flat, *loaded = forces
         return np.column_stack([force - flat for force in loaded])
 
-    def _shift(self, body: str, point: Vector) -> np.ndarray:
+    def _point_jacobian(self, body: str, point: Vector) -> np.ndarray:
         """Jacobian (3, n) of a point's velocity in the design position."""
         return self._jacobian(self.built.marker(body, point), KINDS.Velocity)
 
-    def _turn(self, body: str) -> np.ndarray:
+    def _rotation_jacobian(self, body: str) -> np.ndarray:
         """Jacobian (3, n) of a body's angular velocity in the design position."""
         return self._jacobian(self.built.marker(body, self.vehicle.body(body).position, True), KINDS.AngularVelocity)
 

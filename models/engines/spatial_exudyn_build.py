@@ -39,36 +39,36 @@ class RoadForces:
 
 @dataclass
 class RoadRows:
-    """The road under the tyres. rows : heights (m), then rates (m/s), ``per_time`` rows per second; read : forces
-    computed from them."""
+    """The road under the tyres. rows : heights (m), then rates (m/s), ``rows_per_second`` in a second; computed_forces
+    : the forces that callbacks read from them."""
 
     rows: np.ndarray
-    per_time: float
-    read: list[RoadForces] = field(default_factory=list)
+    rows_per_second: float
+    computed_forces: list[RoadForces] = field(default_factory=list)
 
     def forces(self, by_road: np.ndarray) -> RoadForces:
         """Forces at all rows of the road for one callback, with the factors ``by_road`` (2 w, k)."""
-        self.read.append(RoadForces(by_road, (self.rows @ by_road).tolist()))
-        return self.read[-1]
+        self.computed_forces.append(RoadForces(by_road, (self.rows @ by_road).tolist()))
+        return self.computed_forces[-1]
 
     @contextmanager
-    def still(self, row: np.ndarray) -> Iterator[None]:
+    def fixed_row(self, row: np.ndarray) -> Iterator[None]:
         """Context in which one row (2 w,) of the road is used at all times."""
-        before, per_time, self.per_time = [each.rows for each in self.read], self.per_time, 0.0
-        for each in self.read:
+        before, per_time, self.rows_per_second = [each.rows for each in self.computed_forces], self.rows_per_second, 0.0
+        for each in self.computed_forces:
             each.rows = [(row @ each.by_road).tolist()]
         try:
             yield
         finally:
-            self.per_time = per_time
-            for each, rows in zip(self.read, before, strict=True):
+            self.rows_per_second = per_time
+            for each, rows in zip(self.computed_forces, before, strict=True):
                 each.rows = rows
 
 
 def _add_spring(build: TreeBuild, spring: SpringDamper) -> None:
     """Add a spring-damper: native where Exudyn has an item for it, that is along a global axis, or along any axis of a
     body that never turns."""
-    axis, ends, held = np.array(spring.axis), [spring.first_body, spring.second_body], build.held.parts[spring.name]
+    axis, ends, held = np.array(spring.axis), [spring.first_body, spring.second_body], build.preloads.parts[spring.name]
     upright = np.count_nonzero(axis) == 1
     first, two = (
         build.marker(end, point, not upright)
@@ -124,7 +124,12 @@ def _add_bar(build: TreeBuild, bar: AntiRollBar) -> None:
     """Add an anti-roll bar: vertical forces at its two points, and a moment on the body's roll coordinate."""
     left, right = build.marker(bar.left, bar.point_left), build.marker(bar.right, bar.point_right)
     roll, turning = build.reader(bar.body, "rx"), build.reader(bar.body, "rx", KINDS.Coordinates_t)
-    rest, held, track, read = bar.point_right[2] - bar.point_left[2], build.held.parts[bar.name], bar.track, build.mbs
+    rest, held, track, read = (
+        bar.point_right[2] - bar.point_left[2],
+        build.preloads.parts[bar.name],
+        bar.track,
+        build.mbs,
+    )
     k, c = bar.stiffness, bar.damping
 
     def moment(height_difference: float, rate: float) -> float:
@@ -139,8 +144,8 @@ def _add_bar(build: TreeBuild, bar: AntiRollBar) -> None:
 
     name = f"anti-roll bar {bar.name!r}"
     build.connect(name, left, right, lambda apart, rate: [0.0, 0.0, moment(apart[2], rate[2]) / track])
-    if (bar.body, "rx") in build.places:
-        node, index = build.places[bar.body, "rx"]
+    if (bar.body, "rx") in build.coordinate_nodes:
+        node, index = build.coordinate_nodes[bar.body, "rx"]
         still = build.coordinate(build.mbs.AddNode(items.NodePointGround()), 0)
         rolling = build.coordinate(node, index)
         build.mbs.AddObject(
@@ -154,7 +159,7 @@ def _add_bar(build: TreeBuild, bar: AntiRollBar) -> None:
 def _add_turning_tyre(build: TreeBuild, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
     """Add a tyre on a body that turns: a spring-damper to flat ground, and the road's force as a load; ``by_road`` (2
     w,) : factors of this force (N)."""
-    marker, held = build.marker(tyre.body, tyre.point), build.held.tyres[tyre.name]
+    marker, held = build.marker(tyre.body, tyre.point), build.preloads.tyres[tyre.name]
     sunk = held / tyre.stiffness if tyre.stiffness else 0.0
     law = {"stiffness": [0, 0, tyre.stiffness], "damping": [0, 0, tyre.damping], "offset": [0, 0, sunk]}
     build.spring(build.marker(None, tyre.point), marker, **law, name=f"tyre {tyre.name!r}")
@@ -163,7 +168,7 @@ def _add_turning_tyre(build: TreeBuild, tyre: Tyre, by_road: np.ndarray, road: R
         items.LoadForceVector(
             name=f"road under the tyre {tyre.name!r}, flat here",
             markerNumber=marker,
-            loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road.per_time)],
+            loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road.rows_per_second)],
         )
     )
     build.callbacks += 1
@@ -175,7 +180,11 @@ def _add_steady_tyres(build: TreeBuild, tyres: list[Tyre], by_road: np.ndarray, 
     by_road : (2 w, tyres), what the road adds to each (N).
     """
     lifts = [
-        [build.places[name, "z"] for name in build.vehicle.chain(tyre.body) if (name, "z") in build.places]
+        [
+            build.coordinate_nodes[name, "z"]
+            for name in build.vehicle.chain(tyre.body)
+            if (name, "z") in build.coordinate_nodes
+        ]
         for tyre in tyres
     ]
     nodes = list(dict.fromkeys(node for places in lifts for node, _ in places))
@@ -187,7 +196,7 @@ def _add_steady_tyres(build: TreeBuild, tyres: list[Tyre], by_road: np.ndarray, 
     for row, places in zip(rows, lifts, strict=True):
         for node, index in places:
             row[first[node] + index] = 1.0
-    stiffness, damping, held = np.array([(t.stiffness, t.damping, build.held.tyres[t.name]) for t in tyres]).T
+    stiffness, damping, held = np.array([(t.stiffness, t.damping, build.preloads.tyres[t.name]) for t in tyres]).T
     force = road.forces(by_road @ rows)
     build.mbs.AddObject(
         items.ObjectGenericODE2(
@@ -197,7 +206,7 @@ def _add_steady_tyres(build: TreeBuild, tyres: list[Tyre], by_road: np.ndarray, 
             stiffnessMatrix=rows.T * stiffness @ rows,
             **({"dampingMatrix": rows.T * damping @ rows} if damping.any() else {}),
             **({"forceVector": rows.T @ held} if held.any() else {}),
-            forceUserFunction=lambda mbs, t, item, q, v: force.rows[round(t * road.per_time)],
+            forceUserFunction=lambda mbs, t, item, q, v: force.rows[round(t * road.rows_per_second)],
         )
     )
     build.callbacks += 1
@@ -206,11 +215,11 @@ def _add_steady_tyres(build: TreeBuild, tyres: list[Tyre], by_road: np.ndarray, 
 def _add_pushing_tyre(build: TreeBuild, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
     """Add a tyre that may leave the road, its whole law as a callback; ``by_road`` (2 w, 2) selects height and rate
     under the tyre."""
-    k, c, held, rest = tyre.stiffness, tyre.damping, build.held.tyres[tyre.name], tyre.point[2]
+    k, c, held, rest = tyre.stiffness, tyre.damping, build.preloads.tyres[tyre.name], tyre.point[2]
     under = road.forces(by_road)
 
     def law(mbs: Any, t: float, item: int, position: Any, speed: Any, *_: Any) -> list[float]:
-        height, rate = under.rows[round(t * road.per_time)]
+        height, rate = under.rows[round(t * road.rows_per_second)]
         elastic = held + k * (height - position[2] + rest)
         return [0.0, 0.0, -max(min(elastic + c * (rate - speed[2]), 2.0 * elastic), 0.0)]
 

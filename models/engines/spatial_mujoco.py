@@ -111,14 +111,14 @@ class SpatialMujoco:
         mass = np.empty((n, n))
         mujoco.mj_fullM(self.model, self.data, mass)
         mass = mass[np.ix_(self.numbers.columns, self.numbers.columns)]
-        motion = EngineKinematics(self.vehicle, self._shift, self._turn)
+        motion = EngineKinematics(self.vehicle, self._point_jacobian, self._rotation_jacobian)
         return linear_vehicle("mujoco", self.vehicle, motion, mass, -mass @ damping, -mass @ stiffness, mass @ road)
 
-    def _shift(self, body: str, point: Vector) -> np.ndarray:
+    def _point_jacobian(self, body: str, point: Vector) -> np.ndarray:
         """Jacobian (3, n) of a point's displacement in the design position."""
         return self._jacobians(body, np.array(point, float))[0]
 
-    def _turn(self, body: str) -> np.ndarray:
+    def _rotation_jacobian(self, body: str) -> np.ndarray:
         """Jacobian (3, n) of a body's rotation in the design position."""
         return self._jacobians(body, np.zeros(3))[1]
 

@@ -54,7 +54,7 @@ travel."""
 OF_POINT = 3
 """Results of a point during a call: the moment about the origin of space of a unit force along its axis."""
 UP: Vector = (0.0, 0.0, 1.0)
-Acting = tuple[str | None, Vector, Vector]
+ActingPoint = tuple[str | None, Vector, Vector]
 """A point at which an element acts: body, point (m) and axis."""
 
 
@@ -285,7 +285,7 @@ class Element:
     every coordinate q is -F ds/dq. A tyre that only pushes is ``one_sided``: F is negative where it does.
     """
 
-    points: tuple[Acting, ...]
+    points: tuple[ActingPoint, ...]
     stiffness: float = 0.0
     damping: float = 0.0
     held: float = 0.0
@@ -329,7 +329,7 @@ def _scaled(axis: Vector, factor: float) -> Vector:
 
 
 def packed_numbers(
-    vehicle: SpatialVehicle, elements: list[Element], model: mujoco.MjModel, numbers: MujocoIndices
+    vehicle: SpatialVehicle, elements: list[Element], model: mujoco.MjModel, indices: MujocoIndices
 ) -> tuple[tuple[int, int, int], list[float]]:
     """Counts of bodies, elements and points, and the list of all their numbers in the callback's table."""
     carrying = {name for body in vehicle.bodies if vehicle.turns(body.name) for name in vehicle.chain(body.name)}
@@ -338,19 +338,19 @@ def packed_numbers(
     for name in moving:
         before = len(points)
         points += _points_of(elements, vehicle, name)
-        bodies.append([*_body_numbers(vehicle, name, moving, model, numbers), before, len(points)])
-    laws = [_element_numbers(element, vehicle, numbers) for element in elements]
+        bodies.append([*_body_numbers(vehicle, name, moving, model, indices), before, len(points)])
+    laws = [_element_numbers(element, vehicle, indices) for element in elements]
     return (len(bodies), len(laws), len(points)), [float(value) for value in chain(*bodies, *points, *laws)]
 
 
 def _body_numbers(
-    vehicle: SpatialVehicle, name: str, moving: list[str], model: mujoco.MjModel, numbers: MujocoIndices
+    vehicle: SpatialVehicle, name: str, listed_bodies: list[str], model: mujoco.MjModel, indices: MujocoIndices
 ) -> list[float]:
     """Numbers, in the callback's table, of a body that may turn, or that carries one that may."""
-    body, number = vehicle.body(name), numbers.bodies[name]
+    body, number = vehicle.body(name), indices.bodies[name]
     first, count = max(int(model.body_jntadr[number]), 0), len(body.freedoms)
     sliding = sum(not freedom.startswith("r") for freedom in body.freedoms)
-    parent = moving.index(body.parent) if body.parent else -1
+    parent = listed_bodies.index(body.parent) if body.parent else -1
     return [parent, number, first, first + sliding, first + count]
 
 
@@ -365,29 +365,29 @@ def _points_of(elements: list[Element], vehicle: SpatialVehicle, name: str) -> l
     ]
 
 
-def _element_numbers(element: Element, vehicle: SpatialVehicle, numbers: MujocoIndices) -> list[float]:
+def _element_numbers(element: Element, vehicle: SpatialVehicle, indices: MujocoIndices) -> list[float]:
     """Numbers of an element in the callback's table: its linear law, the factors of coordinates in its travel, and the
     nonlinear terms of its law."""
     shares, rest = dict[int, float](), 0.0
-    if element.added_coordinate in numbers.joints:
-        shares[numbers.joints[element.added_coordinate]] = 1.0
+    if element.added_coordinate in indices.joints:
+        shares[indices.joints[element.added_coordinate]] = 1.0
     for name, point, axis in element.points:
         if vehicle.turns(name):
             rest += float(np.dot(point, axis))
             continue
         for place in ((body, freedom) for body in vehicle.chain(name) for freedom in vehicle.body(body).freedoms):
-            joint = numbers.joints[place]
+            joint = indices.joints[place]
             shares[joint] = shares.get(joint, 0.0) + float(np.dot(axis, AXES[place[1]]))
     flat = [value for pair in shares.items() if pair[1] for value in pair]
-    more = _nonlinear_numbers(element, numbers)
+    more = _nonlinear_numbers(element, indices)
     law = [element.stiffness, element.damping, element.held, element.tyre, rest, element.one_sided]
     begins = SHARES + len(flat)
     return [begins + len(more), *law, begins if more else 0, *flat, *more]
 
 
-def _nonlinear_numbers(element: Element, numbers: MujocoIndices) -> list[float]:
+def _nonlinear_numbers(element: Element, indices: MujocoIndices) -> list[float]:
     """Numbers of the nonlinear terms of an element's law in the callback's table; none where the law is linear."""
-    steered = [value for place, gain in element.steered for value in (numbers.joints.get(place, -1), gain)]
+    steered = [value for place, gain in element.steered for value in (indices.joints.get(place, -1), gain)]
     curves = [element.on_travel, element.on_rate]
     if not (element.friction[0] or steered or any(curves)):
         return []

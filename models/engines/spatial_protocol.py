@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from models.core.errors import InputError, Refused
-from models.core.steps import divides, fitting
+from models.core.steps import divides, dividing_step
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
@@ -128,7 +128,7 @@ def check_divides(engine: str, settings: Settings) -> None:
         raise Refused(
             engine,
             f"the step {step:g} s does not divide the duration {duration:g} s; use for "
-            f"example {fitting(step, duration)} s",
+            f"example {dividing_step(step, duration)} s",
         )
 
 
@@ -233,12 +233,12 @@ def linear_vehicle_at_speeds(engine: str, vehicle: SpatialVehicle) -> Callable[[
     powers = np.array([[1.0, 1.0 / speed, speed] for speed in LINEARISED_SPEEDS])
     parts = np.tensordot(np.linalg.inv(powers), np.array([linear.damping for linear in linears]), 1)
 
-    def at(speed: float) -> LinearVehicle:
+    def linear_vehicle_at(speed: float) -> LinearVehicle:
         if not speed > 0:
             raise InputError(vehicle.name, "speed", speed, "side forces and drag need a speed above 0 m/s")
         return replace(linears[0], damping=parts[0] + parts[1] / speed + parts[2] * speed)
 
-    return at
+    return linear_vehicle_at
 
 
 def checked_trajectory(

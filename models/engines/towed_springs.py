@@ -17,7 +17,7 @@ FORCE_COLUMNS = [parts.STIFFNESS, parts.DAMPING, parts.HELD, parts.FRICTION, par
 """Columns of a part's row in the table that are all 0 where the compiled forces have no term of it."""
 
 
-def divided(handling: Handling, engine: str) -> Division:
+def towed_division(handling: Handling, engine: str) -> Division:
     """Division of the springs and bars of towed bodies between "exudyn" or "mujoco" and the compiled forces."""
     free = handling.vehicle
     elements = elements_of(free, handling.held) if handling.forces == "native" and free.towed else ()
@@ -33,8 +33,8 @@ def shared_numbers(handling: Handling, division: Division) -> np.ndarray:
     first, count = int(numbers[at.OF_PARTS]), int(numbers[at.PARTS])
     rows = numbers[first : first + count * parts.PER_PART].reshape(count, parts.PER_PART)
     left = {element.name: element for element in division.shared}
-    whole: tuple[SpringDamper | AntiRollBar, ...] = (*handling.vehicle.springs, *handling.vehicle.bars)
-    for row, part in zip(rows, whole, strict=True):
+    all_parts: tuple[SpringDamper | AntiRollBar, ...] = (*handling.vehicle.springs, *handling.vehicle.bars)
+    for row, part in zip(rows, all_parts, strict=True):
         if part.name in native:
             _remainder(row, left.get(part.name))
     kept = rows[rows[:, FORCE_COLUMNS].any(axis=1)]
@@ -42,9 +42,16 @@ def shared_numbers(handling: Handling, division: Division) -> np.ndarray:
     return numbers
 
 
-def _remainder(row: np.ndarray, left: Element | None) -> None:
+def _remainder(row: np.ndarray, shared_element: Element | None) -> None:
     """Reduce a part's row of the table to the terms that are not native; to zeros where the part is entirely native."""
-    gone = left is None or left.travel_force is None, left is None or left.rate_force is None
-    row[FORCE_COLUMNS[:4]] = (left.stiffness, left.damping, left.held, left.friction) if left else 0.0
+    gone = (
+        shared_element is None or shared_element.travel_force is None,
+        shared_element is None or shared_element.rate_force is None,
+    )
+    row[FORCE_COLUMNS[:4]] = (
+        (shared_element.stiffness, shared_element.damping, shared_element.held, shared_element.friction)
+        if shared_element
+        else 0.0
+    )
     for column, none in zip(FORCE_COLUMNS[4:], gone, strict=True):
         row[column] = 0.0 if none else row[column]

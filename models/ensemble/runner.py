@@ -130,18 +130,18 @@ class _PathCounter:
 
     paths: int
     done: int
-    tell: Callable[[EnsembleProgress], None]
+    report: Callable[[EnsembleProgress], None]
     start_time: float = field(default_factory=time.perf_counter)
     done_at_start: int = 0
 
     def __post_init__(self) -> None:
         self.done_at_start = self.done
-        self.tell(EnsembleProgress(self.done, self.paths, 0.0, math.inf if self.done < self.paths else 0.0))
+        self.report(EnsembleProgress(self.done, self.paths, 0.0, math.inf if self.done < self.paths else 0.0))
 
     def add(self, paths: int) -> None:
         self.done += paths
         rate = (self.done - self.done_at_start) / (time.perf_counter() - self.start_time)
-        self.tell(EnsembleProgress(self.done, self.paths, rate, (self.paths - self.done) / rate))
+        self.report(EnsembleProgress(self.done, self.paths, rate, (self.paths - self.done) / rate))
 
 
 def run_paths(
@@ -151,13 +151,13 @@ def run_paths(
     executor: Executor | None = None,
     blocks: Blocks = DEFAULT_BLOCKS,
     progress: Callable[[EnsembleProgress], None] = lambda state: None,
-    lost: Callable[[range, str], Arrays] | None = None,
+    replacement: Callable[[range, str], Arrays] | None = None,
 ) -> Arrays:
     """Arrays of all paths 0 to ``paths`` - 1 by name; bitwise identical on any executor and after interruptions.
 
     The arguments are those of ``each_block``.
     """
-    arrays = list(each_block(job, paths, folder, executor, blocks, progress, lost))
+    arrays = list(each_block(job, paths, folder, executor, blocks, progress, replacement))
     return {name: np.concatenate([block[name] for block in arrays]) for name in arrays[0]}
 
 
@@ -168,7 +168,7 @@ def each_block(
     executor: Executor | None = None,
     blocks: Blocks = DEFAULT_BLOCKS,
     progress: Callable[[EnsembleProgress], None] = lambda state: None,
-    lost: Callable[[range, str], Arrays] | None = None,
+    replacement: Callable[[range, str], Arrays] | None = None,
 ) -> Generator[Arrays]:
     """Generator of the arrays of each block of paths 0 to ``paths`` - 1, in order and as early as possible.
 
@@ -176,8 +176,8 @@ def each_block(
     an InputError that names the difference; None keeps them in memory until they are given. executor : a process pool
     (``process_pool``), a Dask cluster (``cluster``), a thread pool; None computes here. A block that fails does
     not stop the others, and one that loses its worker is computed again: RunFailed then names the blocks and paths
-    that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. lost : (paths, reason)
-    -> what stands for a block that failed, in place of RunFailed; it is not kept, so that resuming tries again.
+    that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. replacement : (paths,
+    reason) -> what stands for a block that failed, in place of RunFailed; it is not kept: resuming tries again.
     """
     facts = {"paths": paths, "paths per block": blocks.size, **job.facts()}
     count, block = blocks.count(paths), partial(blocks.block, paths=paths)
@@ -193,16 +193,16 @@ def each_block(
                 if store.has(blocks_given) and not failed:
                     yield store.load(blocks_given)
                     blocks_given += 1
-                elif lost is not None and (store.has(blocks_given) or blocks_given in failed):
+                elif replacement is not None and (store.has(blocks_given) or blocks_given in failed):
                     yield (
-                        lost(block(blocks_given), failed[blocks_given])
+                        replacement(block(blocks_given), failed[blocks_given])
                         if blocks_given in failed
                         else store.load(blocks_given)
                     )
                     blocks_given += 1
                 elif not _store_next_answer(answers, store, failed, counted):
                     break
-        if failed and lost is None:
+        if failed and replacement is None:
             raise _failed_blocks_error({i: (block(i), reason) for i, reason in failed.items()}, folder)
 
 
@@ -227,13 +227,13 @@ def values_in_order(
             break
         yield blocks_by_index.pop(block_index), values_by_index.load(block_index)
 
-    def missing() -> Iterator[tuple[int, T]]:
+    def unfinished_blocks() -> Iterator[tuple[int, T]]:
         for i, block in chain([*blocks_by_index.items()], numbered):
             blocks_by_index[i] = block
             if not values_by_index.has(i):
                 yield i, block
 
-    with closing(_answers_of_blocks(function, missing(), executor, ahead)) as answers:
+    with closing(_answers_of_blocks(function, unfinished_blocks(), executor, ahead)) as answers:
         for i, _, answer in answers:
             if isinstance(answer, _Failure):
                 raise (_disk_full_error if answer.full else _lost_workers_error)(
@@ -268,7 +268,7 @@ def _store_next_answer(
     block_answers: Iterator[tuple[int, range, Arrays | _Failure]],
     store: Store | _MemoryStore,
     failed: dict[int, str],
-    counted: _PathCounter,
+    path_counter: _PathCounter,
 ) -> bool:
     """Store the next block that is finished, or record why it failed; returns False when no block is left."""
     i, block, answer = next(block_answers, (-1, range(0), _Failure("")))
@@ -282,7 +282,7 @@ def _store_next_answer(
         failed[i] = answer.reason
         return True
     _save_block(store, i, answer)
-    counted.add(len(block))
+    path_counter.add(len(block))
     return True
 
 
@@ -295,15 +295,15 @@ def _failed_blocks_error(failed: dict[int, tuple[range, str]], folder: Path | No
 
 
 def _answers_of_blocks(
-    job: Callable[[T], Arrays], missing: Iterator[tuple[int, T]], executor: Executor | None, ahead: int
+    job: Callable[[T], Arrays], unfinished_blocks: Iterator[tuple[int, T]], executor: Executor | None, ahead: int
 ) -> Generator[tuple[int, T, Arrays | _Failure]]:
     """Generator of blocks and their results or failures, in order of completion; at most ``ahead`` blocks are computed
     at once, and none is begun more than ``ahead`` after the first unfinished one."""
     if executor is None:
-        yield from ((i, block, _compute_block(job, block)) for i, block in missing)
+        yield from ((i, block, _compute_block(job, block)) for i, block in unfinished_blocks)
         return
     ahead = ahead if ahead == 1 else max(ahead, 2 * getattr(executor, "width", 0))
-    queue, single_blocks = deque(islice(missing, ahead)), deque[tuple[int, T]]()
+    queue, single_blocks = deque(islice(unfinished_blocks, ahead)), deque[tuple[int, T]]()
     lost, waiting = Counter[int](), dict[Future, tuple[int, T]]()
     try:
         while queue or single_blocks or waiting:
@@ -320,7 +320,7 @@ def _answers_of_blocks(
                     (single_blocks if lost[i] >= AMONG_OTHERS else queue).appendleft((i, block))
                 else:
                     yield i, block, future.result() if error is None else _failure_of(error)
-            queue.extend(islice(missing, max(ahead - len(queue), 0)))
+            queue.extend(islice(unfinished_blocks, max(ahead - len(queue), 0)))
     finally:
         for future in waiting:
             future.cancel()

@@ -26,7 +26,7 @@ def deviation_with_error(values: np.ndarray) -> tuple[float, float]:
     return deviation_from_moments(len(values), float(np.mean(centred**2)), float(np.mean(centred**4)))
 
 
-def deviation_from_moments(value_count: int, second_moment: float, fourth: float) -> tuple[float, float]:
+def deviation_from_moments(value_count: int, second_moment: float, fourth_moment: float) -> tuple[float, float]:
     """Standard deviation and its standard error, from the second and fourth central moments of ``value_count``
     values."""
     if value_count < FEWEST_PATHS:
@@ -36,7 +36,7 @@ def deviation_from_moments(value_count: int, second_moment: float, fourth: float
     spread = math.sqrt(second_moment * value_count / (value_count - 1))
     if spread == 0.0:
         return 0.0, 0.0
-    return spread, math.sqrt(max(fourth - second_moment**2, 0.0) / value_count) / (2 * math.sqrt(second_moment))
+    return spread, math.sqrt(max(fourth_moment - second_moment**2, 0.0) / value_count) / (2 * math.sqrt(second_moment))
 
 
 def percentiles(errors: np.ndarray) -> np.ndarray:

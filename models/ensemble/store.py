@@ -47,18 +47,18 @@ class Store:
             self._write_job(fingerprint(facts))
             yield
 
-    def _write_job(self, described: dict[str, Any]) -> None:
+    def _write_job(self, job_facts: dict[str, Any]) -> None:
         """Write into the folder to which job its blocks belong; raises InputError if the folder belongs to another
         job."""
         file = self.folder / JOB_FILE
         if not file.exists():
-            write_whole(file, json.dumps(described, indent=1).encode())
+            write_whole(file, json.dumps(job_facts, indent=1).encode())
             return
         stored_job = _read_note(file)
-        for key in (*described, *stored_job):
-            if described.get(key) != stored_job.get(key):
+        for key in (*job_facts, *stored_job):
+            if job_facts.get(key) != stored_job.get(key):
                 allowed = (
-                    f"this folder belongs to another job: {described.get(key)!r} is asked for here; "
+                    f"this folder belongs to another job: {job_facts.get(key)!r} is asked for here; "
                     "resume with what it was "
                     "begun with, or begin in a new folder"
                 )

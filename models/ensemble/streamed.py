@@ -127,10 +127,10 @@ class MagnitudeQuantiles:
         cells = (np.arange(columns) * self._bins + bin_numbers)[known]
         self._counts += np.bincount(cells, minlength=self._counts.size).reshape(self._counts.shape)
 
-    def percentiles(self, probabilities: tuple[float, ...]) -> np.ndarray:
+    def percentiles(self, percentages: tuple[float, ...]) -> np.ndarray:
         """Percentiles (percentages, k) of the magnitudes; NaN where a column has no values."""
         upto = self._counts.cumsum(axis=1)
-        wanted = np.array(probabilities)[:, None] / 100.0 * (upto[:, -1] - 1)
+        wanted = np.array(percentages)[:, None] / 100.0 * (upto[:, -1] - 1)
         bin_numbers = (upto[None] <= np.floor(wanted)[:, :, None]).sum(axis=2)
         middle = SMALLEST_MAGNITUDE * np.exp(self._width * bin_numbers) * (1.0 - QUANTILE_ACCURACY)
         return np.where(upto[:, -1] > 0, np.where(bin_numbers == 0, 0.0, middle), np.nan)

@@ -45,22 +45,22 @@ def fit(
     problem: Problem,
     stage_store: Store | None = None,
     report_stage: StageProgress = lambda text, share: None,
-    first: int = 0,
+    first_block: int = 0,
     executor: Executor | None = None,
 ) -> Fit:
     """Least-squares estimates of a problem's parameters; InputError where the model fails at the start values.
 
-    stage_store : finished stages, the first of them block ``first``; report_stage : told after each stage; executor :
-    computes the columns of Jacobians.
+    stage_store : finished stages, the first of them block ``first_block``; report_stage : told after each stage;
+    executor : computes the columns of Jacobians.
     """
     values, cost, converged = problem.start, np.inf, False
     for stage in range(MOST_STAGES):
-        if stage_store is not None and stage_store.has(first + stage):
-            block = stage_store.load(first + stage)
+        if stage_store is not None and stage_store.has(first_block + stage):
+            block = stage_store.load(first_block + stage)
         else:
             block = _one_stage(problem, values, executor)
             if stage_store is not None:
-                stage_store.save(first + stage, block)
+                stage_store.save(first_block + stage, block)
         values, cost_before, cost = block["values"], cost, float(block["cost"])
         converged = cost_before - cost <= COST_DECREASE * cost
         size = np.sqrt(2.0 * cost / int((problem.weights > 0.0).sum()))

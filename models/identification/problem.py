@@ -132,14 +132,14 @@ def _nearest_sample(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Identification problem: model, parameters and measured channels. taking_part (n,) : times whose residuals count;
-    None for all."""
+    """Identification problem: model, parameters and measured channels. counted_times (n,) : whether the residuals at
+    each time count; None for all."""
 
     model: Model
     parameters: Sequence[Parameter]
     channels: Sequence[ChannelOnClock]
     clock: FitClock
-    taking_part: np.ndarray | None = None
+    counted_times: np.ndarray | None = None
 
     @property
     def start(self) -> np.ndarray:
@@ -193,8 +193,8 @@ class Problem:
     def weights(self) -> np.ndarray:
         """Weights (channels, m) of the residuals: 0 for samples that do not count, else the inverse of the channel's
         size."""
-        sample_stride, taking_part = slice(None, None, self.clock.stride), self.taking_part
-        rows = [channel.is_used & (True if taking_part is None else taking_part) for channel in self.channels]
+        sample_stride, counted_times = slice(None, None, self.clock.stride), self.counted_times
+        rows = [channel.is_used & (True if counted_times is None else counted_times) for channel in self.channels]
         return np.array([row[sample_stride] / channel.size for row, channel in zip(rows, self.channels, strict=True)])
 
     @cached_property

@@ -68,7 +68,9 @@ class Subset:
         k = self.rank + 1
         return self.chi2 / inflation + 2.0 * k + 2.0 * k * (k + 1) / max(self.count - k - 1, 1)
 
-    def spread(self, predict: Callable[[dict[str, float]], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def prediction_and_variance(
+        self, predict: Callable[[dict[str, float]], np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Predictions (m,) of the function ``predict`` at the fitted values, and their variances (m,) from the
         parameters' covariance."""
         fitted_predictions = predict(self.named)
@@ -84,7 +86,7 @@ class SubsetChoice:
     """All subsets of parameters in the order of their information criterion, their weights (probabilities), and the
     inflation factor c of chi^2.
 
-    calls : of each parameter (F, p) of leaving it out of the fullest subset that can be told apart;
+    removal_tests : (F, p) of each parameter, of leaving it out of the fullest subset that can be told apart;
     undetermined_parameters : parameters on which no measured number depends.
     """
 
@@ -92,7 +94,7 @@ class SubsetChoice:
     criteria: np.ndarray
     weights: np.ndarray
     variance_inflation: float
-    calls: dict[str, tuple[float, float]]
+    removal_tests: dict[str, tuple[float, float]]
     undetermined_parameters: tuple[str, ...]
 
     @property
@@ -109,7 +111,9 @@ class SubsetChoice:
 
         The variance is that within the subsets and that among them (Burnham and Anderson, ch. 4.3).
         """
-        means, variances = map(np.array, zip(*(fit.spread(predict) for fit in self.subset_fits), strict=True))
+        means, variances = map(
+            np.array, zip(*(fit.prediction_and_variance(predict) for fit in self.subset_fits), strict=True)
+        )
         mean = self.weights @ means
         return mean, np.sqrt(self.weights @ (self.variance_inflation * variances + (means - mean) ** 2))
 
@@ -167,23 +171,23 @@ def ranked_subsets(
     ranked_fits = sorted(determined, key=lambda fit: fit.criterion(inflation))
     criteria = np.array([fit.criterion(inflation) for fit in ranked_fits])
     weights = np.exp(-0.5 * (criteria - criteria[0]))
-    calls = _removal_tests(fits, fullest, inflation, together or {})
-    return SubsetChoice(ranked_fits, criteria, weights / weights.sum(), inflation, calls, blind)
+    removal_tests = _removal_tests(fits, fullest, inflation, together or {})
+    return SubsetChoice(ranked_fits, criteria, weights / weights.sum(), inflation, removal_tests, blind)
 
 
 def _removal_tests(
-    fits: list[Subset], fullest: Subset, inflation: float, together: Mapping[str, Sequence[str]]
+    fits: list[Subset], fullest: Subset, inflation: float, named_sets: Mapping[str, Sequence[str]]
 ) -> dict[str, tuple[float, float]]:
     """F statistic and p value of removing each parameter, and each named set of parameters, from the fullest subset."""
     by_names = {fit.names: fit for fit in fits}
     leaving: dict[str, Sequence[str]] = {name: (name,) for name in fullest.names}
-    leaving |= {set_name: names for set_name, names in together.items() if {*names} <= {*fullest.names}}
-    calls = {}
+    leaving |= {set_name: names for set_name, names in named_sets.items() if {*names} <= {*fullest.names}}
+    tests = {}
     for set_name, gone in leaving.items():
         reduced_fit = by_names[tuple(name for name in fullest.names if name not in gone)]
         ratio = max(reduced_fit.chi2 - fullest.chi2, 0.0) / inflation / len(gone)
-        calls[set_name] = (ratio, float(f_distribution.sf(ratio, len(gone), fullest.freedoms)))
-    return calls
+        tests[set_name] = (ratio, float(f_distribution.sf(ratio, len(gone), fullest.freedoms)))
+    return tests
 
 
 def _combination_text(names: tuple[str, ...], row: np.ndarray) -> str:

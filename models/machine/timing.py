@@ -36,8 +36,8 @@ def interleave(
     thread, warmed up.
 
     minimum_seconds : a job is repeated within its turn until it lasts about this long (s);
-    lasted : seconds of a run of each job that has been, 0 where there was none; every : a job is in one of so many
-    rounds, a run that has been its first; clock : that of the processor leaves out what else the machine does.
+    lasted : seconds of a run of each job that has been, 0 where there was none; round_interval : a job is in one of so
+    many rounds, a run that has been its first; clock : that of the processor leaves out what else the machine does.
     """
     known = [0.0] * len(jobs) if lasted is None else lasted
     repeats = [

@@ -79,7 +79,7 @@ class AxleForces:
         return self.forces.mean(axis=0)
 
     @property
-    def empty(self) -> np.ndarray:
+    def is_unloaded(self) -> np.ndarray:
         """Which axles (2,) have a mean force that is negligible compared with their static load and with their
         variation."""
         return (np.abs(self.means) < NEGLIGIBLE_MEAN_SHARE * self.loads) & (
@@ -168,23 +168,23 @@ def _bridged_samples(values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class SteadyResidual:
-    """Steady accelerations (2,) that the vehicle's motion cannot explain, m/s^2 upwards and rad/s^2 nose up. known (2,)
-    : their uncertainties. units (2,) : accelerations that a whole load would cause: gravity, and the pitch acceleration
-    by one axle's load."""
+    """Steady accelerations (2,) that the vehicle's motion cannot explain, m/s^2 upwards and rad/s^2 nose up, with their
+    uncertainties (2,), and the accelerations (2,) that a whole load would cause: gravity, and the pitch acceleration by
+    one axle's load."""
 
     accelerations: np.ndarray
-    known: np.ndarray
-    units: np.ndarray
+    uncertainties: np.ndarray
+    whole_load_accelerations: np.ndarray
 
     @property
     def shares_of_load(self) -> np.ndarray:
         """Ratios (2,) of the unexplained accelerations to those that a whole load would cause."""
-        return self.accelerations / self.units
+        return self.accelerations / self.whole_load_accelerations
 
     @property
     def is_beyond_uncertainty(self) -> np.ndarray:
         """Which of the two steady accelerations (2,), heave and pitch, exceeds its uncertainty."""
-        return np.abs(self.accelerations) > self.known
+        return np.abs(self.accelerations) > self.uncertainties
 
 
 def equilibrium_residual(axles: AxleForces) -> SteadyResidual:
@@ -219,9 +219,9 @@ def equilibrium_residual(axles: AxleForces) -> SteadyResidual:
     return SteadyResidual(np.array([risen[0], turned[0]]), np.array([risen[1], turned[1]]), units)
 
 
-def _slope_with_error(estimate: tuple[float, float], unit: float, gained: float, lasted: float) -> tuple[float, float]:
+def _slope_with_error(estimate: tuple[float, float], unit: float, gain: float, duration: float) -> tuple[float, float]:
     """A fitted slope, and its uncertainty from the scatter of the values about the fitted line."""
-    return estimate[0], NEGLIGIBLE_SHARE * unit + (gained + BLOCK_SCATTER_FACTOR * estimate[1]) / lasted
+    return estimate[0], NEGLIGIBLE_SHARE * unit + (gain + BLOCK_SCATTER_FACTOR * estimate[1]) / duration
 
 
 def _slope_and_scatter(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = None) -> tuple[float, float]:

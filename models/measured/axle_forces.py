@@ -81,10 +81,10 @@ def _common_mistake_findings(axles: AxleForces) -> list[Finding]:
     p = axles.parameters
     if p.g == 0:
         return []
-    if axles.empty.any():
+    if axles.is_unloaded.any():
         text = " ".join(
             missing_load_sentence(axle[0].name, mean, load)
-            for axle, mean, load, empty in zip(axles.signals, axles.means, axles.loads, axles.empty, strict=True)
+            for axle, mean, load, empty in zip(axles.signals, axles.means, axles.loads, axles.is_unloaded, strict=True)
             if empty
         )
         return [_axle_error(axles, "weight", text, 100 * (axles.means.sum() / axles.loads.sum() - 1), "%")]
@@ -144,7 +144,7 @@ def _imbalance_findings(axles: AxleForces) -> list[Finding]:
     motion = equilibrium_residual(axles)
     if not motion.is_beyond_uncertainty.any():
         return []
-    beyond = np.abs(motion.shares_of_load) > LARGE_SHARE + motion.known / motion.units
+    beyond = np.abs(motion.shares_of_load) > LARGE_SHARE + motion.uncertainties / motion.whole_load_accelerations
     weight: Weight = "error" if (beyond & _travels_too_far(axles, motion)).any() else "doubt"
     excess = np.linalg.solve(
         axles.accelerations_per_newton, np.where(motion.is_beyond_uncertainty, motion.accelerations, 0.0)
@@ -293,8 +293,8 @@ def _weight_note(axles: AxleForces) -> Finding:
     motion = equilibrium_residual(axles)
     text = (
         f"The mean wheel forces carry the vehicle to {motion.shares_of_load[0]:+.2%} of its weight; an error of "
-        f"{100 * motion.known[0] / GRAVITY:.2g} % would be seen, of one axle of "
-        f"{100 * abs(motion.known[1] / (axles.accelerations_per_newton[1] * axles.loads)).max():.2g} %."
+        f"{100 * motion.uncertainties[0] / GRAVITY:.2g} % would be seen, of one axle of "
+        f"{100 * abs(motion.uncertainties[1] / (axles.accelerations_per_newton[1] * axles.loads)).max():.2g} %."
     )
     return Finding("weight", "note", "", text, 100 * float(motion.shares_of_load[0]), "%", axles.names)
 

@@ -55,14 +55,15 @@ class Gap:
     largest_deviation: float
 
 
-def true_runs(holds: np.ndarray) -> np.ndarray:
+def true_runs(is_true: np.ndarray) -> np.ndarray:
     """First index and end index (r, 2) of each run of consecutive true values in an array (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], holds.astype(np.int8), [0]))))
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], is_true.astype(np.int8), [0]))))
     return edges.reshape(-1, 2)
 
 
-def filled_samples(values: np.ndarray, period: float, longest: float) -> tuple[np.ndarray, list[Gap]]:
-    """Values (n,), sampled every ``period`` (s), with gaps of up to ``longest`` (s) filled, and the list of all gaps.
+def filled_samples(values: np.ndarray, period: float, longest_gap: float) -> tuple[np.ndarray, list[Gap]]:
+    """Values (n,), sampled every ``period`` (s), with gaps of up to ``longest_gap`` (s) filled, and the list of all
+    gaps.
 
     Wheels hop at 10 to 15 Hz: of a gap of 0.02 s a third to a tenth of the motion is doubtful, of one of 0.05 s most.
     """
@@ -71,12 +72,12 @@ def filled_samples(values: np.ndarray, period: float, longest: float) -> tuple[n
         return values, []
     out, mean, span = values.copy(), float(np.nanmean(values)), max(round(NEIGHBOUR_SPAN / period), 4)
     stride = max(2 * span // MOST_NEIGHBOURS, 1)
-    law = autocovariance(values - mean, 2 * span + round(longest / period) + 2)
+    law = autocovariance(values - mean, 2 * span + round(longest_gap / period) + 2)
     gaps = []
     for first, end in lost:
         doubt = np.nan
         known = _neighbour_samples(values, first, end, span, stride)
-        if len(known) and (end - first) * period <= longest * (1 + 1e-9):
+        if len(known) and (end - first) * period <= longest_gap * (1 + 1e-9):
             guess, doubt = _conditional_mean(law, known, np.arange(first, end), values[known] - mean)
             out[first:end] = mean + guess
         gaps.append(Gap(first, end, doubt))

@@ -99,17 +99,17 @@ def _correlations(run: np.ndarray, measured: np.ndarray, is_measured: np.ndarray
     """Correlation (n + m - 1,) of run and measurement at every lag from 1 - n on; -1 where they overlap too little."""
     from scipy.signal import correlate
 
-    def over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    def lagged_sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return correlate(a, b, mode="full", method="fft")
 
     x, mask = (run - run.mean()) / run.std(), is_measured.astype(float)
     y = np.where(is_measured, measured - measured[is_measured].mean(), 0.0) / measured[is_measured].std()
-    ones, count = np.ones(len(x)), over(mask, np.ones(len(x)))
-    sums, means = over(mask, x), over(y, ones)
+    ones, count = np.ones(len(x)), lagged_sums(mask, np.ones(len(x)))
+    sums, means = lagged_sums(mask, x), lagged_sums(y, ones)
     safe = np.maximum(count, 1.0)
-    spread = (over(mask, x**2) - sums**2 / safe) * (over(y**2, ones) - means**2 / safe)
+    spread = (lagged_sums(mask, x**2) - sums**2 / safe) * (lagged_sums(y**2, ones) - means**2 / safe)
     enough = (count >= LEAST_OVERLAP * min(len(x), mask.sum())) & (spread > (1e-6 * safe) ** 2)
-    likeness = (over(y, x) - sums * means / safe) / np.sqrt(np.where(enough, spread, 1.0))
+    likeness = (lagged_sums(y, x) - sums * means / safe) / np.sqrt(np.where(enough, spread, 1.0))
     return np.where(enough, likeness, -1.0)
 
 
@@ -121,14 +121,17 @@ def _refined_shift(pairs: Sequence[ChannelPair], coarse: float, step: float) -> 
 
     curves = [(pair, CubicSpline(pair.run_times, pair.run)) for pair in pairs]
 
-    def apart(seconds: float) -> float:
+    def negative_correlation(seconds: float) -> float:
         return -float(np.mean([_correlation_at_shift(pair, curve, seconds) for pair, curve in curves]))
 
     best = minimize_scalar(
-        apart, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": SHIFT_RESOLUTION * step}
+        negative_correlation,
+        bounds=(coarse - step, coarse + step),
+        method="bounded",
+        options={"xatol": SHIFT_RESOLUTION * step},
     )
-    seconds = float(best.x) if best.fun <= apart(coarse) else coarse
-    return TimeShift(seconds, -apart(seconds))
+    seconds = float(best.x) if best.fun <= negative_correlation(coarse) else coarse
+    return TimeShift(seconds, -negative_correlation(seconds))
 
 
 def _correlation_at_shift(

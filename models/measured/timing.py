@@ -92,7 +92,7 @@ def _timing_of_valid_times(times: np.ndarray, place: str, signal_names: tuple[st
     """``Timing`` of values (n,) that can be times (s)."""
     findings, sample_count = list[Finding](), len(times)
 
-    def say(check: str, weight: Weight, text: str, size: float, unit: str, times: Iterable[float]) -> None:
+    def report(check: str, weight: Weight, text: str, size: float, unit: str, times: Iterable[float]) -> None:
         findings.append(
             Finding(check, weight, place, f"{place}: {text}.", size, unit, signal_names, tuple(map(float, times)))
         )
@@ -106,7 +106,7 @@ def _timing_of_valid_times(times: np.ndarray, place: str, signal_names: tuple[st
     if even is not None:
         repeated_count = sample_count - 1 - len(rising)
         repeated_text = f", so that {repeated_count} of {sample_count} repeat themselves" if repeated_count else ""
-        say(
+        report(
             "time",
             "note",
             f"the times are rounded{repeated_text}: "
@@ -121,7 +121,7 @@ def _timing_of_valid_times(times: np.ndarray, place: str, signal_names: tuple[st
         deepest, at = -float(steps.min()), int(np.argmax(steps < -SHUFFLED_PERIODS * period))
         if deepest > SHUFFLED_PERIODS * period:
             keep = keep[: at + 1]
-            say(
+            report(
                 "time",
                 "error",
                 f"the clock goes back by {deepest:.6g} s at {times[at]:.6g} s: there are two "
@@ -131,7 +131,7 @@ def _timing_of_valid_times(times: np.ndarray, place: str, signal_names: tuple[st
                 (times[at + 1], times[at]),
             )
         else:
-            say(
+            report(
                 "time",
                 "doubt",
                 f"{np.count_nonzero(steps < 0)} times are earlier than the one before them, by up to "
@@ -147,7 +147,7 @@ def _timing_of_valid_times(times: np.ndarray, place: str, signal_names: tuple[st
         first, count = float(times[keep][1:][repeated][0]), int(np.count_nonzero(repeated))
         text = f"{count} of {len(keep)} times are there more than once, the first at {first:.6g} s; "
         if count > REPEATED_TIME_SHARE * len(keep):
-            say(
+            report(
                 "time",
                 "error",
                 f"{text}no even clock explains them, and without these samples the forces are others: "
@@ -157,26 +157,26 @@ def _timing_of_valid_times(times: np.ndarray, place: str, signal_names: tuple[st
                 (first, first),
             )
         else:
-            say("time", "doubt", f"{text}of each the first sample is taken", float(count), "samples", (first, first))
+            report("time", "doubt", f"{text}of each the first sample is taken", float(count), "samples", (first, first))
         keep = keep[np.concatenate(([True], ~repeated))]
         order = keep
     kept_times = times[keep]
-    _report_gaps(kept_times, period, say)
-    _report_jitter(kept_times, period, say)
+    _report_gaps(kept_times, period, report)
+    _report_jitter(kept_times, period, report)
     return Timing(kept_times, order, period, tuple(findings))
 
 
-def _median_step(times: np.ndarray, rising: np.ndarray) -> float:
+def _median_step(times: np.ndarray, rising_steps: np.ndarray) -> float:
     """Median of the rising steps (s) of times (n,).
 
     Large times, such as seconds since 1970, are rounded in double precision. Then many steps share the same rounding
     error, and the mean step is taken instead: their sum divided by the number of whole steps in it.
     """
-    middle = float(np.median(rising))
+    middle = float(np.median(rising_steps))
     if np.spacing(np.abs(times).max()) < ROUNDING_SHARE * middle:
         return middle
-    counted = np.rint(rising / middle)
-    return float(rising.sum() / counted.sum()) if counted.sum() else middle
+    counted = np.rint(rising_steps / middle)
+    return float(rising_steps.sum() / counted.sum()) if counted.sum() else middle
 
 
 def even_clock(times: np.ndarray) -> tuple[float, float] | None:

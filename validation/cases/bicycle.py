@@ -242,7 +242,7 @@ def _choice_rows(choice: SubsetChoice) -> list[Row]:
             f"bicycle.suspects.{key}",
             SYSTEM,
             f"chance of leaving {suspect} out; best subset: {parameters_text}",
-            choice.calls[name][1],
+            choice.removal_tests[name][1],
             "",
         ).at_most(0.05, "F test against the fullest subset that can be told apart", "measured")
         for key, suspect, name in (
@@ -250,7 +250,7 @@ def _choice_rows(choice: SubsetChoice) -> list[Row]:
             ("speed_gain", "the speed sensor's gain", "speed_gain"),
             ("speed_bias", "the speed sensor's bias", "speed_bias"),
         )
-        if name in choice.calls
+        if name in choice.removal_tests
     ]
 
 

@@ -70,7 +70,7 @@ def _limit_stop(build: exudyn_engine.PitchPlaneBuild, spring: PitchSpring) -> No
     state = build.mbs.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
     build.mbs.AddObject(
         items.CoordinateSpringDamperExt(
-            markerNumbers=[exudyn_engine.ground_marker(build.mbs), build.places[spring.body, "pitch"]],
+            markerNumbers=[exudyn_engine.ground_marker(build.mbs), build.coordinate_markers[spring.body, "pitch"]],
             nodeNumber=state,
             useLimitStops=True,
             limitStopsUpper=spring.dead_band,

@@ -374,7 +374,7 @@ def find_units(
 ) -> tuple[tuple[str, ...], list[Finding]]:
     """Units of the columns from a row below the headings, empty texts if there is no such row, and findings."""
     stamped = any(map(is_stamp, first_cells(first_lines, header)[clock][:1]))
-    rows = [(line, [_bare_unit(cell) for cell in header.cells(line)]) for line in header.between]
+    rows = [(line, [_bare_unit(cell) for cell in header.cells(line)]) for line in header.rows_between]
     known = {*TIME_UNITS, "", "-"} if clock_heading(header.names[clock])[1] else set(TIME_UNITS)
     unit_row = next((row for row in rows if row[1][clock].casefold() in known or stamped), None)
     if unit_row is None:

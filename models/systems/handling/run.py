@@ -28,7 +28,7 @@ from models.engines.assembly import Settings
 from models.engines.error_control import NO_ESTIMATE
 from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
 from models.engines.native_parts import joint_parts
-from models.engines.towed_springs import divided, shared_numbers
+from models.engines.towed_springs import shared_numbers, towed_division
 from models.multibody import forces as at
 from models.multibody.numbers import Control, Handling
 from models.systems.handling.assumptions import assumptions
@@ -314,7 +314,7 @@ def build(engine: str, handling: Handling, settings: Settings | None = None) -> 
     """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : needed for runs."""
     if engine == REFERENCE:
         return Plain(engine, _plain_equations(handling).acceleration, len(handling.vehicle.coordinates()), settings)
-    division, full_forces = divided(handling, engine), driven_by(handling)
+    division, full_forces = towed_division(handling, engine), driven_by(handling)
     parts = (*full_forces.parts, *division.native)
     return free_model(engine, replace(full_forces, numbers=shared_numbers(handling, division), parts=parts), settings)
 

@@ -11,7 +11,7 @@ from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.signals import Interpolation
-from models.core.steps import divides, fitting
+from models.core.steps import divides, dividing_step
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
 from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, wrong_time_unit_hint
@@ -217,7 +217,7 @@ def _check_file_only(file: str, scene: HubScene) -> None:
 def _check_steps(file: str, scene: HubScene) -> None:
     step, duration = scene.run.step, scene.run.duration
     if not divides(step, duration):
-        allowed = f"must divide run.duration = {duration:g} s, as {fitting(step, duration)} s does"
+        allowed = f"must divide run.duration = {duration:g} s, as {dividing_step(step, duration)} s does"
         raise InputError(file, "run.step", step, allowed)
     period = 1.0 / scene.forces.sampling_rate
     if scene.road is not None and not (divides(step, period) and divides(period, duration)):

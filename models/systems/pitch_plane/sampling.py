@@ -12,7 +12,7 @@ from models.core.assumptions import Assumption
 from models.core.errors import InputError
 from models.core.noise import normal_samples
 from models.core.result import Result
-from models.core.steps import divides, fitting
+from models.core.steps import divides, dividing_step
 from models.core.time_series import write_time_series
 from models.engines.catalogue import CATALOGUE
 from models.systems.pitch_plane.assumptions import watch_function
@@ -34,7 +34,7 @@ def check_rate(scene: Scene, key_path: str, rate: float) -> None:
         if not divides(step, 1 / rate):
             allowed = (
                 f"its period {1 / rate:g} s must be a multiple of {engine}'s step {step:g} s; use a step of "
-                f"{fitting(step, 1 / rate)} s or another rate"
+                f"{dividing_step(step, 1 / rate)} s or another rate"
             )
             raise InputError(scene.file, key_path, rate, allowed)
 

@@ -11,7 +11,7 @@ from pydantic import Field
 from models.core.errors import InputError
 from models.core.scene_effects import check_combination, module_of, read_tables
 from models.core.scene_file import SceneFile, checked, existing_file, parse
-from models.core.steps import MOST_STEPS, divides, fitting
+from models.core.steps import MOST_STEPS, divides, dividing_step
 from models.core.strict import Query, Strict, accepted_queries_field, quantity, read
 from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly, Settings
@@ -184,7 +184,7 @@ def _check_step(scene: Scene, key_path: str, step: float) -> None:
         allowed = f"needs {length / step:.3g} steps of {key_path} = {step:g} s; at most {MOST_STEPS:,} are possible"
         raise InputError(scene.file, "run.duration", length, allowed)
     if not divides(step, length):
-        allowed = f"must divide run.duration = {length:g} s; use for example {fitting(step, length)}"
+        allowed = f"must divide run.duration = {length:g} s; use for example {dividing_step(step, length)}"
         raise InputError(scene.file, key_path, step, allowed)
     if wanted is not None and not divides(step, wanted):
         allowed = f"must be a multiple of {key_path} = {step:g} s"

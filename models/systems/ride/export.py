@@ -44,7 +44,7 @@ def _in_exudyn(vehicle: SpatialVehicle, export_subject: ExportSubject, by_speed:
     built = assemble(vehicle, None, RoadRows(np.zeros((1, 2 * len(vehicle.tyres))), 0.0))
     mbs = built.mbs
     mbs.Assemble()
-    node_indices = [built.places[coordinate] for coordinate in vehicle.coordinates()]
+    node_indices = [built.coordinate_nodes[coordinate] for coordinate in vehicle.coordinates()]
     columns = [mbs.GetNodeODE2Index(node) + index for node, index in node_indices]
     names = dict(zip(coordinate_names(vehicle), columns, strict=True))
     return exported_exudyn_system(mbs, names, export_subject, [*items_with_functions(mbs), *by_speed])

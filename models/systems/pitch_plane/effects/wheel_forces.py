@@ -112,8 +112,8 @@ def _balance_assumptions(axles: "AxleForces", parameters: Parameters) -> tuple[A
             f'if it is meant so: effects.wheel_forces.accept = ["{name}"]',
             partial(_steady_accelerations, float(means.accelerations[i])),
             unit,
-            -float(means.known[i]),
-            float(means.known[i]),
+            -float(means.uncertainties[i]),
+            float(means.uncertainties[i]),
         )
         for i, (name, says, unit, symbols) in enumerate(balance_rows)
         if name not in parameters.accept and axles.parameters.g > 0
