@@ -49,8 +49,9 @@ class TableHead:
     """Headings of a CSV table, and the lines around them up to the numbers.
 
     header : the line of headings. separator : between its cells. names : its cells, those that are empty at its end
-    left out. width : cells of the rows of numbers. titles : lines above the headings. between : rows between headings
-    and numbers. begin, line : byte where the rows of numbers begin, and number of the line before them.
+    left out. width : cells of the rows of numbers. titles : lines above the headings. rows_between : rows between
+    headings and numbers. numbers_begin, line_before_numbers : byte where the rows of numbers begin, and number of the
+    line before them.
     """
 
     header: FileLine

@@ -34,8 +34,8 @@ SLIDER_AXES = {
 class TreeBuild:
     """Exudyn's system of a spatial vehicle while it is being built.
 
-    links: (object, last link or None, where its joint is) of every body; coordinate_nodes: (node, index within it) of every
-    coordinate; markers by body and point; frames: axes (3, 3) of the last link of every body as columns.
+    links: (object, last link or None, where its joint is) of every body; coordinate_nodes: (node, index within it) of
+    every coordinate; markers by body and point; frames: axes (3, 3) of the last link of every body as columns.
     """
 
     vehicle: SpatialVehicle

@@ -199,7 +199,9 @@ def find_headings_and_clock(path: Path, first_lines: FirstLines) -> tuple[TableH
         )
     remarks = Remarks()
     above = [
-        line for line in (*first_lines.comment_lines, *head.titles) if line.number <= head.line and line != head.header
+        line
+        for line in (*first_lines.comment_lines, *head.titles)
+        if line.number <= head.line_before_numbers and line != head.header
     ]
     for line in sorted(above):
         if line in first_lines.comment_lines:
@@ -209,7 +211,7 @@ def find_headings_and_clock(path: Path, first_lines: FirstLines) -> tuple[TableH
     foreign = {
         passage.number: passage.text.strip()[:60]
         for passage in first_lines.undecodable_lines
-        if passage.number <= head.line
+        if passage.number <= head.line_before_numbers
     }
     odd = "is not UTF-8 and is read as Windows-1252"
     said = [flaw_finding(path, "doubt", f"line {number} {odd}: {text!r}") for number, text in foreign.items()]
@@ -293,7 +295,7 @@ def is_other_clock(text: str) -> bool:
 
 def first_cells(first_lines: FirstLines, header: TableHead) -> list[list[str]]:
     """Cells of each column in the first rows of numbers; rows of another width are skipped here and reported later."""
-    lines = [line for line in first_lines.lines if line.number > header.line]
+    lines = [line for line in first_lines.lines if line.number > header.line_before_numbers]
     rows = [cells for line in lines if len(cells := split_cells(line.text, header.separator)) == header.width]
     return [[row[i] for row in rows] for i in range(len(header.names))]
 
@@ -305,17 +307,17 @@ def find_layout(
     interpretations are possible."""
     columns = first_cells(first_lines, header)
     first = next(iter(columns[clock]), "")
-    stamps = find_stamps(path, first, header.line + 1, header.names[clock]) if is_stamp(first) else None
+    stamps = find_stamps(path, first, header.line_before_numbers + 1, header.names[clock]) if is_stamp(first) else None
     nameless = tuple(i for i, name in enumerate(header.names) if not name_and_unit(name)[0])
     texts = tuple(i for i, cells in enumerate(columns) if i not in (clock, *nameless) and _is_text(cells))
     taken = tuple(sorted({*texts, *nameless, *((clock,) if stamps else ())}))
     numbers = {cell: None for i, cells in enumerate(columns) if i not in taken for cell in cells}
-    decimal = decimal_sign(path, header.line + 1, header.separator, list(numbers))
+    decimal = decimal_sign(path, header.line_before_numbers + 1, header.separator, list(numbers))
     layout = Layout(
         header.separator,
         decimal,
-        header.begin,
-        header.line,
+        header.numbers_begin,
+        header.line_before_numbers,
         header.names,
         header.width,
         taken,
