@@ -16,7 +16,7 @@ from models.core.result import Channel, result
 from models.core.strict import Strict, quantity, read
 from models.core.whole_files import write_whole
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.workers import Crew, places_of
+from models.ensemble.workers import Crew, folders_for_workers
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
@@ -80,7 +80,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     scale, steps = scene.tyres.scale.get(options.surface, 1.0), []
     progress("loading", 0.0)
     drive(scene, procedure=options.procedure)  # compiles what is not compiled yet, once and not in every worker
-    with Crew.of(scene).at_work(options.runs, *places_of(scene)) as pool:
+    with Crew.of(scene).at_work(options.runs, *folders_for_workers(scene)) as pool:
         for i in range(options.rounds):
             progress(f"fit, round {i + 1}", i / (options.rounds + 2))
             means = _means_of_stops(fitted_scene(scene, options, scale, steer), options, options.runs, pool)

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from models.core.assumptions import Watched, with_assumptions
-from models.core.discretisation import by_chance, with_sampling_error
+from models.core.discretisation import sampling_error, with_sampling_error
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.steps import divides
@@ -166,7 +166,7 @@ def _with_errors(
     error = json.loads(first.data.attrs["error"])
     result.data.attrs["error"] = json.dumps(error | ({"how": f"{error['how']}, of the first path"} if error else {}))
     worst = {
-        name: by_chance(row[f"{name} error"], row[name], unit, options.paths)
+        name: sampling_error(row[f"{name} error"], row[name], unit, options.paths)
         for name, unit in (("pitch", "rad"), ("heave", "m"))
         for row in [max(rows, key=lambda row: row[f"{name} error"] / (row[name] or 1.0))]
     }

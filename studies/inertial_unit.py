@@ -14,7 +14,7 @@ from pydantic import Field
 from scipy.interpolate import CubicSpline
 
 from models.core.assumptions import Assumption, with_assumptions
-from models.core.discretisation import by_chance, with_sampling_error
+from models.core.discretisation import sampling_error, with_sampling_error
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result
 from models.core.result import result as labelled
@@ -23,7 +23,7 @@ from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.drift.angle_damage import UnitPaths, damage_errors, log_damage_over_pitch_error, unit_paths
 from models.drift.score import SECTION_FORCE_CHANNELS
-from models.ensemble.statistics import ERRORS_95, quantile_with_interval
+from models.ensemble.statistics import STANDARD_ERRORS_95, quantile_with_interval
 from models.fatigue.damage import WOEHLER_SLOPE
 from models.sensors.inertial_unit import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR, angle_variance
 from models.systems.pitch_plane.assumptions import watch_function
@@ -156,7 +156,9 @@ def _errors_of_grades(scene: Scene, paths: UnitPaths, options: Options, curve: C
         ],
     )
     chances = {
-        f"damage error at {grade:g} deg/h": by_chance((high - low) / (2 * ERRORS_95), middle, "", options.samples)
+        f"damage error at {grade:g} deg/h": sampling_error(
+            (high - low) / (2 * STANDARD_ERRORS_95), middle, "", options.samples
+        )
         for grade, (middle, low, high) in zip(options.grades, bounds_of_grades, strict=True)
     }
     return with_sampling_error(units, chances, options.samples)

@@ -23,8 +23,7 @@ WARNED_SHARE, REFUSED_SHARE, GOAL_SHARE = 0.02, 0.5, 0.005
 """Relative errors of a channel: above the first a warning is printed, above the second the run fails, and the third is
 the aim of the advised step."""
 REPEATED_SHARE, FINE_WINDOW = 0.4, 0.3
-"""Shares of a run that are repeated: in four times the step, to observe the order of convergence, and in half the
-step."""
+"""Shares of a run repeated in four times the step, to observe the order of convergence, and in half the step."""
 MOST_FULLY_REPEATED_ROWS = 200
 """Number of rows up to which a run is repeated as a whole in half its step: that costs little, and a part of few rows
 may leave out what makes the error, such as a turn of the steering at the start."""
@@ -65,8 +64,7 @@ class Estimate:
         return not self.share <= WARNED_SHARE
 
     def advice(self, step_unit: str) -> str:
-        """Advice on the step or number of cells that reduces the estimated error; ``step_unit`` is the unit of
-        steps."""
+        """Advice on the step (``step_unit`` : its unit) or number of cells that reduces the estimated error."""
         if self.of:
             return f"use at least {self.step:g} {self.of}"
         return f"use at most {self.step:g} {step_unit}".rstrip() if self.step else "no shorter step mends it"
@@ -78,7 +76,7 @@ class Estimate:
         return not self.share <= REFUSED_SHARE and self.step != 0.0
 
 
-def size_of(values: np.ndarray) -> float:
+def reference_size(values: np.ndarray) -> float:
     """Reference size of a channel for its relative error: its standard deviation along the first axis, or its magnitude
     if it is constant."""
     largest = float(np.abs(values).max(initial=0.0))
@@ -122,7 +120,7 @@ def estimate(
         )
     largest = float(np.abs(fine_values).max(initial=0.0))
     error = max(gap / (2.0**order - 1.0), ONE_ROUNDING * largest * math.sqrt(len(fine_values)))
-    return estimate_rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine_values), step)
+    return estimate_rescaled(Estimate(error, unit, 0.0, order, step), reference_size(fine_values), step)
 
 
 def root_mean_square(values: np.ndarray) -> float:
@@ -156,7 +154,7 @@ Rerun = Callable[[float, float], Series]
 are longer or the share is 1. Raises InputError or RunFailed where that is impossible."""
 
 
-def estimated(
+def with_estimated_errors(
     run: Result,
     fine_run: Series,
     rerun: Rerun,
@@ -172,7 +170,7 @@ def estimated(
     channel_sizes : what shares are of, by channel, where that is not its own deviation. Raises RunFailed, whose
     ``partial`` is the result, where a channel is no answer.
     """
-    estimates, method_text = by_steps(fine_run, rerun, order, step, growth, channel_sizes)
+    estimates, method_text = step_errors(fine_run, rerun, order, step, growth, channel_sizes)
     known = {name: run.data[name].attrs.get("units", "") for name in fine_run.channels if name in run.data}
     known |= fine_run.units
     return with_stated_errors(
@@ -180,7 +178,7 @@ def estimated(
     )
 
 
-def by_steps(
+def step_errors(
     fine_run: Series,
     rerun: Rerun,
     order: float,
@@ -192,7 +190,7 @@ def by_steps(
     method of estimation.
 
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
-    be, half of it over a part tells. growth, channel_sizes : as in ``estimated``.
+    be, half of it over a part tells. growth, channel_sizes : as in ``with_estimated_errors``.
     """
     try:
         estimates, method_text = _by_longer_steps(fine_run, rerun, order, step), "runs in longer steps"
@@ -244,7 +242,7 @@ def _by_half_steps(
             growth.get(name, 1.0),
         )
         estimates[name] = estimate_rescaled(
-            replace(error, error=error.error * 2.0**error.order * later), size_of(values), step
+            replace(error, error=error.error * 2.0**error.order * later), reference_size(values), step
         )
     return estimates
 
@@ -293,7 +291,7 @@ def with_tolerance_error(
 ) -> Result:
     """The result of an adaptive method with estimated errors of its channels, from a run with ``factor`` times the
     tolerance. The error is assumed to grow with the power TOLERANCE_POWER of the tolerance only, and is overestimated.
-    ``channel_sizes`` as in ``estimated``.
+    ``channel_sizes`` as in ``with_estimated_errors``.
 
     Rows may lie where steps end: the finer run is read at the looser one's times by a cubic spline.
     """
@@ -305,10 +303,12 @@ def with_tolerance_error(
         values_at_looser = values if same_times else CubicSpline(fine_run.times, values)(looser_run.times)
         error = max(
             root_mean_square(values_at_looser - looser_run.channels[name]) / (factor**TOLERANCE_POWER - 1.0),
-            LEAST_TOLERANCE_SHARE * tolerance * size_of(values),
+            LEAST_TOLERANCE_SHARE * tolerance * reference_size(values),
         )
         estimate = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / TOLERANCE_POWER, tolerance)
-        estimates[name] = estimate_rescaled(estimate, (channel_sizes or {}).get(name, size_of(values)), tolerance)
+        estimates[name] = estimate_rescaled(
+            estimate, (channel_sizes or {}).get(name, reference_size(values)), tolerance
+        )
     return with_stated_errors(run, estimates, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
@@ -392,7 +392,7 @@ def with_sampling_error(run: Result, estimates: Mapping[str, Estimate], samples:
     return run
 
 
-def by_chance(error: float, channel_size: float, unit: str, samples: int) -> Estimate:
+def sampling_error(error: float, channel_size: float, unit: str, samples: int) -> Estimate:
     """The standard error of an ensemble mean as an ``Estimate``; its ``step`` is the number of samples that would
     reduce the share to WARNED_SHARE."""
     share = error / channel_size if channel_size > 0.0 else (0.0 if error == 0.0 else math.inf)
@@ -400,7 +400,7 @@ def by_chance(error: float, channel_size: float, unit: str, samples: int) -> Est
     return Estimate(error, unit, share, 0.5, float(f"{needed:.2g}") if math.isfinite(needed) else math.inf)
 
 
-def worst_of(run: Result) -> Estimate | None:
+def largest_estimate(run: Result) -> Estimate | None:
     """The error estimate with the largest share in a result; None if there are no estimates."""
     return max(errors_of(run).values(), key=lambda estimate: estimate.share, default=None)
 

@@ -79,7 +79,7 @@ class Sampled:
 
     @property
     def resolution(self) -> float:
-        """The sampling period (s)."""
+        """Longest step (s) of an adaptive solver on this signal: the sampling period."""
         return self.period
 
     def polynomials(self) -> np.ndarray:
@@ -168,7 +168,7 @@ class Smooth:
 
     @property
     def resolution(self) -> float:
-        """The sampling period (s)."""
+        """Longest step (s) of an adaptive solver on this signal: the sampling period."""
         return self.period
 
     def polynomials(self) -> np.ndarray:

@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from models.core.assumptions import BrokenAssumption, assumption_sentences, broken_of
-from models.core.discretisation import WARNED_SHARE, error_lines, errors_of, with_stated_errors, worst_of
+from models.core.discretisation import WARNED_SHARE, error_lines, errors_of, largest_estimate, with_stated_errors
 from models.core.result import Result
 
 LISTED_RESULTS = 4
@@ -27,7 +27,7 @@ def _error_lines(results: Results) -> list[str]:
     if len(results) <= LISTED_RESULTS:
         return [f"  {name}: {line}" for name, run in results.items() for line in error_lines(run)]
     results_without_estimate: dict[str, list[str]] = {}
-    worst = {name: estimate for name, run in results.items() if (estimate := worst_of(run)) is not None}
+    worst = {name: estimate for name, run in results.items() if (estimate := largest_estimate(run)) is not None}
     for name, run in results.items():
         for line in error_lines(run) if name not in worst else ():
             results_without_estimate.setdefault(line, []).append(name)
@@ -70,7 +70,7 @@ def figure_remarks(results: Results) -> list[str]:
     steps = [
         f"{name}: {error_lines(run)[0]}"
         for name, run in results.items()
-        if (worst := worst_of(run)) is not None and worst.warned
+        if (worst := largest_estimate(run)) is not None and worst.warned
     ]
     return [*steps[:LISTED_RESULTS], *(breach.brief() for _, breach in worst_breaches(results))]
 
@@ -114,7 +114,7 @@ def derived_result(derived: Result, results: Results, method: str) -> Result:
     return with_stated_errors(derived, worst, method) if worst else derived
 
 
-def as_json(results: Results) -> dict[str, Any]:
+def errors_and_assumptions(results: Results) -> dict[str, Any]:
     """Items "errors" and "assumptions" of a summary, from the statements of each result; NaN becomes None."""
     return {
         "errors": {name: _json_attribute(run, "error") for name, run in results.items()},
@@ -127,7 +127,7 @@ def as_json(results: Results) -> dict[str, Any]:
 def summary_with_errors(summary: dict[str, Any]) -> dict[str, Any]:
     """The summary of a study, with the errors and broken assumptions of its "results" added as text at the end."""
     results = summary.pop("results", {})
-    return summary | as_json(results) | {"table": [*summary.get("table", []), *message_lines(results)]}
+    return summary | errors_and_assumptions(results) | {"table": [*summary.get("table", []), *message_lines(results)]}
 
 
 def _json_attribute(run: Result, key: str) -> dict[str, Any]:

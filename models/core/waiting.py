@@ -8,7 +8,7 @@ PROGRESS_FUNCTIONS: list[Callable[[], float]] = []
 
 
 @contextmanager
-def marching(share: Callable[[], float]) -> Iterator[None]:
+def simulation_progress(share: Callable[[], float]) -> Iterator[None]:
     """Context of a running simulation; ``share`` is a function that returns the completed share, 0 to 1. Another thread
     may call it at any time."""
     PROGRESS_FUNCTIONS.append(share)

@@ -176,7 +176,7 @@ def holding_stiffness(parameters: Parameters, rate: float) -> float:
     return rigid_pitch(parameters).total_inertia * rate**2
 
 
-def spring_of(parameters: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
+def pitch_spring(parameters: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
     """Stiffness k = (I + J) wc^2 (N m/rad) and damping d = 2 zeta (I + J) wc (N m s/rad) of a pitch spring to the
     ground with a natural ``frequency`` (Hz)."""
     corner, inertia = 2 * math.pi * frequency, rigid_pitch(parameters).total_inertia

@@ -86,7 +86,7 @@ class RunFigures:
 
 
 @dataclass(frozen=True)
-class Errors:
+class RunErrors:
     """Errors of a stabilised run relative to the true run.
 
     Attributes
@@ -146,7 +146,7 @@ def figures_of_run(run: Result, parameters: Parameters) -> RunFigures:
     )
 
 
-def errors_of_run(run: Result, true_run: Result, slope: float = WOEHLER_SLOPE) -> Errors:
+def errors_of_run(run: Result, true_run: Result, slope: float = WOEHLER_SLOPE) -> RunErrors:
     """Errors of a run relative to the true run, with rows at the same times; ``slope`` is the Woehler exponent.
 
     Raises InputError if the rows lie at different times, or if a load of the truth never turns.
@@ -155,7 +155,7 @@ def errors_of_run(run: Result, true_run: Result, slope: float = WOEHLER_SLOPE) -
         raise InputError("", "times", None, "the run and the true one need rows at the same times")
     loads, true = (section_forces(forces["f3"], forces["f4"], forces["pitch"]) for forces in (run, true_run))
     pitch = run["pitch"] - true_run["pitch"]
-    return Errors(
+    return RunErrors(
         damage={name: damage_ratio(loads[name], true[name], slope) for name in SECTION_FORCE_CHANNELS},
         force_rms={name: root_mean_square(loads[name] - true[name]) for name in SECTION_FORCE_CHANNELS},
         vertical_damage={name: damage_ratio(run[name], true_run[name], slope) for name in ("f3", "f4")},
@@ -165,7 +165,7 @@ def errors_of_run(run: Result, true_run: Result, slope: float = WOEHLER_SLOPE) -
     )
 
 
-def verdict_on_run(figures: RunFigures, errors: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
+def verdict_on_run(figures: RunFigures, errors: RunErrors, effects: Iterable[str], limits: Limits) -> Verdict:
     """Verdict on a virtual measurement with a true run, by damage, pitch error and artificial moment.
 
     ``accepted``: all within the limits. ``stabilise``: a run without any stabiliser (none of MEASURED_PITCH_EFFECTS or
@@ -249,7 +249,7 @@ def _free_run_verdict(duration: float, trusted: float | None) -> Verdict:
     return Verdict("stabilise", f"free, and trusted for {trusted:.3g} s of {duration:.3g} s")
 
 
-def _exceeded_limits(errors: Errors, limits: Limits) -> list[str]:
+def _exceeded_limits(errors: RunErrors, limits: Limits) -> list[str]:
     """Phrases on the errors relative to the true run that exceed their limits."""
     damage = [
         f"damage of {name} x {ratio:.3g}"

@@ -51,7 +51,7 @@ BLINK = 1e-5
 """Duration (s) of the short step from which the accelerations of a freely rolling vehicle are computed."""
 
 
-def driven(vehicle: Sprung, engine: str) -> Driven:
+def driven_vehicle(vehicle: Sprung, engine: str) -> Driven:
     """The free vehicle for "exudyn" or "mujoco": springs that the engine itself computes, and the table of all other
     forces."""
     handling = vehicle.handling
@@ -69,7 +69,7 @@ class EngineSprungVehicle:
     def __init__(self, engine: str, vehicle: Sprung) -> None:
         self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size
         self.wheels = len(vehicle.handling.vehicle.tyres)
-        self._driven = driven(vehicle, engine)
+        self._driven = driven_vehicle(vehicle, engine)
         self._units = Units(vehicle.turns, vehicle.leans, np.zeros((2, PLANE + vehicle.turns.size)))
         self._allowed = set[float]()
 

@@ -217,7 +217,7 @@ def slopes(numbers, q, v, by_q, by_v, sensitivity):
                 sensitivity[row, row - row % FREEDOMS + i] += by * (high[row] - low[row]) / (2.0 * step)
 
 
-def linear(wheels: Wheels) -> LinearMatrices:
+def linearised_wheels(wheels: Wheels) -> LinearMatrices:
     """Matrices of the wheels linearised about rest, by the linear theory, whose forces rise most steeply with creepage;
     see ``stability``."""
     n, zeros = wheels.size, np.zeros(wheels.size)
@@ -237,7 +237,7 @@ def check_step(engine: str, wheels: Wheels, method: str, step: float, steps: int
     MuJoCo's ``discrete`` is implicit in its own springs and dampers, not in forces of a callback: it goes by the limit
     of ``Euler``.
     """
-    about, like = linear(replace(wheels, count=1)), "Euler" if method == "discrete" else method
+    about, like = linearised_wheels(replace(wheels, count=1)), "Euler" if method == "discrete" else method
     if log_growth(like, step, steps * step, about) > np.log(ALLOWED_GROWTH):
         longest = longest_stable_step(like, step, LONG_RUN * step, about)
         raise Refused(

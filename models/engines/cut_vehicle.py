@@ -39,12 +39,12 @@ if TYPE_CHECKING:
 ENGINES = ("reference", "exudyn", "mujoco")
 FIXED_STEP_METHOD = "RK4"
 """The classical Runge-Kutta method, which every engine has; all other integrators choose their own steps."""
-PLAIN = "plain"
+PLAIN_ENGINE = "plain"
 """Name of the independent reference, which runs only if it is named."""
-Route = Literal["native", "compiled"]
+ForceRoute = Literal["native", "compiled"]
 """Where springs, mounts and bars are computed: in the engine's own elements as far as it has them, or all in the
 compiled forces."""
-UPRIGHT = 1.4
+TUMBLED_PITCH = 1.4
 """Pitch (rad) beyond which a vehicle has tumbled; at pi / 2 its heading and roll become one angle."""
 
 
@@ -96,7 +96,12 @@ class HubModel:
     """
 
     def __init__(
-        self, engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, settings: Settings, forces: Route = "compiled"
+        self,
+        engine: str,
+        vehicle: CutVehicle,
+        hub_inputs: HubInputs,
+        settings: Settings,
+        forces: ForceRoute = "compiled",
     ) -> None:
         """Build the model. Raises Refused where the step does not divide the duration, or where the inputs do not have
         one row per half step.
@@ -113,9 +118,9 @@ class HubModel:
         _check_settings(engine, vehicle, settings)
         self.numbers = table(vehicle, hub_inputs, step)
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
-        self.plain = _plain_hubs(vehicle, hub_inputs, step, self.adaptive) if engine == PLAIN else None
+        self.plain = _plain_hubs(vehicle, hub_inputs, step, self.adaptive) if engine == PLAIN_ENGINE else None
         division, numbers = Division((), vehicle.elements), self.numbers
-        if forces == "native" and engine not in (PLAIN, "reference"):
+        if forces == "native" and engine not in (PLAIN_ENGINE, "reference"):
             if hub_inputs.guide is not None and hub_inputs.pull is None:
                 raise Refused(engine, 'an enforced tilt needs every force in one place: use forces = "compiled"')
             division = divide(vehicle.tree, vehicle.elements, engine)
@@ -191,10 +196,10 @@ class HubModel:
         path = self.marched(rest if q is None else q, rest if v is None else v)
         times, states = path.times, path.states
         guard(self.engine, times, states, self.steps * self.step)
-        tumbled = np.abs(states[:, PITCH]) > UPRIGHT
+        tumbled = np.abs(states[:, PITCH]) > TUMBLED_PITCH
         if tumbled.any():
             at = int(np.argmax(tumbled))
-            raise RunFailed(self.engine, f"the vehicle pitches by more than {UPRIGHT} rad", times[at], states[at])
+            raise RunFailed(self.engine, f"the vehicle pitches by more than {TUMBLED_PITCH} rad", times[at], states[at])
         return replace(self.reported(times, states), counts=path.counts)
 
     def reported(self, times: np.ndarray, states: np.ndarray) -> HubRun:
@@ -202,7 +207,7 @@ class HubModel:
         if self.plain:
             inside, wrenches, moments = self.plain.report(times, states)
             return HubRun(times, states, elements=inside, wrenches=wrenches, moments=moments)
-        return reported(self.vehicle, self.numbers, times, states)
+        return run_with_forces(self.vehicle, self.numbers, times, states)
 
     def forces_at_rest(self, q: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) on all joints (N, N m) by the compiled forces at time 0, at coordinates (n,) with
@@ -212,7 +217,7 @@ class HubModel:
         return block[: self.size].copy()
 
 
-def reported(vehicle: CutVehicle, numbers: np.ndarray, times: np.ndarray, states: np.ndarray) -> HubRun:
+def run_with_forces(vehicle: CutVehicle, numbers: np.ndarray, times: np.ndarray, states: np.ndarray) -> HubRun:
     """The run with given times (m,) in s and states (m, 2 n), with the compiled forces that act in these states;
     ``numbers`` is the vehicle's table."""
     rows = len(times)
@@ -223,7 +228,12 @@ def reported(vehicle: CutVehicle, numbers: np.ndarray, times: np.ndarray, states
 
 
 def build(
-    engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, step: float, duration: float, forces: Route = "compiled"
+    engine: str,
+    vehicle: CutVehicle,
+    hub_inputs: HubInputs,
+    step: float,
+    duration: float,
+    forces: ForceRoute = "compiled",
 ) -> HubModel:
     """A cut vehicle as ``HubModel`` in "reference", "plain", "exudyn" or "mujoco", for steps (s) of Runge-Kutta 4 over
     a duration (s); raises Refused."""
@@ -278,7 +288,7 @@ def _check_inputs(engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, rows:
 
 def _check_settings(engine: str, vehicle: CutVehicle, settings: Settings) -> None:
     """Raise Refused if fixed steps are too long, or if the engine does not have the integrator."""
-    adaptive = ADAPTIVE.get("reference" if engine == PLAIN else engine, ())
+    adaptive = ADAPTIVE.get("reference" if engine == PLAIN_ENGINE else engine, ())
     if settings.integrator == FIXED_STEP_METHOD:
         check_step(engine, vehicle, settings.step, settings.duration)
     elif settings.integrator not in adaptive:

@@ -96,11 +96,11 @@ def export_free_vehicle(
     spec = specification_of(driven)
     add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))
     return exported_mujoco_model(
-        spec, compiled_from(spec, driven), names_of(vehicle), export_subject, [*omissions, *lowered]
+        spec, compiled_from(spec, driven), exported_names(vehicle), export_subject, [*omissions, *lowered]
     )
 
 
-def names_of(vehicle: SpatialVehicle) -> dict[str, str]:
+def exported_names(vehicle: SpatialVehicle) -> dict[str, str]:
     """Names of bodies and joints in the exported file, by their names in a specification of ``mujoco_tree``."""
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     bodies = {number: name if name != "world" else "world of the vehicle" for name, number in numbers.items()}

@@ -9,7 +9,7 @@ import exudyn as exu
 import exudyn.itemInterface as typed_items
 import numpy as np
 
-from models.core.waiting import marching
+from models.core.waiting import simulation_progress
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
 
@@ -141,7 +141,7 @@ def solve(mbs: Any, settings: Settings, options: Any = None) -> str:
     ti = options.timeIntegration
     ti.numberOfSteps, ti.endTime, ti.verboseMode = settings.steps, settings.duration, 0
     ti.adaptiveStep = ti.explicit.computeEndOfStepAccelerations = False
-    with marching(lambda: mbs.systemData.GetTime() / settings.duration):
+    with simulation_progress(lambda: mbs.systemData.GetTime() / settings.duration):
         return solver_failure(mbs, settings.integrator, options)
 
 

@@ -143,7 +143,7 @@ class FreeMujoco(FreeModel):
             yield
 
     def compiled(self) -> Native:
-        """MuJoCo's functions and arrays for compiled code."""
+        """Handle with which compiled code calls MuJoCo: its functions and arrays."""
         return native(self.model, self.data)
 
     def plan(self) -> dict[str, int]:

@@ -7,7 +7,7 @@ import numpy as np
 from mujoco import rollout
 
 from models.core.errors import RunFailed
-from models.core.waiting import marching
+from models.core.waiting import simulation_progress
 from models.engines.mujoco_quiet import without_warnings
 from models.engines.protocol import guard
 
@@ -37,7 +37,7 @@ def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, control
     path[0, 0], path[0, 1:] = 0.0, start
     for warning in data.warning:
         warning.number = 0
-    with without_warnings(), marching(lambda: data.time / times[-1]):
+    with without_warnings(), simulation_progress(lambda: data.time / times[-1]):
         for first, last in _chunks(steps):
             rows, held = path[first + 1 : last + 1], controls[None, first:last] if controls.size else None
             rollout.rollout(model, data, path[None, first], held, nstep=len(rows), state=rows[None])
@@ -64,7 +64,7 @@ class Marcher:
     def run(self, states: np.ndarray, steps: int) -> np.ndarray:
         """States (n, steps, 2 m) of n runs that start at ``states`` (n, 2 m); RunFailed unless all are finite."""
         whole = np.concatenate((np.zeros((len(states), 1)), states), axis=1)
-        with marching(lambda: self._data[0].time / (steps * self.model.opt.timestep)):
+        with simulation_progress(lambda: self._data[0].time / (steps * self.model.opt.timestep)):
             path = rollout.rollout(self.model, self._data, whole, nstep=steps)[0][..., : 1 + 2 * self.model.nv]
         late = path[:, -1, 0] < (steps - 0.5) * self.model.opt.timestep
         failed = late | ~np.isfinite(path[:, -1]).all(axis=1)  # MuJoCo starts again at time zero where it gives up

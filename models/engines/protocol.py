@@ -29,7 +29,7 @@ SIZE_BOUND = 1e4
 
 def build(engine: str, assembly: Assembly, settings: Settings) -> Model:
     """Model of an assembly in an engine by name; raises Refused where the engine would compute wrong results."""
-    check(engine, assembly, settings)
+    check_assembly(engine, assembly, settings)
     return build_unchecked(engine, assembly, settings)
 
 
@@ -40,7 +40,7 @@ def build_unchecked(engine: str, assembly: Assembly, settings: Settings) -> Mode
     return import_module(f"models.engines.{engine}").build(assembly, settings)
 
 
-def check(engine: str, assembly: Assembly, settings: Settings) -> None:
+def check_assembly(engine: str, assembly: Assembly, settings: Settings) -> None:
     """Raise Refused for combinations of input, integrator and step with which the engine would compute wrong
     results."""
     integrator = CATALOGUE[engine][settings.integrator]

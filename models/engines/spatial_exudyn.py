@@ -123,7 +123,8 @@ class SpatialExudyn:
         return np.column_stack(columns)
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
-        """Trajectory over the duration from positions and rates (n,), or from rest; RunFailed as in the protocol."""
+        """Trajectory over the duration from positions and rates (n,), or from rest; raises RunFailed unless it is
+        finite and sane."""
         settings, rest = settings_of("exudyn", self.settings), np.zeros(self.size)
         set_start(
             self.mbs,

@@ -132,7 +132,8 @@ class SpatialMujoco:
         return shift[:, self.numbers.columns], turn[:, self.numbers.columns]
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
-        """Trajectory over the duration from positions and rates (n,), or from rest; RunFailed as in the protocol."""
+        """Trajectory over the duration from positions and rates (n,), or from rest; raises RunFailed unless it is
+        finite and sane."""
         settings, rest = settings_of("mujoco", self.settings), np.zeros(self.model.nv)
         both, start = np.concatenate((self.numbers.columns, rest.size + self.numbers.columns)), np.empty(2 * rest.size)
         start[both] = np.concatenate((rest if q is None else q, rest if v is None else v))

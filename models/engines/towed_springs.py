@@ -14,7 +14,8 @@ from models.vehicles.cut_vehicle import Element, elements_of
 from models.vehicles.spatial import AntiRollBar, SpringDamper
 
 FORCE_COLUMNS = [parts.STIFFNESS, parts.DAMPING, parts.HELD, parts.FRICTION, parts.ON_TRAVEL, parts.ON_RATE]
-"""Columns of a part's row in the table that are all 0 where the compiled forces have no term of it."""
+"""Columns of a spring's or bar's row in the table for the compiled forces (stiffness, damping, preload, friction,
+curves); all are 0 if the engine itself computes the part."""
 
 
 def towed_division(handling: Handling, engine: str) -> Division:

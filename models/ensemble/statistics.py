@@ -8,7 +8,7 @@ from models.core.errors import InputError
 
 FEWEST_PATHS = 3
 """Least number of values from which a standard deviation and its error are computed."""
-ERRORS_95 = 1.959964
+STANDARD_ERRORS_95 = 1.959964
 """Number of standard errors on either side of a 95 % interval."""
 FAN_PERCENTILES = (5, 25, 50, 75, 95)
 """Percentiles of errors that figures show."""
@@ -63,7 +63,7 @@ def quantile_ranks(value_count: int, probability: float) -> tuple[int, int, int]
     probability that is not between 0 and 1."""
     if not 0.0 < probability < 1.0:
         raise InputError("", "level", probability, "must be between 0 and 1")
-    half = ERRORS_95 * math.sqrt(value_count * probability * (1 - probability))
+    half = STANDARD_ERRORS_95 * math.sqrt(value_count * probability * (1 - probability))
     rank_bounds = (
         value_count * probability,
         math.floor(value_count * probability - half),

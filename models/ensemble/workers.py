@@ -147,7 +147,7 @@ class Crew:
 
     @classmethod
     def of(cls, scene: Any, default_workers: int = DEFAULT_WORKERS) -> "Crew":
-        """The workers that a scene requests, as ``given``."""
+        """The workers that a scene requests: its keys ``workers`` and ``cluster``, or the default."""
         return cls.given(scene.workers, scene.cluster, default_workers)
 
     @contextmanager
@@ -167,7 +167,7 @@ class Crew:
             yield None
 
 
-def places_of(scene: Any) -> tuple[Path, ...]:
+def folders_for_workers(scene: Any) -> tuple[Path, ...]:
     """The folder of a scene whose files the workers read; empty if the scene names no file."""
     folder = Path(scene.folder)
     return (folder,) if named_files(scene.table(), folder) else ()

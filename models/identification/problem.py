@@ -148,7 +148,7 @@ class Problem:
 
     @property
     def scale(self) -> np.ndarray:
-        """Scales (p,) of the parameters."""
+        """Scales (p,) of the parameters: significant changes, in which steps are measured."""
         return np.array([parameter.scale for parameter in self.parameters])
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import Refused, RunFailed
-from models.engines.contact_bridge import Wheels, linear
+from models.engines.contact_bridge import Wheels, linearised_wheels
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.stability import LONG_RUN, longest_stable_step
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
@@ -62,7 +62,7 @@ def march(speed: float, method: str, steps: int, with_slopes: bool = True) -> tu
 
 def longest_step(speed: float) -> float:
     """Longest stable step (s) of RK44."""
-    return longest_stable_step("RK44", 1e-3, LONG_RUN * 1e-3, linear(wheel(speed)[0]))
+    return longest_stable_step("RK44", 1e-3, LONG_RUN * 1e-3, linearised_wheels(wheel(speed)[0]))
 
 
 def runs(speed: float, steps: tuple[float, ...]) -> list[SlowWheelsRun]:

@@ -8,7 +8,15 @@ import numpy as np
 
 from models.core.result import Result
 from models.drift.growth import drift_off_time
-from models.drift.score import Errors, Limits, RunFigures, blind_verdict, errors_of_run, figures_of_run, verdict_on_run
+from models.drift.score import (
+    Limits,
+    RunErrors,
+    RunFigures,
+    blind_verdict,
+    errors_of_run,
+    figures_of_run,
+    verdict_on_run,
+)
 from models.engines.assembly import Settings
 from models.fatigue.damage import damage_ratio, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
@@ -43,7 +51,7 @@ def follow(folder: Path, truth: Result, effects: dict[str, Any] | None = None, t
     return scene.model_copy(update={"start": {"pitch_rate": tilt}} if tilt else {})
 
 
-def figures_and_errors(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, Errors]:
+def figures_and_errors(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, RunErrors]:
     """Figures of a run that need no true run, and its errors relative to the true run."""
     return figures_of_run(run, scene.vehicle_parameters()), errors_of_run(run, truth)
 

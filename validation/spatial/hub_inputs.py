@@ -8,7 +8,7 @@ rounding, or for their tolerance.
 import numpy as np
 
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import ENGINES, FIXED_STEP_METHOD, PLAIN, HubModel
+from models.engines.cut_vehicle import ENGINES, FIXED_STEP_METHOD, PLAIN_ENGINE, HubModel
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.multibody.plain.motion import PLACE, Bodies
@@ -119,7 +119,9 @@ def instants_gap(vehicle: CutVehicle, state_count: int) -> float:
         hubs = static_forces(vehicle, rows).hubs + rng.normal(0.0, 500.0, (rows, WRENCH * len(vehicle.hubs)))
         hub_inputs = HubInputs(hubs, FRAMES[i % 3], guide=rng.normal(0.0, 0.1, (rows, 6)))
         run_settings = Settings("DOP853", STEP, (rows // 2) * STEP)
-        compiled, plain = (HubModel(engine, vehicle, hub_inputs, run_settings) for engine in ("reference", PLAIN))
+        compiled, plain = (
+            HubModel(engine, vehicle, hub_inputs, run_settings) for engine in ("reference", PLAIN_ENGINE)
+        )
         state, time = random_states(vehicle, i), rng.uniform(0.0, run_settings.duration)
         expected = plain.acceleration(time, *state)
         gap = np.abs(compiled.acceleration(time, *state) - expected).max() / np.abs(expected).max()

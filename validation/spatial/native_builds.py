@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.engines.cut_vehicle import HubModel, Route, build
+from models.engines.cut_vehicle import ForceRoute, HubModel, build
 from models.engines.spatial_reference import SpatialReference
 from models.multibody.cut_table import HubInputs
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
@@ -35,7 +35,7 @@ def shaken_drive(vehicle: CutVehicle, rows: int) -> HubInputs:
     )
 
 
-def hub_model(engine: str, vehicle: CutVehicle, route: Route, steps: int = 1) -> HubModel:
+def hub_model(engine: str, vehicle: CutVehicle, route: ForceRoute, steps: int = 1) -> HubModel:
     """The vehicle with random hub forces in an engine, built natively or with compiled forces (``route``)."""
     return build(engine, vehicle, shaken_drive(vehicle, 2 * steps + 1), STEP, steps * STEP, route)
 

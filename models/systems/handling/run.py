@@ -13,10 +13,10 @@ from models.core.assumptions import with_assumptions
 from models.core.discretisation import (
     Estimate,
     Series,
-    by_steps,
     grid_error,
     not_estimated,
-    size_of,
+    reference_size,
+    step_errors,
     summed_error,
     with_stated_errors,
 )
@@ -196,7 +196,7 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
         for name, values in fine.channels.items()
         if np.abs(values).max() > still.get(UNIT_OF_CHANNEL[name], STANDSTILL_SHARE * speed)
     }
-    by_step, method_text = by_steps(Series(fine.times, moving), rerun, TOLD_ORDERS, rerun.step)
+    by_step, method_text = step_errors(Series(fine.times, moving), rerun, TOLD_ORDERS, rerun.step)
     by_net = rerun.by_cells(list(moving))
     estimates = {
         name: replace(summed_error(by_step[name], by_net[name]), unit=UNIT_OF_CHANNEL[name]) for name in moving
@@ -268,7 +268,7 @@ class ManoeuvreRerun:
         for name in names:
             values = base.channels[name]
             gap = share * float(np.sqrt(np.mean((values - coarse.channels[name]) ** 2)))
-            net = grid_error(gap, size_of(values), UNIT_OF_CHANNEL[name], cells, NET_ORDER, MOST_CELLS)
+            net = grid_error(gap, reference_size(values), UNIT_OF_CHANNEL[name], cells, NET_ORDER, MOST_CELLS)
             estimates[name] = replace(net, of=CELLS_KEY)
         return estimates
 

@@ -16,7 +16,7 @@ from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
 from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, wrong_time_unit_hint
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import FIXED_STEP_METHOD, Route
+from models.engines.cut_vehicle import FIXED_STEP_METHOD, ForceRoute
 from models.engines.error_control import Adaptive, check_engines
 from models.own_model.scene_vehicle import scene_vehicle
 from models.systems.hub_forces.measurement import Angles, HubForces
@@ -59,7 +59,7 @@ class Run(Strict):
     step: float = quantity(
         "s", "of Runge-Kutta 4 in every engine, or from row to row and the longest of [engines.NAME]", default=1e-3
     )
-    forces: Route = Field(
+    forces: ForceRoute = Field(
         default="native", description="springs, mounts and bars of the engine's own, or all in its one callback"
     )
 
@@ -139,7 +139,7 @@ class HubScene(SceneFile):
             return Settings(FIXED_STEP_METHOD, step, duration)
         return Settings(adaptive.integrator, step, duration, adaptive.tolerance)
 
-    def forces_with(self, method: Method) -> Route:
+    def forces_with(self, method: Method) -> ForceRoute:
         """Route by which a run computes spring forces. Enforced roll and pitch need compiled forces, whatever the scene
         says.
         """

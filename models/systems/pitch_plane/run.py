@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import FINE_WINDOW, Series, estimated, size_of, with_tolerance_error
+from models.core.discretisation import FINE_WINDOW, Series, reference_size, with_estimated_errors, with_tolerance_error
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
@@ -100,7 +100,7 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
     def longer(step_factor: float, share: float) -> Series:
         return rerun(_settings_of_longer_step(settings, step_factor, share))
 
-    return estimated(
+    return with_estimated_errors(
         run, fine, longer, method.order, settings.step, growth=_pitch_error_growth(assembly), channel_sizes=sizes
     )
 
@@ -125,9 +125,9 @@ def _enforced_sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
     """
     sizes = {}
     if "enforced_moment" in channels:
-        sizes["enforced_moment"] = size_of(channels["inertia_term"][2])
+        sizes["enforced_moment"] = reference_size(channels["inertia_term"][2])
     if "enforced_force" in channels:
-        sizes["enforced_force"] = size_of(channels["f3"][2] + channels["f4"][2])
+        sizes["enforced_force"] = reference_size(channels["f3"][2] + channels["f4"][2])
     return sizes
 
 

@@ -11,8 +11,8 @@ from models.engines.export import (
     elements_left_out,
     exported_exudyn_system,
     exported_mujoco_model,
+    exported_names,
     masses_of_shown_bodies,
-    names_of,
 )
 from models.engines.spatial_protocol import check_buildable
 from models.systems.ride.of_scene import vehicle_of
@@ -61,4 +61,4 @@ def _in_mujoco(vehicle: SpatialVehicle, export_subject: ExportSubject, by_speed:
     add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))
     model = spec.compile()
     set_masses(model, MujocoIndices(vehicle, model), vehicle.bodies)
-    return exported_mujoco_model(spec, model, names_of(vehicle), export_subject, [*left_out, *lowered])
+    return exported_mujoco_model(spec, model, exported_names(vehicle), export_subject, [*left_out, *lowered])

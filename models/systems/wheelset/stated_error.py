@@ -16,11 +16,11 @@ from models.core.discretisation import (
     FINE_WINDOW,
     Estimate,
     Series,
-    estimated,
     grid_error,
     nearest_rows,
     not_estimated,
-    size_of,
+    reference_size,
+    with_estimated_errors,
     with_stated_errors,
 )
 from models.core.errors import InputError, RunFailed
@@ -53,7 +53,7 @@ def with_error(run: Result, scene: WheelsetScene, march_scene: March) -> Result:
     fine, step = principal_series(run.detail), scene.run.step
     sizes = _sizes(fine, float(np.abs(run.detail.contacts["load"]).max()))
     if scene.contact.law == "linear":
-        return estimated(
+        return with_estimated_errors(
             run,
             fine,
             lambda step_factor, share: principal_series(march_scene(with_step_factor(scene, step_factor, share))),
@@ -85,7 +85,7 @@ def principal_series(path: WheelsetPath) -> Series:
 def _sizes(fine_series: Series, load: float) -> dict[str, float]:
     """Sizes of the channels by which errors are divided; ``load`` : the largest of a patch (N)."""
     return {
-        name: max(size_of(values), STILL * (load if UNIT_OF_CHANNEL[name] == "N" else 1.0))
+        name: max(reference_size(values), STILL * (load if UNIT_OF_CHANNEL[name] == "N" else 1.0))
         for name, values in fine_series.channels.items()
     }
 
@@ -165,7 +165,7 @@ def with_error_of_cycles(
         dict[str, Estimate](),
     )
     for name, unit in units.items():
-        size = size_of(np.array([getattr(orbit, name) for orbit in orbits]))
+        size = reference_size(np.array([getattr(orbit, name) for orbit in orbits]))
         changes = [orbit.frequency_error if name == "frequency" else orbit.error for orbit in orbits]
         error = float(np.sqrt(np.mean(np.square(changes)))) / (2.0**KINKED_ORDER - 1.0)
         steps = [orbit.period / orbit.steps for orbit in orbits]

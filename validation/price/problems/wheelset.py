@@ -19,7 +19,7 @@ from models.advice.price.problem import Setting
 from models.contact.inputs import Array
 from models.core.errors import Refused, RunFailed
 from models.engines.catalogue import MISSING
-from models.engines.contact_bridge import FREEDOMS, Wheels, add_forces, check_step, forces, linear
+from models.engines.contact_bridge import FREEDOMS, Wheels, add_forces, check_step, forces, linearised_wheels
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import model
 from models.engines.exudyn_system import solver_counts
@@ -157,7 +157,9 @@ class RollingWheels:
         curves = []
         for engine, method in ((engine, method) for engine, methods in EXPLICIT.items() for method in methods):
             like = "Euler" if method == "discrete" else method
-            fewest = math.ceil(1.02 * DURATION / longest_stable_step(like, 10 * MS, LONG_RUN * MS, linear(self.wheels)))
+            fewest = math.ceil(
+                1.02 * DURATION / longest_stable_step(like, 10 * MS, LONG_RUN * MS, linearised_wheels(self.wheels))
+            )
             curves.append(
                 ((engine, method), tuple(DURATION / round(step_ratio * fewest) for step_ratio in STEP_RATIOS))
             )
