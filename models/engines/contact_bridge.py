@@ -195,7 +195,8 @@ def set_forces(block, t, size):
 
 @njit(cache=True, error_model="numpy")
 def slopes(numbers, q, v, by_q, by_v, sensitivity):
-    """Fill ``sensitivity`` (size, size) with by_q dF/dq + by_v dF/dv by central differences, for implicit integrators.
+    """Fill ``sensitivity`` (size, size) with derivatives of the forces F on all wheels, by_q dF/dq + by_v dF/dv, by
+    central differences, for implicit integrators.
 
     No wheel feels another, so that one coordinate of all wheels is moved at a time: 16 evaluations, however many
     wheels there are.

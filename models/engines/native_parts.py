@@ -213,8 +213,8 @@ def divide(tree: SpatialVehicle, elements: Iterable[Element], engine: str) -> Di
 
 
 def _divided_element(element: Element, engine: str) -> tuple[Element | None, Element | None, list[str]]:
-    """An element with the law's terms that the engine computes, the same with the terms left to a callback, and the
-    reasons. The preload belongs to the first if it has terms of a spring."""
+    """An element with the law's terms that the engine computes, the element with the terms left to a callback, and the
+    reasons. A preload goes with the terms that carry it."""
     curved, rough = bool(element.travel_force or element.rate_force), element.friction != 0.0
     left, why = replace(element, stiffness=0.0, damping=0.0, held=0.0), list[str]()
     if curved and engine not in ENGINES_WITH_CURVES:
