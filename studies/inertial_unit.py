@@ -21,7 +21,7 @@ from models.core.result import result as labelled
 from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
-from models.drift.angle_damage import UnitPaths, damage_errors, log_damage_over_pitch_error, unit_paths
+from models.drift.angle_damage import UnitErrorPaths, damage_errors, log_damage_over_pitch_error, unit_angle_error_paths
 from models.drift.score import SECTION_FORCE_CHANNELS
 from models.ensemble.statistics import STANDARD_ERRORS_95, quantile_with_interval
 from models.fatigue.damage import WOEHLER_SLOPE
@@ -83,7 +83,9 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     options = check(scene, engines)
     progress("angle errors", 0.0)
     length = round(60 * options.durations[-1])
-    paths = unit_paths(options.samples, options.sampling_rate, length, options.correlation_time, options.seed)
+    paths = unit_angle_error_paths(
+        options.samples, options.sampling_rate, length, options.correlation_time, options.seed
+    )
     largest = max(float(np.abs(angle_errors(paths, options, i)).max()) for i in range(len(options.grades)))
     reach = min(largest, np.pi / 2)  # beyond a quarter turn no pitch is left to speak of
     curves: dict[str, CubicSpline] = {}
@@ -122,13 +124,13 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     }
 
 
-def angle_errors(paths: UnitPaths, options: Options, grade: int) -> np.ndarray:
+def angle_errors(paths: UnitErrorPaths, options: Options, grade: int) -> np.ndarray:
     """Angle errors (samples, seconds + 1) in rad of the grade with this number."""
     walk, drift = options.random_walks[grade] * DEGREES_PER_ROOT_HOUR, options.grades[grade] * DEGREES_PER_HOUR
     return walk * paths[0] + drift * paths[1]
 
 
-def _errors_of_grades(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline) -> Result:
+def _errors_of_grades(scene: Scene, paths: UnitErrorPaths, options: Options, curve: CubicSpline) -> Result:
     """For each grade, the largest angle error (rad) over the longest drive. Also the damage error that the share
     KEEPING_SHARE of its units does not exceed, with its standard error."""
     angles = [angle_errors(paths, options, grade) for grade in range(len(options.grades))]

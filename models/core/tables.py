@@ -64,16 +64,16 @@ differ from the one before."""
 ROWS_PER_BLOCK = 20_000
 """Rows per block in which a long table is read."""
 
-Columns = Mapping[str, Mapping[str, float]]
+ColumnUnits = Mapping[str, Mapping[str, float]]
 """Accepted units of each column, with their factors to SI."""
-Lines = list[tuple[int, str]]
+NumberedLines = list[tuple[int, str]]
 """Line numbers and texts of the lines of a file."""
 
 _HEADING_PATTERN = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 
 
 def read_table(
-    path: str | Path, columns: Columns, *, increasing: str | None = None, least_rows: int = 1, gaps: bool = False
+    path: str | Path, columns: ColumnUnits, *, increasing: str | None = None, least_rows: int = 1, gaps: bool = False
 ) -> dict[str, np.ndarray]:
     """Read a CSV table whose header names the unit of every column.
 
@@ -129,7 +129,7 @@ def whole_text(path: str | Path) -> str:
         raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
 
 
-def _is_plain(text: str, columns: Columns) -> bool:
+def _is_plain(text: str, columns: ColumnUnits) -> bool:
     """Whether the first line of a text has known headings with units, separated by commas, and no cell is quoted."""
     first = next(
         (line for line in text[:HEADING_CHARACTERS].split("\n") if line.strip() and not line.startswith("#")), ""
@@ -140,7 +140,7 @@ def _is_plain(text: str, columns: Columns) -> bool:
 
 
 @lru_cache(CACHED_TEXTS)
-def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Lines]:
+def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], NumberedLines]:
     """Header line and rows of numbers, each with its line number, without comments and empty lines."""
     lines = [(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1)]
     used = [(i, line) for i, line in lines if line and not line.startswith("#")]
@@ -186,7 +186,9 @@ def _last_line_is_cut_off(lines: list[str]) -> bool:
     return not has_all_digits or leaping
 
 
-def columns_and_factors(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:
+def columns_and_factors(
+    path: str | Path, header: tuple[int, str], columns: ColumnUnits
+) -> tuple[list[str], list[float]]:
     """Column names and factors to SI, in the order of the file."""
     line_text = f"line {header[0]} (header)"
     names, factors = zip(
@@ -203,7 +205,7 @@ def columns_and_factors(path: str | Path, header: tuple[int, str], columns: Colu
     return list(names), list(factors)
 
 
-def _column_and_factor(path: str | Path, line_text: str, cell: str, columns: Columns) -> tuple[str, float]:
+def _column_and_factor(path: str | Path, line_text: str, cell: str, columns: ColumnUnits) -> tuple[str, float]:
     """Name and factor to SI of one column heading, such as ``left [mm]``."""
     match = _HEADING_PATTERN.fullmatch(cell.strip().strip('"'))
     name, unit = match.groups() if match else (cell.strip(), None)
@@ -218,7 +220,7 @@ def _column_and_factor(path: str | Path, line_text: str, cell: str, columns: Col
     return name, columns[name][unit]
 
 
-def _header_wanted(columns: Columns) -> str:
+def _header_wanted(columns: ColumnUnits) -> str:
     """Header line that the file should have, with the first accepted unit of each column."""
     return ", ".join(f"{name} [{next(iter(units))}]" for name, units in columns.items())
 
@@ -263,7 +265,7 @@ def finite_number(path: str | Path, line_number: int, heading: str, cell: str) -
     return value
 
 
-def _check_increasing(path: str | Path, rows: Lines, name: str, values: np.ndarray) -> None:
+def _check_increasing(path: str | Path, rows: NumberedLines, name: str, values: np.ndarray) -> None:
     """Raise InputError at the first row whose value is not greater than the one before."""
     wrong = np.flatnonzero(np.diff(values) <= 0.0)
     if wrong.size:
@@ -287,7 +289,7 @@ class RowBlock:
     faulty_rows: dict[int, str]
 
 
-def table_blocks(path: Path, columns: tuple[Columns, ...], rows: int = ROWS_PER_BLOCK) -> Iterator[RowBlock]:
+def table_blocks(path: Path, columns: tuple[ColumnUnits, ...], rows: int = ROWS_PER_BLOCK) -> Iterator[RowBlock]:
     """Blocks of at most ``rows`` rows of a CSV table.
 
     columns : the accepted sets of columns, of which the header must name one in full, each with its accepted units
@@ -312,7 +314,7 @@ def _opened_text(path: Path) -> TextIO:
         raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
 
 
-def _nearest_columns(header: str, columns: tuple[Columns, ...]) -> Columns:
+def _nearest_columns(header: str, columns: tuple[ColumnUnits, ...]) -> ColumnUnits:
     """The set of columns that has most names in common with a header line."""
     in_header = {cell.partition("[")[0].strip().strip('"') for cell in header.split(",")}
     return max(columns, key=lambda wanted: len(in_header & set(wanted)))

@@ -20,12 +20,14 @@ ANGLE_NODES = 41
 EVEN_SPACING_ANGLE = 1e-3
 """Angle error (rad) below which the nodes are evenly spaced; above it their spacing grows with the angle."""
 
-UnitPaths = tuple[np.ndarray, np.ndarray]
+UnitErrorPaths = tuple[np.ndarray, np.ndarray]
 """Angle error paths (samples, seconds + 1) with a value per second: of a random walk of 1 rad per sqrt(s), and of a
 gyro bias of 1 rad/s."""
 
 
-def unit_paths(path_count: int, rate: int, length: int, correlation_time: float, seed: int) -> UnitPaths:
+def unit_angle_error_paths(
+    path_count: int, rate: int, length: int, correlation_time: float, seed: int
+) -> UnitErrorPaths:
     """Random angle error paths of a gyro of unit grade, two arrays (samples, length + 1) with a value per second: by
     white noise and by bias. They sum ``rate`` noise samples per second over ``length`` (s); the bias has a correlation
     time (s).

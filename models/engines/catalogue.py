@@ -53,17 +53,19 @@ CATALOGUE: dict[str, dict[str, Integrator]] = {
 }
 """Constrained MuJoCo and reference runs use the reduced model, in which the pitch is an input."""
 
-MISSING = {("exudyn", "DVERK6"): "DVERK6 is named but not implemented in Exudyn; use DOPRI5 or RK67"}
+UNAVAILABLE_INTEGRATORS = {("exudyn", "DVERK6"): "DVERK6 is named but not implemented in Exudyn; use DOPRI5 or RK67"}
 """Integrators that an engine names but does not have, with the message to a user who chooses one."""
 
 ADAPTIVE = {
-    engine: tuple(name for name, known in methods.items() if known.adaptive and (engine, name) not in MISSING)
+    engine: tuple(
+        name for name, known in methods.items() if known.adaptive and (engine, name) not in UNAVAILABLE_INTEGRATORS
+    )
     for engine, methods in CATALOGUE.items()
     if any(known.adaptive for known in methods.values())
 }
 """Integrators that choose their own steps, by engine."""
 
-OUTSIDE: dict[str, type] = {}
+OUTSIDE_CLASSES: dict[str, type] = {}
 """Registered engine and integrator classes from files outside the tree, by their names ``module:Class`` (see
 outside.py)."""
 

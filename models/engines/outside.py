@@ -32,7 +32,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.trajectory import Trajectory
 from models.engines import protocol
 from models.engines.assembly import Assembly, Settings
-from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED, Integrator
+from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES, RECOMMENDED, Integrator
 from models.engines.model import Model
 from models.engines.protocol import guard
 from models.engines.reference import Reference, derivative_of
@@ -68,7 +68,7 @@ def register(name: str) -> None:
         )
     constrained = bool(getattr(outside_class, "constraints", False))
     CATALOGUE[name] = {name: Integrator(order, "any", constraints=integrates or constrained)}
-    RECOMMENDED[name], OUTSIDE[name] = name, outside_class
+    RECOMMENDED[name], OUTSIDE_CLASSES[name] = name, outside_class
 
 
 def _unusable_engine(name: str, why: str) -> InputError:
@@ -103,7 +103,7 @@ def _error_text(error: BaseException) -> str:
 
 def build(name: str, assembly: Assembly, settings: Settings) -> Model:
     """Model of an assembly by an outside class: as an engine, or as an integrator of the reference's equations."""
-    outside_class = OUTSIDE[name]
+    outside_class = OUTSIDE_CLASSES[name]
     if callable(getattr(outside_class, "integrate", None)):
         return OutsideIntegrator(assembly, settings, name, _call_engine(name, "building it", outside_class).integrate)
     return OutsideEngine(name, _call_engine(name, "building it", outside_class, assembly, settings), assembly, settings)
@@ -262,7 +262,7 @@ def _reference_run(assembly: Assembly, settings: Settings) -> Trajectory:
 def _expected_error(engine: str, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
     """Relative error that the stated order and step of an outside engine make likely; its tolerance if it is
     adaptive."""
-    if getattr(OUTSIDE[engine], "adaptive", False):
+    if getattr(OUTSIDE_CLASSES[engine], "adaptive", False):
         return settings.tolerance
     try:
         gap, _ = relative_gap(_reference_run(assembly, replace(settings, integrator="RK4")), truth)

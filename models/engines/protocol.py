@@ -13,7 +13,7 @@ from models.core.resolved import check_resolved
 from models.core.signals import Signal
 from models.core.steps import divides, dividing_step
 from models.engines.assembly import Assembly, Settings
-from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE, Integrator
+from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES, UNAVAILABLE_INTEGRATORS, Integrator
 from models.engines.model import Model
 from models.engines.stability import check_step
 
@@ -35,7 +35,7 @@ def build(engine: str, assembly: Assembly, settings: Settings) -> Model:
 
 def build_unchecked(engine: str, assembly: Assembly, settings: Settings) -> Model:
     """Model of an assembly in an engine, without a check that the engine computes right results."""
-    if engine in OUTSIDE:
+    if engine in OUTSIDE_CLASSES:
         return import_module("models.engines.outside").build(engine, assembly, settings)
     return import_module(f"models.engines.{engine}").build(assembly, settings)
 
@@ -44,8 +44,8 @@ def check_assembly(engine: str, assembly: Assembly, settings: Settings) -> None:
     """Raise Refused for combinations of input, integrator and step with which the engine would compute wrong
     results."""
     integrator = CATALOGUE[engine][settings.integrator]
-    if (engine, settings.integrator) in MISSING:
-        raise Refused(engine, MISSING[engine, settings.integrator])
+    if (engine, settings.integrator) in UNAVAILABLE_INTEGRATORS:
+        raise Refused(engine, UNAVAILABLE_INTEGRATORS[engine, settings.integrator])
     _refuse_uneven_step(engine, settings.step, "the duration", settings.duration)
     if assembly.guided and not integrator.constraints:
         right = (name for name, known in CATALOGUE[engine].items() if known.constraints)

@@ -52,14 +52,14 @@ def _low_and_high(key: str, span: str) -> tuple[float, float]:
 
 def scene_value(scene: Any, key: str) -> tuple[float, float, float]:
     """Value of a scene at a dotted key, and the smallest and the largest value that this key allows."""
-    owner: Any = scene
+    container: Any = scene
     *tables, last_key = key.split(".")
     for table in tables:
-        owner = _value_at_key(owner, table, key)
-    value = _value_at_key(owner, last_key, key)
+        container = _value_at_key(container, table, key)
+    value = _value_at_key(container, last_key, key)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(PARAMETERS_OPTION, key, None, "holds no number: a parameter is a number of the scene")
-    field = type(owner).model_fields.get(last_key) if isinstance(owner, BaseModel) else None
+    field = type(container).model_fields.get(last_key) if isinstance(container, BaseModel) else None
     limits = field.metadata if field is not None else []
     low = max((float(limit_end) for limit in limits for limit_end in _limit_ends(limit, "gt", "ge")), default=-np.inf)
     high = min((float(limit_end) for limit in limits for limit_end in _limit_ends(limit, "lt", "le")), default=np.inf)
@@ -72,27 +72,27 @@ def _limit_ends(field_limit: Any, *names: str) -> list[float]:
     return [end for end in ends if end is not None and abs(end) < LARGEST_QUANTITY]
 
 
-def _value_at_key(owner: Any, name: str, key: str) -> Any:
+def _value_at_key(container: Any, name: str, key: str) -> Any:
     """Value at one key of a table, list or model; raises InputError if there is none."""
-    if isinstance(owner, list) and name.isdecimal() and int(name) < len(owner):
-        return owner[int(name)]
-    if isinstance(owner, Mapping) and name in owner:
-        return owner[name]
-    if isinstance(owner, BaseModel) and name in type(owner).model_fields:
-        return getattr(owner, name)
-    names = _channel_names(owner)
-    if isinstance(owner, Mapping) and not suggestion_phrase(name, names):
+    if isinstance(container, list) and name.isdecimal() and int(name) < len(container):
+        return container[int(name)]
+    if isinstance(container, Mapping) and name in container:
+        return container[name]
+    if isinstance(container, BaseModel) and name in type(container).model_fields:
+        return getattr(container, name)
+    names = _channel_names(container)
+    if isinstance(container, Mapping) and not suggestion_phrase(name, names):
         raise InputError(
             PARAMETERS_OPTION, key, None, f"is not in the scene: --set {key}=VALUE gives it a value to start from"
         )
     raise InputError(PARAMETERS_OPTION, key, None, f"is no key of the scene: there is no {name!r}", names)
 
 
-def _channel_names(owner: Any) -> tuple[str, ...]:
+def _channel_names(container: Any) -> tuple[str, ...]:
     """Names of the keys of a table or model."""
-    if isinstance(owner, BaseModel):
-        return tuple(name for name, field in type(owner).model_fields.items() if not field.exclude)
-    return tuple(map(str, owner)) if isinstance(owner, Mapping) else ()
+    if isinstance(container, BaseModel):
+        return tuple(name for name, field in type(container).model_fields.items() if not field.exclude)
+    return tuple(map(str, container)) if isinstance(container, Mapping) else ()
 
 
 class SceneModel:

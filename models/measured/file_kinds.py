@@ -158,12 +158,12 @@ def is_text(first_bytes: bytes) -> bool:
     return first_bytes.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" not in first_bytes
 
 
-def usual_kind_of_extension(suffix: str, format_name: str) -> str:
+def usual_kind_of_extension(extension: str, format_name: str) -> str:
     """Usual kind of files with an extension; ``format_name``, this file's own format, for an unknown extension or
     .asc."""
-    if suffix in FORMAT_OF_EXTENSION or suffix == ".asc":
-        return FORMAT_OF_EXTENSION.get(suffix, format_name)
-    return next((kind.name for kind in UNREADABLE_KINDS if suffix in kind.extensions), format_name)
+    if extension in FORMAT_OF_EXTENSION or extension == ".asc":
+        return FORMAT_OF_EXTENSION.get(extension, format_name)
+    return next((kind.name for kind in UNREADABLE_KINDS if extension in kind.extensions), format_name)
 
 
 def extension_phrase(path: Path) -> str:

@@ -16,7 +16,7 @@ Progress = Callable[[str, float], None]
 """Function that is called with a text on the present work and the completed share."""
 
 
-def no_progress(*told: Any) -> None:
+def no_progress(*arguments: Any) -> None:
     """A progress function that does nothing."""
 
 

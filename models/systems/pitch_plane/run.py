@@ -15,7 +15,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Channels, Settings
-from models.engines.catalogue import CATALOGUE, OUTSIDE
+from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES
 from models.engines.model import Model
 from models.engines.protocol import build
 from models.systems.pitch_plane.assumptions import assumptions, principal_channels
@@ -46,7 +46,7 @@ def run(
     trajectory = model.run()
     seconds = time.perf_counter() - start
     channels, comparison_texts = output_channels(assembly, trajectory, model), dict[str, str]()
-    if engine in OUTSIDE:
+    if engine in OUTSIDE_CLASSES:
         from models.engines.outside import beside_reference
 
         comparison_texts["beside reference"] = beside_reference(engine, assembly, settings, trajectory)

@@ -15,7 +15,7 @@ from models.core.steps import MOST_STEPS, divides, dividing_step
 from models.core.strict import Query, Strict, accepted_queries_field, quantity, read
 from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly, Settings
-from models.engines.catalogue import CATALOGUE, MISSING, RECOMMENDED
+from models.engines.catalogue import CATALOGUE, RECOMMENDED, UNAVAILABLE_INTEGRATORS
 from models.vehicles import pitch_plane
 from models.vehicles.description import Geometry
 from models.vehicles.pitch_plane import STATE_NAMES
@@ -147,14 +147,18 @@ def _check_engine(name: str, scene: Scene) -> None:
     engine_settings, key_path = scene.engines[name], f"engines.{name}"
     integrator = str(scene.settings(name).integrator)
     if integrator not in CATALOGUE[name]:
-        names = tuple(key for key in CATALOGUE[name] if (name, key) not in MISSING)
+        names = tuple(key for key in CATALOGUE[name] if (name, key) not in UNAVAILABLE_INTEGRATORS)
         raise InputError(scene.file, f"{key_path}.integrator", integrator, "no such integrator", names)
     if "spectral_radius" in engine_settings.model_fields_set and integrator != "GeneralizedAlpha":
         allowed = f"has no meaning for {integrator}: it belongs to exudyn's GeneralizedAlpha"
         raise InputError(scene.file, f"{key_path}.spectral_radius", engine_settings.spectral_radius, allowed)
     if "tolerance" in engine_settings.model_fields_set and not CATALOGUE[name][integrator].adaptive:
         adaptive = (
-            " or ".join(key for key, value in CATALOGUE[name].items() if value.adaptive and (name, key) not in MISSING)
+            " or ".join(
+                key
+                for key, value in CATALOGUE[name].items()
+                if value.adaptive and (name, key) not in UNAVAILABLE_INTEGRATORS
+            )
             or "other engines"
         )
         allowed = f"has no meaning for {integrator}, which takes steps of fixed length: it belongs to {adaptive}"

@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 from models.advice.price.problem import Setting
 from models.contact.inputs import Array
 from models.core.errors import Refused, RunFailed
-from models.engines.catalogue import MISSING
+from models.engines.catalogue import UNAVAILABLE_INTEGRATORS
 from models.engines.contact_bridge import FREEDOMS, Wheels, add_forces, check_step, forces, linearised_wheels
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import model
@@ -174,8 +174,8 @@ class RollingWheels:
     def build(self, setting: Setting) -> WheelsetSolver:
         """The wheel in one engine; raises Refused for an unstable step or a missing method."""
         method = setting.method.split()[0]
-        if (setting.engine, method) in MISSING:
-            raise Refused(setting.engine, MISSING[setting.engine, method])
+        if (setting.engine, method) in UNAVAILABLE_INTEGRATORS:
+            raise Refused(setting.engine, UNAVAILABLE_INTEGRATORS[setting.engine, method])
         if setting.engine == "exudyn":
             return self._exudyn(setting, method)
         steps = round(DURATION / setting.value)
