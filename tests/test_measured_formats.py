@@ -46,14 +46,14 @@ def test_every_row_of_the_case_passes(tmp_path):
 
 
 def test_a_value_that_is_off_by_one_bit_is_seen_by_the_case(tmp_path, monkeypatch):
-    original = OpenFile._checked
+    original = OpenFile._checked_blocks
 
     def off(self, chosen, spans):
         for block in original(self, chosen, spans):
             block.values[0, 0] = np.nextafter(block.values[0, 0], np.inf)
             yield block
 
-    monkeypatch.setattr(OpenFile, "_checked", off)
+    monkeypatch.setattr(OpenFile, "_checked_blocks", off)
     rows, _ = case.round_trip(tmp_path / "trip.mf4", ".mf4")
     assert [row.id for row in rows if row.status == "failed"] == ["measured_formats.mf4.values"]
 
