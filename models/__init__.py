@@ -27,8 +27,8 @@ Noise
     and belongs to the samples, never to the integrator's step.
 """
 
-from models.core.moved import tell_new_names
+from models.core.moved import register_old_module_finder
 from models.machine.threads import use_one_thread
 
 use_one_thread()
-tell_new_names()
+register_old_module_finder()

@@ -25,7 +25,7 @@ from models.bicycle.suspects import (
 from models.bicycle.weave import Observation, observations
 from models.bicycle.whipple import Control, Whipple, load_bicycle
 from models.core.errors import InputError
-from models.identification.subsets import Choice
+from models.identification.subsets import SubsetChoice
 
 EXPERIMENT_FEEDBACK = Control(gain=2.0, until=6.5)
 """Steer feedback of the experimenters during the recorded runs."""
@@ -38,7 +38,7 @@ class BicycleObservations:
     not used in the choice; if all were used, each speed is predicted by a choice on all others."""
 
     observations: list[Observation]
-    choice: Choice
+    choice: SubsetChoice
     predictions: dict[float, tuple[np.ndarray, np.ndarray]]
 
 
@@ -97,10 +97,14 @@ def observation_lines(
         lines.append(f"  {name:<14}{value:8.3f} +- {error:.3f} {UNIT_OF_SUSPECT.get(name, '')}")
     lines += ["", "suspect        weight of all subsets with it    F and p of leaving it out of the fullest"]
     for name in SUSPECTED_PARAMETERS:
-        calls = f"{choice.calls[name][0]:8.1f}, p = {choice.calls[name][1]:.2g}" if name in choice.calls else ""
+        calls = (
+            f"{choice.removal_tests[name][0]:8.1f}, p = {choice.removal_tests[name][1]:.2g}"
+            if name in choice.removal_tests
+            else ""
+        )
         why = "no measured number depends on it" if name in choice.undetermined_parameters else calls
         lines.append(f"  {name:<14}{choice.importance(name):8.3f}{'':20}{why}")
-    for name, (ratio, chance) in choice.calls.items():
+    for name, (ratio, chance) in choice.removal_tests.items():
         if name not in SUSPECTED_PARAMETERS:
             lines.append(f"  {name:<42}{ratio:8.1f}, p = {chance:.2g}")
     for first_name, second_name, correlation in choice.hard_to_tell_apart():

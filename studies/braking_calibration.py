@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.discretisation import of_chance
+from models.core.discretisation import with_sampling_error
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, result
 from models.core.strict import Strict, quantity, read
 from models.core.whole_files import write_whole
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.workers import Crew, places_of
+from models.ensemble.workers import Crew, folders_for_workers
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
@@ -81,7 +81,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     scale, steps = scene.tyres.scale.get(options.surface, 1.0), []
     progress("loading", 0.0)
     drive(scene, procedure=options.procedure)  # compiles what is not compiled yet, once and not in every worker
-    with Crew.of(scene).at_work(options.runs, *places_of(scene)) as pool:
+    with Crew.of(scene).at_work(options.runs, *folders_for_workers(scene)) as pool:
         for i in range(options.rounds):
             progress(f"fit, round {i + 1}", i / (options.rounds + 2))
             means = _means_of_stops(fitted_scene(scene, options, scale, steer), options, options.runs, pool)
@@ -93,7 +93,9 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         scatters = _means_of_stops(fitted, options, options.last, pool, options.seed + 1)
     columns = zip(QUANTITIES_OF_ROUND.items(), np.array(steps).T, strict=True)
     rounds = {name: Channel("round", values, unit) for (name, unit), values in columns}
-    by_rounds = of_chance(result(scene, rounds, {}, engine="reference"), statistical_errors(means), options.runs)
+    by_rounds = with_sampling_error(
+        result(scene, rounds, {}, engine="reference"), statistical_errors(means), options.runs
+    )
     by_rounds.save(folder / "rounds.nc")
     heads = (f"{name} [{unit}]" if unit else name for name, unit in QUANTITIES_OF_ROUND.items())
     rows = [",".join(heads), *(",".join(f"{value:.9g}" for value in step) for step in steps)]

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.discretisation import of_chance
+from models.core.discretisation import with_sampling_error
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
 from models.core.told import Results, joined_result
 from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import EnsembleProgress as Done
-from models.ensemble.workers import Crew, places_of
+from models.ensemble.workers import Crew, folders_for_workers
 from models.systems.braking.of_scene import merged_tables
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
@@ -69,7 +69,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     progress("loading", 0.0)  # compiles what is not compiled yet, once and not in every worker
     scenes = [build(table, scene.file, Path(scene.folder)) for table in tables]
     singles = [drive(scene_of_ensemble, procedure=options.procedure, error=scene.error) for scene_of_ensemble in scenes]
-    with Crew.of(scene).at_work(blocks.count(options.runs), *places_of(scene)) as pool:
+    with Crew.of(scene).at_work(blocks.count(options.runs), *folders_for_workers(scene)) as pool:
         for i, table in enumerate(tables):
             job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i)
 
@@ -85,7 +85,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     ):
         channels = {key: Channel("stop", arrays[key], unit) for key, unit in units.items()}
         stops = joined_result(result(scene_of_ensemble, channels, {}, engine="reference"), {"one stop": single})
-        results[name] = of_chance(stops, statistical_errors(means), options.runs)
+        results[name] = with_sampling_error(stops, statistical_errors(means), options.runs)
         stops.save(folder / f"{name}.nc")
         stops.save_table(folder / f"{name}.csv")
     tests = (

@@ -22,7 +22,7 @@ from models.advice.choice.variants import Variants, system_of
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict, read
-from models.ensemble.workers import Crew, places_of
+from models.ensemble.workers import Crew, folders_for_workers
 from studies.command.asked import ANY_SYSTEM, load_scene, plan_of
 
 SYSTEM = ANY_SYSTEM
@@ -174,7 +174,7 @@ def choice_of_scene(
 ) -> SceneChoice:
     """The choice of effects for a scene by runs in one engine."""
     engine = engine_for_choice(scene, engines)
-    with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *folders_for_workers(scene)) as pool:
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
         choice, full_work = chooser.choose(), chooser.work(frozenset())
     results = (

@@ -16,7 +16,7 @@ from typer.exceptions import TyperException
 
 from models.core.errors import InputError, RunFailed
 from models.core.result_folders import check_unused
-from models.core.whole_files import reason_of
+from models.core.whole_files import write_error_phrase
 from models.machine.left_out import OF_LABELS, leave_out
 from models.measured.file_kinds import is_measurement
 from studies.command.asked import (
@@ -92,7 +92,7 @@ def main() -> None:
             "the run failed: it does not fit into the memory of this machine; use a longer step or shorten it", 1
         )
     except OSError as error:
-        exit_with_message(f"the results could not be written: {reason_of(error)}", 1)
+        exit_with_message(f"the results could not be written: {write_error_phrase(error)}", 1)
 
 
 @app.command("list")

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from models.core.assumptions import Watched, with_assumptions
-from models.core.discretisation import by_chance, of_chance
+from models.core.discretisation import sampling_error, with_sampling_error
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.steps import divides
@@ -167,7 +167,7 @@ def _with_errors(
     error = json.loads(first_path.data.attrs["error"])
     result.data.attrs["error"] = json.dumps(error | ({"how": f"{error['how']}, of the first path"} if error else {}))
     worst = {
-        name: by_chance(row[f"{name} error"], row[name], unit, options.paths)
+        name: sampling_error(row[f"{name} error"], row[name], unit, options.paths)
         for name, unit in (("pitch", "rad"), ("heave", "m"))
         for row in [max(rows, key=lambda row: row[f"{name} error"] / (row[name] or 1.0))]
     }
@@ -176,7 +176,7 @@ def _with_errors(
             "end the runs before, or hold their pitch (kalman_filter)", lambda run: _largest_pitch(statistics)
         )
     ]
-    return of_chance(
+    return with_sampling_error(
         with_assumptions(result, assumed),
         {f"deviation of {name}": breach for name, breach in worst.items()},
         options.paths,
@@ -240,11 +240,11 @@ def _time_text(seconds: float) -> str:
 def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, results: Results, folder: Path) -> None:
     """Save a figure of percentiles of the pitch error over time, and of a histogram of the drift-off times."""
 
-    from models.drawing.drift import draw_fan
+    from models.drawing.drift import draw_quantile_bands
     from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, add_heading, save, subplots
 
     figure, (fan, histogram) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8), width_ratios=(3, 2))
-    draw_fan(fan, times[1:], statistics.fan[:, 1:])
+    draw_quantile_bands(fan, times[1:], statistics.fan[:, 1:])
     fan.axhline(
         options.threshold, color=DARK, linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"
     )

@@ -11,10 +11,10 @@ from models.drawing.figures import (
     GREEN,
     TRUTH_COLOUR,
     VERMILION,
-    about_one,
     add_heading,
     legend_below,
     save,
+    scale_about_one,
     subplots,
 )
 from models.systems.hub_forces.comparison import Comparison
@@ -70,7 +70,7 @@ def damage_figure(comparison: Comparison, title: str, path: Path) -> None:
         least_ratio * (0.8 if least_ratio > 0.5 else 0.1),
         largest_ratio * (1.25 if largest_ratio < 2.0 else 10.0),
     )
-    about_one(axis, "y", [tick for tick in DAMAGE_TICKS if low <= tick <= high])
+    scale_about_one(axis, "y", [tick for tick in DAMAGE_TICKS if low <= tick <= high])
     axis.set_ylim(low, high)
     axis.set_ylabel("damage / true damage [-]" if comparison.truth else "damage / that with the filter [-]")
     legend_below(figure, axis)

@@ -14,16 +14,16 @@ from pydantic import Field
 from scipy.interpolate import CubicSpline
 
 from models.core.assumptions import Assumption, with_assumptions
-from models.core.discretisation import by_chance, of_chance
+from models.core.discretisation import sampling_error, with_sampling_error
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result
 from models.core.result import result as labelled
 from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
-from models.drift.angle_damage import UnitPaths, damage_errors, log_damage_over_pitch_error, unit_paths
+from models.drift.angle_damage import UnitErrorPaths, damage_errors, log_damage_over_pitch_error, unit_angle_error_paths
 from models.drift.score import SECTION_FORCE_CHANNELS
-from models.ensemble.statistics import ERRORS_95, quantile_with_interval
+from models.ensemble.statistics import STANDARD_ERRORS_95, quantile_with_interval
 from models.fatigue.damage import WOEHLER_SLOPE
 from models.sensors.inertial_unit import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR, angle_variance
 from models.systems.pitch_plane.assumptions import watch_function
@@ -84,7 +84,9 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     options = check(scene, engines)
     progress("angle errors", 0.0)
     length = round(60 * options.durations[-1])
-    paths = unit_paths(options.samples, options.sampling_rate, length, options.correlation_time, options.seed)
+    paths = unit_angle_error_paths(
+        options.samples, options.sampling_rate, length, options.correlation_time, options.seed
+    )
     largest = max(float(np.abs(angle_errors(paths, options, i)).max()) for i in range(len(options.grades)))
     reach = min(largest, np.pi / 2)  # beyond a quarter turn no pitch is left to speak of
     curves: dict[str, CubicSpline] = {}
@@ -123,13 +125,13 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     }
 
 
-def angle_errors(paths: UnitPaths, options: Options, grade: int) -> np.ndarray:
+def angle_errors(paths: UnitErrorPaths, options: Options, grade: int) -> np.ndarray:
     """Angle errors (samples, seconds + 1) in rad of the units of gyro grade number ``grade``, at every full second."""
     walk, drift = options.random_walks[grade] * DEGREES_PER_ROOT_HOUR, options.grades[grade] * DEGREES_PER_HOUR
     return walk * paths[0] + drift * paths[1]
 
 
-def _errors_of_grades(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline) -> Result:
+def _errors_of_grades(scene: Scene, paths: UnitErrorPaths, options: Options, curve: CubicSpline) -> Result:
     """Result with, for each gyro grade, the largest angle error (rad) over the longest drive, and the damage error that
     the share SUFFICIENT_SHARE of its units does not exceed, with its standard error."""
     angles = [angle_errors(paths, options, grade) for grade in range(len(options.grades))]
@@ -157,10 +159,12 @@ def _errors_of_grades(scene: Scene, paths: UnitPaths, options: Options, curve: C
         ],
     )
     chances = {
-        f"damage error at {grade:g} deg/h": by_chance((high - low) / (2 * ERRORS_95), middle, "", options.samples)
+        f"damage error at {grade:g} deg/h": sampling_error(
+            (high - low) / (2 * STANDARD_ERRORS_95), middle, "", options.samples
+        )
         for grade, (middle, low, high) in zip(options.grades, bounds_of_grades, strict=True)
     }
-    return of_chance(units, chances, options.samples)
+    return with_sampling_error(units, chances, options.samples)
 
 
 def angle_error_deviation(seconds: np.ndarray, options: Options, grade: int) -> np.ndarray:

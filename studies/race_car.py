@@ -15,7 +15,7 @@ from pydantic import Field
 
 from models.core.errors import InputError
 from models.core.strict import Strict, read
-from models.identification.held_out import Identified, Search, identified_vehicle
+from models.identification.held_out import IdentifiedVehicle, ParameterSearch, identified_vehicle
 from models.identification.of_scene import SceneModel
 from models.systems.single_track.race_file import IDENTIFIED_PARAMETERS, RACE_CAR, write_plain_table
 from models.systems.single_track.scene import SingleTrackScene, build
@@ -81,7 +81,10 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     options = read(Options, scene.options, scene.file, "options")
     first, second = identification_and_test_scenes(scene, options, folder)
     chosen = identified_vehicle(
-        first, second, Search(options.identified_keys(), list(AIMED_ERRORS), options.low_pass, options.blocks), progress
+        first,
+        second,
+        ParameterSearch(options.identified_keys(), list(AIMED_ERRORS), options.low_pass, options.blocks),
+        progress,
     )
     simpler = {name: identified_simpler(first, second, options, name, progress) for name in SIMPLER_VEHICLES}
     draw(chosen, simpler, scene.title, folder / "race_car.png")
@@ -152,12 +155,12 @@ def _scene_of_section(scene: SingleTrackScene, ends: list[float]) -> SingleTrack
 
 def identified_simpler(
     first_scene: SingleTrackScene, second_scene: SingleTrackScene, options: Options, name: str, progress: Progress
-) -> Identified:
+) -> IdentifiedVehicle:
     """Identification and prediction with a simpler vehicle, of which some parameters are fixed and fewer are
     identified."""
     holds, kept_words = SIMPLER_VEHICLES[name]
     parameters = [text for text in options.identified_keys() if any(word in text for word in kept_words)]
-    simpler_search = Search(parameters, list(AIMED_ERRORS), options.low_pass, blocks=2)
+    simpler_search = ParameterSearch(parameters, list(AIMED_ERRORS), options.low_pass, blocks=2)
 
     def tell(text: str, share: float) -> None:
         progress(f"{name}: {text}", 0.95)
@@ -176,7 +179,7 @@ def _with_values(scene: SingleTrackScene, new_values: dict[str, float]) -> Singl
     return build(table, scene.file, Path(scene.folder))
 
 
-def error_ratios(identification: Identified) -> dict[str, Any]:
+def error_ratios(identification: IdentifiedVehicle) -> dict[str, Any]:
     """For each channel, ratios of: rms prediction error to rms of the measurement; samples inside the bands to all
     samples; half-width of the bands to the error; rms cross-validation error to rms of the measurement."""
     sizes = np.array([channel.size for channel in identification.uncertainty.fit.problem.channels])
@@ -197,7 +200,7 @@ def error_ratios(identification: Identified) -> dict[str, Any]:
     }
 
 
-def _result_lines(full_identification: Identified, identifications: dict[str, Identified]) -> list[str]:
+def _result_lines(full_identification: IdentifiedVehicle, identifications: dict[str, IdentifiedVehicle]) -> list[str]:
     table = [f"  {'prediction':<26}{'error':>9}{'aim':>8}{'inside 95 %':>13}{'half-width':>12}{'parts':>9}"]
     for name, identified_one in error_ratios(full_identification).items():
         table.append(
@@ -212,7 +215,7 @@ def _result_lines(full_identification: Identified, identifications: dict[str, Id
     return table
 
 
-def residual_correlations(identification: Identified) -> dict[str, dict[str, float]]:
+def residual_correlations(identification: IdentifiedVehicle) -> dict[str, dict[str, float]]:
     """For each channel, correlations of the cross-validation error, or of its magnitude, with accelerations, speed and
     braking of the car."""
     problem = identification.uncertainty.fit.problem

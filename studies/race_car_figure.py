@@ -8,13 +8,15 @@ import numpy as np
 from models.drawing.figures import BLUE, DARK, SKY, VERMILION, add_heading, save, subplots
 
 if TYPE_CHECKING:
-    from studies.race_car import Identified
+    from models.identification.held_out import IdentifiedVehicle
 
 SECONDS_SHOWN = 60.0
 """Length (s) of the shown part of the prediction."""
 
 
-def draw(full_identification: "Identified", identifications: dict[str, "Identified"], title: str, path: Path) -> Path:
+def draw(
+    full_identification: "IdentifiedVehicle", identifications: dict[str, "IdentifiedVehicle"], title: str, path: Path
+) -> Path:
     """Save a figure of the channels over time with their prediction bands, and of the errors of all vehicles; returns
     its path."""
     problem = full_identification.bands.problem

@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from models.core.assumptions import assumed_of, broken_of
+from models.core.assumptions import assumption_sentences, broken_of
 from models.core.discretisation import error_lines
 from models.core.result import Result
 from models.core.whole_files import write_whole
@@ -53,7 +53,7 @@ def page_text(examination: Examination, folder: Path, result: Result) -> str:
         names=RUN_NAMES,
         errors=error_lines(result),
         breaches=[breach.line() for breach in broken_of(result)],
-        assumed=assumed_of(result),
+        assumed=assumption_sentences(result),
         free=FREE_RUN,
         weights=[finding.weight for finding in examination.findings],
         used=[(signal, examination.put_in(signal)) for signal in examination.recording.signals],

@@ -25,7 +25,7 @@ check = options_of
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Run all methods on both roads; saves every road's files, ``score.csv``, ``score.nc``, ``table.txt`` and two
     figures, and returns the summary."""
-    from models.drawing.drift import decision_figure, stiffness
+    from models.drawing.drift import decision_figure, stiffness_figure
     from models.drawing.figures import save
 
     benches_of_roads, rows, failed = compare(scene, engines, folder, progress)
@@ -45,7 +45,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     progress("figures", 1.0)
     of_first = [row for row in rows if row["engine"] == engines[0]]
     save(decision_figure(of_first, options.limits, options.grade, results), folder / "decide.png")
-    save(stiffness(sweep, benches_of_roads[0], options.limits, options.grade), folder / "stiffness.png")
+    save(stiffness_figure(sweep, benches_of_roads[0], options.limits, options.grade), folder / "stiffness.png")
     return {
         "scene": scene.title,
         "folder": str(folder),

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import by_chance, of_chance
+from models.core.discretisation import sampling_error, with_sampling_error
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
@@ -23,7 +23,7 @@ from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.drift.growth import pitch_variance
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.statistics import ERRORS_95, quantile_with_interval
+from models.ensemble.statistics import STANDARD_ERRORS_95, quantile_with_interval
 from models.ensemble.workers import Crew
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run_away
@@ -166,8 +166,8 @@ def _with_errors(result: Result, quiet_run: Result, drift_off_times: dict[str, n
     middle, low, high = quantile_with_interval(drift_off_times["drift_off"], 0.5)
     if not math.isfinite(high):
         return result
-    error = by_chance((high - low) / (2.0 * ERRORS_95), middle, "s", options.paths)
-    return of_chance(result, {"median drift-off by noise": error}, options.paths)
+    error = sampling_error((high - low) / (2.0 * STANDARD_ERRORS_95), middle, "s", options.paths)
+    return with_sampling_error(result, {"median drift-off by noise": error}, options.paths)
 
 
 def _saved_paths(scene: Scene, rows: list[Row], drift_off_times: dict[str, np.ndarray]) -> Result:

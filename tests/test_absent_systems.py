@@ -12,9 +12,9 @@ from models.core.scene_effects import (
     module_of,
     named_effects,
     names_of,
-    own_table,
     rebuilt_scene,
     scene_without,
+    table_without_defaults,
     with_effects,
 )
 from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, load
@@ -56,7 +56,7 @@ def test_the_counts_see_an_effect_that_says_nothing_of_itself(monkeypatch):
 @pytest.mark.parametrize("name", ["braking", "contact_profiles", "handling", "hub_forces", "recording", "wheelset"])
 def test_a_scene_is_the_same_from_its_own_table_and_can_do_without_what_it_names(name):
     scene = load(SCENES_FOLDER / f"{name}.toml")
-    assert rebuilt_scene(own_table(scene), scene) == scene
+    assert rebuilt_scene(table_without_defaults(scene), scene) == scene
     for effect in named_effects(scene):
         try:
             assert effect not in named_effects(scene_without(scene, effect))

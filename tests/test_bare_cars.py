@@ -36,9 +36,9 @@ def test_bodies_that_are_one_in_mujoco_move_as_they_do_apart(monkeypatch: pytest
     rng = np.random.default_rng(1)
     q, v = q + rng.normal(0.0, 0.05, len(q)), v + rng.normal(0.0, 0.2, len(v))
     one = FreeMujoco(driven_by(own))
-    merged = free_vehicle_mujoco.carriers(own.vehicle)
+    merged = free_vehicle_mujoco.mergeable_carriers(own.vehicle)
     assert {"carrier", "sway"} < set(merged) and len(merged) == 6  # and the four wheels, whose rotors ride on them
-    monkeypatch.setattr(free_vehicle_mujoco, "carriers", lambda vehicle: {})
+    monkeypatch.setattr(free_vehicle_mujoco, "mergeable_carriers", lambda vehicle: {})
     apart = FreeMujoco(driven_by(own))
     assert apart.model.nbody - one.model.nbody == 6
     np.testing.assert_allclose(one.acceleration(0.0, q, v), apart.acceleration(0.0, q, v), rtol=1e-10, atol=1e-10)
@@ -50,7 +50,7 @@ def test_a_wheel_with_inertia_of_its_own_does_not_spin_with_its_rotor() -> None:
         replace(body, inertia=((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0))) if body.name == "fl" else body
         for body in own.vehicle.bodies
     )
-    assert "fl" not in free_vehicle_mujoco.carriers(replace(own.vehicle, bodies=heavy))
+    assert "fl" not in free_vehicle_mujoco.mergeable_carriers(replace(own.vehicle, bodies=heavy))
 
 
 def test_forces_of_cars_and_hubs_make_no_array() -> None:

@@ -57,7 +57,7 @@ def test_the_suspects_that_made_the_recordings_are_called_for(folder):
     told = dict(zip(choice.best_subset.names, choice.best_subset.values, strict=True))
     for name in told:
         assert told[name] == pytest.approx(getattr(TRUE, name), abs=0.03)
-    assert choice.calls["friction"][1] < 1e-3 < 0.05 < choice.calls["torque_gain"][1]
+    assert choice.removal_tests["friction"][1] < 1e-3 < 0.05 < choice.removal_tests["torque_gain"][1]
 
 
 def test_without_a_cause_none_is_called_for(folder):

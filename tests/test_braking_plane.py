@@ -6,7 +6,7 @@ import pytest
 from models.brake.advance import AT_REST, advance
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.trailer import CHOSEN_TRAILER, follow_hook, plane_of_trailer
-from models.engines.braking import CarriedChassis
+from models.engines.braking import EngineChassis
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 from validation.braking.braked_truck import (
     ICE_TABLE,
@@ -88,7 +88,7 @@ def test_backwards_is_forwards_seen_from_behind():
 def test_engines_carry_the_chassis_as_the_compiled_step_does(engine):
     own, carried = (
         RollingTruck(truck_on_tables(), 10.0, steer=0.03, step_function=go).braked(ROLLING, 1e-3, duration=0.5).state
-        for go in (advance, CarriedChassis(engine, plane_of_truck(PAPER_TRUCK)).advance)
+        for go in (advance, EngineChassis(engine, plane_of_truck(PAPER_TRUCK)).advance)
     )
     assert own[0, 1] > 0.05
     assert carried == pytest.approx(own, abs=1e-6)  # both are of order two

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.advice.price import runner as cost
-from models.engines.braking import CarriedChassis
+from models.engines.braking import EngineChassis
 from models.systems.braking.march import BrakedVehicle
 from models.tyre.tyre_table import stacked_tables
 from validation.braking.quarter_stops import FRONT_WHEEL
@@ -58,7 +58,7 @@ def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(
         short._chambers,
         np.zeros(1),
         substeps=2,
-        engine=CarriedChassis(engine, FRONT_WHEEL.plane),
+        engine=EngineChassis(engine, FRONT_WHEEL.plane),
     )
     path = stop.run(ReplayedController(short.valves), 2.0)
     assert path.ended_at_rest and path.states[-1, 0, 0] == pytest.approx(short._stop_by_twinrig(2).distance, abs=1e-12)

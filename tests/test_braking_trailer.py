@@ -10,8 +10,8 @@ from models.brake.plane_vehicle import plane_of_truck
 from models.brake.sprung import suspended_vehicle
 from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import named_effects, scene_without
-from models.engines.braking_sprung import driven
-from models.engines.free_vehicle import built_share
+from models.engines.braking_sprung import driven_vehicle
+from models.engines.free_vehicle import native_elements_and_joints
 from models.multibody.forces import PARTS
 from models.systems.braking.march import StartState
 from models.systems.braking.of_scene import plane_of
@@ -90,9 +90,9 @@ def test_a_piece_of_a_stop_is_that_of_plain_code(name, lags):
 def test_springs_of_a_trailer_are_the_engines_own_and_the_table_has_no_more_of_them():
     for engine in ("mujoco", "exudyn"):
         native, compiled = (
-            driven(vehicle(), engine) for vehicle in (whole.asymmetric_train, whole.train_with_compiled_springs)
+            driven_vehicle(vehicle(), engine) for vehicle in (whole.asymmetric_train, whole.train_with_compiled_springs)
         )
-        names, _ = built_share(engine, replace(native, kernel=None))
+        names, _ = native_elements_and_joints(engine, replace(native, kernel=None))
         of_trailer = {s.name for s in train().springs if s.frame in train().towed} | {"trailer's bar"}
         assert set(names) == of_trailer and not compiled.parts
         assert native.numbers[PARTS] < compiled.numbers[PARTS]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.engines.cut_vehicle import PLAIN, build
+from models.engines.cut_vehicle import PLAIN_ENGINE, build
 from models.multibody.cut_kernel import set_joint_forces
 from models.multibody.cut_table import HubInputs
 from models.multibody.plain.hubs import PlainHubs
@@ -58,7 +58,7 @@ def test_joint_forces_in_a_block_are_those_of_the_plain_equations(car):
 def test_a_march_is_that_of_the_plain_equations():
     vehicle = rough_car()
     hub_inputs = hub_inputs_of(vehicle, 21)
-    compiled, plain = (build(name, vehicle, hub_inputs, STEP, 10 * STEP).run() for name in ("reference", PLAIN))
+    compiled, plain = (build(name, vehicle, hub_inputs, STEP, 10 * STEP).run() for name in ("reference", PLAIN_ENGINE))
     assert np.abs(plain.states[-1]).max() > 1e-3
     assert compiled.states == pytest.approx(plain.states, abs=1e-10)
     for name in ("elements", "wrenches", "moments"):

@@ -11,16 +11,16 @@ from models.core.discretisation import (
     REFUSED_SHARE,
     WARNED_SHARE,
     Series,
-    by_chance,
     error_lines,
     errors_of,
     estimate,
-    estimated,
     finite_rms,
+    nearest_rows,
     not_estimated,
-    of_chance,
     root_mean_square,
-    rows_at,
+    sampling_error,
+    with_estimated_errors,
+    with_sampling_error,
     with_stated_errors,
 )
 from models.core.errors import RunFailed
@@ -55,7 +55,7 @@ def run_of(series: Series) -> Result:
 
 def told(order: int, size: float, declared: int, step: float = STEP) -> Result:
     fine = marched(step, order, size)
-    return estimated(
+    return with_estimated_errors(
         run_of(fine), fine, lambda factor, share: marched(factor * step, order, size, share), declared, step
     )
 
@@ -72,7 +72,7 @@ def test_the_error_is_told_at_the_order_that_is_seen(order, declared):
 def test_an_order_that_is_taken_for_granted_would_be_caught():
     """Planted fault: a rough road lowers the order, and who does not observe it tells a twentieth of the error."""
     fine, coarse = (marched(factor * STEP, 1, 1.0).channels["heave"] for factor in (1, 2))
-    rows = rows_at(marched(STEP, 1, 1.0).times, marched(2 * STEP, 1, 1.0).times)
+    rows = nearest_rows(marched(STEP, 1, 1.0).times, marched(2 * STEP, 1, 1.0).times)
     blind = estimate(fine[rows], coarse, 4.0, STEP)
     assert blind.error < 0.2 * errors_of(told(1, 1.0, 4))["heave"].error
 
@@ -101,7 +101,7 @@ def test_where_no_longer_step_can_be_half_of_it_tells():
         return marched(factor * STEP, 2, 1.0, share)
 
     fine = marched(STEP, 2, 1.0)
-    (one,) = errors_of(estimated(run_of(fine), fine, only_shorter, 2, STEP)).values()
+    (one,) = errors_of(with_estimated_errors(run_of(fine), fine, only_shorter, 2, STEP)).values()
     assert one.error == pytest.approx(STEP**2 * math.sqrt(0.5), rel=0.15)
 
 
@@ -116,7 +116,7 @@ def test_longer_steps_that_outlast_a_run_tell_nothing(steps):
     fine = heave(1.0, 1.0)
     channels = {"heave": Channel(("time", "place"), fine.channels["heave"], "m")}
     made = result(Scene(), channels, {"time": Channel("time", fine.times, "s")}, engine="reference")
-    (one,) = errors_of(estimated(made, fine, heave, 2, STEP)).values()
+    (one,) = errors_of(with_estimated_errors(made, fine, heave, 2, STEP)).values()
     assert one.error == pytest.approx(STEP**2 * math.sqrt(np.mean(fine.times**2)), rel=0.5)
 
 
@@ -125,7 +125,7 @@ def test_what_rests_has_no_error_and_no_warning():
         times = factor * STEP * np.arange(round(share * DURATION / (factor * STEP)) + 1)
         return Series(times, {"heave": np.zeros(len(times))})
 
-    (one,) = errors_of(estimated(run_of(rests(1.0, 1.0)), rests(1.0, 1.0), rests, 4, STEP)).values()
+    (one,) = errors_of(with_estimated_errors(run_of(rests(1.0, 1.0)), rests(1.0, 1.0), rests, 4, STEP)).values()
     assert one.share == 0.0 and not one.warned
 
 
@@ -140,7 +140,7 @@ def test_reasons_and_chance_are_told():
     run = run_of(marched(STEP, 4, 0.0))
     not_estimated(run, "the switches of the controller do not repeat")
     assert error_lines(run) == ["error not estimated: the switches of the controller do not repeat"]
-    of_chance(run, {"heave": by_chance(0.1, 1.0, "m", 100)}, 100)
+    with_sampling_error(run, {"heave": sampling_error(0.1, 1.0, "m", 100)}, 100)
     assert error_lines(run)[1] == "standard error of 100 paths at most 10 % (heave: 0.1 m)"
     assert json.loads(run.data.attrs["error"])["chance"]["channels"]["heave"]["step"] == 2500
 

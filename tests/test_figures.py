@@ -11,11 +11,11 @@ from models.drawing.figures import (
     COLUMN_WIDTH,
     CURVE_COLOURS,
     SMALL_TEXT,
-    about_one,
     add_heading,
     legend_below,
     panels,
     save,
+    scale_about_one,
     subplots,
     wrapped_text,
 )
@@ -132,7 +132,7 @@ def test_pages_of_drawings_use_the_palette():
 
 def test_ratios_near_one_and_far_away_are_both_told():
     _, axis = subplots()
-    about_one(axis, "y", [1e-3, 0.9, 1.0, 1.1, 1e3])
+    scale_about_one(axis, "y", [1e-3, 0.9, 1.0, 1.1, 1e3])
     low, near, one, high, far = axis.transData.transform([(0, value) for value in (1e-3, 0.9, 1.0, 1.1, 1e3)])[:, 1]
     assert high - one > 0.1 * (far - low) and one - near > 0.1 * (far - low)
 

@@ -5,7 +5,7 @@ import errno
 import pytest
 
 from models.core.result_folders import COMMAND_FILE
-from models.core.whole_files import reason_of, whole_file, write_whole
+from models.core.whole_files import whole_file, write_error_phrase, write_whole
 from validation.common import full_disk
 from validation.common.full_disk import files_of_at_most
 
@@ -35,7 +35,7 @@ def test_part_leaves_no_trace(tmp_path):
         part.write_text("half")
         raise OSError(errno.ENOSPC, "No space left on device")
     assert list(tmp_path.iterdir()) == []
-    assert reason_of(raised.value) == f"the disk is full ({tmp_path / 'a.csv'})"
+    assert write_error_phrase(raised.value) == f"the disk is full ({tmp_path / 'a.csv'})"
 
 
 def test_earlier_file_survives(tmp_path):
@@ -47,7 +47,9 @@ def test_earlier_file_survives(tmp_path):
 
 
 def test_other_reasons_keep_their_words():
-    assert reason_of(PermissionError(errno.EACCES, "Permission denied", "x.csv")) == "Permission denied (x.csv)"
+    assert (
+        write_error_phrase(PermissionError(errno.EACCES, "Permission denied", "x.csv")) == "Permission denied (x.csv)"
+    )
 
 
 def test_a_writer_that_leaves_its_part_is_seen(tmp_path, monkeypatch):

@@ -14,7 +14,7 @@ from models.engines import exudyn as exudyn_engine
 from models.engines import protocol, stability
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import balanced, build, guard
+from models.engines.protocol import build, check_balance, guard
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.cases import guards
@@ -76,7 +76,7 @@ def test_step_matrix_of_the_guided_vehicle(engine, integrator):
 )
 def test_limits_are_the_textbook_ones(integrator, limit):
     linear = stability.linearised(setups.vehicle().vehicle)
-    assert stability.limit(integrator, 0.1, 1000.0, linear) == pytest.approx(limit, rel=2e-4)
+    assert stability.longest_stable_step(integrator, 0.1, 1000.0, linear) == pytest.approx(limit, rel=2e-4)
 
 
 @pytest.mark.parametrize(("engine", "integrator"), LIMITED)
@@ -84,7 +84,7 @@ def test_the_limit_separates_decay_from_growth(engine, integrator):
     assembly = setups.vehicle()
     pushed = replace(assembly, initial=assembly.initial + 1e-6)
     linear = stability.linearised(assembly.vehicle)
-    limit = stability.limit(integrator, 0.1, 300.0, linear)
+    limit = stability.longest_stable_step(integrator, 0.1, 300.0, linear)
     below, above = (float(f"{limit * part:.3g}") for part in (0.97, 1.03))
     end = setups.unchecked_run(engine, pushed, below, 400 * below, integrator).states[-1]
     assert np.abs(end - assembly.initial).max() < 1e-4
@@ -138,7 +138,7 @@ def test_a_missing_check_fails_the_row(monkeypatch):
 
 
 def test_a_missing_balance_fails_the_row(monkeypatch):
-    monkeypatch.setattr(exudyn_engine, "balanced", lambda *_: None)
+    monkeypatch.setattr(exudyn_engine, "check_balance", lambda *_: None)
     assert set(guards.unchecked_constrained_endings().values()) == {"answered"}
 
 
@@ -164,9 +164,9 @@ def test_a_moment_that_is_no_number_fails_the_run():
 
 def test_a_multiplier_may_be_small_beside_the_inertia_term():
     times = np.linspace(0, 1, 101)
-    balanced("engine", times, np.full((101, 1), 10.0), lambda row: (np.zeros(1), np.full(1, 1000.0)))
+    check_balance("engine", times, np.full((101, 1), 10.0), lambda row: (np.zeros(1), np.full(1, 1000.0)))
     with pytest.raises(RunFailed, match="balance"):
-        balanced("engine", times, np.full((101, 1), 100.0), lambda row: (np.zeros(1), np.full(1, 1000.0)))
+        check_balance("engine", times, np.full((101, 1), 100.0), lambda row: (np.zeros(1), np.full(1, 1000.0)))
 
 
 @pytest.mark.parametrize("place", ["passive", "control"])

@@ -97,7 +97,7 @@ def test_a_contact_point_that_forgets_its_past_is_found(monkeypatch, tmp_path):
 
 
 def test_without_the_balance_a_noisy_multiplier_is_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(exudyn_engine, "balanced", lambda *_: None)
+    monkeypatch.setattr(exudyn_engine, "check_balance", lambda *_: None)
     assert found(prescribed_pitch, "noise of 1e-6 rad on the pitch", "exudyn", tmp_path) == "SILENT"
 
 
@@ -109,7 +109,7 @@ def test_an_equilibrium_off_by_a_micrometre_is_found(implementation, monkeypatch
 
 
 def test_without_the_growth_check_an_undamped_run_is_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(stability, "GROWTH", np.inf)
+    monkeypatch.setattr(stability, "ALLOWED_GROWTH", np.inf)
     assert found(extremes, "no damping, first order", "exudyn", tmp_path) == "SILENT"
 
 

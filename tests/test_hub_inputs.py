@@ -9,7 +9,7 @@ import pytest
 
 from models.core.errors import InputError, Refused
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import ENGINES, PLAIN, HubModel
+from models.engines.cut_vehicle import ENGINES, PLAIN_ENGINE, HubModel
 from models.multibody import cut_kernel
 from models.multibody.cut_table import HubInputs
 from models.systems.hub_forces.measurement import HubForces
@@ -37,7 +37,7 @@ def scene(**more):
 
 @pytest.mark.grounds("closed form")
 def test_held_forces_move_the_centre_of_mass_along_parabolas():
-    sizes = {engine: centre_of_mass_error(r19(), engine, "held") for engine in (*ENGINES, PLAIN)}
+    sizes = {engine: centre_of_mass_error(r19(), engine, "held") for engine in (*ENGINES, PLAIN_ENGINE)}
     assert max(sizes.values()) < 1e-10  # Runge-Kutta 4 in joint coordinates leaves 5e-12 m
     real = HubForces.hub_inputs
     with patch.object(HubForces, "hub_inputs", lambda *given: replace(real(*given), held=False)):

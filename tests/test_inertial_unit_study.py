@@ -103,7 +103,7 @@ def test_the_study_adds_what_the_effects_add():
     run = simulate(build({"title": "test", "run": {"duration": 10.0, "step": 1e-3}, "effects": effects}), "reference")
     error = (run["gyro"] - run["pitch_rate"])[:10_000:100].sum() / 10.0
     length = round(60 * own.durations[-1])
-    paths = study.unit_paths(own.samples, own.sampling_rate, length, own.correlation_time, own.seed)
+    paths = study.unit_angle_error_paths(own.samples, own.sampling_rate, length, own.correlation_time, own.seed)
     ours = walk * DEGREES_PER_ROOT_HOUR * paths[0][3, 10] + grade * DEGREES_PER_HOUR * paths[1][3, 10]
     assert ours == pytest.approx(error, rel=1e-9)
 

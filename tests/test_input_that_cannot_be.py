@@ -11,7 +11,7 @@ from models.core.errors import InputError
 from models.core.finding import Finding
 from models.core.tables import has_line_end
 from models.core.time_series import read_time_series, write_time_series
-from models.measured.axle_forces import IN_FILE, AxleForces, check
+from models.measured.axle_forces import FILE_REMEDIES, AxleForces, check_axle_forces
 from models.measured.signal import Signal
 from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters import asymmetric_twin, itwm_drift
@@ -40,8 +40,10 @@ def true(road=("hills", 0.0), duration=DURATION):
 
 def judged(forces, turn=False, parameters=TWIN) -> list[Finding]:
     lasted = PERIOD * (len(forces) - 1)
-    own = AxleForces(np.ascontiguousarray(forces), PERIOD, parameters, SIGNALS, lasted, IN_FILE, turn=turn)
-    return [finding for finding in check(own) if finding.weight != "note"]
+    own = AxleForces(
+        np.ascontiguousarray(forces), PERIOD, parameters, SIGNALS, lasted, FILE_REMEDIES, turns_with_chassis=turn
+    )
+    return [finding for finding in check_axle_forces(own) if finding.weight != "note"]
 
 
 FAULTS = {
@@ -79,10 +81,10 @@ def test_times_in_milliseconds_under_seconds_are_doubted():
     """A run would take ten of ten thousand samples, each a second long."""
     forces, lasted = true()[0], 20.0
     for period, said in ((1e3 * PERIOD, ["times"]), (PERIOD, [])):
-        own = AxleForces(forces, period, TWIN, SIGNALS, lasted, IN_FILE)
-        assert [finding.check for finding in check(own) if finding.weight == "doubt"] == said
-    few = AxleForces(np.tile(LOADS, (5, 1)), 1000.0, TWIN, SIGNALS, lasted, IN_FILE)  # a constant load, as meant
-    assert not [finding for finding in check(few) if finding.check == "times"]
+        own = AxleForces(forces, period, TWIN, SIGNALS, lasted, FILE_REMEDIES)
+        assert [finding.check for finding in check_axle_forces(own) if finding.weight == "doubt"] == said
+    few = AxleForces(np.tile(LOADS, (5, 1)), 1000.0, TWIN, SIGNALS, lasted, FILE_REMEDIES)  # a constant load, as meant
+    assert not [finding for finding in check_axle_forces(few) if finding.check == "times"]
 
 
 def test_doubts_about_a_vehicle_stand_beside_its_refusal(twinrig, capsys):

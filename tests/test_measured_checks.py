@@ -361,7 +361,7 @@ def test_what_was_noticed_while_reading_is_carried_and_errors_come_first(ridden,
     noticed = Finding("clock", "doubt", "b.csv", "The clock of b.csv runs fast.")
     lost = white()
     lost[10:1000] = np.nan
-    found = check(replace(made(tmp_path, force_z=lost), noticed=(noticed,)), None)
+    found = check(replace(made(tmp_path, force_z=lost), findings=(noticed,)), None)
     assert [one.weight for one in found[:2]] == ["error", "doubt"]
     assert found[1] is noticed
 

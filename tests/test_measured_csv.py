@@ -64,7 +64,7 @@ def ended(form: Form, text: str | None = None) -> float | str:
         path.write_bytes((form.text() if text is None else text).encode(form.encoding))
         try:
             source = open_source(path)
-            said = [one.text for one in source.noticed]
+            said = [one.text for one in source.findings]
             return reading_error(source, usual_truth(), "cut off" if any("cut off" in text for text in said) else "")
         except InputError as refusal:
             assert path.name in str(refusal) and "\n" not in str(refusal)

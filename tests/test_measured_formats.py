@@ -55,14 +55,14 @@ def test_every_row_of_the_case_passes(tmp_path):
 
 
 def test_a_value_that_is_off_by_one_bit_is_seen_by_the_case(tmp_path, monkeypatch):
-    original = OpenFile._checked
+    original = OpenFile._checked_blocks
 
     def off(self, chosen, spans):
         for block in original(self, chosen, spans):
             block.values[0, 0] = np.nextafter(block.values[0, 0], np.inf)
             yield block
 
-    monkeypatch.setattr(OpenFile, "_checked", off)
+    monkeypatch.setattr(OpenFile, "_checked_blocks", off)
     rows, _ = case.round_trip_rows(tmp_path / "trip.mf4", ".mf4")
     assert [row.id for row in rows if row.status == "failed"] == ["measured_formats.mf4.values"]
 
@@ -250,7 +250,7 @@ def test_numbers_in_other_hands(tmp_path):
     assert [(one.name, one.unit) for one in source.channels] == [("Kraft", "kN"), ("a, b", "")]
     found = read_channels(source)
     assert np.array_equal(found["Kraft"][0], [0.0, 0.01]) and np.array_equal(found["Kraft"][1], [1500.0, -1e-3])
-    assert "tabs" in source.noticed[0].text
+    assert "tabs" in source.findings[0].text
 
 
 def test_shortest_and_longest_decimals_are_read_to_the_last_bit(tmp_path):

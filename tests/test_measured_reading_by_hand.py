@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from models.measured.channel import Channel
-from models.measured.checks.spectra import noise
+from models.measured.checks.spectra import white_noise
 from models.measured.columns import Columns, MemoryColumns
 from models.measured.faults_of_measurement import Faults, measured_samples
 from models.measured.formats import open_source
-from models.measured.gaps import bridged_signals, filled_samples, without_absurd
+from models.measured.gaps import bridged_signals, filled_samples, without_impossible_values
 from models.measured.recording import Recording
 from models.measured.signal import Signal, TransducerPlace
 from models.measured.timing import sample_timing
@@ -128,7 +128,7 @@ def test_a_bridged_signal_tells_the_length_of_its_gap():
 
 def test_marks_for_no_value_are_taken_out_and_all_else_stays():
     values, times = np.array([1.5, 9.9e34, 2.5, 9.9e34, 3.5]), 0.25 * np.arange(5) + 0.5
-    kept, finding = without_absurd(signal_of(), values, times)
+    kept, finding = without_impossible_values(signal_of(), values, times)
     assert np.flatnonzero(np.isnan(kept)).tolist() == [1, 3] and kept[::2].tolist() == [1.5, 2.5, 3.5]
     assert (finding.size, finding.times) == (2.0, (0.75, 1.25))
 
@@ -141,7 +141,7 @@ def test_noise_of_an_impulse_is_that_of_its_flat_spectrum():
     window, squares = np.sin(angle) ** 2, 3.0 / 8.0 * (count + 1)
     expected = size * window / np.sqrt(np.log(2.0) * squares)
     impulse = size * (np.arange(count) == k)
-    assert noise(recording_of({force: impulse}), force) == pytest.approx(expected, rel=1e-6)
+    assert white_noise(recording_of({force: impulse}), force) == pytest.approx(expected, rel=1e-6)
 
 
 def test_noise_that_is_added_has_the_deviation_of_its_fault():

@@ -10,7 +10,7 @@ from models.core.errors import InputError
 from models.core.result import load as load_result
 from models.measured.channel import Channel
 from models.measured.formats import open_source
-from models.measured.gaps import without_absurd
+from models.measured.gaps import without_impossible_values
 from models.measured.resampling import resample_to
 from models.measured.signal import Places, Signal
 from models.measured.timing import sample_timing
@@ -158,7 +158,7 @@ def test_gaps_are_not_measured_and_all_else_is(tmp_path):
     values = found.samples(found.signals[0])
     assert np.flatnonzero(np.isnan(values)).tolist() == list(range(400, 600))
     assert values[600:] == pytest.approx(np.arange(600, 1000) * 1e-3)
-    assert any(finding.check == "clock gaps" and finding.size == pytest.approx(0.201) for finding in found.noticed)
+    assert any(finding.check == "clock gaps" and finding.size == pytest.approx(0.201) for finding in found.findings)
 
 
 @pytest.mark.parametrize("head, period, said", [("ms", 5e-3, "seconds"), ("s", 5.0, "milliseconds"), ("s", 5e-3, "")])
@@ -168,7 +168,7 @@ def test_times_under_a_head_of_another_unit_are_told_with_the_remedy(tmp_path, h
     path = tmp_path / name
     path.write_text(path.read_text().replace("time [s]", f"time [{head}]"))
     own = scene(tmp_path, {"file": name, "channels": [force("fl", "fl"), force("fr", "fr")]})
-    found = [f for f in recorded(own, tmp_path).noticed if f.check == "times"]
+    found = [f for f in recorded(own, tmp_path).findings if f.check == "times"]
     assert [f.weight for f in found] == [{"ms": "doubt", "s": "error"}[head]] * bool(said)
     assert all(f"if its times are in {said}, not in" in f.text for f in found)
 
@@ -229,7 +229,7 @@ def test_marks_for_no_value_are_told_and_not_measured(tmp_path, mark):
         found = recorded(own, tmp_path)
         values = found.samples(found.signals[0])
         assert np.flatnonzero(np.isnan(values)).tolist() == [400, 401, 700]
-        told = next(finding for finding in found.noticed if finding.check == "no value")
+        told = next(finding for finding in found.findings if finding.check == "no value")
         assert told.size == 3 and told.times == pytest.approx((0.4, 0.7)) and "a.csv, fl: 3 samples" in told.text
         assert "at 0.4 s" in told.text
 
@@ -239,7 +239,7 @@ def test_a_wrong_unit_and_a_rough_road_are_no_marks(tmp_path):
     load = 3e3 * (1 + 0.5 * np.sin(20 * t))
     for values in (1e3 * load, np.where(np.arange(1000) == 500, 9e4, load)):
         signal = Signal("fl", "a.csv", "fl", "force", "fl", "z", "hub", 1, "N", 1.0)
-        kept, said = without_absurd(signal, values, t)
+        kept, said = without_impossible_values(signal, values, t)
         assert said is None and kept is values
 
 

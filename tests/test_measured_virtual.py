@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from models.core.errors import InputError
 from models.core.strict import read
 from models.measured.columns import Columns
-from models.measured.faults_of_measurement import Faults, check, measured_samples
+from models.measured.faults_of_measurement import Faults, check_faults, measured_samples
 from models.measured.gaps import filled_samples
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
@@ -101,9 +101,9 @@ def test_a_converter_rounds_and_a_silent_transducer_loses_all_its_channels() -> 
 
 def test_names_that_no_signal_has_are_refused() -> None:
     with pytest.raises(InputError, match="did you mean 'force'"):
-        check(read(Faults, {"noise": {"forse": 1.0}}, ""), TWO)
+        check_faults(read(Faults, {"noise": {"forse": 1.0}}, ""), TWO)
     with pytest.raises(InputError, match="must be 0 or more"):
-        check(read(Faults, {"delay": {"a": -1e-3}}, ""), TWO)
+        check_faults(read(Faults, {"delay": {"a": -1e-3}}, ""), TWO)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.core.scene_effects import extended_by_effects, names_of, own_table, rebuilt_scene, with_effects
+from models.core.scene_effects import extended_by_effects, names_of, rebuilt_scene, table_without_defaults, with_effects
 from models.core.systems import DEFAULT_SYSTEM, SYSTEMS
 from models.systems.pitch_plane.plan import describe
 from models.systems.pitch_plane.run import run as simulate
@@ -101,7 +101,7 @@ def test_a_file_that_is_no_effect_is_told_by_name(text, told, new_file, capsys):
     new_file("braking", "slow_chambers", text)
     list_scenes()
     assert "slow_chambers" in capsys.readouterr().out
-    table = {**own_table(bare_scene("braking")), "effects": {"slow_chambers": {"time": 0.2}}}
+    table = {**table_without_defaults(bare_scene("braking")), "effects": {"slow_chambers": {"time": 0.2}}}
     with pytest.raises(InputError, match=told) as found:
         scene = rebuilt_scene(table, bare_scene("braking"))
         extended_by_effects("what a system built", scene)

@@ -12,7 +12,13 @@ from models.advice.price import effects, effects_of_ride, effects_text
 from models.advice.price.effects import QuantityChange, price_list
 from models.advice.ride_choice.reduced import FullScene
 from models.core.errors import InputError
-from models.core.scene_effects import effect_sentences, own_table, rebuilt_scene, scene_without, with_effects
+from models.core.scene_effects import (
+    effect_sentences,
+    rebuilt_scene,
+    scene_without,
+    table_without_defaults,
+    with_effects,
+)
 from models.core.systems import SYSTEMS, load
 from models.multibody.numbers import Handling, Push
 from models.ride.road_path import road_path
@@ -165,7 +171,7 @@ NEW = {
 @pytest.mark.parametrize("system", NEW)
 def test_a_new_effect_is_one_file(system, new_file):
     new, scene = NEW[system], bare_scene(system)
-    before, table = counts_and_paths(system, scene), own_table(scene) | {"effects": {NEW[system].name: {}}}
+    before, table = counts_and_paths(system, scene), table_without_defaults(scene) | {"effects": {NEW[system].name: {}}}
     with pytest.raises(InputError, match="no such effect"):
         rebuilt_scene(table, scene)
     new_file(system, new.name, new.text)

@@ -13,7 +13,7 @@ import pytest
 from models.core.errors import InputError, Refused, RunFailed
 from models.engines import outside
 from models.engines.assembly import Settings
-from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED
+from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES, RECOMMENDED
 from models.engines.outside import register
 from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
@@ -105,7 +105,7 @@ class Deaf:
 @pytest.fixture
 def own(monkeypatch):
     """Function that gives classes names, as if they stood in a file ``mine.py``."""
-    before = [dict(table) for table in (CATALOGUE, RECOMMENDED, OUTSIDE)]
+    before = [dict(table) for table in (CATALOGUE, RECOMMENDED, OUTSIDE_CLASSES)]
     module = types.ModuleType("mine_of_the_tests")
     monkeypatch.setitem(sys.modules, module.__name__, module)
 
@@ -115,7 +115,7 @@ def own(monkeypatch):
         return "mine_of_the_tests:Own"
 
     yield enter
-    for table, kept in zip((CATALOGUE, RECOMMENDED, OUTSIDE), before, strict=True):
+    for table, kept in zip((CATALOGUE, RECOMMENDED, OUTSIDE_CLASSES), before, strict=True):
         table.clear()
         table.update(kept)
 
@@ -201,8 +201,8 @@ def test_wrong_integrators_are_told_in_a_run_and_right_ones_say_how_near_they_ar
 
 def test_the_comparison_with_the_reference_can_see(monkeypatch):
     """The fault to be seen: an allowance that explains everything."""
-    monkeypatch.setattr(outside, "_expected", lambda *given: 1e9)
-    monkeypatch.setattr(outside, "CEILING", 1e9)
+    monkeypatch.setattr(outside, "_expected_error", lambda *given: 1e9)
+    monkeypatch.setattr(outside, "LARGEST_BOUND", 1e9)
     assert len(wrong_engines.integrators_that_pass()) == len(wrong_engines.WRONG_ENGINES)
 
 

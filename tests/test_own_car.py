@@ -11,7 +11,7 @@ import pytest
 from models.brake.sprung import suspended_vehicle
 from models.core.errors import InputError, Refused
 from models.core.systems import load
-from models.engines.braking_sprung_plain import PlainOnSprings
+from models.engines.braking_sprung_plain import PlainSprungVehicle
 from models.engines.export import ExportSubject
 from models.engines.spatial_protocol import build as build_spatial
 from models.multibody.numbers import Controls, Handling
@@ -328,7 +328,7 @@ def test_it_brakes_in_both_engines_as_the_plain_equations_do(saloon):
     assert (own.plane.front.spin_inertia, own.plane.rear.spin_inertia) == (1.1, 1.2)
     torques = steady_torques(500.0, 500.0, 200.0, 200.0)
     in_engines = [braked_vehicle(own, table_of_surface("wet"), engine, 0.05, 1e-3) for engine in ("exudyn", "mujoco")]
-    cars = (*in_engines, replace(in_engines[0], engine=PlainOnSprings(own)))
+    cars = (*in_engines, replace(in_engines[0], engine=PlainSprungVehicle(own)))
     exudyn, mujoco, plain = (each.run(torques, 6.0, 0.1).states[-1] for each in cars)
     assert mujoco == pytest.approx(exudyn, abs=1e-10)
     assert plain == pytest.approx(exudyn, abs=1e-10)

@@ -221,7 +221,7 @@ class Fixed:
 @pytest.fixture
 def catalogue(monkeypatch):
     """Engines from outside leave the catalogue with the test that entered them: others list what is in it."""
-    for table in (outside.CATALOGUE, outside.RECOMMENDED, outside.OUTSIDE):
+    for table in (outside.CATALOGUE, outside.RECOMMENDED, outside.OUTSIDE_CLASSES):
         monkeypatch.setitem(table, f"{__name__}:Fixed", None)  # which is taken back; until then register enters it
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.advice.price import runner as cost
-from models.engines.spatial_protocol import METHODS
+from models.engines.spatial_protocol import ALLOWED_INTEGRATORS
 from validation.price.problems import free_vehicle
 from validation.price.problems.free_vehicle import COMPARED_GRID, FULL_STEPS, FreeVehicle, track_heights
 
@@ -21,7 +21,7 @@ def test_the_road_is_smooth_and_has_the_slope_that_it_says():
 
 def test_every_method_of_both_engines_is_tried():
     tried = {(engine, method.split()[0]) for engine, method in FULL_STEPS}
-    assert {(engine, method) for engine, methods in METHODS.items() for method in methods} <= tried
+    assert {(engine, method) for engine, methods in ALLOWED_INTEGRATORS.items() for method in methods} <= tried
     for steps in FULL_STEPS.values():
         assert all(step < 1e-5 or abs(COMPARED_GRID / step - round(COMPARED_GRID / step)) < 1e-9 for step in steps)
 

@@ -9,8 +9,8 @@ from models.core.errors import InputError
 from models.core.result import Result
 from models.drift.score import (
     SECTION_FORCE_CHANNELS,
-    Errors,
     Limits,
+    RunErrors,
     RunFigures,
     blind_verdict,
     errors_of_run,
@@ -38,7 +38,7 @@ FIGURES = RunFigures(
     force_calls=4,
     steps=1,
 )
-ERRORS = Errors(
+ERRORS = RunErrors(
     damage=dict.fromkeys(SECTION_FORCE_CHANNELS, 1.01),
     force_rms={},
     vertical_damage={"f3": 1.0, "f4": 1.0},

@@ -46,7 +46,7 @@ def test_a_force_without_its_sign_fails_its_rows(monkeypatch, tmp_path, module, 
 
     monkeypatch.setattr(getattr(module, model), "_enforced", upward)
     if engine == "exudyn":
-        monkeypatch.setattr(exudyn, "balanced", lambda *_: None)  # which would raise before the row could see it
+        monkeypatch.setattr(exudyn, "check_balance", lambda *_: None)  # which would raise before the row could see it
     names = {f"stabilisers.mass.{engine}.{vehicle}" for vehicle in ("itwm_drift", "asymmetric_twin")}
     assert failed(case, tmp_path) == names
 
@@ -84,12 +84,12 @@ def test_figure_draws_from_saved_data(measured):
 
 
 def test_exudyns_limit_stops_would_be_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(exudyn, "_pitch_spring", hard._limit_stop)
+    monkeypatch.setattr(exudyn, "_add_pitch_spring", hard._limit_stop)
     edge = next(one for one in hard.CASES if one.name == "edge of a dead band")
     assert judge(edge, "exudyn", tmp_path).word == "SILENT"
 
 
 def test_without_the_balance_rough_rails_are_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(exudyn, "balanced", lambda *_: None)
+    monkeypatch.setattr(exudyn, "check_balance", lambda *_: None)
     rough = next(one for one in hard.CASES if one.name.startswith("noise of 1e-6 on prescribed"))
     assert judge(rough, "exudyn", tmp_path).word == "SILENT"

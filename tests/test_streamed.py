@@ -8,7 +8,13 @@ import pytest
 from models.core.noise import normal_samples
 from models.ensemble.runner import Blocks, each_block
 from models.ensemble.statistics import FAN_PERCENTILES, deviation_with_error, percentiles, quantile_with_interval
-from models.ensemble.streamed import QUANTILE_ACCURACY, Moments, Spread, StreamedCovariance, Tally
+from models.ensemble.streamed import (
+    QUANTILE_ACCURACY,
+    MagnitudeQuantiles,
+    StreamedCovariance,
+    StreamedMoments,
+    ValueCounts,
+)
 
 VALUES = normal_samples(11, 0, 3000 * 4, 1).reshape(1000, 3, 4) * [1.0, 1e3, 1e-6, 1.0] + [0.0, 5e3, 1.0, 1e4]
 
@@ -23,7 +29,7 @@ def streamed(kind, values, cuts):
 @pytest.mark.parametrize("cuts", [[], [1, 10, 700], list(range(50, 1000, 50))], ids=len)
 def test_moments_and_covariances_are_those_of_all_values(cuts):
     """To rounding of sums about a mean that lies up to 1e6 deviations away: 1e6 eps of a deviation, 1e-10."""
-    moments, both = (streamed(kind, VALUES, cuts) for kind in (Moments, StreamedCovariance))
+    moments, both = (streamed(kind, VALUES, cuts) for kind in (StreamedMoments, StreamedCovariance))
     for place in np.ndindex(3, 4):
         assert moments.deviation(*place) == pytest.approx(deviation_with_error(VALUES[:, *place]), rel=1e-9)
     for row in range(3):
@@ -34,7 +40,7 @@ def test_moments_and_covariances_are_those_of_all_values(cuts):
 
 
 def test_a_correction_that_is_left_out_is_seen():
-    class Faulty(Moments):
+    class Faulty(StreamedMoments):
         def add(self, values):
             before = self.second
             super().add(values)
@@ -48,14 +54,14 @@ def test_a_correction_that_is_left_out_is_seen():
 def test_quantiles_of_a_grid_are_exact_with_their_intervals(level):
     times = np.round(np.abs(VALUES[:, 0, 0]), 2)
     times[::7] = np.inf
-    assert streamed(Tally, times, [3, 500]).quantile(level) == quantile_with_interval(times, level)
+    assert streamed(ValueCounts, times, [3, 500]).quantile(level) == quantile_with_interval(times, level)
 
 
 def test_percentiles_are_within_the_stated_share():
     """Of the value of the rank; numpy's lies between two ranks, which here are at most 2 % apart in the middle."""
     errors = VALUES[:, :, 0].copy()
     errors[::10, 1], errors[:, 2] = np.nan, 0.0
-    spread = streamed(Spread, errors, [1, 400]).percentiles(FAN_PERCENTILES)
+    spread = streamed(MagnitudeQuantiles, errors, [1, 400]).percentiles(FAN_PERCENTILES)
     for i, level in enumerate(FAN_PERCENTILES):
         for k in (0, 1):
             lower = np.nanpercentile(np.abs(errors[:, k]), level, method="lower")
@@ -76,7 +82,7 @@ class Paths:
 
 def peak(paths, folder):
     tracemalloc.start()
-    moments = Moments()
+    moments = StreamedMoments()
     for block in each_block(Paths(), paths, folder, blocks=Blocks(10)):
         moments.add(block["states"])
     most = tracemalloc.get_traced_memory()[1]

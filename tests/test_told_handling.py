@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.core.assumptions import assumed_of, broken_of
+from models.core.assumptions import assumption_sentences, broken_of
 from models.core.discretisation import WARNED_SHARE, error_lines, errors_of
 from models.core.errors import RunFailed
 from models.core.systems import load
@@ -71,7 +71,9 @@ def test_a_gentle_manoeuvre_breaks_nothing_and_show_lists_what_is_assumed():
     own = scene(steer=[[0.1, 0.0], [0.4, 0.02]])
     gentle = run(own, "mujoco")
     assert broken_of(gentle) == [] and gentle.data.attrs["status"] == "complete"
-    assert all(line in describe(own) for line in assumed_of(gentle)) and len(assumed_of(gentle)) >= 10
+    assert (
+        all(line in describe(own) for line in assumption_sentences(gentle)) and len(assumption_sentences(gentle)) >= 10
+    )
 
 
 @pytest.mark.parametrize(("step", "cells"), [(1e-3, 7), (2.5e-3, 12)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.core import told
-from models.core.assumptions import assumed_of, broken_of, with_assumptions
+from models.core.assumptions import assumption_sentences, broken_of, with_assumptions
 from models.core.discretisation import errors_of
 from models.core.systems import load
 from models.core.time_series import write_time_series
@@ -96,7 +96,7 @@ def test_the_measurement_itself_is_judged_and_show_lists_all():
     true = {one.name: one for one in broken_of(module.labelled_result(measurement, measurement.truth, "mujoco"))}
     assert {"tyres press", "springs between stops", "side forces"} <= set(true)
     assert 'system = "handling"' in true["side forces"].remedy
-    assert all(line in describe(own) for line in assumed_of(run(own, "mujoco", measurement=measurement)))
+    assert all(line in describe(own) for line in assumption_sentences(run(own, "mujoco", measurement=measurement)))
 
 
 @pytest.mark.parametrize(
@@ -146,7 +146,7 @@ def recorded(**virtual: object):
 
 def test_recordings_are_judged(tmp_path):
     right = run_recording(recorded(), error=True)
-    assert broken_of(right) == [] and len(assumed_of(right)) == 6
+    assert broken_of(right) == [] and len(assumption_sentences(right)) == 6
     assert 0.0 < max(one.share for one in errors_of(right).values()) < 0.02
     run_recording(recorded(), folder=tmp_path / "a")
     lines = (tmp_path / "a" / "measured.csv").read_text().splitlines()

@@ -5,7 +5,7 @@ import pytest
 
 from models.core import discretisation
 from models.core.assumptions import broken_of
-from models.core.discretisation import Series, errors_of, estimated, worst_of
+from models.core.discretisation import Series, errors_of, largest_estimate, with_estimated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, result
 from models.core.systems import load
@@ -228,9 +228,9 @@ def test_an_estimate_that_forgets_how_errors_grow_is_caught(monkeypatch):
         scene(), {"z3": Channel("time", fine.channels["z3"], "m")}, {"time": Channel("time", fine.times, "s")}
     )
     true = 1e-3 * float(np.sqrt(np.mean(fine.times**4)))
-    assert errors_of(estimated(made, fine, drifting, 2, step))["z3"].error == pytest.approx(true, rel=0.3)
+    assert errors_of(with_estimated_errors(made, fine, drifting, 2, step))["z3"].error == pytest.approx(true, rel=0.3)
     monkeypatch.setattr(discretisation, "_growth_after_window", lambda gap, values: 1.0)
-    assert errors_of(estimated(made, fine, drifting, 2, step))["z3"].error < true / 3.0
+    assert errors_of(with_estimated_errors(made, fine, drifting, 2, step))["z3"].error < true / 3.0
 
 
 @pytest.mark.parametrize("steps", [1, 2, 3, 5])
@@ -249,11 +249,11 @@ def test_a_refused_run_names_a_step_that_is_then_accepted():
     soft = {"vehicle": {"override": {"k1": 1e5, "k2": 1e5, "d1": 3000.0, "d2": 3000.0}}}
     with pytest.raises(RunFailed, match="this is no answer") as refusal:
         run(scene(duration=3.0, step=3e-3, **rough, **soft), "reference", error=True)
-    advised = worst_of(refusal.value.partial).step
+    advised = largest_estimate(refusal.value.partial).step
     shorter = float(f"{advised:g}")  # as it is printed
     assert (
         shorter < 3e-3
-        and not worst_of(run(scene(duration=3.0, step=shorter, **rough, **soft), "mujoco", error=True)).warned
+        and not largest_estimate(run(scene(duration=3.0, step=shorter, **rough, **soft), "mujoco", error=True)).warned
     )
 
 
@@ -265,5 +265,5 @@ SAYS_SO = {"tyres press", "springs compressed"}
 def test_shipped_scenes_raise_no_alarm_that_they_do_not_speak_of(name, allowed):
     shipped = load(SCENES_FOLDER / f"{name}.toml")
     made = run(shipped, "reference", error=True)
-    assert {breach.name for breach in broken_of(made)} == allowed and not worst_of(made).warned
+    assert {breach.name for breach in broken_of(made)} == allowed and not largest_estimate(made).warned
     assert not allowed or "for 3 % of the time" in (SCENES_FOLDER / f"{name}.toml").read_text()

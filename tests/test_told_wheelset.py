@@ -145,7 +145,7 @@ def test_joined_paths_keep_what_each_says():
     paths = {"reference": {SPEED: run(scene(**PUSHED), "reference", error=True)}}
     whole = over_speeds(paths)
     assert names(whole) == names(paths["reference"][SPEED]) and "reference, 40 m/s, y of cells" in errors_of(whole)
-    json.dumps(told.as_json({"whole": whole}), allow_nan=False)
+    json.dumps(told.errors_and_assumptions({"whole": whole}), allow_nan=False)
 
 
 def test_a_limit_cycle_tells_its_error_and_what_it_takes_for_granted():

@@ -9,8 +9,8 @@ import pytest
 
 from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import named_effects, scene_without
-from models.engines.free_vehicle import built_share, free_model
-from models.engines.towed_springs import divided, numbers_beside
+from models.engines.free_vehicle import free_model, native_elements_and_joints
+from models.engines.towed_springs import shared_numbers, towed_division
 from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.systems.handling.energy import drive_energy, unaccounted
@@ -97,9 +97,9 @@ def test_a_file_of_ones_own_keeps_its_trailer(tmp_path):
 @pytest.mark.parametrize("engine", ["mujoco", "exudyn"])
 def test_springs_of_a_trailer_are_the_engines_own_and_bear_it(engine):
     car = rolling_cars()["train"]
-    division = divided(car, engine)
-    driven_by_both = replace(driven_by(car), numbers=numbers_beside(car, division), parts=division.native)
-    names, _ = built_share(engine, driven_by_both)
+    division = towed_division(car, engine)
+    driven_by_both = replace(driven_by(car), numbers=shared_numbers(car, division), parts=division.native)
+    names, _ = native_elements_and_joints(engine, driven_by_both)
     wanted = {spring.name for spring in car.given.springs if spring.frame in car.given.towed} | {"trailer's bar"}
     assert set(names) == wanted
     assert all("friction" in why for why in division.reasons.values()) and len(division.reasons) == 4

@@ -10,7 +10,7 @@ import pytest
 
 from models.core.noise import GYRO_BIAS, normal_samples
 from models.core.systems import of_table
-from models.engines.stability import first_order, growth
+from models.engines.stability import first_order, log_growth
 from models.multibody.numbers import Handling, Tyres
 from models.sensors.inertial_unit import bias_path
 from models.systems.braking.of_scene import controller_of
@@ -101,7 +101,7 @@ def test_an_oscillator_grows_in_steps_of_euler_by_their_known_factor():
     undamped = (mass, 0.0 * damping, stiffness, 0.0 * damping, 0.0 * damping)
     assert first_order((mass, damping, stiffness, damping, damping)).tolist() == [[0.0, 1.0], [-36.0, -0.2]]
     wanted = 0.3 / 1e-3 * 0.5 * math.log1p(36.0 * 1e-6)
-    assert growth("ExplicitEuler", 1e-3, 0.3, undamped) == pytest.approx(wanted, rel=1e-9)
+    assert log_growth("ExplicitEuler", 1e-3, 0.3, undamped) == pytest.approx(wanted, rel=1e-9)
 
 
 def test_a_bias_starts_from_its_draw_and_forgets_by_its_time():

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from models.core.waiting import SHARES_OF_MARCHES, marching
+from models.core.waiting import PROGRESS_FUNCTIONS, simulation_progress
 from models.engines.assembly import Settings
 from models.engines.protocol import build
 from models.systems.pitch_plane.scene import assembly_of_scene
@@ -20,7 +20,7 @@ from validation.common.scenes import road_scene
 ROOT = Path(__file__).parents[1]
 WORK = """
 import os, sys, time
-from models.core.waiting import marching
+from models.core.waiting import simulation_progress
 from studies.command.waiting import progress_bar
 begun = time.monotonic()
 def until(seen):
@@ -28,7 +28,7 @@ def until(seen):
         time.sleep(0.05)
 with progress_bar("road: exudyn", "handling") as tell:
     tell("road: exudyn", 0.0)
-    with marching(lambda: min(0.9, (time.monotonic() - begun) / {0})):
+    with simulation_progress(lambda: min(0.9, (time.monotonic() - begun) / {0})):
         until("march")
     import numba
     from numba.core import event
@@ -118,7 +118,7 @@ def test_a_march_tells_how_far_it_is(engine, monkeypatch):
             ends.append(share())
             super().remove(share)
 
-    monkeypatch.setattr("models.core.waiting.SHARES_OF_MARCHES", Told())
+    monkeypatch.setattr("models.core.waiting.PROGRESS_FUNCTIONS", Told())
     scene = road_scene(duration=0.5)
     build(engine, assembly_of_scene(scene), Settings({"exudyn": "RK44", "mujoco": "RK4"}[engine], 1e-3, 0.5)).run()
     assert ends == [pytest.approx(1.0, abs=1e-9)]
@@ -140,10 +140,10 @@ def test_time_left_follows_the_share_and_leaves_out_compiling(monkeypatch):
     assert shown.state()[1:] == (None, f"{2.0 + 2.0 * COMPILE_SECONDS['pitch-plane']:.0f} s so far")
     shown.compilations._end_compilation()
     assert shown.state() == ("six runs", 0.25, "30 s left")
-    with marching(lambda: 0.5):
+    with simulation_progress(lambda: 0.5):
         shown.state()
         now[0] += 8.0
         assert shown.state() == ("six runs", 0.5, "8 s left")
-    assert not SHARES_OF_MARCHES
-    with marching(lambda: 1 / 0):
+    assert not PROGRESS_FUNCTIONS
+    with simulation_progress(lambda: 1 / 0):
         assert shown.state()[1] == 0.0

@@ -10,7 +10,7 @@ import pytest
 from mortal_job import Mortal
 
 from models.core.errors import InputError
-from models.ensemble.runner import Blocks, in_order, run_paths
+from models.ensemble.runner import Blocks, run_paths, values_in_order
 from models.ensemble.workers import Crew, process_pool
 from models.identification.fit import fit
 from models.identification.problem import FitClock, Parameter, Problem, measured_channel
@@ -58,7 +58,7 @@ def test_profiles_of_a_fit_are_the_same_by_two_workers(pool):
     clock = FitClock(times)
     channel = measured_channel("y", "-", (times, 1.0 + 2.0 * times + 0.1 * random.standard_normal(200)), clock)
     known = uncertainty(fit(Problem(straight, [Parameter("a", 0.5), Parameter("b", 1.0)], [channel], clock)))
-    shared = list(in_order(partial(likelihood_profile, known), iter([0, 1]), pool))
+    shared = list(values_in_order(partial(likelihood_profile, known), iter([0, 1]), pool))
     assert [k for k, _ in shared] == [0, 1]
     for k, made in shared:
         alone = likelihood_profile(known, k)

@@ -8,7 +8,7 @@ import pytest
 from models.core.errors import InputError, RunFailed
 from models.core.systems import load
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import PLAIN
+from models.engines.cut_vehicle import PLAIN_ENGINE
 from models.engines.cut_vehicle import build as hub_model
 from models.engines.free_vehicle import Plain
 from models.multibody import forces as at
@@ -113,7 +113,7 @@ def test_a_run_that_blows_up_fails():
         return np.full(len(q), np.inf)
 
     with pytest.raises(RunFailed):
-        Plain(PLAIN, blown, 1, Settings("RK4", 1e-3, 0.01)).run()
+        Plain(PLAIN_ENGINE, blown, 1, Settings("RK4", 1e-3, 0.01)).run()
 
 
 def test_curves_of_the_description_press():
@@ -129,7 +129,7 @@ def test_curves_of_the_description_press():
 def test_a_cut_car_rests_on_its_static_loads():
     vehicle = cut_cars()["twin"]
     still = np.zeros(vehicle.size)
-    model = hub_model(PLAIN, vehicle, static_forces(vehicle, 3), 1e-3, 1e-3)
+    model = hub_model(PLAIN_ENGINE, vehicle, static_forces(vehicle, 3), 1e-3, 1e-3)
     assert np.abs(model.acceleration(0.0, still, still)).max() < 1e-9
 
 

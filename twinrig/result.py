@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.core import result as saved
-from models.core.assumptions import BrokenAssumption, assumed_of, broken_of
+from models.core.assumptions import BrokenAssumption, assumption_sentences, broken_of
 from models.core.discretisation import Estimate, errors_of
 from models.core.errors import InputError
 from models.core.told import figure_remarks, message_lines
@@ -53,7 +53,7 @@ class Result(saved.Result):
     @property
     def assumed(self) -> list[str]:
         """Sentences of all assumptions that were checked in the run, broken or not."""
-        return assumed_of(self)
+        return assumption_sentences(self)
 
     @property
     def _label(self) -> str:

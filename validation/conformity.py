@@ -17,7 +17,7 @@ import numpy as np
 from models.core.errors import InputError, RunFailed
 from models.core.result import provenance
 from models.engines.assembly import Assembly, Settings
-from models.engines.catalogue import CATALOGUE, OUTSIDE
+from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES
 from models.engines.outside import register
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assembly_of_scene
@@ -99,7 +99,7 @@ def _value_text(row: Row) -> str:
 
 
 def _conformity_rows(name: str, folder: Path) -> Iterator[Row]:
-    second: Independence = "shared kernel" if hasattr(OUTSIDE[name], "integrate") else "native"
+    second: Independence = "shared kernel" if hasattr(OUTSIDE_CLASSES[name], "integrate") else "native"
     for id, quantity, unit, bound, why, error in _checks_on_engine(name, folder):
         yield _error_row(f"conformity.{id}", quantity, unit, bound, why, error, second)
     yield _order_row(name, second)
@@ -191,7 +191,7 @@ def _audit_assembly(vehicle: str, geometry: str) -> Assembly:
 
 
 def _is_adaptive(name: str) -> bool:
-    return bool(getattr(OUTSIDE[name], "adaptive", False))
+    return bool(getattr(OUTSIDE_CLASSES[name], "adaptive", False))
 
 
 def _difference_bound(name: str) -> float:

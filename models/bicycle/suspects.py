@@ -13,7 +13,7 @@ import numpy as np
 from models.bicycle.weave import Observation
 from models.bicycle.whipple import Control, Whipple
 from models.core.errors import InputError
-from models.identification.subsets import Candidate, Choice
+from models.identification.subsets import Candidate, SubsetChoice
 from models.identification.subsets import ranked_subsets as chosen_of
 
 SUSPECTED_PARAMETERS = {
@@ -45,7 +45,7 @@ def ranked_suspects(
     base_control: Control,
     observations: Sequence[Observation],
     suspects: Sequence[str] = tuple(SUSPECTED_PARAMETERS),
-) -> Choice:
+) -> SubsetChoice:
     """Fits of every subset of the suspected control parameters, ranked; InputError for fewer than two speeds, or an
     unknown name.
     """
@@ -67,7 +67,7 @@ def ranked_suspects(
 
 
 def averaged_weave(
-    bicycle: Whipple, base_control: Control, choice: Choice, observation: Observation
+    bicycle: Whipple, base_control: Control, choice: SubsetChoice, observation: Observation
 ) -> tuple[np.ndarray, np.ndarray]:
     """Decay rate and angular frequency (2,) of the weave, averaged over all subsets of parameters with their weights,
     and their standard deviations (2,).
@@ -78,7 +78,7 @@ def averaged_weave(
 
 
 def forecast_deviations(
-    bicycle: Whipple, base_control: Control, choice: Choice, observation: Observation
+    bicycle: Whipple, base_control: Control, choice: SubsetChoice, observation: Observation
 ) -> np.ndarray:
     """Forecast less measured real and imaginary part of the weave (2,), divided by the standard deviation of
     measurement and forecast together.

@@ -226,8 +226,9 @@ class OnEngine(NamedTuple):
     """Data that a step of a vehicle on its suspension needs in addition to the data of a plane step.
 
     numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
-    middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine :
-    its model; units : ``Units``; lag : of ``models.brake.sprung_relaxation``, empty where tyres answer at once.
+    middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see
+    ``EngineSprungVehicle``; engine : its model; units : ``Units``; lag : of ``models.brake.sprung_relaxation``, empty
+    where tyres answer at once.
     """
 
     numbers: np.ndarray

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from models.core.errors import InputError
-from models.core.strict import Strict, message
+from models.core.strict import Strict, input_error_from_faults
 
 LARGEST_MISMATCH = 0.01
 """Largest |K| of a pair that theories without K accept: at mu = 0.3 the forces would be off by 7 % of mu N."""
@@ -29,7 +29,7 @@ class Material(Strict):
         try:
             super().__init__(**values)
         except ValidationError as error:
-            raise message(error, type(self), "", "material") from None
+            raise input_error_from_faults(error, type(self), "", "material") from None
 
     @property
     def G(self) -> float:

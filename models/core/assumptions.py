@@ -1,4 +1,4 @@
-"""Assumptions of a vehicle, an effect or a law, and whether a run kept to them."""
+"""Assumptions of a vehicle, an effect or a force law, and whether a run satisfies them."""
 
 import json
 import math
@@ -13,13 +13,14 @@ import numpy as np
 from models.core.result import Result
 
 ALLOWED_TIME_SHARE = 0.00135
-"""Share of the time for which a Gaussian may lie beyond a limit: that of three standard deviations."""
+"""Share of the time for which a normally distributed quantity may exceed a limit: the tail beyond three standard
+deviations."""
 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Values known only by mean and standard deviation (rows,); ``rows`` holds a label for each, such as "at 20
-    m/s"."""
+    """Normally distributed quantities known only by their means and standard deviations (rows,); ``rows`` labels each
+    of them, such as "at 20 m/s"."""
 
     mean: np.ndarray
     deviation: np.ndarray
@@ -27,13 +28,13 @@ class Gaussian:
 
 
 Watched = Mapping[str, np.ndarray | Gaussian]
-"""Values at every row of a run, by the name of the part (wheel, strut, joint) that they are of."""
+"""Values of a quantity at every row of a run, by the name of the wheel, strut or joint."""
 
 
 @dataclass(frozen=True)
 class Assumption:
-    """One assumption: that the values of ``watched_values`` stay between ``lower_limit`` and ``upper_limit``, in
-    ``unit``.
+    """One modelling assumption: the values that ``watched_values`` takes from a result stay between ``lower_limit`` and
+    ``upper_limit``, in ``unit``.
 
     name : a few words; says : a sentence; remedy : what removes the assumption, such as an effect to name.
     """
@@ -48,7 +49,7 @@ class Assumption:
 
     @property
     def allowed(self) -> str:
-        """Text on the allowed range."""
+        """The allowed range with its unit, as text."""
         low, high = f"at least {self.lower_limit:g}", f"at most {self.upper_limit:g}"
         if math.isinf(self.upper_limit):
             return f"{low} {self.unit}".rstrip()
@@ -59,7 +60,8 @@ class Assumption:
 
 @dataclass(frozen=True)
 class BrokenAssumption:
-    """A violated assumption: ``where``, the share of time, the time of the first violation (s), and the worst value.
+    """A violated assumption: ``where`` (wheel, strut or joint), the share of time, the time of the first violation (s),
+    and the worst value.
 
     law : by which the share is told where no values over time are known; the worst value then is three deviations off.
     """
@@ -77,15 +79,15 @@ class BrokenAssumption:
 
     @property
     def _worst_value_text(self) -> str:
-        """Text with the worst value in four digits and its unit; no power of ten below a million."""
+        """The worst value with its unit as text of four digits, without a power of ten below a million."""
         return f"worst {float(f'{self.worst:.4g}'):g} {self.unit}".rstrip()
 
     def brief(self) -> str:
-        """Short text for a figure."""
+        """Short text for a figure that says which assumption was broken, where, and how far."""
         return f"assumption broken: {self.fact()}"
 
     def fact(self) -> str:
-        """Sentence that the assumption was broken, for readers who know the assumption."""
+        """Sentence that states where and how far the assumption was broken, for readers who know the assumption."""
         return f"{self.says}; {self.where}, {self._time_text}, {self._worst_value_text}"
 
     @property
@@ -95,7 +97,8 @@ class BrokenAssumption:
         return f"{100.0 * self.share:.3g} % of the time" + self.law
 
     def line(self) -> str:
-        """A full sentence for readers who do not know the assumption."""
+        """Full sentence on the violation with the allowed range and a remedy, for readers who do not know the
+        assumption."""
         first = "" if math.isnan(self.first) else f", first at {self.first:.4g} s"
         return (
             f"assumption broken: {self.says}; {self.where}: {self._time_text}{first}, {self._worst_value_text} "
@@ -107,32 +110,45 @@ def worst_violation(run: Result, assumption: Assumption) -> BrokenAssumption | N
     """The worst violation of an assumption in a run, or None if there is none; NaN and infinite values are not
     judged."""
     judged = [
-        _longest_exceedance(run, assumption, value_name, values)
+        _gaussian_violation(run, assumption, value_name, values)
         if isinstance(values, Gaussian)
-        else _gaussian_violation(run, assumption, value_name, np.asarray(values, float))
+        else _sampled_violation(run, assumption, value_name, np.asarray(values, float))
         for value_name, values in assumption.watched_values(run).items()
     ]
     return max((breach for breach in judged if breach is not None), key=lambda breach: breach.share, default=None)
 
 
-def _gaussian_violation(run: Result, a: Assumption, where: str, values: np.ndarray) -> BrokenAssumption | None:
-    beyond = (values < a.lower_limit) | (values > a.upper_limit)
+def _sampled_violation(run: Result, assumption: Assumption, where: str, values: np.ndarray) -> BrokenAssumption | None:
+    """The violation of an assumption by values sampled over a run; None if all lie within the limits."""
+    beyond = (values < assumption.lower_limit) | (values > assumption.upper_limit)
     if not beyond.any():
         return None
-    excess = np.where(beyond, np.maximum(a.lower_limit - values, values - a.upper_limit), -np.inf)
+    excess = np.where(beyond, np.maximum(assumption.lower_limit - values, values - assumption.upper_limit), -np.inf)
     timed = "time" in run.data.coords and len(values) == len(run.times)
     first = float(run.times[np.argmax(beyond)]) if timed else math.nan
     worst, share = float(values[np.argmax(excess)]), float(np.mean(beyond))
-    return BrokenAssumption(a.name, a.says, where, share, first, worst, a.unit, a.allowed, a.remedy)
+    return BrokenAssumption(
+        assumption.name,
+        assumption.says,
+        where,
+        share,
+        first,
+        worst,
+        assumption.unit,
+        assumption.allowed,
+        assumption.remedy,
+    )
 
 
-def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian) -> BrokenAssumption | None:
-    """The violation by the row whose normally distributed values exceed a limit for the largest share of time; None if
-    no share is above ALLOWED_TIME_SHARE."""
+def _gaussian_violation(run: Result, assumption: Assumption, where: str, values: Gaussian) -> BrokenAssumption | None:
+    """The violation by the normally distributed quantity that exceeds a limit for the largest share of the time; None
+    if no share is above ALLOWED_TIME_SHARE."""
     from scipy.special import ndtr
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        sides = np.array([a.lower_limit - values.mean, values.mean - a.upper_limit]) / values.deviation
+        sides = (
+            np.array([assumption.lower_limit - values.mean, values.mean - assumption.upper_limit]) / values.deviation
+        )
     known = np.isfinite(values.deviation) & (values.deviation > 0.0)
     shares = np.where(known, ndtr(np.where(known, sides, -np.inf)), 0.0)
     if not (shares > ALLOWED_TIME_SHARE).any():
@@ -143,11 +159,22 @@ def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian
     worst = float(values.mean[row] + (-3.0, 3.0)[side] * values.deviation[row])
     value_name = f"{where} {values.rows[row]}" if values.rows else where
     share, law = float(shares[side, row]), " by the normal law"
-    return BrokenAssumption(a.name, a.says, value_name, share, first, worst, a.unit, a.allowed, a.remedy, law)
+    return BrokenAssumption(
+        assumption.name,
+        assumption.says,
+        value_name,
+        share,
+        first,
+        worst,
+        assumption.unit,
+        assumption.allowed,
+        assumption.remedy,
+        law,
+    )
 
 
 def with_assumptions(run: Result, assumptions: Iterable[Assumption]) -> Result:
-    """The result with a list of its assumptions and of those that it violates; its status names violations, too."""
+    """The result with the list of its assumptions and of the violated ones; violations are named in its status, too."""
     listed = list(assumptions)
     breaches = [breach for breach in (worst_violation(run, assumption) for assumption in listed) if breach is not None]
     run.data.attrs["assumptions"] = json.dumps(
@@ -163,7 +190,7 @@ _RESULT_OBSERVER: ContextVar[Callable[[Result], None]] = ContextVar("noted", def
 
 
 @contextmanager
-def watching(note: Callable[[Result], None]) -> Iterator[None]:
+def result_observer(note: Callable[[Result], None]) -> Iterator[None]:
     """Context in which ``note`` is called with each result that is checked for assumptions. Of nested contexts only the
     inner one is called."""
     token = _RESULT_OBSERVER.set(note)
@@ -184,8 +211,8 @@ def broken_of(run: Result) -> list[BrokenAssumption]:
     return [BrokenAssumption(**entry) for entry in stored.get("broken", ())]
 
 
-def assumed_of(run: Result) -> list[str]:
-    """Assumptions against which a result was checked."""
+def assumption_sentences(run: Result) -> list[str]:
+    """Sentences of the assumptions against which a result was checked."""
     stored: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
     return list(stored.get("assumed", ()))
 
@@ -201,5 +228,5 @@ def collected_breaches() -> Iterator[dict[str, BrokenAssumption]]:
             if breach.name not in worst or breach.share > worst[breach.name].share:
                 worst[breach.name] = breach
 
-    with watching(note):
+    with result_observer(note):
         yield worst

@@ -1,5 +1,5 @@
-"""Where the numbers of a CSV file begin and what stands above them: titles, groups, headings, units; and tables as
-spreadsheets and loggers write them, turned line by line into the plain form of ``models.core.tables``.
+"""Finds the headings, units and first row of numbers in CSV files of spreadsheets and loggers, and turns them line by
+line into the plain form of ``models.core.tables``.
 
 The line of headings is the first one with a heading that the caller knows (a clock, say) above a row of numbers with as
 many cells. Whatever exporters write above it is kept: title rows, a row of groups; beneath it a row of units.
@@ -16,26 +16,27 @@ from models.core.errors import InputError
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 MOST_ROWS_BETWEEN = 3
-"""Most rows between the headings and the numbers."""
+"""Largest number of rows between the headings and the numbers."""
 NUMBER_PATTERN = re.compile(r"\s*[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?\s*", re.IGNORECASE)
 MISSING_VALUE_PATTERN = re.compile(
     r"\s*([+-]?nan(\(ind\))?|#?n/?a|n\.a\.|null|none|-+|inv(alid)?|missing|\*+|\?+|no ?data|void|"
     r"#value!|#div/0!|[+-]?1[.,]#(qnan|ind)0*)?\s*",
     re.IGNORECASE,
 )
-"""Cells that say that nothing was measured."""
+"""Pattern of the cells that mark a missing measured value."""
 CLOCK_TIME_PATTERN = re.compile(
     r"\s*(\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]+)?\d{1,3}:\d{2}(:\d{2})?([.,:]\d+)?\s*(z|[+-]\d{2}:?\d{2}|"
     r"am|pm)?\s*",
     re.IGNORECASE,
 )
-"""Cells that are a time of the clock, in whatever notation."""
+"""Pattern of the cells that hold a time of day, with or without a date, in any common notation."""
 _THOUSANDS_PATTERN = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _HEADING_PATTERN = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?", re.DOTALL)
 
 
 class FileLine(NamedTuple):
-    """A line of the file: number from 1, text without the line end, and the bytes where it begins and ends."""
+    """A line of a text file: its number from 1, its text without the line end, and the bytes where it begins and
+    ends."""
 
     number: int
     text: str
@@ -45,11 +46,12 @@ class FileLine(NamedTuple):
 
 @dataclass(frozen=True)
 class TableHead:
-    """Headings of a table, and the lines around them up to the numbers.
+    """Headings of a CSV table, and the lines around them up to the numbers.
 
     header : the line of headings. separator : between its cells. names : its cells, those that are empty at its end
-    left out. width : cells of the rows of numbers. titles : lines above the headings. between : rows between headings
-    and numbers. begin, line : byte where the rows of numbers begin, and number of the line before them.
+    left out. width : cells of the rows of numbers. titles : lines above the headings. rows_between : rows between
+    headings and numbers. numbers_begin, line_before_numbers : byte where the rows of numbers begin, and number of the
+    line before them.
     """
 
     header: FileLine
@@ -57,17 +59,17 @@ class TableHead:
     names: tuple[str, ...]
     width: int
     titles: tuple[FileLine, ...]
-    between: tuple[FileLine, ...]
-    begin: int
-    line: int
+    rows_between: tuple[FileLine, ...]
+    numbers_begin: int
+    line_before_numbers: int
 
     def cells(self, line: FileLine) -> tuple[str, ...]:
-        """Cells of a line, cut to the number of headings."""
+        """Cells of a line, cut or filled up with empty ones to the number of headings."""
         return tuple((split_cells(line.text, self.separator) + [""] * len(self.names))[: len(self.names)])
 
     def groups(self) -> tuple[str, ...]:
-        """Group name of each heading, from the row above if it has as many cells. An empty cell repeats the one before
-        it. Empty if there is no such row."""
+        """Group name of each heading, from the row above the headings if it has as many cells; an empty cell repeats
+        the name before it. Returns () if there is no such row."""
         cells_above = split_cells(self.titles[-1].text, self.separator) if self.titles else []
         if (
             len(self.names) < 3
@@ -97,20 +99,20 @@ def split_cells(text: str, separator: str) -> list[str]:
 
 
 def without_empty_end(cells: Sequence[str]) -> list[str]:
-    """Cells without the empty ones at the end."""
+    """Cells of a line without the empty ones at its end."""
     used = max((i for i, cell in enumerate(cells, start=1) if cell), default=0)
     return list(cells[:used])
 
 
 def separator_line(text: str) -> str:
-    """Separator given by a first line such as ``sep=;``; empty for any other line."""
+    """Column separator given by a first line such as ``sep=;``; empty for any other line."""
     matched = re.fullmatch(r'\s*"?sep=(.)"?\s*', text, re.IGNORECASE)
     return matched[1] if matched else ""
 
 
 def decimal_sign(path: str | Path, line_number: int, separator: str, cells: Sequence[str]) -> str:
-    """Decimal sign used in the cells, which begin in line ``line_number``; InputError where a comma can be read in two
-    ways."""
+    """Decimal sign ("." or ",") of number cells, the first of which stands in line ``line_number``. Raises InputError
+    where a comma can be a decimal sign or a separator of thousands."""
     commas, why = [cell for cell in cells if "," in cell], ""
     if not commas:
         return "."
@@ -134,8 +136,8 @@ def is_number(cell: str) -> bool:
 def find_head(
     lines: Sequence[FileLine], is_known_heading: Callable[[str], bool], separators: Sequence[str]
 ) -> list[TableHead]:
-    """One ``TableHead`` for each separator with which a line is headings above numbers; the first such line is used.
-    Empty if there is none."""
+    """Headings in the first line that stands above a row of numbers: one ``TableHead`` for each separator that splits
+    it so. Empty if there is no such line."""
     heads = (
         [head for sign in separators if (head := _head_in_line(lines, i, is_known_heading, sign))]
         for i in range(len(lines))
@@ -146,8 +148,8 @@ def find_head(
 def find_headings(
     lines: Sequence[FileLine], is_known_heading: Callable[[str], bool], separators: Sequence[str]
 ) -> list[TableHead]:
-    """Headings in the first line with a known heading, whatever rows follow it. Errors in these rows are found when
-    they are read."""
+    """Headings in the first line with a known heading, whatever rows follow: one ``TableHead`` for each possible
+    separator. Errors in the rows are reported when they are read."""
     for i, line in enumerate(lines):
         parted = {sign: without_empty_end(split_cells(line.text, sign)) for sign in separators}
         heads = [
@@ -163,7 +165,7 @@ def find_headings(
 def _head_in_line(
     lines: Sequence[FileLine], i: int, is_known_heading: Callable[[str], bool], separator: str
 ) -> TableHead | None:
-    """Headings in line ``i`` if a row of numbers follows; else None."""
+    """The ``TableHead`` of line ``i`` if headings stand there above a row of numbers; else None."""
     names = without_empty_end(split_cells(lines[i].text, separator))
     first_known = next((k for k, name in enumerate(names) if is_known_heading(name)), None)
     if (
@@ -188,8 +190,8 @@ def _head_in_line(
 
 
 def plain_text(path: str | Path, text: str, wanted_headings: Collection[str]) -> str:
-    """Text of a table in plain form: commas between columns, decimal points and units in the headings. Every line keeps
-    its number.
+    """Text of a CSV table in plain form: commas between columns, decimal points and units in the headings. Every line
+    keeps its number.
 
     ``wanted_headings`` are names of columns, by which the headings are known. Titles become comments; a separator that
     ends the lines, quotes and a row of units go. What has two meanings, or is no such table, comes back as it was, for
@@ -209,11 +211,11 @@ def plain_text(path: str | Path, text: str, wanted_headings: Collection[str]) ->
 
 
 def _plain_table(path: str | Path, lines: list[FileLine], header: TableHead) -> str:
-    """Text of the table with headings and rows in the plain form."""
-    rows = {line.number: split_cells(line.text, header.separator) for line in lines[header.line :]}
+    """Text of a CSV table with headings and rows in the plain form."""
+    rows = {line.number: split_cells(line.text, header.separator) for line in lines[header.line_before_numbers :]}
     cells = [cell for row in rows.values() for cell in row]
-    sign = decimal_sign(path, header.line + 1, header.separator, cells)
-    new = {line.number: f"# {line.text}" if line.text.strip() else "" for line in lines[: header.line]}
+    sign = decimal_sign(path, header.line_before_numbers + 1, header.separator, cells)
+    new = {line.number: f"# {line.text}" if line.text.strip() else "" for line in lines[: header.line_before_numbers]}
     new[header.header.number] = ",".join(_headings_with_units(header))
     for number, row in rows.items():
         row_cells = row[: len(header.names)] if len(row) == header.width and not any(row[len(header.names) :]) else row
@@ -222,10 +224,10 @@ def _plain_table(path: str | Path, lines: list[FileLine], header: TableHead) -> 
 
 
 def _headings_with_units(header: TableHead) -> list[str]:
-    """Headings, completed by the units in the row beneath them if there is one."""
-    if len(header.between) != 1:
+    """Column headings, completed by the units from the row beneath them if there is one."""
+    if len(header.rows_between) != 1:
         return list(header.names)
-    units = [cell.strip("[]() ") for cell in header.cells(header.between[0])]
+    units = [cell.strip("[]() ") for cell in header.cells(header.rows_between[0])]
     return [
         name if name_and_unit(name)[1] else f"{name} [{unit}]" for name, unit in zip(header.names, units, strict=True)
     ]

@@ -1,4 +1,4 @@
-"""Step errors of a run against steps without length, told by a second run in longer steps.
+"""Discretisation errors of a run, estimated from a second run in longer steps.
 
 With steps twice as long a method of order p errs 2^p times as much: the difference of both runs, divided by 2^p - 1, is
 the error of the finer one (Richardson). Roads, switches and contacts lower the order, so that it is observed, where a
@@ -20,30 +20,32 @@ from models.core.errors import InputError, RunFailed
 from models.core.result import Result
 
 WARNED_SHARE, REFUSED_SHARE, GOAL_SHARE = 0.02, 0.5, 0.005
-"""Shares of a channel from which an error is a warning, from which it is no answer, and which a step is advised for."""
+"""Relative errors of a channel: above the first a warning is printed, above the second the run fails, and the third is
+the aim of the advised step."""
 REPEATED_SHARE, FINE_WINDOW = 0.4, 0.3
-"""Shares of a run that are repeated in four times the step, to observe the order, and in half of it."""
-FEW_ROWS = 200
-"""Rows up to which all of a run is repeated in half of its step: that takes little, and a part of few rows may leave
-out what makes the error, such as a turn of the steering at the start."""
+"""Shares of a run repeated in four times the step, to observe the order of convergence, and in half the step."""
+MOST_FULLY_REPEATED_ROWS = 200
+"""Number of rows up to which a run is repeated as a whole in half its step: that costs little, and a part of few rows
+may leave out what makes the error, such as a turn of the steering at the start."""
 STEEPEST_ERROR_GROWTH = 4.0
-"""Largest power of time with which errors of a part are taken to grow on: a road that fades in makes 3, a drift 2."""
+"""Largest power of time with which an error, known for part of a run, is assumed to grow: a road that fades in makes 3,
+a drift 2."""
 LEAST_ORDER = 0.5
-"""Observed orders are taken for at least this: below, runs differ by chance."""
-NOTHING = "none of its channels changes"
+"""Lower limit of an observed order of convergence: below it, runs differ by chance."""
+NO_CHANGING_CHANNEL = "none of its channels changes"
 CELLS_NOTE = "cells along each axis"
-"""What an estimate is of that a coarser grid told."""
+"""Mark of an estimate that comes from a coarser grid of cells rather than from a longer time step."""
 TOLERANCE_POWER, LEAST_TOLERANCE_SHARE = 0.6, 0.03
-"""Power of the tolerance with which the error of an adaptive method is taken to fall, which is from 0.5 to 1.1, and
-share of the tolerance that it errs by at least, as where its input has it stop more often than the tolerance would."""
+"""Assumed power of the tolerance in the error of an adaptive method (observed: 0.5 to 1.1), and the least error as a
+share of the tolerance, for runs whose input makes the method stop more often than the tolerance would."""
 UNMOVED_DEVIATION, ONE_ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
-"""Deviation by size below which a channel does not move; error by size of one rounding."""
+"""Ratio of standard deviation to magnitude below which a channel counts as constant; relative error of one rounding."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimated error of a channel: ``error`` in its unit, ``share`` relative to its standard deviation, ``order`` of
-    convergence.
+    """Estimated error of a channel: ``error`` in the channel's unit, ``share`` relative to its standard deviation,
+    ``order`` of convergence.
 
     step : longest step (s), or fewest cells, that would hold the share to GOAL_SHARE; 0 where no step mends it. of :
     CELLS_NOTE where it is of cells.
@@ -58,66 +60,67 @@ class Estimate:
 
     @property
     def warned(self) -> bool:
-        """Whether the error is so large that the user must be warned."""
+        """Whether the error is so large that the user must be warned: above WARNED_SHARE."""
         return not self.share <= WARNED_SHARE
 
     def advice(self, step_unit: str) -> str:
-        """Advice on reducing the estimated error, ``step_unit`` the unit of steps."""
+        """Advice on the step (``step_unit`` : its unit) or number of cells that reduces the estimated error."""
         if self.of:
             return f"use at least {self.step:g} {self.of}"
         return f"use at most {self.step:g} {step_unit}".rstrip() if self.step else "no shorter step mends it"
 
     @property
     def refused(self) -> bool:
-        """Whether the error makes the channel useless. An error that no smaller step reduces gives a warning only."""
+        """Whether the error makes the channel useless: above REFUSED_SHARE. An error that no smaller step reduces gives
+        a warning only."""
         return not self.share <= REFUSED_SHARE and self.step != 0.0
 
 
-def size_of(values: np.ndarray) -> float:
-    """Size of a channel, to which its error is related: its standard deviation along the first axis, or its magnitude
+def reference_size(values: np.ndarray) -> float:
+    """Reference size of a channel for its relative error: its standard deviation along the first axis, or its magnitude
     if it is constant."""
     largest = float(np.abs(values).max(initial=0.0))
     deviation = float(np.sqrt(np.mean(np.var(values, axis=0))))
     return deviation if deviation > UNMOVED_DEVIATION * largest else largest
 
 
-def observed_order(fine_difference: float, coarse_difference: float, declared: float) -> float:
-    """Order of convergence from the differences between successive runs, limited to LEAST_ORDER up to the declared
-    order."""
+def observed_order(fine_difference: float, coarse_difference: float, declared_order: float) -> float:
+    """Observed order of convergence, log2 of the ratio of the differences between successive runs with halved steps,
+    limited to LEAST_ORDER up to the declared order."""
     if not (
         fine_difference > 0.0
         and coarse_difference > 0.0
         and math.isfinite(fine_difference)
         and math.isfinite(coarse_difference)
     ):
-        return declared if fine_difference == 0.0 else LEAST_ORDER
-    return float(np.clip(math.log2(coarse_difference / fine_difference), LEAST_ORDER, declared))
+        return declared_order if fine_difference == 0.0 else LEAST_ORDER
+    return float(np.clip(math.log2(coarse_difference / fine_difference), LEAST_ORDER, declared_order))
 
 
 def estimate(
     fine_values: np.ndarray,
     coarse_values: np.ndarray,
-    declared: float,
+    declared_order: float,
     step: float,
-    coarser: np.ndarray | None = None,
+    coarsest_values: np.ndarray | None = None,
     unit: str = "",
 ) -> Estimate:
     """Estimated error of ``fine_values`` (m, ...) from runs with twice and (over the first rows) four times the step,
-    at the rows of the run with twice the step.
+    all read at the rows of the run with twice the step.
 
-    coarse_values : (m, ...); coarser : (k, ...) with k <= (m + 1) / 2, rows of every second one of these.
+    coarse_values : (m, ...); coarsest_values : (k, ...) with k <= (m + 1) / 2, rows of every second one of these.
     """
-    gap, order = root_mean_square(fine_values - coarse_values), declared
-    if coarser is not None and len(coarser) > 1:
-        window = slice(0, 2 * len(coarser) - 1, 2)
+    gap, order = root_mean_square(fine_values - coarse_values), declared_order
+    if coarsest_values is not None and len(coarsest_values) > 1:
+        window = slice(0, 2 * len(coarsest_values) - 1, 2)
         order = observed_order(
             root_mean_square((fine_values - coarse_values)[window]),
-            root_mean_square(coarse_values[window] - coarser),
-            declared,
+            root_mean_square(coarse_values[window] - coarsest_values),
+            declared_order,
         )
     largest = float(np.abs(fine_values).max(initial=0.0))
     error = max(gap / (2.0**order - 1.0), ONE_ROUNDING * largest * math.sqrt(len(fine_values)))
-    return estimate_rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine_values), step)
+    return estimate_rescaled(Estimate(error, unit, 0.0, order, step), reference_size(fine_values), step)
 
 
 def root_mean_square(values: np.ndarray) -> float:
@@ -127,19 +130,19 @@ def root_mean_square(values: np.ndarray) -> float:
 
 
 def finite_rms(values: np.ndarray) -> float:
-    """Root mean square of the finite values, 0 where there are none."""
+    """Root mean square of the finite values; 0 where there are none."""
     return root_mean_square(values[np.isfinite(values)])
 
 
-def rows_at(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
+def nearest_rows(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
     """Indices of the times in ``times`` (n,) nearest to the wanted ones (m,); both must be ascending."""
     row_after = np.clip(np.searchsorted(times, wanted_times), 1, len(times) - 1)
     return row_after - (wanted_times - times[row_after - 1] < times[row_after] - wanted_times)
 
 
 class Series(NamedTuple):
-    """Channels (n, ...) of a run by name, at its times (n,) in s, and units of the channels that the run's result does
-    not contain."""
+    """Channels (n, ...) of a run by name, at times (n,) in s, with units of the channels that the run's result does not
+    contain."""
 
     times: np.ndarray
     channels: Mapping[str, np.ndarray]
@@ -147,11 +150,11 @@ class Series(NamedTuple):
 
 
 Rerun = Callable[[float, float], Series]
-"""The same run in steps ``factor`` times as long over a ``share`` of its time, from the start on where they are longer
-or the share is 1; raises InputError or RunFailed where that cannot be."""
+"""Function that repeats a run in steps ``factor`` times as long over a ``share`` of its time: from the start if steps
+are longer or the share is 1. Raises InputError or RunFailed where that is impossible."""
 
 
-def estimated(
+def with_estimated_errors(
     run: Result,
     fine_run: Series,
     rerun: Rerun,
@@ -160,14 +163,14 @@ def estimated(
     growth: Mapping[str, float] | None = None,
     channel_sizes: Mapping[str, float] | None = None,
 ) -> Result:
-    """The result with estimated errors of the channels in ``fine_run``, which are its own rows at steps of ``step``
-    (s).
+    """The result with estimated errors of the channels in ``fine_run``: rows of that run at steps of ``step`` (s),
+    compared with runs that ``rerun`` makes in other steps.
 
     growth : by channel, least factor on what a part tells, where errors grow faster than by a power of time;
     channel_sizes : what shares are of, by channel, where that is not its own deviation. Raises RunFailed, whose
     ``partial`` is the result, where a channel is no answer.
     """
-    estimates, method_text = by_steps(fine_run, rerun, order, step, growth, channel_sizes)
+    estimates, method_text = step_errors(fine_run, rerun, order, step, growth, channel_sizes)
     known = {name: run.data[name].attrs.get("units", "") for name in fine_run.channels if name in run.data}
     known |= fine_run.units
     return with_stated_errors(
@@ -175,7 +178,7 @@ def estimated(
     )
 
 
-def by_steps(
+def step_errors(
     fine_run: Series,
     rerun: Rerun,
     order: float,
@@ -183,10 +186,11 @@ def by_steps(
     growth: Mapping[str, float] | None = None,
     channel_sizes: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, Estimate], str]:
-    """Estimated errors of the channels in ``fine_run``, without units, and a text on how they were estimated.
+    """Estimated errors of the channels in ``fine_run`` from runs in other steps, without units, and a text on the
+    method of estimation.
 
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
-    be, half of it over a part tells. growth, channel_sizes : as in ``estimated``.
+    be, half of it over a part tells. growth, channel_sizes : as in ``with_estimated_errors``.
     """
     try:
         estimates, method_text = _by_longer_steps(fine_run, rerun, order, step), "runs in longer steps"
@@ -198,19 +202,21 @@ def by_steps(
 
 
 def _by_longer_steps(fine_run: Series, rerun: Rerun, order: float, step: float) -> dict[str, Estimate]:
-    coarse = _within(fine_run, rerun(2.0, 1.0), step)
+    """Estimated errors by channel from runs in twice the step and, over a part, four times the step."""
+    coarse = _comparable_coarse_run(fine_run, rerun(2.0, 1.0), step)
     coarser: Mapping[str, np.ndarray] = {}
     with suppress(InputError, RunFailed):
-        coarser = _within(coarse, rerun(4.0, REPEATED_SHARE), step).channels
-    rows = rows_at(fine_run.times, coarse.times)
+        coarser = _comparable_coarse_run(coarse, rerun(4.0, REPEATED_SHARE), step).channels
+    rows = nearest_rows(fine_run.times, coarse.times)
     return {
         name: estimate(values[rows], coarse.channels[name], order, step, coarser.get(name))
         for name, values in fine_run.channels.items()
     }
 
 
-def _within(fine_run: Series, coarse_run: Series, step: float) -> Series:
-    """The run in longer steps; RunFailed where it has no row after its start that a row of the finer run is near to.
+def _comparable_coarse_run(fine_run: Series, coarse_run: Series, step: float) -> Series:
+    """The run in longer steps, unchanged; raises RunFailed where it has no row besides the start, or lasts longer than
+    the finer run.
 
     Steps of a short run, twice as long, may outlast it: nothing is there to compare.
     """
@@ -222,12 +228,12 @@ def _within(fine_run: Series, coarse_run: Series, step: float) -> Series:
 def _by_half_steps(
     fine_run: Series, rerun: Rerun, order: float, step: float, growth: Mapping[str, float]
 ) -> dict[str, Estimate]:
-    """Estimates from part of the run, or all of a short one, repeated with half the step. The error found there is
-    scaled to the run's own step by the order of the method, and to the rest of the run by its growth."""
-    finer = rerun(0.5, FINE_WINDOW if len(fine_run.times) > FEW_ROWS else 1.0)
+    """Estimated errors by channel from part of the run, or all of a short one, repeated with half the step; scaled to
+    the run's step by the order of the method, and to the rest of the run by the error's growth."""
+    finer = rerun(0.5, FINE_WINDOW if len(fine_run.times) > MOST_FULLY_REPEATED_ROWS else 1.0)
     slack = 1e-9 * finer.times[-1]
     in_finer_run = (fine_run.times >= finer.times[0] - slack) & (fine_run.times <= finer.times[-1] + slack)
-    rows = rows_at(finer.times, fine_run.times[in_finer_run])
+    rows = nearest_rows(finer.times, fine_run.times[in_finer_run])
     estimates = {}
     for name, values in fine_run.channels.items():
         error = estimate(finer.channels[name][rows], values[in_finer_run], order, step)
@@ -236,7 +242,7 @@ def _by_half_steps(
             growth.get(name, 1.0),
         )
         estimates[name] = estimate_rescaled(
-            replace(error, error=error.error * 2.0**error.order * later), size_of(values), step
+            replace(error, error=error.error * 2.0**error.order * later), reference_size(values), step
         )
     return estimates
 
@@ -262,29 +268,30 @@ def _growth_after_window(error_rows: np.ndarray, values: np.ndarray) -> float:
 
 
 def estimate_rescaled(estimate: Estimate, channel_size: float, step: float) -> Estimate:
-    """The estimate with share and step recomputed for the size of the whole channel; ``step`` is the run's step."""
+    """The estimate with share and advised step recomputed for the size of the whole channel; ``step`` is the run's
+    step."""
     share = estimate.error / channel_size if channel_size > 0.0 else (0.0 if estimate.error == 0.0 else math.inf)
     wanted = (share / GOAL_SHARE) ** (1.0 / estimate.order) if share < math.inf else 1.0
     return replace(estimate, share=share, step=step / _whole_divisor(wanted))
 
 
 def _whole_divisor(minimum: float) -> int:
-    """Smallest number 2^i 5^j that is at least ``minimum``; a step divided by it stays a short decimal."""
+    """Smallest number 2^i 5^j that is at least ``minimum``; a step divided by this number stays a short decimal."""
     powers = (2**i * 5**j for i in range(30) for j in range(12))
     return min((number for number in powers if number >= minimum), default=1)
 
 
-def of_tolerance(
+def with_tolerance_error(
     run: Result,
     fine_run: Series,
-    looser: Series,
+    looser_run: Series,
     factor: float,
     tolerance: float,
     channel_sizes: Mapping[str, float] | None = None,
 ) -> Result:
-    """The result of an adaptive method with estimated errors of its channels, from a run whose tolerance is ``factor``
-    times as large. The error is assumed to grow only with the power TOLERANCE_POWER of the tolerance, so that it is
-    overestimated. ``channel_sizes`` as in ``estimated``.
+    """The result of an adaptive method with estimated errors of its channels, from a run with ``factor`` times the
+    tolerance. The error is assumed to grow with the power TOLERANCE_POWER of the tolerance only, and is overestimated.
+    ``channel_sizes`` as in ``with_estimated_errors``.
 
     Rows may lie where steps end: the finer run is read at the looser one's times by a cubic spline.
     """
@@ -292,27 +299,29 @@ def of_tolerance(
 
     estimates = {}
     for name, values in fine_run.channels.items():
-        same_times = len(looser.times) == len(fine_run.times) and np.array_equal(looser.times, fine_run.times)
-        values_at_looser = values if same_times else CubicSpline(fine_run.times, values)(looser.times)
+        same_times = len(looser_run.times) == len(fine_run.times) and np.array_equal(looser_run.times, fine_run.times)
+        values_at_looser = values if same_times else CubicSpline(fine_run.times, values)(looser_run.times)
         error = max(
-            root_mean_square(values_at_looser - looser.channels[name]) / (factor**TOLERANCE_POWER - 1.0),
-            LEAST_TOLERANCE_SHARE * tolerance * size_of(values),
+            root_mean_square(values_at_looser - looser_run.channels[name]) / (factor**TOLERANCE_POWER - 1.0),
+            LEAST_TOLERANCE_SHARE * tolerance * reference_size(values),
         )
         estimate = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / TOLERANCE_POWER, tolerance)
-        estimates[name] = estimate_rescaled(estimate, (channel_sizes or {}).get(name, size_of(values)), tolerance)
+        estimates[name] = estimate_rescaled(
+            estimate, (channel_sizes or {}).get(name, reference_size(values)), tolerance
+        )
     return with_stated_errors(run, estimates, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
-def by_cells(error: float, channel_size: float, unit: str, cells: int, order: float, maximum_cells: int) -> Estimate:
-    """Estimated error on a grid of ``cells`` cells. Its ``step`` is the number of cells needed for GOAL_SHARE, at most
-    ``maximum_cells``."""
+def grid_error(error: float, channel_size: float, unit: str, cells: int, order: float, maximum_cells: int) -> Estimate:
+    """Estimated error on a grid of ``cells`` cells along each axis. The ``step`` of the estimate is the number of cells
+    needed for GOAL_SHARE, at most ``maximum_cells``."""
     share = error / channel_size if channel_size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = cells * max(1.0, (min(share, 1.0) / GOAL_SHARE) ** (1.0 / order))
     return Estimate(error, unit, share, order, float(min(maximum_cells, math.ceil(needed))), CELLS_NOTE)
 
 
 def summed_error(first: Estimate, added_error: Estimate) -> Estimate:
-    """Sum of two errors, such as that of a run and that of the input which drives it.
+    """Sum of two estimated errors, such as those of a run and of its input.
 
     What mends it is told of the larger one where that is of cells and the other of steps.
     """
@@ -325,13 +334,13 @@ def summed_error(first: Estimate, added_error: Estimate) -> Estimate:
 
 
 def with_stated_errors(run: Result, estimates: Mapping[str, Estimate], method: str, step_unit: str = "s") -> Result:
-    """The result with the estimated error of each channel and the method of the estimate; ``step_unit``: unit of steps
-    or cells.
+    """The result with the estimated error of each channel and the method of estimation; ``step_unit`` is the unit of
+    steps or cells.
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
     if not estimates:
-        return not_estimated(run, NOTHING)
+        return not_estimated(run, NO_CHANGING_CHANNEL)
     channels = {name: asdict(estimate) for name, estimate in estimates.items()}
     run.data.attrs["error"] = json.dumps({"how": method, "of": step_unit, "channels": channels})
     worst = max(estimates, key=lambda name: estimates[name].share, default=None)
@@ -346,7 +355,7 @@ def with_stated_errors(run: Result, estimates: Mapping[str, Estimate], method: s
 
 
 def errors_of(run: Result) -> dict[str, Estimate]:
-    """Estimates stored in a result, by channel; empty if no estimate was made."""
+    """Error estimates stored in a result, by channel; empty if no estimate was made."""
     stored = json.loads(run.data.attrs.get("error", "{}"))
     return {name: Estimate(**values) for name, values in stored.get("channels", {}).items()}
 
@@ -358,8 +367,8 @@ def not_estimated(run: Result, reason: str) -> Result:
     return run
 
 
-def of_theory(run: Result, estimates: Mapping[str, Estimate], method: str) -> Result:
-    """The result with the error of the theory itself, stated beside that of the grid; ``method`` : text on its source.
+def with_theory_error(run: Result, estimates: Mapping[str, Estimate], method: str) -> Result:
+    """The result with the error of the theory beside that of the grid; ``method`` is text on how it is known.
 
     A finer grid does not reduce this error, so it leads to no warning and no refusal.
     """
@@ -369,7 +378,7 @@ def of_theory(run: Result, estimates: Mapping[str, Estimate], method: str) -> Re
     return run
 
 
-def of_chance(run: Result, estimates: Mapping[str, Estimate], samples: int) -> Result:
+def with_sampling_error(run: Result, estimates: Mapping[str, Estimate], samples: int) -> Result:
     """The result of an ensemble with the standard errors of its channels, from ``samples`` paths.
 
     The errors of the time step stay in the result as well.
@@ -383,22 +392,22 @@ def of_chance(run: Result, estimates: Mapping[str, Estimate], samples: int) -> R
     return run
 
 
-def by_chance(error: float, channel_size: float, unit: str, samples: int) -> Estimate:
-    """A standard error as an ``Estimate``; its ``step`` is the number of samples that would reduce the share to
-    WARNED_SHARE."""
+def sampling_error(error: float, channel_size: float, unit: str, samples: int) -> Estimate:
+    """The standard error of an ensemble mean as an ``Estimate``; its ``step`` is the number of samples that would
+    reduce the share to WARNED_SHARE."""
     share = error / channel_size if channel_size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = samples * max(1.0, (share / WARNED_SHARE) ** 2) if math.isfinite(share) else math.inf
     return Estimate(error, unit, share, 0.5, float(f"{needed:.2g}") if math.isfinite(needed) else math.inf)
 
 
-def worst_of(run: Result) -> Estimate | None:
-    """The estimate with the largest relative error in a result; None if there are no estimates."""
+def largest_estimate(run: Result) -> Estimate | None:
+    """The error estimate with the largest share in a result; None if there are no estimates."""
     return max(errors_of(run).values(), key=lambda estimate: estimate.share, default=None)
 
 
 def error_lines(run: Result) -> list[str]:
-    """Printed lines on a result's error. First the worst channels for the time step and for cells, the worse one first,
-    with a warning and advice if needed; then the errors of its theory and of its sample."""
+    """Printed lines on a result's error: the worst channel for the time step and the worst for cells, with a warning
+    and advice if needed, then the errors of the theory and of the sample."""
     stored, estimates = json.loads(run.data.attrs.get("error", "{}")), errors_of(run)
     text = [f"error not estimated: {stored['why']}"] if "why" in stored else []
     shares = {name: estimate.share for name, estimate in sorted(estimates.items(), key=lambda entry: entry[1].share)}
@@ -415,6 +424,7 @@ def error_lines(run: Result) -> list[str]:
 
 
 def _size_text(name: str, estimate: Estimate) -> str:
+    """Text with the share of an estimated error in per cent, the channel, and the error in its unit."""
     share, error = (float(f"{value:.2g}") for value in (100.0 * estimate.share, estimate.error))
     size = f"{error:g} {estimate.unit}".rstrip()
     return f"{share:g} % ({name}: {size})"

@@ -8,13 +8,14 @@ if TYPE_CHECKING:  # the command line imports this file before it knows whether 
     import numpy as np
 
 LONGEST_VALUE_TEXT = 80
-"""Characters of an offending value that a message shows."""
+"""Most characters of an offending value that an error message shows."""
 MOST_NAMES = 40
-"""Accepted names that a message lists; of more it lists those most like the user's."""
+"""Most accepted names that an error message lists in full; beyond this number only the most similar names are
+listed."""
 
 
 class InputError(ValueError):
-    """Something that the user wrote cannot be used; its text is one complete message.
+    """Error for user input that cannot be used; its text is one complete message.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ class InputError(ValueError):
 
 
 def _value_text(shown_value: Any) -> str:
-    """Return `` = shown_value`` as a scene file would hold it, cut to a readable length."""
+    """Text `` = value`` as a scene file would hold the value, cut to a readable length; empty for None."""
     if shown_value is None:
         return ""
     plain = shown_value.tolist() if hasattr(shown_value, "tolist") else shown_value
@@ -58,14 +59,16 @@ def nearest_names_phrase(name: object, choices: tuple[str, ...]) -> str:
 
 
 def suggestion_phrase(name: object, choices: tuple[str, ...]) -> str:
-    """Phrase that offers the accepted name most like ``name``, whatever its case; empty if none is."""
+    """Phrase "did you mean ..." with the accepted name most similar to ``name``, regardless of upper and lower case;
+    empty if none is similar."""
     lower = {choice.casefold(): choice for choice in choices}
     match = get_close_matches(str(name).casefold(), lower, n=1, cutoff=0.6)
     return f"; did you mean {lower[match[0]]!r}?" if match else ""
 
 
 def similar_file(path: Path) -> str:
-    """Phrase that offers the file with the most similar name among those of the same kind in the folder of ``path``."""
+    """Phrase "did you mean ..." with the most similar name among the files of the same kind in the folder of
+    ``path``."""
     try:
         stems = tuple(p.stem for p in path.parent.iterdir() if p.suffix == path.suffix and p.is_file())
     except OSError:
@@ -74,7 +77,7 @@ def similar_file(path: Path) -> str:
 
 
 class RunFailed(RuntimeError):
-    """A simulation that did not give a complete, finite answer.
+    """Error for a simulation that did not give a complete, finite result.
 
     ``partial`` is what the run had recorded until then, where its system keeps that.
 
@@ -99,7 +102,7 @@ class RunFailed(RuntimeError):
 
 
 class Refused(InputError):
-    """A valid scene needs something that the engine does not compute correctly."""
+    """Error for a valid scene that needs something which the engine does not compute correctly."""
 
     def __init__(self, engine: str, reason: str, file: str = "") -> None:
         self.engine, self.why = engine, reason

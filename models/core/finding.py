@@ -1,19 +1,20 @@
-"""What a check finds in a recording: one sentence with place and size."""
+"""Findings of the checks of a recording: sentences with place and size."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 Weight = Literal["error", "doubt", "note"]
-"""An error stops what follows, a doubt is carried into the report, a note says what was looked at and found good."""
+"""Severity of a finding: an error stops the processing, a doubt is repeated in the report, and a note states what was
+checked and is in order."""
 
 LISTED_FINDINGS = 3
-"""Findings of one check that are told one by one where people read."""
+"""Most findings of one check and severity that are listed one by one; of more, only the largest is listed."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One finding.
+    """One finding of a check of a recording.
 
     check : name of the check. place : channel, hub or file. text : a complete sentence for an engineer, with size,
     unit and remedy. size : the figure in it, in ``unit``; None where there is none. signals : names of the signals
@@ -31,7 +32,7 @@ class Finding:
 
 
 def findings_as_dicts(findings: Iterable[Finding]) -> list[dict[str, Any]]:
-    """Findings as plain dicts, for JSON."""
+    """Findings of checks as plain dicts, for JSON."""
     return [
         {"check": f.check, "weight": f.weight, "place": f.place, "text": f.text, "size": f.size, "unit": f.unit}
         for f in findings
@@ -39,13 +40,14 @@ def findings_as_dicts(findings: Iterable[Finding]) -> list[dict[str, Any]]:
 
 
 def finding_lines(findings: Iterable[Finding]) -> list[str]:
-    """Text of findings for plans and summaries: one line per finding, or fewer for many of the same kind."""
+    """Text lines on the findings for plans and summaries: one per finding, or one for many findings of the same check
+    and severity."""
     return [f"  {f.weight:<10} {f.text}" for f in merged_findings(findings)]
 
 
 def merged_findings(findings: Iterable[Finding]) -> list[Finding]:
-    """The findings. If more than LISTED_FINDINGS share check and severity, only the worst is kept, with the number of
-    the others."""
+    """The findings, but where more than LISTED_FINDINGS share check and severity, only the one of largest size, with
+    the number of all of them."""
     kinds: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         kinds.setdefault((finding.check, finding.weight), []).append(finding)
@@ -58,9 +60,9 @@ def merged_findings(findings: Iterable[Finding]) -> list[Finding]:
     ]
 
 
-def _largest_finding(alike: list[Finding]) -> Finding:
-    """The finding with the largest size, with the number of channels or places concerned."""
-    worst = max(alike, key=lambda finding: abs(finding.size or 0.0))
-    names = {name for finding in alike for name in finding.signals or (finding.place,)}
+def _largest_finding(similar_findings: list[Finding]) -> Finding:
+    """The finding of largest size among similar ones; its text states the number of channels or places concerned."""
+    worst = max(similar_findings, key=lambda finding: abs(finding.size or 0.0))
+    names = {name for finding in similar_findings for name in finding.signals or (finding.place,)}
     noun = "channels" if worst.signals else "places"
     return replace(worst, text=f"{worst.check!r} at {len(names)} {noun}, the worst: {worst.text}")

@@ -1,4 +1,4 @@
-"""Counter-based noise: any block of any stream can be made alone, in any order, on any worker.
+"""Counter-based random numbers: any block of any noise stream can be computed alone, in any order, in any process.
 
 A stream is named by (seed, path, source); its samples are made in blocks of SAMPLES_PER_BLOCK that the counter numbers,
 so sample i of path j is the same number whoever asks for it and whatever was asked for before. The source says whose
@@ -10,7 +10,7 @@ import numpy as np
 from models.core.errors import InputError
 
 SAMPLES_PER_BLOCK = 4096
-"""Samples per block; part of what names a sample, so it never changes."""
+"""Number of noise samples per block; never changed, since every sample of a stream would change with it."""
 
 
 (
@@ -26,14 +26,15 @@ SAMPLES_PER_BLOCK = 4096
     TRANSDUCERS,
     DROPOUTS,
 ) = range(11)
-"""Sources of noise; a new one takes the next number."""
+"""Numbers of the noise sources (measured forces, gyro, ...), so that equal seeds give independent noise; a new source
+takes the next number."""
 
 
 def normal_block(
     seed: int, path: int, block: int, channels: int, source: int = FORCES, rows: int = SAMPLES_PER_BLOCK
 ) -> np.ndarray:
-    """Standard normal samples (rows, channels) of one block, its first: samples SAMPLES_PER_BLOCK block and following
-    of a stream.
+    """First ``rows`` standard normal samples (rows, channels) of block number ``block`` of the noise stream (seed,
+    path, source).
 
     seed : 0 to 2**64 - 1; path : 0 to 2**64 - 1; block : 0 to 2**64 - 1; InputError for others, which would name the
     stream of another one. Philox with the key (seed, path), the block in the counter's third word and the source in
@@ -45,14 +46,15 @@ def normal_block(
 
 
 def _whole_number(name: str, number: int) -> int:
-    """The value, checked to be a whole number of at most 64 bits."""
+    """The number as int; raises InputError unless it is a whole number from 0 to 2**64 - 1."""
     if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number < 2**64:
         raise InputError("", name, number, "must be a whole number from 0 to 2^64 - 1")
     return int(number)
 
 
 def normal_samples(seed: int, path: int, count: int, channels: int, first: int = 0, source: int = FORCES) -> np.ndarray:
-    """Standard normal samples (count, channels) of a stream from sample ``first`` on; raises InputError."""
+    """Standard normal samples (count, channels) of the noise stream (seed, path, source), from sample ``first`` on;
+    raises InputError for negative counts."""
     if min(count, first) < 0:
         raise InputError("", "count, first", (count, first), "must be 0 or more")
     start, end = first // SAMPLES_PER_BLOCK, -(-(first + count) // SAMPLES_PER_BLOCK)

@@ -1,4 +1,4 @@
-"""Compiled evaluation of piecewise polynomials, with their derivatives, and of lines between samples."""
+"""Compiled evaluation of piecewise polynomials and their derivatives, and linear interpolation of samples."""
 
 import numpy as np
 
@@ -7,8 +7,8 @@ from models.machine.compiled import njit
 
 @njit(cache=True)
 def evaluate(coefficients, period, start_time, step, sample_count, derivatives):
-    """Values of a piecewise polynomial at start_time + i step, then its first and second derivatives: shape
-    (sample_count, columns (derivatives + 1)).
+    """Values of a piecewise polynomial at the times start_time + i step, followed by its derivatives up to the order
+    ``derivatives``: shape (sample_count, columns (derivatives + 1)).
 
     coefficients : (degree + 1, pieces, columns), lowest power first, in the time since each piece's start;
     the pieces lie ``period`` (s) apart from t = 0 on, and the outer ones go on beyond their ends.
@@ -33,8 +33,8 @@ def evaluate(coefficients, period, start_time, step, sample_count, derivatives):
 
 @njit(cache=True, nogil=True)
 def interpolate(values, index, fraction):
-    """Values (n, columns), linearly interpolated from each sample ``index`` by ``fraction`` of a period towards the
-    next sample."""
+    """Samples interpolated linearly, shape (m, columns): between row ``index`` (m,) of ``values`` (n, columns) and the
+    next row, at the ``fraction`` (m,) of a period."""
     rows, columns = values.shape
     values_out = np.empty((len(index), columns))
     for i in range(len(index)):

@@ -1,4 +1,4 @@
-"""Whether the steps of a run were short enough for what happened in it, told from its states alone.
+"""Check from the states of a run alone whether its steps were short enough to resolve the motion.
 
 Simpson's rule over two steps gives the way that the rates make: where the positions went another way, the motion bent
 within a step, at a stop that was hit, a stick that let go, a swing that took few steps. What is missing, over the time
@@ -15,14 +15,14 @@ import numpy as np
 from models.core.errors import RunFailed
 
 ALLOWED_MISSING_SHARE = 0.08
-"""Share of the velocities that may be missing in any second."""
+"""Largest allowed share of the velocity that goes unseen between steps within any second."""
 NEGLIGIBLE_VELOCITY, ROUNDING_VELOCITY_SHARE = 1e-6, 1e-9
-"""m/s of the largest mass, and share of the velocities at the start, below which a motion is none."""
+"""Velocity (m/s, of the largest mass), and share of the velocities at the start, below which a motion is negligible."""
 
 
 def missed_velocity_share(positions: np.ndarray, rates: np.ndarray, step: float, mass: np.ndarray) -> tuple[float, int]:
-    """Largest velocity error within one second, relative to the velocities, and the row where that second begins. The
-    error compares displacements over two steps with the integral of the rates.
+    """Largest velocity error within one second, relative to the velocity change of the run, and the row where that
+    second begins. The error compares displacements over two steps with the integral of the rates by Simpson's rule.
 
     positions, rates (m, n) at every step (s); mass (n, n) or its diagonal (n,) weighs one coordinate against another.
     """
@@ -44,9 +44,11 @@ def missed_velocity_share(positions: np.ndarray, rates: np.ndarray, step: float,
     return float(within.max() / velocity_scale), int(within.argmax())
 
 
-def missed_by_first_order(positions: np.ndarray, rates: np.ndarray, step: float, mass: np.ndarray) -> tuple[float, int]:
-    """``missed_velocity_share`` for first-order methods: the least result when rates belong to the steps' ends, or to
-    the middle of the step after or before them."""
+def missed_velocity_share_first_order(
+    positions: np.ndarray, rates: np.ndarray, step: float, mass: np.ndarray
+) -> tuple[float, int]:
+    """``missed_velocity_share`` for first-order methods: the smallest of three results, in which the rates belong to
+    the ends of the steps, or to the middle of the step after or before."""
     middle = (rates[1:] + rates[:-1]) / 2.0
     variants = ((positions, rates), (positions[:-1], middle), (positions[1:], middle))
     return min(missed_velocity_share(positions_at, velocities, step, mass) for positions_at, velocities in variants)
@@ -62,7 +64,7 @@ def check_resolved(
     if len(times) < 3:
         return
     step = float(times[1] - times[0])
-    missed = missed_by_first_order if order == 1 else missed_velocity_share
+    missed = missed_velocity_share_first_order if order == 1 else missed_velocity_share
     share, row = missed(positions, rates, step, mass)
     if not share <= ALLOWED_MISSING_SHARE:
         raise RunFailed(

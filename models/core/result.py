@@ -1,4 +1,4 @@
-"""Results: labelled arrays with units, counts and provenance, saved as netCDF; the only thing that a run saves."""
+"""Results of runs: labelled arrays with units, counts and provenance, saved as netCDF files."""
 
 import json
 import math
@@ -21,12 +21,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 RECORDED_PACKAGES = ("exudyn", "mujoco", "numpy", "scipy", "numba")
+"""Packages whose versions every result records."""
 _version = cache(version)
-"""Version of an installed package; finding it out takes longer than a short run."""
+"""Version of an installed package, cached since the look-up takes longer than a short run."""
 
 
 class Channel(NamedTuple):
-    """An array with the names of its axes (one name, or one per axis), its unit and its meaning."""
+    """An array of a result with the names of its axes (one name, or one per axis), its unit and its meaning."""
 
     axes: str | tuple[str, ...]
     values: Any
@@ -40,7 +41,7 @@ class Channel(NamedTuple):
 
 @dataclass(frozen=True)
 class Result:
-    """One run: ``data`` is an xarray Dataset of channels with their axes, units and meanings.
+    """Result of one run: ``data`` is an xarray Dataset of channels with their axes, units and meanings.
 
     Its attributes hold, as text (JSON) or numbers, title, file, system and table of the scene, engine, status, doubts,
     counts, error, assumptions and provenance, and ``seconds`` until it is saved. ``detail`` is what the system's own
@@ -51,7 +52,7 @@ class Result:
     detail: Any = field(default=None, repr=False)
 
     def __getitem__(self, channel: str) -> np.ndarray:
-        """Values of a channel, shape (n,)."""
+        """Values of a channel, by its name, as an array."""
         return self.data[channel].values
 
     @property
@@ -66,7 +67,7 @@ class Result:
         return np.column_stack([self[name] for name in (*names, *(f"{name}_rate" for name in names))])
 
     def counts(self) -> dict[str, int]:
-        """Steps and force calls of the run."""
+        """Counts of steps, force calls and the like of the run, by name."""
         return json.loads(self.data.attrs["counts"])
 
     def every(self, spacing: float) -> "Result":
@@ -81,7 +82,7 @@ class Result:
         return float(self.data.attrs["seconds"])
 
     def save(self, path: Path | str) -> None:
-        """Write a netCDF file without the computing time, so that the same run gives identical bytes.
+        """Write the result as a netCDF file without the computing time, so that equal runs give identical bytes.
 
         It is written whole or not at all; numbers have checksums, so that whoever reads a damaged file is told.
         """
@@ -97,7 +98,7 @@ class Result:
         )  # HDF5 itself crashes on a full disk
 
     def save_table(self, path: Path | str, *channels: str) -> None:
-        """Write channels that share one axis, or all of them, as columns of a CSV."""
+        """Write channels that share one axis as columns of a CSV file; all channels if none is named."""
         from models.core.tables import write_table
 
         names = channels or [str(name) for name in (*self.data.coords, *self.data.data_vars)]
@@ -115,7 +116,7 @@ def result(
     detail: Any = None,
     **attributes: Any,
 ) -> Result:
-    """``Result`` of a scene's run.
+    """A ``Result`` from the channels of a scene's run, with counts, doubts and provenance.
 
     axes : coordinates by their names; counts : of steps, calls and the like, which repeat; seconds : of the march;
     doubts : sentences on what contradicts the scene; attributes : the ``engine`` and more, numbers or text.
@@ -164,8 +165,8 @@ def join_results(results: Mapping[str, Result], axis: str) -> Result:
 
 
 def result_from_table(scene: Any, rows: Sequence[Mapping[str, Any]], axis: str, **attributes: Any) -> Result:
-    """A table as a ``Result``: one channel per column along ``axis``. Columns with computing times are left out, since
-    they never repeat.
+    """A table (rows of dicts) as a ``Result``: one channel per column along ``axis``. Columns with computing times are
+    left out, since these never repeat.
 
     Values are numbers, text, or None for no number; a name's unit is what it has in brackets, as "heave [m]".
     """
@@ -178,7 +179,7 @@ def result_from_table(scene: Any, rows: Sequence[Mapping[str, Any]], axis: str, 
 
 
 def load(path: Path) -> Result:
-    """Read a saved result; raises InputError if the file is not one."""
+    """Read a saved result from a netCDF file; raises InputError if the file holds none."""
     import xarray as xr
 
     if not path.is_file():
@@ -193,7 +194,7 @@ def load(path: Path) -> Result:
 
 
 def provenance(command: str = "") -> dict[str, Any]:
-    """Versions, machine and commit: what someone needs to repeat a figure."""
+    """Package versions, commit, machine and command, from which a result can be reproduced."""
     return {
         "twinrig": _version("twinrig"),
         "commit": _commit_of_checkout(),
@@ -207,7 +208,7 @@ def provenance(command: str = "") -> dict[str, Any]:
 
 @cache
 def _commit_of_checkout() -> str:
-    """Commit of the checkout that runs, marked if files were changed since."""
+    """Git commit of the running source tree, marked if files were changed since."""
     git_output = partial(
         subprocess.run, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=10, check=True
     )
@@ -223,6 +224,7 @@ def _commit_of_checkout() -> str:
 
 @cache
 def _processor_name() -> str:
+    """Name of the processor's model, or "unknown processor"."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
@@ -231,5 +233,5 @@ def _processor_name() -> str:
 
 
 def write(data: "xr.Dataset", path: Path) -> None:
-    """Write a dataset as ``Result.save`` does."""
+    """Write an xarray Dataset as a netCDF file, as ``Result.save`` does."""
     Result(data).save(path)

@@ -1,4 +1,4 @@
-"""Where results go: a new folder each time, so that nothing earlier is overwritten or lost."""
+"""Output folders of runs: a new one each time, so that no earlier result is overwritten."""
 
 import sys
 from collections.abc import Iterator
@@ -7,16 +7,16 @@ from itertools import count
 from pathlib import Path
 
 from models.core.errors import InputError
-from models.core.whole_files import DISK_FULL_ERRORS, drop_parts
+from models.core.whole_files import DISK_FULL_ERRORS, remove_partial_files
 
 COMMAND_FILE = "command.txt"
-"""First file of a folder that the user named: what made the others."""
+"""Name of the first file of an output folder: the command line that made the other files."""
 RESULTS_FOLDER = Path("results")
-"""Where results go unless the user says otherwise, within the folder in which the command runs."""
+"""Default parent folder of all output folders, within the working folder."""
 
 
 def new_folder(requested_folder: Path | None, name: str) -> Path:
-    """The folder that the user named, which must be empty, or the first unused one under ``results/``.
+    """The output folder that the user named, which must be empty, or the first unused one under ``results/``.
 
     Raises InputError if the named folder holds anything or cannot be made. Two runs at the same time never
     get the same folder: it is made, or its first file is, in one step that only one of them can take.
@@ -48,7 +48,8 @@ def _used_folder(folder: Path) -> InputError:
 
 
 def resumed_folder(requested_folder: Path, blocks: str) -> Path:
-    """The folder of an earlier run, which has no results yet except finished work in ``blocks``; else InputError.
+    """The output folder of an interrupted run, which has no results yet except finished blocks in the subfolder
+    ``blocks``; raises InputError for any other folder.
 
     What the run left of files when it was killed is removed.
     """
@@ -56,12 +57,13 @@ def resumed_folder(requested_folder: Path, blocks: str) -> Path:
     if not has_begun and not (requested_folder / blocks).is_dir():
         allowed = f"holds no unfinished run: name a folder with {blocks!r} in it, or leave out --resume"
         raise InputError("--resume", "", str(requested_folder), allowed)
-    drop_parts(requested_folder)
+    remove_partial_files(requested_folder)
     return requested_folder
 
 
 def _take_folder(folder: Path) -> bool:
-    """Claim the folder by writing the command into it as its first file; False if another run did so before."""
+    """Claim an output folder by writing the command into it as its first file; False if another run claimed it
+    before."""
     try:
         with (folder / COMMAND_FILE).open("x", encoding="utf-8", errors="backslashreplace") as file:
             file.write(" ".join(sys.argv) + "\n")
@@ -75,7 +77,7 @@ def _take_folder(folder: Path) -> bool:
 
 
 def drop_if_empty(folder: Path) -> None:
-    """Remove the folder of a run that saved nothing."""
+    """Remove the output folder of a run that saved nothing."""
     with suppress(OSError):
         if [path.name for path in folder.iterdir()] == [COMMAND_FILE]:
             (folder / COMMAND_FILE).unlink()
@@ -85,13 +87,14 @@ def drop_if_empty(folder: Path) -> None:
 
 
 def _candidate_folders(name: str) -> Iterator[Path]:
+    """Possible output folders under ``results/``: ``name``, then name-2, name-3, ..."""
     yield RESULTS_FOLDER / name
     for i in count(2):
         yield RESULTS_FOLDER / f"{name}-{i}"
 
 
 def _make_folder(path: Path) -> bool:
-    """Create a folder; False if it exists already."""
+    """Create an output folder; False if it exists already."""
     try:
         path.mkdir(parents=True)
     except FileExistsError:
@@ -102,7 +105,8 @@ def _make_folder(path: Path) -> bool:
 
 
 def _unwritable_folder(folder: Path, reason: str, error: OSError) -> Exception:
-    """Error for a folder that cannot be written; a full disk is not reported as a mistake of the user."""
+    """The error to raise for an output folder that cannot be written: InputError, or the original error if the disk is
+    full."""
     return (
         error
         if error.errno in DISK_FULL_ERRORS

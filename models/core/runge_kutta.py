@@ -10,10 +10,12 @@ from collections.abc import Callable
 import numpy as np
 
 RK4_STAGES = 4
-"""Evaluations of the rates in a step."""
+"""Evaluations of the right-hand side per step of the classical Runge-Kutta method."""
 
 
-def step_on(rate: Callable[[float, np.ndarray], np.ndarray], time: float, state: np.ndarray, step: float) -> np.ndarray:
+def runge_kutta_step(
+    rate: Callable[[float, np.ndarray], np.ndarray], time: float, state: np.ndarray, step: float
+) -> np.ndarray:
     """State after one classical Runge-Kutta step (s). ``rate`` gives the derivative at a time (s) and state; it is
     evaluated at 0, 1/2, 1/2 and 1 step."""
     half = 0.5 * step

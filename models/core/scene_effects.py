@@ -1,4 +1,4 @@
-"""Effects of the scenes of every system: lines of the system's table, and files found by listing its folder.
+"""Modelling effects that scenes name: entries of the system's table of effects, and files of its folder of effects.
 
 A system's ``effects`` is the package that holds them. What a key of the system's own tables names is a line (``Entry``)
 of its ``TABLE``; an effect with physics or code of its own has a file, which nothing registers. The file has
@@ -34,13 +34,13 @@ Table = dict[str, Any]
 
 @dataclass(frozen=True)
 class Entry:
-    """An entry in a system's table of effects, for an effect that is named by a key of the system's own tables.
+    """Entry in a system's table of effects, for an effect that is named by a key of the system's own tables.
 
     says : what it is, a sentence; place : the key, as "port.teeth"; cost : what it takes, a sentence; counts : what it
     adds in every engine, in_engines : what more in some; needs, excludes, why, after, modules, channels : as of
     ``Effect``.
     usual_value : what the key is where the effect has usual values, None where there are none. An effect that is not
-    the presence of that one key has functions of its own: ``there(scene)``, ``leave_out(table, scene)``,
+    the presence of that one key has functions of its own: ``is_present(scene)``, ``leave_out(table, scene)``,
     ``put_in(table, scene)``.
     """
 
@@ -55,22 +55,22 @@ class Entry:
     modules: tuple[str, ...] = ()
     channels: tuple[str, ...] = ()
     usual_value: Any = None
-    there: Callable[[Any], bool] | None = None
+    is_present: Callable[[Any], bool] | None = None
     leave_out: Callable[[Table, Any], None] | None = None
     put_in: Callable[[Table, Any], None] | None = None
     in_engines: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
 
     def named(self, scene: Any) -> bool:
-        """Whether a scene names the effect."""
-        if self.there is not None:
-            return self.there(scene)
+        """Whether a scene names the effect of this entry."""
+        if self.is_present is not None:
+            return self.is_present(scene)
         value = scene
         for key in self.place.split("."):
             value = getattr(value, key, None)
         return value is not None and value is not False and value != 0.0
 
     def drop(self, table: Table, scene: Any) -> None:
-        """Take the effect out of a scene's table."""
+        """Remove the effect from the nested tables of a scene."""
         if self.leave_out is not None:
             return self.leave_out(table, scene)
         *parent_keys, key = self.place.split(".")
@@ -79,7 +79,7 @@ class Entry:
         del table[key]
 
     def add(self, table: Table, scene: Any) -> None:
-        """Put the effect into a scene's table, with its usual values."""
+        """Add the effect with its usual values to the nested tables of a scene."""
         if self.put_in is not None:
             return self.put_in(table, scene)
         *parent_keys, key = self.place.split(".")
@@ -89,7 +89,7 @@ class Entry:
 
 
 class Effect:
-    """An effect as defined by its file or its table entry; attributes missing there have the defaults given here.
+    """A modelling effect as its file or table entry defines it; attributes missing there have these defaults.
 
     Attributes
     ----------
@@ -114,8 +114,8 @@ class Effect:
         vars(self).update(names)
 
 
-def _of_entry(entry: Entry) -> Effect:
-    """An ``Effect`` made from a table entry, with the attribute names that an effect's own file would use."""
+def _effect_of_entry(entry: Entry) -> Effect:
+    """An ``Effect`` made from an entry of a system's table, with the attribute names of an effect's file."""
     field_names = ("place", "cost", "needs", "excludes", "why", "after", "modules", "channels")
     known = {key.upper(): getattr(entry, key) for key in field_names}
     known |= {"COUNTS": {"all": entry.counts, **entry.in_engines}} if entry.counts else {}
@@ -124,30 +124,32 @@ def _of_entry(entry: Entry) -> Effect:
 
 
 def names_of(system: str) -> tuple[str, ...]:
-    """Names of all effects that scenes of a system may have, found without importing them."""
+    """Names of all effects that scenes of a system may have, listed without importing the effects' files."""
     return tuple(sorted({*_effect_files(system), *_table(system)}))
 
 
 def _table(system: str) -> Mapping[str, Entry]:
-    """Entries of a system's table of effects; empty if all its effects are in files."""
+    """Entries of a system's table of effects, by effect name; empty if all its effects are in files."""
     package = SYSTEMS[system].effects
     return getattr(import_module(package), "TABLE", {}) if package else {}
 
 
 def _effect_files(system: str) -> dict[str, Path]:
+    """Files of a system's effects, by effect name."""
     package = SYSTEMS[system].effects
     folders = import_module(package).__path__ if package else ()
     return {file.stem: file for folder in folders for file in Path(folder).glob("[!_]*.py")}
 
 
 def effect_sentences(system: str) -> dict[str, str]:
-    """First sentence about each effect of a system, read from its text without importing it."""
+    """First sentence on each effect of a system, by effect name, read without importing the effect's file."""
     says = {name: _first_sentence(file) for name, file in _effect_files(system).items()}
     says |= {name: entry.says.rstrip(".") for name, entry in _table(system).items()}
     return dict(sorted(says.items()))
 
 
 def _first_sentence(file: Path) -> str:
+    """First line of the docstring of an effect's file, without its full stop."""
     try:
         text = ast.get_docstring(ast.parse(file.read_text())) or ""
     except SyntaxError as error:
@@ -156,10 +158,10 @@ def _first_sentence(file: Path) -> str:
 
 
 def module_of(system: str, name: str) -> Any:
-    """The ``Effect`` with a name, from the system's table or from the effect's own file. Raises InputError for an
-    unknown name, or a file that lacks something."""
+    """The ``Effect`` of a name, from the system's table or from the effect's own file. Raises InputError for an unknown
+    name, or a file that lacks something."""
     if entry := _table(system).get(name):
-        return _of_entry(entry)
+        return _effect_of_entry(entry)
     try:
         file = import_module(f"{SYSTEMS[system].effects}.{name}")
     except (ImportError, SyntaxError) as error:
@@ -177,7 +179,7 @@ def module_of(system: str, name: str) -> Any:
 
 
 def named_effects(scene: Any) -> tuple[str, ...]:
-    """Effects that a scene names; effects that only a table can name are not imported for this."""
+    """Names of the effects that a scene names. Those that only a table can name are not imported for this."""
     named = [
         name
         for name, file in _effect_files(scene.system).items()
@@ -199,25 +201,23 @@ def absent_effects(scene: Any) -> tuple[str, ...]:
 
 
 def tables_of(scene: Any) -> Mapping[str, Any]:
-    """The scene's tables [effects.NAME]."""
+    """The scene's tables [effects.NAME], by effect name."""
     tables = getattr(scene, "effects", None)
     return tables if isinstance(tables, Mapping) else {}
 
 
 @cache
 def _is_in_own_tables(file: Path) -> bool:
-    """Whether a key in the system's own tables names the effect; found by reading the effect's file, without importing
-    it."""
+    """Whether the system's own tables have a key for the effect, according to the text of the effect's file."""
     return re.search(r"^def named\(", file.read_text(), re.MULTILINE) is not None
 
 
 def read_tables(tables: Mapping[str, Any], system: str, file: str) -> Table:
-    """Parameters of every table [effects.NAME]; raises InputError for an unknown effect, or for one that another key
-    names."""
+    """Checked parameters of all tables [effects.NAME]; InputError for an effect that is unknown or has another key."""
     return {name: _read(name, values, system, file) for name, values in tables.items()}
 
 
-def with_own(scene: Any) -> Any:
+def with_effect_tables(scene: Any) -> Any:
     """The scene with its tables [effects.NAME] read and checked; refuses unknown effects and effects that exclude each
     other."""
     extended_scene = scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, scene.file)})
@@ -234,6 +234,7 @@ def extended_by_effects(system_object: Any, scene: Any) -> Any:
 
 
 def _extend(name: str, module: Any, system_object: Any, table: Any) -> Any:
+    """The system's object, extended by one effect; InputError if the effect's ``extend`` fails or returns nothing."""
     try:
         result = module.extend(system_object, table)
     except (InputError, RunFailed):
@@ -250,6 +251,7 @@ def _extend(name: str, module: Any, system_object: Any, table: Any) -> Any:
 
 
 def _read(name: str, values: Any, system: str, file: str) -> Any:
+    """Checked parameters of one table [effects.NAME]; raises InputError for an unknown effect."""
     if name not in names_of(system):
         raise InputError(file, f"effects.{name}", None, "no such effect", names_of(system))
     module = module_of(system, name)
@@ -259,12 +261,12 @@ def _read(name: str, values: Any, system: str, file: str) -> Any:
 
 
 def check(scene: Any) -> None:
-    """Refuse effects that exclude each other or lack an effect that they need; the message gives the remedy."""
+    """Raise InputError, with the remedy, if a scene's effects exclude each other or lack an effect that they need."""
     check_combination(named_effects(scene), scene)
 
 
 def check_combination(present_effects: Iterable[str], scene: Any) -> None:
-    """Check that effects of a scene, given by existing names, are allowed together."""
+    """Raise InputError if these effects (names) of a scene exclude each other or lack one that they need."""
     present_effects = tuple(present_effects)
     for name in present_effects:
         module = module_of(scene.system, name)
@@ -290,32 +292,31 @@ def check_combination(present_effects: Iterable[str], scene: Any) -> None:
 
 
 def _what_to_drop(scene: Any, name: str, present_effects: tuple[str, ...]) -> str:
-    """Phrase on the effects that must be dropped so that the effect ``name`` can be added."""
+    """Phrase that names the effects that cannot stand beside the effect ``name``; empty if there are none."""
     clash = [other_effect for other_effect in module_of(scene.system, name).EXCLUDES if other_effect in present_effects]
     return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
 
 
 def _key_of_effect(module: Any, name: str) -> str:
-    """Key in the scene that names an effect."""
+    """Key in the scene that names an effect, such as "effects.road"."""
     return str(module.PLACE) if hasattr(module, "named") else f"effects.{name}"
 
 
 def _table_of_effect(scene: Any, name: str) -> str:
-    """Phrase on the key that names an effect, if this is not the effect's own name."""
+    """Phrase on the scene key that names an effect, if this is not the effect's own name; else empty."""
     key = _key_of_effect(module_of(scene.system, name), name).removeprefix("effects.")
     return "" if key == name else f"; {name!r} is named by {key}"
 
 
-def own_table(scene: Any) -> Table:
+def table_without_defaults(scene: Any) -> Table:
     """The scene's file as nested, editable tables, without default values."""
     table: Table = deepcopy(scene.model_dump(exclude_unset=True))
     return {key: value for key, value in table.items() if key not in ("file", "folder")}
 
 
 def scene_without(scene: Any, *left_out: str) -> Any:
-    """The scene without the given effects; raises InputError if one cannot be left out, or if another effect needs
-    it."""
-    table = own_table(scene)
+    """The scene without the given effects; InputError if an effect cannot be left out or another one needs it."""
+    table = table_without_defaults(scene)
     for name in sorted(left_out, key=lambda name: _dependency_depth(name, scene.system), reverse=True):
         if name in tables_of(scene):
             del table["effects"][name]
@@ -336,17 +337,15 @@ def scene_without(scene: Any, *left_out: str) -> Any:
 
 
 def _dependency_depth(name: str, system: str) -> int:
-    """Length of the longest chain of needed effects that starts at ``name``. Effects are left out before the effects
-    that they need."""
+    """Length of the longest chain of needed effects from ``name`` on; the longest chains are removed first."""
     return 1 + max(
         (_dependency_depth(other_effect, system) for other_effect in module_of(system, name).NEEDS), default=0
     )
 
 
 def with_effects(scene: Any, *added_effects: str) -> Any:
-    """The scene with the given effects at their usual values; raises InputError if one cannot be added, or not with
-    these values."""
-    table = own_table(scene)
+    """The scene with the given effects added at their usual values; InputError if an effect cannot be added."""
+    table = table_without_defaults(scene)
     for name in added_effects:
         _put_in(table, name, scene)
     return _confirmed_scene(rebuilt_scene(table, scene), added_effects, True)
@@ -367,6 +366,7 @@ def _confirmed_scene(scene: Any, effects: Iterable[str], must_be_named: bool) ->
 
 
 def _put_in(table: Table, name: str, scene: Any) -> None:
+    """Add an effect with its usual values to the nested tables of a scene; raises InputError if it has none."""
     module = module_of(scene.system, name)
     if "file" in getattr(module, "EXAMPLE", ()):
         raise InputError(scene.file, f"effects.{name}.file", None, "has no usual value: name a file of yours")

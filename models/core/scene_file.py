@@ -1,4 +1,4 @@
-"""A scene file of any system: a TOML table read strictly, before anything is imported that a run would need."""
+"""Scene files: TOML tables read strictly, before anything is imported that only a run would need."""
 
 import re
 import tomllib
@@ -43,7 +43,7 @@ class SceneFile(Strict):
         return names
 
     def table(self) -> dict[str, Any]:
-        """The scene as nested tables of plain values, defaults included: enough to run it again."""
+        """The scene as nested tables of plain values with the defaults included, from which it can be run again."""
         return self.model_dump(exclude_none=True)
 
     def check_choice(self) -> None:
@@ -60,15 +60,15 @@ class SceneFile(Strict):
 
     def path(self, name: str, key_path: str = "") -> Path:
         """Path of a file that the scene names at ``key_path``: in the scene's folder, or else in the working folder."""
-        return existing(name, Path(self.folder), self.file, key_path)
+        return existing_file(name, Path(self.folder), self.file, key_path)
 
 
 Model = TypeVar("Model", bound=SceneFile)
 
 
-def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Path) -> Model:
-    """The scene of one system from nested tables; raises InputError for anything that is not understood."""
-    if "effects" in table and "effects" not in model.model_fields:
+def checked(scene_class: type[Model], table: Mapping[str, Any], file: str, folder: Path) -> Model:
+    """The scene of one system, built from nested tables; raises InputError for anything that is not understood."""
+    if "effects" in table and "effects" not in scene_class.model_fields:
         allowed = (
             "has no place in a scene of this system, which only shows or compares what others compute: put it "
             "into a scene of theirs, such as contact, wheelset or ride"
@@ -76,30 +76,34 @@ def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Pat
         raise InputError(file, "effects", None, allowed)
     for key in ("file", "folder"):
         if key in table:
-            raise InputError(file, key, table[key], "unknown key", tuple(set(model.model_fields) - {"file", "folder"}))
+            raise InputError(
+                file, key, table[key], "unknown key", tuple(set(scene_class.model_fields) - {"file", "folder"})
+            )
     checked_scene = read(
-        model, {**_table_with_chosen_effects(model, table, file), "file": file, "folder": str(folder)}, file
+        scene_class, {**_table_with_chosen_effects(scene_class, table, file), "file": file, "folder": str(folder)}, file
     )
     checked_scene.check_choice()
     return checked_scene
 
 
 AUTOMATIC_EFFECTS = "auto"
-"""What a scene says in place of effects to have them chosen."""
+"""Value of the key ``effects`` by which a scene has its effects chosen automatically."""
 
 
-def _table_with_chosen_effects(model: type[SceneFile], table: Mapping[str, Any], file: str) -> dict[str, Any]:
+def _table_with_chosen_effects(scene_class: type[SceneFile], table: Mapping[str, Any], file: str) -> dict[str, Any]:
     """The table of a scene with ``effects = "auto"``, rewritten as the study that chooses the effects."""
     plain = dict(table)
     if plain.get("effects") == AUTOMATIC_EFFECTS:
         del plain["effects"]
-        if plain.setdefault("study", model.CHOOSING) != model.CHOOSING:
-            raise InputError(file, "study", plain["study"], f'with effects = "auto" the study is {model.CHOOSING}')
+        if plain.setdefault("study", scene_class.CHOOSING) != scene_class.CHOOSING:
+            raise InputError(
+                file, "study", plain["study"], f'with effects = "auto" the study is {scene_class.CHOOSING}'
+            )
     return plain
 
 
-def existing(name: str, folder: Path, file: str, key_path: str) -> Path:
-    """The file ``name`` within ``folder``, or else in the folder in which the command runs.
+def existing_file(name: str, folder: Path, file: str, key_path: str) -> Path:
+    """Path of the file ``name`` within ``folder``, or else in the folder in which the command runs.
 
     Raises InputError that names the place of the scene that wanted it.
     """
@@ -139,7 +143,7 @@ def parse(path: Path) -> dict[str, Any]:
 
 
 def _not_toml(path: Path, error: Exception) -> InputError:
-    """Message with the line at which reading stopped."""
+    """InputError with the line at which reading a TOML file stopped."""
     if not isinstance(error, tomllib.TOMLDecodeError):
         reason = "nested too deeply" if isinstance(error, RecursionError) else "a number has too many digits"
         return InputError(path, "", None, f"not valid TOML: {reason}")
@@ -151,10 +155,11 @@ def _not_toml(path: Path, error: Exception) -> InputError:
 
 
 _ERROR_PLACE_PATTERN = re.compile(r"(.*?)(?: \(at line (\d+), column (\d+)\))?", re.DOTALL)
+"""Pattern that splits a message of ``tomllib`` into complaint, line and column."""
 
 
 def _set_nested_key(table: dict[str, Any], assignment: str) -> None:
-    """Set one nested key from KEY.KEY=VALUE; the value is parsed as TOML, and is text if that fails."""
+    """Set one nested key from text KEY.KEY=VALUE; the value is parsed as TOML, and taken as text if that fails."""
     key, equals, text = (text_part.strip() for text_part in assignment.partition("="))
     if not equals or not all(key.split(".")):
         raise InputError("--set", "", assignment, "must read KEY=VALUE, for example run.step=5e-4")
@@ -198,15 +203,16 @@ def _table_of_key(table: dict[str, Any], key: str, new_value: Any, file: str) ->
     )
 
 
-def _list_index(entries: list[Any], index_text: str, written: tuple[str, str, Any]) -> int:
-    """Index in a list from its text, counted from 0 as in messages; written : file, key and value of the change."""
-    if not (index_text.isdecimal() and int(index_text) < len(entries)):
-        raise InputError(*written, f"a list of {len(entries)} has no entry {index_text!r}: they count from 0")
+def _list_index(items: list[Any], index_text: str, change: tuple[str, str, Any]) -> int:
+    """Index in a list from its text, counted from 0 as in messages. change : file, key and value of the change, for
+    the message."""
+    if not (index_text.isdecimal() and int(index_text) < len(items)):
+        raise InputError(*change, f"a list of {len(items)} has no entry {index_text!r}: they count from 0")
     return int(index_text)
 
 
 def _parsed_value(text: str) -> Any:
-    """Value parsed as in a scene file; text may stand without quotes."""
+    """Value parsed from text as in a scene file; text may stand without quotes."""
     for written in (text,) if '"' in text or "'" in text else (text, BARE_POINT.sub(_with_digits, text)):
         try:
             parsed = tomllib.loads(f"x = {written}")
@@ -217,7 +223,8 @@ def _parsed_value(text: str) -> Any:
 
 
 BARE_POINT = re.compile(r"(?<![\w.])(?=\.?\d)(\d*)\.(\d*)(?=[eE][-+]?\d|(?![\w.]))")
-"""A number that may lack digits before or behind its point, which TOML does not take: 20. or .5"""
+"""Pattern of a number that may lack digits before or behind its decimal point, such as 20. or .5, which TOML does not
+accept."""
 
 
 def _with_digits(number_match: re.Match) -> str:

@@ -1,4 +1,4 @@
-"""Inputs over time: sampled data held, linear or smooth, on uniform grids or at any instant.
+"""Input signals over time: samples held, linearly interpolated or smooth, on uniform grids or at any instant.
 
 Every signal has ``channels`` columns and three readings: ``sample`` on a uniform grid (the tables
 that engines step through), ``at`` one instant (adaptive solvers), and ``knots``, the times at which it
@@ -16,7 +16,7 @@ from models.core.errors import InputError
 
 Interpolation = Literal["held", "linear", "smooth"]
 SNAP_SHARE = 1e-6
-"""Part of a period within which a time is taken for that of a sample."""
+"""Share of a sampling period within which a time counts as that of a sample."""
 
 
 class Signal(Protocol):
@@ -24,7 +24,7 @@ class Signal(Protocol):
 
     @property
     def channels(self) -> int:
-        """Number of columns."""
+        """Number of channels (columns of the samples)."""
         ...
 
     @property
@@ -57,7 +57,7 @@ class Signal(Protocol):
 
 @dataclass(frozen=True)
 class Sampled:
-    """Uniformly sampled data, held over each period or linear in between.
+    """Uniformly sampled signal, held constant over each period or linear in between.
 
     values : shape (n, channels), the first one at t = 0; period : s.
     The nearest sample is found by rounding, never by truncating an accumulated time.
@@ -69,7 +69,7 @@ class Sampled:
 
     @property
     def channels(self) -> int:
-        """Number of columns."""
+        """Number of channels (columns of the samples)."""
         return self.values.shape[1]
 
     @property
@@ -79,11 +79,12 @@ class Sampled:
 
     @property
     def resolution(self) -> float:
-        """The sampling period (s)."""
+        """Longest step (s) of an adaptive solver on this signal: the sampling period."""
         return self.period
 
     def polynomials(self) -> np.ndarray:
-        """Coefficients (powers, periods, channels), lowest power first, in the time since each sample."""
+        """Polynomial coefficients (powers, periods, channels) of the signal within each period, lowest power first, in
+        the time since the period's first sample."""
         if self.held:
             return self.values[None]
         return np.stack([self.values[:-1], np.diff(self.values, axis=0) / self.period])
@@ -112,7 +113,7 @@ class Sampled:
         )
 
     def knots(self, duration: float) -> np.ndarray:
-        """All sample times inside (0, duration)."""
+        """All sample times inside (0, duration), in s."""
         return self.period * np.arange(1, math.ceil(duration / self.period - 1e-9))
 
 
@@ -120,8 +121,8 @@ class Sampled:
 def _sample_and_fraction(
     start_time: float, step: float, sample_count: int, period: float, samples: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Index of the sample at or before each time start + i step, and the fraction of a period after it; the same for
-    all paths of an ensemble."""
+    """Index (sample_count,) of the sample at or before each time start_time + i step, and the fraction of a period
+    after that sample. Cached, since all paths of an ensemble use the same times."""
     position = (start_time + step * np.arange(sample_count)) / period
     nearest = np.rint(position)
     snapped = np.where(np.abs(position - nearest) < SNAP_SHARE, nearest, position)
@@ -133,7 +134,7 @@ def _sample_and_fraction(
 
 @dataclass(frozen=True)
 class Smooth:
-    """A spline through uniformly sampled data, with ``derivatives`` derivatives as further channels.
+    """A spline through uniformly sampled data, with its first ``derivatives`` time derivatives as further channels.
 
     values : shape (n, columns); channels are ordered value columns, first derivatives, second ones.
     A cubic spline is C2; a quintic one is C4 and used where second derivatives are read.
@@ -157,7 +158,7 @@ class Smooth:
 
     @property
     def channels(self) -> int:
-        """Number of columns, derivatives included."""
+        """Number of channels, derivatives included."""
         return self.values.shape[1] * (self.derivatives + 1)
 
     @property
@@ -167,11 +168,12 @@ class Smooth:
 
     @property
     def resolution(self) -> float:
-        """The sampling period (s)."""
+        """Longest step (s) of an adaptive solver on this signal: the sampling period."""
         return self.period
 
     def polynomials(self) -> np.ndarray:
-        """Coefficients (powers, periods, value columns), lowest power first, in the time since each sample."""
+        """Polynomial coefficients (powers, periods, value columns) of the spline within each period, lowest power
+        first, in the time since the period's first sample."""
         return self._pieces
 
     def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
@@ -185,13 +187,13 @@ class Smooth:
         return self.sample(time, self.period, 1)[0]
 
     def knots(self, duration: float) -> np.ndarray:
-        """Times at which a solver must restart: none, because the signal is smooth enough for solvers of moderate
-        order."""
+        """Empty array: the spline is smooth enough for solvers of moderate order, which need no restart."""
         return np.empty(0)
 
 
 def signal_from_samples(values: np.ndarray, period: float, interpolation: Interpolation) -> Sampled | Smooth:
-    """Signal from uniform samples, shape (n, channels), interpolated by the rule that a scene names.
+    """Signal from uniform samples, shape (n, channels), with the interpolation that a scene names: held, linear or
+    smooth.
 
     Raises InputError for a period or a rule that is none, and for fewer samples than the rule needs: 4, or 1 if held
     or linear.
@@ -210,7 +212,7 @@ def signal_from_samples(values: np.ndarray, period: float, interpolation: Interp
 
 @dataclass(frozen=True)
 class Stacked:
-    """Several signals combined into one, whose channels follow one another."""
+    """Several signals combined into one, with their channels side by side."""
 
     parts: tuple[Signal, ...]
 
@@ -221,7 +223,7 @@ class Stacked:
 
     @property
     def period(self) -> float | None:
-        """Period (s) of the first sampled signal in the stack."""
+        """Sampling period (s) of the first sampled signal in the stack; None if none is sampled."""
         return next((signal.period for signal in self.parts if signal.period is not None), None)
 
     @property

@@ -1,4 +1,4 @@
-"""Measured samples smoothed without delay."""
+"""Low-pass filtering of measured samples without delay."""
 
 import math
 
@@ -7,9 +7,10 @@ import numpy as np
 from models.core.errors import InputError
 
 BUTTERWORTH_ORDER = 4
-"""Of the Butterworth low-pass, which runs once forward and once backward."""
+"""Order of the Butterworth low-pass, which runs once forward and once backward."""
 LEAST_PERIODS = 1.0
-"""Of the cut-off that a record must hold: a straight line then passes to 1 %; with a fiftieth it turned round."""
+"""Least length of a record in periods of the cut-off frequency: a straight line then passes to 1 %; with a fiftieth of
+it, the line was reversed."""
 
 
 def low_passed(values: np.ndarray, period: float, bandwidth: float, file: str, key_path: str) -> np.ndarray:

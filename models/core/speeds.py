@@ -21,7 +21,7 @@ class Speeds(Strict):
 
 
 def check_speeds(file: str, speeds: Speeds) -> None:
-    """Raises InputError for a speed of 0, half a range, or a range beside a list."""
+    """Raise InputError for a speed of 0, half a range, or a range beside a list."""
     for i, value in enumerate(speeds.values):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError(file, f"speeds.values.{i}", value, "must be above 0, in m/s: at standstill nothing moves")

@@ -1,19 +1,19 @@
-"""Whole numbers of steps: what divides what, and a step that would."""
+"""Step counts: whether a step divides a length of time, and the nearest step that does."""
 
 import math
 
 MOST_STEPS = 20_000_000
-"""Longest run in steps: its states and its input table then take about 3 GB."""
+"""Largest number of steps of a run: its states and its input table then take about 3 GB."""
 
 
 def divides(step: float, length: float) -> bool:
-    """Whether ``length`` is a whole number of steps, 1 or more, to the rounding of decimal input."""
+    """Whether ``length`` is a whole number of steps ``step``, 1 or more, to the rounding of decimal input."""
     ratio = length / step
     return 0.5 <= ratio < math.inf and abs(ratio - round(ratio)) <= 1e-6 * max(1.0, ratio * 1e-3)
 
 
-def fitting(step: float, length: float) -> str:
-    """Largest short decimal up to ``step`` that divides ``length``, as a user would write it."""
+def dividing_step(step: float, length: float) -> str:
+    """Largest short decimal up to ``step`` that divides ``length``, as text that a user would write."""
     count = max(1, math.ceil(length / step * (1.0 - 1e-9)))
     for n in range(count, 2 * count + 10_000):
         text = f"{length / n:.3g}"

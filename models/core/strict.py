@@ -1,4 +1,4 @@
-"""Reading a user's values strictly: unknown or non-physical ones become one clear message."""
+"""Strict reading of a user's values: an unknown or non-physical value becomes one clear error message."""
 
 from collections.abc import Mapping
 from typing import Any, Literal, TypeVar, get_origin
@@ -10,27 +10,28 @@ from models.core.errors import InputError, nearest_names_phrase, suggestion_phra
 
 
 class Strict(BaseModel):
-    """Base of everything a user may write: frozen, finite, no unknown key, no silent conversion."""
+    """Base class of every table that a user may write: immutable, finite numbers only, no unknown key, no silent
+    conversion."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 Query = Literal["mass", "size", "inertia", "strut", "load", "stiffness", "frequency", "damping"]
-"""Checks of what a usual vehicle has (``models.vehicles.plausible``)."""
+"""Names of the plausibility checks of a vehicle (``models.vehicles.plausible``)."""
 
 
 def accepted_queries_field() -> Any:
-    """Model field for the queries about a vehicle that its user has seen and confirmed."""
+    """Model field for the plausibility queries about a vehicle that its user has seen and accepted."""
     return Field(default=[], description="queries about the vehicle that are meant so: they are not told again")
 
 
 LARGEST_QUANTITY = 1e15
-"""No quantity of a vehicle is larger in SI units; products of two such values are still finite."""
+"""Largest accepted magnitude of a physical quantity in SI units; products of two such values are still finite."""
 
 
 def quantity(unit: str, meaning: str, *, default: Any = ..., zero: bool = False, signed: bool = False) -> Any:
-    """Model field for a physical quantity in SI: positive, or non-negative, or of either sign, and of plausible
-    magnitude."""
+    """Model field for a physical quantity in SI units: positive, or non-negative (``zero``), or of either sign
+    (``signed``), and of plausible magnitude."""
     exclusive_least, least = (None, -LARGEST_QUANTITY) if signed else (None, 0) if zero else (0, None)
     return Field(
         default,
@@ -45,25 +46,27 @@ def quantity(unit: str, meaning: str, *, default: Any = ..., zero: bool = False,
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def read(model: type[Model], values: Mapping[str, Any], file: object, key_path: str = "") -> Model:
-    """Build ``model`` from a user's table; raises InputError that names file, place, value and what is allowed.
+def read(table_class: type[Model], values: Mapping[str, Any], file: object, key_path: str = "") -> Model:
+    """Build ``table_class`` from a user's table; raises InputError that names file, place, value and what is allowed.
 
     Of several errors the first is told in full, an unknown key before all others, and the rest are named.
     """
     if not isinstance(values, Mapping):
         raise InputError(file, key_path, values, ERROR_SENTENCES["dict_type"])
     try:
-        return model.model_validate(dict(values))
+        return table_class.model_validate(dict(values))
     except ValidationError as error:
-        raise message(error, model, file, key_path) from None
+        raise input_error_from_faults(error, table_class, file, key_path) from None
 
 
-def message(error: ValidationError, model: type[BaseModel], file: object, key_path: str) -> InputError:
-    """One InputError from all faults that pydantic listed."""
+def input_error_from_faults(
+    error: ValidationError, table_class: type[BaseModel], file: object, key_path: str
+) -> InputError:
+    """One InputError from all faults that pydantic listed for a user's table."""
     first, *other_faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     keys = _keys_of_error(first)
     value = None if first["type"] == "missing" else first["input"]
-    allowed = _allowed_phrase(first, keys, _owning_model(model, keys))
+    allowed = _allowed_phrase(first, keys, _owning_model(table_class, keys))
     other_keys = [
         _dotted_key(key_path, _keys_of_error(fault))
         for fault in other_faults
@@ -76,10 +79,12 @@ def message(error: ValidationError, model: type[BaseModel], file: object, key_pa
 
 
 def _keys_of_error(fault: Any) -> tuple[str, ...]:
+    """Nested keys of the value that an error of pydantic concerns."""
     return tuple(str(key) for key in fault["loc"])
 
 
 def _dotted_key(key_path: str, keys: tuple[str, ...]) -> str:
+    """Nested keys joined with dots, below ``key_path``."""
     return ".".join((*((key_path,) if key_path else ()), *keys))
 
 
@@ -98,26 +103,29 @@ def _owning_model(model: type[BaseModel], keys: tuple[str, ...]) -> type[BaseMod
 
 
 def _inner_model(annotation: Any) -> type[BaseModel] | None:
+    """The model class in a type annotation, also within a list, dict or union; None if there is none."""
     options = (annotation, *getattr(annotation, "__args__", ()))
     return next((o for o in options if isinstance(o, type) and issubclass(o, BaseModel)), None)
 
 
-def _allowed_phrase(first: Any, keys: tuple[str, ...], owning_model: type[BaseModel] | None) -> str:
+def _allowed_phrase(first_fault: Any, keys: tuple[str, ...], owning_model: type[BaseModel] | None) -> str:
     """Phrase that says which keys or values would have been accepted."""
     fields = {} if owning_model is None else owning_model.model_fields
     key = keys[-1] if keys else ""
-    kind, facts = first["type"], _unit_and_meaning(fields.get(key))
+    kind, facts = first_fault["type"], _unit_and_meaning(fields.get(key))
     if kind == "extra_forbidden":
         known = tuple(name for name, field in fields.items() if not field.exclude)
         return "unknown key" + (nearest_names_phrase(key, known) or ": this table takes none")
     if kind == "missing":
         return f"is missing{facts}"
     if kind == "literal_error":
-        names = tuple(phrase.strip().strip("'") for phrase in first["ctx"]["expected"].replace(" or ", ", ").split(","))
-        return f"must be {' or '.join(names)}{facts}{suggestion_phrase(first['input'], names)}"
+        names = tuple(
+            phrase.strip().strip("'") for phrase in first_fault["ctx"]["expected"].replace(" or ", ", ").split(",")
+        )
+        return f"must be {' or '.join(names)}{facts}{suggestion_phrase(first_fault['input'], names)}"
     if kind == "value_error":
-        return f"{first['ctx']['error']}{facts}"
-    return ERROR_SENTENCES.get(kind, "is not accepted here").format(**first.get("ctx", {})) + facts
+        return f"{first_fault['ctx']['error']}{facts}"
+    return ERROR_SENTENCES.get(kind, "is not accepted here").format(**first_fault.get("ctx", {})) + facts
 
 
 ERROR_SENTENCES = {
@@ -139,11 +147,11 @@ ERROR_SENTENCES = {
     "less_than": "must be below {lt:g}",
     "less_than_equal": "must be at most {le:g}",
 }
-"""What each kind of error of the library means to a person who writes a file."""
+"""Phrases on what is allowed, by the kind of error that pydantic reports."""
 
 
 def _unit_and_meaning(field: FieldInfo | None) -> str:
-    """Text with unit and meaning of a key, in brackets."""
+    """Meaning and unit of a scene key, as text in brackets; empty if there are none."""
     if field is None:
         return ""
     extra = field.json_schema_extra

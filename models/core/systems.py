@@ -1,4 +1,4 @@
-"""The systems that a scene can be of: the folders of ``models/systems``, found by listing.
+"""Systems (kinds of scenes, such as wheelset or braking): the folders of ``models/systems``, listed automatically.
 
 A system's folder is a package with
 
@@ -21,12 +21,12 @@ from typing import Any
 from models.core.errors import InputError
 
 DEFAULT_SYSTEM = "pitch-plane"
-"""System of a scene that names none."""
+"""System of a scene that does not name its system."""
 
 
 @dataclass(frozen=True)
 class System:
-    """One system, identified by the name of its package and its folder."""
+    """One system (kind of scene), identified by the name of its package and its folder."""
 
     package: str
     folder: Path
@@ -38,12 +38,12 @@ class System:
 
     @property
     def plan(self) -> str:
-        """Module that checks and describes its scenes."""
+        """Module that checks and describes the scenes of this system."""
         return f"{self.package}.plan"
 
     @property
     def effects(self) -> str:
-        """Package of its effects, "" if its scenes have none."""
+        """Package of the system's effects; "" if its scenes have none."""
         return f"{self.package}.effects" if (self.folder / "effects").is_dir() else ""
 
     @property
@@ -60,7 +60,7 @@ class System:
 
 
 def systems_in_folder(folder: Path, package: str) -> dict[str, System]:
-    """Systems by their names: all packages within ``folder`` (the package ``package``) that have scenes."""
+    """Systems by their names: all subpackages of ``folder`` (of the package ``package``) that have scenes."""
     system_folders = sorted(path.parent for path in folder.glob("*/scene.py"))
     systems = {
         system_folder.name.replace("_", "-"): System(f"{package}.{system_folder.name}", system_folder)
@@ -70,16 +70,17 @@ def systems_in_folder(folder: Path, package: str) -> dict[str, System]:
 
 
 SYSTEMS = systems_in_folder(Path(__file__).parents[1] / "systems", "models.systems")
+"""All systems of this project, by their names in scenes."""
 
 
 def modules_of(package: str) -> dict[str, str]:
-    """Modules of a package by system name, without importing them."""
+    """Full names of the modules in a package, by system name, without importing them."""
     names = [module.name for module in iter_modules(import_module(package).__path__)]
     return {name.replace("_", "-"): f"{package}.{name}" for name in names}
 
 
 def load(path: Path, changes: Iterable[str] = (), systems: Mapping[str, System] = SYSTEMS) -> Any:
-    """Read a scene file of any system, with ``--set`` changes of the form KEY.KEY=VALUE applied on top."""
+    """The scene in a file of any system, with ``--set`` changes of the form KEY.KEY=VALUE applied on top."""
     from models.core.scene_file import changed_tables
 
     changes = list(changes)
@@ -88,7 +89,8 @@ def load(path: Path, changes: Iterable[str] = (), systems: Mapping[str, System] 
 
 
 def of_table(table: Mapping[str, Any], file: str, folder: Path, systems: Mapping[str, System] = SYSTEMS) -> Any:
-    """The checked scene of nested tables; messages name ``file``, and files that it names lie in ``folder``."""
+    """The checked scene of any system, built from nested tables. ``file`` is named in messages; ``folder`` holds the
+    files that the scene names."""
     name = table.get("system", DEFAULT_SYSTEM)
     if not isinstance(name, str) or name not in systems:
         raise InputError(file, "system", name, "no such system", tuple(systems))

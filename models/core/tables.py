@@ -1,4 +1,4 @@
-"""Tables of measured values: CSV with the unit of every column in its header, read strictly.
+"""Tables of measured values: CSV files with the unit of every column in the header, read strictly.
 
 The accepted text, in full: UTF-8, or UTF-16 with its mark; lines that start with ``#`` and empty lines are
 skipped; the first other line is the header, ``name [unit], name [unit], ...`` in any order; every further
@@ -27,41 +27,53 @@ from models.core.errors import InputError
 from models.core.whole_files import write_whole
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+"""Accepted units of lengths, with their factors to SI."""
 DISTANCES = {"m": 1.0, "km": 1e3}
+"""Accepted units of distances along a road, with their factors to SI."""
 SECONDS = {"s": 1.0, "ms": 1e-3}
+"""Accepted units of times, with their factors to SI."""
 NEWTONS = {"N": 1.0, "kN": 1e3}
+"""Accepted units of forces, with their factors to SI."""
 PER_METRE = {"1/m": 1.0, "rad/m": 1.0, "1/mm": 1e3, "rad/mm": 1e3}
+"""Accepted units of curvatures and of spin creepage, with their factors to SI."""
 SHARES = {"-": 1.0, "%": 1e-2}
+"""Accepted units of ratios, with their factors to SI."""
 RADIANS = {"rad": 1.0, "deg": math.pi / 180.0}
+"""Accepted units of angles, with their factors to SI."""
 ACCELERATIONS = {"m/s^2": 1.0, "g": 9.80665}
+"""Accepted units of accelerations, with their factors to SI."""
 RADIANS_PER_SECOND = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
+"""Accepted units of angular rates, with their factors to SI."""
 
 GAP_CELLS = ("", "nan")
-"""Cells that say that nothing was measured, where that is allowed."""
+"""Cells that mark a missing measured value, where gaps are allowed."""
 
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
-"""Marks that text in UTF-16 begins with."""
+"""Byte-order marks with which text in UTF-16 begins."""
 HEADING_CHARACTERS = 100_000
-"""Characters among which the headings of a plain table are."""
+"""Number of characters at the beginning of a file among which the headings of a plain table are looked for."""
 CACHED_TEXTS = 4
-"""Texts whose numbers are kept: every engine and every method of a comparison reads the same few files."""
+"""Number of files whose numbers stay in memory: every engine and method of a comparison reads the same few files."""
 
 NUMBER_PATTERN = re.compile(r"[-+]?(?=\.?\d)(\d*)\.?(\d*)(?:[eE][-+]?(\d+))?")
-"""A number, its digits before the point, after it and in its exponent."""
-COMPARED_ROWS, LARGEST_LEAP = 8, 3.0
-"""Rows before a last one without a line end, and how much further than they it may go on."""
+"""Pattern of a number with three groups: the digits before the decimal point, after it and in the exponent."""
+COMPARED_ROWS_BEFORE_CUT, LARGEST_LEAP = 8, 3.0
+"""Number of rows before a last one without a line end, and how many times their largest difference the last value may
+differ from the one before."""
 
 ROWS_PER_BLOCK = 20_000
-"""Rows of a block of a long table."""
+"""Rows per block in which a long table is read."""
 
-Columns = Mapping[str, Mapping[str, float]]
-Lines = list[tuple[int, str]]
+ColumnUnits = Mapping[str, Mapping[str, float]]
+"""Accepted units of each column, with their factors to SI."""
+NumberedLines = list[tuple[int, str]]
+"""Line numbers and texts of the lines of a file."""
 
 _HEADING_PATTERN = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 
 
 def read_table(
-    path: str | Path, columns: Columns, *, increasing: str | None = None, least_rows: int = 1, gaps: bool = False
+    path: str | Path, columns: ColumnUnits, *, increasing: str | None = None, least_rows: int = 1, gaps: bool = False
 ) -> dict[str, np.ndarray]:
     """Read a CSV table whose header names the unit of every column.
 
@@ -107,7 +119,7 @@ def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]])
 
 
 def whole_text(path: str | Path) -> str:
-    """Whole text of a file; InputError for anything that prevents reading it."""
+    """Whole text of a file; raises InputError if the file cannot be read."""
     try:
         data = Path(path).read_bytes()
         return data.decode("utf-16" if data.startswith(UTF_16) else "utf-8-sig")
@@ -117,7 +129,7 @@ def whole_text(path: str | Path) -> str:
         raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
 
 
-def _is_plain(text: str, columns: Columns) -> bool:
+def _is_plain(text: str, columns: ColumnUnits) -> bool:
     """Whether the first line of a text has known headings with units, separated by commas, and no cell is quoted."""
     first = next(
         (line for line in text[:HEADING_CHARACTERS].split("\n") if line.strip() and not line.startswith("#")), ""
@@ -128,8 +140,8 @@ def _is_plain(text: str, columns: Columns) -> bool:
 
 
 @lru_cache(CACHED_TEXTS)
-def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Lines]:
-    """Header line and rows, with line numbers, without comments and empty lines."""
+def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], NumberedLines]:
+    """Header line and rows of numbers, each with its line number, without comments and empty lines."""
     lines = [(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1)]
     used = [(i, line) for i, line in lines if line and not line.startswith("#")]
     if not used:
@@ -143,7 +155,7 @@ def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Line
 
 
 def has_line_end(path: str | Path) -> bool:
-    """Whether the last line of a file has a line end; where not, its last number may lack digits."""
+    """Whether the last line of a file has a line end; if not, the last number may lack digits."""
     with Path(path).open("rb") as file:
         size = file.seek(0, io.SEEK_END)
         file.seek(max(size - 1, 0))
@@ -151,8 +163,8 @@ def has_line_end(path: str | Path) -> bool:
 
 
 def _last_line_is_cut_off(lines: list[str]) -> bool:
-    """Whether a last line without a line end is incomplete: it lacks a cell or digits, or its value jumps more than in
-    the rows before.
+    """Whether a last line without a line end is incomplete: a cell or digits are missing, or the value jumps more than
+    in the rows before.
 
     A number counts as complete if it has as many digits before the point, after it and in the exponent as every other
     row has at least.
@@ -166,7 +178,7 @@ def _last_line_is_cut_off(lines: list[str]) -> bool:
     *digit_counts, cut = [[len(digits or "") for digits in number.groups()] for number in numbers if number is not None]
     fewest = [min(counts) for counts in zip(*digit_counts, strict=True)]
     has_all_digits = cut[1] >= fewest[1] and cut[2] >= fewest[2] and (fewest[1] > 0 or cut[0] >= fewest[0])
-    value, *earlier = (float(cell) for _, _, cell in (last_line, *complete_lines[:0:-1][:COMPARED_ROWS]))
+    value, *earlier = (float(cell) for _, _, cell in (last_line, *complete_lines[:0:-1][:COMPARED_ROWS_BEFORE_CUT]))
     leaps = [abs(a - b) for a, b in itertools.pairwise(earlier)]
     leaping = len(last_line[2]) < len(complete_lines[-1][2]) and abs(value - earlier[0]) > LARGEST_LEAP * max(
         leaps, default=0.0
@@ -174,7 +186,9 @@ def _last_line_is_cut_off(lines: list[str]) -> bool:
     return not has_all_digits or leaping
 
 
-def columns_and_factors(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:
+def columns_and_factors(
+    path: str | Path, header: tuple[int, str], columns: ColumnUnits
+) -> tuple[list[str], list[float]]:
     """Column names and factors to SI, in the order of the file."""
     line_text = f"line {header[0]} (header)"
     names, factors = zip(
@@ -191,7 +205,7 @@ def columns_and_factors(path: str | Path, header: tuple[int, str], columns: Colu
     return list(names), list(factors)
 
 
-def _column_and_factor(path: str | Path, line_text: str, cell: str, columns: Columns) -> tuple[str, float]:
+def _column_and_factor(path: str | Path, line_text: str, cell: str, columns: ColumnUnits) -> tuple[str, float]:
     """Name and factor to SI of one column heading, such as ``left [mm]``."""
     match = _HEADING_PATTERN.fullmatch(cell.strip().strip('"'))
     name, unit = match.groups() if match else (cell.strip(), None)
@@ -206,14 +220,15 @@ def _column_and_factor(path: str | Path, line_text: str, cell: str, columns: Col
     return name, columns[name][unit]
 
 
-def _header_wanted(columns: Columns) -> str:
-    """The header that the file should have, with the first accepted unit of each column."""
+def _header_wanted(columns: ColumnUnits) -> str:
+    """Header line that the file should have, with the first accepted unit of each column."""
     return ", ".join(f"{name} [{next(iter(units))}]" for name, units in columns.items())
 
 
 @lru_cache(CACHED_TEXTS)
 def _all_cells(path: str | Path, text: str, gaps_allowed: tuple[bool, ...]) -> np.ndarray:
-    """All cells as an array (rows, columns), in the units of the file; NaN for gaps in the columns that allow gaps."""
+    """All cells of a table as an array (rows, columns), in the units of the file; NaN for gaps in the columns that
+    allow gaps."""
     header, rows = _header_and_rows(path, text)
     headings = header[1].split(",")
     values = np.empty((len(rows), len(headings)))
@@ -225,7 +240,7 @@ def _all_cells(path: str | Path, text: str, gaps_allowed: tuple[bool, ...]) -> n
 def _numbers_of_row(
     path: str | Path, line_number: int, row: str, headings: list[str], gaps_allowed: tuple[bool, ...]
 ) -> list[float]:
-    """The numbers of one row; raises InputError that names its line."""
+    """The numbers of one row of a table; raises InputError that names its line."""
     cells = row.split(",")
     if len(cells) != len(headings):
         raise InputError(
@@ -238,7 +253,8 @@ def _numbers_of_row(
 
 
 def finite_number(path: str | Path, line_number: int, heading: str, cell: str) -> float:
-    """One finite number; Python's extensions (1_000, non-Latin digits) do not count as numbers."""
+    """The finite number in a cell; raises InputError for other text, also for Python's extensions (1_000, non-Latin
+    digits)."""
     try:
         value = float(cell) if cell.isascii() and "_" not in cell else math.nan
     except ValueError:
@@ -249,8 +265,8 @@ def finite_number(path: str | Path, line_number: int, heading: str, cell: str) -
     return value
 
 
-def _check_increasing(path: str | Path, rows: Lines, name: str, values: np.ndarray) -> None:
-    """Refuse rows that are out of order or repeat a station."""
+def _check_increasing(path: str | Path, rows: NumberedLines, name: str, values: np.ndarray) -> None:
+    """Raise InputError at the first row whose value is not greater than the one before."""
     wrong = np.flatnonzero(np.diff(values) <= 0.0)
     if wrong.size:
         i = int(wrong[0]) + 1
@@ -262,7 +278,7 @@ def _check_increasing(path: str | Path, rows: Lines, name: str, values: np.ndarr
 
 @dataclass(frozen=True)
 class RowBlock:
-    """Successive rows of a table.
+    """Block of successive rows of a table.
 
     lines : (rows,) line of the file, counted from 1. values : name -> (rows,) in SI, NaN throughout a wrong row.
     faulty_rows : row of the block -> what is wrong with it.
@@ -273,7 +289,7 @@ class RowBlock:
     faulty_rows: dict[int, str]
 
 
-def table_blocks(path: Path, columns: tuple[Columns, ...], rows: int = ROWS_PER_BLOCK) -> Iterator[RowBlock]:
+def table_blocks(path: Path, columns: tuple[ColumnUnits, ...], rows: int = ROWS_PER_BLOCK) -> Iterator[RowBlock]:
     """Blocks of at most ``rows`` rows of a CSV table.
 
     columns : the accepted sets of columns, of which the header must name one in full, each with its accepted units
@@ -290,28 +306,31 @@ def table_blocks(path: Path, columns: tuple[Columns, ...], rows: int = ROWS_PER_
 
 
 def _opened_text(path: Path) -> TextIO:
+    """The file opened as text, with a replacement for bytes that are no text; raises InputError if it cannot be
+    read."""
     try:
         return path.open(encoding="utf-8-sig", errors="replace")  # a byte that is no text spoils its row alone
     except OSError as error:
         raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
 
 
-def _nearest_columns(header: str, columns: tuple[Columns, ...]) -> Columns:
-    """The set of columns that has most names in common with the header."""
+def _nearest_columns(header: str, columns: tuple[ColumnUnits, ...]) -> ColumnUnits:
+    """The set of columns that has most names in common with a header line."""
     in_header = {cell.partition("[")[0].strip().strip('"') for cell in header.split(",")}
     return max(columns, key=lambda wanted: len(in_header & set(wanted)))
 
 
 def _row_block(
-    path: Path, block: list[tuple[int, str]], names: list[str], factors: np.ndarray, titles: list[str]
+    path: Path, block: list[tuple[int, str]], names: list[str], factors: np.ndarray, headings: list[str]
 ) -> RowBlock:
+    """Block of rows in SI units; a row that cannot be read is NaN, with a message."""
     lines, wrong = [line for line, _ in block], {}
     values = _rows_at_once(block, len(names))
     if values is None:
         values = np.full((len(block), len(names)), np.nan)
         for i, (line, text) in enumerate(block):
             try:
-                values[i] = _numbers_of_row(path, line, text, titles, (False,) * len(titles))
+                values[i] = _numbers_of_row(path, line, text, headings, (False,) * len(headings))
             except InputError as error:
                 wrong[i] = str(error).partition(f"line {line}")[2].lstrip(":, ")
     values = values * factors
@@ -319,7 +338,7 @@ def _row_block(
 
 
 def _rows_at_once(block: list[tuple[int, str]], width: int) -> np.ndarray | None:
-    """All rows parsed in one call; None if some row needs to be parsed by itself."""
+    """All rows of a block parsed in one call, shape (rows, columns); None if some row must be parsed by itself."""
     rows = [text for _, text in block]
     if not (all(map(str.isascii, rows)) and rows[-1].endswith("\n")) or any("_" in text for text in rows):
         return None

@@ -1,4 +1,4 @@
-"""Uniformly sampled time series from CSV, with the unit of every column in its header."""
+"""Uniformly sampled time series from CSV files, with the unit of every column in the header."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,13 +9,14 @@ from models.core.errors import InputError
 from models.core.tables import SECONDS, read_table, write_table
 
 MISSING_VALUE_MARK = 1e28
-"""SI: what is beyond this nobody measured; exporters write 9.9E+34 and the like, in any unit."""
+"""Magnitude (SI units) beyond which a value is an exporter's mark for a missing one, such as 9.9E+34."""
 
 SHORT_TIME_SHARE = 100.0
-"""Part of the time that is needed below which a file's times may be of another unit."""
+"""Ratio of the needed time to a file's time, or the reverse, beyond which the file's times may be in another unit."""
 MANY_SAMPLES, WHEEL_SAMPLE_TIME, CHASSIS_SAMPLE_TIME = 1000, 0.02, 0.2
-"""Samples of a record, and s between them, from which on times may be of another unit: a wheel moves with up to 25 Hz,
-a chassis with up to 2.5 Hz on its springs, and shows nothing of it in fewer."""
+"""Number of samples, and time (s) between samples for wheel and for chassis signals, above which a record's times may
+be in another unit: a wheel moves with up to 25 Hz and a chassis with up to 2.5 Hz on its springs, which longer sample
+times do not show."""
 
 
 def read_time_series(
@@ -37,9 +38,10 @@ def read_time_series(
     return np.column_stack([table[name] for name in columns]), float(f"{period:.12g}")
 
 
-def other_unit(lasts: float, needed_duration: float) -> str:
-    """Hint that the times of a file may be in milliseconds, if it is far shorter (s) than needed; else empty."""
-    wrong = lasts < needed_duration / SHORT_TIME_SHARE
+def wrong_time_unit_hint(duration: float, needed_duration: float) -> str:
+    """Hint that the times of a file may be in milliseconds, if the file lasts (s) a hundredth of the needed time (s) or
+    less; else empty."""
+    wrong = duration < needed_duration / SHORT_TIME_SHARE
     return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
 
 
@@ -62,7 +64,7 @@ def sparse_record_warning(
 
 
 def _check_marks(path: str | Path, name: str, values: np.ndarray, time: np.ndarray) -> None:
-    """Refuse the special numbers that some exporters write for missing values."""
+    """Raise InputError for the special numbers that some exporters write for missing values."""
     marks = np.flatnonzero(np.abs(values) > MISSING_VALUE_MARK)
     if len(marks):
         raise InputError(
@@ -76,7 +78,7 @@ def _check_marks(path: str | Path, name: str, values: np.ndarray, time: np.ndarr
 
 
 def _check_even(path: str | Path, time: np.ndarray, period: float) -> None:
-    """Refuse times with jitter or missing samples, at the first row where this shows."""
+    """Raise InputError for times with jitter or missing samples, at the first row where this shows."""
     slack = 1e-6 * period + 1e-12 * time[-1]
     if np.abs(time - period * np.arange(len(time))).max() <= slack:
         return
@@ -92,6 +94,7 @@ def _check_even(path: str | Path, time: np.ndarray, period: float) -> None:
 
 
 def write_time_series(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]], period: float) -> None:
-    """Write columns name -> (unit, values), shape (n,) each, with a column of times."""
+    """Write a CSV file of columns name -> (unit, values), shape (n,) each, with a column of times at the sampling
+    ``period`` (s)."""
     count = len(next(iter(columns.values()))[1])
     write_table(path, {"time": ("s", period * np.arange(count)), **columns})

@@ -1,35 +1,37 @@
-"""Texts for readers of results: the error of each, and every assumption that was broken."""
+"""Texts that accompany results: the error of each result, and every broken assumption."""
 
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
-from models.core.assumptions import BrokenAssumption, assumed_of, broken_of
-from models.core.discretisation import WARNED_SHARE, error_lines, errors_of, with_stated_errors, worst_of
+from models.core.assumptions import BrokenAssumption, assumption_sentences, broken_of
+from models.core.discretisation import WARNED_SHARE, error_lines, errors_of, largest_estimate, with_stated_errors
 from models.core.result import Result
 
 LISTED_RESULTS = 4
-"""Results up to which the error of each has a line."""
+"""Most results whose errors are printed one by one; of more, only the largest error is printed."""
 
 Results = Mapping[str, Result]
-"""Results of one command by what tells them apart, such as the engine."""
+"""Results of one command by what distinguishes them, such as the engine."""
 
 
 def message_lines(results: Results) -> list[str]:
-    """Lines for the screen: errors first, then broken assumptions, each listed once with the results that broke it."""
+    """Printed lines on results: errors first, then broken assumptions, each listed once with the results that broke
+    it."""
     return [*_error_lines(results), *(f"  {names}: {breach.line()}" for names, breach in worst_breaches(results))]
 
 
 def _error_lines(results: Results) -> list[str]:
+    """Printed lines on the errors of results: one by one for few results, else the largest error only."""
     if len(results) <= LISTED_RESULTS:
         return [f"  {name}: {line}" for name, run in results.items() for line in error_lines(run)]
-    untold: dict[str, list[str]] = {}
-    worst = {name: estimate for name, run in results.items() if (estimate := worst_of(run)) is not None}
+    results_without_estimate: dict[str, list[str]] = {}
+    worst = {name: estimate for name, run in results.items() if (estimate := largest_estimate(run)) is not None}
     for name, run in results.items():
         for line in error_lines(run) if name not in worst else ():
-            untold.setdefault(line, []).append(name)
-    listed = [f"  {_list_of_few(names)}: {line}" for line, names in untold.items()]
+            results_without_estimate.setdefault(line, []).append(name)
+    listed = [f"  {_list_of_few(names)}: {line}" for line, names in results_without_estimate.items()]
     if not worst:
         return listed
     largest = max(worst, key=lambda name: worst[name].share)
@@ -44,14 +46,15 @@ def _error_lines(results: Results) -> list[str]:
 
 
 def _list_of_few(names: list[str]) -> str:
+    """The first few names, and the number of the others, as text."""
     return ", ".join(names[:LISTED_RESULTS]) + (
         f" and {len(names) - LISTED_RESULTS} more" if len(names) > LISTED_RESULTS else ""
     )
 
 
 def worst_breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
-    """Broken assumptions: for each name the worst violation over all results, and the names of the results that broke
-    it."""
+    """Broken assumptions with the names of the results that broke them: of each assumption the worst violation over all
+    results."""
     names_by_breach: dict[str, list[str]] = {}
     worst: dict[str, BrokenAssumption] = {}
     for name, run in results.items():
@@ -63,19 +66,18 @@ def worst_breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
 
 
 def figure_remarks(results: Results) -> list[str]:
-    """Short lines for figures: warnings about errors, and broken assumptions."""
+    """Short lines below a figure: warnings about errors, and broken assumptions."""
     steps = [
         f"{name}: {error_lines(run)[0]}"
         for name, run in results.items()
-        if (worst := worst_of(run)) is not None and worst.warned
+        if (worst := largest_estimate(run)) is not None and worst.warned
     ]
     return [*steps[:LISTED_RESULTS], *(breach.brief() for _, breach in worst_breaches(results))]
 
 
-def joined_result(joined: Result, parts: Results) -> Result:
-    """A result that joins other results, with the errors that each of them states and all assumptions that any of them
-    broke."""
-    stored_errors = {name: json.loads(run.data.attrs["error"]) for name, run in parts.items()}
+def joined_result(joined: Result, results: Results) -> Result:
+    """A result joined from other results, with all their stated errors and all assumptions that any of them broke."""
+    stored_errors = {name: json.loads(run.data.attrs["error"]) for name, run in results.items()}
     first = next(iter(stored_errors.values()))
     channels = {
         f"{name}, {channel}": values
@@ -83,23 +85,23 @@ def joined_result(joined: Result, parts: Results) -> Result:
         for channel, values in stored_error.get("channels", {}).items()
     }
     joined.data.attrs["error"] = json.dumps({**first, "channels": channels} if channels else first)
-    assumed = dict.fromkeys(text for run in parts.values() for text in assumed_of(run))
-    worst_breach = [replace(breach, where=f"{names}, {breach.where}") for names, breach in worst_breaches(parts)]
+    assumed = dict.fromkeys(text for run in results.values() for text in assumption_sentences(run))
+    worst_breach = [replace(breach, where=f"{names}, {breach.where}") for names, breach in worst_breaches(results)]
     joined.data.attrs["assumptions"] = json.dumps(
         {"assumed": list(assumed), "broken": [asdict(breach) for breach in worst_breach]}
     )
-    broke = (run.data.attrs["status"] for run in parts.values() if broken_of(run))
+    broke = (run.data.attrs["status"] for run in results.values() if broken_of(run))
     joined.data.attrs["status"] = next(broke, joined.data.attrs["status"])
     return joined
 
 
 def derived_result(derived: Result, results: Results, method: str) -> Result:
-    """A result derived from others, with the errors of the sources and the assumptions that they broke; ``method`` :
-    text on how errors carry over.
+    """A result computed from other results, with the errors and broken assumptions of these; ``method`` is text on how
+    the errors carry over.
 
     Without estimates in the results it has none.
     """
-    assumed = [says for run in results.values() for says in assumed_of(run)]
+    assumed = [says for run in results.values() for says in assumption_sentences(run)]
     assumptions = {
         "assumed": list(dict.fromkeys(assumed)),
         "broken": [asdict(breach) for _, breach in worst_breaches(results)],
@@ -112,8 +114,8 @@ def derived_result(derived: Result, results: Results, method: str) -> Result:
     return with_stated_errors(derived, worst, method) if worst else derived
 
 
-def as_json(results: Results) -> dict[str, Any]:
-    """Entries "errors" and "assumptions" of a summary, from the statements of each result; NaN becomes None."""
+def errors_and_assumptions(results: Results) -> dict[str, Any]:
+    """Items "errors" and "assumptions" of a summary, from the statements of each result; NaN becomes None."""
     return {
         "errors": {name: _json_attribute(run, "error") for name, run in results.items()},
         "assumptions": {
@@ -125,17 +127,17 @@ def as_json(results: Results) -> dict[str, Any]:
 def summary_with_errors(summary: dict[str, Any]) -> dict[str, Any]:
     """The summary of a study, with the errors and broken assumptions of its "results" added as text at the end."""
     results = summary.pop("results", {})
-    return summary | as_json(results) | {"table": [*summary.get("table", []), *message_lines(results)]}
+    return summary | errors_and_assumptions(results) | {"table": [*summary.get("table", []), *message_lines(results)]}
 
 
 def _json_attribute(run: Result, key: str) -> dict[str, Any]:
-    """Attribute of a result, parsed from JSON, with None in place of NaN and infinity."""
+    """Attribute ``key`` of a result, parsed from JSON, with None in place of NaN and infinity."""
     attribute: dict[str, Any] = json.loads(run.data.attrs[key], parse_constant=lambda text: None)
     return attribute
 
 
 DOUBT_ATTRIBUTES = ("engine", "error", "assumptions")
-"""Attributes by which a result says what it must be doubted for."""
+"""Attributes of a result that state its engine, its error and its assumptions."""
 
 
 def attributes_for_json(results: Results) -> dict[str, dict[str, str]]:

@@ -1,4 +1,4 @@
-"""Trajectory of a vehicle, as every engine and every system returns it."""
+"""Trajectory of a simulated vehicle, as every engine and every system returns it."""
 
 from dataclasses import dataclass, field
 
@@ -7,8 +7,8 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Path of a run: times (m,) in s; states (m, 2 n): coordinates of the vehicle (m, rad), then their rates; cost in
-    counts.
+    """Simulated motion: times (m,) in s; states (m, 2 n), that is coordinates of the vehicle (m, rad), then their
+    rates; counts of the computing work.
 
     enforced (m, guided coordinates): force on the chassis (N, down), where its heave is prescribed, and moment
     (N m, nose up); None where nothing is.

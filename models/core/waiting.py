@@ -1,18 +1,18 @@
-"""Progress of a long run for a bar that someone may watch; nothing is computed unless someone does."""
+"""Progress of a long simulation for a progress bar; nothing is computed unless a bar is shown."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-SHARES_OF_MARCHES: list[Callable[[], float]] = []
-"""Shares of the marches that are under way, the innermost last."""
+PROGRESS_FUNCTIONS: list[Callable[[], float]] = []
+"""Functions that return the completed share of each running simulation, the innermost simulation last."""
 
 
 @contextmanager
-def marching(share: Callable[[], float]) -> Iterator[None]:
-    """Context of a running simulation; share : function that returns the completed fraction, 0 to 1. Another thread may
-    call it at any time."""
-    SHARES_OF_MARCHES.append(share)
+def simulation_progress(share: Callable[[], float]) -> Iterator[None]:
+    """Context of a running simulation; ``share`` is a function that returns the completed share, 0 to 1. Another thread
+    may call it at any time."""
+    PROGRESS_FUNCTIONS.append(share)
     try:
         yield
     finally:
-        SHARES_OF_MARCHES.remove(share)
+        PROGRESS_FUNCTIONS.remove(share)

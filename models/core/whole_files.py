@@ -1,4 +1,5 @@
-"""Files that are written whole or not at all, even if the disk is full, the process is killed or the machine stops."""
+"""Files that are written completely or not at all, even if the disk is full, the process is killed or the machine
+stops."""
 
 import errno
 import os
@@ -8,15 +9,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 PARTIAL_NAME = ".{}.{}.part{}"
-"""Name of a file while it is written: its final name, the number of the process, and its extension again."""
+"""Name of a file while it is written: the final name, the number of the process, and the extension again."""
 DISK_FULL_ERRORS = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG)
-"""What a system says where nothing more can be stored: the disk, the user's share of it, or a file is full."""
+"""Error numbers of the operating system for storage that is full: the disk, the user's quota, or the largest file
+size."""
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Context with the path of a temporary file beside ``path``; if the block ends without error, it is renamed to
-    ``path``.
+    """Context with the path of a temporary file beside ``path``; if the block ends without error, the file is renamed
+    to ``path``.
 
     An earlier file of that name is replaced. After an error the temporary file is removed, and the error is raised
     again; an OSError then names ``path``.
@@ -35,12 +37,12 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def write_whole(path: Path, content: bytes | memoryview | str) -> None:
-    """Write a file of these bytes, or of this text in UTF-8 with its line ends as they are."""
+    """Write a file completely or not at all, from bytes, or from text in UTF-8 with its line ends unchanged."""
     with whole_file(path) as partial_path:
         partial_path.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
-def drop_parts(folder: Path) -> None:
+def remove_partial_files(folder: Path) -> None:
     """Remove temporary files and folders that killed processes left in a folder and its subfolders."""
     for partial_path in list(folder.rglob(PARTIAL_NAME.format("*", "*", "*"))):
         number = partial_path.name.rpartition(".part")[0].rpartition(".")[2]
@@ -49,7 +51,7 @@ def drop_parts(folder: Path) -> None:
 
 
 def _runs_elsewhere(process: int) -> bool:
-    """Whether another process has this number; True where the operating system offers no harmless query."""
+    """Whether another running process has this number; True where the operating system offers no harmless query."""
     if os.name != "posix":
         return True
     try:
@@ -59,7 +61,7 @@ def _runs_elsewhere(process: int) -> bool:
     return process != os.getpid()
 
 
-def reason_of(error: OSError) -> str:
-    """The operating system's reason why a file could not be written, as a phrase with the file."""
+def write_error_phrase(error: OSError) -> str:
+    """The operating system's reason why a file could not be written, as a phrase with the file name."""
     reason = "the disk is full" if error.errno in DISK_FULL_ERRORS else error.strerror or str(error)
     return " ".join(reason.split()) + (f" ({error.filename})" if error.filename else "")

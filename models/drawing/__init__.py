@@ -1,1 +1,1 @@
-"""How every figure looks: sizes, colours, axes."""
+"""Appearance of every figure: sizes, colours, axes."""

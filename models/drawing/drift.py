@@ -1,4 +1,5 @@
-"""Figures of drift: what each stabiliser leaves, what its stiffness or cut-off does on a grade, how paths scatter."""
+"""Figures of drift: the error that each stabiliser leaves, the effect of its stiffness or cut-off on a grade, and the
+scatter of error paths."""
 
 import math
 from typing import Any
@@ -18,9 +19,9 @@ from models.drawing.figures import (
     REJECTED_COLOUR,
     SMALL_TEXT,
     VERMILION,
-    about_one,
     add_heading,
     legend_below,
+    scale_about_one,
     subplots,
 )
 from models.drift.score import JUDGED_BAND, SECTION_FORCE_CHANNELS, TUMBLING_PITCH, Limits
@@ -28,30 +29,34 @@ from models.drift.score import JUDGED_BAND, SECTION_FORCE_CHANNELS, TUMBLING_PIT
 Row = dict[str, Any]
 
 ROAD_LABELS = {"road": ("on the road", BLUE), "grade": ("on the grade", VERMILION)}
+"""Words and colour of each road."""
 VERDICT_SIGNS = {
     "accepted": ("✓", ACCEPTED_COLOUR),
     "stabilise": ("~", DOUBTFUL_COLOUR),
     "rejected": ("✗", REJECTED_COLOUR),
 }
-"""Sign and colour of a verdict."""
+"""Symbol and colour of each verdict."""
 CHANNEL_MARKERS = dict(zip(SECTION_FORCE_CHANNELS, ("o", "s", "^", "D"), strict=True))
+"""Marker of each section force channel."""
 CHANNEL_LABELS = {"f3x": "front, along", "f3z": "front, upright", "f4x": "rear, along", "f4z": "rear, upright"}
 DAMAGE_AXIS, PITCH_AXIS, MOMENT_SHARE_AXIS = (3e-3, 3e2), (1e-4, 10.0), (1e-4, 1.0)
-"""What the axes show; a mark at an edge lies beyond it."""
+"""Ranges of the figure's axes; a marker at an edge stands for a value beyond it."""
 DAMAGE_TICKS = (0.01, 0.5, 0.9, 1.1, 2.0, 100.0)
 
 
-def draw_fan(axis: Any, times: np.ndarray, bands: np.ndarray) -> None:
-    """Draw bands of a pitch error (rad) over times (s), from its 5, 25, 50, 75 and 95 % quantiles (5, times)."""
-    low, quarter, middle, three, high = bands
+def draw_quantile_bands(axis: Any, times: np.ndarray, bands: np.ndarray) -> None:
+    """Draw bands of the pitch error's magnitude (rad) over times (s), from its 5, 25, 50, 75 and 95 % quantiles (5,
+    times)."""
+    low, lower_quarter, middle, upper_quarter, high = bands
     axis.fill_between(times, low, high, alpha=0.2, color=BLUE, linewidth=0, label="5 to 95 %")
-    axis.fill_between(times, quarter, three, alpha=0.4, color=BLUE, linewidth=0, label="25 to 75 %")
+    axis.fill_between(times, lower_quarter, upper_quarter, alpha=0.4, color=BLUE, linewidth=0, label="25 to 75 %")
     axis.semilogy(times, middle, color=BLUE, label="median")
     axis.set_title("Magnitude of the pitch error [rad]")
 
 
 def decision_figure(rows: list[Row], limits: Limits, grade: float | None, results: Results | None = None) -> Any:
-    """Figure with one line per method: damage, pitch error, artificial moment, both verdicts, and cost."""
+    """Figure with one line per stabilising method: damage, pitch error, artificial moment, the verdicts with and
+    without a true run, and cost."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
     widths = (2.5, 1.25, 1.25, 1.5)
     figure, axes = subplots(1, 4, figsize=(COLUMN_WIDTH, 2.6 + 0.36 * len(methods)), sharey=True, width_ratios=widths)
@@ -70,7 +75,7 @@ def decision_figure(rows: list[Row], limits: Limits, grade: float | None, result
         f"added moment /\nI pitch'' [-],\nrms to {JUDGED_BAND:g} Hz",
         (MOMENT_SHARE_AXIS[0], limits.artificial_share),
     )
-    about_one(axes[0], "x", DAMAGE_TICKS)
+    scale_about_one(axes[0], "x", DAMAGE_TICKS)
     axes[0].set_xlim(*DAMAGE_AXIS)
     axes[1].axvline(TUMBLING_PITCH, color=REJECTED_COLOUR, linewidth=0.8, linestyle=":")
     axes[0].set_yticks(range(len(methods)), methods)
@@ -86,7 +91,7 @@ def decision_figure(rows: list[Row], limits: Limits, grade: float | None, result
 
 
 def _draw_run(axes: Any, row: Row, line: int) -> None:
-    """Draw the marks of one run; those of the run on a grade are slightly lower."""
+    """Draw the markers of one run; those of a run on a grade are slightly lower."""
     _, colour = ROAD_LABELS[row["road"]]
     y = line + (0.17 if row["road"] == "grade" else -0.17)
     for channel, mark in CHANNEL_MARKERS.items():
@@ -103,14 +108,16 @@ def _draw_run(axes: Any, row: Row, line: int) -> None:
         axis.plot(np.clip(row[name], *span), y, "o", color=colour, markersize=4, clip_on=False)
 
 
-def _prepare_panel(axis: Any, span: tuple[float, float], title: str, good: tuple[float, float]) -> None:
+def _prepare_panel(axis: Any, span: tuple[float, float], title: str, acceptable_range: tuple[float, float]) -> None:
+    """Set a panel's logarithmic axis, its label, and the band of acceptable values."""
     axis.set(xscale="log", xlim=span, xlabel=title)
-    axis.axvspan(*good, color=ACCEPTED_COLOUR, alpha=0.16, linewidth=0)
+    axis.axvspan(*acceptable_range, color=ACCEPTED_COLOUR, alpha=0.16, linewidth=0)
     axis.grid(axis="y", alpha=0.25)
 
 
 def _draw_verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
-    """Draw symbols for the verdicts with and without the true run, per road, and the cost."""
+    """Draw symbols for the verdicts with and without the true run, per road, and the computing time relative to the
+    free run."""
     axis.set_xlim(0, 10)
     axis.axis("off")
     columns = [(row["road"], key) for row in rows if row["method"] == "free" for key in ("verdict", "without truth")]
@@ -152,11 +159,11 @@ def _draw_legend(figure: Any, grade: float | None) -> None:
     figure.legend(handles=[*marks, *roads, good, *signs], loc="outside lower center", ncols=4)
 
 
-def stiffness(sweep: dict[str, np.ndarray], offset_level: Any, limits: Limits, grade: float | None) -> Any:
-    """Figure of pitch error and worst damage ratio over stiffness, for every road; the equivalent cut-off is on the
-    upper axis.
+def stiffness_figure(sweep: dict[str, np.ndarray], bench: Any, limits: Limits, grade: float | None) -> Any:
+    """Figure of the largest pitch error and the worst damage ratio over the stiffness of the spring to the ground, for
+    every road; the upper axis shows the cut-off of the equivalent high-pass.
 
-    sweep : per road what ``Bench.sweep`` gives; offset_level : the bench of the road without the grade
+    sweep : per road what ``Bench.sweep`` gives; bench : the bench of the road without the grade
     """
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.6))
     for road, curve in sweep.items():
@@ -173,13 +180,11 @@ def stiffness(sweep: dict[str, np.ndarray], offset_level: Any, limits: Limits, g
     axes[0].set(ylim=(low, 3.0), title="Largest pitch error [rad]")
     axes[1].set(ylim=(None, 1.5 * DAMAGE_AXIS[1]), title="Damage of the worst section force / true [-]")
     for axis in axes:
-        axis.axvline(
-            offset_level.holding, color=GREY, linewidth=0.8, linestyle="--", label="predicted to hold from here"
-        )
+        axis.axvline(bench.holding, color=GREY, linewidth=0.8, linestyle="--", label="predicted to hold from here")
         axis.set_xlabel("stiffness of the spring to the ground [N m/rad]")
         turning = (
-            lambda k: np.sqrt(np.maximum(k, 0.0) / offset_level.pitch_inertia) / (2 * math.pi),
-            lambda f: offset_level.pitch_inertia * (2 * math.pi * f) ** 2,
+            lambda k: np.sqrt(np.maximum(k, 0.0) / bench.pitch_inertia) / (2 * math.pi),
+            lambda f: bench.pitch_inertia * (2 * math.pi * f) ** 2,
         )
         cutoff_axis = axis.secondary_xaxis("top", functions=turning)
         cutoff_axis.set_xlabel("cut-off of the equivalent high-pass [Hz]")

@@ -1,4 +1,4 @@
-"""How figures look: one style, one set of colours, SVG and PNG, the same bytes from the same results.
+"""Style of all figures: one set of colours, SVG and PNG files, identical bytes from identical results.
 
 Pages show figures ``COLUMN_WIDTH`` inches wide: no figure is wider, so that its letters are read in the size they are
 drawn.
@@ -26,38 +26,43 @@ from models.core.told import Results, figure_remarks
 from models.core.whole_files import whole_file
 
 COLUMN_WIDTH = 8.0
-"""Width (inches) of the column in which pages show figures: at most that of a figure."""
+"""Width (inches) of the column in which pages show figures: the largest width of a figure."""
 TITLE_TEXT, SMALL_TEXT = 9.5, 7.5
-"""Size (points) of titles, and the smallest one, of remarks and crowded legends."""
+"""Font sizes (points) of titles, and of remarks and crowded legends."""
 SMALLEST_TEXT = 7.0
-"""Size (points) below which nobody reads a figure."""
+"""Font size (points) below which text in a figure cannot be read."""
 
 DARK, BLUE, VERMILION, GREEN = "#222222", "#0072b2", "#d55e00", "#009e73"
 PINK, ORANGE, SKY, YELLOW = "#cc79a7", "#e69f00", "#56b4e9", "#f0e442"
 GREY, PALE = "#767676", "#b5b5b5"
-"""Colours that eyes of every kind tell apart (Okabe and Ito, 2008), and what is no curve of its own."""
+"""Colours that colour-blind readers can tell apart (Okabe and Ito, 2008); grey and pale are for lines that are no
+curves."""
 CURVE_COLOURS = (BLUE, VERMILION, GREEN, PINK, ORANGE, SKY, DARK, GREY)
-"""Colours of curves that have none of their own, in turn."""
+"""Colours of curves without a fixed colour, in turn."""
 TRUTH_COLOUR, MEASURED_COLOUR = DARK, PALE
-"""What is true, and what was measured, beside what was computed."""
+"""Colours of true and of measured quantities, beside computed ones."""
 ACCEPTED_COLOUR, DOUBTFUL_COLOUR, REJECTED_COLOUR = "#00795a", "#a86400", "#b00020"
-"""Words and bands of a verdict: accepted or within the limit, in between, rejected or broken."""
+"""Colours of verdicts and bands: accepted or within the limit, doubtful, rejected or beyond the limit."""
 
 
 class _Colours(dict[str, str]):
+    """Colours by engine; green for an engine that has none."""
+
     def __missing__(self, engine: str) -> str:
         return GREEN
 
 
 class _Labels(dict[str, str]):
+    """Labels by engine; an unknown engine has its own name."""
+
     def __missing__(self, engine: str) -> str:
         return engine
 
 
 COLOURS = _Colours({"reference": DARK, "exudyn": BLUE, "mujoco": VERMILION})
-"""One colour per implementation in every figure; told apart by people who see colours differently."""
+"""Colour of each engine in every figure; colour-blind readers can tell them apart."""
 LABELS = _Labels({"reference": "reference", "exudyn": "Exudyn", "mujoco": "MuJoCo"})
-"""As figures call them; one from outside the tree by its own name and in a colour of its own."""
+"""Names of the engines in figures; an engine from outside the tree has its own name."""
 
 rcParams.update(
     {
@@ -85,9 +90,9 @@ rcParams.update(
 
 
 REMARK_FONT_SIZE = 8
-"""Size (points) of remarks."""
+"""Font size (points) of remarks below a figure."""
 LETTER_WIDTH = 0.6
-"""Width of a letter by its size, of bold ones; of others a tenth less."""
+"""Ratio of a bold letter's mean width to the font size; other letters are a tenth narrower."""
 
 
 def wrapped_text(text: str, inches: float, font_size: float) -> str:
@@ -97,7 +102,7 @@ def wrapped_text(text: str, inches: float, font_size: float) -> str:
 
 
 def add_heading(figure: Figure, title: str, results: Results | None = None) -> None:
-    """Add a title above the figure's left edge, and below the figure the warnings and doubts about its results."""
+    """Add a title above the figure's left edge, and below the figure the warnings about its results."""
     size, wide = rcParams["figure.titlesize"], figure.get_figwidth()
     figure.suptitle(wrapped_text(title, wide, size), x=0.01, ha="left", fontweight="bold")
     if remarks := figure_remarks(results or {}):
@@ -110,8 +115,8 @@ def add_heading(figure: Figure, title: str, results: Results | None = None) -> N
 
 
 def empty_figure(figure_size: tuple[float, float] | None = None) -> Figure:
-    """An empty figure of a size in inches, or of matplotlib's default size. It does not use pyplot, which is slow to
-    import and keeps every figure until it is closed."""
+    """An empty figure of a size in inches, or of matplotlib's default size, made without pyplot, which is slow to
+    import and keeps every figure open."""
     figure = Figure(figsize=figure_size)
     FigureCanvasAgg(figure)
     return figure
@@ -140,8 +145,8 @@ def subplot_mosaic(
 def panels(
     panel_count: int, column_count: int, height: float, figure_width: float = COLUMN_WIDTH, **options_of_figure: Any
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of ``panel_count`` panels without empty places, ``column_count`` of them side by side, each ``height``
-    inches high.
+    """A figure of ``panel_count`` panels in rows of ``column_count``, without empty panels, each ``height`` inches
+    high.
 
     options_of_figure : as for ``subplots``; panels that share an axis show its numbers once.
     """
@@ -172,8 +177,8 @@ def _lines_of_legends(figure: Figure) -> int:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write ``path`` (.svg or .png) without a date, and return the path. The figure is drawn once, while ``savefig``
-    draws it twice."""
+    """Write a figure to ``path`` (.svg or .png) without a date, and return the path. The figure is drawn once, while
+    ``savefig`` draws it twice."""
     with whole_file(path) as partial_path:
         if path.suffix == ".svg":
             from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -186,14 +191,13 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 RATIO_SHARPNESS = 0.05
-"""Ratios are drawn as asinh(ln(ratio) / RATIO_SHARPNESS): linear about 1, where a tenth is told, logarithmic far from
-it.
-"""
+"""Ratios are drawn as asinh(ln(ratio) / RATIO_SHARPNESS): linear about 1, where differences of 10 % are visible, and
+logarithmic far from 1."""
 
 
-def about_one(axis: Axes, axis_name: str, ticks: Sequence[float]) -> None:
-    """Scale an axis (x or y) for ratios, so that both 5 % and several decades are visible; ticks : the ratios to be
-    marked."""
+def scale_about_one(axis: Axes, axis_name: str, ticks: Sequence[float]) -> None:
+    """Scale an axis ("x" or "y") for ratios, so that both 5 % and several decades are visible; ``ticks`` are the ratios
+    to be marked."""
     scale = (
         lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / RATIO_SHARPNESS),
         lambda u: np.exp(RATIO_SHARPNESS * np.sinh(u)),
@@ -204,21 +208,23 @@ def about_one(axis: Axes, axis_name: str, ticks: Sequence[float]) -> None:
 
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+"""Translation of a minus sign and digits to superscripts."""
 MANY_DECADES = 2.0
-"""Decades on an axis from which on only whole powers of ten are marked."""
+"""Number of decades on an axis from which on only whole powers of ten are labelled."""
 DECADE_MARKS = ("", "2", "4")
-"""What stands before a power of ten that is written on an axis of one decade to ``MANY_DECADES``."""
+"""Leading digits that are labelled on an axis of one decade to ``MANY_DECADES``; empty for the power of ten itself."""
 
 
 def _spans_few_decades(low: float, high: float) -> bool:
+    """Whether an axis range is positive and shorter than ``MANY_DECADES``."""
     return 0 < low < high and bool(np.log10(high / low) < MANY_DECADES)
 
 
-class _Powers(LogFormatterSciNotation):
-    """Tick labels instead of matplotlib's: plain text such as 10⁻³ or 2 × 10⁻³, and 20 on an axis with few decades."""
+class _PlainTickLabels(LogFormatterSciNotation):
+    """Tick labels in plain text such as 10⁻³ or 2 × 10⁻³, and 20 on an axis with few decades."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """Label of a tick mark, called by matplotlib."""
+        """Label of a tick mark; called by matplotlib."""
         power = re.search(r"(?:([\d.]+)\\times)?10\^\{(-?\d+)\}", text := super().__call__(x, pos))
         if not power:
             return text
@@ -230,27 +236,28 @@ class _Powers(LogFormatterSciNotation):
         return f"{power[1] + ' × ' if power[1] else ''}10{power[2].translate(SUPERSCRIPTS)}"
 
 
-class _Between(LogLocator):
+class _MinorTicks(LogLocator):
     """Positions of minor ticks between powers of ten; none on an axis with many decades."""
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
-        """Positions of the ticks on an axis, called by matplotlib."""
+        """Positions of the ticks on an axis; called by matplotlib."""
         return super().tick_values(vmin, vmax) if _spans_few_decades(vmin, vmax) else np.array([])
 
 
 class PlainLogScale(LogScale):
-    """Logarithmic scale named "log" in every figure; with a base other than ten it behaves as matplotlib's."""
+    """Logarithmic scale with plain labels, which replaces matplotlib's "log" in every figure; with a base other than
+    ten it behaves as matplotlib's."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
 
     def set_default_locators_and_formatters(self, axis: Any) -> None:
-        """Set the axis' tick marks and labels, as matplotlib asks of a scale; called for every axis that takes it."""
+        """Set tick marks and labels of an axis; called by matplotlib for every axis with this scale."""
         super().set_default_locators_and_formatters(axis)
         if self.base == 10:
-            axis.set_major_formatter(_Powers())
-            axis.set_minor_locator(_Between(subs=None if self.subs is None else list(self.subs)))
-            axis.set_minor_formatter(_Powers(labelOnlyBase=self.subs is not None))
+            axis.set_major_formatter(_PlainTickLabels())
+            axis.set_minor_locator(_MinorTicks(subs=None if self.subs is None else list(self.subs)))
+            axis.set_minor_formatter(_PlainTickLabels(labelOnlyBase=self.subs is not None))
 
 
 register_scale(PlainLogScale)

@@ -1,4 +1,4 @@
-"""Templates of self-contained HTML pages: what every page of ours sets in the same way."""
+"""Jinja environment of the templates of self-contained HTML pages."""
 
 from pathlib import Path
 from typing import Any

@@ -1,1 +1,2 @@
-"""Why a force-excited vehicle runs away: stochastic theory, growth of errors, and what a remedy is worth."""
+"""Drift of force-excited vehicle models: stochastic theory, growth of errors, and the error that a stabiliser
+leaves."""

@@ -1,4 +1,4 @@
-"""Damage of a component by a wrong pitch: paths of a gyro's angle error, and damage over such an error.
+"""Fatigue damage caused by a wrong pitch: error paths of a gyro's angle, and damage averaged over such an error.
 
 A vehicle that is guided by a gyro's pitch stands wrong by its angle error, and a slow angle turns the section forces
 and changes nothing else: the component along the chassis is f3 sin(pitch + error). So the damage of a run, driven again
@@ -16,23 +16,26 @@ from models.fatigue.damage import pseudo_damage
 from models.sensors.inertial_unit import bias_path
 
 ANGLE_NODES = 41
-"""Constant angle errors at which damage is counted; an odd number, so that one of them is zero."""
+"""Number of constant angle errors at which damage is counted; odd, so that one of them is zero."""
 EVEN_SPACING_ANGLE = 1e-3
-"""rad; below it the nodes are evenly spaced, above it their spacing grows with the angle."""
+"""Angle error (rad) below which the nodes are evenly spaced; above it their spacing grows with the angle."""
 
-UnitPaths = tuple[np.ndarray, np.ndarray]
-"""Angle errors (samples, seconds + 1) at each second: of a random walk of 1 rad per sqrt(s), of a bias of 1 rad/s."""
+UnitErrorPaths = tuple[np.ndarray, np.ndarray]
+"""Angle error paths (samples, seconds + 1) with a value per second: of a random walk of 1 rad per sqrt(s), and of a
+gyro bias of 1 rad/s."""
 
 
-def unit_paths(samples: int, rate: int, length: int, correlation_time: float, seed: int) -> UnitPaths:
-    """Error paths of an angle, two arrays (samples, length + 1) with a value per second: by noise and by bias of a gyro
-    of unit grade. They sum ``rate`` samples per second, the same that the effects add to a reading, over ``length``
-    (s).
+def unit_angle_error_paths(
+    path_count: int, rate: int, length: int, correlation_time: float, seed: int
+) -> UnitErrorPaths:
+    """Random angle error paths of a gyro of unit grade, two arrays (samples, length + 1) with a value per second: by
+    white noise and by bias. They sum ``rate`` noise samples per second over ``length`` (s); the bias has a correlation
+    time (s).
 
     Every grade of gyro is a multiple of the same paths, so that grades are compared without scatter between them.
     """
     walks, drifts = list[np.ndarray](), list[np.ndarray]()
-    for path in range(samples):
+    for path in range(path_count):
         noise = normal_samples(seed, path, rate * length, 1, source=GYRO)[:, 0] / rate**0.5
         wander = bias_path(rate * length, 1 / rate, 0.0, 1.0, correlation_time, seed, path) / rate
         for paths, samples_of_paths in ((walks, noise), (drifts, wander)):
@@ -47,7 +50,7 @@ def damage_at_angle_errors(result: Result, error: float) -> list[float]:
 
 
 def log_damage_over_pitch_error(result: Result, largest_angle: float, file: str = "") -> CubicSpline:
-    """Logarithm of the ratio of the section forces' damage to the true damage, as a function of a constant pitch error
+    """Spline of the logarithm of damage divided by true damage for each section force, over a constant pitch error
     (rad).
 
     Raises InputError, which names the scene's file, for a run without damage.
@@ -63,8 +66,8 @@ def log_damage_over_pitch_error(result: Result, largest_angle: float, file: str 
 
 
 def rotated_to_maximum(load: np.ndarray) -> np.ndarray:
-    """The load (n,) rotated so that it begins and ends at its largest value, as in one of many repetitions (ASTM
-    E1049-85, 5.4.5).
+    """The load history (n,) rotated so that it begins and ends at its largest value, as in a block of many repetitions
+    (ASTM E1049-85, 5.4.5).
 
     Cut elsewhere, the largest cycle of all would stay open and count one half.
     """
@@ -73,6 +76,7 @@ def rotated_to_maximum(load: np.ndarray) -> np.ndarray:
 
 
 def damage_errors(curve: CubicSpline, angles: np.ndarray) -> np.ndarray:
-    """Relative error (samples, 4) of the damage of each section force over error paths (samples, n) in rad."""
+    """Relative error (samples, 4) of the damage of each section force, averaged over angle error paths (samples, n) in
+    rad; ``curve`` is from ``log_damage_over_pitch_error``."""
     reach = curve.x[-1]
     return np.expm1(curve(np.clip(angles, -reach, reach))).mean(axis=1)

@@ -1,4 +1,4 @@
-"""How fast a tilt error of a force-excited vehicle grows, and the noise laws that follow from it.
+"""Growth of the pitch error of a force-excited vehicle, and its variance from noise on the wheel forces.
 
 Vertical wheel forces act at an arm b cos(pitch), so a fast moment pushes the pitch away from zero on average, as a
 fast shaken support holds Kapitza's pendulum up, with the opposite sign. Averaging the rigid vehicle, whose wheels
@@ -26,18 +26,18 @@ FAST_PITCH_FREQUENCY = 0.2
 roads, for an average over a motion means something only where the error hardly grows meanwhile. Half of it or twice
 as much changes the growth rate of these roads by 1 to 3 %."""
 SERIES_LIMIT = 0.1
-"""Below this 2 lambda t the sinh law is summed as a series, which loses no digit."""
+"""Argument 2 lambda t below which the sinh law is summed as a power series, which loses no digit."""
 LARGEST_EXPONENT = 710.0
-"""From about this 2 lambda t on, sinh is beyond all numbers."""
+"""Argument 2 lambda t from which on sinh overflows."""
 SMALLEST_POSITIVE = 1e-300
-"""What counts as above 0 (rad^2/s^3, rad)."""
+"""Least accepted positive value of an intensity (rad^2/s^3) or angle (rad)."""
 MEDIAN_OF_NORMAL = 0.6744897501960817
-"""Median of |x| of a normal x, by its standard deviation."""
+"""Median of |x| of a normally distributed x, divided by the standard deviation."""
 
 
 @dataclass(frozen=True)
 class RigidPitch:
-    """Pitch of the rigid vehicle about the common centre of mass.
+    """Pitch of the vehicle as a rigid body about the common centre of mass of chassis and wheels.
 
     front_arm, rear_arm : arms of the wheel forces (m); inertia : I of the chassis; wheel_inertia : J of the wheels (kg
     m^2);
@@ -61,15 +61,16 @@ class RigidPitch:
         return self.front_arm * forces[:, 0] - self.rear_arm * forces[:, 1]
 
     def noise_intensity(self, deviation: float, sample_period: float) -> float:
-        """Intensity q (rad^2/s^3) of the pitch acceleration that white samples of both forces make.
+        """Noise intensity q (rad^2/s^3) of the pitch acceleration from white samples of both wheel forces, each with
+        the standard deviation (N) and the sample period (s).
 
         q = s^2 D (front^2 + rear^2) / (I + J)^2 with the standard deviation s (N) of each sample and the period D (s).
         """
         return deviation**2 * sample_period * (self.front_arm**2 + self.rear_arm**2) / self.total_inertia**2
 
     def squared_growth_rate(self, rates: np.ndarray) -> np.ndarray:
-        """Squared growth rate lambda^2 (1/s^2) for each of the fast pitch rates (rad/s); the forces are vertical in
-        space."""
+        """Squared growth rate lambda^2 (1/s^2) of a pitch error for each fast pitch rate (rad/s); the wheel forces are
+        vertical in space."""
         return rates**2 * self.inertia / self.total_inertia
 
 
@@ -86,8 +87,8 @@ def rigid_pitch(parameters: Parameters) -> RigidPitch:
 
 
 def high_passed(values: np.ndarray, sample_period: float, cutoff: float = FAST_PITCH_FREQUENCY) -> np.ndarray:
-    """Part of the signal ``values`` (n,) above ``cutoff`` (Hz), without delay, with the gain x^4 / (1 + x^4) at x = f /
-    cutoff.
+    """Part of the signal ``values`` (n,) above ``cutoff`` (Hz), without delay, with the gain x^4 / (1 + x^4) at x =
+    frequency / cutoff.
 
     That is a Butterworth filter of order 2 run forward and backward. Beyond its ends the signal goes on as its odd
     mirror image, for a period of the cut-off where it is that long.
@@ -110,8 +111,8 @@ def pitch_rate_of_forces(forces: np.ndarray, sample_period: float, parameters: P
 def growth_rate(
     pitch_rate: np.ndarray, sample_period: float, parameters: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
 ) -> float:
-    """Growth rate lambda (1/s) from the pitch rate (n,) of a run or of ``pitch_rate_of_forces``; forces are vertical in
-    space."""
+    """Growth rate lambda (1/s) of a pitch error from the pitch rate (n,) in rad/s of a run or of
+    ``pitch_rate_of_forces``; the wheel forces are vertical in space."""
     return float(
         np.sqrt(rigid_pitch(parameters).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff)).mean())
     )
@@ -120,7 +121,8 @@ def growth_rate(
 def sinh_law_rate(
     pitch_rate: np.ndarray, sample_period: float, parameters: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
 ) -> np.ndarray:
-    """Growth rate lambda (n,) in 1/s for use in the sinh law at each time, if the motion changes along the run.
+    """Growth rate lambda (n,) in 1/s with which the sinh law of ``pitch_variance`` holds at each time, if the motion
+    changes along the run.
 
     A noise impulse at s moves the pitch at t by g(t, s) with g'' = lambda^2(t) g. To first order in lambda^2 the
     variance q int g^2 ds depends on int lambda^2(u) w(u) du alone, with the weight w = u^2 (t - u) (3 t - u): what
@@ -129,8 +131,8 @@ def sinh_law_rate(
     times = sample_period * np.arange(len(pitch_rate))
     squares = rigid_pitch(parameters).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff))
 
-    def weighted(values: np.ndarray) -> np.ndarray:
-        second, third, fourth = (np.cumsum(values * times**power) for power in (2, 3, 4))
+    def weighted(rates: np.ndarray) -> np.ndarray:
+        second, third, fourth = (np.cumsum(rates * times**power) for power in (2, 3, 4))
         return 3 * times**2 * second - 4 * times * third + fourth
 
     scaled = np.zeros(len(times))
@@ -139,7 +141,8 @@ def sinh_law_rate(
 
 
 def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensity: float) -> np.ndarray:
-    """Variance (rad^2) of the pitch: q / (4 lambda^3) (sinh(2 lambda t) - 2 lambda t); q t^3 / 3 for lambda = 0.
+    """Variance (rad^2) of the pitch after times t (s) by the sinh law: q / (4 lambda^3) (sinh(2 lambda t) - 2 lambda
+    t), with growth rate lambda (1/s) and noise intensity q (rad^2/s^3); q t^3 / 3 for lambda = 0.
 
     times in s, rate lambda in 1/s, intensity q in rad^2/s^3; InputError for one that is negative or no number. With
     x = 2 lambda t it is q t^3 / 3 times 6 (sinh x - x) / x^3, whose bracket loses its digits for small x and is summed
@@ -160,25 +163,29 @@ def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensit
 def heave_variance(
     times: np.ndarray | float, parameters: Parameters, deviation: float, sample_period: float
 ) -> np.ndarray:
-    """Variance (m^2) of the common centre of mass: 2 s^2 D / M^2 t^3 / 3. Heave has no growth, in either frame."""
+    """Variance (m^2) of the heave of the common centre of mass after times t (s): 2 s^2 D / M^2 t^3 / 3, with standard
+    deviation s (N) and period D (s) of the wheel forces' samples, and total mass M. A heave error does not grow by
+    itself."""
     mass = rigid_pitch(parameters).mass
     return 2 * deviation**2 * sample_period / mass**2 * np.asarray(times, dtype=float) ** 3 / 3
 
 
 def holding_stiffness(parameters: Parameters, rate: float) -> float:
-    """Smallest rotational stiffness to the ground (N m/rad) that holds the pitch: (I + J) lambda^2."""
+    """Smallest rotational stiffness to the ground (N m/rad) that keeps the pitch from growing: total pitch inertia
+    times the squared growth rate (1/s)."""
     return rigid_pitch(parameters).total_inertia * rate**2
 
 
-def spring_of(parameters: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
-    """Stiffness and damping of a pitch spring to the ground with a natural frequency (Hz): k = (I + J) wc^2 in N m/rad,
-    d = 2 zeta (I + J) wc in N m s/rad."""
+def pitch_spring(parameters: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
+    """Stiffness k = (I + J) wc^2 (N m/rad) and damping d = 2 zeta (I + J) wc (N m s/rad) of a pitch spring to the
+    ground with a natural ``frequency`` (Hz)."""
     corner, inertia = 2 * math.pi * frequency, rigid_pitch(parameters).total_inertia
     return inertia * corner**2, 2 * damping_ratio * inertia * corner
 
 
 def drift_off_time(rate: float, intensity: float, angle: float) -> float:
-    """Time (s) at which half of all runs deviate by more than ``angle`` (rad), for a constant growth rate (1/s).
+    """Time (s) after which half of all runs deviate in pitch by more than ``angle`` (rad), for a constant growth rate
+    (1/s) and noise intensity (rad^2/s^3).
 
     Raises InputError for an intensity or angle that is not above 0, and for a rate below it.
     """
@@ -200,8 +207,8 @@ def drift_off_time(rate: float, intensity: float, angle: float) -> float:
 
 
 def _log_gain(log_x: float) -> float:
-    """Logarithm of 6 (sinh x - x) / x^3 from the logarithm of x = 2 lambda t; works where x or the result would
-    overflow."""
+    """Logarithm of the sinh law's gain 6 (sinh x - x) / x^3 from the logarithm of x = 2 lambda t; works where x or the
+    result would overflow."""
     x = math.exp(log_x)
     if x > LARGEST_EXPONENT:
         return math.log(3.0) + x - 3.0 * log_x

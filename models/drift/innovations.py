@@ -1,4 +1,4 @@
-"""Are the innovations of a filter what its model and its stated noise make of them: as large, without mean, and white?
+"""Consistency check of a Kalman filter: whether its innovations are as large as stated, without mean, and white.
 
 Of a filter that is right, the innovations divided by the root of their covariance are independent and normal with
 deviation 1, whatever the measurement was. Three figures of a run are held against that law, each with its own share of
@@ -14,17 +14,17 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 FALSE_ALARM_SHARE = 1e-3
-"""Share of the runs of a right filter that are called inconsistent all the same."""
+"""Share of the runs of a correct filter that are called inconsistent."""
 CORRELATION_LAGS = 20
-"""Samples over which correlation is looked for."""
+"""Largest lag, in samples, at which innovations are checked for correlation."""
 FEWEST_INNOVATIONS = 100
-"""Innovations of a column below which its mean and correlation are not judged."""
+"""Number of innovations in a column below which their mean and correlation are not judged."""
 
 
 @dataclass(frozen=True)
 class AcceptedStatistic:
-    """A statistic of a run with its acceptance interval. If the filter is right, the statistic lies outside it only
-    with probability FALSE_ALARM_SHARE."""
+    """A statistic of a filter's innovations with its acceptance interval. If the filter is right, a run has any
+    statistic outside only with the probability FALSE_ALARM_SHARE."""
 
     name: str
     value: float
@@ -37,13 +37,13 @@ class AcceptedStatistic:
         return self.low <= self.value <= self.high
 
     def __str__(self) -> str:
-        """The figure with its interval, as text for an engineer."""
+        """The statistic with its acceptance interval, as text for an engineer."""
         return f"{self.name} {self.value:.3g} ({self.low:.3g} to {self.high:.3g})"
 
 
 @dataclass(frozen=True)
 class Consistency:
-    """Statistics of a run's innovations, the first one being the mean square of all normalised innovations."""
+    """Statistics of the innovations of a filter's run; the first is the mean square of all normalised innovations."""
 
     statistics: tuple[AcceptedStatistic, ...]
 
@@ -53,7 +53,7 @@ class Consistency:
         return all(figure.is_within_interval for figure in self.statistics)
 
     def __str__(self) -> str:
-        """One sentence: which statistics are outside their intervals, or that none is."""
+        """Sentence on the statistics outside their acceptance intervals, or that all are inside."""
         if self.consistent:
             return f"its innovations are as stated: {self.statistics[0]}"
         wrong = "; ".join(map(str, (figure for figure in self.statistics if not figure.is_within_interval)))
@@ -64,8 +64,8 @@ class Consistency:
 
 
 def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:
-    """Consistency figures of normalised innovations (n, columns), independent and of deviation 1 where the filter is
-    right; NaN where nothing was measured."""
+    """Consistency statistics of normalised innovations (n, columns), which are independent and of standard deviation 1
+    if the filter is right; NaN where nothing was measured."""
     known = np.isfinite(innovations)
     tail = FALSE_ALARM_SHARE / (1 + 2 * len(names)) / 2
     count = int(known.sum())
@@ -80,14 +80,15 @@ def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:
 
 
 def _mean_innovation(name: str, column: np.ndarray, tail_probability: float) -> AcceptedStatistic:
-    """Statistic of the mean innovation, in units of its standard deviation."""
+    """Statistic of the mean of one column's normalised innovations."""
     known = column[np.isfinite(column)]
     wide = float(norm.isf(tail_probability)) / math.sqrt(len(known))
     return AcceptedStatistic(f"mean of {name}", float(known.mean()), -wide, wide)
 
 
 def _correlation(name: str, column: np.ndarray, tail_probability: float) -> AcceptedStatistic:
-    """Statistic of serial correlation: root mean square of the correlations at lags 1 to CORRELATION_LAGS.
+    """Statistic of the serial correlation of innovations: root mean square of the correlations at lags 1 to
+    CORRELATION_LAGS.
 
     For white samples each correlation is normal, with a variance of one over the number of pairs (Box and Pierce).
     """

@@ -1,4 +1,4 @@
-"""The paper's Section 2: what white noise on a measured force does to a point mass that is driven by it.
+"""Drift of a point mass driven by a noisy measured force, in closed form (Section 2 of the paper).
 
 m x'' = -eta m x' + f, with an error on each sample of f of standard deviation ``deviation`` (N), held over the
 sampling period ``step`` (s). Two results, each the covariance (2, 2) of the errors of position (m) and velocity
@@ -18,13 +18,15 @@ from models.core.errors import InputError
 from models.core.noise import normal_samples
 
 SERIES_LIMIT = 1.0
-"""Damping times time below which a series is used: 20 terms there, and no digit lost by the closed form above."""
+"""Product of damping (1/s) and time (s) below which a power series of 20 terms is used; above it the closed form loses
+no digit."""
 
 
 def continuous_covariance(
     time: float, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0
 ) -> np.ndarray:
-    """Covariance after ``time`` (s) of eq. (4); ``damping`` eta in 1/s, zero or more.
+    """Covariance (2, 2) of the errors of position (m) and velocity (m/s) after ``time`` (s), by the stochastic
+    differential equation (4); ``damping`` eta in 1/s, zero or more.
 
     Raises InputError where the closed form does not hold (see ``_check_inputs``).
     """
@@ -37,7 +39,7 @@ def continuous_covariance(
 
 
 def _relative_decay(x: float) -> float:
-    """(1 - exp(-x)) / x."""
+    """The function (1 - exp(-x)) / x; 1 at x = 0."""
     return -math.expm1(-x) / x if x else 1.0
 
 
@@ -49,7 +51,8 @@ def _bracket_ratio(x: float) -> float:
 
 
 def euler_covariance(steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0) -> np.ndarray:
-    """Covariance after ``steps`` steps of the explicit Euler scheme (3), exactly.
+    """Covariance (2, 2) of the errors of position (m) and velocity (m/s) after ``steps`` steps of the explicit Euler
+    scheme (3), exactly.
 
     With h = eta step, r = 1 - h and the sums S1, S2 of r^i and r^(2i): Var v = q S2, Cov = q step (S1 - S2) / h,
     Var x = q step^2 (n - 2 S1 + S2) / h^2, where q = (deviation step / mass)^2. Raises InputError where the
@@ -65,7 +68,8 @@ def euler_covariance(steps: int, deviation: float, step: float, mass: float = 1.
 
 
 def _damping_times_step(damping_step: float) -> float:
-    """Product of damping and step, after a check that it is below 2."""
+    """Product of damping and step, unchanged; raises InputError unless it is below 2, where the explicit Euler scheme
+    is stable."""
     if damping_step >= 2:
         raise InputError(
             "", "damping", None, f"times step is {damping_step:g}: the explicit Euler scheme is unstable from 2 on"
@@ -74,7 +78,7 @@ def _damping_times_step(damping_step: float) -> float:
 
 
 def _geometric_sum(damping_step: float, n: int) -> float:
-    """(1 - (1 - h)^n) / h: the sum of (1 - h)^i over i < n."""
+    """Sum of (1 - h)^i over i < n, that is (1 - (1 - h)^n) / h, with h = ``damping_step``."""
     if damping_step == 0 or n <= 0:
         return float(max(n, 0))
     return (
@@ -85,7 +89,8 @@ def _geometric_sum(damping_step: float, n: int) -> float:
 
 
 def _sum_of_squares(damping_step: float, n: int) -> float:
-    """Sum over i < n of ((1 - (1 - h)^i) / h)^2, that is (n - 2 S1 + S2) / h^2.
+    """Sum over i < n of ((1 - (1 - h)^i) / h)^2, that is (n - 2 S1 + S2) / h^2, with h = ``damping_step`` and the sums
+    S1, S2 of (1 - h)^i and (1 - h)^(2i).
 
     For small h the binomial expansion of (2 - h) (n - 2 S1 + S2): its terms up to h^1 vanish, and the exact
     integers of the others are divided by powers of n before they become floating-point numbers.
@@ -108,7 +113,8 @@ def _sum_of_squares(damping_step: float, n: int) -> float:
 
 
 def _check_inputs(deviation: float, step: float, mass: float, damping: float, length: float) -> None:
-    """Require deviation, damping and length to be zero or more, step and mass above zero, and all finite."""
+    """Raise InputError unless deviation, damping and length are zero or more, step and mass above zero, and all
+    finite."""
     finite = all(map(math.isfinite, (deviation, step, mass, damping, length)))
     if not finite or min(deviation, damping, length) < 0 or min(step, mass) <= 0:
         numbers = (
@@ -120,7 +126,8 @@ def _check_inputs(deviation: float, step: float, mass: float, damping: float, le
 def monte_carlo_errors(
     path_count: int, steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0, seed: int = 0
 ) -> np.ndarray:
-    """Monte Carlo: errors (path_count, 2) of position (m) and velocity (m/s) of Euler paths after ``steps`` steps.
+    """Random errors (path_count, 2) of position (m) and velocity (m/s) after ``steps`` steps of the explicit Euler
+    scheme.
 
     Raises InputError as ``euler_covariance`` does.
     """

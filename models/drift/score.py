@@ -1,4 +1,4 @@
-"""Score of a stabilised run: the cost of the stabilisation, its error beside the true run, and a verdict.
+"""Scores of a stabilised run: cost of the stabilisation, errors relative to the true run, and a verdict.
 
 Two kinds of figures are kept apart, because an engineer has only one of them.
 
@@ -21,19 +21,19 @@ from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio
 from models.vehicles.pitch_plane import Parameters
 
 JUDGED_BAND = 15.0
-"""Upper edge (Hz) of the band in which the artificial moment is judged: what bends a chassis."""
+"""Upper edge (Hz) of the frequency band in which the artificial moment is judged: what bends a chassis."""
 BUTTERWORTH_ORDER = 4
-"""Order of the Butterworth low-pass, run forwards and backwards (``scipy.signal.sosfiltfilt``): no phase, -6 dB at
-JUDGED_BAND."""
+"""Order of the Butterworth low-pass, run forwards and backwards (``scipy.signal.sosfiltfilt``): no phase shift, -6 dB
+at JUDGED_BAND."""
 TUMBLING_PITCH = 0.5
-"""Pitch (rad) beyond which no road is that steep."""
+"""Pitch (rad) beyond which a vehicle counts as tumbled, since no road is that steep."""
 MEASURED_PITCH_EFFECTS = ("prescribed_pitch", "prescribed_heave_and_pitch", "kalman_filter")
-"""Effects that hold the pitch to a measured one."""
+"""Names of the effects that guide the pitch to a measured pitch."""
 LEVELLING_EFFECTS = ("pitch_spring", "high_pass")
-"""Effects that hold it near zero, whatever the road does."""
+"""Names of the effects that hold the pitch near zero, whatever the road does."""
 
 INNOVATION_CONFIDENCE = 0.999
-"""Of the band in which a filter's innovations must lie."""
+"""Probability of the chi-square band in which a correct filter's innovations lie."""
 
 DOUBTFUL_INNOVATION_LIMIT = 2.0
 """Mean of the normalised innovation squared from which on the measurements of a filter of roll and pitch are doubted: 1
@@ -41,9 +41,11 @@ is right, and noise that is estimated is right to a third. An axle force 0.5 % t
 damage along the vehicle, makes 2."""
 
 FEWEST_ROWS, COARSEST_SPACING = 100, 5e-3
-"""Rows and spacing (s) that a balance of moments over each step takes: a quarter of a wave at 50 Hz."""
+"""Least number of rows and largest row spacing (s) for a balance of moments over each step: a quarter of a wave at 50
+Hz."""
 
-Word = Literal["accepted", "accepted with doubt", "rejected", "stabilise"]
+VerdictWord = Literal["accepted", "accepted with doubt", "rejected", "stabilise"]
+"""Words of a verdict on a run."""
 
 
 class Limits(Strict):
@@ -84,7 +86,7 @@ class RunFigures:
 
 
 @dataclass(frozen=True)
-class Errors:
+class RunErrors:
     """Errors of a stabilised run relative to the true run.
 
     Attributes
@@ -106,24 +108,28 @@ class Errors:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict on a run: a word and its reason."""
+    """Verdict on a stabilised run: a word and its reason."""
 
-    word: Word
+    word: VerdictWord
     reason: str
 
 
 def figures_of_run(run: Result, parameters: Parameters) -> RunFigures:
-    """Figures of a run for the vehicle's parameters p; raises InputError unless its rows are on a uniform, fine grid.
+    """Figures of a run that need no true run, such as its artificial moment; raises InputError unless its rows are on a
+    uniform, fine grid.
 
     The artificial moment is the mean over each step of I pitch'' less the suspension's moment, so it counts whatever
     acts on the chassis beside its springs and dampers, by whichever effect, in whichever engine.
     """
-    step = _step(run)
-    inertia, heave = parameters.I * np.diff(run["pitch_rate"]) / step, parameters.m3 * np.diff(run["z3_rate"]) / step
-    moment = inertia - _step_means(_natural_moment(run, parameters), step)
-    force = heave - _step_means(parameters.m3 * parameters.g - run["f3"] - run["f4"], step)
+    row_spacing = _row_spacing(run)
+    inertia, heave = (
+        parameters.I * np.diff(run["pitch_rate"]) / row_spacing,
+        parameters.m3 * np.diff(run["z3_rate"]) / row_spacing,
+    )
+    moment = inertia - _step_means(_natural_moment(run, parameters), row_spacing)
+    force = heave - _step_means(parameters.m3 * parameters.g - run["f3"] - run["f4"], row_spacing)
     band = {
-        name: low_pass(values, step)
+        name: low_pass(values, row_spacing)
         for name, values in (("moment", moment), ("inertia", inertia), ("force", force), ("heave", heave))
     }
     counts = run.counts()
@@ -140,34 +146,34 @@ def figures_of_run(run: Result, parameters: Parameters) -> RunFigures:
     )
 
 
-def errors_of_run(run: Result, truth: Result, slope: float = WOEHLER_SLOPE) -> Errors:
-    """Errors of a run compared with the true run; both have rows at the same times; ``slope`` is the Woehler exponent.
+def errors_of_run(run: Result, true_run: Result, slope: float = WOEHLER_SLOPE) -> RunErrors:
+    """Errors of a run relative to the true run, with rows at the same times; ``slope`` is the Woehler exponent.
 
     Raises InputError if the rows lie at different times, or if a load of the truth never turns.
     """
-    if len(run.times) != len(truth.times) or np.abs(run.times - truth.times).max() > 1e-9:
+    if len(run.times) != len(true_run.times) or np.abs(run.times - true_run.times).max() > 1e-9:
         raise InputError("", "times", None, "the run and the true one need rows at the same times")
-    loads, true = (section_forces(forces["f3"], forces["f4"], forces["pitch"]) for forces in (run, truth))
-    pitch = run["pitch"] - truth["pitch"]
-    return Errors(
+    loads, true = (section_forces(forces["f3"], forces["f4"], forces["pitch"]) for forces in (run, true_run))
+    pitch = run["pitch"] - true_run["pitch"]
+    return RunErrors(
         damage={name: damage_ratio(loads[name], true[name], slope) for name in SECTION_FORCE_CHANNELS},
         force_rms={name: root_mean_square(loads[name] - true[name]) for name in SECTION_FORCE_CHANNELS},
-        vertical_damage={name: damage_ratio(run[name], truth[name], slope) for name in ("f3", "f4")},
+        vertical_damage={name: damage_ratio(run[name], true_run[name], slope) for name in ("f3", "f4")},
         pitch_max=float(np.abs(pitch).max()),
         pitch_rms=root_mean_square(pitch),
-        heave_max=float(np.abs(run["z3"] - truth["z3"]).max()),
+        heave_max=float(np.abs(run["z3"] - true_run["z3"]).max()),
     )
 
 
-def verdict_on_run(figures: RunFigures, deviations: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
-    """The verdict of a virtual measurement, by damage, pitch error and artificial moment.
+def verdict_on_run(figures: RunFigures, errors: RunErrors, effects: Iterable[str], limits: Limits) -> Verdict:
+    """Verdict on a virtual measurement with a true run, by damage, pitch error and artificial moment.
 
     ``accepted``: all within the limits. ``stabilise``: a run without any stabiliser (none of MEASURED_PITCH_EFFECTS or
     LEVELLING_EFFECTS among the scene's ``effects``) that is outside them but has not tumbled. ``rejected``: all else.
     """
     if figures.pitch_max > TUMBLING_PITCH:
         return _tumbling_verdict(figures)
-    wrong = [*_exceeded_limits(deviations, limits), *_burden_sentences(figures, limits)]
+    wrong = [*_exceeded_limits(errors, limits), *_burden_sentences(figures, limits)]
     if not wrong:
         return Verdict("accepted", f"damage ratios within {limits.damage_error:.0%} of 1")
     stabilised = not set(effects).isdisjoint((*MEASURED_PITCH_EFFECTS, *LEVELLING_EFFECTS))
@@ -175,7 +181,7 @@ def verdict_on_run(figures: RunFigures, deviations: Errors, effects: Iterable[st
 
 
 def innovations_are_consistent(run: Result) -> bool | None:
-    """Whether the innovations of a run's Kalman filter are as large as the filter expects; None without a filter.
+    """Whether the innovations of a run's Kalman filter are as large as the filter states; None without a filter.
 
     The mean normalised innovation squared over the whole run, per measured value, lies in the chi-square band of
     INNOVATION_CONFIDENCE. A filter whose model is wrong in a way that it does not allow for lies far above it.
@@ -190,8 +196,8 @@ def innovations_are_consistent(run: Result) -> bool | None:
 
 
 def uncertainty(run: Result) -> float:
-    """Uncertainty of the pitch that a Kalman filter states itself: twice its largest standard deviation (rad); 0
-    without a filter."""
+    """Uncertainty (rad) that a Kalman filter states for the pitch: twice its largest standard deviation; 0 without a
+    filter."""
     return 2.0 * float(run["pitch_deviation"].max()) if "pitch_deviation" in run.data else 0.0
 
 
@@ -204,7 +210,7 @@ def blind_verdict(
     consistent: bool | None = None,
     uncertainty: float = 0.0,
 ) -> Verdict:
-    """Verdict of an engineer who has no true run, from figures of the run itself; damage is not among them.
+    """Verdict without a true run, from figures of the run alone; damage is not among them.
 
     ``accepted``: the pitch is held to a measured one (MEASURED_PITCH_EFFECTS), the artificial moment is within its
     limit and the filter, where there is one, is ``innovations_are_consistent`` with its measurement (NIS within its
@@ -230,10 +236,12 @@ def blind_verdict(
 
 
 def _tumbling_verdict(figures: RunFigures) -> Verdict:
+    """Verdict on a run that tumbled: rejected."""
     return Verdict("rejected", f"tumbled: pitch of {figures.pitch_max:.2g} rad; none of its forces mean anything")
 
 
 def _free_run_verdict(duration: float, trusted: float | None) -> Verdict:
+    """Verdict on a run without stabiliser, by the predicted time (s) for which it can be trusted."""
     if trusted is None:
         return Verdict("stabilise", "free, and nothing predicts how long it can be trusted")
     if duration <= trusted:
@@ -241,20 +249,18 @@ def _free_run_verdict(duration: float, trusted: float | None) -> Verdict:
     return Verdict("stabilise", f"free, and trusted for {trusted:.3g} s of {duration:.3g} s")
 
 
-def _exceeded_limits(deviations: Errors, limits: Limits) -> list[str]:
-    """Sentences on those errors relative to the true run that exceed their limits."""
+def _exceeded_limits(errors: RunErrors, limits: Limits) -> list[str]:
+    """Phrases on the errors relative to the true run that exceed their limits."""
     damage = [
         f"damage of {name} x {ratio:.3g}"
-        for name, ratio in deviations.damage.items()
+        for name, ratio in errors.damage.items()
         if not abs(ratio - 1.0) <= limits.damage_error
     ]
-    return damage + (
-        [] if deviations.pitch_max <= limits.pitch_error else [f"pitch wrong by {deviations.pitch_max:.2g} rad"]
-    )
+    return damage + ([] if errors.pitch_max <= limits.pitch_error else [f"pitch wrong by {errors.pitch_max:.2g} rad"])
 
 
 def _burden_sentences(figures: RunFigures, limits: Limits) -> list[str]:
-    """Sentences on the stabiliser's share of moment and force where it exceeds the limit."""
+    """Phrases on the artificial moment and force of the stabiliser where their shares exceed the limit."""
     shares = {"moment": (figures.moment_share_band, "I pitch''"), "force": (figures.force_share_band, "m3 z3''")}
     return [
         f"artificial {name} {share:.0%} of {full_value}"
@@ -264,25 +270,26 @@ def _burden_sentences(figures: RunFigures, limits: Limits) -> list[str]:
 
 
 def root_mean_square(values: np.ndarray) -> float:
-    """Root of the mean square."""
+    """Root mean square of an array."""
     return float(np.sqrt(np.mean(np.square(values))))
 
 
 def low_pass(values: np.ndarray, step: float) -> np.ndarray:
-    """Samples (n,) spaced ``step`` (s), with frequencies above JUDGED_BAND removed without phase shift."""
+    """Samples (n,) spaced by ``step`` (s), with frequencies above JUDGED_BAND removed without phase shift."""
     from scipy.signal import butter, sosfiltfilt
 
     return sosfiltfilt(butter(BUTTERWORTH_ORDER, JUDGED_BAND, fs=1.0 / step, output="sos"), values)
 
 
 def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
-    """Ratio of the rms of a part to that of the total; 0 where both are 0."""
+    """Ratio of the root mean square of ``values`` to that of ``total``; 0 where both are 0."""
     size, all_of_it = root_mean_square(values), root_mean_square(total)
     return size / all_of_it if all_of_it > 0 else (np.inf if size > 0 else 0.0)
 
 
 def _step_means(values: np.ndarray, step: float) -> np.ndarray:
-    """Mean over each step of sampled values (n,): the trapezoidal rule with its end correction, order 4."""
+    """Means (n - 1,) over each step (s) of a sampled signal (n,), by the trapezoidal rule with its end correction,
+    order 4."""
     slope = np.gradient(values, step, edge_order=2)
     return (values[1:] + values[:-1]) / 2.0 - step / 12.0 * np.diff(slope)
 
@@ -296,8 +303,8 @@ def _natural_moment(run: Result, parameters: Parameters) -> np.ndarray:
     return moment + np.sin(run["pitch"]) ** 2 * (parameters.b * run["f1"] - parameters.a * run["f2"])
 
 
-def _step(run: Result) -> float:
-    """Spacing (s) of the rows."""
+def _row_spacing(run: Result) -> float:
+    """Spacing (s) of a run's rows; raises InputError unless they are equally and closely spaced."""
     steps = np.diff(run.times)
     if len(steps) < FEWEST_ROWS or np.ptp(steps) > 1e-6 * steps[0] or steps[0] > COARSEST_SPACING:
         raise InputError(
@@ -311,7 +318,8 @@ def _step(run: Result) -> float:
 
 
 SECTION_FORCE_CHANNELS = ("f3x", "f3z", "f4x", "f4z")
-"""Front and rear, along the chassis' forward axis and (in compression) along its vertical one."""
+"""Names of the section forces: front (f3) and rear (f4), along the chassis' forward axis (x) and, positive in
+compression, along its vertical axis (z)."""
 
 
 def section_forces(f3: np.ndarray, f4: np.ndarray, pitch: np.ndarray) -> dict[str, np.ndarray]:

@@ -1,1 +1,1 @@
-"""Engines: Exudyn, MuJoCo and the reference, one file each behind the protocol of ``protocol.py``."""
+"""Engines: Exudyn, MuJoCo and the hand-written reference behind one protocol."""

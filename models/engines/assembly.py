@@ -1,4 +1,5 @@
-"""The pitch-plane system that engines are given, bodies, struts, input and settings, and the path that they return."""
+"""Input and output of pitch-plane engines: the system with its bodies, struts and input, and the settings of the time
+integration."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -11,16 +12,16 @@ from models.vehicles import pitch_plane
 from models.vehicles.description import PitchSpring, Vehicle
 
 Mode = Literal["free", "road", "force", "force-body", "pitch", "heave-pitch"]
-GUIDED: dict[str, tuple[int, ...]] = {"pitch": (3,), "heave-pitch": (2, 3)}
-"""Coordinates that a mode's input prescribes, by their place in the state. The input is then the two wheel forces,
-these coordinates, their rates and their second derivatives."""
+PRESCRIBED_COORDINATES: dict[str, tuple[int, ...]] = {"pitch": (3,), "heave-pitch": (2, 3)}
+"""Indices of the coordinates that a mode's input prescribes. The input is then the two wheel forces, these coordinates,
+their rates and their second derivatives."""
 Channels = dict[str, tuple[str, str, np.ndarray]]
-"""Name -> unit, meaning, values (n,)."""
+"""Channels by name: unit, meaning, values (n,)."""
 
 
 @dataclass(frozen=True)
 class Assembly:
-    """A pitch-plane system to be computed. Effects extend it, and engines build models from it.
+    """A pitch-plane system to be simulated. Effects extend it, and engines build models from it.
 
     Attributes
     ----------
@@ -52,16 +53,15 @@ class Assembly:
     @property
     def guided(self) -> tuple[int, ...]:
         """Indices of the coordinates that the input prescribes; empty for most modes."""
-        return GUIDED.get(self.mode, ())
+        return PRESCRIBED_COORDINATES.get(self.mode, ())
 
     def with_input(self, mode: Mode, signal: Signal) -> "Assembly":
-        """A copy of the assembly that is driven by ``signal``."""
+        """A copy of the assembly in another ``mode`` that is driven by ``signal``."""
         return replace(self, mode=mode, input=signal)
 
     def with_moment(self, signal: Signal) -> "Assembly":
-        """A copy of the assembly with a pitch moment added on the chassis; it acts together with any forces, held ones
-        as well.
-        """
+        """A copy of the assembly with an added pitch moment (N m, nose up) on the chassis; it acts together with any
+        wheel forces."""
         assert self.mode in ("force", "force-body") and signal.channels == 1 and not signal.held
         return replace(self, moment=signal)
 
@@ -78,7 +78,8 @@ class Assembly:
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of the time integration: integrator by its engine's name, step and duration in s."""
+    """Settings of the time integration: name of the integrator in its engine, step (s), duration (s), tolerance and
+    spectral radius."""
 
     integrator: str
     step: float

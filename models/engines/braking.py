@@ -1,4 +1,4 @@
-"""A braked vehicle whose chassis an engine carries: "exudyn" or "mujoco" has the bodies, joints and masses.
+"""Braked vehicle whose chassis moves in an engine: "exudyn" or "mujoco" has the bodies, joints and masses.
 
 Tyres, wheels and the loads under them stay with the compiled step, which is exact where an engine would need steps of
 microseconds. Each step it finds the mean force of every tyre in the wheel's own axes; the engine then marches by its
@@ -22,14 +22,14 @@ from models.machine.stack import array, at, beyond
 from models.vehicles.spatial import Body, SpatialVehicle
 
 HEADER, HELD = 2, 6
-"""Numbers at the head of the table, those of units and of wheels, and numbers of each wheel."""
+"""Length of the table's header, which holds the numbers of units and of wheels, and number of table rows of wheel
+quantities."""
 
 
 class WheelForces(NamedTuple):
-    """Wheel quantities, each (W,), that are constant over a step: the unit, the position (m) in the unit's axes, the
-    steer angle (rad), and the mean forces (N) in the wheel's own axes. They are the rows at the end of the table,
-    behind the units' reach.
-    """
+    """Wheel quantities, each (W,), that are constant over a step: number of the unit (tractor or trailer), position (m)
+    in the unit's axes, steer angle (rad), and mean forces (N) in the wheel's own axes. They are the rows at the end of
+    the table, behind the units' reach."""
 
     unit: np.ndarray
     x: np.ndarray
@@ -41,9 +41,8 @@ class WheelForces(NamedTuple):
 
 @lean
 def held(numbers, time, q, v, f):
-    """Add the forces of the wheels to those of the engine's coordinates. The forces are constant in the wheels' own
-    axes; arguments are pointers to doubles.
-    """
+    """Add the wheel forces, constant in the wheels' own axes, to the generalised forces ``f``. All arguments but the
+    time are pointers to doubles."""
     head = array(numbers, (HEADER,))
     units, wheels = int(head[0]), int(head[1])
     reach = array(beyond(numbers, HEADER), (units, units))
@@ -71,16 +70,16 @@ def held(numbers, time, q, v, f):
 
 @lean
 def set_held(block, t, n):
-    """Compute the wheels' forces for a state. The block of doubles at an address holds forces f (set to zero first), q
-    and v (n,), and the table.
-    """
+    """Compute the generalised wheel forces for a state, in a block of doubles at an address: forces f (n,), which are
+    set to zero first, q and v (n,), and the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     held(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
 
 
 def bodies(plane: Plane) -> SpatialVehicle:
-    """The units of a plane vehicle as bodies of an engine. Each unit after the first turns about its hinge.
+    """The units of a plane vehicle (tractor, trailers) as bodies of an engine. Each unit after the first turns about
+    its hinge.
 
     The hinge of unit k lies at reach[k, j] ahead of the units j < k and reach[k, k] behind its own centre.
     """
@@ -97,8 +96,9 @@ def bodies(plane: Plane) -> SpatialVehicle:
     return SpatialVehicle("braked", tuple(chain), (), (), ())
 
 
-class CarriedChassis:
-    """The chassis of a plane vehicle in an engine. Its ``advance`` replaces the compiled function of that name."""
+class EngineChassis:
+    """The chassis of a plane vehicle in an engine. Its ``advance`` replaces the compiled function
+    ``models.brake.advance.advance``."""
 
     def __init__(self, engine: str, plane: Plane) -> None:
         units, none = plane.masses.size, np.zeros((3, plane.wheels))
@@ -112,8 +112,7 @@ class CarriedChassis:
         self, motion: PlaneMotion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, *lag: Any
     ) -> tuple[int, float]:
         """Advance a braked vehicle as ``models.brake.advance.advance`` does (``advance_lagging`` with a ``Lag``); the
-        engine computes the motion in each step.
-        """
+        engine computes the motion in each step (s). Returns the status and the time (s)."""
         time, report, go = 0.0, Report(*motion.report), advance
         if lag:
             from models.brake.relaxation import advance_lagging as go
@@ -125,17 +124,16 @@ class CarriedChassis:
                 return status, time
             self._held.steer[:] = steer
             self._held.force_x[:], self._held.force_y[:] = report.force_x, report.force_y
-            motion.state[:] = self._moved(before, step)
+            motion.state[:] = self._state_after_step(before, step)
         return FINE, time
 
-    def moving(self, *given: Any) -> Iterator[tuple[int, float, float, float]]:
-        """March a braked vehicle as ``models.brake.samples.samples`` does; the engine computes the motion in each
-        step.
-        """
-        return moved(self.advance)(*given)
+    def moving(self, *arguments: Any) -> Iterator[tuple[int, float, float, float]]:
+        """Generator that marches a braked vehicle as ``models.brake.samples.samples`` does; the engine computes the
+        motion in each step."""
+        return moved(self.advance)(*arguments)
 
-    def _moved(self, state_before: np.ndarray, step: float) -> np.ndarray:
-        """Positions and rates (2, 2 + U) after a step of the engine."""
+    def _state_after_step(self, state_before: np.ndarray, step: float) -> np.ndarray:
+        """Positions and rates (2, 2 + U) of the U units after a step (s) of the engine."""
         carried = state_before.copy()
         carried[:, 3:] = np.diff(state_before[:, 2:], axis=1)
         after = self._model.march(carried[0], carried[1], 1, step)[-1].reshape(2, -1)

@@ -1,4 +1,4 @@
-"""A braked vehicle on its suspension in an engine: "exudyn" or "mujoco" has bodies, joints, masses and weights.
+"""Braked vehicle on its suspension in an engine: "exudyn" or "mujoco" has bodies, joints, masses and weights.
 
 Its steps are those of ``models.brake.sprung_step``; compiled code calls MuJoCo, and all of a sample is compiled.
 """
@@ -40,7 +40,7 @@ from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.native_parts import joint_parts
 from models.engines.spatial_protocol import INTEGRATORS, check_modes
 from models.engines.stability import LONG_RUN
-from models.engines.towed_springs import divided, numbers_beside
+from models.engines.towed_springs import shared_numbers, towed_division
 from models.vehicles.spatial_linear import linearise, mass
 
 if TYPE_CHECKING:
@@ -48,37 +48,35 @@ if TYPE_CHECKING:
     from models.brake.sprung_relaxation import ContactLag
 
 BLINK = 1e-5
-"""s: time over which wheels that only roll are looked at."""
+"""Duration (s) of the short step from which the accelerations of a freely rolling vehicle are computed."""
 
 
-def driven(vehicle: Sprung, engine: str) -> Driven:
-    """The vehicle for "exudyn" or "mujoco": springs as far as the engine has them, and the table of all other
-    forces.
-    """
+def driven_vehicle(vehicle: Sprung, engine: str) -> Driven:
+    """The free vehicle for "exudyn" or "mujoco": springs that the engine itself computes, and the table of all other
+    forces."""
     handling = vehicle.handling
-    division = divided(handling, engine)
+    division = towed_division(handling, engine)
     wheels = np.zeros(VALUES_PER_WHEEL * len(handling.vehicle.tyres))
-    table = np.concatenate((numbers_beside(handling, division), wheels))
+    table = np.concatenate((shared_numbers(handling, division), wheels))
     native = (*joint_parts(handling.vehicle), *division.native)
     return Driven(handling.vehicle, handling.gravity, table, forces_from_pointers, set_forces_from_block, native)
 
 
-class OnSprings:
-    """A vehicle on its suspension in an engine. Its ``advance`` replaces the compiled function of that name, with all
-    coordinates.
-    """
+class EngineSprungVehicle:
+    """A braked vehicle on its suspension in an engine. Its ``advance`` replaces the compiled function
+    ``models.brake.advance.advance``, for all coordinates."""
 
     def __init__(self, engine: str, vehicle: Sprung) -> None:
         self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size
         self.wheels = len(vehicle.handling.vehicle.tyres)
-        self._driven = driven(vehicle, engine)
+        self._driven = driven_vehicle(vehicle, engine)
         self._units = Units(vehicle.turns, vehicle.leans, np.zeros((2, PLANE + vehicle.turns.size)))
         self._allowed = set[float]()
 
     @cached_property
     def liveliness(self) -> float:
-        """Largest rate (m/s^2) at which side forces of slope 1 damp a motion at a speed of 1 m/s; for a point mass it
-        is g.
+        """Largest rate (m/s^2) at which lateral forces of unit slip slope under the static loads damp a motion at a
+        speed of 1 m/s; for a point mass it is g.
 
         A body that rolls lets its contacts go sideways more easily than its mass would.
         """
@@ -93,13 +91,12 @@ class OnSprings:
 
     @cached_property
     def _model(self) -> FreeModel:
-        """The engine's model, built when the first step needs it."""
+        """The engine's model of the vehicle, built when the first step needs it."""
         return free_model(self.engine, self._driven)
 
-    def _go(self, lags: bool) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    def _march_functions(self, lags: bool) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """Functions that advance the vehicle and that generate samples, with or without lag of the tyres; compiled
-        where compiled code can call the engine.
-        """
+        where compiled code can call the engine."""
         if self._model.compiled() is not None:
             from models.engines import braking_sprung_mujoco as native
 
@@ -113,7 +110,7 @@ class OnSprings:
 
     @cached_property
     def _on_engine(self) -> OnEngine:
-        """Data that time steps need for a vehicle whose tyres respond without lag."""
+        """Data that time steps in the engine need for a vehicle whose tyres respond without lag."""
         engine, size, table = self._model.compiled(), self.size, self._model.numbers
         return OnEngine(
             table,
@@ -128,7 +125,7 @@ class OnSprings:
         )
 
     def _at_wheels(self, table: np.ndarray) -> AtWheels:
-        """``AtWheels`` for the wheel quantities at the end of a table; these share the table's memory."""
+        """``AtWheels``: the wheel quantities at the end of a table, whose memory they share."""
         wheels = Wheels(*np.zeros((KNOWN, self.wheels)))
         return AtWheels(
             WheelForces(*table[-VALUES_PER_WHEEL * self.wheels :].reshape(VALUES_PER_WHEEL, self.wheels)),
@@ -146,15 +143,17 @@ class OnSprings:
         lag: "ContactLag | None" = None,
     ) -> tuple[int, float]:
         """Advance the vehicle as ``models.brake.advance.advance`` does; the state (2, n) has all coordinates and their
-        rates.
+        rates. Returns the status and the time (s).
 
         lag : of tyres that lag, moved in place. A run begins with accelerations of zero. Raises RunFailed where the
         vehicle turns over.
         """
-        go, _ = self._go(lag is not None)
+        go, _ = self._march_functions(lag is not None)
         with self._model.at_step(step):
-            status, time = go(motion, torques, step, steer, _alike(vehicle), self._on_engine._replace(lag=lag or ()))
-        return self._sound(status, time), time
+            status, time = go(
+                motion, torques, step, steer, _without_unit_count(vehicle), self._on_engine._replace(lag=lag or ())
+            )
+        return self._checked_status(status, time), time
 
     def moving(
         self,
@@ -166,24 +165,23 @@ class OnSprings:
         vehicle: OnRoad,
         lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:
-        """March the vehicle as ``models.brake.samples.samples`` does; ``lag`` : of tyres that lag. Refused for a step
-        that is too long, RunFailed as in ``advance``.
-        """
-        _, by_steps = self._go(lag is not None)
+        """Generator that marches the vehicle as ``models.brake.samples.samples`` does; ``lag`` is the slip lag of the
+        tyres. Raises Refused for a step that is too long, and RunFailed as ``advance`` does."""
+        _, by_steps = self._march_functions(lag is not None)
         step, on_engine = sample / (braking.torques.shape[0] - 1), self._on_engine
         self.check_step(step)
         if lag is not None:
             from models.brake.sprung_relaxation import ContactLag
 
             on_engine = on_engine._replace(lag=ContactLag(*lag, np.zeros(1)))
-        rows = by_steps(commands, record, sample, braking, motion, _alike(vehicle), on_engine)
+        rows = by_steps(commands, record, sample, braking, motion, _without_unit_count(vehicle), on_engine)
         while True:
             with self._model.at_step(step):
                 status, time, speed, supply = next(rows)
-            yield self._sound(status, time), time, speed, supply
+            yield self._checked_status(status, time), time, speed, supply
 
     def check_step(self, step: float) -> None:
-        """Refuse a step (s) with which a mode of the vehicle on its springs and tyres would be unstable."""
+        """Raise Refused for a step (s) with which a mode of the vehicle on its springs and tyres would be unstable."""
         if step in self._allowed:
             return
         check_modes(
@@ -193,7 +191,9 @@ class OnSprings:
         )
         self._allowed.add(step)
 
-    def _sound(self, status: int, time: float) -> int:
+    def _checked_status(self, status: int, time: float) -> int:
+        """The status of a march, unchanged; raises RunFailed if the vehicle turned over, jackknifed, or the engine gave
+        up."""
         if status == OVER:
             raise RunFailed(self.engine, f"the vehicle turns over: it leans by more than {UPRIGHT} rad", time)
         if status == FOLDED:
@@ -204,9 +204,8 @@ class OnSprings:
         return status
 
     def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,) of a state (2, n) in which the wheels roll without brakes, and the wheels' speeds of
-        turning (W,).
-        """
+        """Accelerations (n,) of a state (2, n) in which the wheels roll without brakes, and the wheels' rotational
+        speeds (W,) in rad/s."""
         on_engine, none = self._on_engine, np.zeros(steer.size)
         known = self._at_wheels(on_engine.numbers)
         for part in known.wheel_forces:
@@ -216,15 +215,14 @@ class OnSprings:
         turning = on_engine.contacts.along / vehicle.plane.radius
         for whole, of_units in zip(state, on_engine.units.motion, strict=True):
             to_units(whole, on_engine.units.turns, of_units)
-        under_wheels(on_engine.units.motion, 0.0, _alike(vehicle), known.surfaces)
+        under_wheels(on_engine.units.motion, 0.0, _without_unit_count(vehicle), known.surfaces)
         known.wheels.start[:] = on_engine.contacts.along
         set_slip_angles(on_engine.contacts, 0.0, known.surfaces.lag, vehicle.tables.angles, known.wheels)
-        store_mean_forces(known, none, none, BLINK, motion_of(state, turning), _alike(vehicle))
+        store_mean_forces(known, none, none, BLINK, motion_of(state, turning), _without_unit_count(vehicle))
         return self._model.acceleration(0.0, *state), turning
 
 
-def _alike(vehicle: OnRoad) -> OnRoad:
-    """The vehicle in the single type for which steps are compiled, whatever it tows: the steps do not count its
-    units.
-    """
+def _without_unit_count(vehicle: OnRoad) -> OnRoad:
+    """The vehicle with the number of its units cleared, so that steps are compiled for one type whatever the vehicle
+    tows."""
     return vehicle._replace(plane=vehicle.plane._replace(units=(0,)))

@@ -1,4 +1,4 @@
-"""A braked vehicle on its suspension in MuJoCo, compiled as a whole: steps, and samples of them."""
+"""Braked vehicle on its suspension in MuJoCo, compiled as a whole: steps, and generators of samples."""
 
 from collections.abc import Callable
 from functools import cache
@@ -14,7 +14,7 @@ by_steps = samples.compiled(advance, "by_steps_in_mujoco")
 
 @cache
 def lagging() -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """The compiled functions that advance, and that generate samples, with tyres that lag."""
+    """The compiled functions that advance the vehicle and that generate samples, with tyres whose slip lags."""
     from models.brake.sprung_relaxation import relax
 
     go = compiled("lagging_in_mujoco", accelerate=accelerate, march=march, relax=relax)

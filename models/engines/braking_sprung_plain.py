@@ -1,6 +1,6 @@
-"""A braked vehicle on its suspension by the independent reference: no engine and no compiled code in its steps.
+"""Braked vehicle on its suspension by the independent reference: no engine and no compiled code in its steps.
 
-It stands where ``models.engines.braking_sprung.OnSprings`` stands, with the same start, controller and samples.
+It replaces ``models.engines.braking_sprung.EngineSprungVehicle``, with the same start, controller and samples.
 """
 
 import math
@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 NAME = "reference"
 
 
-class PlainOnSprings:
-    """A vehicle on its suspension in plain code, with ``advance`` and ``moving`` as in ``OnSprings``."""
+class PlainSprungVehicle:
+    """A braked vehicle on its suspension in plain Python, with ``advance`` and ``moving`` as in
+    ``EngineSprungVehicle``."""
 
     def __init__(self, vehicle: Sprung) -> None:
         self.vehicle, self.size, self.suspension = vehicle, vehicle.size, Suspension(vehicle)
@@ -48,8 +49,8 @@ class PlainOnSprings:
         vehicle: OnRoad,
         lag: "LaggingTyres | None" = None,
     ) -> tuple[int, float]:
-        """Advance the vehicle in plain code as ``models.brake.advance.advance`` does; the state (2, n) has all
-        coordinates and their rates.
+        """Advance the vehicle in plain Python as ``models.brake.advance.advance`` does; the state (2, n) has all
+        coordinates and their rates. Returns the status and the time (s).
 
         lag : of tyres that lag, moved in place. A run begins with accelerations of zero. Raises RunFailed where the
         vehicle turns over.
@@ -83,9 +84,8 @@ class PlainOnSprings:
         vehicle: OnRoad,
         lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:
-        """March the vehicle in plain code as ``models.brake.samples.samples`` does; ``lag`` : of tyres that lag.
-        Refused for a step that is too long, RunFailed as in ``advance``.
-        """
+        """Generator that marches the vehicle in plain Python as ``models.brake.samples.samples`` does; ``lag`` is the
+        slip lag of the tyres. Raises Refused for a step that is too long, and RunFailed as ``advance`` does."""
         torques, time, status, lagging = braking.torques, 0.0, FINE, None
         if lag is not None:
             from models.brake.plain.relaxation import LaggingTyres
@@ -110,12 +110,11 @@ class PlainOnSprings:
                     break
 
     def check_step(self, step: float) -> None:
-        """Refuse a step (s) with which a mode of the vehicle on its springs and tyres would be unstable."""
+        """Raise Refused for a step (s) with which a mode of the vehicle on its springs and tyres would be unstable."""
         settings = Settings(INTEGRATORS["mujoco"], step, LONG_RUN * step)
         check_modes(NAME, linearise(self.vehicle.handling.vehicle), settings)
 
     def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,) of a state (2, n) in which the wheels roll without brakes, and the wheels' speeds of
-        turning (W,).
-        """
+        """Accelerations (n,) of a state (2, n) in which the wheels roll without brakes, and the wheels' rotational
+        speeds (W,) in rad/s."""
         return Steps(self.suspension, Course(vehicle, steer, 0.0), BLINK).rolling(state)

@@ -1,14 +1,15 @@
-"""Which integrators each engine offers, and what is known of each before an engine is imported."""
+"""Integrators that each engine offers, and their properties, known before an engine is imported."""
 
 from dataclasses import dataclass
 from typing import Literal
 
 Nodes = Literal["start", "half-steps", "any"]
+"""Times within a step at which an integrator reads its input."""
 
 
 @dataclass(frozen=True)
 class Integrator:
-    """Properties of one integrator.
+    """Properties of one time integrator.
 
     order : of its global error; nodes : when within a step it reads the input; adaptive : picks its own
     steps; constraints : gives correct moments of a prescribed pitch; holds : takes a held sample as constant
@@ -52,19 +53,23 @@ CATALOGUE: dict[str, dict[str, Integrator]] = {
 }
 """Constrained MuJoCo and reference runs use the reduced model, in which the pitch is an input."""
 
-MISSING = {("exudyn", "DVERK6"): "DVERK6 is named but not implemented in Exudyn; use DOPRI5 or RK67"}
-"""Integrators that an engine names and does not have, with what to say to who asks for one."""
+UNAVAILABLE_INTEGRATORS = {("exudyn", "DVERK6"): "DVERK6 is named but not implemented in Exudyn; use DOPRI5 or RK67"}
+"""Integrators that an engine names but does not have, with the message to a user who chooses one."""
 
 ADAPTIVE = {
-    engine: tuple(name for name, known in methods.items() if known.adaptive and (engine, name) not in MISSING)
+    engine: tuple(
+        name for name, known in methods.items() if known.adaptive and (engine, name) not in UNAVAILABLE_INTEGRATORS
+    )
     for engine, methods in CATALOGUE.items()
     if any(known.adaptive for known in methods.values())
 }
-"""Integrators that pick their own steps, of the engines that have some."""
+"""Integrators that choose their own steps, by engine."""
 
-OUTSIDE: dict[str, type] = {}
-"""Classes from files outside the tree by their names ``module:Class``, once they are registered (outside.py)."""
+OUTSIDE_CLASSES: dict[str, type] = {}
+"""Registered engine and integrator classes from files outside the tree, by their names ``module:Class`` (see
+outside.py)."""
 
 RECOMMENDED = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
+"""Recommended integrator of each engine."""
 DEFAULT_METHODS = {"exudyn": "GeneralizedAlpha", "mujoco": "Euler"}
-"""What an engine does if it is not told otherwise (Exudyn 1.13, MuJoCo 4)."""
+"""Integrator that an engine uses by default (Exudyn 1.13, MuJoCo 4)."""

@@ -1,4 +1,4 @@
-"""Creep forces on the wheels of a vehicle as one callback: what is the same in every engine.
+"""Creep forces on the wheels of a rail vehicle as one callback: the code that all engines share.
 
 Each wheel has four coordinates of its own: forward x beside the steady rolling at speed V, lateral y, vertical z
 downwards and yaw. From them follow the approach to the rail and the velocity x', y' - V yaw, yaw' at which the wheel
@@ -32,31 +32,33 @@ from models.contact.material import MaterialPair
 from models.contact.simplified_theory import press
 from models.contact.undeformed_distance import Distance, quadratic
 from models.core.errors import InputError, Refused
-from models.engines.stability import GROWTH, LONG_RUN, Linear, growth, limit
+from models.engines.stability import ALLOWED_GROWTH, LONG_RUN, LinearMatrices, log_growth, longest_stable_step
 from models.machine.compiled import njit
 from models.machine.records import record, records, size_of
 from models.machine.stack import array, at, beyond, doubles, start
 from models.rail.wheel_forces import REGULAR
 
 FREEDOM = record("x", "y", "z", "yaw")
-"""Coordinates of a wheel, their rates, or forces on them."""
+"""Coordinates of a wheel, the rates of these, or the forces on them."""
 FREEDOMS = size_of(FREEDOM)
 Theory = Literal["none", "linear", "fastsim", "simplified"]
 HEAD = record("wheels", "speed", "weight", "sunk", "mu", "G", "nu", "curved_x", "curved_y")
-"""Head of the table: count; V (m/s); load (N) and approach (m) at rest; mu; G (Pa); nu; A, B (1/m). Then a net."""
+"""Header of the table of numbers: count of wheels; speed V (m/s); load (N) and approach (m) at rest; friction
+coefficient mu; shear modulus G (Pa); Poisson's ratio nu; curvatures A, B (1/m). The tables of the contact theory
+follow."""
 HEADER = size_of(HEAD)
 
 THEORIES = get_args(Theory)
 HALF_WIDTH = 0.03
-"""Half the sides (m) of the distance that is made of curvatures."""
+"""Half the sides (m) of the area on which the undeformed distance is computed from curvatures."""
 OF_POSITION, OF_RATE = np.array([1e-8, 1e-8, 1e-8, 1e-6]), np.array([1e-5, 1e-5, 1e-5, 1e-4])
-"""Steps (m, rad; m/s, rad/s) by which forces are differentiated: creepages of about 1e-6."""
+"""Steps (m, rad; m/s, rad/s) of the finite differences of forces: creepages of about 1e-6."""
 
 
 @dataclass(frozen=True)
 class Wheels:
-    """Wheels that roll side by side. Springs and dampers connect each to a frame that moves along the track at
-    ``speed``.
+    """Rail wheels that roll side by side. Springs and dampers connect each to a frame that moves along the track at
+    ``speed`` (m/s).
 
     count : of wheels; theory : of the contact, as scenes name it, or "none"; cells : per strip, where strips are;
     speed : V (m/s), negative backwards, also zero; load : N, on each wheel at rest; mu : coefficient of friction;
@@ -96,17 +98,17 @@ class Wheels:
 
     @property
     def size(self) -> int:
-        """Number of coordinates."""
+        """Number of coordinates of all wheels, four each."""
         return FREEDOMS * self.count
 
     @property
     def masses(self) -> Array:
-        """Diagonal of the mass matrix (size,)."""
+        """Diagonal (size,) of the mass matrix, in kg and kg m^2."""
         return np.tile([self.mass, self.mass, self.mass, self.inertia], self.count)
 
     @cached_property
     def numbers(self) -> Array:
-        """The table that ``forces`` reads: general numbers, then those of the theory."""
+        """The table that ``forces`` reads: the header, then the numbers of the contact theory."""
         if self.theory == "simplified":
             law = table(self.bodies, self.cells)
         else:
@@ -116,7 +118,7 @@ class Wheels:
 
     @cached_property
     def sunk(self) -> float:
-        """Approach (m) of a wheel to its rail under the load at rest."""
+        """Approach (m) of a wheel and its rail under the load at rest."""
         if self.theory == "simplified":
             return press(self.bodies, self.pair, load=self.load).approach
         return float(by_load(*self.curvatures, self.load, self.pair).approach)
@@ -128,11 +130,11 @@ class Wheels:
 
     @property
     def sticking(self) -> Array:
-        """The table of numbers for the linear theory, whose forces rise most steeply with creepage."""
+        """The table that ``forces`` reads, for the linear theory, whose forces rise most steeply with creepage."""
         return replace(self, theory="linear").numbers
 
     def state(self, seed: int = 8) -> tuple[Array, Array]:
-        """Random positions and rates (size,) whose creepages are about those at which the wheels begin to slide."""
+        """Random positions and rates (size,) with creepages at which the wheels begin to slide."""
         draw = np.random.default_rng(seed)
         q = draw.normal(0.0, 1.0, (self.count, FREEDOMS)) * [1e-4, 1e-4, 5e-6, 1e-3]
         v = draw.normal(0.0, 1.0, (self.count, FREEDOMS)) * [0.02, 0.02, 1e-3, 0.5]
@@ -174,13 +176,15 @@ def forces(numbers, t, q, v, f):
 
 @njit(cache=True, error_model="numpy")
 def add_forces(numbers, q, v, f):
-    """``forces`` with arrays as arguments, for a callback from Python."""
+    """Add the forces on all wheels to ``f`` as ``forces`` does, with arrays as arguments, for a callback from
+    Python."""
     forces(start(numbers), 0.0, start(q), start(v), start(f))
 
 
 @njit(cache=True, error_model="numpy")
 def set_forces(block, t, size):
-    """``forces`` with one block of doubles at an address, the least that Python can pass to compiled code.
+    """Compute the forces on all wheels as ``forces`` does, in one block of doubles at an address, the least that Python
+    can pass to compiled code.
 
     It holds f, q and v (size,) and the numbers; f is cleared before.
     """
@@ -191,7 +195,8 @@ def set_forces(block, t, size):
 
 @njit(cache=True, error_model="numpy")
 def slopes(numbers, q, v, by_q, by_v, sensitivity):
-    """Fill ``sensitivity`` (size, size) with by_q dF/dq + by_v dF/dv by central differences, for implicit integrators.
+    """Fill ``sensitivity`` (size, size) with derivatives of the forces F on all wheels, by_q dF/dq + by_v dF/dv, by
+    central differences, for implicit integrators.
 
     No wheel feels another, so that one coordinate of all wheels is moved at a time: 16 evaluations, however many
     wheels there are.
@@ -213,10 +218,9 @@ def slopes(numbers, q, v, by_q, by_v, sensitivity):
                 sensitivity[row, row - row % FREEDOMS + i] += by * (high[row] - low[row]) / (2.0 * step)
 
 
-def linear(wheels: Wheels) -> Linear:
-    """Matrices of the wheels linearised about rest, with the linear theory, whose forces are the steepest; see
-    ``stability``.
-    """
+def linearised_wheels(wheels: Wheels) -> LinearMatrices:
+    """Matrices of the wheels linearised about rest, by the linear theory, whose forces rise most steeply with creepage;
+    see ``stability``."""
     n, zeros = wheels.size, np.zeros(wheels.size)
     by_place, by_rate = np.zeros((n, n)), np.zeros((n, n))
     if wheels.theory != "none":
@@ -228,14 +232,15 @@ def linear(wheels: Wheels) -> Linear:
 
 
 def check_step(engine: str, wheels: Wheels, method: str, step: float, steps: int = LONG_RUN) -> None:
-    """Refuse a step (s) with which a motion of the wheels would grow over the run; the message gives the limit.
+    """Raise Refused for a step (s) with which a motion of the wheels would grow over the run; the message gives the
+    longest stable step.
 
     MuJoCo's ``discrete`` is implicit in its own springs and dampers, not in forces of a callback: it goes by the limit
     of ``Euler``.
     """
-    about, like = linear(replace(wheels, count=1)), "Euler" if method == "discrete" else method
-    if growth(like, step, steps * step, about) > np.log(GROWTH):
-        longest = limit(like, step, LONG_RUN * step, about)
+    about, like = linearised_wheels(replace(wheels, count=1)), "Euler" if method == "discrete" else method
+    if log_growth(like, step, steps * step, about) > np.log(ALLOWED_GROWTH):
+        longest = longest_stable_step(like, step, LONG_RUN * step, about)
         raise Refused(
             engine,
             f"step {step:g} s exceeds the stability limit of {method}, {0.999 * longest:.3g} s, for "

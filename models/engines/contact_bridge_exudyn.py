@@ -1,4 +1,4 @@
-"""Rolling wheels in Exudyn: the model, and the routes by which a user function gives it creep forces.
+"""Rail wheels in Exudyn: the model, and the kinds of user function that apply creep forces.
 
 The route that costs least is one generic object over the nodes of all wheels: its force function is called once per
 stage. A load for each coordinate is called more often; a function before each step cannot see the stages, so that no
@@ -18,23 +18,25 @@ from models.engines.contact_bridge import FREEDOMS, Wheels, check_step, set_forc
 from models.engines.exudyn_system import add_node, items, packed_forces, quiet_settings, set_start, solve
 
 Law = Callable[[Array, Array, Array, Array], Any]
-Listed = Callable[[Any, Any], Any]
-"""Forces of lists of positions and rates, as a list."""
+"""Function that adds forces to its last argument: of the table of numbers, positions, rates and forces."""
+ListForces = Callable[[Any, Any], Any]
+"""Function that returns a list of forces for lists of positions and rates."""
 CONTRACTIVITY, ITERATIONS = 0.99999, 1000
+"""Settings of Exudyn's modified Newton method for steep creep forces: largest contractivity, and most iterations."""
 ROUTES = ("generic object", "loads", "before each step")
+"""Kinds of user function by which Exudyn receives forces: one object for all wheels, a load per coordinate, or a
+function before each step."""
 
 
-def listed(size: int, numbers: Array, write_forces: Callable[[int, float, int], Any]) -> Listed:
-    """``packed_forces`` of a compiled force law that does not depend on time; the block ends with the table
-    ``numbers``.
-    """
+def list_forces(size: int, numbers: Array, write_forces: Callable[[int, float, int], Any]) -> ListForces:
+    """Function that returns lists of forces by a compiled force law that does not depend on time; its block of doubles
+    ends with the table ``numbers``."""
     packed = packed_forces(size, np.concatenate((np.zeros(3 * size), numbers)), write_forces)
     return lambda positions, rates: packed(None, 0.0, 0, positions, rates)
 
 
 class Forces:
-    """Function that returns a list of forces for lists of positions and rates, by the compiled kernel or by a Python
-    ``law``.
+    """Creep forces as functions of lists of positions and rates, by the compiled kernel or by a Python ``law``.
 
     ``of`` gives the forces, ``slopes`` the sum of their derivatives to positions and rates, each times a factor: those
     of the linear theory, the steepest that there are. With the slopes of a wheel that slides, next to none, Newton's
@@ -50,16 +52,16 @@ class Forces:
             law(numbers, np.array(positions), np.array(rates), forces)  # type: ignore[misc]
             return forces.tolist()
 
-        def moved(positions: Any, rates: Any, by_q: float, by_v: float) -> Array:
+        def steepest_jacobian(positions: Any, rates: Any, by_q: float, by_v: float) -> Array:
             slopes(sticking, np.array(positions), np.array(rates), by_q, by_v, jacobian)
             return jacobian
 
-        self.of = by_law if law is not None else listed(size, numbers, set_forces)
-        self.slopes = moved
+        self.of = by_law if law is not None else list_forces(size, numbers, set_forces)
+        self.slopes = steepest_jacobian
 
 
 class Rolling:
-    """Wheels on springs in one Exudyn system.
+    """Rail wheels on springs in one Exudyn system.
 
     of : forces of positions and rates, None for no contact; route : one of ROUTES; slopes : as those of ``Forces``,
     for implicit solvers by the generic object; without them Exudyn differentiates by 2 size calls of ``of``.
@@ -68,7 +70,7 @@ class Rolling:
     def __init__(
         self,
         wheels: Wheels,
-        listed: Listed | None,
+        force_function: ListForces | None,
         route: str = ROUTES[0],
         slopes: Callable[[Any, Any, float, float], Array] | None = None,
     ) -> None:
@@ -85,11 +87,16 @@ class Rolling:
                 )
             )
             self._nodes.append(node)
-        if listed is not None:
-            {"generic object": self._object, "loads": self._loads, "before each step": self._before}[route](listed)
+        if force_function is not None:
+            {
+                "generic object": self._add_generic_object,
+                "loads": self._add_loads,
+                "before each step": self._add_step_loads,
+            }[route](force_function)
         self.mbs.Assemble()
 
-    def _object(self, listed: Listed) -> None:
+    def _add_generic_object(self, force_function: ListForces) -> None:
+        """Add one generic object over the nodes of all wheels, whose user function gives their forces."""
         slopes, more = self._slopes, dict[str, Any]()
         if slopes is not None:  # those of the left-hand side
             more["jacobianUserFunction"] = lambda mbs, t, item, q, v, by_q, by_v: -slopes(q, v, by_q, by_v)
@@ -97,41 +104,44 @@ class Rolling:
             items.ObjectGenericODE2(
                 nodeNumbers=self._nodes,
                 massMatrix=exu.MatrixContainer(),
-                forceUserFunction=lambda mbs, t, item, q, v: listed(q, v),
+                forceUserFunction=lambda mbs, t, item, q, v: force_function(q, v),
                 **more,
             )
         )
 
     def _markers(self) -> list[Any]:
+        """New markers of all coordinates, wheel by wheel."""
         return [
             self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=i))
             for node in self._nodes
             for i in range(FREEDOMS)
         ]
 
-    def _loads(self, listed: Listed) -> None:
-        """Attach a load to every coordinate; the first load's callback computes the forces of all."""
+    def _add_loads(self, force_function: ListForces) -> None:
+        """Add a load to every coordinate; the first load's callback computes the forces of all."""
         data, loads = self.mbs.systemData, [0.0] * self.wheels.size
 
-        def first(mbs: Any, t: float, load: float) -> float:
-            loads[:] = listed(data.GetODE2Coordinates(), data.GetODE2Coordinates_t())
+        def first_load(mbs: Any, t: float, load: float) -> float:
+            loads[:] = force_function(data.GetODE2Coordinates(), data.GetODE2Coordinates_t())
             return loads[0]
 
         for i, marker in enumerate(self._markers()):
-            function = (lambda mbs, t, load, i=i: loads[i]) if i else first
+            function = (lambda mbs, t, load, i=i: loads[i]) if i else first_load
             self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker, loadUserFunction=function))
 
-    def _before(self, listed: Listed) -> None:
-        """Attach loads that are constant over a step; their forces are computed at its start."""
+    def _add_step_loads(self, force_function: ListForces) -> None:
+        """Add loads that are constant over a step; their forces are computed at the beginning of the step."""
         loads = [self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker)) for marker in self._markers()]
 
-        def hold(mbs: Any, t: float) -> bool:
+        def set_loads(mbs: Any, t: float) -> bool:
             data, write = mbs.systemData, mbs.SetLoadParameter
-            for load, value in zip(loads, listed(data.GetODE2Coordinates(), data.GetODE2Coordinates_t()), strict=True):
+            for load, value in zip(
+                loads, force_function(data.GetODE2Coordinates(), data.GetODE2Coordinates_t()), strict=True
+            ):
                 write(load, "load", value)
             return True
 
-        self.mbs.SetPreStepUserFunction(hold)
+        self.mbs.SetPreStepUserFunction(set_loads)
 
     def run(
         self, q: Array, v: Array, steps: int, step: float = 1e-4, solver: str = "ExplicitEuler", tolerance: float = 0.0

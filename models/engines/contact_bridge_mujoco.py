@@ -1,4 +1,4 @@
-"""Rolling wheels in MuJoCo: the model, and creep forces by a native callback or by one that goes through Python."""
+"""Rail wheels in MuJoCo: the model, and creep forces by a native callback or by one that goes through Python."""
 
 from collections.abc import Callable
 from functools import cache
@@ -9,14 +9,14 @@ from numba import cfunc, types
 
 from models.contact.inputs import Array
 from models.engines.contact_bridge import Wheels, check_step
-from models.engines.mujoco_layout import check
+from models.engines.mujoco_layout import check_offsets
 
 SLIDE, HINGE = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
 JOINTS = ((SLIDE, (1.0, 0.0, 0.0)), (SLIDE, (0.0, 1.0, 0.0)), (SLIDE, (0.0, 0.0, 1.0)), (HINGE, (0.0, 0.0, 1.0)))
 
 
 def model(wheels: Wheels, step: float = 1e-4, integrator: str = "Euler") -> mujoco.MjModel:
-    """MuJoCo model of the wheels on springs. The callback's numbers are stored in the model, so that one callback
+    """MuJoCo model of rail wheels on springs. The callback's numbers are stored in the model, so that one callback
     serves all models of the process.
 
     Refused is raised for a step that the integrator cannot take.
@@ -33,13 +33,13 @@ def model(wheels: Wheels, step: float = 1e-4, integrator: str = "Euler") -> mujo
         for (kind, axis), k, d in zip(JOINTS, wheels.stiffness, wheels.damping, strict=True):
             body.add_joint(type=kind, axis=axis, stiffness=k, damping=d)
     built = spec.compile()
-    check(built, mujoco.MjData(built))
+    check_offsets(built, mujoco.MjData(built))
     return built
 
 
 @cache
 def empty_law() -> Any:
-    """Compiled callback that does nothing."""
+    """Compiled MuJoCo callback that does nothing."""
 
     @cfunc(types.void(types.voidptr, types.voidptr))
     def law(model, data):
@@ -49,5 +49,6 @@ def empty_law() -> Any:
 
 
 def python_law(add: Callable[[Array, Array, Array, Array], Any]) -> Callable[[Any, Any], None]:
-    """Callback that calls a Python function with arrays: numbers, positions, rates, and the forces to which it adds."""
+    """MuJoCo callback that calls a Python function ``add`` with arrays: numbers, positions, rates, and the forces to
+    which it adds."""
     return lambda model, data: add(model.numeric_data, data.qpos, data.qvel, data.qfrc_passive)

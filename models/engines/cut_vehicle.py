@@ -1,4 +1,4 @@
-"""A vehicle cut at its wheels in an engine: the code that all engines share.
+"""A vehicle cut at its wheel hubs in an engine: the code that all engines share.
 
 In an engine it is a free vehicle (``free_vehicle``), of which springs, hub forces and stabilisers are the compiled
 forces of ``models.multibody.cut_kernel``. "reference" solves the written-out equations instead, around the same forces;
@@ -15,7 +15,7 @@ from models.core.errors import Refused, RunFailed
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.catalogue import ADAPTIVE
-from models.engines.free_vehicle import Driven, FreeModel, Plain, built_share, free_model
+from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model, native_elements_and_joints
 from models.engines.native_parts import Division, divide
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import check_divides, check_modes
@@ -37,19 +37,20 @@ if TYPE_CHECKING:
     from models.multibody.plain.hubs import PlainHubs
 
 ENGINES = ("reference", "exudyn", "mujoco")
-FIXED = "RK4"
-"""The classical Runge-Kutta method, which every engine has; others pick their own steps."""
-PLAIN = "plain"
-"""The independent reference, which runs where it is named."""
-Route = Literal["native", "compiled"]
-"""Whose the springs, mounts and bars are: the engine's own as far as it has them, or all in the compiled forces."""
-UPRIGHT = 1.4
-"""rad: a vehicle that pitches farther has tumbled, and its heading and roll become one angle at pi / 2."""
+FIXED_STEP_METHOD = "RK4"
+"""The classical Runge-Kutta method, which every engine has; all other integrators choose their own steps."""
+PLAIN_ENGINE = "plain"
+"""Name of the independent reference, which runs only if it is named."""
+ForceRoute = Literal["native", "compiled"]
+"""Where springs, mounts and bars are computed: in the engine's own elements as far as it has them, or all in the
+compiled forces."""
+TUMBLED_PITCH = 1.4
+"""Pitch (rad) beyond which a vehicle has tumbled; at pi / 2 its heading and roll become one angle."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HubRun(Trajectory):
-    """A run and its forces; the chassis' six coordinates are the first ones of the states.
+    """Trajectory of a cut vehicle with its forces; the chassis' six coordinates come first in the states.
 
     elements (m, e): forces of springs, mounts and bars in the chassis' axes, compression positive, N or N m
     wrenches (m, hubs, 6): force (N) and moment (N m) at every hub in the frame of the hub inputs
@@ -61,8 +62,8 @@ class HubRun(Trajectory):
     moments: np.ndarray
 
 
-class Written(FreeModel):
-    """Written-out equations of a vehicle, without an engine."""
+class WrittenEquations(FreeModel):
+    """Hand-written equations of motion of a vehicle, without an engine."""
 
     ENGINE = "reference"
 
@@ -70,7 +71,7 @@ class Written(FreeModel):
         self.driven, self.size, self.settings = driven, driven.size, None
 
     def plan(self) -> dict[str, int]:
-        """Counts of what was built: coordinates, and no native items or callbacks."""
+        """Counts of built items: coordinates, and no native items or callbacks."""
         return {"degrees of freedom": self.size, "native items": 0, "callbacks": 0}
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -88,17 +89,22 @@ class Written(FreeModel):
 
 
 class HubModel:
-    """A driven cut vehicle in one engine. It is marched over ``steps`` steps of ``step`` (s) by Runge-Kutta 4, or from
-    row to row of the same spacing by an integrator that picks its own steps.
+    """A cut vehicle in one engine, driven by hub forces or motions. It is marched over ``steps`` steps of ``step`` (s)
+    by Runge-Kutta 4, or from row to row of the same spacing by an integrator that chooses its own steps.
 
     ``model`` is the free vehicle there.
     """
 
     def __init__(
-        self, engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, settings: Settings, forces: Route = "compiled"
+        self,
+        engine: str,
+        vehicle: CutVehicle,
+        hub_inputs: HubInputs,
+        settings: Settings,
+        forces: ForceRoute = "compiled",
     ) -> None:
-        """Build the model. Refused where the step does not divide the duration, or where the inputs do not have one row
-        per half step.
+        """Build the model. Raises Refused where the step does not divide the duration, or where the inputs do not have
+        one row per half step.
 
         settings : "RK4", or an integrator of the engine that picks its own steps.
         forces : "native" leaves springs, mounts and bars to the engine, as far as it has them; the written-out
@@ -107,14 +113,14 @@ class HubModel:
         check_divides(engine, settings)
         self.engine, self.vehicle, self.hub_inputs, self.settings = engine, vehicle, hub_inputs, settings
         step, self.step, self.steps, self.size = settings.step, settings.step, settings.steps, vehicle.size
-        self.adaptive = settings.integrator != FIXED
-        _check(engine, vehicle, hub_inputs, 2 * self.steps + 1)
+        self.adaptive = settings.integrator != FIXED_STEP_METHOD
+        _check_inputs(engine, vehicle, hub_inputs, 2 * self.steps + 1)
         _check_settings(engine, vehicle, settings)
         self.numbers = table(vehicle, hub_inputs, step)
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
-        self.plain = _plain(vehicle, hub_inputs, step, self.adaptive) if engine == PLAIN else None
+        self.plain = _plain_hubs(vehicle, hub_inputs, step, self.adaptive) if engine == PLAIN_ENGINE else None
         division, numbers = Division((), vehicle.elements), self.numbers
-        if forces == "native" and engine not in (PLAIN, "reference"):
+        if forces == "native" and engine not in (PLAIN_ENGINE, "reference"):
             if hub_inputs.guide is not None and hub_inputs.pull is None:
                 raise Refused(engine, 'an enforced tilt needs every force in one place: use forces = "compiled"')
             division = divide(vehicle.tree, vehicle.elements, engine)
@@ -129,16 +135,18 @@ class HubModel:
             self.model.numbers[ANY_TIME] = 1.0
 
     def _in_engine(self, driven: Driven) -> FreeModel:
+        """The free vehicle in the engine, as written equations, or in plain code."""
         if self.plain:
             return Plain(self.engine, self.plain.acceleration, self.size)
-        return Written(driven) if self.engine == "reference" else free_model(self.engine, driven)
+        return WrittenEquations(driven) if self.engine == "reference" else free_model(self.engine, driven)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), from coordinates and rates (n,)."""
         return self.model.acceleration(time, q, v)
 
     def marched(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
-        """March from coordinates and rates (n,) without a check of the attitude; RunFailed where the engine stops."""
+        """Trajectory from coordinates and rates (n,), without a check of the attitude; RunFailed where the engine
+        stops."""
         if not self.hub_inputs.held:
             return self._march(q, v, self.steps)
         states, counts = np.empty((self.steps + 1, 2 * self.size)), Counter[str]()
@@ -155,7 +163,7 @@ class HubModel:
         return Trajectory(self._times(self.steps), states, counts=dict(counts))
 
     def _march(self, q: np.ndarray, v: np.ndarray, steps: int) -> Trajectory:
-        """March ``steps`` steps from time 0 on."""
+        """Trajectory over ``steps`` steps from time 0 on."""
         if self.adaptive:
             from models.engines.free_vehicle_adaptive import march_adaptively
 
@@ -164,10 +172,12 @@ class HubModel:
         return Trajectory(self._times(steps), states, counts={"steps": steps, "force calls": 4 * steps})
 
     def _times(self, steps: int) -> np.ndarray:
+        """Times (steps + 1,) in s of the rows of a march."""
         return self.step * np.arange(steps + 1)
 
     def _hold_forces(self, first: int, last_step: int) -> None:
-        """Restart the model's time at a span of steps over which the hub forces are constant."""
+        """Set the hub forces of a span of steps over which they are constant; the model's time starts again at the
+        span."""
         hub_inputs = self.hub_inputs.during(first, last_step)
         if self.plain:
             self.plain.hub_inputs = hub_inputs
@@ -176,39 +186,40 @@ class HubModel:
             parts(self.model.numbers)[-1][: len(rows)] = rows
 
     def plan(self) -> dict[str, int]:
-        """Counts of what was built: degrees of freedom, native items, callbacks."""
+        """Counts of built items: degrees of freedom, native items, callbacks."""
         return self.model.plan()
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> HubRun:
-        """March from coordinates and rates (n,), or from rest; RunFailed unless the vehicle stays upright."""
+        """Trajectory with forces from coordinates and rates (n,), or from rest; RunFailed unless the vehicle stays
+        upright."""
         rest = np.zeros(self.size)
         path = self.marched(rest if q is None else q, rest if v is None else v)
         times, states = path.times, path.states
         guard(self.engine, times, states, self.steps * self.step)
-        tumbled = np.abs(states[:, PITCH]) > UPRIGHT
+        tumbled = np.abs(states[:, PITCH]) > TUMBLED_PITCH
         if tumbled.any():
             at = int(np.argmax(tumbled))
-            raise RunFailed(self.engine, f"the vehicle pitches by more than {UPRIGHT} rad", times[at], states[at])
+            raise RunFailed(self.engine, f"the vehicle pitches by more than {TUMBLED_PITCH} rad", times[at], states[at])
         return replace(self.reported(times, states), counts=path.counts)
 
     def reported(self, times: np.ndarray, states: np.ndarray) -> HubRun:
-        """The run of given states, with the forces that act in them."""
+        """The run with given times (m,) in s and states (m, 2 n), with the forces that act in these states."""
         if self.plain:
             inside, wrenches, moments = self.plain.report(times, states)
             return HubRun(times, states, elements=inside, wrenches=wrenches, moments=moments)
-        return reported(self.vehicle, self.numbers, times, states)
+        return run_with_forces(self.vehicle, self.numbers, times, states)
 
     def forces_at_rest(self, q: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) on all joints (N, N m) that the compiled forces exert at time 0, at coordinates (n,)
-        with zero rates.
-        """
+        """Generalised forces (n,) on all joints (N, N m) by the compiled forces at time 0, at coordinates (n,) with
+        zero rates."""
         block = np.concatenate((np.zeros(self.size), q, np.zeros(self.size), self.numbers))
         set_joint_forces(block.ctypes.data, 0.0, self.size)
         return block[: self.size].copy()
 
 
-def reported(vehicle: CutVehicle, numbers: np.ndarray, times: np.ndarray, states: np.ndarray) -> HubRun:
-    """The run of given states, with the compiled forces that act in them; ``numbers`` : the vehicle's table."""
+def run_with_forces(vehicle: CutVehicle, numbers: np.ndarray, times: np.ndarray, states: np.ndarray) -> HubRun:
+    """The run with given times (m,) in s and states (m, 2 n), with the compiled forces that act in these states;
+    ``numbers`` is the vehicle's table."""
     rows = len(times)
     inside, moments = np.empty((rows, len(vehicle.elements))), np.empty((rows, 2))
     wrenches = np.empty((rows, len(vehicle.hubs), WRENCH))
@@ -217,15 +228,20 @@ def reported(vehicle: CutVehicle, numbers: np.ndarray, times: np.ndarray, states
 
 
 def build(
-    engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, step: float, duration: float, forces: Route = "compiled"
+    engine: str,
+    vehicle: CutVehicle,
+    hub_inputs: HubInputs,
+    step: float,
+    duration: float,
+    forces: ForceRoute = "compiled",
 ) -> HubModel:
-    """A driven cut vehicle as ``HubModel`` in "reference", "plain", "exudyn" or "mujoco", for steps (s) of Runge-Kutta
-    4 over a duration (s); raises Refused.
-    """
-    return HubModel(engine, vehicle, hub_inputs, Settings(FIXED, step, duration), forces)
+    """A cut vehicle as ``HubModel`` in "reference", "plain", "exudyn" or "mujoco", for steps (s) of Runge-Kutta 4 over
+    a duration (s); raises Refused."""
+    return HubModel(engine, vehicle, hub_inputs, Settings(FIXED_STEP_METHOD, step, duration), forces)
 
 
-def _plain(vehicle: CutVehicle, hub_inputs: HubInputs, step: float, any_time: bool) -> "PlainHubs":
+def _plain_hubs(vehicle: CutVehicle, hub_inputs: HubInputs, step: float, any_time: bool) -> "PlainHubs":
+    """The cut vehicle by the independent plain code."""
     from models.multibody.plain.hubs import PlainHubs
 
     return PlainHubs(vehicle, hub_inputs, step, any_time)
@@ -233,9 +249,8 @@ def _plain(vehicle: CutVehicle, hub_inputs: HubInputs, step: float, any_time: bo
 
 @dataclass(frozen=True)
 class NativeShare:
-    """Native elements of a built model: names of elements that the engine itself computes, number of its joints, and
-    reasons why other elements are not native.
-    """
+    """Native elements of a built model: names of the elements that the engine itself computes, number of its joints,
+    and reasons why other elements are not native."""
 
     elements: tuple[str, ...]
     joints: int
@@ -244,22 +259,22 @@ class NativeShare:
 
 def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
     """Elements of a vehicle that "exudyn" or "mujoco" computes natively, counted in a model that is built without a
-    callback.
-    """
+    callback."""
     division = divide(vehicle.tree, vehicle.elements, engine)
     driven = Driven(vehicle.tree, np.zeros(3), np.zeros(1), None, None, division.native)
-    elements, joints = built_share(engine, driven)
+    elements, joints = native_elements_and_joints(engine, driven)
     return NativeShare(elements, joints, division.reasons)
 
 
 def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:
-    """Refuse a step (s) with which a mode of the vehicle on its tyres would grow; without tyres the vehicle is
-    softer.
-    """
+    """Raise Refused for a step (s) with which a mode of the vehicle on its tyres would grow; without tyres the vehicle
+    is softer."""
     check_modes(engine, linearise(replace(vehicle.uncut, side_forces=())), Settings("RK4", step, duration))
 
 
-def _check(engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, rows: int) -> None:
+def _check_inputs(engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, rows: int) -> None:
+    """Raise Refused unless the hub inputs have the right shapes, are finite, and held forces change only between
+    steps."""
     width = (2 if hub_inputs.road else WRENCH) * len(vehicle.hubs)
     if hub_inputs.hubs.shape != (rows, width) or not np.isfinite(hub_inputs.hubs).all():
         raise Refused(engine, f"inputs must be {rows} rows (half steps) of {width} finite numbers")
@@ -273,8 +288,8 @@ def _check(engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, rows: int) -
 
 def _check_settings(engine: str, vehicle: CutVehicle, settings: Settings) -> None:
     """Raise Refused if fixed steps are too long, or if the engine does not have the integrator."""
-    adaptive = ADAPTIVE.get("reference" if engine == PLAIN else engine, ())
-    if settings.integrator == FIXED:
+    adaptive = ADAPTIVE.get("reference" if engine == PLAIN_ENGINE else engine, ())
+    if settings.integrator == FIXED_STEP_METHOD:
         check_step(engine, vehicle, settings.step, settings.duration)
     elif settings.integrator not in adaptive:
-        raise Refused(engine, f"{settings.integrator} is not offered: {' or '.join((FIXED, *adaptive))}")
+        raise Refused(engine, f"{settings.integrator} is not offered: {' or '.join((FIXED_STEP_METHOD, *adaptive))}")

@@ -1,4 +1,4 @@
-"""[engines.NAME] of scenes that Runge-Kutta 4 marches: an integrator of an engine that controls its error instead."""
+"""Scene table [engines.NAME]: an integrator that controls its error, in place of Runge-Kutta 4."""
 
 from collections.abc import Mapping
 
@@ -9,18 +9,18 @@ from models.core.strict import Strict
 from models.engines.catalogue import ADAPTIVE
 
 NO_ESTIMATE = "its steps are kept to a tolerance; for an error leave engines.NAME out: Runge-Kutta 4 tells it"
-"""Why a run whose integrator picks its own steps states no error: that of what drives it would be missing."""
+"""Reason why a run with an adaptive integrator states no error: the error of its input would be missing."""
 
 
 class Adaptive(Strict):
-    """[engines.NAME]: in place of Runge-Kutta 4 an integrator of this engine that picks its own steps."""
+    """[engines.NAME]: in place of Runge-Kutta 4 an integrator of this engine that chooses its own steps."""
 
     integrator: str = Field(description="DOPRI5 or ODE23 of exudyn; DOP853, Radau or LSODA of the reference")
     tolerance: float = Field(default=1e-8, ge=1e-13, le=1e-3, description="of every step, relative; absolute: 1/100")
 
 
 def check_engines(file: str, engines: Mapping[str, Adaptive]) -> None:
-    """InputError for an engine, or an integrator of it, that cannot pick its own steps."""
+    """Raise InputError for an engine, or an integrator of an engine, that cannot choose its own steps."""
     for engine, adaptive in engines.items():
         if engine not in ADAPTIVE:
             allowed = "no engine with integrators that pick their own steps"
@@ -31,7 +31,8 @@ def check_engines(file: str, engines: Mapping[str, Adaptive]) -> None:
 
 
 def plan_lines(engines: Mapping[str, Adaptive], step: float) -> list[tuple[str, str]]:
-    """Lines of a plan, head and text, on the integrators that replace Runge-Kutta 4, with rows every ``step`` (s)."""
+    """Lines of a plan, heading and text, on the integrators that replace Runge-Kutta 4, with rows every ``step``
+    (s)."""
     return [
         (
             engine,

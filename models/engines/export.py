@@ -1,4 +1,4 @@
-"""The native part of a vehicle as a file of its engine: MJCF for MuJoCo, a script for Exudyn.
+"""Export of a vehicle's native elements as a file of the engine: MJCF for MuJoCo, a Python script for Exudyn.
 
 What is written is what the builders of the models make, not a second description: bodies, joints, weights, and the
 springs and dampers that are elements of the engine. Every other force acts in twinrig by compiled functions and stays
@@ -16,16 +16,15 @@ if TYPE_CHECKING:
     import mujoco
 
 SUFFIXES = {"mujoco": ".xml", "exudyn": ".py"}
-"""Ends of the names of files, by the engines that have them."""
+"""Suffixes of exported files, by engine."""
 LIGHTEST_SHOWN_BODY = 1e-6
-"""kg: lighter bodies are carriers of joints and of spin, and no part that people know."""
+"""Mass (kg) below which a body is not shown: such bodies only carry joints or spin."""
 
 
 @dataclass(frozen=True)
 class Exported:
     """An exported model. text : of the file; has : texts with counts of what the file holds; left_out : texts on what
-    it does not hold.
-    """
+    the file does not hold."""
 
     text: str
     has: tuple[str, ...]
@@ -35,7 +34,7 @@ class Exported:
 @dataclass(frozen=True)
 class ExportSubject:
     """The system that an exported file describes. title : of the scene; source : the scene's file; axes : a sentence on
-    directions and zero."""
+    directions and origin."""
 
     title: str
     source: str
@@ -55,51 +54,53 @@ class ExportSubject:
         return "\n".join(lines)
 
 
-def of_mujoco(
+def exported_mujoco_model(
     spec: "mujoco.MjSpec",
     model: "mujoco.MjModel",
     names: Mapping[str, str],
     export_subject: ExportSubject,
     omissions: Sequence[str],
 ) -> Exported:
-    """Export a MuJoCo model that was compiled from a specification; names : see ``mujoco_export.mjcf``."""
-    from models.engines.mujoco_export import counts, mjcf
+    """Exported MuJoCo model that was compiled from a specification; names : see ``mujoco_export.mjcf``."""
+    from models.engines.mujoco_export import item_counts, mjcf
 
-    has, missing = tuple(counts(model)), tuple(omissions)
+    has, missing = tuple(item_counts(model)), tuple(omissions)
     return Exported(mjcf(spec, model, names, export_subject.title, export_subject.comment(has, missing)), has, missing)
 
 
-def of_exudyn(
+def exported_exudyn_system(
     mbs: Any, coordinates: dict[str, int], export_subject: ExportSubject, omissions: Sequence[str]
 ) -> Exported:
-    """Export an assembled Exudyn system; coordinates : their indices in Exudyn's vectors, by name."""
-    from models.engines.exudyn_export import counts, script
+    """Exported assembled Exudyn system; coordinates : indices of the coordinates in Exudyn's vectors, by name."""
+    from models.engines.exudyn_export import item_counts, python_script
 
-    has, missing = tuple(counts(mbs)), tuple(omissions)
-    return Exported(script(mbs, coordinates, export_subject.comment(has, missing)), has, missing)
+    has, missing = tuple(item_counts(mbs)), tuple(omissions)
+    return Exported(python_script(mbs, coordinates, export_subject.comment(has, missing)), has, missing)
 
 
 def export_free_vehicle(
     engine: str, driven: Driven, export_subject: ExportSubject, omissions: Sequence[str]
 ) -> Exported:
-    """Export a free vehicle without the forces that its kernel computes."""
+    """Exported free vehicle in "exudyn" or "mujoco", without the forces of the compiled kernel."""
     if engine == "exudyn":
         from models.engines.free_vehicle_exudyn import FreeExudyn
 
         coordinates = {name: i for i, name in enumerate(coordinate_names(driven.vehicle))}
-        return of_exudyn(FreeExudyn(driven).mbs, coordinates, export_subject, omissions)
-    from models.engines.free_vehicle_mujoco import compiled, specified
+        return exported_exudyn_system(FreeExudyn(driven).mbs, coordinates, export_subject, omissions)
+    from models.engines.free_vehicle_mujoco import compiled_from, specification_of
     from models.engines.mujoco_export import add_shapes
     from models.engines.mujoco_inertia import realisable
 
     vehicle, lowered = realisable(driven.vehicle)
     driven = replace(driven, vehicle=vehicle)
-    spec = specified(driven)
+    spec = specification_of(driven)
     add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))
-    return of_mujoco(spec, compiled(spec, driven), names_of(vehicle), export_subject, [*omissions, *lowered])
+    return exported_mujoco_model(
+        spec, compiled_from(spec, driven), exported_names(vehicle), export_subject, [*omissions, *lowered]
+    )
 
 
-def names_of(vehicle: SpatialVehicle) -> dict[str, str]:
+def exported_names(vehicle: SpatialVehicle) -> dict[str, str]:
     """Names of bodies and joints in the exported file, by their names in a specification of ``mujoco_tree``."""
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     bodies = {number: name if name != "world" else "world of the vehicle" for name, number in numbers.items()}
@@ -107,7 +108,7 @@ def names_of(vehicle: SpatialVehicle) -> dict[str, str]:
 
 
 def masses_of_shown_bodies(vehicle: SpatialVehicle, shown_bodies: Iterable[str]) -> dict[str, float]:
-    """Masses (kg) of those bodies that are shown, by their names in a specification of ``mujoco_tree``."""
+    """Masses (kg) of the bodies that are shown, by their names in a specification of ``mujoco_tree``."""
     return {
         str(i): body.mass
         for i, body in enumerate(vehicle.bodies)
@@ -120,8 +121,8 @@ def coordinate_names(vehicle: SpatialVehicle) -> list[str]:
     return [f"{body} {freedom}" for body, freedom in vehicle.coordinates()]
 
 
-def parts_left_out(vehicle: SpatialVehicle, native: Iterable[str] = ()) -> list[str]:
-    """Texts that name the springs, bars and tyres of a vehicle, except those in ``native``."""
+def elements_left_out(vehicle: SpatialVehicle, native: Iterable[str] = ()) -> list[str]:
+    """Texts that name the springs, bars and tyres of a vehicle, except those named in ``native``."""
     kept = set(native)
     return [
         *(f"spring {spring.name!r}" for spring in vehicle.springs if spring.name not in kept),

@@ -1,4 +1,4 @@
-"""The vehicle in Exudyn: native bodies and spring-dampers, a constraint for a prescribed pitch.
+"""The pitch-plane vehicle in Exudyn: native bodies and spring-dampers, a constraint for a prescribed pitch.
 
 Exudyn's plane is x-y with rotation from x to y. The description's x forward, z down, nose-up pitch
 becomes x **backward**, y down: then a positive rotation lifts the front, as it should.
@@ -17,40 +17,41 @@ from models.engines.assembly import Assembly, Settings
 from models.engines.exudyn_clock import SignalClock
 from models.engines.exudyn_system import (
     KINDS,
+    add_state_sensors,
     items,
     march_settings,
     mass_and_force,
-    recorders,
     set_start,
     solve,
     solver_counts,
 )
-from models.engines.protocol import balanced, guard, landings_followed
+from models.engines.protocol import check_balance, check_landings, guard
 from models.vehicles.description import PitchSpring, Point, Strut, Vehicle, matrices
 
 Reader = Callable[[Any, float, float], float]
-"""What Exudyn asks at a stage's time: (system, s, constant load) -> value."""
+"""Function that Exudyn calls at a stage's time: (system, time in s, constant load) -> value."""
 
 
 @dataclass
-class Build:
-    """Exudyn's system while it is being built, with handles of its items.
+class PitchPlaneBuild:
+    """Exudyn's system of a pitch-plane vehicle while it is being built, with handles of its items.
 
-    places maps (body, "z" or "pitch") to a coordinate marker, nodes a body's name to its node.
+    coordinate_markers maps (body, "z" or "pitch") to a coordinate marker, nodes a body's name to its node.
     """
 
     container: Any
     mbs: Any
-    places: dict[tuple[str, str], Any] = field(default_factory=dict)
+    coordinate_markers: dict[tuple[str, str], Any] = field(default_factory=dict)
     nodes: dict[str, Any] = field(default_factory=dict)
     callbacks: int = 0
 
 
-def _exact_bodies(assembly: Assembly) -> Build:
-    """The vehicle as point masses, a rigid body, and vertical springs between points: exact in sin and cos of pitch."""
+def _exact_bodies(assembly: Assembly) -> PitchPlaneBuild:
+    """The vehicle as point masses, a rigid body, and vertical springs between points: exact in sin and cos of the
+    pitch."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
-    built = Build(container, mbs)
+    built = PitchPlaneBuild(container, mbs)
     bodies: dict[str | None, Any] = {None: mbs.AddObject(items.ObjectGround())}
     for body in assembly.vehicle.bodies:
         if body.pitch_inertia is None:
@@ -61,26 +62,26 @@ def _exact_bodies(assembly: Assembly) -> Build:
             item = items.RigidBody2D(nodeNumber=node, mass=body.mass, inertia=body.pitch_inertia)
         bodies[body.name] = mbs.AddObject(item)
         if body.pitch_inertia is not None:
-            built.places[body.name, "pitch"] = _marker(mbs, node, 2)
+            built.coordinate_markers[body.name, "pitch"] = _marker(mbs, node, 2)
         built.nodes[body.name] = node
-        built.places[body.name, "z"] = _marker(mbs, node, 1)
+        built.coordinate_markers[body.name, "z"] = _marker(mbs, node, 1)
         weight = body.mass * assembly.vehicle.gravity
-        mbs.AddLoad(items.LoadCoordinate(markerNumber=built.places[body.name, "z"], load=weight))
+        mbs.AddLoad(items.LoadCoordinate(markerNumber=built.coordinate_markers[body.name, "z"], load=weight))
 
-    def end(point: Point) -> Any:  # x is counted backward in Exudyn's plane
+    def end_marker(point: Point) -> Any:  # x is counted backward in Exudyn's plane
         return mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=bodies[point.body], localPosition=[-point.x, 0, 0]))
 
     for strut in (strut for strut in assembly.vehicle.struts if not strut.pushes_only):
         mbs.AddObject(
             items.CartesianSpringDamper(
                 name=f"strut {strut.name!r}",
-                markerNumbers=[end(strut.lower), end(strut.upper)],
+                markerNumbers=[end_marker(strut.lower), end_marker(strut.upper)],
                 stiffness=[0, strut.stiffness, 0],
                 damping=[0, strut.damping, 0],
             )
         )
     for spring in assembly.vehicle.pitch_springs:
-        _pitch_spring(built, spring)
+        _add_pitch_spring(built, spring)
     return built
 
 
@@ -90,16 +91,19 @@ def ground_marker(mbs: Any) -> Any:
 
 
 def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
+    """Marker of one coordinate of a node."""
     return mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
 
 
-def _to_ground(build: Build, place: tuple[str, str], element: Strut | PitchSpring, law: Any = None) -> None:
+def _add_ground_spring(
+    build: PitchPlaneBuild, coordinate: tuple[str, str], element: Strut | PitchSpring, law: Any = None
+) -> None:
     """Add a spring and damper between a coordinate and the ground; ``law`` replaces their force."""
     keywords = {} if law is None else {"springForceUserFunction": law}
     build.callbacks += len(keywords)
     build.mbs.AddObject(
         items.CoordinateSpringDamper(
-            markerNumbers=[ground_marker(build.mbs), build.places[place]],
+            markerNumbers=[ground_marker(build.mbs), build.coordinate_markers[coordinate]],
             stiffness=element.stiffness,
             damping=element.damping,
             **keywords,
@@ -107,8 +111,8 @@ def _to_ground(build: Build, place: tuple[str, str], element: Strut | PitchSprin
     )
 
 
-def _pitch_spring(build: Build, spring: PitchSpring) -> None:
-    """Add a pitch spring to the ground; one with a dead band gets a force law as a callback.
+def _add_pitch_spring(build: PitchPlaneBuild, spring: PitchSpring) -> None:
+    """Add a pitch spring between chassis and ground; one with a dead band gets a force law as a callback.
 
     Exudyn has limit stops, but checks only once per step whether one is touched, not at every stage.
     """
@@ -117,23 +121,22 @@ def _pitch_spring(build: Build, spring: PitchSpring) -> None:
         (k, d, _), beyond = law, abs(angle) - spring.dead_band
         return k * math.copysign(beyond, angle) + d * rate if beyond >= 0 else 0.0
 
-    _to_ground(build, (spring.body, "pitch"), spring, moment if spring.dead_band else None)
+    _add_ground_spring(build, (spring.body, "pitch"), spring, moment if spring.dead_band else None)
 
 
-def _pushing_tyre(build: Build, tyre: Strut, height: Reader, rate: Reader) -> None:
-    """Add a tyre that can lift, on a road of given height (m, down) and rate, with a callback: Exudyn has no item that
-    switches within a step.
-    """
+def _add_pushing_tyre(build: PitchPlaneBuild, tyre: Strut, height: Reader, rate: Reader) -> None:
+    """Add a tyre that can lift off, on a road of given height (m, down) and rate, with a callback: Exudyn has no item
+    that switches within a step."""
 
     def force(mbs: Any, t: float, item: int, position: float, speed: float, *law: float) -> float:
         k, d, _ = law
         pressed = k * (position - height(mbs, t, 0.0))
         return max(min(pressed + d * (speed - rate(mbs, t, 0.0)), 2.0 * pressed), 0.0)
 
-    _to_ground(build, (str(tyre.upper.body), "z"), tyre, force)
+    _add_ground_spring(build, (str(tyre.upper.body), "z"), tyre, force)
 
 
-def _linear(assembly: Assembly) -> Build:
+def _linear_vehicle(assembly: Assembly) -> PitchPlaneBuild:
     """The vehicle linearised about zero pitch, as one object with constant mass, damping and stiffness matrices."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
@@ -153,18 +156,18 @@ def _linear(assembly: Assembly) -> Build:
         )
     )
     places = {place: _marker(mbs, node, i) for i, place in enumerate(assembly.vehicle.coordinates())}
-    built = Build(container, mbs, places, {"vehicle": node})
+    built = PitchPlaneBuild(container, mbs, places, {"vehicle": node})
     for spring in (spring for spring in assembly.vehicle.pitch_springs if spring.dead_band):
-        _pitch_spring(built, spring)
+        _add_pitch_spring(built, spring)
     return built
 
 
-def native(assembly: Assembly) -> Build:
+def native_elements(assembly: Assembly) -> PitchPlaneBuild:
     """Bodies, weights, springs and dampers without any input, in an Exudyn system that is not yet assembled."""
-    return _exact_bodies(assembly) if assembly.vehicle.geometry == "exact" else _linear(assembly)
+    return _exact_bodies(assembly) if assembly.vehicle.geometry == "exact" else _linear_vehicle(assembly)
 
 
-def columns(build: Build, vehicle: Vehicle) -> list[int]:
+def coordinate_indices(build: PitchPlaneBuild, vehicle: Vehicle) -> list[int]:
     """Index of each of the four coordinates in Exudyn's vector, once the system is assembled."""
     if vehicle.geometry == "linear":
         return [0, 1, 2, 3]
@@ -172,8 +175,8 @@ def columns(build: Build, vehicle: Vehicle) -> list[int]:
     return [start[body] + (1 if kind == "z" else 2) for body, kind in vehicle.coordinates()]
 
 
-def _drive(build: Build, assembly: Assembly, clock: SignalClock) -> None:
-    """Apply the input to the wheels, and to the chassis as well if forces act along its own axis."""
+def _apply_input(build: PitchPlaneBuild, assembly: Assembly, clock: SignalClock) -> None:
+    """Apply the input signal as loads on the wheels, and on the chassis as well if forces act along its own axis."""
     if clock.held:
         build.mbs.SetPreStepUserFunction(clock.advance)
         build.callbacks += 1
@@ -183,51 +186,57 @@ def _drive(build: Build, assembly: Assembly, clock: SignalClock) -> None:
             tyre = tyres[axle.wheel]
             if tyre.pushes_only:
                 continue
-            _load(build, (axle.wheel, "z"), clock.reader(i, tyre.stiffness))
-            _load(build, (axle.wheel, "z"), clock.reader(2 + i, tyre.damping))
+            _add_load(build, (axle.wheel, "z"), clock.reader(i, tyre.stiffness))
+            _add_load(build, (axle.wheel, "z"), clock.reader(2 + i, tyre.damping))
         elif assembly.mode == "force-body":
-            _body_fixed(build, axle.wheel, axle.x, clock.reader(i, 1.0))
+            _add_body_fixed_force(build, axle.wheel, axle.x, clock.reader(i, 1.0))
         else:
-            _load(build, (axle.wheel, "z"), clock.reader(i, -1.0))
+            _add_load(build, (axle.wheel, "z"), clock.reader(i, -1.0))
 
 
 def _flat_road(mbs: Any, t: float, load: float) -> float:
-    """Height and rate of a flat road, for a vehicle without road input."""
+    """Height and rate of a flat road (0), for a vehicle without road input."""
     return 0.0
 
 
-def _load(build: Build, place: tuple[str, str], function: Any) -> None:
-    build.mbs.AddLoad(items.LoadCoordinate(markerNumber=build.places[place], load=0.0, loadUserFunction=function))
+def _add_load(build: PitchPlaneBuild, coordinate: tuple[str, str], function: Any) -> None:
+    """Add a load on a coordinate whose value (N, N m) a function gives."""
+    build.mbs.AddLoad(
+        items.LoadCoordinate(markerNumber=build.coordinate_markers[coordinate], load=0.0, loadUserFunction=function)
+    )
     build.callbacks += 1
 
 
-def _body_fixed(build: Build, wheel: str, x: float, force: Reader) -> None:
-    """Apply a force along the chassis' vertical axis: f cos on the wheel, f x sin^2 on the chassis."""
+def _add_body_fixed_force(build: PitchPlaneBuild, wheel: str, x: float, force: Reader) -> None:
+    """Apply a wheel force f along the chassis' vertical axis: f cos(pitch) on the wheel, f x sin(pitch)^2 on the
+    chassis."""
     node = build.nodes["chassis"]
 
     def pitch(mbs: Any) -> float:
         return mbs.GetNodeOutput(node, KINDS.Coordinates)[2]
 
-    _load(build, (wheel, "z"), lambda mbs, t, load: -force(mbs, t, load) * np.cos(pitch(mbs)))
-    _load(build, ("chassis", "pitch"), lambda mbs, t, load: x * force(mbs, t, load) * np.sin(pitch(mbs)) ** 2)
+    _add_load(build, (wheel, "z"), lambda mbs, t, load: -force(mbs, t, load) * np.cos(pitch(mbs)))
+    _add_load(build, ("chassis", "pitch"), lambda mbs, t, load: x * force(mbs, t, load) * np.sin(pitch(mbs)) ** 2)
 
 
-def _prescribe(build: Build, assembly: Assembly, settings: Settings) -> list[Any]:
+def _add_constraints(build: PitchPlaneBuild, assembly: Assembly, settings: Settings) -> list[Any]:
     """Add constraints, which have Lagrange multipliers, for the prescribed coordinates; returns the constraints."""
     if not assembly.guided or assembly.input is None:
         return []
     table = assembly.input.sample(0.0, settings.step / 2, 2 * settings.steps + 1).T.tolist()
     places = [assembly.vehicle.coordinates()[i] for i in assembly.guided]
     paths, rates = table[2 : 2 + len(places)], table[2 + len(places) :]
-    return [_constraint(build, *path, 2.0 / settings.step) for path in zip(places, paths, rates, strict=False)]
+    return [_add_constraint(build, *path, 2.0 / settings.step) for path in zip(places, paths, rates, strict=False)]
 
 
-def _constraint(build: Build, place: tuple[str, str], path: list[float], rate: list[float], per_time: float) -> Any:
+def _add_constraint(
+    build: PitchPlaneBuild, coordinate: tuple[str, str], path: list[float], rate: list[float], per_time: float
+) -> Any:
     """Add a constraint by which a coordinate follows a path given at half steps."""
     build.callbacks += 2
     return build.mbs.AddObject(
         items.CoordinateConstraint(
-            markerNumbers=[ground_marker(build.mbs), build.places[place]],
+            markerNumbers=[ground_marker(build.mbs), build.coordinate_markers[coordinate]],
             offsetUserFunction=lambda mbs, t, item, offset: path[round(t * per_time)],
             offsetUserFunction_t=lambda mbs, t, item, offset: rate[round(t * per_time)],
         )
@@ -235,55 +244,55 @@ def _constraint(build: Build, place: tuple[str, str], path: list[float], rate: l
 
 
 class ExudynModel:
-    """Model of one assembly in an Exudyn system."""
+    """Model of one pitch-plane assembly in an Exudyn system."""
 
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings
-        self.built = native(assembly)
+        self.built = native_elements(assembly)
         if assembly.input is not None:
             self.clock = SignalClock(assembly.input, settings)
-            _drive(self.built, assembly, self.clock)
+            _apply_input(self.built, assembly, self.clock)
         for i, tyre in enumerate(tyre for tyre in assembly.vehicle.tyres if tyre.pushes_only):
             flat = assembly.input is None
             height, rate = (
                 (_flat_road, _flat_road) if flat else (self.clock.reader(i, 1.0), self.clock.reader(2 + i, 1.0))
             )
-            _pushing_tyre(self.built, tyre, height, rate)
+            _add_pushing_tyre(self.built, tyre, height, rate)
         if assembly.moment is not None:
-            _load(self.built, ("chassis", "pitch"), SignalClock(assembly.moment, settings).reader(0, 1.0))
-        self.constraints = _prescribe(self.built, assembly, settings)
+            _add_load(self.built, ("chassis", "pitch"), SignalClock(assembly.moment, settings).reader(0, 1.0))
+        self.constraints = _add_constraints(self.built, assembly, settings)
         p = assembly.parameters
         self._inertia = np.array([p.m1, p.m2, p.m3, p.I])[list(assembly.guided)]
         mbs, kept = self.built.mbs, {"storeInternal": True, "writeToFile": False}
-        self._sensors = recorders(mbs, self.built.nodes.values())
+        self._sensors = add_state_sensors(mbs, self.built.nodes.values())
         self._multipliers = [
             mbs.AddSensor(items.SensorObject(objectNumber=constraint, outputVariableType=KINDS.Force, **kept))
             for constraint in self.constraints
         ]
         mbs.Assemble()
-        self._columns = columns(self.built, assembly.vehicle)
+        self._columns = coordinate_indices(self.built, assembly.vehicle)
         self._set_state(*np.split(assembly.initial, 2))
 
     def _set_state(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Set the initial coordinates and rates (4,) of the system."""
         whole = np.zeros((2, self.built.mbs.systemData.ODE2Size()))
         whole[:, self._columns] = q, v
         set_start(self.built.mbs, *whole)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (4,) at a time (s), from coordinates and rates (4,) by Exudyn's own residual and mass
-        matrix.
-        """
+        matrix."""
         accelerations = self._free_acceleration(time, q, v)
         accelerations[list(self.assembly.guided)] = self._prescribed_accelerations(time)
         return accelerations
 
     def _prescribed_accelerations(self, time: float) -> np.ndarray:
-        """Accelerations of the prescribed coordinates, if any."""
+        """Accelerations of the prescribed coordinates at a time (s); empty if there are none."""
         signal, count = self.assembly.input, len(self.assembly.guided)
         return np.empty(0) if not count or signal is None else signal.at(time)[-count:]
 
     def _free_acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations of the vehicle if nothing enforced the prescribed coordinates."""
+        """Accelerations (4,) of the vehicle if nothing enforced the prescribed coordinates."""
         self._set_state(q, v)
         if self.assembly.input is not None:
             self.clock.step = min(int(time / self.settings.step + 1e-6), self.settings.steps - 1)
@@ -292,7 +301,7 @@ class ExudynModel:
         return np.linalg.solve(*mass_force)[self._columns]
 
     def plan(self) -> dict[str, int]:
-        """Counts of what was built: degrees of freedom, native items, callbacks."""
+        """Counts of built items: degrees of freedom, native items, callbacks."""
         data = self.built.mbs.systemData
         return {
             "degrees of freedom": 4,
@@ -301,26 +310,25 @@ class ExudynModel:
         }
 
     def run(self) -> Trajectory:
-        """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
+        """Trajectory over the whole duration; raises RunFailed unless it is complete and finite."""
         options = march_settings(self.settings)
         if self.assembly.input is not None:
             self.clock.step = 0  # a run before this one has left it at its own last sample
         if self.constraints:
             self._consistent_start(options)
         note = solve(self.built.mbs, self.settings, options)
-        times, states = self._recorded()
+        times, states = self._recorded_states()
         enforced = self._enforced()
         guard("exudyn", times, states, self.settings.duration, note, enforced)
-        landings_followed("exudyn", self.assembly, self.settings, times, states)
+        check_landings("exudyn", self.assembly, self.settings, times, states)
         counts = solver_counts(self.built.mbs)
         if enforced is not None:
-            balanced("exudyn", times, enforced, lambda i: self._balance(times[i], states[i]))
+            check_balance("exudyn", times, enforced, lambda i: self._balance(times[i], states[i]))
         return Trajectory(times, states, enforced, counts)
 
     def _balance(self, time: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces and moments that enforce the prescribed coordinates at one row of a run, and the inertia terms of
-        these (N, N m).
-        """
+        """Forces and moments (N, N m) that enforce the prescribed coordinates at a time (s) and state (8,), and the
+        inertia terms of the same coordinates."""
         wanted, free = (
             self._prescribed_accelerations(time),
             self._free_acceleration(time, *np.split(state, 2))[list(self.assembly.guided)],
@@ -328,7 +336,7 @@ class ExudynModel:
         return self._inertia * (wanted - free), self._inertia * wanted
 
     def _consistent_start(self, options: Any) -> None:
-        """Start with accelerations that are consistent with the prescribed coordinates.
+        """Set initial accelerations that are consistent with the prescribed coordinates.
 
         Exudyn leaves the constraint's own acceleration out of its initial values; the multiplier then
         rings, or never forgets the error.
@@ -341,7 +349,7 @@ class ExudynModel:
         options.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
         options.timeIntegration.generalizedAlpha.resetAccelerations = False
 
-    def _recorded(self) -> tuple[np.ndarray, np.ndarray]:
+    def _recorded_states(self) -> tuple[np.ndarray, np.ndarray]:
         """Times (n,) and states (n, 8) as the sensors stored them; Exudyn's y is the heave, its rotation the pitch."""
         read = self.built.mbs.GetSensorStoredData
         halves = [[read(sensor) for sensor in sensors] for sensors in self._sensors]
@@ -354,7 +362,8 @@ class ExudynModel:
         return grid if fixed else times, np.column_stack(states)
 
     def _enforced(self) -> np.ndarray | None:
-        """Enforced force and moment (n, constraints): the Lagrange multipliers, with the sign of loads on the chassis.
+        """Force and moment (n, constraints) that enforce the prescribed coordinates: the Lagrange multipliers, with the
+        sign of loads on the chassis.
 
         Exudyn has no multipliers at t = 0 yet; those follow from the accelerations of the start.
         """
@@ -367,5 +376,5 @@ class ExudynModel:
 
 
 def build(assembly: Assembly, settings: Settings) -> ExudynModel:
-    """The Exudyn model of an assembly."""
+    """The Exudyn model of a pitch-plane assembly."""
     return ExudynModel(assembly, settings)

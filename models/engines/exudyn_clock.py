@@ -1,4 +1,4 @@
-"""The input as Exudyn's callbacks read it."""
+"""Input signals in the form that Exudyn's callbacks read."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +11,7 @@ from models.engines.catalogue import CATALOGUE
 
 
 class SignalClock:
-    """A signal in the form that Exudyn's callbacks read: by step, by half step or at any time."""
+    """A signal as Exudyn's callbacks read it: by step, by half step or at any time."""
 
     def __init__(self, signal: Signal, settings: Settings) -> None:
         h, n = settings.step, settings.steps
@@ -39,12 +39,14 @@ class SignalClock:
         return lambda mbs, t, load: scale * self.at(t)[column]
 
     def at(self, t: float) -> np.ndarray:
-        """All channels at one time. The last answer is kept, since all loads of a stage ask for the same time."""
+        """All channels of the signal at one time t (s). The last values are stored, since all loads of a stage ask for
+        the same time."""
         if t != self.latest[0]:
             self.latest = (t, self.signal.at(t))
         return self.latest[1]
 
     def advance(self, mbs: Any, t: float) -> bool:
-        """Set the current step. Exudyn calls this before each step with the time t of the step's end."""
+        """Set the current step. Exudyn calls this before each step with the time t of the step's end, and expects
+        True."""
         self.step = min(round(t * self.per_time / 2) - 1, len(self.steps[0]) - 1)
         return True

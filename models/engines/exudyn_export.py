@@ -1,4 +1,4 @@
-"""An assembled Exudyn system as a script in Python that builds it again with Exudyn and numpy alone.
+"""Export of an assembled Exudyn system as a Python script that builds it again with Exudyn and numpy alone.
 
 The script is read off the system: its nodes, its objects and loads, and the markers that these need, each with the
 values that are not Exudyn's defaults. Functions in Python do not leave the process: an item whose law is a function is
@@ -14,15 +14,15 @@ import numpy as np
 
 from models.engines.exudyn_system import items
 
-ADDING = ("ObjectKinematicTree", "ObjectGenericODE2")
-"""Items whose user function adds to what they have of their own."""
-ADDED = ": what the road adds, which is flat here"
-"""Behind the name of such an item."""
-FUNCTION, DERIVED = "UserFunction", ("HT", "HTs")
-"""Ends of the names of functions, and of what Exudyn works out of other values."""
+ITEMS_WITH_ADDED_FORCE = ("ObjectKinematicTree", "ObjectGenericODE2")
+"""Classes of Exudyn items whose user function adds a force to their own."""
+ADDED_FORCE_REMARK = ": what the road adds, which is flat here"
+"""Remark behind the name of an item whose user function is left out."""
+FUNCTION_SUFFIX, DERIVED_SUFFIXES = "UserFunction", ("HT", "HTs")
+"""Endings of the keys of functions, and of keys that Exudyn derives from other values."""
 REFERENCES = {"nodeNumber": "node", "markerNumber": "marker", "bodyNumber": "object", "objectNumber": "object"}
-"""Keys, one number or several, that refer to other items."""
-HEAD = '''"""{comment}"""
+"""Kind of item to which a key refers, with one number or several."""
+SCRIPT_TEMPLATE = '''"""{comment}"""
 
 import exudyn as exu
 import exudyn.itemInterface as items
@@ -65,48 +65,53 @@ if __name__ == "__main__":
 '''
 
 
-def script(mbs: Any, coordinates: dict[str, int], comment: str) -> str:
+def python_script(mbs: Any, coordinates: dict[str, int], comment: str) -> str:
     """Text of a Python script that builds an assembled Exudyn system.
 
     coordinates : place of every coordinate in Exudyn's vectors, by its name; comment : for people, at its head.
     """
-    lines = _Writer(mbs).system()
+    lines = _Writer(mbs).script_lines()
     text = comment.replace("\\", "/").replace('"""', "'''")
-    return HEAD.format(comment=text, coordinates=coordinates, lines="\n".join(lines))
+    return SCRIPT_TEMPLATE.format(comment=text, coordinates=coordinates, lines="\n".join(lines))
 
 
-def counts(mbs: Any) -> Sequence[str]:
-    """Texts with the numbers of items that the exported script of a system builds."""
+def item_counts(mbs: Any) -> Sequence[str]:
+    """Texts with the numbers of nodes, objects, markers and loads that the exported script builds."""
     writer = _Writer(mbs)
-    writer.system()
+    writer.script_lines()
     return [f"{count} {kind}s" for kind, count in writer.counts.items() if count]
 
 
-def functions(mbs: Any) -> tuple[str, ...]:
-    """Names of the items that an exported script lacks because their law is a function, or because a function adds to
-    it.
-    """
+def items_with_functions(mbs: Any) -> tuple[str, ...]:
+    """Names of the items that an exported script lacks because their law is a function, or whose added force it
+    lacks."""
     writer, data = _Writer(mbs), mbs.systemData
     places = [("object", i) for i in range(data.NumberOfObjects())] + [("load", i) for i in range(data.NumberOfLoads())]
-    acting = ((kind, item) for kind, item in ((kind, writer.item(kind, i)) for kind, i in places) if _acts(item))
-    return tuple(f"{item['name']}{ADDED if _class(kind, item) in ADDING else ''}" for kind, item in acting)
+    acting = (
+        (kind, item) for kind, item in ((kind, writer.item(kind, i)) for kind, i in places) if _has_force_function(item)
+    )
+    return tuple(
+        f"{item['name']}{ADDED_FORCE_REMARK if _class_name(kind, item) in ITEMS_WITH_ADDED_FORCE else ''}"
+        for kind, item in acting
+    )
 
 
-def _acts(item: dict[str, Any]) -> bool:
-    """Whether an item calls a function for its forces."""
-    return any(key.endswith(FUNCTION) and value for key, value in item.items() if not key.startswith("V"))
+def _has_force_function(item: dict[str, Any]) -> bool:
+    """Whether an item calls a user function for its forces."""
+    return any(key.endswith(FUNCTION_SUFFIX) and value for key, value in item.items() if not key.startswith("V"))
 
 
 @dataclass
 class _Writer:
-    """Writer of the lines that rebuild a system. Each item is written once, before the first item that refers to it."""
+    """Writer of the script lines that rebuild an Exudyn system. Each item is written once, before the first item that
+    refers to it."""
 
     mbs: Any
     lines: list[str] = field(default_factory=list)
     written: set[str] = field(default_factory=set)
     counts: dict[str, int] = field(default_factory=lambda: {"node": 0, "object": 0, "marker": 0, "load": 0})
 
-    def system(self) -> list[str]:
+    def script_lines(self) -> list[str]:
         """All lines of the script; nodes come first, so that coordinates keep their order."""
         data = self.mbs.systemData
         for kind, count in (
@@ -116,7 +121,7 @@ class _Writer:
         ):
             for number in range(count):
                 if not self._by_function(kind, number):
-                    self.need(kind, number)
+                    self.variable_of(kind, number)
         return self.lines
 
     def item(self, kind: str, number: int) -> dict[str, Any]:
@@ -125,12 +130,12 @@ class _Writer:
         return item
 
     def _by_function(self, kind: str, number: int) -> bool:
-        """Whether the law of an item is given by a function, so that it cannot be exported."""
+        """Whether the law of an item is given by a function, so that the item cannot be exported."""
         item = self.item(kind, number)
-        return _acts(item) and _class(kind, item) not in ADDING
+        return _has_force_function(item) and _class_name(kind, item) not in ITEMS_WITH_ADDED_FORCE
 
-    def need(self, kind: str, number: int) -> str:
-        """Name of the variable of an item in the script; the item is written now if it has not been."""
+    def variable_of(self, kind: str, number: int) -> str:
+        """Name of the script's variable for an item; the item is written now if it has not been."""
         variable = f"{kind}{number}"
         if variable not in self.written:
             self.written.add(variable)
@@ -138,34 +143,34 @@ class _Writer:
             arguments = dict(self._arguments(kind, item))
             if arguments.get("name") == repr(variable):  # which Exudyn gives what has none
                 del arguments["name"]
-            made = f"items.{_class(kind, item)}({', '.join(f'{key}={text}' for key, text in arguments.items())})"
+            made = f"items.{_class_name(kind, item)}({', '.join(f'{key}={text}' for key, text in arguments.items())})"
             self.lines.append(f"    {variable} = mbs.Add{kind.capitalize()}({made})")
             self.counts[kind] += 1
         return variable
 
     def _arguments(self, kind: str, item: dict[str, Any]) -> Iterator[tuple[str, str]]:
         """Names and texts of an item's arguments that differ from Exudyn's defaults."""
-        usual = dict(getattr(items, _class(kind, item))())
+        usual = dict(getattr(items, _class_name(kind, item))())
         for key, value in item.items():
             referred = REFERENCES.get(key.removesuffix("s"))
-            if key not in usual or key.startswith("V") or key.endswith((FUNCTION, *DERIVED)):
+            if key not in usual or key.startswith("V") or key.endswith((FUNCTION_SUFFIX, *DERIVED_SUFFIXES)):
                 continue
             if referred and key in REFERENCES:
                 if int(value) >= 0:
-                    yield key, self.need(referred, int(value))
+                    yield key, self.variable_of(referred, int(value))
             elif referred:
-                yield key, f"[{', '.join(self.need(referred, int(each)) for each in value)}]"
+                yield key, f"[{', '.join(self.variable_of(referred, int(each)) for each in value)}]"
             elif (text := _python_text(value)) not in (_python_text(usual[key]), "[]"):
                 yield key, text
 
 
-def _class(kind: str, item: dict[str, Any]) -> str:
+def _class_name(kind: str, item: dict[str, Any]) -> str:
     """Name of an item's class in exudyn.itemInterface."""
     return f"{kind.capitalize()}{item[f'{kind}Type']}"
 
 
 def _python_text(value: Any) -> str:
-    """Text of a value in the script: matrices as arrays, Exudyn's own lists by their constructors."""
+    """Python text of a value in the script: matrices as arrays, Exudyn's own lists by their constructors."""
     if isinstance(value, exu.Vector3DList | exu.Matrix3DList):
         entries: Any = value  # Exudyn's type hints do not know that these are lists
         inner = ", ".join(_python_text(np.asarray(entries[i]).tolist()) for i in range(len(entries)))

@@ -1,4 +1,4 @@
-"""Functions that all models in Exudyn share: items, states, mass matrix and residual, packed forces, and marches by its
+"""Functions that all models in Exudyn share: items, states, mass matrix and residual, packed forces, and runs of its
 solvers."""
 
 import struct
@@ -9,22 +9,24 @@ import exudyn as exu
 import exudyn.itemInterface as typed_items
 import numpy as np
 
-from models.core.waiting import marching
+from models.core.waiting import simulation_progress
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
 
 exu.config.printToConsole = False
 KINDS = exu.OutputVariableType
 lists: Any = exu
+"""Exudyn without its type hints, which do not know how its lists are made."""
 items: Any = typed_items
-"""Exudyn's type hints know neither how its lists are made nor that a function is a user function."""
+"""Exudyn's items without their type hints, which do not know user functions."""
 UserFunction = Callable[[Any, float, int, Any, Any], Any]
-"""Forces as Exudyn asks for them: of system, time (s), item, lists of positions and of rates, as a list."""
+"""Force function in the form that Exudyn requires: of system, time (s), item, lists of positions and of rates; returns
+a list."""
 
 
 def packed_forces(size: int, block: np.ndarray, write_forces: Callable[[int, float, int], Any]) -> UserFunction:
     """User function of Exudyn that packs its lists into one block of doubles for ``write_forces(address, time, size)``.
-    The block holds forces, positions and rates (size,), then a table.
+    The block holds forces, positions and rates (size,) each, then a table.
 
     Exudyn calls Python and nothing else, and hands a user function lists: to pack both into one block, to let a
     compiled kernel work on its address and to return a list costs least.
@@ -41,7 +43,7 @@ def packed_forces(size: int, block: np.ndarray, write_forces: Callable[[int, flo
 
 
 def add_node(mbs: Any, size: int) -> Any:
-    """Add a node with ``size`` coordinates, all zero."""
+    """New node of an Exudyn system with ``size`` coordinates, all zero."""
     zero = [0.0] * size
     return mbs.AddNode(
         items.NodeGenericODE2(
@@ -57,8 +59,8 @@ def quiet_settings() -> Any:
     return options
 
 
-def recorders(mbs: Any, nodes: Collection[Any]) -> list[list[Any]]:
-    """Add sensors that store the coordinates of every node, and sensors that store their rates."""
+def add_state_sensors(mbs: Any, nodes: Collection[Any]) -> list[list[Any]]:
+    """New sensors that store the coordinates of every node, and sensors that store the rates."""
     return [
         [
             mbs.AddSensor(
@@ -71,14 +73,14 @@ def recorders(mbs: Any, nodes: Collection[Any]) -> list[list[Any]]:
 
 
 def set_start(mbs: Any, q: np.ndarray, v: np.ndarray) -> None:
-    """Set the coordinates and rates (n,) with which a system begins, in Exudyn's order."""
+    """Set the initial coordinates and rates (n,) of an Exudyn system, in Exudyn's order."""
     initial = exu.ConfigurationType.Initial
     mbs.systemData.SetODE2Coordinates(q, initial)
     mbs.systemData.SetODE2Coordinates_t(v, initial)
 
 
 def mass_and_force(mbs: Any, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Exudyn's own mass matrix (n, n) and residual (n,) at its initial state and a time (s), without multipliers."""
+    """Exudyn's own mass matrix (n, n) and residual (n,) at the initial state and a time (s), without multipliers."""
     solver: Any = exu.MainSolverImplicitSecondOrder()
     options = quiet_settings()
     options.timeIntegration.startTime = time
@@ -91,14 +93,15 @@ def mass_and_force(mbs: Any, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]
     return mass, force
 
 
-def ties(mbs: Any, places: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Jacobians (c, n) of Exudyn's own constraints with respect to the coordinates, one for each of ``places`` (n,)."""
+def constraint_jacobians(mbs: Any, positions: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Jacobians (c, n) of Exudyn's own c constraints with respect to the coordinates, one for each of ``positions``
+    (n,)."""
     solver: Any = exu.MainSolverImplicitSecondOrder()
     options = quiet_settings()
     solver.InitializeSolver(mbs, options)
     n, count = solver.GetODE2size(), solver.GetAEsize()
     nothing, rows = np.zeros((n + count, n + count)), list[np.ndarray]()
-    for q in places:
+    for q in positions:
         mbs.systemData.SetODE2Coordinates(q, exu.ConfigurationType.Current)
         solver.SetSystemJacobian(nothing)
         solver.ComputeJacobianAE(mbs)
@@ -107,8 +110,8 @@ def ties(mbs: Any, places: Sequence[np.ndarray]) -> list[np.ndarray]:
     return rows
 
 
-def tie_gaps(mbs: Any, q: np.ndarray) -> np.ndarray:
-    """Residuals (c,) of Exudyn's own constraints at coordinates (n,)."""
+def constraint_residuals(mbs: Any, q: np.ndarray) -> np.ndarray:
+    """Residuals (c,) of Exudyn's own c constraints at coordinates (n,)."""
     mbs.systemData.SetODE2Coordinates(q, exu.ConfigurationType.Initial)
     solver: Any = exu.MainSolverImplicitSecondOrder()
     options = quiet_settings()
@@ -120,7 +123,7 @@ def tie_gaps(mbs: Any, q: np.ndarray) -> np.ndarray:
 
 
 def march_settings(settings: Settings) -> Any:
-    """Exudyn's settings for a march in which sensors store every step."""
+    """Exudyn's settings for a run in which sensors store every step."""
     options = quiet_settings()
     options.solution.sensors.active, options.solution.sensors.writePeriod = True, settings.step
     ti = options.timeIntegration
@@ -132,19 +135,18 @@ def march_settings(settings: Settings) -> Any:
 
 
 def solve(mbs: Any, settings: Settings, options: Any = None) -> str:
-    """March with an integrator and Exudyn's ``options``, by default those of ``march_settings``. Returns the solver's
-    message, empty if there is none.
-    """
+    """Run Exudyn's solver over the duration with ``options``, by default those of ``march_settings``. Returns the
+    solver's failure message, empty if there is none."""
     options = options or march_settings(settings)
     ti = options.timeIntegration
     ti.numberOfSteps, ti.endTime, ti.verboseMode = settings.steps, settings.duration, 0
     ti.adaptiveStep = ti.explicit.computeEndOfStepAccelerations = False
-    with marching(lambda: mbs.systemData.GetTime() / settings.duration):
+    with simulation_progress(lambda: mbs.systemData.GetTime() / settings.duration):
         return solver_failure(mbs, settings.integrator, options)
 
 
 def solver_failure(mbs: Any, integrator: str, options: Any) -> str:
-    """Run Exudyn's solver; returns a phrase on how it failed, empty if it did not."""
+    """Run Exudyn's solver; returns a phrase on how it failed, empty if it succeeded."""
     try:
         done = mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, integrator))
     except (exu.ExudynError, RuntimeError, ValueError) as error:
@@ -155,7 +157,7 @@ def solver_failure(mbs: Any, integrator: str, options: Any) -> str:
 
 
 def solver_counts(mbs: Any) -> dict[str, int]:
-    """Steps, evaluations of the forces and Jacobians of a system's last run, from the solver's own counters."""
+    """Counts of steps, force evaluations and Jacobians of a system's last run, from the solver's own counters."""
     solver = mbs.sys["dynamicSolver"]
     steps = solver.it.currentStepIndex - 1
     tried = steps + solver.it.rejectedAutomaticStepSizeSteps

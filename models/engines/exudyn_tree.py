@@ -1,4 +1,4 @@
-"""Bodies of a vehicle in space in Exudyn: kinematic trees, sliders, and markers of their points.
+"""Bodies of a spatial vehicle in Exudyn: kinematic trees, sliders, and markers of points on bodies.
 
 A body without parent and all that ride on it are one tree with a link per coordinate; only the last link of a body has
 mass. (Rigid bodies whose missing freedoms are constrained would be wrong: the explicit solvers drop constrained rows
@@ -17,38 +17,40 @@ from models.vehicles.free_vehicle import anchor, frames, joints
 from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector, steiner
 from models.vehicles.spatial_linear import Preloads
 
-JOINTS = {
+JOINT_TYPES = {
     freedom: getattr(exu.JointType, f"{'Revolute' if freedom.startswith('r') else 'Prismatic'}{freedom[-1].upper()}")
     for freedom in FREEDOMS
 }
-SLIDES = {
+"""Exudyn's joint type of each freedom."""
+SLIDER_AXES = {
     "x": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
     "y": [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
     "z": [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
 }
-"""Where a body of one slide has its own axes: its first one lies along the slide."""
+"""Axes of a body with one sliding freedom, as columns: the first lies along the slide."""
 
 
 @dataclass
-class Build:
-    """Exudyn's system while it is being built.
+class TreeBuild:
+    """Exudyn's system of a spatial vehicle while it is being built.
 
-    links: (object, last link or None, where its joint is) of every body; places: (node, index within it) of every
-    coordinate; markers by body and point; frames: axes (3, 3) of the last link of every body as columns.
+    links: (object, last link or None, where its joint is) of every body; coordinate_nodes: (node, index within it) of
+    every coordinate; markers by body and point; frames: axes (3, 3) of the last link of every body as columns.
     """
 
     vehicle: SpatialVehicle
     mbs: Any
-    held: Preloads
+    preloads: Preloads
     ground: Any
     links: dict[str, tuple[Any, int | None, Vector]] = field(default_factory=dict)
-    places: dict[tuple[str, str], tuple[Any, int]] = field(default_factory=dict)
+    coordinate_nodes: dict[tuple[str, str], tuple[Any, int]] = field(default_factory=dict)
     markers: dict[tuple[str | None, Vector, bool], Any] = field(default_factory=dict)
     frames: dict[str, np.ndarray] = field(default_factory=dict)
     callbacks: int = 0
 
     def marker(self, body: str | None, point: Vector, turning: bool = False) -> Any:
-        """Marker of a body's point, made once. ``turning`` : whether its axes or its rotation are needed as well."""
+        """Marker of a point (m) on a body, made once. ``turning``: whether the body's axes or rotation are needed as
+        well."""
         apart = turning and body is not None and self.links[body][1] is None
         key = (body, point, apart or (body, point, True) in self.markers)
         if key not in self.markers:
@@ -56,6 +58,7 @@ class Build:
         return self.markers[key]
 
     def _new_marker(self, body: str | None, point: Vector, turning: bool) -> Any:
+        """Exudyn item of a marker of a point (m) on a body; None means the ground."""
         if body is None:
             return items.MarkerBodyRigid(bodyNumber=self.ground, localPosition=list(point))
         tree, link, origin = self.links[body]
@@ -66,7 +69,8 @@ class Build:
         return items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=local)
 
     def frame_marker(self, body: str | None, point: Vector, axes: np.ndarray) -> Any:
-        """Marker of a point with axes (3, 3), its columns, given in the design position; only for bodies in trees."""
+        """Marker of a point (m) on a body with axes (3, 3), as columns in the design position; only for bodies in trees
+        and the ground."""
         if body is None:
             frame = lists.HT(rotation=axes.tolist(), translation=list(point))
             return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=self.ground, localHT=frame))
@@ -76,27 +80,27 @@ class Build:
         return self.mbs.AddMarker(items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localHT=frame))
 
     def reader(self, body: str, freedom: str, kind: Any = KINDS.Coordinates) -> Callable[[], float]:
-        """Function that reads a coordinate, or its rate, at the current stage; it returns 0 if the body does not have
-        the coordinate.
-        """
-        if (body, freedom) not in self.places:
+        """Function that reads a body's coordinate, or its rate, at the current stage; it returns 0 if the body does not
+        have the coordinate."""
+        if (body, freedom) not in self.coordinate_nodes:
             return lambda: 0.0
-        read, (node, index) = self.mbs.GetNodeOutput, self.places[body, freedom]
+        read, (node, index) = self.mbs.GetNodeOutput, self.coordinate_nodes[body, freedom]
         if self.size(node) == 1:  # Exudyn gives a number, no array
             return lambda: read(node, kind)
         return lambda: read(node, kind)[index]
 
     def size(self, node: Any) -> int:
-        """Number of coordinates that a node has."""
-        return sum(node == each for each, _ in self.places.values())
+        """Number of coordinates of a node."""
+        return sum(node == each for each, _ in self.coordinate_nodes.values())
 
     def in_body_axes(self, body: str | None, vector: np.ndarray) -> np.ndarray:
-        """A vector (3,) that is given in the design position, in the axes that Exudyn uses for a body."""
+        """A vector (3,), given in the design position along the axes of space, in the axes that Exudyn uses for a
+        body."""
         if body is None:
             return vector
         if self.links[body][1] is not None:
             return self.frames[body].T @ vector
-        return np.array(SLIDES[self.vehicle.body(body).freedoms[0]]).T @ vector
+        return np.array(SLIDER_AXES[self.vehicle.body(body).freedoms[0]]).T @ vector
 
     def coordinate(self, node: Any, index: int) -> Any:
         """Marker of one coordinate of a node."""
@@ -104,15 +108,13 @@ class Build:
 
     def spring(self, first: Any, second: Any, **law: Any) -> None:
         """Add a native spring-damper between two points along the axes of space, or one whose force is a function of
-        place and speed.
-        """
+        position and speed."""
         self.mbs.AddObject(items.CartesianSpringDamper(markerNumbers=[first, second], **law))
         self.callbacks += "springForceUserFunction" in law
 
     def connect(self, name: str, first: Any, second: Any, law: Callable[[Any, Any], list[float]]) -> None:
-        """Connect two points by a force law. The force on the first (N, axes of space) depends on the second's position
-        and rate relative to the first.
-        """
+        """Connect two points by a force law. The force on the first point (N, axes of space) depends on the second
+        point's relative position and velocity."""
         self.spring(
             first,
             second,
@@ -123,14 +125,15 @@ class Build:
 
 @dataclass
 class Link:
-    """Mass that a joint carries. ``centre`` is measured from the joint, ``inertia`` is about the centre."""
+    """Mass carried by one joint of a tree. ``centre`` (m) is measured from the joint, ``inertia`` (kg m^2) is about the
+    centre."""
 
     mass: float = 0.0
     centre: np.ndarray = field(default_factory=lambda: np.zeros(3))
     inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
 
     def load(self, body: Body, mass_centre: np.ndarray) -> None:
-        """Add a body's mass and inertia, with its centre at ``mass_centre``."""
+        """Add a body's mass and inertia to the link, with the body's centre of mass at ``mass_centre`` (m)."""
         mass = self.mass + body.mass
         centre = (self.mass * self.centre + body.mass * mass_centre) / mass if mass else mass_centre
         self.inertia = (
@@ -142,8 +145,9 @@ class Link:
         self.mass, self.centre = mass, centre
 
 
-def add_tree(build: Build, bodies: list[Body]) -> None:
-    """Add a body without parent and its riders: a link per coordinate, the mass of each body on its last link.
+def add_tree(build: TreeBuild, bodies: list[Body]) -> None:
+    """Add a body without parent and all bodies that it carries: a link per coordinate, the mass of each body on its
+    last link.
 
     A rider without freedoms adds its mass to the last link of what it rides on.
     """
@@ -167,7 +171,7 @@ def add_tree(build: Build, bodies: list[Body]) -> None:
         items.ObjectKinematicTree(
             nodeNumber=node,
             gravity=[0, 0, -build.vehicle.gravity],
-            jointTypes=[JOINTS[freedom] for _, freedom in places],
+            jointTypes=[JOINT_TYPES[freedom] for _, freedom in places],
             linkParents=below.tolist(),
             jointTransformations=lists.Matrix3DList([b.T @ a for a, b in zip(axes, base, strict=True)]),
             jointOffsets=lists.Vector3DList([b.T @ arm for arm, b in zip(rows[:, 2:], base, strict=True)]),
@@ -178,23 +182,25 @@ def add_tree(build: Build, bodies: list[Body]) -> None:
     )
     build.links |= {name: (tree, *end) for name, end in ends.items()}
     build.frames |= {name: axes[end[0]] for name, end in ends.items()}
-    build.places |= {place: (node, i) for i, place in enumerate(places)}
+    build.coordinate_nodes |= {place: (node, i) for i, place in enumerate(places)}
 
 
-def add_slider(build: Build, body: Body) -> None:
-    """Add a body on the ground that has one sliding coordinate and carries nothing. As trees of one link, a car would
-    take 1.6 times as long.
-    """
+def add_slider(build: TreeBuild, body: Body) -> None:
+    """Add a body on the ground that has one sliding coordinate and carries no other body. As trees of one link, the
+    bodies of a car would take 1.6 times as long."""
     still, (freedom,) = [0.0], body.freedoms
     node = build.mbs.AddNode(
         items.Node1D(referenceCoordinates=still, initialCoordinates=still, initialVelocities=still)
     )
     mass = build.mbs.AddObject(
         items.Mass1D(
-            nodeNumber=node, mass=body.mass, referencePosition=list(body.position), referenceRotation=SLIDES[freedom]
+            nodeNumber=node,
+            mass=body.mass,
+            referencePosition=list(body.position),
+            referenceRotation=SLIDER_AXES[freedom],
         )
     )
-    build.links[body.name], build.places[body.name, freedom] = (mass, None, body.position), (node, 0)
+    build.links[body.name], build.coordinate_nodes[body.name, freedom] = (mass, None, body.position), (node, 0)
     if freedom == "z" and build.vehicle.gravity:
         build.mbs.AddLoad(
             items.LoadCoordinate(markerNumber=build.coordinate(node, 0), load=-body.mass * build.vehicle.gravity)

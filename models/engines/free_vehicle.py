@@ -40,8 +40,8 @@ ENGINES = ("exudyn", "mujoco")
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """A free vehicle with the forces on it, as an engine builds it. vehicle : each body directly before those that ride
-    on it; gravity (3,) in m/s^2.
+    """A free vehicle with the forces on it, from which an engine builds its model. vehicle : every body directly before
+    those that it carries; gravity (3,) in m/s^2.
 
     numbers : table of doubles that the kernel reads; kernel : compiled function that adds to the forces, None where the
     engine computes all forces itself and calls nothing back; block : compiled function of (address, time, n) that
@@ -68,7 +68,7 @@ class Driven:
 
     @property
     def size(self) -> int:
-        """Number of coordinates of the driven vehicle."""
+        """Number of coordinates of the vehicle."""
         return len(self.vehicle.coordinates())
 
     @property
@@ -94,17 +94,17 @@ class FreeModel(ABC):
 
     @property
     def numbers(self) -> np.ndarray:
-        """The table that the kernel reads; values written into it hold from then on."""
+        """The table that the compiled forces read; values written into it are used from then on."""
         return self.driven.numbers
 
     @contextmanager
     def at_step(self, step: float) -> Iterator[None]:
-        """Context in which the engine is ready for a march by its caller, in steps of ``step`` (s)."""
+        """Context in which a caller can march the engine in steps of ``step`` (s)."""
         self.step = step
         yield
 
     def compiled(self) -> Any:
-        """The handle with which compiled code can call the engine, None where the engine has none."""
+        """The handle with which compiled code can call the engine; None where the engine has none."""
         return None
 
     @abstractmethod
@@ -113,16 +113,15 @@ class FreeModel(ABC):
 
     @abstractmethod
     def plan(self) -> dict[str, int]:
-        """Counts of what was built: degrees of freedom, native items, callbacks."""
+        """Counts of built items: degrees of freedom, native items, callbacks."""
 
     @abstractmethod
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
-        """Positions and rates (steps + 1, 2 n) at every step, from initial ones (n,) each; RunFailed where the engine
-        stops.
-        """
+        """Positions and rates (steps + 1, 2 n) at every step, from initial positions and rates (n,); RunFailed where
+        the engine stops."""
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
-        """March from positions and rates (n,), or from rest in the design position; states at every step.
+        """Trajectory from positions and rates (n,), or from rest in the design position, with states at every step.
 
         RunFailed unless all of it is finite and sane.
         """
@@ -135,9 +134,8 @@ class FreeModel(ABC):
 
 
 class Plain(FreeModel):
-    """The independent reference: plain equations of a vehicle, integrated in plain numpy; it has no table of
-    numbers.
-    """
+    """The independent reference: equations of a vehicle in plain Python, integrated with numpy; it has no table of
+    numbers."""
 
     def __init__(self, engine: str, equations: "Acceleration", size: int, settings: Settings | None = None) -> None:
         """equations : function that gives accelerations (n,) at a time (s), positions and rates (n,); engine : name of
@@ -150,40 +148,41 @@ class Plain(FreeModel):
         return self.equations(time, q, v)
 
     def plan(self) -> dict[str, int]:
-        """Counts of what was built: coordinates, and no native items or callbacks."""
+        """Counts of built items: coordinates, and no native items or callbacks."""
         return {"degrees of freedom": self.size, "native items": 0, "callbacks": 0}
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
-        """Positions and rates (steps + 1, 2 n) at every step, from initial ones (n,) each; not finite after a
-        failure.
-        """
+        """Positions and rates (steps + 1, 2 n) at every step, from initial positions and rates (n,); not finite after a
+        failure."""
         from models.multibody.plain.march import march
 
         return march(self.equations, q, v, steps, step)
 
 
 def free_model(engine: str, driven: Driven, settings: Settings | None = None) -> FreeModel:
-    """The vehicle in "exudyn" or "mujoco"; settings : needed for runs, not for single steps."""
+    """The free vehicle in "exudyn" or "mujoco"; ``settings`` are needed for runs, not for single steps."""
     if engine not in ENGINES:
         raise InputError("", "engine", engine, "no such engine", ENGINES)
-    model: FreeModel = getattr(_module(engine), f"Free{engine.capitalize()}")(driven, settings)
+    model: FreeModel = getattr(_engine_module(engine), f"Free{engine.capitalize()}")(driven, settings)
     return model
 
 
-def built_share(engine: str, driven: Driven) -> tuple[tuple[str, ...], int]:
-    """Names of the springs, mounts and bars that a built model itself computes, and the number of its joints.
+def native_elements_and_joints(engine: str, driven: Driven) -> tuple[tuple[str, ...], int]:
+    """Names of the springs, mounts and bars that a built model of an engine itself computes, and the number of its
+    joints.
 
     Counted in the model; it is built without its callback, for which numba would compile.
     """
-    share: tuple[tuple[str, ...], int] = _module(engine).share(driven)
-    return share
+    elements_and_joints: tuple[tuple[str, ...], int] = _engine_module(engine).native_elements_and_joints(driven)
+    return elements_and_joints
 
 
 def native_share(
     vehicle: SpatialVehicle, native: Mapping[str, tuple[NativePart, ...]] | None = None
 ) -> tuple[tuple[str, str], ...]:
-    """Lines of a plan, head and text, on the joints and springs that each engine computes natively, and on why others
-    are not native, for a vehicle whose springs keep to the heading of its carrier. They are counted in built models.
+    """Lines of a plan, heading and text, on the joints and springs that each engine computes natively, and on why
+    others are not native, counted in built models. The vehicle's springs act along axes that turn with their carrier's
+    heading.
 
     Such springs act along axes that turn with the carrier only, while both their ends roll and pitch relative to it.
     Elements along coordinates are native. native : further parts of each engine, of springs that keep to other
@@ -193,12 +192,13 @@ def native_share(
     count = len(vehicle.springs) + len(along)
     for engine in ENGINES:
         parts = (*along, *(native or {}).get(engine, ()))
-        names, joints = built_share(engine, Driven(vehicle, np.zeros(3), np.zeros(1), None, None, parts))
+        names, joints = native_elements_and_joints(engine, Driven(vehicle, np.zeros(3), np.zeros(1), None, None, parts))
         told = f"{engine}: bodies and {joints} joints, {len(names)} of {count} springs and {bars} bars"
         lines.append(("native", told))
     why = "their axes turn with the carrier alone, beside which both their ends roll and pitch: no element has that"
     return (*lines, *([("shared", f"springs, mounts and bars: {why}")] if vehicle.springs or bars else []))
 
 
-def _module(engine: str) -> Any:
+def _engine_module(engine: str) -> Any:
+    """Module with the free vehicle of "exudyn" or "mujoco"."""
     return import_module(f"models.engines.free_vehicle_{engine}")

@@ -1,4 +1,4 @@
-"""A free vehicle marched by an integrator that picks its own steps: Exudyn's, or scipy's around plain equations.
+"""A free vehicle marched by an integrator that chooses its own steps: Exudyn's, or scipy's with plain equations.
 
 Rows are even. Each is the end of a march of its own in Exudyn, which would write rows where its steps fall; scipy's
 methods interpolate by polynomials of their own order. No step is longer than the time between two rows.
@@ -14,31 +14,31 @@ from models.engines.assembly import Settings
 from models.engines.free_vehicle import FreeModel
 from models.engines.protocol import guard
 
-ABSOLUTE = 1e-2
-"""Absolute tolerance (m, rad, per s) by the relative one."""
+ABSOLUTE_TOLERANCE_RATIO = 1e-2
+"""Ratio of the absolute tolerance (m, rad, per s) to the relative tolerance."""
 FINEST_TOLERANCE = 3e-14
 """Relative tolerance below which scipy's methods would work on rounding."""
 
 
 def march_adaptively(model: FreeModel, q: np.ndarray, v: np.ndarray, settings: Settings) -> Trajectory:
-    """March from positions and rates (n,) with rows every ``settings.step``; RunFailed unless all values are finite and
-    sane.
+    """Trajectory from positions and rates (n,), with rows every ``settings.step`` (s); RunFailed unless all values are
+    finite and sane.
 
     model : of an engine that ``models.engines.catalogue.ADAPTIVE`` names, with one of its integrators there.
     """
-    march, begun = (_in_exudyn if model.ENGINE == "exudyn" else _by_scipy), np.concatenate((q, v))
-    states, counts = march(model, begun, settings)
+    march, initial_state = (_in_exudyn if model.ENGINE == "exudyn" else _by_scipy), np.concatenate((q, v))
+    states, counts = march(model, initial_state, settings)
     times = settings.step * np.arange(settings.steps + 1)
     guard(model.ENGINE, times, states, settings.steps * settings.step)
     return Trajectory(times, states, counts=counts)
 
 
-def _in_exudyn(model: Any, begun: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
+def _in_exudyn(model: Any, initial_state: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
     """States (steps + 1, 2 n), marched in Exudyn one row at a time, and counts of steps and force calls."""
     from models.engines.exudyn_system import set_start, solver_counts, solver_failure
 
-    mbs, states = model.mbs, np.empty((settings.steps + 1, begun.size))
-    states[0], counts = begun, {"steps": 0, "force calls": 0}
+    mbs, states = model.mbs, np.empty((settings.steps + 1, initial_state.size))
+    states[0], counts = initial_state, {"steps": 0, "force calls": 0}
     for i in range(settings.steps):
         set_start(mbs, *np.split(states[i], 2))
         if solver_failure(mbs, settings.integrator, _options(i * settings.step, settings)):
@@ -49,19 +49,19 @@ def _in_exudyn(model: Any, begun: np.ndarray, settings: Settings) -> tuple[np.nd
     return states, counts
 
 
-def _options(begin: float, settings: Settings) -> Any:
+def _options(start_time: float, settings: Settings) -> Any:
     """Exudyn's settings for the march from a time (s) to the next row."""
     from models.engines.exudyn_system import quiet_settings
 
     options = quiet_settings()
     ti = options.timeIntegration
-    ti.startTime, ti.endTime, ti.numberOfSteps, ti.verboseMode = begin, begin + settings.step, 1, 0
+    ti.startTime, ti.endTime, ti.numberOfSteps, ti.verboseMode = start_time, start_time + settings.step, 1, 0
     ti.automaticStepSize, ti.explicit.computeEndOfStepAccelerations = True, False
-    ti.relativeTolerance, ti.absoluteTolerance = settings.tolerance, ABSOLUTE * settings.tolerance
+    ti.relativeTolerance, ti.absoluteTolerance = settings.tolerance, ABSOLUTE_TOLERANCE_RATIO * settings.tolerance
     return options
 
 
-def _by_scipy(model: FreeModel, begun: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
+def _by_scipy(model: FreeModel, initial_state: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
     """States (steps + 1, 2 n) of plain equations, integrated by an adaptive scipy solver, and its counts."""
     from scipy.integrate import solve_ivp
 
@@ -78,11 +78,11 @@ def _by_scipy(model: FreeModel, begun: np.ndarray, settings: Settings) -> tuple[
     solution = solve_ivp(
         rate,
         (0.0, rows[-1]),
-        begun,
+        initial_state,
         method=settings.integrator,
         t_eval=rows,
         rtol=tolerance,
-        atol=ABSOLUTE * tolerance,
+        atol=ABSOLUTE_TOLERANCE_RATIO * tolerance,
         max_step=settings.step,
     )
     if not solution.success:

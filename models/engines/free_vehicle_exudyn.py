@@ -1,4 +1,4 @@
-"""A free vehicle in Exudyn: one kinematic tree, all forces by its user function around the compiled kernel."""
+"""A free vehicle in Exudyn: one kinematic tree, and a user function around the compiled forces."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,19 +9,19 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
 from models.engines.exudyn_system import (
+    add_state_sensors,
+    constraint_jacobians,
+    constraint_residuals,
     items,
     mass_and_force,
     packed_forces,
-    recorders,
     set_start,
     solve,
-    tie_gaps,
-    ties,
 )
-from models.engines.exudyn_tree import Build, add_tree
+from models.engines.exudyn_tree import TreeBuild, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.native_exudyn import (
-    Coordinates,
+    CoordinateConnectors,
     add_body_load,
     add_connection,
     add_ground_spring,
@@ -35,15 +35,15 @@ from models.engines.native_parts import rotors
 from models.vehicles.spatial_linear import Preloads
 
 
-def share(driven: Driven) -> tuple[tuple[str, ...], int]:
-    """Names of the elements that have an object in the built system, and the number of joints in its first tree."""
+def native_elements_and_joints(driven: Driven) -> tuple[tuple[str, ...], int]:
+    """Names of the elements that have an object in the built system, and the number of joints of its tree."""
     model = FreeExudyn(driven)
     names = built_elements(model.mbs, [part.element.name for part in driven.parts])
     return names, len(model.mbs.GetObject(model.tree)["jointTypes"])
 
 
 class FreeExudyn(FreeModel):
-    """One free vehicle in one Exudyn system. The numbers for its user function are in a block of the model's own."""
+    """One free vehicle in one Exudyn system. The numbers for the user function are in a block of the model's own."""
 
     ENGINE = "exudyn"
 
@@ -51,7 +51,7 @@ class FreeExudyn(FreeModel):
         self.driven, self.size, self.settings, bodies = driven, driven.size, settings, driven.vehicle.bodies
         self._container = exu.SystemContainer()
         mbs: Any = self._container.AddSystem()
-        self.mbs, built = mbs, Build(driven.vehicle, mbs, Preloads({}, {}), mbs.AddObject(items.ObjectGround()))
+        self.mbs, built = mbs, TreeBuild(driven.vehicle, mbs, Preloads({}, {}), mbs.AddObject(items.ObjectGround()))
         add_tree(built, list(bodies))
         self.tree = built.links[bodies[0].name][0]
         self._block = np.concatenate((np.zeros(3 * self.size), driven.numbers))
@@ -59,7 +59,7 @@ class FreeExudyn(FreeModel):
         if driven.has_kernel:
             forces = packed_forces(self.size, self._block, driven.block)
             mbs.SetObjectParameter(self.tree, "forceUserFunction", forces)
-        node = next(iter(built.places.values()))[0]
+        node = next(iter(built.coordinate_nodes.values()))[0]
         add_parts(built, node, driven.parts)
         add_rotors(built, node, rotors(driven.vehicle))
         for spring in driven.ground_springs:
@@ -70,14 +70,14 @@ class FreeExudyn(FreeModel):
             add_body_load(built, load)
         for turning in driven.turning_springs:
             add_turning_spring(built, turning)
-        coordinates = Coordinates(built, node)
+        coordinates = CoordinateConnectors(built, node)
         for friction in driven.frictions:
-            coordinates.rub(friction)
+            coordinates.add_friction(friction)
         for coupling in driven.couplings:
-            coordinates.couple(coupling)
+            coordinates.add_coupling(coupling)
         for connection in driven.connections:
             add_connection(built, connection)
-        self._sensors = recorders(mbs, [node])
+        self._sensors = add_state_sensors(mbs, [node])
         mbs.Assemble()
 
     @property
@@ -86,7 +86,7 @@ class FreeExudyn(FreeModel):
         return self._block[3 * self.size :]
 
     def plan(self) -> dict[str, int]:
-        """Counts of what was built: degrees of freedom, native items, callbacks."""
+        """Counts of built items: degrees of freedom, native items, callbacks."""
         data = self.mbs.systemData
         native = data.NumberOfObjects() + data.NumberOfLoads()
         return {"degrees of freedom": self.size, "native items": native, "callbacks": int(self.driven.has_kernel)}
@@ -96,22 +96,21 @@ class FreeExudyn(FreeModel):
         return np.linalg.solve(*self.mass_and_force(time, q, v))
 
     def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Exudyn's own mass matrix (n, n) and residual (n,)."""
+        """Exudyn's own mass matrix (n, n) and residual (n,) at a time (s), positions and rates (n,)."""
         set_start(self.mbs, q, v)
         return mass_and_force(self.mbs, time)
 
-    def ties(self, places: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Jacobians (c, n) of Exudyn's own constraints with respect to the coordinates, one for each of ``places``
-        (n,).
-        """
-        return ties(self.mbs, places)
+    def ties(self, positions: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Jacobians (c, n) of Exudyn's own c constraints with respect to the coordinates, one for each of the positions
+        (n,)."""
+        return constraint_jacobians(self.mbs, positions)
 
     def gaps(self, q: np.ndarray) -> np.ndarray:
-        """Residuals (c,) of Exudyn's own constraints at coordinates (n,)."""
-        return tie_gaps(self.mbs, q)
+        """Residuals (c,) of Exudyn's own c constraints at coordinates (n,)."""
+        return constraint_residuals(self.mbs, q)
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float, integrator: str = "RK44") -> np.ndarray:
-        """Positions and rates (steps + 1, 2 n) with one of Exudyn's integrators; RunFailed where it stops."""
+        """Positions and rates (steps + 1, 2 n) by one of Exudyn's integrators; RunFailed where it stops."""
         set_start(self.mbs, q, v)
         if note := solve(self.mbs, Settings(integrator, step, steps * step)):
             raise RunFailed("exudyn", note.lstrip("; "))

@@ -1,4 +1,4 @@
-"""A free vehicle in MuJoCo: native bodies and joints, all forces by a native callback."""
+"""A free vehicle in MuJoCo: native bodies and joints, all other forces by a native callback."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +10,7 @@ from models.core.errors import RunFailed
 from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.mujoco_callback import kernel_law
-from models.engines.mujoco_layout import check
+from models.engines.mujoco_layout import check_offsets
 from models.engines.mujoco_march import GAVE_UP, Marcher
 from models.engines.mujoco_native import Native, native
 from models.engines.mujoco_quiet import installed, without_warnings
@@ -34,8 +34,8 @@ from models.engines.native_parts import rotors
 from models.vehicles.spatial import SpatialVehicle
 
 
-def carriers(vehicle: SpatialVehicle) -> dict[str, str]:
-    """Bodies that MuJoCo can merge with the only body that rides on them: name of the carrier to name of the rider.
+def mergeable_carriers(vehicle: SpatialVehicle) -> dict[str, str]:
+    """Bodies that MuJoCo can merge with the only body that they carry: name of the carrier to name of the carried body.
 
     They have no mass, or are points about which the other does no more than turn: either way the other's mass and
     inertia, with the point's mass, move as both do.
@@ -52,9 +52,10 @@ def carriers(vehicle: SpatialVehicle) -> dict[str, str]:
     return only
 
 
-def specified(driven: Driven) -> mujoco.MjSpec:
-    """Specification with bodies, joints, springs and room for the callback's numbers, which ``compiled`` fills in."""
-    spec = spec_of(driven.vehicle, 1e-3, _merged(driven))
+def specification_of(driven: Driven) -> mujoco.MjSpec:
+    """MuJoCo specification with bodies, joints, springs and space for the callback's numbers, which ``compiled_from``
+    fills in."""
+    spec = spec_of(driven.vehicle, 1e-3, _merged_bodies(driven))
     add_parts(spec, driven.vehicle, driven.parts)
     add_rotors(spec, driven.vehicle, rotors(driven.vehicle))
     for spring in driven.ground_springs:
@@ -73,21 +74,23 @@ def specified(driven: Driven) -> mujoco.MjSpec:
     return spec
 
 
-def _merged(driven: Driven) -> dict[str, str]:
-    """Bodies that are merged with their only rider: those of ``carriers`` at which no spring or constraint ends."""
-    held = [body for line in driven.line_springs for body, _ in line.ends]
-    held += [body for connection in driven.connections for body, _ in connection.ends]
-    held += [body for each in driven.turning_springs for body in each.bodies]
-    held += [load.body for load in driven.body_loads]
-    bearing = end_bodies(driven.parts) | {body for body in held if body is not None}
-    return {name: rider for name, rider in carriers(driven.vehicle).items() if name not in bearing}
+def _merged_bodies(driven: Driven) -> dict[str, str]:
+    """Bodies that are merged with the only body that they carry: those of ``mergeable_carriers`` at which no spring or
+    constraint ends."""
+    end_bodies_of_springs = [body for line in driven.line_springs for body, _ in line.ends]
+    end_bodies_of_springs += [body for connection in driven.connections for body, _ in connection.ends]
+    end_bodies_of_springs += [body for each in driven.turning_springs for body in each.bodies]
+    end_bodies_of_springs += [load.body for load in driven.body_loads]
+    bearing = end_bodies(driven.parts) | {body for body in end_bodies_of_springs if body is not None}
+    return {name: rider for name, rider in mergeable_carriers(driven.vehicle).items() if name not in bearing}
 
 
-def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
-    """Model compiled from the specification of ``specified``, with all its numbers but without the callback."""
+def compiled_from(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
+    """MuJoCo model compiled from the specification of ``specification_of``, with all its numbers but without the
+    callback."""
     model = spec.compile()
     model.numeric_data[:] = driven.numbers
-    places = MujocoIndices(driven.vehicle, model, _merged(driven))
+    places = MujocoIndices(driven.vehicle, model, _merged_bodies(driven))
     if not np.array_equal(places.columns, np.arange(driven.size)):
         raise ValueError("the bodies are not in the order of a walk through their tree")
     with without_warnings():  # a hinge with a ball joint of one body has no inertia but its rotor, which comes next
@@ -103,11 +106,12 @@ def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
 
 
 def compiled_model(driven: Driven) -> mujoco.MjModel:
-    """Compiled model with bodies, joints, springs and the callback's numbers, but without the callback."""
-    return compiled(specified(driven), driven)
+    """Compiled MuJoCo model of a free vehicle with bodies, joints, springs and the callback's numbers, but without the
+    callback."""
+    return compiled_from(specification_of(driven), driven)
 
 
-def share(driven: Driven) -> tuple[tuple[str, ...], int]:
+def native_elements_and_joints(driven: Driven) -> tuple[tuple[str, ...], int]:
     """Names of the elements that have a tendon or an actuator in the built model, and the number of its joints."""
     model = compiled_model(driven)
     return built_elements(model), int(model.njnt)
@@ -124,7 +128,7 @@ class FreeMujoco(FreeModel):
         self.data = mujoco.MjData(self.model)
         self.law = kernel_law(driven.kernel) if driven.has_kernel else None
         self._marcher = Marcher(self.model)
-        check(self.model, self.data)
+        check_offsets(self.model, self.data)
 
     @property
     def numbers(self) -> np.ndarray:
@@ -139,11 +143,11 @@ class FreeMujoco(FreeModel):
             yield
 
     def compiled(self) -> Native:
-        """MuJoCo's functions and arrays for compiled code."""
+        """Handle with which compiled code calls MuJoCo: its functions and arrays."""
         return native(self.model, self.data)
 
     def plan(self) -> dict[str, int]:
-        """Counts of what was built: degrees of freedom, native items, callbacks."""
+        """Counts of built items: degrees of freedom, native items, callbacks."""
         m = self.model
         native = m.nbody - 1 + m.njnt + m.ntendon + m.nu
         return {"degrees of freedom": m.nv, "native items": native, "callbacks": int(self.driven.has_kernel)}
@@ -156,20 +160,21 @@ class FreeMujoco(FreeModel):
         return self.data.qacc.copy()
 
     def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """MuJoCo's own mass matrix (n, n) and generalised forces (n,), constraint forces included."""
+        """MuJoCo's own mass matrix (n, n) and generalised forces (n,), constraint forces included, at a time (s),
+        positions and rates (n,)."""
         self.acceleration(time, q, v)
         mass = np.empty((self.size, self.size))
         mujoco.mj_fullM(self.model, self.data, mass)
         return mass, self.data.qfrc_smooth + self.data.qfrc_constraint
 
     def gaps(self, q: np.ndarray) -> np.ndarray:
-        """Residuals (c,) of MuJoCo's own equality constraints at coordinates (n,)."""
+        """Residuals (c,) of MuJoCo's own c equality constraints at coordinates (n,)."""
         self.acceleration(0.0, q, np.zeros(self.size))
         gaps: np.ndarray = self.data.efc_pos[self.data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY]
         return gaps.copy()
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
-        """Positions and rates (steps + 1, 2 n) by MuJoCo's RK4; RunFailed where it gives up."""
+        """Positions and rates (steps + 1, 2 n) by MuJoCo's RK4; RunFailed where MuJoCo gives up."""
         self.model.opt.timestep, start = step, np.concatenate((q, v))
         if steps == 1:
             return np.vstack((start, self._stepped(q, v, step)))
@@ -177,7 +182,8 @@ class FreeMujoco(FreeModel):
             return np.vstack((start, self._marcher.run(start[None], steps)[0]))
 
     def _stepped(self, q: np.ndarray, v: np.ndarray, step: float) -> np.ndarray:
-        """State after one step, without the overhead of a loop; RunFailed where MuJoCo resets itself to time zero."""
+        """State (2 n,) after one step (s), without the overhead of a loop; RunFailed where MuJoCo resets itself to time
+        zero."""
         data = self.data
         data.time, data.qpos[:], data.qvel[:] = 0.0, q, v
         with installed(self.law):

@@ -1,4 +1,4 @@
-"""The engine protocol that every system shares; comparisons, prices, choices and sweeps go by."""
+"""The engine protocol that all systems share."""
 
 from typing import Protocol
 
@@ -8,7 +8,7 @@ from models.core.trajectory import Trajectory
 
 
 class Model(Protocol):
-    """A vehicle in an engine, or as written equations, together with its input and its time integration.
+    """A vehicle in an engine, or as hand-written equations, together with its input and its time integration.
 
     Ride also needs a linear vehicle (``spatial_protocol``). A braked vehicle, whose wheels take smaller steps than its
     chassis, also needs single steps (``free_vehicle.FreeModel.march``). A wheelset on rails has a state that is not its
@@ -21,9 +21,9 @@ class Model(Protocol):
         ...
 
     def run(self) -> Trajectory:
-        """March over the whole duration; RunFailed if the answer is not complete, finite and sane."""
+        """Trajectory over the whole duration; RunFailed unless it is complete, finite and sane."""
         ...
 
     def plan(self) -> dict[str, int]:
-        """Counts of what was built: degrees of freedom, native items, callbacks."""
+        """Counts of built items: degrees of freedom, native items, callbacks."""
         ...

@@ -1,4 +1,4 @@
-"""The vehicle in MuJoCo: native joints, tendons and actuators; sampled input through a compiled callback.
+"""The pitch-plane vehicle in MuJoCo: native joints, tendons and actuators; sampled input through a compiled callback.
 
 World axes are the description's own (x forward, y right, z down), so gravity is (0, 0, +g) and the
 hinge about +y lifts the front. A strut with exact geometry is a site actuator whose reference site sits
@@ -19,7 +19,7 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.mujoco_march import FORCE_CALLS, march
 from models.engines.mujoco_quiet import installed
-from models.engines.protocol import guard, landings_followed
+from models.engines.protocol import check_landings, guard
 from models.vehicles.description import Strut, Vehicle
 
 INTEGRATORS = {
@@ -29,10 +29,12 @@ INTEGRATORS = {
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
     "discrete": mujoco.mjtIntegrator.mjINT_DISCRETE,
 }
+"""MuJoCo's number of each integrator."""
 
 
 def specification(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) -> mujoco.MjSpec:
-    """Bodies and joints of the vehicle, without joints for the ``guided`` coordinates, which stay at zero."""
+    """MuJoCo specification with bodies and joints of the vehicle, without joints for the prescribed coordinates
+    ``guided``, which stay at zero."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = [0, 0, vehicle.gravity]
@@ -60,7 +62,7 @@ def specification(vehicle: Vehicle, settings: Settings, guided: Collection[int] 
             joint = spec.joint(f"{strut.upper.body} z")
             joint.stiffness[0], joint.damping[0] = strut.stiffness, strut.damping
         else:
-            _suspension(spec, vehicle, strut, joints)
+            _add_suspension(spec, vehicle, strut, joints)
     for spring in (spring for spring in vehicle.pitch_springs if not spring.dead_band):
         joint = spec.joint(f"{spring.body} pitch")
         joint.stiffness[0] += spring.stiffness
@@ -68,7 +70,8 @@ def specification(vehicle: Vehicle, settings: Settings, guided: Collection[int] 
     return spec
 
 
-def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set[tuple[str, str]]) -> None:
+def _add_suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set[tuple[str, str]]) -> None:
+    """Add a suspension strut: as a fixed tendon with linear geometry, or as a site actuator with exact geometry."""
     if vehicle.geometry == "linear":
         tendon = spec.add_tendon(name=strut.name, springlength=[0, 0])
         tendon.stiffness[0], tendon.damping[0] = strut.stiffness, strut.damping
@@ -94,8 +97,8 @@ def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set
 
 @dataclass
 class ModelInput:
-    """Input of a MuJoCo model: a table (rows, columns) of generalised forces per half step, controls (n, 2), and lever
-    arms.
+    """Input of a MuJoCo model: a table (rows, columns) of generalised forces per half step, controls (n, 2), lever arms
+    (m), and the callback ``law``.
 
     Where tyres only push, the table has the road, heights and rates, and ``tyres`` stiffness and damping of each.
     """
@@ -107,10 +110,9 @@ class ModelInput:
     tyres: tuple[float, ...] = ()
 
 
-def _drive(assembly: Assembly, settings: Settings) -> ModelInput:
+def _model_input(assembly: Assembly, settings: Settings) -> ModelInput:
     """The model's input, with a callback where native items cannot apply it: for tables, forces that turn, and springs
-    or tyres that lose contact.
-    """
+    or tyres that lose contact."""
     signal, h, n = assembly.input, settings.step, settings.steps
     slack = any(spring.dead_band for spring in assembly.vehicle.pitch_springs)
     slack = slack or any(tyre.pushes_only for tyre in assembly.vehicle.tyres)
@@ -133,16 +135,15 @@ def _drive(assembly: Assembly, settings: Settings) -> ModelInput:
     if assembly.mode == "force-body":
         arms = np.array([axle.x for axle in assembly.vehicle.axles])
         return ModelInput(np.hstack([inputs[:, : 0 if signal.held else 2], moment]), held, arms, body_fixed_law())
-    forces = _generalised(assembly, inputs)
+    forces = _generalised_forces(assembly, inputs)
     if assembly.moment is not None:
         forces = np.column_stack([forces, np.zeros(len(forces)), moment])
     return ModelInput(forces, held, None, table_law())
 
 
-def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
-    """Generalised forces (rows, 2 or 3) on the free heave coordinates that the input causes; motors apply held
-    forces.
-    """
+def _generalised_forces(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
+    """Generalised forces (rows, 2 or 3) in N on the free heave coordinates that the input causes; motors apply forces
+    that are held over a step."""
     if assembly.mode == "road":
         tyres = assembly.vehicle.tyres
         pushes = [tyre.stiffness * inputs[:, i] + tyre.damping * inputs[:, 2 + i] for i, tyre in enumerate(tyres)]
@@ -151,15 +152,14 @@ def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
     forces = np.zeros((len(inputs), 2)) if held else -inputs[:, :2]
     if not assembly.guided:
         return forces
-    guidance = _guidance(assembly, inputs)
+    guidance = _guidance_forces(assembly, inputs)
     guidance[:, :2] += forces
     return guidance
 
 
-def _guidance(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
-    """Generalised forces (rows, 2 or 3) on the free heave coordinates that result from the prescribed coordinates
-    through the struts.
-    """
+def _guidance_forces(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
+    """Generalised forces (rows, 2 or 3) in N on the free heave coordinates that the prescribed coordinates cause
+    through the struts."""
     count = len(assembly.guided)
     path, rate = (inputs[:, 2 + i * count : 2 + (i + 1) * count] for i in range(2))
     z, pitch, dz, turn = (
@@ -176,13 +176,16 @@ def _guidance(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
     return forces[:, : 4 - count]
 
 
-def _compiled(
-    assembly: Assembly, settings: Settings, drive: ModelInput, guided: Collection[int] = ()
+def _compiled_model(
+    assembly: Assembly, settings: Settings, model_input: ModelInput, guided: Collection[int] = ()
 ) -> mujoco.MjModel:
-    """The compiled model. Its numeric data hold the input table, after the numbers that ``mujoco_callback`` reads."""
+    """The compiled MuJoCo model. Its numeric data hold the input table, after the numbers that ``mujoco_callback``
+    reads."""
     spec = specification(assembly.vehicle, settings, guided)
-    gear = 0.0 if drive.arms is not None else -1.0
-    for axle in assembly.vehicle.axles if drive.controls is not None else ():  # motors for forces held over a step
+    gear = 0.0 if model_input.arms is not None else -1.0
+    for axle in (
+        assembly.vehicle.axles if model_input.controls is not None else ()
+    ):  # motors for forces held over a step
         spec.add_actuator(
             name=f"{axle.name} force",
             target=f"{axle.wheel} z",
@@ -190,15 +193,15 @@ def _compiled(
             gear=[gear, 0, 0, 0, 0, 0],
             gainprm=[1.0 if gear else 0.0, *[0] * 9],
         )
-    if drive.law is None:
+    if model_input.law is None:
         return spec.compile()
-    arms = (0.0, 0.0) if drive.arms is None else drive.arms
-    table = np.empty((0, 2)) if drive.table is None else drive.table
-    motors = len(spec.actuators) - 2 if drive.controls is not None else -1
+    arms = (0.0, 0.0) if model_input.arms is None else model_input.arms
+    table = np.empty((0, 2)) if model_input.table is None else model_input.table
+    motors = len(spec.actuators) - 2 if model_input.controls is not None else -1
     slack = [spring for spring in assembly.vehicle.pitch_springs if spring.dead_band]
     springs = [value for spring in slack for value in (spring.stiffness, spring.damping, spring.dead_band)]
     header = [2.0 / settings.step, table.shape[1], len(table), motors, *arms, len(springs), *springs]
-    content = np.concatenate((header, drive.tyres, table.ravel()))
+    content = np.concatenate((header, model_input.tyres, table.ravel()))
     spec.add_numeric(name="input", size=len(content), data=[0.0])
     model = spec.compile()
     model.numeric_data[:] = content
@@ -206,26 +209,26 @@ def _compiled(
 
 
 class MujocoModel:
-    """Model of one assembly in MuJoCo; there is a second model where the pitch is prescribed."""
+    """Model of one pitch-plane assembly in MuJoCo; a second model computes the moment of a prescribed pitch."""
 
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings
         self.signal: Any = assembly.input
         self.guided = list(assembly.guided)
         self.free = [i for i in range(4) if i not in self.guided]
-        self.drive = _drive(assembly, settings)
+        self.drive = _model_input(assembly, settings)
         for table in (self.drive.table, self.drive.controls):  # the discrete integrator skips a force that is no number
             if table is not None and not np.isfinite(table).all():
                 raise RunFailed("mujoco", "the input holds an infinite value or one that is not a number")
-        self.model = _compiled(assembly, settings, self.drive, self.guided)
+        self.model = _compiled_model(assembly, settings, self.drive, self.guided)
         self.data = mujoco.MjData(self.model)
         if self.drive.law is not None:
-            from models.engines.mujoco_layout import check
+            from models.engines.mujoco_layout import check_offsets
 
-            check(self.model, self.data)
+            check_offsets(self.model, self.data)
 
     def run(self) -> Trajectory:
-        """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
+        """Trajectory over the whole duration; raises RunFailed unless it is complete and finite."""
         n = self.settings.steps
         states, free = np.empty((n + 1, 8)), [*self.free, *(4 + i for i in self.free)]
         with installed(self.drive.law):
@@ -235,16 +238,15 @@ class MujocoModel:
             inputs = self.signal.sample(0.0, self.settings.step, n + 1)
             states[:, [*self.guided, *(4 + i for i in self.guided)]] = inputs[:, 2 : 2 + 2 * len(self.guided)]
         guard("mujoco", times, states, self.settings.duration)
-        landings_followed("mujoco", self.assembly, self.settings, times, states)
+        check_landings("mujoco", self.assembly, self.settings, times, states)
         enforced = self._enforced(times, states) if self.guided else None
         guard("mujoco", times, states, self.settings.duration, enforced=enforced)
         calls = n * FORCE_CALLS.get(self.settings.integrator, 1)
         return Trajectory(times, states, enforced, {"steps": n, "force calls": calls})
 
     def controls(self) -> np.ndarray:
-        """Controls (steps, nu) of all actuators, the wheels' motors last; (steps, 0) where there are no motors, as
-        springs need no controls.
-        """
+        """Controls (steps, nu) of all nu actuators, the wheels' motors last; (steps, 0) without motors, as springs need
+        no controls."""
         if self.drive.controls is None:
             return np.zeros((self.settings.steps, 0))
         padded = np.zeros((self.settings.steps, self.model.nu))
@@ -261,7 +263,8 @@ class MujocoModel:
         return out
 
     def _free_acceleration(self, time: float, q: np.ndarray, v: np.ndarray, step: int) -> np.ndarray:
-        """Accelerations of the coordinates that are not prescribed, at a time within a given step of the run."""
+        """Accelerations of the coordinates that are not prescribed, at a time (s) and state within a given step of the
+        run."""
         self.data.time, self.data.qpos[:], self.data.qvel[:] = time, q[self.free], v[self.free]
         if self.drive.controls is not None:
             self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[min(step, len(self.drive.controls) - 1)]
@@ -269,12 +272,12 @@ class MujocoModel:
         return self.data.qacc
 
     def _enforced(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Force and moment (n, guided) that enforce the prescribed motion, by inverse dynamics of a model with all
-        joints.
+        """Force (N) and moment (N m) (n, guided) that enforce the prescribed motion, by inverse dynamics of a model
+        with all joints.
 
         Wheel forces and motors act on the wheels' heave only, so the rows of the chassis need neither.
         """
-        full = _compiled(self.assembly, self.settings, ModelInput())
+        full = _compiled_model(self.assembly, self.settings, ModelInput())
         data, enforced = mujoco.MjData(full), np.empty((len(times), len(self.guided)))
         accelerations = np.empty((len(times), 4))
         with installed(self.drive.law):
@@ -290,12 +293,12 @@ class MujocoModel:
         return enforced
 
     def plan(self) -> dict[str, int]:
-        """Counts of what was built: degrees of freedom, native items, callbacks."""
+        """Counts of built items: degrees of freedom, native items, callbacks."""
         native = self.model.nu + self.model.ntendon + int((self.model.jnt_stiffness != 0).sum())
         law = int(self.drive.law is not None)
         return {"degrees of freedom": self.model.nv, "native items": native, "callbacks": law}
 
 
 def build(assembly: Assembly, settings: Settings) -> MujocoModel:
-    """The MuJoCo model of an assembly."""
+    """The MuJoCo model of a pitch-plane assembly."""
     return MujocoModel(assembly, settings)

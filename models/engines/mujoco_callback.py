@@ -22,10 +22,12 @@ from models.machine.compiled import callback, named_closure
 from models.machine.stack import array_at, double_at
 
 HEADER, PER_ROAD = 7, 4
-"""Numbers before those of the springs; of a row of the road (two heights, two rates), and of two tyres."""
+"""Numbers of the table's header before those of the pitch springs; numbers per row of the road: two heights, two rates
+(and of two tyres: stiffness and damping each)."""
 CALLBACK = types.void(types.voidptr, types.voidptr)
 """Signature of MuJoCo's callbacks: bare pointers to model and data."""
 FIELDS = ("numeric_data", "qfrc_passive", "time", "qpos", "qvel")
+"""Fields of MuJoCo's model and data that the callbacks read or write."""
 
 
 forces: Any = None
@@ -35,7 +37,7 @@ would know the machine code again."""
 
 @cache
 def kernel_law(kernel: Any) -> Any:
-    """Callback that passes MuJoCo's data to a compiled kernel of (numbers, time, positions, rates, forces).
+    """MuJoCo callback that passes MuJoCo's data to a compiled kernel of (numbers, time, positions, rates, forces).
 
     All but the time (s) are pointers to doubles, the numbers those of the model. It is kept on disk if the kernel is.
     """
@@ -58,7 +60,7 @@ def kernel_law(kernel: Any) -> Any:
 
 @register_jitable
 def _springs(header, force, pitch, rate):
-    """Add the moments of those pitch springs whose dead band the pitch exceeds."""
+    """Add the moments (N m) of the pitch springs whose dead band the pitch exceeds."""
     for i in range(HEADER, HEADER + int(header[6]), 3):
         beyond = abs(pitch[3]) - header[i + 2]
         if beyond >= 0.0:
@@ -67,9 +69,8 @@ def _springs(header, force, pitch, rate):
 
 @cache
 def table_law() -> Any:
-    """Callback that adds the table's row at the time of the stage to the first passive forces, and the springs'
-    moments.
-    """
+    """MuJoCo callback that adds the table's row at the stage's time to the first passive forces, and the moments of
+    pitch springs with a dead band."""
     numeric, passive, time, position, velocity = offsets(*FIELDS)
 
     @cfunc(CALLBACK, cache=True)
@@ -87,7 +88,7 @@ def table_law() -> Any:
 
 @cache
 def pushing_law() -> Any:
-    """Callback for tyres that only push, and for springs with a dead band.
+    """MuJoCo callback for tyres that only push, and for pitch springs with a dead band.
 
     The road under the tyres is the table's or, where that has one row, of this height for ever.
     """
@@ -111,8 +112,8 @@ def pushing_law() -> Any:
 
 @cache
 def body_fixed_law() -> Any:
-    """Callback for wheel forces along the chassis' vertical axis, read from the table or, if they are held, from the
-    controls.
+    """MuJoCo callback for wheel forces along the chassis' vertical axis, read from the table or, if held over a step,
+    from the controls.
 
     A column of the table beyond those of the forces is a moment on the chassis.
     """

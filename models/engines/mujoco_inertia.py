@@ -1,4 +1,4 @@
-"""Inertia tensors as MuJoCo's files may hold them: its compiler refuses those that no distribution of mass has.
+"""Inertia tensors that MuJoCo's files may hold: its compiler refuses tensors that no mass distribution has.
 
 Principal moments A <= B <= C of any mass keep A + B >= C. Published vehicles break that, as do rotors that have an
 inertia about their axle alone. What is refused is replaced by what moves alike, where there is such a tensor; otherwise
@@ -13,33 +13,33 @@ import numpy as np
 from models.vehicles.spatial import Body, SpatialVehicle, Vector
 
 MARGIN = 1e-13
-"""Share by which A + B is kept above C, so that rounding does not undo it."""
-TOLD_SHARE = 1e-9
-"""Share of a moment from which on lowering it is told."""
+"""Relative margin of the triangle inequality A + B >= C of principal moments of inertia, so that rounding does not
+break it."""
+REPORTED_SHARE = 1e-9
+"""Relative reduction of a principal moment of inertia above which it is reported."""
 
 
 def realisable(vehicle: SpatialVehicle) -> tuple[SpatialVehicle, list[str]]:
-    """The vehicle with inertia tensors that MuJoCo's compiler accepts, and sentences on the inertia that is lost
-    thereby.
-    """
+    """The vehicle with inertia tensors that MuJoCo's compiler accepts, and sentences on the inertia that is lost by
+    that."""
     tensors = {body.name: np.array(body.inertia, float) for body in vehicle.bodies}
     for body in vehicle.bodies:
-        if not _fits(tensors[body.name]):
-            _move_alike(vehicle, body, tensors)
-    lowered = [_lower(name, tensors) for name, tensor in tensors.items() if not _fits(tensor)]
+        if not _is_physical(tensors[body.name]):
+            _replace_by_equivalent(vehicle, body, tensors)
+    lowered = [_lower_largest_moment(name, tensors) for name, tensor in tensors.items() if not _is_physical(tensor)]
     bodies = tuple(replace(body, inertia=_rows(tensors[body.name])) for body in vehicle.bodies)
     return replace(vehicle, bodies=bodies), [sentence for sentence in lowered if sentence]
 
 
-def _fits(tensor: np.ndarray) -> bool:
-    """Whether a distribution of mass can have this inertia tensor (3, 3); zero inertia counts, too."""
+def _is_physical(tensor: np.ndarray) -> bool:
+    """Whether a mass distribution can have this inertia tensor (3, 3); zero inertia counts, too."""
     least, middle, largest = np.linalg.eigvalsh(tensor)
     return bool(least >= 0.0 and least + middle >= (1.0 + MARGIN) * largest)
 
 
-def _move_alike(vehicle: SpatialVehicle, body: Body, tensors: dict[str, np.ndarray]) -> None:
-    """Replace a tensor by one that moves in the same way, possible for bodies that turn about one axis at most, and for
-    rotors.
+def _replace_by_equivalent(vehicle: SpatialVehicle, body: Body, tensors: dict[str, np.ndarray]) -> None:
+    """Replace an inertia tensor by one with the same motion, which is possible for bodies that turn about one axis at
+    most, and for rotors.
 
     A rotor is as heavy about every axis across its axle: what is added there is constant in the axes of its carrier,
     and is taken from the heaviest body that always lies parallel to these.
@@ -52,7 +52,7 @@ def _move_alike(vehicle: SpatialVehicle, body: Body, tensors: dict[str, np.ndarr
     elif len(_turning_freedoms(body)) == 1 and np.count_nonzero(tensor) == 1 and body.parent is not None:
         across = (0.5 + MARGIN) * (tensor.max() * np.eye(3) - tensor)
         tensors[body.name] = tensor + across
-        tensors[max(_parallel(vehicle, body.parent), key=lambda name: float(np.trace(tensors[name])))] -= across
+        tensors[max(_parallel_bodies(vehicle, body.parent), key=lambda name: float(np.trace(tensors[name])))] -= across
 
 
 def _turning_freedoms(body: Body) -> list[str]:
@@ -60,26 +60,25 @@ def _turning_freedoms(body: Body) -> list[str]:
     return [freedom for freedom in body.freedoms if freedom.startswith("r")]
 
 
-def _parallel(vehicle: SpatialVehicle, name: str) -> Sequence[str]:
+def _parallel_bodies(vehicle: SpatialVehicle, name: str) -> Sequence[str]:
     """Names of the bodies whose axes always remain parallel to those of ``name``."""
 
-    def leader(name: str) -> str:
+    def turning_ancestor(name: str) -> str:
         body = vehicle.body(name)
-        return name if _turning_freedoms(body) or body.parent is None else leader(body.parent)
+        return name if _turning_freedoms(body) or body.parent is None else turning_ancestor(body.parent)
 
-    return [body.name for body in vehicle.bodies if leader(body.name) == leader(name)]
+    return [body.name for body in vehicle.bodies if turning_ancestor(body.name) == turning_ancestor(name)]
 
 
-def _lower(name: str, tensors: dict[str, np.ndarray]) -> str:
-    """Lower the largest principal moment of a body to one that a distribution of mass can have. Returns a sentence that
-    says so, empty where the change is only rounding.
-    """
+def _lower_largest_moment(name: str, tensors: dict[str, np.ndarray]) -> str:
+    """Lower the largest principal moment of inertia of a body to one that a mass distribution can have. Returns a
+    sentence on the change, empty where it is only rounding."""
     moments, axes = np.linalg.eigh(tensors[name])
     largest, axis = float(moments[2]), axes[:, 2]
     moments = np.maximum(moments, 0.0)
     moments[2] = (moments[0] + moments[1]) / (1.0 + 2.0 * MARGIN)
     tensors[name] = axes * moments @ axes.T
-    if largest - moments[2] < TOLD_SHARE * largest:
+    if largest - moments[2] < REPORTED_SHARE * largest:
         return ""
     where = ", ".join(f"{part:.3g}" for part in axis)
     return (
@@ -89,6 +88,6 @@ def _lower(name: str, tensors: dict[str, np.ndarray]) -> str:
 
 
 def _rows(tensor: np.ndarray) -> tuple[Vector, Vector, Vector]:
-    """A tensor (3, 3) as rows of plain numbers."""
+    """The rows of a tensor (3, 3) as tuples."""
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = tensor.tolist()
     return (xx, xy, xz), (yx, yy, yz), (zx, zy, zz)

@@ -24,9 +24,11 @@ _SCALARS = {
     "uint64_t": ctypes.c_uint64,
     "uintptr_t": ctypes.c_size_t,
 }
+"""C type of each scalar type that MuJoCo's description names."""
 
 
 def _ctype(node: ast_nodes.ValueType | ast_nodes.PointerType | ast_nodes.ArrayType) -> type:
+    """C type (``ctypes``) of a field in MuJoCo's description of its structures."""
     if isinstance(node, ast_nodes.PointerType):
         return ctypes.c_void_p
     if isinstance(node, ast_nodes.ArrayType):
@@ -44,6 +46,7 @@ def _ctype(node: ast_nodes.ValueType | ast_nodes.PointerType | ast_nodes.ArrayTy
 
 
 def _structure(fields: tuple) -> type:
+    """``ctypes.Structure`` with these fields of MuJoCo's description."""
     pairs = [(field.name, _ctype(field.type)) for field in fields]
     return type("Layout", (ctypes.Structure,), {"_fields_": pairs})
 
@@ -60,12 +63,12 @@ def offset(structure: str, field: str) -> int:
 
 
 def offsets(*fields: str) -> list[int]:
-    """Offsets (bytes) of the model's ``numeric_data`` and of fields of the data, by their names."""
+    """Offsets (bytes) of fields by their names: ``numeric_data`` within MuJoCo's model, all others within its data."""
     return [offset("mjModel" if field == "numeric_data" else "mjData", field) for field in fields]
 
 
-def check(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Compare offsets with the addresses of MuJoCo's arrays in Python; raises RuntimeError on a mismatch."""
+def check_offsets(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Compare computed offsets with the addresses of MuJoCo's arrays in Python; raises RuntimeError on a mismatch."""
     arrays = (("mjModel", model, ("numeric_data", "qpos0")), ("mjData", data, ("qfrc_passive", "qvel", "qpos")))
     for structure, owner, fields in arrays:
         for field in fields:

@@ -1,4 +1,4 @@
-"""Runs in MuJoCo's own loop: one with a guard on the way, or many at once in several threads."""
+"""Runs in MuJoCo's own loop: a single run with checks on the way, or many runs at once in several threads."""
 
 from collections.abc import Iterator
 
@@ -7,27 +7,27 @@ import numpy as np
 from mujoco import rollout
 
 from models.core.errors import RunFailed
-from models.core.waiting import marching
+from models.core.waiting import simulation_progress
 from models.engines.mujoco_quiet import without_warnings
 from models.engines.protocol import guard
 
-CHUNK = 4096
-"""Steps between two looks at the guard."""
+STEPS_PER_CHUNK = 4096
+"""Number of steps between two checks of a run."""
 FORCE_CALLS = {"RK4": 4}
-"""Evaluations of the forces in a step of an integrator; 1 in those that are not here."""
+"""Force evaluations per step of an integrator; 1 for integrators that are not listed."""
 GAVE_UP = "the engine gave up, since the motion grew without bound: shorten the step, or soften what is stiff"
-"""Reason of a run after which MuJoCo's time is not that of its last step: it began again at time zero."""
+"""Failure message of a run in which MuJoCo reset itself to time zero."""
 
 
-def warnings(data: mujoco.MjData) -> str:
-    """Text with MuJoCo's own warnings; empty if there are none."""
+def warning_text(data: mujoco.MjData) -> str:
+    """Text that lists MuJoCo's own warnings; empty if there are none."""
     names = [mujoco.mjtWarning(i).name for i in range(len(data.warning)) if data.warning[i].number]
     return f"; MuJoCo warned {', '.join(names)}" if names else ""
 
 
 def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, controls: np.ndarray) -> np.ndarray:
-    """Positions and rates (steps + 1, 2 n) from ``start`` (2 n,), with controls (steps, nu) held over each step, or
-    without controls (steps, 0).
+    """Positions and rates (steps + 1, 2 n) from the state ``start`` (2 n,), with controls (steps, nu) held over each
+    step, or without controls (steps, 0).
 
     In chunks, so that a run that has failed is not carried to its end. RunFailed where MuJoCo stops, starts again at
     time zero or warns; the guard names a worse reason if there is one.
@@ -37,26 +37,26 @@ def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, control
     path[0, 0], path[0, 1:] = 0.0, start
     for warning in data.warning:
         warning.number = 0
-    with without_warnings(), marching(lambda: data.time / times[-1]):
+    with without_warnings(), simulation_progress(lambda: data.time / times[-1]):
         for first, last in _chunks(steps):
             rows, held = path[first + 1 : last + 1], controls[None, first:last] if controls.size else None
             rollout.rollout(model, data, path[None, first], held, nstep=len(rows), state=rows[None])
             late = np.abs(rows[:, 0] - times[first + 1 : last + 1]) > 1e-6 * times[-1]
-            if late.any() or warnings(data):
+            if late.any() or warning_text(data):
                 end = first + (int(np.argmax(late)) if late.any() else len(rows))
                 guard("mujoco", times[: end + 1], path[: end + 1, 1:], times[end])
-                raise RunFailed("mujoco", f"{GAVE_UP}{warnings(data)}", times[end], path[end, 1:])
+                raise RunFailed("mujoco", f"{GAVE_UP}{warning_text(data)}", times[end], path[end, 1:])
     return path[:, 1:]
 
 
 def _chunks(steps: int) -> Iterator[tuple[int, int]]:
     """First and last row of each chunk of a run."""
-    for first in range(0, steps, CHUNK):
-        yield first, min(first + CHUNK, steps)
+    for first in range(0, steps, STEPS_PER_CHUNK):
+        yield first, min(first + STEPS_PER_CHUNK, steps)
 
 
 class Marcher:
-    """Runs of one MuJoCo model, in one thread or several."""
+    """Runner of one MuJoCo model, in one thread or several."""
 
     def __init__(self, compiled_model: mujoco.MjModel, threads: int = 1) -> None:
         self.model, self._data = compiled_model, [mujoco.MjData(compiled_model) for _ in range(threads)]
@@ -64,7 +64,7 @@ class Marcher:
     def run(self, states: np.ndarray, steps: int) -> np.ndarray:
         """States (n, steps, 2 m) of n runs that start at ``states`` (n, 2 m); RunFailed unless all are finite."""
         whole = np.concatenate((np.zeros((len(states), 1)), states), axis=1)
-        with marching(lambda: self._data[0].time / (steps * self.model.opt.timestep)):
+        with simulation_progress(lambda: self._data[0].time / (steps * self.model.opt.timestep)):
             path = rollout.rollout(self.model, self._data, whole, nstep=steps)[0][..., : 1 + 2 * self.model.nv]
         late = path[:, -1, 0] < (steps - 0.5) * self.model.opt.timestep
         failed = late | ~np.isfinite(path[:, -1]).all(axis=1)  # MuJoCo starts again at time zero where it gives up

@@ -1,4 +1,4 @@
-"""MuJoCo's own functions called by compiled code: a model's accelerations and steps without a line of Python.
+"""MuJoCo's own functions called by compiled code: a model's accelerations and steps without Python.
 
 Whoever reads the list of a kernel's signatures imports the classes in them, those of other engines' runs included. So
 this file imports MuJoCo only where a model is at hand.
@@ -40,7 +40,7 @@ class Native(NamedTuple):
 
 @_intrinsic
 def _call(typing_context, function, model, data):
-    """Call the function void(mjModel*, mjData*) at an address."""
+    """Call the C function void(mjModel*, mjData*) at an address."""
 
     def generate(context, builder, signature, arguments):
         pointer = ir.IntType(8).as_pointer()
@@ -61,7 +61,7 @@ def _library() -> ctypes.CDLL:
 
 
 def native(model: "mujoco.MjModel", data: "mujoco.MjData") -> Native:
-    """The model and its data for compiled functions; both must outlive the result."""
+    """``Native`` of a MuJoCo model and its data, for compiled functions; both must outlive the result."""
     from models.engines.mujoco_layout import offset
 
     time = ctypes.c_double.from_address(data._address + offset("mjData", "time"))
@@ -82,7 +82,7 @@ def native(model: "mujoco.MjModel", data: "mujoco.MjData") -> Native:
 
 @lean
 def accelerate(native, q, v, out):
-    """Fill ``out`` (n,) with the accelerations at positions and rates (n,)."""
+    """Fill ``out`` (n,) with the accelerations at positions q and rates v (n,)."""
     for i in range(q.size):
         native.place[i], native.rate[i] = q[i], v[i]
     _call(native.forward, native.model, native.data)
@@ -92,9 +92,8 @@ def accelerate(native, q, v, out):
 
 @lean
 def march(native, q, v):
-    """Advance positions and rates (n,), in place, by one step of the model; False where MuJoCo resets itself to time
-    zero.
-    """
+    """Advance positions q and rates v (n,), in place, by one step of the MuJoCo model; returns False where MuJoCo
+    resets itself to time zero."""
     for i in range(q.size):
         native.place[i], native.rate[i] = q[i], v[i]
     native.time[0] = 1.0

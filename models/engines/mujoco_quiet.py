@@ -1,4 +1,4 @@
-"""MuJoCo's state that is global to a process: its callbacks and its warnings."""
+"""Control of the MuJoCo state that is global to a process: its callbacks and its warnings."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,28 +11,29 @@ from models.core.errors import RunFailed
 
 @contextmanager
 def without_warnings() -> Iterator[None]:
-    """Keep MuJoCo from printing warnings and writing a log into the user's folder: the guard reports them."""
-    before = mujoco.get_mju_user_warning()
+    """Context in which MuJoCo prints no warnings and writes no log into the user's folder; every run checks for
+    warnings itself."""
+    previous_handler = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: None)
     try:
         yield
     finally:
-        mujoco.set_mju_user_warning(before)
+        mujoco.set_mju_user_warning(previous_handler)
 
 
 @contextmanager
-def installed(law: Any) -> Iterator[None]:
-    """Install a compiled callback, or none, within the block only: MuJoCo's callbacks are global to the process.
+def installed(callback: Any) -> Iterator[None]:
+    """Context in which a compiled MuJoCo callback, or none, is installed: MuJoCo's callbacks are global to the process.
 
     Meanwhile MuJoCo is quiet: what it would warn of is raised by whoever runs it. RunFailed where another one is.
     """
     if mujoco.get_mjcb_control() is not None or mujoco.get_mjcb_passive() is not None:
         raise RunFailed("mujoco", "another callback is installed in this process: its forces would act here, too")
     with without_warnings():
-        if law is None:
+        if callback is None:
             yield
             return
-        mujoco.set_mjcb_passive(law.ctypes)
+        mujoco.set_mjcb_passive(callback.ctypes)
         try:
             yield
         finally:

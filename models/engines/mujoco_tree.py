@@ -1,4 +1,4 @@
-"""Bodies and joints of a vehicle in space in MuJoCo, their masses, and where MuJoCo keeps them.
+"""Bodies and joints of a spatial vehicle in MuJoCo, their masses, and their indices there.
 
 World axes are those of ride, z up. A body has one joint per freedom, in their order. MuJoCo counts bodies and joints
 from the root of a tree to its leaves: a rider may come earlier there than in the vehicle. Masses and inertias are
@@ -14,12 +14,14 @@ import numpy as np
 from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle
 
 AXES = {freedom: np.eye(3)[i % 3].tolist() for i, freedom in enumerate(FREEDOMS)}
+"""Unit axis of each freedom, along or about which the freedom moves a body."""
 NO_CARRIERS: Mapping[str, str] = {}
-"""Carriers, where no body is one with another: the body that rides on each, by their names."""
+"""Merged bodies (name of the carrier to name of the carried body) of a vehicle in which none are merged."""
 
 
 def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = NO_CARRIERS) -> mujoco.MjSpec:
-    """Specification with the vehicle's bodies and joints; masses and inertias are 1 until ``set_masses`` sets them.
+    """MuJoCo specification with the vehicle's bodies and joints; masses and inertias are 1 until ``set_masses`` sets
+    them.
 
     Their names are numbers: a user's body may be called "world". carriers : bodies that are one with the only one that
     rides on them, whose frame and name they get.
@@ -40,7 +42,7 @@ def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = 
             pos=np.subtract(body.position, (0.0, 0.0, 0.0) if parent is None else vehicle.body(parent).position),
             ipos=[0, 0, 0],
             mass=1.0,
-            iquat=principal(body)[1],
+            iquat=principal_inertias(body)[1],
             inertia=[1.0, 1.0, 1.0],
             explicitinertial=True,
         )
@@ -55,16 +57,15 @@ def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = 
 
 
 def _merged(carriers: Mapping[str, str], name: str) -> str:
-    """The body with which a body is merged in MuJoCo, itself if with none."""
+    """Name of the body with which a body is merged in MuJoCo; the body itself if it is not merged."""
     while name in carriers:
         name = carriers[name]
     return name
 
 
-def principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Principal inertias (3,) and the quaternion of their axes, which is the identity if there are no products of
-    inertia.
-    """
+def principal_inertias(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Principal moments of inertia (3,) of a body and the quaternion (4,) of their axes, which is the identity if there
+    are no products of inertia."""
     tensor, quaternion = np.array(body.inertia, float), np.array([1.0, 0.0, 0.0, 0.0])
     if np.array_equal(tensor, np.diag(tensor.diagonal())):
         return tensor.diagonal(), quaternion
@@ -75,8 +76,8 @@ def principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
 
 
 class MujocoIndices:
-    """Indices of a vehicle's bodies and coordinates in MuJoCo: ids of bodies by name, columns (n,) in the vehicle's
-    order.
+    """Indices of a vehicle's bodies and coordinates in MuJoCo: ids of bodies by name, columns (n,) of the coordinates
+    in the vehicle's order.
 
     carriers : bodies that are one there with the only one that rides on them, by its name.
     """
@@ -93,19 +94,19 @@ class MujocoIndices:
 
 
 def keep_small_turns(model: mujoco.MjModel) -> None:
-    """Have MuJoCo turn and shift the frames of inertias and sites that lie almost as the body's do; its compiler takes
-    them for the same, which moves a link on angles of ten digits by 1e-9."""
+    """Make MuJoCo apply rotations and offsets of inertia and site frames that nearly coincide with the body's frame;
+    its compiler ignores them, which moves a link on angles of ten digits by 1e-9."""
     for part, place in (("body", "ipos"), ("site", "pos")):
         same = getattr(model, f"{part}_sameframe")
         turn, shift = getattr(model, f"{part}_{'i' * (part == 'body')}quat"), getattr(model, f"{part}_{place}")
         same[turn[:, 1:].any(axis=1) | (shift.any(axis=1) & (same != mujoco.mjtSameFrame.mjSAMEFRAME_BODYROT))] = 0
 
 
-def set_masses(model: mujoco.MjModel, numbers: MujocoIndices, bodies: Iterable[Body]) -> None:
-    """Set masses and principal inertias in a model; bodies that are merged get the sum."""
+def set_masses(model: mujoco.MjModel, indices: MujocoIndices, bodies: Iterable[Body]) -> None:
+    """Set masses and principal inertias in a MuJoCo model; merged bodies get the sum."""
     model.body_mass[1:] = model.body_inertia[1:] = 0.0
     for body in bodies:
-        number = numbers.bodies[body.name]
+        number = indices.bodies[body.name]
         model.body_mass[number] += body.mass
-        model.body_inertia[number] += principal(body)[0]
+        model.body_inertia[number] += principal_inertias(body)[0]
     mujoco.mj_setConst(model, mujoco.MjData(model))

@@ -1,4 +1,4 @@
-"""Springs, dampers, mounts and bars of a cut vehicle as Exudyn's own: connectors of coordinates and along an axis.
+"""Springs, dampers, mounts and bars as Exudyn's native elements: connectors between coordinates, and along an axis.
 
 A travel that is a sum of coordinates is a spring-damper between two of them, or a matrix where it is one of more. A
 travel along an axis that is fixed in a turning body has no connector that is exact: Exudyn takes axes as they lie in
@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from models.engines.exudyn_system import items, lists
-from models.engines.exudyn_tree import JOINTS, Build
+from models.engines.exudyn_tree import JOINT_TYPES, TreeBuild
 from models.engines.native_parts import (
-    SLIDES,
+    FULL_FRICTION_SPEED,
     AxialTravel,
     BodyLoad,
     Connection,
@@ -33,26 +33,29 @@ from models.vehicles.cut_vehicle import Element
 from models.vehicles.free_vehicle import anchor, joints
 
 Axial = tuple[Element, AxialTravel]
-MASS = 1e-15
-"""kg and kg m^2 of a link of a second tree: Exudyn divides by them, and the vehicle must not feel them."""
-LAW, ROTORS, NEXT = "native law: ", "rotors: ", "; "
-"""What names of objects begin with, and what stands between the names of several elements in it."""
+"""An element with its travel along an axis."""
+LINK_MASS = 1e-15
+"""Mass (kg) and inertia (kg m^2) of a link of an additional tree: Exudyn divides by them, and the vehicle must not feel
+them."""
+LAW_PREFIX, ROTOR_PREFIX, NAME_SEPARATOR = "native law: ", "rotors: ", "; "
+"""Beginnings of the names of objects (springs, rotors), and the separator of several element names in one object's
+name."""
 
 
-def add_parts(build: Build, node: Any, parts: Sequence[NativePart]) -> None:
-    """Add all parts to a system with one tree, whose coordinates are in ``node``."""
-    coordinates, trees, axial = Coordinates(build, node), _Trees(build, node), list[Axial]()
+def add_parts(build: TreeBuild, node: Any, parts: Sequence[NativePart]) -> None:
+    """Add all native parts to an Exudyn system with one tree, whose coordinates are in ``node``."""
+    coordinates, trees, axial = CoordinateConnectors(build, node), _Trees(build, node), list[Axial]()
     for part in parts:
         if isinstance(part.travel, CoordinateTravel):
             coordinates.add(part.element, part.travel)
         else:
             axial.append((part.element, part.travel))
-    for group in _at_one_place(axial):
+    for group in _groups_at_one_place(axial):
         trees.add(group)
 
 
-def add_rotors(build: Build, node: Any, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
-    """Add inertias that move with sums of coordinates, as one mass matrix in addition to the tree's."""
+def add_rotors(build: TreeBuild, node: Any, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
+    """Add inertias (kg, kg m^2) that move with sums of coordinates, as one mass matrix in addition to the tree's."""
     size = build.size(node)
     mass = np.zeros((size, size))
     for _, travel, inertia in rotors:
@@ -60,7 +63,7 @@ def add_rotors(build: Build, node: Any, rotors: Sequence[tuple[str, CoordinateTr
         row[list(travel.coordinates)] = travel.factors
         mass += inertia * np.outer(row, row)
     if rotors:
-        names = ROTORS + NEXT.join(_plain(name) for name, _, _ in rotors)
+        names = ROTOR_PREFIX + NAME_SEPARATOR.join(_without_separator(name) for name, _, _ in rotors)
         nothing = np.zeros((size, size))
         matrices = {"massMatrix": mass, "stiffnessMatrix": nothing, "dampingMatrix": nothing}
         build.mbs.AddObject(
@@ -68,8 +71,8 @@ def add_rotors(build: Build, node: Any, rotors: Sequence[tuple[str, CoordinateTr
         )
 
 
-def add_ground_spring(build: Build, spring: GroundSpring) -> None:
-    """Add a spring-damper along the axes of space, and the spring's load."""
+def add_ground_spring(build: TreeBuild, spring: GroundSpring) -> None:
+    """Add a spring-damper between the ground and a body's point along the axes of space, and the load at this point."""
     foot, tip = build.marker(None, spring.anchor), build.marker(spring.body, spring.point)
     if any(spring.stiffness + spring.damping):
         build.spring(foot, tip, stiffness=spring.stiffness, damping=spring.damping)
@@ -77,10 +80,9 @@ def add_ground_spring(build: Build, spring: GroundSpring) -> None:
         build.mbs.AddLoad(items.LoadForceVector(markerNumber=tip, loadVector=spring.load))
 
 
-def add_line_spring(build: Build, spring: LineSpring) -> None:
-    """Add a spring-damper along the line between two points. Exudyn needs a length above 0; a constant force corrects
-    for it.
-    """
+def add_line_spring(build: TreeBuild, spring: LineSpring) -> None:
+    """Add a spring-damper along the line between two points. Exudyn needs a free length above 0; a constant force
+    compensates for it."""
     length = spring.length if spring.length > 0.0 else 1.0
     build.mbs.AddObject(
         items.SpringDamper(
@@ -93,7 +95,7 @@ def add_line_spring(build: Build, spring: LineSpring) -> None:
     )
 
 
-def add_body_load(build: Build, load: BodyLoad) -> None:
+def add_body_load(build: TreeBuild, load: BodyLoad) -> None:
     """Add a force and a moment that turn with a body."""
     marker, axes = build.marker(load.body, load.point, True), {"bodyFixed": True}
     force, moment = (build.in_body_axes(load.body, vector) for vector in (load.force, load.moment))
@@ -103,10 +105,9 @@ def add_body_load(build: Build, load: BodyLoad) -> None:
         build.mbs.AddLoad(items.LoadTorqueVector(markerNumber=marker, loadVector=moment, **axes))
 
 
-def add_turning_spring(build: Build, spring: TurningSpring) -> None:
-    """Add a connector for rotations alone between frames of both bodies; it measures the rotation as a vector, not by
-    angles.
-    """
+def add_turning_spring(build: TreeBuild, spring: TurningSpring) -> None:
+    """Add a rotational spring-damper between frames of two bodies; it measures the rotation as a vector, not by
+    angles."""
     ends = zip(spring.bodies, spring.axes, strict=True)
     places = {body: (0.0, 0.0, 0.0) if body is None else build.vehicle.body(body).position for body in spring.bodies}
     turning = np.diag((0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
@@ -120,8 +121,8 @@ def add_turning_spring(build: Build, spring: TurningSpring) -> None:
     )
 
 
-def add_connection(build: Build, connection: Connection) -> None:
-    """Add a spherical joint, or a rigid one between frames of both bodies."""
+def add_connection(build: TreeBuild, connection: Connection) -> None:
+    """Add a spherical joint between points of two bodies, or a rigid joint between frames of both."""
     if connection.axes is None:
         markers = [build.marker(*end) for end in connection.ends]
         build.mbs.AddObject(items.ObjectJointSpherical(markerNumbers=markers))
@@ -132,26 +133,30 @@ def add_connection(build: Build, connection: Connection) -> None:
 
 
 def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:
-    """Those of the elements' names for which an assembled system has an object."""
+    """Names of the given elements for which an assembled Exudyn system has an object."""
     objects = [mbs.GetObject(i)["name"] for i in range(mbs.systemData.NumberOfObjects())]
-    listed = {name for each in objects if each.startswith(LAW) for name in each.removeprefix(LAW).split(NEXT)}
-    return tuple(name for name in elements if _plain(name) in listed)
+    listed = {
+        name
+        for each in objects
+        if each.startswith(LAW_PREFIX)
+        for name in each.removeprefix(LAW_PREFIX).split(NAME_SEPARATOR)
+    }
+    return tuple(name for name in elements if _without_separator(name) in listed)
 
 
-def _name(*elements: Element) -> str:
+def _object_name(*elements: Element) -> str:
     """Name of the Exudyn object that represents these elements."""
-    return LAW + NEXT.join(_plain(element.name) for element in elements)
+    return LAW_PREFIX + NAME_SEPARATOR.join(_without_separator(element.name) for element in elements)
 
 
-def _plain(name: str) -> str:
-    """An element's name without the separator that is put between names."""
-    return name.replace(NEXT, " ")
+def _without_separator(name: str) -> str:
+    """An element's name without the separator that stands between names."""
+    return name.replace(NAME_SEPARATOR, " ")
 
 
-def _at_one_place(parts: Sequence[Axial]) -> list[list[Axial]]:
-    """Groups of parts that one connector can represent: along different ones of x, y and z at the same places. Every
-    other part is a group by itself.
-    """
+def _groups_at_one_place(parts: Sequence[Axial]) -> list[list[Axial]]:
+    """Groups of parts that one connector can represent: along different axes x, y, z at the same points. Every other
+    part is a group by itself."""
     groups = dict[object, list[Axial]]()
     for i, (element, travel) in enumerate(parts):
         places = (travel.frame, travel.body, *travel.foot, *travel.tip)
@@ -162,34 +167,36 @@ def _at_one_place(parts: Sequence[Axial]) -> list[list[Axial]]:
     return list(groups.values())
 
 
-def _gains(element: Element) -> dict[str, float]:
+def _stiffness_and_damping(element: Element) -> dict[str, float]:
+    """Stiffness and damping of an element, as arguments of an Exudyn item."""
     return {"stiffness": element.stiffness, "damping": element.damping}
 
 
-def _sunk(element: Element) -> float:
+def _preload_travel(element: Element) -> float:
     """Travel of a spring at which its force equals its preload."""
     return element.held / element.stiffness if element.stiffness else 0.0
 
 
-def _along_axes(group: Sequence[Axial]) -> dict[str, Any]:
-    """Law of one connector for parts along different axes; a part's axis may point backwards."""
+def _connector_law(group: Sequence[Axial]) -> dict[str, Any]:
+    """Name, stiffness, damping and offset (3,) of one connector for parts along different axes; a part's axis may point
+    backwards."""
     stiffness, damping, offset = np.zeros((3, 3))
     for element, travel in group:
         stiffness += element.stiffness * travel.axis**2
         damping += element.damping * travel.axis**2
-        offset += (travel.design - _sunk(element)) * travel.axis
-    names = _name(*(element for element, _ in group))
+        offset += (travel.design - _preload_travel(element)) * travel.axis
+    names = _object_name(*(element for element, _ in group))
     return {"name": names, "stiffness": stiffness, "damping": damping, "offset": offset}
 
 
-class Coordinates:
-    """Builder of connectors and constraints between coordinates of one node."""
+class CoordinateConnectors:
+    """Builder of connectors and constraints between coordinates of one Exudyn node."""
 
-    def __init__(self, build: Build, node: Any) -> None:
+    def __init__(self, build: TreeBuild, node: Any) -> None:
         self.built, self.node, self.markers = build, node, dict[int, Any]()
 
     def add(self, element: Element, travel: CoordinateTravel) -> None:
-        """Add one connector for an element, or a matrix where more than two coordinates take part."""
+        """Add one connector for an element, or a matrix object where more than two coordinates take part."""
         if len(travel.coordinates) > 2:
             return self._add_matrix(element, travel)
         if not travel.coordinates:
@@ -198,28 +205,31 @@ class Coordinates:
             self._add_loads(element, travel)
         first, *others = [self._marker(i) for i in travel.coordinates]
         factor, *rest = travel.factors
-        other, against = (others[0], -rest[0]) if others else (self._still(), 1.0)
+        other, against = (others[0], -rest[0]) if others else (self._ground_marker(), 1.0)
         self.built.mbs.AddObject(
             items.CoordinateSpringDamperExt(
-                name=_name(element),
+                name=_object_name(element),
                 markerNumbers=[other, first],
                 factor0=against,
                 factor1=factor,
-                offset=-_sunk(element),
-                **_gains(element),
+                offset=-_preload_travel(element),
+                **_stiffness_and_damping(element),
             )
         )
 
-    def rub(self, friction: DryFriction) -> None:
+    def add_friction(self, friction: DryFriction) -> None:
         """Add dry friction of a coordinate against the ground."""
-        markers, law = [self._still(), self._marker(friction.coordinate)], {"frictionProportionalZone": SLIDES}
+        markers, law = (
+            [self._ground_marker(), self._marker(friction.coordinate)],
+            {"frictionProportionalZone": FULL_FRICTION_SPEED},
+        )
         self.built.mbs.AddObject(
             items.CoordinateSpringDamperExt(markerNumbers=markers, dynamicFrictionForce=friction.force, **law)
         )
 
-    def couple(self, coupling: Coupling) -> None:
+    def add_coupling(self, coupling: Coupling) -> None:
         """Add a rigid constraint between coordinates; Exudyn's form is factor1 q1 - q0 - offset = 0."""
-        driver = self._still() if coupling.driver is None else self._marker(coupling.driver)
+        driver = self._ground_marker() if coupling.driver is None else self._marker(coupling.driver)
         markers = [self._marker(coupling.driven), driver]
         self.built.mbs.AddObject(
             items.CoordinateConstraint(markerNumbers=markers, factor1=coupling.ratio, offset=-coupling.offset)
@@ -232,11 +242,12 @@ class Coordinates:
             self.built.mbs.AddLoad(load)
 
     def _add_matrix(self, element: Element, travel: CoordinateTravel) -> None:
+        """Add an element whose travel is a sum of more than two coordinates, as a stiffness and damping matrix."""
         row = np.zeros(self.built.size(self.node))
         row[list(travel.coordinates)] = travel.factors
         self.built.mbs.AddObject(
             items.ObjectGenericODE2(
-                name=_name(element),
+                name=_object_name(element),
                 nodeNumbers=[self.node],
                 massMatrix=np.zeros((row.size, row.size)),
                 stiffnessMatrix=element.stiffness * np.outer(row, row),
@@ -246,26 +257,27 @@ class Coordinates:
         )
 
     def _marker(self, coordinate: int) -> Any:
+        """Marker of a coordinate, made once."""
         if coordinate not in self.markers:
             self.markers[coordinate] = self.built.coordinate(self.node, coordinate)
         return self.markers[coordinate]
 
-    def _still(self) -> Any:
+    def _ground_marker(self) -> Any:
+        """Marker of a coordinate that is fixed to the ground, made once."""
         if -1 not in self.markers:
             self.markers[-1] = self.built.coordinate(self.built.mbs.AddNode(items.NodePointGround()), 0)
         return self.markers[-1]
 
 
 class _Trees:
-    """Additional trees of links, one for each body that carries axes of connectors, and connectors from the ground to
-    them.
-    """
+    """Additional trees of links, one for each body in which axes of connectors are fixed, and connectors from the
+    ground to them."""
 
-    def __init__(self, build: Build, node: Any) -> None:
+    def __init__(self, build: TreeBuild, node: Any) -> None:
         self.built, self.node, self.trees = build, node, dict[str, Any]()
 
     def add(self, group: Sequence[Axial]) -> None:
-        """Add one connector, from the foot's position on the ground to the tip."""
+        """Add one connector for a group of parts, from the foot's position on the ground to the tip."""
         (element, travel), *others = group
         mbs, (link, origin) = self.built.mbs, anchor(self.built.vehicle, travel.body)
         foot = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=self.built.ground, localPosition=travel.foot.tolist()))
@@ -277,27 +289,27 @@ class _Trees:
             )
         )
         if others or np.count_nonzero(travel.axis) == 1:
-            mbs.AddObject(items.CartesianSpringDamper(markerNumbers=[foot, tip], **_along_axes(group)))
+            mbs.AddObject(items.CartesianSpringDamper(markerNumbers=[foot, tip], **_connector_law(group)))
             return
         mbs.AddObject(
             items.LinearSpringDamper(
-                name=_name(element),
+                name=_object_name(element),
                 markerNumbers=[foot, tip],
                 axisMarker0=travel.axis.tolist(),
-                offset=travel.design - _sunk(element),
-                **_gains(element),
+                offset=travel.design - _preload_travel(element),
+                **_stiffness_and_damping(element),
             )
         )
 
     def _tree(self, frame: str) -> Any:
-        """The tree of links that a body carries, attached to the ground where the body is in the design position; made
-        once per body.
-        """
+        """Tree of the links that a body carries, attached to the ground where the body is in the design position; made
+        once per body."""
         if frame not in self.trees:
             self.trees[frame] = self.built.mbs.AddObject(self._new_tree(frame))
         return self.trees[frame]
 
     def _new_tree(self, frame: str) -> Any:
+        """Exudyn item of the tree of links that a body carries."""
         vehicle = self.built.vehicle
         rows, places = joints(vehicle), vehicle.coordinates()
         parents, offsets = rows[:, 1].astype(int), rows[:, 2:].copy()
@@ -309,11 +321,11 @@ class _Trees:
         return items.ObjectKinematicTree(
             nodeNumber=self.node,
             gravity=[0, 0, 0],
-            jointTypes=[JOINTS[freedom] for _, freedom in places],
+            jointTypes=[JOINT_TYPES[freedom] for _, freedom in places],
             linkParents=parents.tolist(),
             jointTransformations=lists.Matrix3DList([np.eye(3)] * count),
             jointOffsets=lists.Vector3DList(list(offsets)),
-            linkInertiasCOM=lists.Matrix3DList([MASS * np.eye(3)] * count),
+            linkInertiasCOM=lists.Matrix3DList([LINK_MASS * np.eye(3)] * count),
             linkCOMs=lists.Vector3DList([np.zeros(3)] * count),
-            linkMasses=[MASS] * count,
+            linkMasses=[LINK_MASS] * count,
         )

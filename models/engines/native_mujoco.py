@@ -1,4 +1,4 @@
-"""Springs, dampers, mounts and bars of a cut vehicle as MuJoCo's own: fixed tendons and site actuators.
+"""Springs, dampers, mounts and bars as MuJoCo's native elements: fixed tendons and site actuators.
 
 A travel that is a sum of coordinates is the length of a fixed tendon with its own spring and damper. A travel along an
 axis that is fixed in a body is that of a site beside a reference site on this body, exact because the body carries the
@@ -30,43 +30,44 @@ from models.engines.native_parts import (
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
 
-ENDLESS = 1e300
-"""N: a force range that cuts nothing off."""
-ROTOR = "rotor "
-"""What the name of a tendon begins with that has inertia alone."""
-LINE = "line "
-"""What the name of a tendon begins with that lies along the line between two points."""
+UNLIMITED_FORCE = 1e300
+"""Force range (N) of an actuator that limits nothing."""
+ROTOR_PREFIX = "rotor "
+"""Beginning of the names of tendons that have inertia alone."""
+LINE_SPRING_PREFIX = "line "
+"""Beginning of the names of tendons along the line between two points."""
 SOLVER_TOLERANCE = 1e-15
-"""Share of its scale up to which MuJoCo's solver lowers what is left of constraints; its default, 1e-8, is seen in
-accelerations of joints with little inertia."""
-BREAK = ": "
-"""Between the number of a tendon or an actuator and its element's name."""
+"""Relative residual of constraints at which MuJoCo's solver stops; its default, 1e-8, is visible in accelerations of
+joints with little inertia."""
+NAME_SEPARATOR = ": "
+"""Separator between the number of a tendon or an actuator and its element's name."""
 
 
-class Affine(NamedTuple):
-    """A force constant + slope L + damping L' of a length L (m) and its rate, limited to a range; N, N/m, N s/m."""
+class AffineForce(NamedTuple):
+    """A force (N) constant + slope L + damping L' of a length L (m) and its rate L', limited to a range; slope in N/m,
+    damping in N s/m."""
 
     constant: float = 0.0
     slope: float = 0.0
     damping: float = 0.0
-    low: float = -ENDLESS
-    high: float = ENDLESS
+    low: float = -UNLIMITED_FORCE
+    high: float = UNLIMITED_FORCE
 
 
 def end_bodies(parts: Sequence[NativePart]) -> set[str]:
-    """Bodies that carry sites of parts, so that MuJoCo must not merge them with their riders."""
+    """Names of bodies that carry sites of the parts, so that MuJoCo must not merge them with the bodies that they
+    carry."""
     axial = [part.travel for part in parts if isinstance(part.travel, AxialTravel)]
     return {name for travel in axial for name in (travel.frame, travel.body)}
 
 
 def add_parts(spec: mujoco.MjSpec, vehicle: SpatialVehicle, parts: Sequence[NativePart]) -> None:
-    """Add tendons, sites and actuators for the parts to a specification of ``mujoco_tree.spec_of``; ``set_laws`` sets
-    their values.
-    """
+    """Add tendons, sites and actuators for native parts to a specification of ``mujoco_tree.spec_of``; ``set_laws``
+    sets their values."""
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
     for i, part in enumerate(parts):
-        travel, name = part.travel, f"{i}{BREAK}{part.element.name}"
+        travel, name = part.travel, f"{i}{NAME_SEPARATOR}{part.element.name}"
         if isinstance(travel, CoordinateTravel):
             tendon = spec.add_tendon(name=name)
             for coordinate, factor in zip(travel.coordinates, travel.factors, strict=True):
@@ -78,32 +79,31 @@ def add_parts(spec: mujoco.MjSpec, vehicle: SpatialVehicle, parts: Sequence[Nati
             of = {"trntype": mujoco.mjtTrn.mjTRN_SITE, "target": f"tip {i}", "refsite": f"foot {i}"}
             of["gear"] = [*travel.axis, 0.0, 0.0, 0.0]
         for k, _ in enumerate(affine_forces(part)):
-            actuator = spec.add_actuator(name=f"{i}.{k}{BREAK}{part.element.name}", **of)
+            actuator = spec.add_actuator(name=f"{i}.{k}{NAME_SEPARATOR}{part.element.name}", **of)
             actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
 
 
 def add_rotors(
     spec: mujoco.MjSpec, vehicle: SpatialVehicle, rotors: Sequence[tuple[str, CoordinateTravel, float]]
 ) -> None:
-    """Add tendons for inertias along sums of coordinates; ``set_rotors`` sets their values."""
+    """Add tendons for inertias along sums of coordinates to a specification; ``set_rotors`` sets their values."""
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
     for i, (name, travel, _) in enumerate(rotors):
-        tendon = spec.add_tendon(name=f"{ROTOR}{i}{BREAK}{name}")
+        tendon = spec.add_tendon(name=f"{ROTOR_PREFIX}{i}{NAME_SEPARATOR}{name}")
         for coordinate, factor in zip(travel.coordinates, travel.factors, strict=True):
             tendon.wrap_joint(joints[coordinate], factor)
 
 
 def set_rotors(model: mujoco.MjModel, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
-    """Write the inertias along sums of coordinates into the compiled model."""
+    """Write the inertias (kg, kg m^2) along sums of coordinates into the compiled MuJoCo model."""
     for i, (name, _, inertia) in enumerate(rotors):
-        model.tendon_armature[model.tendon(f"{ROTOR}{i}{BREAK}{name}").id] = inertia
+        model.tendon_armature[model.tendon(f"{ROTOR_PREFIX}{i}{NAME_SEPARATOR}{name}").id] = inertia
 
 
 def add_ground_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: GroundSpring) -> None:
     """Add an actuator along each axis of space in which a ground spring acts, between sites on the body and on the
-    ground.
-    """
+    ground."""
     number = len(spec.sites)
     tip, foot = f"ground spring {number}", f"ground {number}"
     _add_site(spec, vehicle, tip, spring.body, spring.point)
@@ -116,8 +116,8 @@ def add_ground_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: Grou
 
 
 def add_line_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: LineSpring) -> None:
-    """Add a spatial tendon between two sites; ``set_line_springs`` sets its law."""
-    number, tendon = len(spec.sites), spec.add_tendon(name=f"{LINE}{spring.name}")
+    """Add a spatial tendon between two sites; ``set_line_springs`` sets its stiffness, damping and length."""
+    number, tendon = len(spec.sites), spec.add_tendon(name=f"{LINE_SPRING_PREFIX}{spring.name}")
     for i, end in enumerate(spring.ends):
         site = f"end {number + i}"
         _add_site(spec, vehicle, site, *end)
@@ -145,12 +145,13 @@ def add_constraints(
 
 
 def _allow_constraints(spec: mujoco.MjSpec) -> None:
+    """Switch MuJoCo's constraint solver on, with a tight tolerance."""
     spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     spec.option.tolerance = SOLVER_TOLERANCE
 
 
 def add_connection(spec: mujoco.MjSpec, vehicle: SpatialVehicle, connection: Connection) -> None:
-    """Add a soft equality constraint between two sites: of their positions alone, or of their axes as well."""
+    """Add a soft equality constraint between two sites: of their positions, or of their positions and axes."""
     axes = connection.axes or (np.eye(3), np.eye(3))
     first = len(spec.sites)
     for i, ((body, point), columns) in enumerate(zip(connection.ends, axes, strict=True)):
@@ -168,7 +169,7 @@ def add_connection(spec: mujoco.MjSpec, vehicle: SpatialVehicle, connection: Con
 
 
 def add_body_load(spec: mujoco.MjSpec, vehicle: SpatialVehicle, load: BodyLoad) -> None:
-    """Add an actuator that applies a constant force and moment at a site of a body."""
+    """Add an actuator that applies a constant force and moment at a site of a body and turns with it."""
     site = f"load {len(spec.sites)}"
     _add_site(spec, vehicle, site, load.body, load.point)
     push = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=site)
@@ -178,8 +179,7 @@ def add_body_load(spec: mujoco.MjSpec, vehicle: SpatialVehicle, load: BodyLoad) 
 
 def add_turning_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: TurningSpring) -> None:
     """Add an actuator about each axis of a site on the first body; its length is the rotation vector's component along
-    this axis.
-    """
+    this axis."""
     number = len(spec.sites)
     foot, tip = f"turn {number}", f"turn {number + 1}"
     for name, body, axes in zip((foot, tip), spring.bodies, spring.axes, strict=True):
@@ -192,6 +192,7 @@ def add_turning_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: Tur
 
 
 def _quaternion(axes: np.ndarray) -> np.ndarray:
+    """Quaternion (4,) of a frame whose axes (3, 3) are columns."""
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
     return quaternion
@@ -206,64 +207,66 @@ def _add_site(spec: mujoco.MjSpec, vehicle: SpatialVehicle, name: str, body: str
 
 
 def set_line_springs(model: mujoco.MjModel, springs: Sequence[LineSpring]) -> None:
-    """Write stiffness, damping and free length of the line springs into the compiled model."""
+    """Write stiffness, damping and free length of the line springs into the compiled MuJoCo model."""
     for spring in springs:
-        tendon = model.tendon(f"{LINE}{spring.name}").id
+        tendon = model.tendon(f"{LINE_SPRING_PREFIX}{spring.name}").id
         model.tendon_stiffness[tendon], model.tendon_damping[tendon] = spring.stiffness, spring.damping
         model.tendon_lengthspring[tendon] = spring.length
 
 
 def set_laws(model: mujoco.MjModel, parts: Sequence[NativePart]) -> None:
-    """Write stiffness, damping, preload and curves of all parts into the compiled model."""
+    """Write stiffness, damping, preload and curves of all native parts into the compiled MuJoCo model."""
     model.actuator_gainprm[:] = 0.0
     for i, part in enumerate(parts):
         element = part.element
         if isinstance(part.travel, CoordinateTravel):
-            tendon = model.tendon(f"{i}{BREAK}{element.name}").id
+            tendon = model.tendon(f"{i}{NAME_SEPARATOR}{element.name}").id
             model.tendon_stiffness[tendon], model.tendon_damping[tendon] = element.stiffness, element.damping
             model.tendon_lengthspring[tendon] = -element.held / element.stiffness if element.stiffness else 0.0
         for k, force in enumerate(affine_forces(part)):
-            actuator = model.actuator(f"{i}.{k}{BREAK}{element.name}").id
+            actuator = model.actuator(f"{i}.{k}{NAME_SEPARATOR}{element.name}").id
             model.actuator_biasprm[actuator, :3] = force[:3]
-            model.actuator_forcelimited[actuator] = (force.low, force.high) != (-ENDLESS, ENDLESS)
+            model.actuator_forcelimited[actuator] = (force.low, force.high) != (-UNLIMITED_FORCE, UNLIMITED_FORCE)
             model.actuator_forcerange[actuator] = force.low, force.high
 
 
 def built_elements(model: mujoco.MjModel) -> tuple[str, ...]:
-    """Names of the elements that have a tendon or an actuator in a model, each once."""
+    """Names of the elements that have a tendon or an actuator in a MuJoCo model, each once."""
     tendons = [model.tendon(i).name for i in range(model.ntendon)]
     actuators = [model.actuator(i).name for i in range(model.nu)]
-    return tuple(dict.fromkeys(name.split(BREAK, 1)[1] for name in (*tendons, *actuators)))
+    return tuple(dict.fromkeys(name.split(NAME_SEPARATOR, 1)[1] for name in (*tendons, *actuators)))
 
 
-def affine_forces(element: NativePart) -> list[Affine]:
-    """Forces on the length L of a part, beyond the force of the tendon's own spring; d = L less its design value.
+def affine_forces(part: NativePart) -> list[AffineForce]:
+    """Forces of actuators on the length L of a part, beyond the force of the tendon's own spring, with d = L less its
+    design value.
 
     They draw it together: where the element presses with F, they are -F.
     """
-    axial, e = isinstance(element.travel, AxialTravel), element.element
-    design = element.travel.design if isinstance(element.travel, AxialTravel) else 0.0
+    axial, e = isinstance(part.travel, AxialTravel), part.element
+    design = part.travel.design if isinstance(part.travel, AxialTravel) else 0.0
     stiffness, damping = (e.stiffness, e.damping) if axial else (0.0, 0.0)
     held = e.held if axial or not e.stiffness else 0.0
-    line = np.array([held, stiffness, damping]) + sum(_lines(e), np.zeros(3))
-    forces = [Affine(*-line), *_corners(e.travel_force, 1), *_corners(e.rate_force, 2)]
+    line = np.array([held, stiffness, damping]) + sum(_first_pieces(e), np.zeros(3))
+    forces = [AffineForce(*-line), *_corner_forces(e.travel_force, 1), *_corner_forces(e.rate_force, 2)]
     shifted = [force._replace(constant=force.constant - force.slope * design) for force in forces]
     return [force for force in shifted if any(force[:3])]
 
 
-def _lines(e: Element) -> Iterator[np.ndarray]:
-    """Constant, slope and damping (3,) of the first straight piece of each of an element's two curves."""
-    for curve, place in ((e.travel_force, 1), (e.rate_force, 2)):
+def _first_pieces(element: Element) -> Iterator[np.ndarray]:
+    """Constant, slope and damping (3,) of the first straight piece of each of an element's two curves, over travel and
+    rate."""
+    for curve, place in ((element.travel_force, 1), (element.rate_force, 2)):
         if curve is not None:
             line = np.zeros(3)
             line[[0, place]] = curve.hinges()[:2]
             yield line
 
 
-def _corners(curve: Curve | None, place: int) -> Iterator[Affine]:
+def _corner_forces(curve: Curve | None, place: int) -> Iterator[AffineForce]:
     """Force -bend max(x - corner, 0) for every corner of a curve; x is the travel if ``place`` is 1, its rate if 2."""
     _, _, corners, bends = curve.hinges() if curve else (0.0, 0.0, (), ())
     for corner, bend in zip(corners, bends, strict=True):
-        low, high = (-ENDLESS, 0.0) if bend > 0.0 else (0.0, ENDLESS)
+        low, high = (-UNLIMITED_FORCE, 0.0) if bend > 0.0 else (0.0, UNLIMITED_FORCE)
         slope, damping = (-bend, 0.0) if place == 1 else (0.0, -bend)
-        yield Affine(bend * corner, slope, damping, low, high)
+        yield AffineForce(bend * corner, slope, damping, low, high)

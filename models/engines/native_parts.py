@@ -1,4 +1,4 @@
-"""Split of a cut vehicle's springs, mounts and bars into an engine's native elements and the forces left to a callback.
+"""Division of a vehicle's springs, mounts and bars between an engine's native elements and the forces of a callback.
 
 A travel d that is a sum of coordinates is one for every engine. So is d = a . (p2 - p1), where the axis a is fixed in
 the body of one end and that body carries the other end. What an engine lacks stays in the compiled forces that act for
@@ -13,11 +13,12 @@ import numpy as np
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.spatial import FREEDOMS, JointElement, SpatialVehicle, Vector
 
-CURVES = ("mujoco",)
-"""Engines whose own elements can have a force that is piecewise linear in travel or rate."""
-SLIDES = 1e-3
-"""m/s, rad/s: dry friction has its whole force above this speed, and in proportion to the speed below."""
+ENGINES_WITH_CURVES = ("mujoco",)
+"""Engines whose native elements can have a force that is piecewise linear in travel or rate."""
+FULL_FRICTION_SPEED = 1e-3
+"""Speed (m/s, rad/s) above which dry friction has its whole force; below, the force is proportional to the speed."""
 NO_FRAME = "its axis is fixed in no end of it that carries the other end"
+"""Reasons why an element or a term of its law is not native."""
 NO_TRAVEL = "no coordinate moves its ends apart along its axis"
 NO_CURVE = "curve: piecewise linear forces are functions in Exudyn, no elements"
 NO_FRICTION = {
@@ -28,9 +29,8 @@ NO_FRICTION = {
 
 @dataclass(frozen=True)
 class CoordinateTravel:
-    """Travel along coordinates: d = sum of factor times q over ``coordinates``, which are numbered in the order of the
-    tree.
-    """
+    """Spring travel along coordinates q: the sum of factor times q over ``coordinates``, which are numbered in the
+    order of the tree."""
 
     coordinates: tuple[int, ...]
     factors: tuple[float, ...]
@@ -38,7 +38,8 @@ class CoordinateTravel:
 
 @dataclass(frozen=True)
 class AxialTravel:
-    """Travel along an axis: d = axis . (tip - foot) less its design value. Axis (3,) and foot are fixed in ``frame``.
+    """Spring travel along an axis: axis . (tip - foot) less its design value (m). Axis (3,) and foot are fixed in the
+    body ``frame``.
 
     foot, tip : places (3,) in the design position, m; the tip is on ``body``, which ``frame`` carries.
     """
@@ -51,13 +52,13 @@ class AxialTravel:
 
     @property
     def design(self) -> float:
-        """Design value of the travel: axis . (tip - foot) in the design position."""
+        """Design value of the travel (m): axis . (tip - foot) in the design position."""
         return float(self.axis @ (self.tip - self.foot))
 
 
 @dataclass(frozen=True)
 class NativePart:
-    """An element, reduced to that part of its law which the engine itself computes, and its travel."""
+    """An element with the terms of its force law that the engine itself computes, and its travel."""
 
     element: Element
     travel: CoordinateTravel | AxialTravel
@@ -98,15 +99,14 @@ class LineSpring:
 
     @property
     def ends(self) -> tuple[tuple[str | None, Vector], ...]:
-        """Both bodies, each with its point."""
+        """The two bodies, each with its point (m)."""
         return (self.first_body, self.first_point), (self.second_body, self.second_point)
 
 
 @dataclass(frozen=True)
 class DryFriction:
-    """Coulomb friction against the motion of a coordinate, which is given by its number in the tree's order; force in N
-    or N m; solref, solimp : how soft MuJoCo makes it, where it sticks.
-    """
+    """Coulomb friction against the motion of a coordinate (number in the tree's order); force in N or N m; solref,
+    solimp : MuJoCo's softness of sticking."""
 
     name: str
     coordinate: int
@@ -194,7 +194,7 @@ class Division:
 
 
 def divide(tree: SpatialVehicle, elements: Iterable[Element], engine: str) -> Division:
-    """Divide the elements of a vehicle's tree between an engine ("exudyn" or "mujoco") and the compiled forces."""
+    """Division of the elements of a vehicle's tree between an engine ("exudyn" or "mujoco") and the compiled forces."""
     native, shared, reasons = list[NativePart](), list[Element](), dict[str, str]()
     for element in elements:
         travel = travel_of(tree, element)
@@ -203,7 +203,7 @@ def divide(tree: SpatialVehicle, elements: Iterable[Element], engine: str) -> Di
             shared.append(element)
             reasons[element.name] = NO_TRAVEL if still else NO_FRAME
             continue
-        kept, left, why = _divided(element, engine)
+        kept, left, why = _divided_element(element, engine)
         if kept is not None:
             native.append(NativePart(kept, travel))
         if left is not None:
@@ -212,13 +212,12 @@ def divide(tree: SpatialVehicle, elements: Iterable[Element], engine: str) -> Di
     return Division(tuple(native), tuple(shared), reasons)
 
 
-def _divided(element: Element, engine: str) -> tuple[Element | None, Element | None, list[str]]:
-    """The part of an element that the engine computes, the part left to a callback, and the reasons. A preload goes
-    with the part that carries it.
-    """
+def _divided_element(element: Element, engine: str) -> tuple[Element | None, Element | None, list[str]]:
+    """An element with the law's terms that the engine computes, the element with the terms left to a callback, and the
+    reasons. A preload goes with the terms that carry it."""
     curved, rough = bool(element.travel_force or element.rate_force), element.friction != 0.0
     left, why = replace(element, stiffness=0.0, damping=0.0, held=0.0), list[str]()
-    if curved and engine not in CURVES:
+    if curved and engine not in ENGINES_WITH_CURVES:
         why.append(NO_CURVE)
         element = replace(element, travel_force=None, rate_force=None)
         if not element.stiffness:
@@ -233,7 +232,7 @@ def _divided(element: Element, engine: str) -> tuple[Element | None, Element | N
 
 
 def joint_parts(vehicle: SpatialVehicle) -> tuple[NativePart, ...]:
-    """Joint elements with a spring, damper or preload, as native parts; each engine adds their inertia itself."""
+    """Joint elements with a spring, damper or preload, as native parts; their inertia is in ``rotors``."""
     return tuple(
         NativePart(_joint_force(element), CoordinateTravel(_coordinate_numbers(vehicle, element), element.factors))
         for element in vehicle.joint_elements
@@ -242,7 +241,7 @@ def joint_parts(vehicle: SpatialVehicle) -> tuple[NativePart, ...]:
 
 
 def rotors(vehicle: SpatialVehicle) -> list[tuple[str, CoordinateTravel, float]]:
-    """Name, travel and inertia (kg, kg m^2) of those joint elements that have inertia."""
+    """Name, travel and inertia (kg, kg m^2) of the joint elements that have inertia."""
     return [
         (element.name, CoordinateTravel(_coordinate_numbers(vehicle, element), element.factors), element.inertia)
         for element in vehicle.joint_elements
@@ -251,6 +250,7 @@ def rotors(vehicle: SpatialVehicle) -> list[tuple[str, CoordinateTravel, float]]
 
 
 def _coordinate_numbers(vehicle: SpatialVehicle, element: JointElement) -> tuple[int, ...]:
+    """Numbers, in the tree's order, of the coordinates of a joint element."""
     places = {place: i for i, place in enumerate(vehicle.coordinates())}
     return tuple(places[place] for place in element.coordinates)
 
@@ -262,9 +262,8 @@ def _joint_force(element: JointElement) -> Element:
 
 
 def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | AxialTravel | None:
-    """The travel of an element in a form that an engine may have: along coordinates or along an axis; None where it has
-    neither.
-    """
+    """The travel of an element in a form that an engine may have, along coordinates or along an axis; None if it has
+    neither form."""
     first, two = (_bodies_up_to_frame(tree, end, element.frame) for end in (element.first_body, element.second_body))
     if first is not None and two is not None and not any(_turns_on_carrier(tree, body) for body in (*first, *two)):
         return _along_coordinates(tree, element, first, two)
@@ -285,9 +284,8 @@ def _turns_on_carrier(tree: SpatialVehicle, body: str) -> bool:
 
 
 def _bodies_up_to_frame(tree: SpatialVehicle, body: str, frame: str) -> tuple[str, ...] | None:
-    """The bodies in the chain from ``body`` to the one that rides on ``frame``; None where the frame does not carry
-    it.
-    """
+    """The bodies in the chain from ``body`` to the one carried directly by ``frame``; None where the frame does not
+    carry the body."""
     chain = tree.chain(body)
     return chain[: chain.index(frame)] if frame in chain else None
 
@@ -295,7 +293,8 @@ def _bodies_up_to_frame(tree: SpatialVehicle, body: str, frame: str) -> tuple[st
 def _along_coordinates(
     tree: SpatialVehicle, element: Element, first: tuple[str, ...], second: tuple[str, ...]
 ) -> CoordinateTravel:
-    """Travel along the slides of the bodies between the frame and either end; slides that move both ends cancel."""
+    """Travel along the sliding coordinates of the bodies between the frame and either end; slides that move both ends
+    cancel."""
     factors = dict[int, float]()
     for number, (body, freedom) in enumerate(tree.coordinates()):
         ends = int(body in second) - int(body in first)

@@ -1,4 +1,4 @@
-"""Engines and integrators from a file outside the tree, named ``module:Class``; nothing but that is imported.
+"""Engines and integrators from a file outside the tree, named ``module:Class``.
 
 An integrator has ``integrate(f, times, start, tolerance)``, which returns states (len(times), 8) of y' = f(t, y) from
 ``start`` (8,) at ``times[0]`` on; it is called for each stretch on which f is smooth. An engine is built with
@@ -32,21 +32,24 @@ from models.core.errors import InputError, RunFailed
 from models.core.trajectory import Trajectory
 from models.engines import protocol
 from models.engines.assembly import Assembly, Settings
-from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED, Integrator
+from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES, RECOMMENDED, Integrator
 from models.engines.model import Model
 from models.engines.protocol import guard
 from models.engines.reference import Reference, derivative_of
 
-HIGHEST = 20
-"""Order that a method may claim."""
+HIGHEST_ORDER = 20
+"""Largest order of convergence that an outside integrator may claim."""
 
 
 def register(name: str) -> None:
-    """Import the class that ``module:Class`` names and enter it in the catalogue; InputError if it cannot be used."""
-    outside_class = _class(name)
+    """Import the class that ``module:Class`` names and add it to the catalogue; raises InputError if it cannot be
+    used."""
+    outside_class = _outside_class(name)
     order = getattr(outside_class, "order", None)
-    if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= HIGHEST:
-        raise _unusable_engine(name, f"must say its order of convergence: order = a whole number from 1 to {HIGHEST}")
+    if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= HIGHEST_ORDER:
+        raise _unusable_engine(
+            name, f"must say its order of convergence: order = a whole number from 1 to {HIGHEST_ORDER}"
+        )
     integrates = callable(getattr(outside_class, "integrate", None))
     missing = (
         []
@@ -65,14 +68,16 @@ def register(name: str) -> None:
         )
     constrained = bool(getattr(outside_class, "constraints", False))
     CATALOGUE[name] = {name: Integrator(order, "any", constraints=integrates or constrained)}
-    RECOMMENDED[name], OUTSIDE[name] = name, outside_class
+    RECOMMENDED[name], OUTSIDE_CLASSES[name] = name, outside_class
 
 
 def _unusable_engine(name: str, why: str) -> InputError:
+    """InputError on an outside engine that cannot be used."""
     return InputError("--engine", "", name, why)
 
 
-def _class(name: str) -> type:
+def _outside_class(name: str) -> type:
+    """The class that ``module:Class`` names, imported; raises InputError if that fails."""
     module, _, attribute = name.partition(":")
     if not all(part.isidentifier() for part in (*module.split("."), attribute)):
         raise _unusable_engine(name, "must read module:Class, for mine.py in this folder for example mine:Scipy")
@@ -92,47 +97,50 @@ def _class(name: str) -> type:
 
 
 def _error_text(error: BaseException) -> str:
+    """Class and message of an exception, as text."""
     return f"{type(error).__name__}: {error}".rstrip(": ")
 
 
 def build(name: str, assembly: Assembly, settings: Settings) -> Model:
-    """The outside class with an assembly: as an engine, or as an integrator of the reference's equations."""
-    outside_class = OUTSIDE[name]
+    """Model of an assembly by an outside class: as an engine, or as an integrator of the reference's equations."""
+    outside_class = OUTSIDE_CLASSES[name]
     if callable(getattr(outside_class, "integrate", None)):
-        return Integrated(assembly, settings, name, _call_engine(name, "building it", outside_class).integrate)
-    return Guarded(name, _call_engine(name, "building it", outside_class, assembly, settings), assembly, settings)
+        return OutsideIntegrator(assembly, settings, name, _call_engine(name, "building it", outside_class).integrate)
+    return OutsideEngine(name, _call_engine(name, "building it", outside_class, assembly, settings), assembly, settings)
 
 
-def _call_engine(name: str, question: str, function: Callable, *arguments: Any) -> Any:
-    """The value that a function of an outside engine returns; RunFailed for any exception but the project's own."""
+def _call_engine(name: str, action: str, function: Callable, *arguments: Any) -> Any:
+    """Result of a function of an outside engine; raises RunFailed for any exception other than the project's own."""
     try:
         return function(*arguments)
     except (InputError, RunFailed):
         raise
     except Exception as error:
-        raise RunFailed(name, f"{question} raised {_error_text(error)}") from error
+        raise RunFailed(name, f"{action} raised {_error_text(error)}") from error
 
 
-def _answer_as_array(name: str, question: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """A value that an outside engine returned, as an array of this shape; RunFailed if it is none."""
+def _returned_array(name: str, action: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """The value that an outside engine returned, as an array of this shape; raises RunFailed if it has no such
+    shape."""
     try:
         numbers = np.asarray(value if value is not None else "nothing", dtype=float)
     except (TypeError, ValueError):
-        raise RunFailed(name, f"{question} gave {type(value).__name__} instead of numbers") from None
+        raise RunFailed(name, f"{action} gave {type(value).__name__} instead of numbers") from None
     if numbers.shape != shape:
-        raise RunFailed(name, f"{question} gave the shape {numbers.shape} instead of {shape}")
+        raise RunFailed(name, f"{action} gave the shape {numbers.shape} instead of {shape}")
     return numbers
 
 
 @dataclass
-class Integrated(Reference):
-    """The reference's equations with an integrator from outside; a prescribed pitch is one of their inputs."""
+class OutsideIntegrator(Reference):
+    """The reference's equations with an outside integrator; a prescribed pitch is one of their inputs."""
 
     name: str
     integrate: Callable
 
     def run(self) -> Trajectory:
-        """Integrate stretch by stretch between the knots of the input; raises RunFailed as every engine does."""
+        """Trajectory, integrated piece by piece between the knots of the input; raises RunFailed as every engine
+        does."""
         times = self.settings.step * np.arange(self.settings.steps + 1)
         states, calls = self._march(times)
         guard(self.name, times, states, self.settings.duration)
@@ -142,22 +150,23 @@ class Integrated(Reference):
         return Trajectory(times, states, enforced, {"steps": self.settings.steps, "force calls": calls})
 
     def _march(self, times: np.ndarray) -> tuple[np.ndarray, int]:
-        """States (n, 8) at the times, and the number of calls of the right-hand side."""
+        """States (n, 8) at the times (n,) in s, and the number of calls of the right-hand side."""
         states, calls = np.empty((len(times), 8)), [0]
         y = states[0] = self.assembly.initial
-        for start, end, inside in self._stretches(times, times[-1]):
+        for start, end, inside in self._pieces_between_knots(times, times[-1]):
             within = times[inside]
             last = [] if len(within) and within[-1] > end - 1e-9 * self.settings.step else [end]
             grid = np.array([start, *within, *last])
             asked = (self._rhs(start, end, calls), grid, y.copy(), self.settings.tolerance)
             answer = _call_engine(self.name, "integrate", self.integrate, *asked)
-            states_then = _answer_as_array(self.name, "integrate", answer, (len(grid), 8))
+            states_then = _returned_array(self.name, "integrate", answer, (len(grid), 8))
             states[inside], y = states_then[1 : 1 + len(within)], states_then[-1]
             if not np.isfinite(y).all():
                 raise RunFailed(self.name, "the state became infinite or not a number", start)
         return states, calls[0]
 
     def _rhs(self, start: float, end: float, calls: list[int]) -> Callable[[float, np.ndarray], np.ndarray]:
+        """Right-hand side (t, y) -> y' over one piece between knots, which counts its calls."""
         derivative, p, at = derivative_of(*self._key), self._p, self._reader(start, end)
 
         def rhs(t: float, y: np.ndarray) -> np.ndarray:
@@ -171,8 +180,8 @@ class Integrated(Reference):
 
 
 @dataclass
-class Guarded:
-    """An engine from outside, whose runs are checked as those of every engine."""
+class OutsideEngine:
+    """An outside engine whose runs are checked as those of every engine."""
 
     name: str
     model: Any
@@ -180,49 +189,47 @@ class Guarded:
     settings: Settings
 
     def run(self) -> Trajectory:
-        """The trajectory that the outside engine's run returns, after checks."""
+        """The trajectory of the outside engine, after checks."""
         answer = _call_engine(self.name, "run", self.model.run)
         if not (hasattr(answer, "times") and hasattr(answer, "states")):
             raise RunFailed(self.name, f"run gave {type(answer).__name__}, which has no times and states")
         count = np.size(answer.times)
-        times = _answer_as_array(self.name, "run, as times,", answer.times, (count,))
-        states = _answer_as_array(self.name, "run, as states,", answer.states, (count, 8))
+        times = _returned_array(self.name, "run, as times,", answer.times, (count,))
+        states = _returned_array(self.name, "run, as states,", answer.states, (count, 8))
         enforced = getattr(answer, "enforced", None)
         if self.assembly.guided:
-            enforced = _answer_as_array(self.name, "run, as enforced,", enforced, (count, len(self.assembly.guided)))
+            enforced = _returned_array(self.name, "run, as enforced,", enforced, (count, len(self.assembly.guided)))
         guard(self.name, times, states, self.settings.duration, enforced=enforced)
         return Trajectory(times, states, enforced, dict(getattr(answer, "counts", {})))
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (4,) at a time (s), from coordinates and rates (4,), which the outside class receives as one
-        state (8,).
-        """
+        state (8,)."""
         answer = _call_engine(self.name, "acceleration", self.model.acceleration, time, np.concatenate((q, v)))
-        return _answer_as_array(self.name, "acceleration", answer, (4,))
+        return _returned_array(self.name, "acceleration", answer, (4,))
 
     def plan(self) -> dict[str, int]:
-        """Counts of what an outside engine built, as far as it states them."""
+        """Counts of the items that an outside engine built, as far as it states them."""
         blank = {"degrees of freedom": 4 - len(self.assembly.guided), "native items": 0, "callbacks": 0}
         return blank | dict(getattr(self.model, "plan", dict)())
 
 
 REFERENCE_TOLERANCE = 1e-10
-"""Tolerance of the reference's own run."""
-MARGIN, FLOOR, CEILING = 100.0, 1e-5, 0.1
-"""A run is refused beyond so many times the expected error, of the largest motion; but not below the first share of
-that motion (between their own steps, methods interpolate to 3e-6), and always beyond the second."""
+"""Tolerance of the reference run with which an outside engine is compared."""
+ERROR_MARGIN, SMALLEST_BOUND, LARGEST_BOUND = 100.0, 1e-5, 0.1
+"""A run fails if its error exceeds ERROR_MARGIN times the expected error. The bound, relative to the largest motion, is
+at least SMALLEST_BOUND (methods interpolate between steps to 3e-6) and at most LARGEST_BOUND."""
 
 
 def beside_reference(engine: str, assembly: Assembly, settings: Settings, run: Trajectory) -> str:
-    """Text on the difference of a run from the reference; RunFailed where the run's order and step cannot explain
-    it.
-    """
+    """Text on the difference of a run from the reference; raises RunFailed where the run's order and step cannot
+    explain the difference."""
     try:
-        truth = _of_reference(assembly, replace(settings, integrator="DOP853", tolerance=REFERENCE_TOLERANCE))
+        truth = _reference_run(assembly, replace(settings, integrator="DOP853", tolerance=REFERENCE_TOLERANCE))
     except (InputError, RunFailed) as error:
         return f"nothing was compared with it: the reference gives no run of this scene ({error})"
     gap, where = relative_gap(run, truth)
-    allowed = min(max(MARGIN * _expected(engine, assembly, settings, truth), FLOOR), CEILING)
+    allowed = min(max(ERROR_MARGIN * _expected_error(engine, assembly, settings, truth), SMALLEST_BOUND), LARGEST_BOUND)
     if not gap <= allowed:
         raise RunFailed(
             engine,
@@ -247,16 +254,18 @@ def relative_gap(run: Trajectory, truth: Trajectory) -> tuple[float, float]:
     return float(gaps[worst]), float(run.times[worst])
 
 
-def _of_reference(assembly: Assembly, settings: Settings) -> Trajectory:
+def _reference_run(assembly: Assembly, settings: Settings) -> Trajectory:
+    """Trajectory of an assembly by the reference."""
     return protocol.build("reference", assembly, settings).run()
 
 
-def _expected(engine: str, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
-    """Relative error that the stated order and step make likely; for an adaptive method its tolerance."""
-    if getattr(OUTSIDE[engine], "adaptive", False):
+def _expected_error(engine: str, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
+    """Relative error that the stated order and step of an outside engine make likely; its tolerance if it is
+    adaptive."""
+    if getattr(OUTSIDE_CLASSES[engine], "adaptive", False):
         return settings.tolerance
     try:
-        gap, _ = relative_gap(_of_reference(assembly, replace(settings, integrator="RK4")), truth)
+        gap, _ = relative_gap(_reference_run(assembly, replace(settings, integrator="RK4")), truth)
     except (InputError, RunFailed):
-        return CEILING  # too coarse for RK4: only what no step explains is told
+        return LARGEST_BOUND  # too coarse for RK4: only what no step explains is told
     return float(gap ** (min(CATALOGUE[engine][settings.integrator].order, 4) / 4))

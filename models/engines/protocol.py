@@ -1,5 +1,4 @@
-"""The engine protocol of the pitch plane, the scenes that it refuses, and the guard that every run of every system
-passes.
+"""Engine protocol of the pitch plane, the scenes that it refuses, and the checks that every run of every system passes.
 
 An engine is a module with ``build(assembly, settings) -> Model``.
 """
@@ -12,39 +11,41 @@ import numpy as np
 from models.core.errors import Refused, RunFailed
 from models.core.resolved import check_resolved
 from models.core.signals import Signal
-from models.core.steps import divides, fitting
+from models.core.steps import divides, dividing_step
 from models.engines.assembly import Assembly, Settings
-from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE, Integrator
+from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES, UNAVAILABLE_INTEGRATORS, Integrator
 from models.engines.model import Model
 from models.engines.stability import check_step
 
 BALANCE_ROWS, BALANCE_START, BALANCE_BOUND = 60, 50, 0.05
-"""Rows at which a multiplier is checked, rows at the start that may ring, and the accepted share of its rms.
+"""Number of rows at which a multiplier is checked, number of rows at the start that may ring, and the accepted relative
+rms error.
 
 Sixty rows cost 5 ms. Clean data are met to 1e-4; white noise on the data that is differentiated over a
 step of one sample comes out 10 times too large, a constant wrong multiplier 0.2 to 1 times."""
 SIZE_BOUND = 1e4
-"""A state above this (m, rad, m/s, rad/s) is not a vehicle any more: 1e303 is finite, too."""
+"""Largest magnitude of a state (m, rad, m/s, rad/s) of a vehicle; 1e303 is finite, too."""
 
 
 def build(engine: str, assembly: Assembly, settings: Settings) -> Model:
-    """Build an assembly in an engine by name; raises Refused where the engine would answer wrongly."""
-    check(engine, assembly, settings)
-    return unchecked(engine, assembly, settings)
+    """Model of an assembly in an engine by name; raises Refused where the engine would compute wrong results."""
+    check_assembly(engine, assembly, settings)
+    return build_unchecked(engine, assembly, settings)
 
 
-def unchecked(engine: str, assembly: Assembly, settings: Settings) -> Model:
-    """Build an assembly in an engine, without a check that the engine would answer rightly."""
-    if engine in OUTSIDE:
+def build_unchecked(engine: str, assembly: Assembly, settings: Settings) -> Model:
+    """Model of an assembly in an engine, without a check that the engine computes right results."""
+    if engine in OUTSIDE_CLASSES:
         return import_module("models.engines.outside").build(engine, assembly, settings)
     return import_module(f"models.engines.{engine}").build(assembly, settings)
 
 
-def check(engine: str, assembly: Assembly, settings: Settings) -> None:
-    """Refuse combinations of input, integrator and step with which the engine would answer wrongly."""
+def check_assembly(engine: str, assembly: Assembly, settings: Settings) -> None:
+    """Raise Refused for combinations of input, integrator and step with which the engine would compute wrong
+    results."""
     integrator = CATALOGUE[engine][settings.integrator]
-    if (engine, settings.integrator) in MISSING:
-        raise Refused(engine, MISSING[engine, settings.integrator])
+    if (engine, settings.integrator) in UNAVAILABLE_INTEGRATORS:
+        raise Refused(engine, UNAVAILABLE_INTEGRATORS[engine, settings.integrator])
     _refuse_uneven_step(engine, settings.step, "the duration", settings.duration)
     if assembly.guided and not integrator.constraints:
         right = (name for name, known in CATALOGUE[engine].items() if known.constraints)
@@ -61,13 +62,14 @@ def check(engine: str, assembly: Assembly, settings: Settings) -> None:
         )
     for signal in (assembly.input, assembly.moment):
         if signal is not None:
-            _reading(engine, integrator, settings, signal)
+            _check_reading(engine, integrator, settings, signal)
     check_step(engine, assembly, settings)
 
 
-def _reading(engine: str, integrator: Integrator, settings: Settings, signal: Signal) -> None:
+def _check_reading(engine: str, integrator: Integrator, settings: Settings, signal: Signal) -> None:
+    """Raise Refused if an integrator reads the input signal at wrong times or may miss details of the signal."""
     if signal.period is not None:
-        _sampling(engine, integrator, settings, signal.period, signal.held)
+        _check_sampling(engine, integrator, settings, signal.period, signal.held)
     if integrator.adaptive and engine != "reference" and settings.step > signal.resolution:
         raise Refused(
             engine,
@@ -76,7 +78,8 @@ def _reading(engine: str, integrator: Integrator, settings: Settings, signal: Si
         )
 
 
-def _sampling(engine: str, integrator: Integrator, settings: Settings, period: float, held: bool) -> None:
+def _check_sampling(engine: str, integrator: Integrator, settings: Settings, period: float, held: bool) -> None:
+    """Raise Refused if an integrator cannot read a signal of this sampling period (s), ``held`` over it or not."""
     if integrator.adaptive and engine != "reference":
         if held:
             raise Refused(
@@ -96,10 +99,12 @@ def _sampling(engine: str, integrator: Integrator, settings: Settings, period: f
 
 
 def _refuse_uneven_step(engine: str, step: float, multiple: str, length: float) -> None:
+    """Raise Refused if the step (s) does not divide a length of time (s)."""
     if not divides(step, length):
         raise Refused(
             engine,
-            f"the step {step:g} s does not divide {multiple} {length:g} s; use for example {fitting(step, length)} s",
+            f"the step {step:g} s does not divide {multiple} {length:g} s; "
+            f"use for example {dividing_step(step, length)} s",
         )
 
 
@@ -125,25 +130,24 @@ def guard(
     """
     if len(times) == 0 or len(times) != len(states):
         raise RunFailed(engine, f"gave {len(states)} states at {len(times)} times{note}")
-    if not _sound(times, states, enforced):
-        _fail(engine, times, states, note, enforced)
+    if not _is_sane(times, states, enforced):
+        _raise_failure(engine, times, states, note, enforced)
     if note:
         raise RunFailed(engine, note.lstrip("; "), times[-1], states[-1])
     if abs(times[-1] - duration) > 1e-9 * max(1.0, duration):
         raise RunFailed(engine, f"stopped at {times[-1]:.6g} s instead of {duration:.6g} s", times[-1], states[-1])
 
 
-def _sound(times: np.ndarray, states: np.ndarray, enforced: np.ndarray | None) -> bool:
-    """Whether times, states and enforced forces are all finite and sane. Written to be fast, for ten thousand runs; NaN
-    fails every comparison.
-    """
+def _is_sane(times: np.ndarray, states: np.ndarray, enforced: np.ndarray | None) -> bool:
+    """Whether times, states and enforced forces are all finite and of sane size. Written to be fast, for ten thousand
+    runs; NaN fails every comparison."""
     sane = states.max() < SIZE_BOUND and states.min() > -SIZE_BOUND
     forward = np.isfinite(times).all() and (np.diff(times) > 0).all()
     return bool(sane and forward and (enforced is None or np.isfinite(enforced).all()))
 
 
-def _fail(engine: str, times: np.ndarray, states: np.ndarray, note: str, enforced: np.ndarray | None) -> None:
-    """Raise RunFailed, with the state before the first wrong one."""
+def _raise_failure(engine: str, times: np.ndarray, states: np.ndarray, note: str, enforced: np.ndarray | None) -> None:
+    """Raise RunFailed for a run that is not sane, with the state before the first wrong state."""
     finite = np.isfinite(states).all(axis=1) & (True if enforced is None else np.isfinite(enforced).all(axis=1))
     sane = finite & (np.abs(np.where(np.isfinite(states), states, 0)) < SIZE_BOUND).all(axis=1)
     forward = np.concatenate(([True], np.diff(times) > 0))
@@ -153,11 +157,9 @@ def _fail(engine: str, times: np.ndarray, states: np.ndarray, note: str, enforce
     raise RunFailed(engine, reason + note, times[last] if last >= 0 else None, states[last] if last >= 0 else None)
 
 
-def landings_followed(
-    engine: str, assembly: Assembly, settings: Settings, times: np.ndarray, states: np.ndarray
-) -> None:
-    """Raise RunFailed where fixed steps were too long for the landings of tyres that only push. A step that is stable
-    on the road may still jump over a landing.
+def check_landings(engine: str, assembly: Assembly, settings: Settings, times: np.ndarray, states: np.ndarray) -> None:
+    """Raise RunFailed where fixed steps were too long for the landings of tyres that can lift off. A step that is
+    stable on the road may still jump over a landing.
 
     times (n,) in s, states (n, 8); nothing is looked at where tyres cannot lift.
     """
@@ -170,7 +172,7 @@ def landings_followed(
     check_resolved(engine, times, states[:, :4], states[:, 4:], mass, integrator.order)
 
 
-def balanced(
+def check_balance(
     engine: str, times: np.ndarray, enforced: np.ndarray, balance: Callable[[int], tuple[np.ndarray, np.ndarray]]
 ) -> None:
     """Raise RunFailed unless multipliers (n, 1 or 2) agree with the balance of moments, the last column, and of forces.

@@ -1,4 +1,5 @@
-"""The hand-written reference: the paper's equations, a compiled fixed-step Runge-Kutta, scipy's adaptive solvers."""
+"""The hand-written reference of the pitch plane: the paper's equations, a compiled fixed-step Runge-Kutta method,
+scipy's adaptive solvers."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -15,21 +16,23 @@ from models.core.signals import Stacked
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import guard, landings_followed
+from models.engines.protocol import check_landings, guard
 from models.machine.compiled import named_closure, njit
 from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES, numbers
 
-NO_INPUT = np.zeros((1, 4))
-"""The flat road."""
+FLAT_ROAD_INPUT = np.zeros((1, 4))
+"""Input of a vehicle on a flat road: one row of zeros."""
 
 
-def compiled(function: Any, key: tuple) -> Any:
-    """Compile a closure under a cache index of its own; closures of one factory would otherwise share numba's."""
+def compiled_closure(function: Any, key: tuple) -> Any:
+    """A compiled closure with its own index in numba's cache, which closures of one factory would otherwise share."""
     function = named_closure(function, *key)
     return njit(cache=True, nogil=True, error_model="numpy")(function)  # no check for masses of zero: there are none
 
 
 def _compile_fixed(rhs, key):
+    """Compiled march with fixed classical Runge-Kutta steps for one right-hand side."""
+
     def march(y, step, count, inputs, rows, p, states):
         """March with classical Runge-Kutta steps. ``rows`` gives the distances to the rows of the input at the middle,
         at the end and at the next step.
@@ -56,19 +59,23 @@ def _compile_fixed(rhs, key):
                 y[j] += step / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])
                 states[i + 1, j] = y[j]
 
-    return compiled(march, key)
+    return compiled_closure(march, key)
 
 
 def _compile_single(rhs, key):
+    """Compiled function (y, u, p) -> dy (8,) for one right-hand side."""
+
     def derivative(y, u, p):
         dy, copy = np.empty(8), y.copy()
         rhs(copy, u, p, dy)
         return dy
 
-    return compiled(derivative, key)
+    return compiled_closure(derivative, key)
 
 
-def _sum(rhs, added):
+def _summed_right_hand_side(rhs, added):
+    """Right-hand side with the terms of ``added`` added to those of ``rhs``."""
+
     def total(y, u, p, dy):
         rhs(y, u, p, dy)
         added(y, u, p, dy)
@@ -78,7 +85,7 @@ def _sum(rhs, added):
 
 @dataclass
 class Reference:
-    """The vehicle as compiled equations of motion, marched by fixed steps or an adaptive solver."""
+    """The pitch-plane vehicle as compiled equations of motion, marched by fixed steps or by an adaptive solver."""
 
     assembly: Assembly
     settings: Settings
@@ -99,11 +106,11 @@ class Reference:
         self._p = numbers(assembly.parameters, assembly.vehicle)
 
     def run(self) -> Trajectory:
-        """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
+        """Trajectory over the whole duration; raises RunFailed unless it is complete and finite."""
         adaptive = CATALOGUE["reference"][self.settings.integrator].adaptive
-        times, states, counts = self._adaptive() if adaptive else self._fixed()
+        times, states, counts = self._march_adaptively() if adaptive else self._march_fixed()
         guard("reference", times, states, self.settings.duration)
-        landings_followed("reference", self.assembly, self.settings, times, states)
+        check_landings("reference", self.assembly, self.settings, times, states)
         enforced = self._enforced(times, states)
         guard("reference", times, states, self.settings.duration, enforced=enforced)
         return Trajectory(times, states, enforced, counts)
@@ -113,19 +120,19 @@ class Reference:
         return derivative_of(*self._key)(np.concatenate((q, v)), self._input_at(time), self._p)[4:]
 
     def plan(self) -> dict[str, int]:
-        """Counts of what was built: coordinates, and no native items or callbacks."""
+        """Counts of built items: coordinates, and no native items or callbacks."""
         return {"degrees of freedom": 4 - len(self.assembly.guided), "native items": 0, "callbacks": 0}
 
     def _input_at(self, time: float) -> np.ndarray:
-        return NO_INPUT[0] if self._input is None else self._input.at(time)
+        """Values of the input at a time (s)."""
+        return FLAT_ROAD_INPUT[0] if self._input is None else self._input.at(time)
 
     def _inputs(self) -> tuple[np.ndarray, tuple[int, int, int]]:
         """The input table, and the numbers of rows from a step's start to its middle, to its end and to the next
-        step.
-        """
+        step."""
         signal, h, n = self._input, self.settings.step, self.settings.steps
         if signal is None:
-            return NO_INPUT, (0, 0, 0)
+            return FLAT_ROAD_INPUT, (0, 0, 0)
         if not signal.held:
             return signal.sample(0.0, h / 2, 2 * n + 1), (1, 2, 2)
         if signal.channels == 2:
@@ -135,7 +142,8 @@ class Reference:
         table[:, 1:, :2] = table[:, :1, :2]
         return table.reshape(3 * n, -1), (1, 2, 3)
 
-    def _fixed(self) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
+    def _march_fixed(self) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
+        """Times (n,), states (n, 8) and counts of a march in fixed steps."""
         n = self.settings.steps
         states = np.empty((n + 1, 8))
         inputs, rows = self._inputs()
@@ -145,19 +153,20 @@ class Reference:
         return self.settings.step * np.arange(n + 1), states, {"steps": n, "force calls": 4 * n}
 
     def _guide(self, states: np.ndarray) -> None:
-        """Write the prescribed coordinates and their rates, if any, into the states."""
+        """Write the prescribed coordinates and their rates, if any, into the states (n, 8)."""
         guided = self.assembly.guided
         if guided and self.assembly.input is not None:
             inputs = self.assembly.input.sample(0.0, self.settings.step, len(states))
             states[:, [*guided, *(4 + i for i in guided)]] = inputs[:, 2 : 2 + 2 * len(guided)]
 
-    def _adaptive(self) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
-        """Integrate adaptively from knot to knot of the input, since it is smooth between knots."""
+    def _march_adaptively(self) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
+        """Times (n,), states (n, 8) and counts of an adaptive integration from knot to knot of the input, which is
+        smooth between knots."""
         h, n = self.settings.step, self.settings.steps
         times, states = h * np.arange(n + 1), np.empty((n + 1, 8))
         y = states[0] = self.assembly.initial
         steps = calls = 0
-        for start, end, inside in self._stretches(times, self.settings.duration):
+        for start, end, inside in self._pieces_between_knots(times, self.settings.duration):
             within = times[inside]
             dense = bool(len(within)) and within[0] < end - 1e-9 * h  # else a row at the end at most, which is y there
             solution = self._march_piece(start, end, y, dense)
@@ -169,14 +178,15 @@ class Reference:
         self._guide(states)
         return times, states, {"steps": steps, "force calls": calls}
 
-    def _stretches(self, times: np.ndarray, last: float) -> Iterator[tuple[float, float, slice]]:
-        """Start and end (s) of each stretch between knots of the input, and the slice of ``times`` (n,) within it."""
+    def _pieces_between_knots(self, times: np.ndarray, last: float) -> Iterator[tuple[float, float, slice]]:
+        """Start and end (s) of each piece between knots of the input, and the slice of ``times`` (n,) within it."""
         knots = np.empty(0) if self._input is None else self._input.knots(self.settings.duration)
         small = 1e-9 * self.settings.step
         for start, end in pairwise((0.0, *knots, last)):
             yield start, end, slice(*np.searchsorted(times, (start + small, end + small)))
 
     def _march_piece(self, start: float, end: float, y: np.ndarray, dense: bool):
+        """Solution by scipy's adaptive solver between two knots of the input, from the state y (8,)."""
         from scipy.integrate import solve_ivp
 
         derivative, p, at = derivative_of(*self._key), self._p, self._reader(start, end)
@@ -204,9 +214,8 @@ class Reference:
         return solution
 
     def _reader(self, start: float, end: float) -> Callable[[float], np.ndarray]:
-        """Function that reads the input within one stretch. Held forces keep their value in its middle; other inputs
-        vary.
-        """
+        """Function of time (s) that reads the input within one piece between knots. Held forces keep their value in its
+        middle; other inputs vary."""
         middle = self._input_at(0.5 * (start + end))
         if self._input is None or (self._input.held and self._input.channels == 2):
             return lambda t: middle
@@ -215,7 +224,8 @@ class Reference:
         return self._input_at
 
     def _enforced(self, times: np.ndarray, states: np.ndarray) -> np.ndarray | None:
-        """Enforced moment A = I beta'' - cos(beta) (b f3 - a f4), below eq. (34), and force m3 (z3'' - g) + f3 + f4."""
+        """Moment A = I beta'' - cos(beta) (b f3 - a f4), below eq. (34), and force m3 (z3'' - g) + f3 + f4, that
+        enforce a prescribed motion."""
         guided = self.assembly.guided
         if not guided or self.assembly.input is None:
             return None
@@ -227,17 +237,19 @@ class Reference:
 
 
 _FIXED: dict[tuple, Any] = {}
+"""Compiled marches by mode, geometry and added terms."""
 _SINGLE: dict[tuple, Any] = {}
+"""Compiled right-hand sides by mode, geometry and added terms."""
 
 
 def _right_hand_side(mode: str, geometry: str, *added: str):
-    return reduce(_sum, (ADDED[name] for name in added), RIGHT_HAND_SIDES[mode, geometry])
+    """Right-hand side of the equations for one mode and geometry, with the added terms."""
+    return reduce(_summed_right_hand_side, (ADDED[name] for name in added), RIGHT_HAND_SIDES[mode, geometry])
 
 
 def march_of(mode: str, geometry: str, *added: str):
-    """The compiled fixed-step march for one mode and geometry with the terms ``added``, compiled when it is first
-    requested.
-    """
+    """The compiled fixed-step march for one mode and geometry with the terms ``added``, compiled at the first
+    request."""
     key = (mode, geometry, *added)
     if key not in _FIXED:
         _FIXED[key] = _compile_fixed(_right_hand_side(*key), key)
@@ -245,9 +257,8 @@ def march_of(mode: str, geometry: str, *added: str):
 
 
 def derivative_of(mode: str, geometry: str, *added: str):
-    """The compiled right-hand side (y, u, p) -> dy (8,) for one mode and geometry, compiled when it is first
-    requested.
-    """
+    """The compiled right-hand side (y, u, p) -> dy (8,) for one mode and geometry with the terms ``added``, compiled at
+    the first request."""
     key = (mode, geometry, *added)
     if key not in _SINGLE:
         _SINGLE[key] = _compile_single(_right_hand_side(*key), key)
@@ -255,5 +266,5 @@ def derivative_of(mode: str, geometry: str, *added: str):
 
 
 def build(assembly: Assembly, settings: Settings) -> Reference:
-    """The reference model of an assembly."""
+    """The reference model of a pitch-plane assembly."""
     return Reference(assembly, settings)

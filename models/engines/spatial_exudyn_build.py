@@ -1,4 +1,4 @@
-"""A vehicle in space as Exudyn's items: native spring-dampers between points of its bodies, and user functions.
+"""A spatial vehicle as Exudyn's items: native spring-dampers between points of its bodies, and user functions.
 
 What Exudyn has no item for is a function in Python: curves and friction, inclined axes between two bodies that turn,
 anti-roll bars, side forces, the road.
@@ -14,7 +14,7 @@ import exudyn as exu
 import numpy as np
 
 from models.engines.exudyn_system import KINDS, items
-from models.engines.exudyn_tree import Build, add_slider, add_tree
+from models.engines.exudyn_tree import TreeBuild, add_slider, add_tree
 from models.vehicles.spatial import (
     AntiRollBar,
     Body,
@@ -30,9 +30,8 @@ from models.vehicles.spatial_linear import preloads
 
 @dataclass
 class RoadForces:
-    """Road forces for a callback. by_road (2 w, k) : factors of heights and rates; rows : the k forces at every half
-    step.
-    """
+    """Road forces for one callback. by_road (2 w, k) : factors of the road's heights and rates under w tyres; rows :
+    the k forces at every half step."""
 
     by_road: np.ndarray
     rows: list[list[float]]
@@ -40,38 +39,36 @@ class RoadForces:
 
 @dataclass
 class RoadRows:
-    """The road under the tyres. rows : heights (m), then rates (m/s), ``per_time`` rows in a second; read : forces
-    computed from them.
-    """
+    """The road under the tyres. rows : heights (m), then rates (m/s), ``rows_per_second`` in a second; computed_forces
+    : the forces that callbacks read from them."""
 
     rows: np.ndarray
-    per_time: float
-    read: list[RoadForces] = field(default_factory=list)
+    rows_per_second: float
+    computed_forces: list[RoadForces] = field(default_factory=list)
 
     def forces(self, by_road: np.ndarray) -> RoadForces:
-        """Forces at all rows of the road for one callback, with the factors ``by_road``."""
-        self.read.append(RoadForces(by_road, (self.rows @ by_road).tolist()))
-        return self.read[-1]
+        """Forces at all rows of the road for one callback, with the factors ``by_road`` (2 w, k)."""
+        self.computed_forces.append(RoadForces(by_road, (self.rows @ by_road).tolist()))
+        return self.computed_forces[-1]
 
     @contextmanager
-    def still(self, row: np.ndarray) -> Iterator[None]:
-        """Within the block, use one row of the road at all times."""
-        before, per_time, self.per_time = [each.rows for each in self.read], self.per_time, 0.0
-        for each in self.read:
+    def fixed_row(self, row: np.ndarray) -> Iterator[None]:
+        """Context in which one row (2 w,) of the road is used at all times."""
+        before, per_time, self.rows_per_second = [each.rows for each in self.computed_forces], self.rows_per_second, 0.0
+        for each in self.computed_forces:
             each.rows = [(row @ each.by_road).tolist()]
         try:
             yield
         finally:
-            self.per_time = per_time
-            for each, rows in zip(self.read, before, strict=True):
+            self.rows_per_second = per_time
+            for each, rows in zip(self.computed_forces, before, strict=True):
                 each.rows = rows
 
 
-def _spring(build: Build, spring: SpringDamper) -> None:
-    """Add a spring-damper, native where Exudyn has an item for it: along a global axis, or along any axis of a body
-    that never turns.
-    """
-    axis, ends, held = np.array(spring.axis), [spring.first_body, spring.second_body], build.held.parts[spring.name]
+def _add_spring(build: TreeBuild, spring: SpringDamper) -> None:
+    """Add a spring-damper: native where Exudyn has an item for it, that is along a global axis, or along any axis of a
+    body that never turns."""
+    axis, ends, held = np.array(spring.axis), [spring.first_body, spring.second_body], build.preloads.parts[spring.name]
     upright = np.count_nonzero(axis) == 1
     first, two = (
         build.marker(end, point, not upright)
@@ -80,7 +77,7 @@ def _spring(build: Build, spring: SpringDamper) -> None:
     rest = np.subtract(spring.second_point, spring.first_point)
     curved = spring.travel_force or spring.rate_force or spring.friction
     if curved or not (upright or any(not build.vehicle.turns(end) for end in ends)):
-        return build.connect(f"spring {spring.name!r}", first, two, _law(spring, axis, rest, held))
+        return build.connect(f"spring {spring.name!r}", first, two, _spring_law(spring, axis, rest, held))
     sunk = held / spring.stiffness if spring.stiffness else 0.0
     if upright:
         diagonal = axis**2
@@ -99,10 +96,11 @@ def _spring(build: Build, spring: SpringDamper) -> None:
     )
 
 
-def _law(
+def _spring_law(
     spring: SpringDamper, axis: np.ndarray, length_at_rest: np.ndarray, preload: float
 ) -> Callable[[Any, Any], list[float]]:
-    """Force law of a spring-damper with all its terms, for a callback."""
+    """Force law of a spring-damper with all its terms, for a callback: force (3,) in N from relative position and
+    velocity of its ends."""
     (ax, ay, az), design = axis.tolist(), float(axis @ length_at_rest)
     k, c, dry, dry_rate = spring.stiffness, spring.damping, spring.friction, spring.friction_rate
     travel_force, rate_force = spring.travel_force, spring.rate_force
@@ -122,11 +120,16 @@ def _law(
     return law
 
 
-def _bar(build: Build, bar: AntiRollBar) -> None:
-    """Add an anti-roll bar: vertical forces at its two points, and the moment on the body's roll coordinate."""
+def _add_bar(build: TreeBuild, bar: AntiRollBar) -> None:
+    """Add an anti-roll bar: vertical forces at its two points, and a moment on the body's roll coordinate."""
     left, right = build.marker(bar.left, bar.point_left), build.marker(bar.right, bar.point_right)
     roll, turning = build.reader(bar.body, "rx"), build.reader(bar.body, "rx", KINDS.Coordinates_t)
-    rest, held, track, read = bar.point_right[2] - bar.point_left[2], build.held.parts[bar.name], bar.track, build.mbs
+    rest, held, track, read = (
+        bar.point_right[2] - bar.point_left[2],
+        build.preloads.parts[bar.name],
+        bar.track,
+        build.mbs,
+    )
     k, c = bar.stiffness, bar.damping
 
     def moment(height_difference: float, rate: float) -> float:
@@ -141,8 +144,8 @@ def _bar(build: Build, bar: AntiRollBar) -> None:
 
     name = f"anti-roll bar {bar.name!r}"
     build.connect(name, left, right, lambda apart, rate: [0.0, 0.0, moment(apart[2], rate[2]) / track])
-    if (bar.body, "rx") in build.places:
-        node, index = build.places[bar.body, "rx"]
+    if (bar.body, "rx") in build.coordinate_nodes:
+        node, index = build.coordinate_nodes[bar.body, "rx"]
         still = build.coordinate(build.mbs.AddNode(items.NodePointGround()), 0)
         rolling = build.coordinate(node, index)
         build.mbs.AddObject(
@@ -153,11 +156,10 @@ def _bar(build: Build, bar: AntiRollBar) -> None:
         build.callbacks += 1
 
 
-def _turning_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
-    """Add a tyre of a body that turns: a spring-damper to flat ground, and the road's force as a load; ``by_road`` (2
-    w,) : factors of this force (N).
-    """
-    marker, held = build.marker(tyre.body, tyre.point), build.held.tyres[tyre.name]
+def _add_turning_tyre(build: TreeBuild, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
+    """Add a tyre on a body that turns: a spring-damper to flat ground, and the road's force as a load; ``by_road`` (2
+    w,) : factors of this force (N)."""
+    marker, held = build.marker(tyre.body, tyre.point), build.preloads.tyres[tyre.name]
     sunk = held / tyre.stiffness if tyre.stiffness else 0.0
     law = {"stiffness": [0, 0, tyre.stiffness], "damping": [0, 0, tyre.damping], "offset": [0, 0, sunk]}
     build.spring(build.marker(None, tyre.point), marker, **law, name=f"tyre {tyre.name!r}")
@@ -166,19 +168,23 @@ def _turning_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows)
         items.LoadForceVector(
             name=f"road under the tyre {tyre.name!r}, flat here",
             markerNumber=marker,
-            loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road.per_time)],
+            loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road.rows_per_second)],
         )
     )
     build.callbacks += 1
 
 
-def _steady_tyres(build: Build, tyres: list[Tyre], by_road: np.ndarray, road: RoadRows) -> None:
-    """Add all tyres of bodies that never turn: matrices over the coordinates that lift them, and one callback.
+def _add_steady_tyres(build: TreeBuild, tyres: list[Tyre], by_road: np.ndarray, road: RoadRows) -> None:
+    """Add all tyres on bodies that never turn: matrices over the coordinates that lift them, and one callback.
 
     by_road : (2 w, tyres), what the road adds to each (N).
     """
     lifts = [
-        [build.places[name, "z"] for name in build.vehicle.chain(tyre.body) if (name, "z") in build.places]
+        [
+            build.coordinate_nodes[name, "z"]
+            for name in build.vehicle.chain(tyre.body)
+            if (name, "z") in build.coordinate_nodes
+        ]
         for tyre in tyres
     ]
     nodes = list(dict.fromkeys(node for places in lifts for node, _ in places))
@@ -190,7 +196,7 @@ def _steady_tyres(build: Build, tyres: list[Tyre], by_road: np.ndarray, road: Ro
     for row, places in zip(rows, lifts, strict=True):
         for node, index in places:
             row[first[node] + index] = 1.0
-    stiffness, damping, held = np.array([(t.stiffness, t.damping, build.held.tyres[t.name]) for t in tyres]).T
+    stiffness, damping, held = np.array([(t.stiffness, t.damping, build.preloads.tyres[t.name]) for t in tyres]).T
     force = road.forces(by_road @ rows)
     build.mbs.AddObject(
         items.ObjectGenericODE2(
@@ -200,21 +206,20 @@ def _steady_tyres(build: Build, tyres: list[Tyre], by_road: np.ndarray, road: Ro
             stiffnessMatrix=rows.T * stiffness @ rows,
             **({"dampingMatrix": rows.T * damping @ rows} if damping.any() else {}),
             **({"forceVector": rows.T @ held} if held.any() else {}),
-            forceUserFunction=lambda mbs, t, item, q, v: force.rows[round(t * road.per_time)],
+            forceUserFunction=lambda mbs, t, item, q, v: force.rows[round(t * road.rows_per_second)],
         )
     )
     build.callbacks += 1
 
 
-def _pushing_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
-    """Add a tyre that may leave the road, its whole law as a callback; ``by_road`` (2 w, 2) : columns of height and
-    rate under it.
-    """
-    k, c, held, rest = tyre.stiffness, tyre.damping, build.held.tyres[tyre.name], tyre.point[2]
+def _add_pushing_tyre(build: TreeBuild, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
+    """Add a tyre that may leave the road, its whole law as a callback; ``by_road`` (2 w, 2) selects height and rate
+    under the tyre."""
+    k, c, held, rest = tyre.stiffness, tyre.damping, build.preloads.tyres[tyre.name], tyre.point[2]
     under = road.forces(by_road)
 
     def law(mbs: Any, t: float, item: int, position: Any, speed: Any, *_: Any) -> list[float]:
-        height, rate = under.rows[round(t * road.per_time)]
+        height, rate = under.rows[round(t * road.rows_per_second)]
         elastic = held + k * (height - position[2] + rest)
         return [0.0, 0.0, -max(min(elastic + c * (rate - speed[2]), 2.0 * elastic), 0.0)]
 
@@ -223,21 +228,22 @@ def _pushing_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows)
     build.spring(on_road, build.marker(tyre.body, tyre.point), name=name, springForceUserFunction=law)
 
 
-def _tyres(build: Build, road: RoadRows) -> None:
+def _add_tyres(build: TreeBuild, road: RoadRows) -> None:
     """Add all tyres of the vehicle."""
     tyres, turns, count = build.vehicle.tyres, build.vehicle.turns, len(build.vehicle.tyres)
     by_road = np.vstack([np.diag([tyre.stiffness for tyre in tyres]), np.diag([tyre.damping for tyre in tyres])])
     steady = [i for i, tyre in enumerate(tyres) if not (tyre.pushes_only or turns(tyre.body))]
     if steady:
-        _steady_tyres(build, [tyres[i] for i in steady], by_road[:, steady], road)
+        _add_steady_tyres(build, [tyres[i] for i in steady], by_road[:, steady], road)
     for i, tyre in enumerate(tyres):
         if tyre.pushes_only:
-            _pushing_tyre(build, tyre, np.eye(2 * count)[:, [i, count + i]], road)
+            _add_pushing_tyre(build, tyre, np.eye(2 * count)[:, [i, count + i]], road)
         elif i not in steady:
-            _turning_tyre(build, tyre, by_road[:, i], road)
+            _add_turning_tyre(build, tyre, by_road[:, i], road)
 
 
-def _side_force(build: Build, force: SideForce, speed: float) -> None:
+def _add_side_force(build: TreeBuild, force: SideForce, speed: float) -> None:
+    """Add a lateral force that depends on the body's lateral speed and the chassis' roll and yaw."""
     roll, yaw = (build.reader(force.chassis, freedom) for freedom in ("rx", "rz"))
 
     def law(apart: Any, rate: Any) -> list[float]:
@@ -249,29 +255,29 @@ def _side_force(build: Build, force: SideForce, speed: float) -> None:
 
 
 def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
-    """Each body without parent together with all bodies that ride on it, parents first."""
+    """Trees of bodies: each body without parent together with all bodies that it carries, parents first."""
     trees: dict[str, list[Body]] = {}
     for body in vehicle.bodies:
         trees.setdefault(vehicle.chain(body.name)[-1], []).append(body)
     return list(trees.values())
 
 
-def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadRows) -> Build:
+def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadRows) -> TreeBuild:
     """Build the vehicle in a new Exudyn system, which is not assembled yet, so that sensors can be added."""
     mbs = exu.SystemContainer().AddSystem()
-    built = Build(vehicle, mbs, preloads(vehicle), mbs.AddObject(items.ObjectGround()))
+    built = TreeBuild(vehicle, mbs, preloads(vehicle), mbs.AddObject(items.ObjectGround()))
     for bodies in _trees(vehicle):
         if len(bodies) == 1 and bodies[0].freedoms in (("x",), ("y",), ("z",)):
             add_slider(built, bodies[0])
         else:
             add_tree(built, bodies)
     for spring in vehicle.springs:
-        _spring(built, spring)
+        _add_spring(built, spring)
     for bar in vehicle.bars:
-        _bar(built, bar)
-    _tyres(built, road)
+        _add_bar(built, bar)
+    _add_tyres(built, road)
     for force in vehicle.side_forces:
-        _side_force(built, force, float(speed or 0.0))
+        _add_side_force(built, force, float(speed or 0.0))
     for drag in vehicle.drags:
         centre = vehicle.body(drag.body).position
         damping = [drag.coefficient * float(speed or 0.0), 0, 0]

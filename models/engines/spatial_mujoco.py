@@ -1,4 +1,4 @@
-"""A vehicle in space in MuJoCo: native bodies and joints; forces through one compiled callback."""
+"""A spatial vehicle in MuJoCo: native bodies and joints; forces through one compiled callback."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,25 +10,32 @@ import numpy as np
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.mujoco import INTEGRATORS
-from models.engines.mujoco_layout import check
+from models.engines.mujoco_layout import check_offsets
 from models.engines.mujoco_march import FORCE_CALLS, march
 from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
 from models.engines.protocol import settings_of
-from models.engines.spatial_mujoco_callback import HEADER, PER_TIME, ROAD, elements, packed, spatial_law
-from models.engines.spatial_protocol import EngineKinematics, curves, difference_step, jacobian, linear_vehicle, sound
+from models.engines.spatial_mujoco_callback import HEADER, PER_TIME, ROAD, force_elements, packed_numbers, spatial_law
+from models.engines.spatial_protocol import (
+    EngineKinematics,
+    checked_trajectory,
+    curve_count,
+    difference_step,
+    jacobian,
+    linear_vehicle,
+)
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle, Vector
 
 
-def _compiled(
+def _compiled_model(
     vehicle: SpatialVehicle, step: float, integrator: str, speed: float | None, road: np.ndarray, per_time: float
 ) -> mujoco.MjModel:
-    """The compiled model; its numeric data hold all numbers that the callback reads."""
+    """The compiled MuJoCo model; its numeric data hold all numbers that the callback reads."""
     spec = spec_of(vehicle, step)
     spec.option.integrator = INTEGRATORS[integrator]
     plain = spec.compile()
-    counts, content = packed(vehicle, elements(vehicle, speed), plain, MujocoIndices(vehicle, plain))
+    counts, content = packed_numbers(vehicle, force_elements(vehicle, speed), plain, MujocoIndices(vehicle, plain))
     begins = HEADER + len(content)
     header = [per_time, len(road), len(vehicle.tyres), *counts, begins]
     spec.add_numeric(name="vehicle", size=begins + road.size, data=[0.0])
@@ -39,7 +46,7 @@ def _compiled(
 
 
 class SpatialMujoco:
-    """One vehicle in space in one MuJoCo model."""
+    """One spatial vehicle in one MuJoCo model."""
 
     def __init__(
         self, vehicle: SpatialVehicle, settings: Settings | None, speed: float | None, road: np.ndarray | None
@@ -48,17 +55,16 @@ class SpatialMujoco:
         self._flat = np.zeros(2 * len(vehicle.tyres))
         step, integrator = (settings.step, settings.integrator) if settings else (1e-3, "RK4")
         table = self._flat[None, :] if road is None else road
-        self.model = _compiled(vehicle, step, integrator, speed, table, 0.0 if road is None else 2.0 / step)
+        self.model = _compiled_model(vehicle, step, integrator, speed, table, 0.0 if road is None else 2.0 / step)
         self.data = mujoco.MjData(self.model)
         self.numbers = MujocoIndices(vehicle, self.model)
         self.law: Any = spatial_law()
-        check(self.model, self.data)
+        check_offsets(self.model, self.data)
 
     @contextmanager
     def _hold_road(self) -> Iterator[np.ndarray]:
-        """Within the block, let the callback read one row (2 w,) of the road at all times; this row is yielded and can
-        be changed.
-        """
+        """Context in which the callback reads one row (2 w,) of the road at all times; this row is yielded and can be
+        changed."""
         numbers = self.model.numeric_data
         first = int(numbers[ROAD])
         row = numbers[first : first + len(self._flat)]
@@ -71,9 +77,8 @@ class SpatialMujoco:
             numbers[PER_TIME], row[:] = before
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) at a time (s), positions and rates (n,); ``road`` (2 w,) : row of the road that replaces
-        the one at this time.
-        """
+        """Accelerations (n,) at a time (s), positions and rates (n,); ``road`` (2 w,) replaces the road's row at this
+        time: heights (m), then rates (m/s) under w tyres."""
         if road is None:
             with installed(self.law):
                 return self._acceleration(q, v, time)
@@ -82,15 +87,15 @@ class SpatialMujoco:
             return self._acceleration(q, v)
 
     def _acceleration(self, q: np.ndarray, v: np.ndarray, time: float = 0.0) -> np.ndarray:
+        """Accelerations (n,) at positions and rates (n,) and a time (s), with the callback that is installed."""
         columns = self.numbers.columns
         self.data.time, self.data.qpos[columns], self.data.qvel[columns] = time, q, v
         mujoco.mj_forward(self.model, self.data)
         return self.data.qacc[columns]
 
     def linearise(self) -> LinearVehicle:
-        """The linear vehicle. M comes from MuJoCo; D, K and the road's columns from central differences of the
-        accelerations, which include the callback.
-        """
+        """The linear vehicle. The mass matrix comes from MuJoCo; damping, stiffness and the road's columns come from
+        central differences of the accelerations, callback included."""
         n, zero, h = self.model.nv, np.zeros(self.model.nv), difference_step(self.vehicle)
         with self._hold_road() as row:
 
@@ -106,13 +111,15 @@ class SpatialMujoco:
         mass = np.empty((n, n))
         mujoco.mj_fullM(self.model, self.data, mass)
         mass = mass[np.ix_(self.numbers.columns, self.numbers.columns)]
-        motion = EngineKinematics(self.vehicle, self._shift, self._turn)
+        motion = EngineKinematics(self.vehicle, self._point_jacobian, self._rotation_jacobian)
         return linear_vehicle("mujoco", self.vehicle, motion, mass, -mass @ damping, -mass @ stiffness, mass @ road)
 
-    def _shift(self, body: str, point: Vector) -> np.ndarray:
+    def _point_jacobian(self, body: str, point: Vector) -> np.ndarray:
+        """Jacobian (3, n) of a point's displacement in the design position."""
         return self._jacobians(body, np.array(point, float))[0]
 
-    def _turn(self, body: str) -> np.ndarray:
+    def _rotation_jacobian(self, body: str) -> np.ndarray:
+        """Jacobian (3, n) of a body's rotation in the design position."""
         return self._jacobians(body, np.zeros(3))[1]
 
     def _jacobians(self, body: str, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -125,7 +132,8 @@ class SpatialMujoco:
         return shift[:, self.numbers.columns], turn[:, self.numbers.columns]
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
-        """March from positions and rates (n,), or from rest, over the duration; RunFailed as in the protocol."""
+        """Trajectory over the duration from positions and rates (n,), or from rest; raises RunFailed unless it is
+        finite and sane."""
         settings, rest = settings_of("mujoco", self.settings), np.zeros(self.model.nv)
         both, start = np.concatenate((self.numbers.columns, rest.size + self.numbers.columns)), np.empty(2 * rest.size)
         start[both] = np.concatenate((rest if q is None else q, rest if v is None else v))
@@ -134,13 +142,13 @@ class SpatialMujoco:
         times = settings.step * np.arange(settings.steps + 1)
         counts = {"steps": settings.steps, "force calls": FORCE_CALLS.get(settings.integrator, 1) * settings.steps}
         states = path if (np.diff(both) == 1).all() else path[:, both]
-        return sound("mujoco", settings, times, states, "", counts)
+        return checked_trajectory("mujoco", settings, times, states, "", counts)
 
     def plan(self) -> dict[str, int]:
-        """Counts of what was built: degrees of freedom, native items, callbacks, and the curves within these."""
+        """Counts of built items: degrees of freedom, native items, callbacks, and the curves among these."""
         return {
             "degrees of freedom": self.model.nv,
             "native items": self.model.nbody - 1 + self.model.njnt,
             "callbacks": 1,
-            "curves": curves(self.vehicle),
+            "curves": curve_count(self.vehicle),
         }

@@ -1,10 +1,11 @@
-"""The compiled MuJoCo callback of a vehicle in space and its numbers: forces between points of bodies that may turn.
+"""The compiled MuJoCo callback of a spatial vehicle and its table of numbers: forces between points of bodies that may
+turn.
 
 MuJoCo's own site actuators are wrong between two turning bodies, so every force is summed here. A point of a body that
 never turns is moved by its joints' constant shares. Every other body that counts has a twist, its turning and the
 velocity that it gives the origin of space, and gathers a wrench, force and moment about that origin, so that its joints
 are gone through twice in a call, however many points it has. All numbers lie in the model's numeric data, as
-``packed`` gives them: the header; the bodies, parents first; the elements; the road. So one compiled function
+``packed_numbers`` gives them: the header; the bodies, parents first; the elements; the road. So one compiled function
 serves every model in the process, and holds no address that could go stale in numba's cache.
 """
 
@@ -26,37 +27,39 @@ from models.vehicles.spatial import Curve, SpatialVehicle, Vector
 from models.vehicles.spatial_linear import preloads
 
 PER_TIME, ROWS, TYRES, BODIES, ELEMENTS, POINTS, ROAD, HEADER = range(8)
-"""Header: road rows per second; counts of rows, tyres, bodies that may turn or carry such, elements and points; where
-the road begins."""
+"""Indices in the table's header: road rows per second; counts of rows, tyres, bodies that may turn or carry such,
+elements and points; first number of the road."""
 PARENT, NUMBER, FIRST, TURNING, LAST, POINT, BEYOND, PER_BODY = range(8)
-"""Numbers of a body: its parent in this list (-1: none), MuJoCo's number, the first joint, the first one that turns,
-the one after its last, its first point and the one after its last."""
+"""Numbers of a body: its parent in the table (-1: none), MuJoCo's number, the first joint, the first joint that turns,
+the index after the last joint, the first point, the index after the last point."""
 ELEMENT, PLACE, AXIS, PER_POINT = 0, 1, 4, 7
-"""Numbers of a point: the element whose travel it moves, where it is on the body, the axis of its motion."""
+"""Numbers of a point: the element to whose travel it contributes, its position (m) on the body, the axis of its
+contribution."""
 LENGTH, STIFFNESS, DAMPING, HELD, TYRE, REST, ONE_SIDED, MORE, SHARES = range(9)
-"""Numbers of an element: how many there are, its law, the tyre whose road it sees, its points' travel at rest, whether
-it only pushes, where it has more of a law than a line, 0 if nowhere, and its shares up to there or to its end."""
+"""Numbers of an element: their count; stiffness, damping and preload; the tyre whose road enters; the points' travel at
+rest; whether it only pushes; the first number of the law's nonlinear terms (0 if none); then its shares."""
 JOINT, SHARE, PER_SHARE = range(3)
-"""Numbers of a share: a joint, and what its coordinate adds to the travel."""
+"""Numbers of a share: a joint, and the factor of its coordinate in the travel."""
 FRICTION, FRICTION_RATE, FIRST_COORDINATE, FIRST_GAIN, SECOND_COORDINATE, SECOND_GAIN, ON_TRAVEL, ON_RATE, CURVES = (
     range(9)
 )
-"""More of a law: dry friction, two coordinates (-1: none) that add to the force, points of the curves, these."""
+"""Numbers of the law's nonlinear terms: dry friction, two coordinates (-1: none) that add to the force, numbers of
+points of the curves over travel and rate, and these points."""
 TURNS, SHIFTS, MOMENTS, FORCES, OF_BODY = 0, 3, 6, 9, 12
-"""Of a body while the callback runs: turning, velocity at the origin of space, moment about it, force."""
+"""Results of a body during a call: angular velocity, velocity at the origin of space, moment about the origin,
+force."""
 TRAVEL, RATE, OF_ELEMENT = range(3)
-"""Of an element: what its points move it by, and how fast; then its force in their place."""
+"""Results of an element during a call: the travel from its points, replaced by its force later, and the rate of
+travel."""
 OF_POINT = 3
-"""Of a point: the moment of a force of 1 along its axis about the origin of space."""
+"""Results of a point during a call: the moment about the origin of space of a unit force along its axis."""
 UP: Vector = (0.0, 0.0, 1.0)
-Acting = tuple[str | None, Vector, Vector]
-"""Body, point and axis."""
+ActingPoint = tuple[str | None, Vector, Vector]
+"""A point at which an element acts: body, point (m) and axis."""
 
 
 class Parts(NamedTuple):
-    """Layout of a vehicle's bodies, points and elements in MuJoCo's numeric data: their counts, and pointers to
-    doubles.
-    """
+    """Layout of a vehicle's bodies, points and elements in MuJoCo's numeric data: counts, and pointers to doubles."""
 
     body_count: int
     bodies: Any
@@ -66,8 +69,8 @@ class Parts(NamedTuple):
 
 
 class MujocoState(NamedTuple):
-    """MuJoCo's kinematic state as pointers to its doubles: coordinates and rates of the joints; of each body its
-    centre and rotation (rows); of each joint its anchor and axis in space."""
+    """MuJoCo's kinematic state as pointers to doubles: coordinates and rates of the joints; centre and rotation (rows)
+    of each body; anchor and axis in space of each joint."""
 
     positions: Any
     rates: Any
@@ -79,8 +82,7 @@ class MujocoState(NamedTuple):
 
 class Workspace(NamedTuple):
     """Pointers to arrays for results within a call. bodies : twist and wrench of each body (OF_BODY); elements : travel
-    and rate, then force, of each element (OF_ELEMENT); levers : lever of each point (OF_POINT).
-    """
+    and rate, then force, of each element (OF_ELEMENT); levers : lever of each point (OF_POINT)."""
 
     bodies: Any
     elements: Any
@@ -89,34 +91,38 @@ class Workspace(NamedTuple):
 
 @register_jitable
 def _three(p, i):
+    """The vector (three doubles) at index i of a pointer."""
     return p[i], p[i + 1], p[i + 2]
 
 
 @register_jitable
 def _put(p, i, a):
+    """Write the vector ``a`` (three doubles) to index i of a pointer."""
     p[i], p[i + 1], p[i + 2] = a
 
 
 @register_jitable
 def _plus(a, factor, b):
+    """The vector a + factor b."""
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
 @register_jitable
 def _across(a, b):
+    """The vector product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @register_jitable
 def _along(a, b):
+    """The scalar product a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @register_jitable
 def _move(parts, motion, work):
-    """Compute the twists of the bodies, clear their wrenches, and add what the motion of the points contributes to the
-    travels and rates of the elements.
-    """
+    """Compute the twists of the bodies, clear their wrenches, and add the contributions of the points to the travels
+    and rates of the elements."""
     for b in range(parts.body_count):
         body, state = beyond(parts.bodies, PER_BODY * b), beyond(work.bodies, OF_BODY * b)
         turn, shift = _twist(body, motion, work.bodies)
@@ -140,9 +146,8 @@ def _move(parts, motion, work):
 
 @register_jitable
 def _twist(body, motion, states):
-    """Angular velocity of a body, and the velocity of its point at the origin of space: those of its parent plus what
-    its joints add.
-    """
+    """Angular velocity of a body, and the velocity of its point at the origin of space: the parent's twist plus the
+    contributions of the body's joints."""
     turn, shift, parent, turning = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), int(body[PARENT]), int(body[TURNING])
     if parent >= 0:
         turn, shift = _three(states, OF_BODY * parent + TURNS), _three(states, OF_BODY * parent + SHIFTS)
@@ -156,7 +161,7 @@ def _twist(body, motion, states):
 
 @register_jitable
 def _press(parts, motion, work, forces):
-    """Transfer the elements' forces from the bodies to the joints, riders first."""
+    """Transfer the elements' forces from the bodies to the joints, carried bodies before their carriers."""
     for b in range(parts.body_count - 1, -1, -1):
         body, state = beyond(parts.bodies, PER_BODY * b), beyond(work.bodies, OF_BODY * b)
         moment, force, parent = _three(state, MOMENTS), _three(state, FORCES), int(body[PARENT])
@@ -179,7 +184,7 @@ def _press(parts, motion, work, forces):
 
 @register_jitable
 def _on_curve(pairs, size, argument):
-    """Force on a curve given as (argument, force, ...); beyond its ends the outer straight pieces continue."""
+    """Force on a curve given as pairs (argument, force, ...); beyond its ends the outer straight pieces continue."""
     i = 0
     while i < size - 4 and argument >= pairs[i + 2]:
         i += 2
@@ -188,7 +193,7 @@ def _on_curve(pairs, size, argument):
 
 @register_jitable
 def _more(law, travel, rate, q):
-    """Nonlinear part of a force law: its value less that of the law's straight line."""
+    """Nonlinear terms of an element's force law (N, or N m), at a travel, its rate and the joint coordinates q."""
     force = 0.0
     if law[FRICTION] != 0.0:
         force += law[FRICTION] * np.tanh(rate / law[FRICTION_RATE])
@@ -206,7 +211,7 @@ def _more(law, travel, rate, q):
 
 @register_jitable
 def _act(parts, road, tyres, motion, moved, forces):
-    """Compute the forces of the elements, write them in place of the travels, and add them to the joints that move
+    """Compute the forces of the elements, store them in place of the travels, and add them to the joints that move
     points of bodies which never turn.
 
     road : pointer to the heights (m) under ``tyres`` tyres, followed by their rates (m/s).
@@ -236,7 +241,7 @@ def _act(parts, road, tyres, motion, moved, forces):
 
 @cache
 def spatial_law() -> Any:
-    """The callback, compiled when it is first requested."""
+    """The compiled MuJoCo callback of a spatial vehicle, compiled at the first request."""
     numeric, passive, time, position, velocity, xpos, xmat, xanchor, xaxis = offsets(
         "numeric_data", "qfrc_passive", "time", "qpos", "qvel", "xpos", "xmat", "xanchor", "xaxis"
     )
@@ -280,7 +285,7 @@ class Element:
     every coordinate q is -F ds/dq. A tyre that only pushes is ``one_sided``: F is negative where it does.
     """
 
-    points: tuple[Acting, ...]
+    points: tuple[ActingPoint, ...]
     stiffness: float = 0.0
     damping: float = 0.0
     held: float = 0.0
@@ -293,8 +298,8 @@ class Element:
     one_sided: bool = False
 
 
-def elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
-    """Every element that acts in a vehicle, besides weights and inertia."""
+def force_elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
+    """All force elements of a vehicle: springs, anti-roll bars, tyres, side forces and drags."""
     held, v, acting = preloads(vehicle), float(speed or 0.0), list[Element]()
     for s in vehicle.springs:
         points = ((s.second_body, s.second_point, s.axis), (s.first_body, s.first_point, _scaled(s.axis, -1.0)))
@@ -319,37 +324,38 @@ def elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
 
 
 def _scaled(axis: Vector, factor: float) -> Vector:
+    """The axis times a factor."""
     return (factor * axis[0], factor * axis[1], factor * axis[2])
 
 
-def packed(
-    vehicle: SpatialVehicle, elements: list[Element], model: mujoco.MjModel, numbers: MujocoIndices
+def packed_numbers(
+    vehicle: SpatialVehicle, elements: list[Element], model: mujoco.MjModel, indices: MujocoIndices
 ) -> tuple[tuple[int, int, int], list[float]]:
-    """Counts of bodies, elements and points, and the list of all their numbers for the callback."""
+    """Counts of bodies, elements and points, and the list of all their numbers in the callback's table."""
     carrying = {name for body in vehicle.bodies if vehicle.turns(body.name) for name in vehicle.chain(body.name)}
     moving = [body.name for body in vehicle.bodies if body.name in carrying]
     bodies, points = list[list[float]](), list[list[float]]()
     for name in moving:
         before = len(points)
         points += _points_of(elements, vehicle, name)
-        bodies.append([*_body(vehicle, name, moving, model, numbers), before, len(points)])
-    laws = [_element(element, vehicle, numbers) for element in elements]
+        bodies.append([*_body_numbers(vehicle, name, moving, model, indices), before, len(points)])
+    laws = [_element_numbers(element, vehicle, indices) for element in elements]
     return (len(bodies), len(laws), len(points)), [float(value) for value in chain(*bodies, *points, *laws)]
 
 
-def _body(
-    vehicle: SpatialVehicle, name: str, moving: list[str], model: mujoco.MjModel, numbers: MujocoIndices
+def _body_numbers(
+    vehicle: SpatialVehicle, name: str, listed_bodies: list[str], model: mujoco.MjModel, indices: MujocoIndices
 ) -> list[float]:
-    """Numbers of a body that may turn, or that carries one that may."""
-    body, number = vehicle.body(name), numbers.bodies[name]
+    """Numbers, in the callback's table, of a body that may turn, or that carries one that may."""
+    body, number = vehicle.body(name), indices.bodies[name]
     first, count = max(int(model.body_jntadr[number]), 0), len(body.freedoms)
     sliding = sum(not freedom.startswith("r") for freedom in body.freedoms)
-    parent = moving.index(body.parent) if body.parent else -1
+    parent = listed_bodies.index(body.parent) if body.parent else -1
     return [parent, number, first, first + sliding, first + count]
 
 
 def _points_of(elements: list[Element], vehicle: SpatialVehicle, name: str) -> list[list[float]]:
-    """Numbers of the points at which elements act on a body that may turn."""
+    """Numbers, in the callback's table, of the points at which elements act on a body that may turn."""
     centre = vehicle.body(name).position
     return [
         [i, *np.subtract(point, centre), *axis]
@@ -359,28 +365,29 @@ def _points_of(elements: list[Element], vehicle: SpatialVehicle, name: str) -> l
     ]
 
 
-def _element(element: Element, vehicle: SpatialVehicle, numbers: MujocoIndices) -> list[float]:
-    """Numbers of an element: its law, the factors of coordinates in its travel, and the nonlinear part of its law."""
+def _element_numbers(element: Element, vehicle: SpatialVehicle, indices: MujocoIndices) -> list[float]:
+    """Numbers of an element in the callback's table: its linear law, the factors of coordinates in its travel, and the
+    nonlinear terms of its law."""
     shares, rest = dict[int, float](), 0.0
-    if element.added_coordinate in numbers.joints:
-        shares[numbers.joints[element.added_coordinate]] = 1.0
+    if element.added_coordinate in indices.joints:
+        shares[indices.joints[element.added_coordinate]] = 1.0
     for name, point, axis in element.points:
         if vehicle.turns(name):
             rest += float(np.dot(point, axis))
             continue
         for place in ((body, freedom) for body in vehicle.chain(name) for freedom in vehicle.body(body).freedoms):
-            joint = numbers.joints[place]
+            joint = indices.joints[place]
             shares[joint] = shares.get(joint, 0.0) + float(np.dot(axis, AXES[place[1]]))
     flat = [value for pair in shares.items() if pair[1] for value in pair]
-    more = _rest_of_law(element, numbers)
+    more = _nonlinear_numbers(element, indices)
     law = [element.stiffness, element.damping, element.held, element.tyre, rest, element.one_sided]
     begins = SHARES + len(flat)
     return [begins + len(more), *law, begins if more else 0, *flat, *more]
 
 
-def _rest_of_law(element: Element, numbers: MujocoIndices) -> list[float]:
-    """Numbers of the nonlinear part of an element's law; none where the law is a straight line."""
-    steered = [value for place, gain in element.steered for value in (numbers.joints.get(place, -1), gain)]
+def _nonlinear_numbers(element: Element, indices: MujocoIndices) -> list[float]:
+    """Numbers of the nonlinear terms of an element's law in the callback's table; none where the law is linear."""
+    steered = [value for place, gain in element.steered for value in (indices.joints.get(place, -1), gain)]
     curves = [element.on_travel, element.on_rate]
     if not (element.friction[0] or steered or any(curves)):
         return []

@@ -1,8 +1,8 @@
-"""The engine protocol for a vehicle in space: the vehicle is linearised there and runs in time on a given road.
+"""The engine protocol of a spatial vehicle: the engine linearises the vehicle, and runs it in time on a given road.
 
 An engine's module ``spatial_NAME`` has a class ``SpatialName`` of (vehicle, settings, speed, road). Rides march in both
-with the same tableau, the classical Runge-Kutta one, so that they may be compared to rounding; METHODS has the others.
-All read the road from one table at half steps. Nothing is integrated here.
+with the same tableau, the classical Runge-Kutta one, so that they may be compared to rounding; ALLOWED_INTEGRATORS has
+the others. All read the road from one table at half steps. Nothing is integrated here.
 """
 
 import math
@@ -14,46 +14,45 @@ from typing import Protocol
 import numpy as np
 
 from models.core.errors import InputError, Refused
-from models.core.steps import divides, fitting
+from models.core.steps import divides, dividing_step
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.model import Model
 from models.engines.protocol import guard
-from models.engines.stability import GROWTH, growth, limit
+from models.engines.stability import ALLOWED_GROWTH, log_growth, longest_stable_step
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle, Vector
 from models.vehicles.spatial_linear import linearise, outputs, wheels
 
 INTEGRATORS = {"exudyn": "RK44", "mujoco": "RK4"}
-"""What each engine calls the classical Runge-Kutta method."""
-METHODS = {
+"""Name of the classical Runge-Kutta method in each engine."""
+ALLOWED_INTEGRATORS = {
     engine: tuple(name for name, method in CATALOGUE[engine].items() if method.nodes != "any") for engine in INTEGRATORS
 }
-"""All that read nothing between half steps."""
-DIFFERENCES = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
-"""Weights of f(i h) - f(-i h) in h f'(0): central differences of order six (by their defining equations)."""
+"""Integrators of each engine that read the road at half steps only."""
+DIFFERENCE_WEIGHTS = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
+"""Weights of f(i h) - f(-i h) in h f'(0), by i: central differences of order six."""
 SMOOTH_STEP, CORNERED_STEP = 4e-3, 1e-5
-"""Their step h (m, rad, m/s, rad/s): on sines and lines the first errs by h^6 / 140 and by rounding, both below 1e-13;
-curves with corners and friction need the second, which rounding keeps to 1e-11."""
+"""Steps h (m, rad, m/s, rad/s) of the central differences, for smooth laws, with errors below 1e-13, and for laws with
+corners and friction, with errors of 1e-11."""
 
 
 class SpatialModel(Model, Protocol):
-    """A vehicle in space in an engine, which also gives the linear vehicle that ride needs."""
+    """A spatial vehicle in an engine, which also gives the linear vehicle that ride needs."""
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,); ``road`` (2 w,) : heights (m), then their rates (m/s), which replace the model's own
-        road.
-        """
+        """Accelerations (n,) at a time (s), positions and rates (n,); ``road`` (2 w,) replaces the model's own road:
+        heights (m), then rates (m/s) under w tyres."""
         ...
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
-        """March from positions and rates (n,), or from rest in the design position."""
+        """Trajectory from positions and rates (n,), or from rest in the design position."""
         ...
 
     def linearise(self) -> LinearVehicle:
-        """The vehicle as the engine itself linearises it about the design position."""
+        """The linear vehicle, as the engine linearises it about the design position."""
         ...
 
 
@@ -64,16 +63,16 @@ def build(
     speed: float | None = None,
     road: np.ndarray | None = None,
 ) -> SpatialModel:
-    """Build a vehicle in space in "exudyn" or "mujoco".
+    """Model of a spatial vehicle in "exudyn" or "mujoco".
 
     settings : wanted for runs in time; Refused where the step does not fit or a mode would grow.
     speed : m/s, for side forces and drag; InputError where they miss it.
     road : heights (m) under the tyres, then their rates (m/s), at every half step: (2 steps + 1, 2 w); None: flat.
     """
-    check_whole(engine, vehicle)
+    check_buildable(engine, vehicle)
     linear = linearise(vehicle, speed)
     if settings is not None:
-        _check(engine, linear, settings, road)
+        _check_run(engine, linear, settings, road)
     elif road is not None:
         raise Refused(engine, "a road is read by half steps: it needs settings with a step")
     kind = getattr(import_module(f"models.engines.spatial_{engine}"), f"Spatial{engine.capitalize()}")
@@ -81,10 +80,9 @@ def build(
     return model
 
 
-def check_whole(engine: str, vehicle: SpatialVehicle) -> None:
-    """Refuse a vehicle that "exudyn" and "mujoco" cannot build: a reduced one, one with axes that turn with a body, or
-    one with springs along coordinates.
-    """
+def check_buildable(engine: str, vehicle: SpatialVehicle) -> None:
+    """Raise Refused for a vehicle that "exudyn" and "mujoco" cannot build: a reduced vehicle, one with spring axes that
+    turn with a body, or one with springs along coordinates."""
     if vehicle.limits:
         raise Refused(
             engine,
@@ -105,11 +103,12 @@ def check_whole(engine: str, vehicle: SpatialVehicle) -> None:
         )
 
 
-def _check(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndarray | None) -> None:
-    """Refuse integrators, roads and steps with which a run would give wrong answers."""
-    if settings.integrator not in METHODS[engine]:
+def _check_run(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndarray | None) -> None:
+    """Raise Refused for integrators, roads and steps with which a run would compute wrong results."""
+    if settings.integrator not in ALLOWED_INTEGRATORS[engine]:
         raise Refused(
-            engine, f"vehicles in space march with {' or '.join(METHODS[engine])}, not with {settings.integrator}"
+            engine,
+            f"vehicles in space march with {' or '.join(ALLOWED_INTEGRATORS[engine])}, not with {settings.integrator}",
         )
     check_divides(engine, settings)
     shape = (2 * settings.steps + 1, 2 * len(linear.wheels))
@@ -123,47 +122,49 @@ def _check(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndar
 
 
 def check_divides(engine: str, settings: Settings) -> None:
-    """Refuse a step that does not divide the duration."""
+    """Raise Refused for a step that does not divide the duration."""
     step, duration = settings.step, settings.duration
     if not divides(step, duration):
         raise Refused(
             engine,
             f"the step {step:g} s does not divide the duration {duration:g} s; use for "
-            f"example {fitting(step, duration)} s",
+            f"example {dividing_step(step, duration)} s",
         )
 
 
 def check_modes(engine: str, linear: LinearVehicle, settings: Settings) -> None:
-    """Refuse a step with which a mode of the linear vehicle grows, although the mode itself does not."""
+    """Raise Refused for a step with which a mode of the linear vehicle grows, although the mode itself does not."""
     n = len(linear.mass)
     damping, stiffness = np.split(np.linalg.solve(linear.mass, np.hstack([linear.damping, linear.stiffness])), 2, 1)
     parts = (np.eye(n), damping, stiffness, *np.zeros((2, n, n)))  # no engine knows its callback's damping
     name, h, duration = settings.integrator, settings.step, settings.duration
     poles = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
-    if growth(name, h, duration, parts) > math.log(GROWTH) + max(0.0, float(poles.real.max())) * duration:
+    if log_growth(name, h, duration, parts) > math.log(ALLOWED_GROWTH) + max(0.0, float(poles.real.max())) * duration:
         raise Refused(
             engine,
             f"at a step of {h:g} s {name} lets a mode of the vehicle grow; use at most "
-            f"{limit(name, h, duration, parts):.3g} s",
+            f"{longest_stable_step(name, h, duration, parts):.3g} s",
         )
 
 
 def difference_step(vehicle: SpatialVehicle) -> float:
-    """Step of central differences that suits the vehicle's laws: one size for laws with corners, another for smooth
-    laws.
-    """
-    return CORNERED_STEP if curves(vehicle) else SMOOTH_STEP
+    """Step of central differences that suits the vehicle's force laws: one size for laws with corners, another for
+    smooth laws."""
+    return CORNERED_STEP if curve_count(vehicle) else SMOOTH_STEP
 
 
-def curves(vehicle: SpatialVehicle) -> int:
+def curve_count(vehicle: SpatialVehicle) -> int:
     """Number of nonlinear curves and dry frictions in the springs of a vehicle."""
     return sum((s.travel_force is not None) + (s.rate_force is not None) + (s.friction != 0) for s in vehicle.springs)
 
 
 def jacobian(function: Callable[[np.ndarray], np.ndarray], size: int, step: float) -> np.ndarray:
-    """Jacobian (outputs, size) of a function at 0, by the central differences in DIFFERENCES."""
+    """Jacobian (outputs, size) of a function at 0, by central differences of order six with a step."""
     columns = [
-        sum(weight * (function(i * step * unit) - function(-i * step * unit)) for i, weight in DIFFERENCES.items())
+        sum(
+            weight * (function(i * step * unit) - function(-i * step * unit))
+            for i, weight in DIFFERENCE_WEIGHTS.items()
+        )
         / step
         for unit in np.eye(size)
     ]
@@ -180,7 +181,8 @@ class EngineKinematics(Kinematics):
         self._shift, self._turn = shift, turn
 
     def shift(self, body: str | None, point: Vector) -> np.ndarray:
-        """Jacobian (3, n) of a point's (m) displacement with respect to the coordinates; zeros on the ground, None."""
+        """Jacobian (3, n) of a point's (m) displacement with respect to the coordinates; zeros for a point on the
+        ground (None)."""
         return np.zeros((3, self.size)) if body is None else self._shift(body, point)
 
     def turn(self, body: str) -> np.ndarray:
@@ -198,8 +200,7 @@ def linear_vehicle(
     road: np.ndarray,
 ) -> LinearVehicle:
     """The linear vehicle from an engine's matrices; ``road`` (n, 2 w) : generalised forces per road height, then per
-    rate.
-    """
+    rate, under w tyres."""
     by_height, by_rate = np.split(road, 2, axis=1)
     source = f"{engine}, " + ("loaded" if vehicle.gravity else "unloaded")
     return LinearVehicle(
@@ -215,34 +216,34 @@ def linear_vehicle(
     )
 
 
-SPEEDS = (5.0, 15.0, 45.0)
-"""Speeds (m/s) that are linearised; any three would do."""
+LINEARISED_SPEEDS = (5.0, 15.0, 45.0)
+"""Speeds (m/s) at which the vehicle is linearised; any three would do."""
 
 
-def at_speeds(engine: str, vehicle: SpatialVehicle) -> Callable[[float], LinearVehicle]:
-    """Function that gives the vehicle at a speed (m/s, above 0), as the engine linearises it. It needs one or three
-    linearisations in all.
+def linear_vehicle_at_speeds(engine: str, vehicle: SpatialVehicle) -> Callable[[float], LinearVehicle]:
+    """Function that gives the linear vehicle at a speed (m/s, above 0), as the engine linearises it, from one or three
+    linearisations.
 
     Side forces damp by 1 / v and drag by v, and nothing else depends on the speed: D = D0 + D1 / v + D2 v exactly.
     """
     if not vehicle.side_forces and not vehicle.drags:
         only = build(engine, vehicle).linearise()
         return lambda speed: only
-    linears = [build(engine, vehicle, speed=speed).linearise() for speed in SPEEDS]
-    powers = np.array([[1.0, 1.0 / speed, speed] for speed in SPEEDS])
+    linears = [build(engine, vehicle, speed=speed).linearise() for speed in LINEARISED_SPEEDS]
+    powers = np.array([[1.0, 1.0 / speed, speed] for speed in LINEARISED_SPEEDS])
     parts = np.tensordot(np.linalg.inv(powers), np.array([linear.damping for linear in linears]), 1)
 
-    def at(speed: float) -> LinearVehicle:
+    def linear_vehicle_at(speed: float) -> LinearVehicle:
         if not speed > 0:
             raise InputError(vehicle.name, "speed", speed, "side forces and drag need a speed above 0 m/s")
         return replace(linears[0], damping=parts[0] + parts[1] / speed + parts[2] * speed)
 
-    return at
+    return linear_vehicle_at
 
 
-def sound(
+def checked_trajectory(
     engine: str, settings: Settings, times: np.ndarray, states: np.ndarray, note: str, counts: dict[str, int]
 ) -> Trajectory:
-    """The trajectory, after the checks of ``guard``; raises RunFailed."""
+    """The trajectory of a run, after the checks of ``guard``; raises RunFailed."""
     guard(engine, times, states, settings.duration, note)
     return Trajectory(times, states, counts=counts)

@@ -1,4 +1,4 @@
-"""Accelerations of a vehicle in space written down by hand: what both engines are compared with.
+"""Hand-written accelerations of a spatial vehicle, with which both engines are compared.
 
 Every body's centre and turning velocity as rows of the rates, body by body from the ground outwards; the sums of
 Jourdain's principle over bodies and forces; one linear solve. The laws are those of ``models.vehicles.spatial``, read
@@ -15,10 +15,9 @@ from models.vehicles.spatial_linear import preloads
 
 
 @dataclass
-class Motion:
-    """Motion of a body: position of its centre, rotation, Jacobians (3, n) of both, and the parts (3,) of their
-    accelerations that do not depend on q''.
-    """
+class BodyMotion:
+    """Motion of a body: position of its centre, rotation, Jacobians (3, n) of both, and the terms (3,) of their
+    accelerations that do not depend on q''."""
 
     centre: np.ndarray
     rotation: np.ndarray
@@ -28,31 +27,32 @@ class Motion:
     turn_rest: np.ndarray
 
     def at(self, arm: np.ndarray, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Position and Jacobian of the point at ``arm`` (body's axes) from the centre, and the part of its acceleration
-        that does not depend on q''.
-        """
+        """Position and Jacobian of a body's point at ``arm`` (body's axes) from the centre, and the term of its
+        acceleration that does not depend on q''."""
         r = self.rotation @ arm
-        rows = self.shift - across(r) @ self.turn
-        rest = self.shift_rest - across(r) @ self.turn_rest + across(omega) @ (across(omega) @ r)
+        rows = self.shift - cross_product_matrix(r) @ self.turn
+        rest = (
+            self.shift_rest
+            - cross_product_matrix(r) @ self.turn_rest
+            + cross_product_matrix(omega) @ (cross_product_matrix(omega) @ r)
+        )
         return self.centre + r, rows, rest
 
 
-def across(v: np.ndarray) -> np.ndarray:
-    """The matrix (3, 3) that multiplies a vector by v (3,) from the left, v x; ten times as fast as numpy's own
-    product.
-    """
+def cross_product_matrix(v: np.ndarray) -> np.ndarray:
+    """The matrix (3, 3) of the cross product v x of a vector v (3,); ten times as fast as numpy's own product."""
     x, y, z = v.tolist()
     return np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
 
 
 def _rotation_about(axis: int, angle: float) -> np.ndarray:
-    """Rotation matrix about a unit axis (Rodrigues)."""
-    cross = across(UNIT[axis])
+    """Rotation matrix (3, 3) about coordinate axis number ``axis`` by an angle (rad), after Rodrigues."""
+    cross = cross_product_matrix(UNIT[axis])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 class SpatialReference:
-    """A vehicle in space as equations of motion, without an engine."""
+    """Hand-written equations of motion of a spatial vehicle, without an engine."""
 
     def __init__(self, vehicle: SpatialVehicle, speed: float | None = None) -> None:
         self.vehicle, self.speed, self.held = vehicle, float(speed or 0.0), preloads(vehicle)
@@ -60,7 +60,8 @@ class SpatialReference:
         self.size = len(self.index)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) from positions and rates (n,); ``road`` (2 w,): heights (m), then their rates (m/s)."""
+        """Accelerations (n,) from positions and rates (n,); ``road`` (2 w,): heights (m), then rates (m/s) under w
+        tyres."""
         self.q, self.v, self.motions = q, v, self.motions_of(q, v)
         mass, force = np.zeros((self.size, self.size)), np.zeros(self.size)
         for body in self.vehicle.bodies:
@@ -68,19 +69,20 @@ class SpatialReference:
             inertia, omega = m.rotation @ np.array(body.inertia) @ m.rotation.T, m.turn @ v
             mass += body.mass * m.shift.T @ m.shift + m.turn.T @ inertia @ m.turn
             force -= body.mass * m.shift.T @ (m.shift_rest + self.vehicle.gravity * UNIT[2])
-            force -= m.turn.T @ (inertia @ m.turn_rest + across(omega) @ inertia @ omega)
+            force -= m.turn.T @ (inertia @ m.turn_rest + cross_product_matrix(omega) @ inertia @ omega)
         force += self._forces(np.zeros(2 * len(self.vehicle.tyres)) if road is None else road)
         return np.linalg.solve(mass, force)
 
-    def motions_of(self, q: np.ndarray, v: np.ndarray) -> dict[str, Motion]:
-        """Motions of all bodies, parents first. Each freedom shifts along, or turns about, an axis that the freedoms
-        before it have turned.
-        """
-        motions: dict[str, Motion] = {}
+    def motions_of(self, q: np.ndarray, v: np.ndarray) -> dict[str, BodyMotion]:
+        """Motions of all bodies at positions and rates (n,), parents first. Each freedom shifts along, or turns about,
+        an axis that the freedoms before it have turned."""
+        motions: dict[str, BodyMotion] = {}
         for body in self.vehicle.bodies:
             rows = np.zeros((3, self.size))
             below = (
-                motions[body.parent] if body.parent else Motion(np.zeros(3), UNIT, rows, rows, rows[:, 0], rows[:, 0])
+                motions[body.parent]
+                if body.parent
+                else BodyMotion(np.zeros(3), UNIT, rows, rows, rows[:, 0], rows[:, 0])
             )
             origin = self.vehicle.body(body.parent).position if body.parent else (0.0, 0.0, 0.0)
             arm, turned_rows, omega = np.subtract(body.position, origin), rows.copy(), below.turn @ v
@@ -89,25 +91,25 @@ class SpatialReference:
                     arm[k] += q[self.index[body.name, freedom]]
                     turned_rows[:, self.index[body.name, freedom]] = below.rotation[:, k]
             centre, shift, rest = below.at(arm, omega)
-            m = Motion(
+            m = BodyMotion(
                 centre,
                 below.rotation,
                 shift + turned_rows,
                 below.turn.copy(),
-                rest + 2 * across(omega) @ turned_rows @ v,
+                rest + 2 * cross_product_matrix(omega) @ turned_rows @ v,
                 below.turn_rest.copy(),
             )
             for k, freedom in enumerate(FREEDOMS[3:]):
                 if freedom in body.freedoms:
                     i, axis = self.index[body.name, freedom], m.rotation[:, k]
-                    m.turn_rest += across(m.turn @ v) @ axis * v[i]
+                    m.turn_rest += cross_product_matrix(m.turn @ v) @ axis * v[i]
                     m.turn[:, i] += axis
                     m.rotation = m.rotation @ _rotation_about(k, q[i])
             motions[body.name] = m
         return motions
 
     def _point(self, body: str | None, point: Vector) -> tuple[np.ndarray, np.ndarray]:
-        """Position (3,) and Jacobian (3, n) of a point that is given in the design position."""
+        """Position (3,) and Jacobian (3, n) of a point (m) that is given in the design position."""
         if body is None:
             return np.array(point), np.zeros((3, self.size))
         return self.motions[body].at(np.subtract(point, self.vehicle.body(body).position), np.zeros(3))[:2]
@@ -136,6 +138,7 @@ class SpatialReference:
         return out
 
     def _spring(self, s: SpringDamper) -> np.ndarray:
+        """Generalised forces (n,) of a spring-damper."""
         travel, row = self._travel((s.first_body, s.first_point), (s.second_body, s.second_point), s.axis, s.frame)
         rate = row @ self.v
         force = self.held.parts[s.name] + s.stiffness * travel + s.damping * rate
@@ -143,9 +146,8 @@ class SpatialReference:
         return -(force + s.friction * np.tanh(rate / s.friction_rate)) * row
 
     def _bar(self, bar: AntiRollBar) -> np.ndarray:
-        """Generalised forces (n,) of an anti-roll bar. Where the bar's frame is the body itself, the roll of the body
-        is not counted.
-        """
+        """Generalised forces (n,) of an anti-roll bar. Where the bar's frame is the body itself, the body's roll is not
+        counted."""
         ends = (bar.right, bar.point_right), (bar.left, bar.point_left)
         apart, row = self._travel(*ends, (0.0, 0.0, 1.0), bar.frame)
         roll = np.eye(self.size)[self.index[bar.body, "rx"]] * (bar.frame != bar.body)
@@ -154,9 +156,8 @@ class SpatialReference:
         return np.asarray(-moment * row)
 
     def _travel(self, from_end: End, to_end: End, axis: Vector, frame: str | None) -> tuple[float, np.ndarray]:
-        """Distance of two points along an axis less its value in the design position, axis . (point to_end - point
-        from_end), and its derivatives (n,).
-        """
+        """Distance (m) of two points along an axis less its value in the design position, axis . (point to_end - point
+        from_end), and its derivatives (n,)."""
         (first, of_first), (second, of_second) = self._point(*from_end), self._point(*to_end)
         along, apart, row = np.array(axis), np.subtract(to_end[1], from_end[1]), np.zeros(self.size)
         if frame is not None:

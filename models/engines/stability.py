@@ -1,4 +1,4 @@
-"""Which step an explicit integrator can take: computed from the vehicle before a run, not seen after it.
+"""Largest stable step of an explicit integrator, computed from the vehicle before a run.
 
 A step that is too long does not always show: a mode that grows by a tenth per step leaves a short run
 finite, of sane size and wrong. So each fixed-step integrator is written here as the matrix that takes
@@ -21,27 +21,27 @@ from models.core.errors import Refused
 from models.engines.assembly import Assembly, Settings
 from models.vehicles.description import Vehicle, matrices
 
-Linear = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""M, D, K, the part of D that an engine knows of (no callbacks) and the part of that which sits on single joints
-(tyres, pitch springs), (n, n) each."""
+LinearMatrices = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Matrices (n, n) of a linear vehicle: mass, damping, stiffness, the damping that the engine knows (without callbacks),
+and the part of the latter on single joints (tyres, pitch springs)."""
 
-GROWTH = 2.0
-"""How much a mode may grow over a run. Rounding moves the double eigenvalue 1 of a free vehicle by 1e-7,
-which is 1.06 over 10 minutes at 1 kHz; a step 3 % above RK4's limit passes 2 after seven steps."""
+ALLOWED_GROWTH = 2.0
+"""Factor by which a mode may grow over a run. Rounding moves the double eigenvalue 1 of a free vehicle by 1e-7, which
+is 1.06 over 10 minutes at 1 kHz; a step 3 % above RK4's limit passes 2 after seven steps."""
 
 LONG_RUN = 1000
-"""Steps that a named limit must hold for: in a run of eight even RK4 at 4.1 ms does not double."""
+"""Number of steps for which a stated step limit must hold: in a run of eight even RK4 at 4.1 ms does not double."""
 
 TAYLOR = {1: ("ExplicitEuler",), 2: ("ExplicitMidpoint",), 3: ("RK33",), 4: ("RK44", "RK4")}
-"""Runge-Kutta methods whose number of stages is their order: R(z) is the Taylor polynomial of exp."""
+"""Runge-Kutta methods, by order, whose number of stages is their order: the stability polynomial is the Taylor
+polynomial of exp."""
 RK67_SEVENTH = -2.2652475842503 / math.factorial(7)
 """Coefficient of z^7 of Exudyn's seven stages of order six, measured from one step (residual 1e-15)."""
 
 
-def coefficients(integrator: str) -> list[float] | None:
+def stability_polynomial(integrator: str) -> list[float] | None:
     """Coefficients of the stability polynomial R(z) of a Runge-Kutta method, lowest power first; None for other
-    methods.
-    """
+    methods."""
     for order, names in TAYLOR.items():
         if integrator in names:
             return [1 / math.factorial(k) for k in range(order + 1)]
@@ -50,10 +50,9 @@ def coefficients(integrator: str) -> list[float] | None:
     return None
 
 
-def linearised(vehicle: Vehicle, guided: Collection[int] = ()) -> Linear:
-    """The vehicle's matrices about zero pitch without ``guided`` coordinates, where the vehicle is stiffest: with
-    springs as beyond their dead bands and tyres on the road.
-    """
+def linearised(vehicle: Vehicle, guided: Collection[int] = ()) -> LinearMatrices:
+    """The vehicle's matrices about zero pitch, without the ``guided`` coordinates: pitch springs as beyond their dead
+    bands, and tyres on the road."""
     known = replace(vehicle, struts=tuple(strut for strut in vehicle.struts if not strut.pushes_only))
     taut = tuple(replace(spring, dead_band=0.0) for spring in vehicle.pitch_springs)
     mass, damping, stiffness = matrices(replace(vehicle, pitch_springs=taut))
@@ -63,7 +62,7 @@ def linearised(vehicle: Vehicle, guided: Collection[int] = ()) -> Linear:
     return mass[pick], damping[pick], stiffness[pick], native[pick], joint[pick]
 
 
-def first_order(linear: Linear) -> np.ndarray:
+def first_order(linear: LinearMatrices) -> np.ndarray:
     """State matrix A (2n, 2n) of y' = A y, where y = (q, q')."""
     mass, damping, stiffness, *_ = linear
     n = len(mass)
@@ -71,14 +70,13 @@ def first_order(linear: Linear) -> np.ndarray:
     return np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]])
 
 
-def step_matrix(integrator: str, step: float, linear: Linear) -> np.ndarray | None:
-    """Matrix (2n, 2n) that advances (q, q') by one step of ``step`` seconds; None for integrators that are stable in
-    any step.
+def step_matrix(integrator: str, step: float, linear: LinearMatrices) -> np.ndarray | None:
+    """Matrix (2n, 2n) that advances (q, q') by one step (s); None for integrators that are stable with any step.
 
     That is so for generalised-alpha, the trapezoidal rule and MuJoCo's ``discrete``, which are implicit in
     position and velocity, and for adaptive integrators, which shorten their own steps.
     """
-    polynomial = coefficients(integrator)
+    polynomial = stability_polynomial(integrator)
     if polynomial is not None:
         z = step * first_order(linear)
         out = np.zeros_like(z)
@@ -95,7 +93,7 @@ def step_matrix(integrator: str, step: float, linear: Linear) -> np.ndarray | No
     return _semi_implicit(step, linear, implicit[integrator]) if integrator in implicit else None
 
 
-def _verlet(step: float, linear: Linear) -> np.ndarray:
+def _verlet(step: float, linear: LinearMatrices) -> np.ndarray:
     """Matrix (3n, 3n) that advances (q, q', q'') by one step of Exudyn's velocity Verlet.
 
     The acceleration at the end of a step uses the velocity at its middle, and the next step begins with this
@@ -110,10 +108,9 @@ def _verlet(step: float, linear: Linear) -> np.ndarray:
     return np.vstack([after, v + 0.5 * step * (first + second), second])
 
 
-def _semi_implicit(step: float, linear: Linear, implicit: np.ndarray) -> np.ndarray:
-    """Matrix of one of MuJoCo's single steps: new velocities, with part of the damping implicit, then positions from
-    these.
-    """
+def _semi_implicit(step: float, linear: LinearMatrices, implicit: np.ndarray) -> np.ndarray:
+    """Matrix (2n, 2n) of one step of MuJoCo's single-step integrators: new velocities, with the damping ``implicit``
+    implicit, then positions from these."""
     mass, damping, stiffness, *_ = linear
     n = len(mass)
     q, v = np.eye(2 * n)[:n], np.eye(2 * n)[n:]
@@ -121,7 +118,7 @@ def _semi_implicit(step: float, linear: Linear, implicit: np.ndarray) -> np.ndar
     return np.vstack([q + step * after, after])
 
 
-def growth(integrator: str, step: float, duration: float, linear: Linear) -> float:
+def log_growth(integrator: str, step: float, duration: float, linear: LinearMatrices) -> float:
     """Natural logarithm of the factor by which the fastest growing mode grows over a run; 0 if none grows."""
     matrix = step_matrix(integrator, step, linear)
     if matrix is None:
@@ -130,15 +127,15 @@ def growth(integrator: str, step: float, duration: float, linear: Linear) -> flo
     return max(0.0, duration / step * math.log(radius)) if math.isfinite(radius) else math.inf
 
 
-def limit(integrator: str, step: float, duration: float, linear: Linear) -> float:
+def longest_stable_step(integrator: str, step: float, duration: float, linear: LinearMatrices) -> float:
     """Longest step (s), to four digits, at which no mode grows over the run; the search starts at an unstable step."""
-    allowed, stable = math.log(GROWTH), step / 2
-    while growth(integrator, stable, duration, linear) > allowed and stable > 1e-12 * step:
+    allowed, stable = math.log(ALLOWED_GROWTH), step / 2
+    while log_growth(integrator, stable, duration, linear) > allowed and stable > 1e-12 * step:
         stable /= 2
     unstable = 2 * stable
     while unstable - stable > 1e-5 * stable:
         middle = 0.5 * (stable + unstable)
-        if growth(integrator, middle, duration, linear) > allowed:
+        if log_growth(integrator, middle, duration, linear) > allowed:
             unstable = middle
         else:
             stable = middle
@@ -146,23 +143,26 @@ def limit(integrator: str, step: float, duration: float, linear: Linear) -> floa
 
 
 def check_step(engine: str, assembly: Assembly, settings: Settings) -> None:
-    """Refuse a step with which a mode of the vehicle would grow; the message gives the limit and the fastest pole."""
+    """Raise Refused for a step with which a mode of the vehicle would grow; the message gives the limit and the fastest
+    pole."""
     linear = linearised(assembly.vehicle, assembly.guided)
-    grown = growth(settings.integrator, settings.step, settings.duration, linear)
-    if grown <= math.log(GROWTH):
+    grown = log_growth(settings.integrator, settings.step, settings.duration, linear)
+    if grown <= math.log(ALLOWED_GROWTH):
         return
-    longest = limit(settings.integrator, settings.step, max(settings.duration, LONG_RUN * settings.step), linear)
+    longest = longest_stable_step(
+        settings.integrator, settings.step, max(settings.duration, LONG_RUN * settings.step), linear
+    )
     scale = 10.0 ** (math.floor(math.log10(longest)) - 2)  # three digits, rounded down: a limit that is named must hold
     raise Refused(
         engine,
         f"step {settings.step:g} s exceeds the stability limit {math.floor(longest / scale) * scale:g} s of "
-        f"{settings.integrator} for this vehicle (fastest pole {_pole(linear)}): an error would grow "
+        f"{settings.integrator} for this vehicle (fastest pole {_fastest_pole_text(linear)}): an error would grow "
         f"1e{grown / math.log(10):.0f}-fold over the run; shorten the step",
     )
 
 
-def _pole(linear: Linear) -> str:
-    """Text of the vehicle's eigenvalue with the largest magnitude."""
+def _fastest_pole_text(linear: LinearMatrices) -> str:
+    """Text of the vehicle's eigenvalue with the largest magnitude, in 1/s."""
     poles = np.linalg.eigvals(first_order(linear))
     pole = complex(poles[np.abs(poles).argmax()])
     real = 0.0 if abs(pole.real) < 1e-9 * abs(pole) else pole.real

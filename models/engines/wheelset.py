@@ -1,4 +1,4 @@
-"""A wheelset on rails whose equations of motion an engine writes.
+"""A wheelset on rails whose accelerations an engine computes.
 
 It is a free vehicle (``free_vehicle``): one body behind five joints, with its weight, the primary suspension as
 elements of the engine, and both rails as the compiled forces. The suspension's ends are points of the axle, which spin
@@ -22,10 +22,9 @@ from models.vehicles.spatial import Body, SpatialVehicle
 CENTRE = (0.0, 0.0, 0.0)
 
 
-def driven_by(equations: Equations) -> Driven:
+def driven_wheelset(equations: Equations) -> Driven:
     """The wheelset as engines build it: bodies in the order of the joints, the suspension at both ends, and the table
-    of numbers for the forces of the rails.
-    """
+    of numbers for the forces of the rails."""
     body = equations.body
     across, along = body.across, body.along
     inertia = ((across, 0.0, 0.0), (0.0, along, 0.0), (0.0, 0.0, across))
@@ -47,12 +46,13 @@ def driven_by(equations: Equations) -> Driven:
 
 
 class EngineWheelset(Equations):
-    """A wheelset that an engine moves along the track at a speed; parameters and results are those of ``Equations``."""
+    """A wheelset that an engine moves along the track at a constant speed; parameters and results as in
+    ``Equations``."""
 
     @cached_property
     def model(self) -> FreeModel:
         """The wheelset in its engine, with joint coordinates."""
-        return free_model(self.ENGINE, driven_by(self))
+        return free_model(self.ENGINE, driven_wheelset(self))
 
     def rates(self, state: Array) -> Array:
         """Time derivatives (10,) of a state (10,), computed by the engine."""
@@ -60,7 +60,7 @@ class EngineWheelset(Equations):
         return rates_of(joints, self.model.acceleration(0.0, joints[:JOINTS], joints[JOINTS:]))
 
     def _marched(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
-        """States by the engine's RK4, every ``stride``-th of them, and the contacts in these states."""
+        """States (m, 10) by the engine's RK4, every ``stride``-th of them, and the contacts in these states."""
         joints = to_joints(state)
         states = from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], count, step))
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < DERAILED_LIMIT)

@@ -1,4 +1,4 @@
-"""Many paths of one scene: a runner over any executor, and the jobs that it runs.
+"""Ensembles: many computations of one scene on any executor, with finished blocks stored and resumed.
 
 ::
 

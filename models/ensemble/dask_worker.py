@@ -1,4 +1,4 @@
-"""What a worker of a Dask cluster is told before it computes: imported only where there is a cluster."""
+"""Set-up of the workers of a Dask cluster; imported only where there is a cluster."""
 
 import dask
 from distributed import Worker, WorkerPlugin
@@ -6,8 +6,8 @@ from distributed import Worker, WorkerPlugin
 from models.ensemble.workers import keep_freed_memory
 
 
-class Plain(WorkerPlugin):
-    """Dask plugin: tasks do not use a scheduler, and a worker keeps freed memory as local workers do.
+class WorkerSetup(WorkerPlugin):
+    """Dask plugin: tasks on a worker use no scheduler, and a worker keeps freed memory as local workers do.
 
     Otherwise xarray would ask the scheduler in vain for locks on files in a worker's own memory.
     """

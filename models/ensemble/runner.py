@@ -1,4 +1,4 @@
-"""Blocks of work on any executor: progress, finished blocks kept, resumed with the same bits.
+"""Runner of blocks of work on any executor; finished blocks are stored, and a run resumes with identical bits.
 
 A job is called with a block and gives named arrays. It must depend on the block alone, so that the result does not
 depend on who computes which block, or when. ``each_block`` gives the arrays of all blocks in their order, and holds no
@@ -21,23 +21,23 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.core.whole_files import DISK_FULL_ERRORS, reason_of
+from models.core.whole_files import DISK_FULL_ERRORS, write_error_phrase
 from models.ensemble.store import Arrays, Store
 
 PATHS_PER_BLOCK = 50
-"""Paths per block: half a second of work of the pitch plane over 60 s, which a killed run may lose."""
+"""Number of paths per block: half a second of work of the pitch plane over 60 s, which a killed run may lose."""
 BLOCKS_AHEAD = 64
-"""Blocks under way at once, so that the memory for results on their way stays bounded; two per worker of a cluster that
-has more."""
+"""Most blocks that are computed or waiting at once, so that memory stays bounded; two per worker of a cluster that has
+more workers."""
 NAMED_FAILURES = 5
-"""Failed blocks that a message names."""
+"""Most failed blocks that a message names."""
 MOST_WORKER_LOSSES, AMONG_OTHERS = 4, 2
-"""Times that a block may lose its worker, of which so many among others; then it is computed alone, and is to blame
-where that fails twice: once may be anybody's kill."""
+"""Number of times that a block may lose its worker before it fails, and number of these among other blocks; afterwards
+the block is computed alone, to tell whether it is to blame."""
 
 
 T = TypeVar("T")
-"""A block of work."""
+"""Type of a block of work."""
 
 
 class Blocks(NamedTuple):
@@ -48,44 +48,44 @@ class Blocks(NamedTuple):
     ahead: int = BLOCKS_AHEAD
 
     def count(self, paths: int) -> int:
-        """Number of blocks."""
+        """Number of blocks for a number of paths."""
         return -(-paths // self.size)
 
     def block(self, block_number: int, paths: int) -> range:
-        """Path numbers of a block."""
+        """Numbers of the paths in a block."""
         return range(block_number * self.size, min((block_number + 1) * self.size, paths))
 
 
 DEFAULT_BLOCKS = Blocks()
-"""As paths are cut where nothing else is asked for."""
+"""Default division of paths into blocks."""
 
 
 class PathJob(Protocol):
-    """The computation that an ensemble repeats for each path; it must survive pickling to run in other processes."""
+    """Protocol of a computation that an ensemble repeats for each path; it must survive pickling."""
 
     def __call__(self, paths: range) -> Arrays:
         """Named arrays with the results of these paths; their first axis runs over the paths."""
         ...
 
     def facts(self) -> dict[str, Any]:
-        """All inputs that determine the result: numbers, text, arrays, and dictionaries of these."""
+        """All inputs that determine the result of the job: numbers, text, arrays, and dictionaries of these."""
         ...
 
 
 class PathFailed(RuntimeError):
-    """A path that could not be computed, with its number; jobs raise it so that the message can name the path."""
+    """Error for a path that could not be computed, with its number, so that the message can name the path."""
 
     def __init__(self, path: int, reason: str) -> None:
         super().__init__(path, reason)
 
     def __str__(self) -> str:
+        """Number of the path and reason, as text."""
         return f"path {self.args[0]}: {self.args[1]}"
 
 
 @dataclass(frozen=True)
 class EnsembleProgress:
-    """Progress of an ensemble: paths done, total number of paths, paths per second, and seconds left (infinite before
-    the first block)."""
+    """Progress of an ensemble: finished and all paths, paths per second, seconds left (infinite at first)."""
 
     done: int
     paths: int
@@ -93,13 +93,14 @@ class EnsembleProgress:
     seconds_left: float
 
     def __str__(self) -> str:
+        """Finished paths, rate and time left, as text."""
         left = f", {self.seconds_left:.0f} s left" if self.rate else ""
         return f"{self.done} of {self.paths} paths, {self.rate:.3g} per second{left}"
 
 
 @dataclass(frozen=True)
 class _Failure:
-    """Failure that a worker returns instead of an answer, since many exceptions cannot be sent between processes."""
+    """Failure that a worker returns instead of results, since many exceptions cannot be sent between processes."""
 
     reason: str
     full: bool = False
@@ -108,8 +109,8 @@ class _Failure:
 
 
 @dataclass
-class _Memory:
-    """Finished blocks, kept in memory only."""
+class _MemoryStore:
+    """Store of finished blocks in memory only."""
 
     blocks: dict[int, Arrays] = field(default_factory=dict)
 
@@ -125,22 +126,22 @@ class _Memory:
 
 @dataclass
 class _PathCounter:
-    """Counts finished paths, and reports the time left for the others."""
+    """Counter of finished paths that reports the progress and the time left."""
 
     paths: int
     done: int
-    tell: Callable[[EnsembleProgress], None]
+    report: Callable[[EnsembleProgress], None]
     start_time: float = field(default_factory=time.perf_counter)
-    before: int = 0
+    done_at_start: int = 0
 
     def __post_init__(self) -> None:
-        self.before = self.done
-        self.tell(EnsembleProgress(self.done, self.paths, 0.0, math.inf if self.done < self.paths else 0.0))
+        self.done_at_start = self.done
+        self.report(EnsembleProgress(self.done, self.paths, 0.0, math.inf if self.done < self.paths else 0.0))
 
     def add(self, paths: int) -> None:
         self.done += paths
-        rate = (self.done - self.before) / (time.perf_counter() - self.start_time)
-        self.tell(EnsembleProgress(self.done, self.paths, rate, (self.paths - self.done) / rate))
+        rate = (self.done - self.done_at_start) / (time.perf_counter() - self.start_time)
+        self.report(EnsembleProgress(self.done, self.paths, rate, (self.paths - self.done) / rate))
 
 
 def run_paths(
@@ -150,14 +151,13 @@ def run_paths(
     executor: Executor | None = None,
     blocks: Blocks = DEFAULT_BLOCKS,
     progress: Callable[[EnsembleProgress], None] = lambda state: None,
-    lost: Callable[[range, str], Arrays] | None = None,
+    replacement: Callable[[range, str], Arrays] | None = None,
 ) -> Arrays:
-    """Arrays of all paths 0 to ``paths`` - 1; bitwise the same on any executor, in any order and after any
-    interruption.
+    """Arrays of all paths 0 to ``paths`` - 1 by name; bitwise identical on any executor and after interruptions.
 
     The arguments are those of ``each_block``.
     """
-    arrays = list(each_block(job, paths, folder, executor, blocks, progress, lost))
+    arrays = list(each_block(job, paths, folder, executor, blocks, progress, replacement))
     return {name: np.concatenate([block[name] for block in arrays]) for name in arrays[0]}
 
 
@@ -168,22 +168,21 @@ def each_block(
     executor: Executor | None = None,
     blocks: Blocks = DEFAULT_BLOCKS,
     progress: Callable[[EnsembleProgress], None] = lambda state: None,
-    lost: Callable[[range, str], Arrays] | None = None,
+    replacement: Callable[[range, str], Arrays] | None = None,
 ) -> Generator[Arrays]:
-    """Arrays of the blocks of paths 0 to ``paths`` - 1, in order; each is given as soon as all earlier ones are
-    finished.
+    """Generator of the arrays of each block of paths 0 to ``paths`` - 1, in order and as early as possible.
 
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
     an InputError that names the difference; None keeps them in memory until they are given. executor : a process pool
     (``process_pool``), a Dask cluster (``cluster``), a thread pool; None computes here. A block that fails does
     not stop the others, and one that loses its worker is computed again: RunFailed then names the blocks and paths
-    that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. lost : (paths, reason)
-    -> what stands for a block that failed, in place of RunFailed; it is not kept, so that resuming tries again.
+    that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. replacement : (paths,
+    reason) -> what stands for a block that failed, in place of RunFailed; it is not kept: resuming tries again.
     """
     facts = {"paths": paths, "paths per block": blocks.size, **job.facts()}
     count, block = blocks.count(paths), partial(blocks.block, paths=paths)
-    store = _Memory() if folder is None else Store(folder)
-    with nullcontext() if isinstance(store, _Memory) else store.reserved_folder(facts):
+    store = _MemoryStore() if folder is None else Store(folder)
+    with nullcontext() if isinstance(store, _MemoryStore) else store.reserved_folder(facts):
         failed = dict[int, str]()
         counted = _PathCounter(paths, sum(len(block(i)) for i in range(count) if store.has(i)), progress)
         missing = ((i, block(i)) for i in range(count) if not store.has(i))
@@ -194,34 +193,33 @@ def each_block(
                 if store.has(blocks_given) and not failed:
                     yield store.load(blocks_given)
                     blocks_given += 1
-                elif lost is not None and (store.has(blocks_given) or blocks_given in failed):
+                elif replacement is not None and (store.has(blocks_given) or blocks_given in failed):
                     yield (
-                        lost(block(blocks_given), failed[blocks_given])
+                        replacement(block(blocks_given), failed[blocks_given])
                         if blocks_given in failed
                         else store.load(blocks_given)
                     )
                     blocks_given += 1
-                elif not _next_kept(answers, store, failed, counted):
+                elif not _store_next_answer(answers, store, failed, counted):
                     break
-        if failed and lost is None:
+        if failed and replacement is None:
             raise _failed_blocks_error({i: (block(i), reason) for i, reason in failed.items()}, folder)
 
 
-def in_order(
+def values_in_order(
     function: Callable[[T], Any],
     blocks: Iterator[T],
     executor: Executor | None = None,
     store: Store | None = None,
     ahead: int = BLOCKS_AHEAD,
 ) -> Generator[tuple[T, Any]]:
-    """Pairs of a block and the function's value for it, in the order of the blocks, each as soon as all earlier ones
-    are finished.
+    """Generator of pairs of a block and the function's value, in the order of the blocks and as early as possible.
 
     The blocks are read as they are needed, ``ahead`` of them at most. store : keeps what is finished, of a folder that
     the caller has claimed, and takes named arrays alone; what it has is not computed. Raises RunFailed for the first
     block that fails.
     """
-    values_by_index: Store | _Memory = _Memory() if store is None else store
+    values_by_index: Store | _MemoryStore = _MemoryStore() if store is None else store
     numbered, blocks_by_index, block_index = enumerate(blocks), dict[int, T](), 0
     for block_index, block in numbered:
         blocks_by_index[block_index] = block
@@ -229,16 +227,16 @@ def in_order(
             break
         yield blocks_by_index.pop(block_index), values_by_index.load(block_index)
 
-    def missing() -> Iterator[tuple[int, T]]:
+    def unfinished_blocks() -> Iterator[tuple[int, T]]:
         for i, block in chain([*blocks_by_index.items()], numbered):
             blocks_by_index[i] = block
             if not values_by_index.has(i):
                 yield i, block
 
-    with closing(_answers_of_blocks(function, missing(), executor, ahead)) as answers:
+    with closing(_answers_of_blocks(function, unfinished_blocks(), executor, ahead)) as answers:
         for i, _, answer in answers:
             if isinstance(answer, _Failure):
-                raise (_disk_full if answer.full else _lost_workers_error)(
+                raise (_disk_full_error if answer.full else _lost_workers_error)(
                     f"block {i}: {answer.reason}", values_by_index
                 )
             _save_block(values_by_index, i, answer)
@@ -250,7 +248,7 @@ def in_order(
 
 
 def block_results(function: Callable[[T], Any], blocks: Iterable[T], executor: Executor | None = None) -> list[Any]:
-    """The function's values for a few blocks, in the order of the blocks.
+    """List of the function's values for a few blocks, in the order of the blocks.
 
     Raises what the function raises for the first block that fails: InputError and RunFailed as they are, by whatever
     executor; any other error is a RunFailed where an executor computes.
@@ -266,30 +264,30 @@ def block_results(function: Callable[[T], Any], blocks: Iterable[T], executor: E
     return ordered
 
 
-def _next_kept(
+def _store_next_answer(
     block_answers: Iterator[tuple[int, range, Arrays | _Failure]],
-    store: Store | _Memory,
+    store: Store | _MemoryStore,
     failed: dict[int, str],
-    counted: _PathCounter,
+    path_counter: _PathCounter,
 ) -> bool:
-    """Store the next answer, or record why it failed; returns False when there are no more answers."""
+    """Store the next block that is finished, or record why it failed; returns False when no block is left."""
     i, block, answer = next(block_answers, (-1, range(0), _Failure("")))
     if i < 0:
         return False
     if isinstance(answer, _Failure):
         if answer.full:
-            raise _disk_full(answer.reason, store)
+            raise _disk_full_error(answer.reason, store)
         if answer.worker_is_gone:
             raise _lost_workers_error(answer.reason, store)
         failed[i] = answer.reason
         return True
     _save_block(store, i, answer)
-    counted.add(len(block))
+    path_counter.add(len(block))
     return True
 
 
 def _failed_blocks_error(failed: dict[int, tuple[range, str]], folder: Path | None) -> RunFailed:
-    """The error that lists the failed blocks and paths."""
+    """RunFailed that lists the failed blocks and paths."""
     failure_texts = [f"block {i} (paths {block[0]} to {block[-1]}): {reason}" for i, (block, reason) in failed.items()]
     folder_hint = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
     further_text = f"; {len(failed) - NAMED_FAILURES} more blocks" if len(failed) > NAMED_FAILURES else ""
@@ -297,15 +295,15 @@ def _failed_blocks_error(failed: dict[int, tuple[range, str]], folder: Path | No
 
 
 def _answers_of_blocks(
-    job: Callable[[T], Arrays], missing: Iterator[tuple[int, T]], executor: Executor | None, ahead: int
+    job: Callable[[T], Arrays], unfinished_blocks: Iterator[tuple[int, T]], executor: Executor | None, ahead: int
 ) -> Generator[tuple[int, T, Arrays | _Failure]]:
-    """Blocks and their answers in order of completion. At most ``ahead`` blocks are computed at once, and none is begun
-    more than that many after the first unfinished one."""
+    """Generator of blocks and their results or failures, in order of completion; at most ``ahead`` blocks are computed
+    at once, and none is begun more than ``ahead`` after the first unfinished one."""
     if executor is None:
-        yield from ((i, block, _compute_block(job, block)) for i, block in missing)
+        yield from ((i, block, _compute_block(job, block)) for i, block in unfinished_blocks)
         return
     ahead = ahead if ahead == 1 else max(ahead, 2 * getattr(executor, "width", 0))
-    queue, single_blocks = deque(islice(missing, ahead)), deque[tuple[int, T]]()
+    queue, single_blocks = deque(islice(unfinished_blocks, ahead)), deque[tuple[int, T]]()
     lost, waiting = Counter[int](), dict[Future, tuple[int, T]]()
     try:
         while queue or single_blocks or waiting:
@@ -314,15 +312,15 @@ def _answers_of_blocks(
                 waiting[_submitted_block(executor, job, block)] = i, block
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 i, block = waiting.pop(future)
-                error = _error(future)
+                error = _future_error(future)
                 died = _worker_died(error)
                 if died:
                     lost[i] += 1
                 if died and lost[i] < MOST_WORKER_LOSSES:
                     (single_blocks if lost[i] >= AMONG_OTHERS else queue).appendleft((i, block))
                 else:
-                    yield i, block, future.result() if error is None else _error_text(error)
-            queue.extend(islice(missing, max(ahead - len(queue), 0)))
+                    yield i, block, future.result() if error is None else _failure_of(error)
+            queue.extend(islice(unfinished_blocks, max(ahead - len(queue), 0)))
     finally:
         for future in waiting:
             future.cancel()
@@ -331,14 +329,13 @@ def _answers_of_blocks(
 def _may_begin(
     i: int, waiting: dict[Future, tuple[int, T]], single_blocks: Collection[tuple[int, T]], ahead: int
 ) -> bool:
-    """Whether a block may be started now: fewer than ``ahead`` are running, and it is less than ``ahead`` after the
-    first unfinished one."""
+    """Whether a block may be started now: fewer than ``ahead`` are running, and it is not too far ahead."""
     first = min((other_index for other_index, _ in (*waiting.values(), *single_blocks)), default=i)
     return len(waiting) < ahead and i < first + ahead
 
 
-def _error(future: Future) -> BaseException | None:
-    """Exception of a future; a future of a lost cluster counts as cancelled."""
+def _future_error(future: Future) -> BaseException | None:
+    """Exception of a future, or None; the future of a lost cluster counts as cancelled."""
     try:
         return future.exception()
     except CancelledError as error:
@@ -346,34 +343,36 @@ def _error(future: Future) -> BaseException | None:
 
 
 def _worker_died(error: BaseException | None) -> bool:
-    """Whether the error means that the block's worker died; Dask has its own exception for that."""
+    """Whether an error means that the block's worker died; Dask has its own exception for that."""
     return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
 
 
-def _save_block(store: Store | _Memory, block: int, arrays: Arrays) -> None:
-    """Save a block; RunFailed if the disk is full, since every other block would fail, too."""
+def _save_block(store: Store | _MemoryStore, block: int, arrays: Arrays) -> None:
+    """Save the arrays of a block; RunFailed if the disk is full, since every other block would fail, too."""
     try:
         store.save(block, arrays)
     except OSError as error:
         if error.errno not in DISK_FULL_ERRORS:
             raise
-        raise _disk_full(reason_of(error), store) from None
+        raise _disk_full_error(write_error_phrase(error), store) from None
 
 
-def _disk_full(reason: str, store: Store | _Memory) -> RunFailed:
+def _disk_full_error(reason: str, store: Store | _MemoryStore) -> RunFailed:
+    """RunFailed for a full disk, with advice on how to resume."""
     folder_hint = (
         f"; the finished blocks are kept in {store.folder}: make room and resume" if isinstance(store, Store) else ""
     )
     return RunFailed("ensemble", f"{reason}{folder_hint}")
 
 
-def _lost_workers_error(reason: str, store: Store | _Memory) -> RunFailed:
+def _lost_workers_error(reason: str, store: Store | _MemoryStore) -> RunFailed:
+    """RunFailed for lost workers, with advice on how to resume."""
     folder_hint = f"; the finished blocks are kept in {store.folder}: resume there" if isinstance(store, Store) else ""
     return RunFailed("ensemble", f"{reason}{folder_hint}")
 
 
 def _submitted_block(executor: Executor, job: Callable[[T], Arrays], block: T) -> Future:
-    """Future of a block; a failed future if the pool has lost its workers."""
+    """Future of a block on an executor; a failed future if the pool has lost its workers."""
     try:
         return executor.submit(_compute_block, job, block)
     except BrokenExecutor as error:
@@ -383,18 +382,19 @@ def _submitted_block(executor: Executor, job: Callable[[T], Arrays], block: T) -
 
 
 def _compute_block(job: Callable[[T], Arrays], block: T) -> Arrays | _Failure:
-    """Compute one block in the worker; a failure is returned instead of raised."""
+    """Arrays of one block, computed in the worker; a failure is returned instead of raised."""
     try:
         arrays = job(block)
     except Exception as error:
-        return _error_text(error)
+        return _failure_of(error)
     if not isinstance(block, range):
         return arrays
     short = [name for name, values in arrays.items() if len(values) != len(block)]
     return _Failure(f"{short[0]!r} has not one row per path") if short else arrays
 
 
-def _error_text(error: BaseException) -> _Failure:
+def _failure_of(error: BaseException) -> _Failure:
+    """The ``_Failure`` that describes an exception in a worker."""
     if _worker_died(error):
         return _Failure("its worker died: killed, or out of memory")
     if isinstance(error, CancelledError) or type(error).__name__ == "FutureCancelledError":

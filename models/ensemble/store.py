@@ -1,4 +1,4 @@
-"""Finished blocks of an ensemble in a folder, and the note beside them that says whose they are."""
+"""Finished blocks of an ensemble in a folder, with a file that identifies their job."""
 
 import hashlib
 import io
@@ -19,18 +19,19 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.result import RECORDED_PACKAGES
-from models.core.whole_files import drop_parts, write_whole
+from models.core.whole_files import remove_partial_files, write_whole
 
 Arrays = dict[str, np.ndarray]
+"""Arrays by name: the results of a block."""
 JOB_FILE = "job.json"
-"""What the blocks of a folder belong to."""
+"""Name of the file that identifies the job to which the blocks of a folder belong."""
 LOCK_FILE = ".lock"
-"""File that the process at work in a folder holds."""
+"""Name of the file that the process working in a folder locks."""
 
 
 @dataclass(frozen=True)
 class Store:
-    """Finished blocks in ``folder``, one file each; a file is either complete or absent."""
+    """Store of finished blocks in ``folder``, one file each; a file is either complete or absent."""
 
     folder: Path
 
@@ -42,21 +43,22 @@ class Store:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with exclusive_folder(self.folder):
-            drop_parts(self.folder)
+            remove_partial_files(self.folder)
             self._write_job(fingerprint(facts))
             yield
 
-    def _write_job(self, described: dict[str, Any]) -> None:
-        """Write into the folder to which job its blocks belong; raises InputError if it belongs to another job."""
+    def _write_job(self, job_facts: dict[str, Any]) -> None:
+        """Write into the folder to which job its blocks belong; raises InputError if the folder belongs to another
+        job."""
         file = self.folder / JOB_FILE
         if not file.exists():
-            write_whole(file, json.dumps(described, indent=1).encode())
+            write_whole(file, json.dumps(job_facts, indent=1).encode())
             return
         stored_job = _read_note(file)
-        for key in (*described, *stored_job):
-            if described.get(key) != stored_job.get(key):
+        for key in (*job_facts, *stored_job):
+            if job_facts.get(key) != stored_job.get(key):
                 allowed = (
-                    f"this folder belongs to another job: {described.get(key)!r} is asked for here; "
+                    f"this folder belongs to another job: {job_facts.get(key)!r} is asked for here; "
                     "resume with what it was "
                     "begun with, or begin in a new folder"
                 )
@@ -87,7 +89,7 @@ class Store:
 
 @contextmanager
 def exclusive_folder(folder: Path) -> Iterator[None]:
-    """Context with exclusive use of the folder; InputError if another process has it. The lock ends with its
+    """Context with exclusive use of the folder; InputError if another process uses it. The lock ends with its
     process."""
     try:
         from fcntl import LOCK_EX, LOCK_NB, flock
@@ -104,6 +106,7 @@ def exclusive_folder(folder: Path) -> Iterator[None]:
 
 
 def _read_note(file: Path) -> dict[str, Any]:
+    """Content of a folder's job file; raises InputError if it cannot be read."""
     try:
         note = json.loads(file.read_text())
     except (OSError, ValueError) as error:
@@ -112,7 +115,8 @@ def _read_note(file: Path) -> dict[str, Any]:
 
 
 def fingerprint(facts: dict[str, Any]) -> dict[str, Any]:
-    """The facts that identify a job: its settings as dotted keys, arrays by their checksum, the code and the packages.
+    """Facts that identify a job: its settings as dotted keys, arrays by their checksum, the code and the package
+    versions.
 
     Bits depend on all of these (and on the processor's own rounding of sines, which is left out).
     """
@@ -121,6 +125,7 @@ def fingerprint(facts: dict[str, Any]) -> dict[str, Any]:
 
 
 def _flat_items(key_path: str, job_value: Any) -> list[tuple[str, Any]]:
+    """Pairs of dotted key and plain value in nested job settings; arrays are replaced by their checksum."""
     if isinstance(job_value, dict):
         return [
             pair
@@ -135,6 +140,7 @@ def _flat_items(key_path: str, job_value: Any) -> list[tuple[str, Any]]:
 
 @cache
 def _code_checksum() -> str:
+    """Checksum of all sources of ``models``."""
     return checksum_of_sources(Path(__file__).parents[1])
 
 
@@ -147,7 +153,8 @@ def checksum_of_sources(root: Path) -> str:
 
 
 def named_files(job_value: Any, folder: Path) -> dict[str, str]:
-    """Checksum of each file that a text names, by that text; paths start from ``folder`` or from the working folder.
+    """Checksum of each file that a text in a job names, by that text; paths start from ``folder`` or from the working
+    folder.
 
     job_value : texts, and lists and tables of these. Files that a TOML file names count from its own folder; of code
     named ``file.py:Name`` or ``module:Name`` it is the file, without what that imports.
@@ -158,27 +165,29 @@ def named_files(job_value: Any, folder: Path) -> dict[str, str]:
 
 
 def _collect_files(job_value: Any, folder: Path, hashes: dict[str, str], paths_seen: set[Path]) -> None:
+    """Add the checksums of all files named in a job's values to ``hashes``."""
     if isinstance(job_value, dict | list | tuple):
         for inner in job_value.values() if isinstance(job_value, dict) else job_value:
             _collect_files(inner, folder, hashes, paths_seen)
-    elif isinstance(job_value, str) and (path := _file(job_value, folder)) and path.resolve() not in paths_seen:
+    elif isinstance(job_value, str) and (path := _named_file(job_value, folder)) and path.resolve() not in paths_seen:
         paths_seen.add(path.resolve())
         content = path.read_bytes()
         hashes[job_value] = hashes.get(job_value, "") + hashlib.sha256(content).hexdigest()[:16]
         if path.suffix == ".toml":
-            _collect_files(_table(content), path.parent, hashes, paths_seen)
+            _collect_files(_toml_content(content), path.parent, hashes, paths_seen)
 
 
-def _file(text: str, folder: Path) -> Path | None:
-    """The file that a text names, or None."""
+def _named_file(text: str, folder: Path) -> Path | None:
+    """Path of the file that a text names, or None."""
     text_before_colon, _, _ = text.rpartition(":")
     for path in (folder / text, Path(text), folder / text_before_colon, Path(text_before_colon)):
         if text and os.path.isfile(path):
             return path
-    return _of_module(text_before_colon)
+    return _module_file(text_before_colon)
 
 
-def _of_module(name: str) -> Path | None:
+def _module_file(name: str) -> Path | None:
+    """Path of a Python module's source, or None."""
     if not name or not all(name_part.isidentifier() for name_part in name.split(".")):
         return None
     try:
@@ -188,8 +197,8 @@ def _of_module(name: str) -> Path | None:
     return Path(spec.origin) if spec and spec.origin and os.path.isfile(spec.origin) else None
 
 
-def _table(file_content: bytes) -> Any:
-    """Contents of a TOML file; empty if it is not valid, which is reported when the scene is read."""
+def _toml_content(file_content: bytes) -> Any:
+    """Content of a TOML file; None if it is not valid, which is reported when the scene is read."""
     try:
         return tomllib.loads(file_content.decode("utf-8-sig"))
     except ValueError:

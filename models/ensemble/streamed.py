@@ -1,4 +1,4 @@
-"""Statistics of values that come block by block, in memory that does not grow with their number.
+"""Statistics of values that arrive block by block, with memory that does not grow with their number.
 
 Means and central moments are merged as in P. Pebay, Formulas for robust, one-pass parallel computation of covariances
 and arbitrary-order statistical moments, SAND2008-6212 (2008), eqs. 1.1, 3.1 to 3.3. Quantiles of values on a grid are
@@ -10,15 +10,15 @@ from collections import Counter
 
 import numpy as np
 
-from models.ensemble.statistics import deviation_of, quantile_ranks
+from models.ensemble.statistics import deviation_from_moments, quantile_ranks
 
 QUANTILE_ACCURACY = 0.005
-"""Largest relative error of a quantile by ``Spread``."""
+"""Largest relative error of a quantile by ``MagnitudeQuantiles``."""
 SMALLEST_MAGNITUDE, LARGEST_MAGNITUDE = 1e-15, 1e9
-"""Magnitudes between which ``Spread`` tells values apart; smaller ones count as 0."""
+"""Magnitudes between which ``MagnitudeQuantiles`` distinguishes values; smaller ones count as 0."""
 
 
-class Moments:
+class StreamedMoments:
     """Count, mean (k,), and sums of the second to fourth powers of deviations from the mean, for values (n, k) that
     arrive in batches."""
 
@@ -27,7 +27,7 @@ class Moments:
         self.mean = self.second = self.third = self.fourth = np.zeros(())
 
     def add(self, values: np.ndarray) -> None:
-        """Include values (n, ...)."""
+        """Include a batch of values (n, ...) in the moments."""
         n, m, total = self.count, len(values), self.count + len(values)
         mean = values.mean(axis=0)
         second, third, fourth = (((values - mean) ** power).sum(axis=0) for power in (2, 3, 4))
@@ -46,8 +46,11 @@ class Moments:
         self.mean, self.count = self.mean + d * m / total, total
 
     def deviation(self, *index: int) -> tuple[float, float]:
-        """Standard deviation of the values at index ``index``, and its standard error, as ``statistics.deviation``."""
-        return deviation_of(self.count, float(self.second[index]) / self.count, float(self.fourth[index]) / self.count)
+        """Standard deviation of the values at an array index, and its standard error, as by
+        ``statistics.deviation_with_error``."""
+        return deviation_from_moments(
+            self.count, float(self.second[index]) / self.count, float(self.fourth[index]) / self.count
+        )
 
 
 class StreamedCovariance:
@@ -57,7 +60,7 @@ class StreamedCovariance:
         self.count, self.mean, self._sums = 0, np.zeros(()), np.zeros(())
 
     def add(self, values: np.ndarray) -> None:
-        """Include values (n, ..., p)."""
+        """Include a batch of values (n, ..., p) in mean and covariance."""
         n, m, total = self.count, len(values), self.count + len(values)
         mean = values.mean(axis=0)
         deviations, d = values - mean, mean - self.mean
@@ -71,14 +74,15 @@ class StreamedCovariance:
         return self._sums / max(self.count - 1, 1)
 
 
-class Tally:
-    """Counts of distinct values; they should lie on a grid, so that few of them differ. No value may be NaN."""
+class ValueCounts:
+    """Numbers of occurrences of distinct values, which should lie on a grid, so that few of them differ. No value may
+    be NaN."""
 
     def __init__(self) -> None:
         self._counts: Counter[float] = Counter()
 
     def add(self, values: np.ndarray) -> None:
-        """Count values (n,), some of which may be infinite."""
+        """Count a batch of values (n,), some of which may be infinite."""
         distinct_values, counts = np.unique(values, return_counts=True)
         self._counts.update(dict(zip(distinct_values.tolist(), counts.tolist(), strict=True)))
 
@@ -89,21 +93,21 @@ class Tally:
 
     @property
     def counts(self) -> np.ndarray:
-        """Number of occurrences (m,) of each of ``values``."""
+        """Number of occurrences (m,) of each of the distinct values."""
         return np.array([self._counts[value] for value in sorted(self._counts)])
 
     def quantile(self, probability: float) -> tuple[float, float, float]:
-        """Quantile and the ends of its 95 % interval, identical to ``statistics.quantile`` of all values."""
+        """Quantile of all counted values and the ends of its 95 % interval, identical to
+        ``statistics.quantile_with_interval``."""
         upto = np.cumsum(self.counts)
         ranks = np.searchsorted(upto, np.array(quantile_ranks(int(upto[-1]), probability)), side="right")
         low, high, upper = (float(self.values[rank]) for rank in ranks)
         return low, high, upper
 
 
-class Spread:
-    """Quantiles of the magnitudes of values (n, k), each within QUANTILE_ACCURACY of the exact quantile; NaN is
-    ignored.
-    """
+class MagnitudeQuantiles:
+    """Quantiles of the magnitudes of values (n, k) that arrive in batches, each within QUANTILE_ACCURACY of the exact
+    quantile; NaN is ignored."""
 
     def __init__(self) -> None:
         self._width = np.log1p(2.0 * QUANTILE_ACCURACY / (1.0 - QUANTILE_ACCURACY))
@@ -111,7 +115,7 @@ class Spread:
         self._counts = np.zeros((0, self._bins), dtype=np.int64)
 
     def add(self, values: np.ndarray) -> None:
-        """Count values (n, k)."""
+        """Count a batch of values (n, k)."""
         columns = values.shape[1]
         if not len(self._counts):
             self._counts = np.zeros((columns, self._bins), dtype=np.int64)
@@ -123,10 +127,10 @@ class Spread:
         cells = (np.arange(columns) * self._bins + bin_numbers)[known]
         self._counts += np.bincount(cells, minlength=self._counts.size).reshape(self._counts.shape)
 
-    def percentiles(self, probabilities: tuple[float, ...]) -> np.ndarray:
-        """Percentiles (probabilities, k) of the magnitudes; NaN where a column has no values."""
+    def percentiles(self, percentages: tuple[float, ...]) -> np.ndarray:
+        """Percentiles (percentages, k) of the magnitudes; NaN where a column has no values."""
         upto = self._counts.cumsum(axis=1)
-        wanted = np.array(probabilities)[:, None] / 100.0 * (upto[:, -1] - 1)
+        wanted = np.array(percentages)[:, None] / 100.0 * (upto[:, -1] - 1)
         bin_numbers = (upto[None] <= np.floor(wanted)[:, :, None]).sum(axis=2)
         middle = SMALLEST_MAGNITUDE * np.exp(self._width * bin_numbers) * (1.0 - QUANTILE_ACCURACY)
         return np.where(upto[:, -1] > 0, np.where(bin_numbers == 0, 0.0, middle), np.nan)

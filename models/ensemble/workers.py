@@ -1,4 +1,4 @@
-"""Who computes what repeats: processes of this machine that outlive one of their number, or a Dask cluster.
+"""Workers for repeated computations: processes of this machine, which are replaced if they die, or a Dask cluster.
 
 The pool of this machine is that of the standard library, with fresh workers in place of dead ones. Two libraries were
 measured beside it. Workers of loky 3.7 outlive a parent that is killed, and Ctrl-C while they start breaks its pool. A
@@ -26,11 +26,11 @@ from models.machine.left_out import let_in
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
 """Options of glibc's mallopt, from its malloc.h."""
 KEPT_MEMORY = 1 << 28
-"""Bytes that a worker keeps for its next array."""
+"""Freed memory (bytes) that a worker keeps for its next array."""
 
 
-class Processes(Executor):
-    """A process pool that replaces workers that have died, and ends its workers when an error ends the pool.
+class ReplacingProcessPool(Executor):
+    """Process pool that replaces workers that have died, and ends its workers when an error ends the pool.
 
     A pool of the standard library is lost with the first worker that is killed; and where its parent is killed, its
     workers wait for ever. These end as soon as the far end of their pipe is closed, by whatever closes it.
@@ -42,7 +42,7 @@ class Processes(Executor):
         self._pool = self._started()
 
     def _started(self) -> ProcessPoolExecutor:
-        """Start all workers at once while Ctrl-C is blocked, a setting that they inherit.
+        """A new pool whose workers were all started at once while Ctrl-C is blocked, a setting that they inherit.
 
         One that struck a worker while it imports would break the pool, and the process that keeps the blocks could
         wait for it for ever.
@@ -50,13 +50,13 @@ class Processes(Executor):
         pool = ProcessPoolExecutor(
             self._workers, mp_context=self._context, initializer=_prepare_worker, initargs=(self._theirs,)
         )
-        with _interrupts_held():
+        with _interrupts_blocked():
             for _ in range(self._workers):
                 pool.submit(os.getpid)
         return pool
 
     def submit(self, function: Callable, /, *args: Any, **options: Any) -> Future:
-        """Submit a function to the pool, as in any executor; if workers have died, new ones take it."""
+        """Submit a function to the pool, as in any executor; if workers have died, new ones execute it."""
         try:
             return self._pool.submit(function, *args, **options)
         except BrokenExecutor:
@@ -76,13 +76,13 @@ class Processes(Executor):
         self.shutdown(cancel_futures=error_type is not None)
 
 
-def process_pool(workers: int) -> Processes:
+def process_pool(workers: int) -> ReplacingProcessPool:
     """A pool of freshly started processes, since threads of engines and compilers do not survive a fork."""
-    return Processes(workers)
+    return ReplacingProcessPool(workers)
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
+def _interrupts_blocked() -> Iterator[None]:
     """Context in which Ctrl-C is delayed to the end, where the operating system allows it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -95,14 +95,15 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def _prepare_worker(pipe: Connection) -> None:
-    """Prepare a worker: it ignores Ctrl-C, ends with the process that keeps the blocks, and keeps freed memory."""
+    """Prepare a worker process: it ignores Ctrl-C, ends with the process that stores the blocks, and keeps freed
+    memory."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with, args=(pipe,), daemon=True).start()
+    Thread(target=_exit_with_parent, args=(pipe,), daemon=True).start()
     keep_freed_memory()
 
 
 def keep_freed_memory() -> None:
-    """Let this process reuse freed memory for its next arrays, where the C library allows it.
+    """Make this process reuse freed memory for its next arrays, where the C library allows it.
 
     It otherwise returns every array of some megabytes to the system and gets fresh pages for the next one: a third of
     the time of a path of 60,000 steps, and almost half where Dask has set it to return still smaller ones. What a
@@ -114,25 +115,25 @@ def keep_freed_memory() -> None:
             mallopt(option, KEPT_MEMORY)
 
 
-def _end_with(pipe: Connection) -> None:
-    """End this process when the other end of the pipe is closed, also by the death of the process that held it."""
+def _exit_with_parent(pipe: Connection) -> None:
+    """End this process when the other end of the pipe is closed, also by the death of the parent process."""
     with suppress(EOFError, OSError):
         pipe.recv_bytes()
     os._exit(1)
 
 
 DEFAULT_WORKERS = 2
-"""Processes, if there are so many cores and nobody asks for another number; no result depends on it."""
+"""Number of worker processes by default, at most one per core; no result depends on it."""
 SCHEDULER_SCHEMES = ("tcp", "tls", "ws", "wss", "ucx", "inproc")
-"""Ways in which a Dask scheduler is reached."""
+"""Schemes of the address of a Dask scheduler."""
 SCHEDULER_TIMEOUT = "10s"
-"""How long a scheduler has to answer."""
+"""Time within which a scheduler must respond."""
 
 
 @dataclass(frozen=True)
 class Crew:
-    """Where repeated computations run: ``workers`` processes of this machine, or all workers of the Dask
-    ``dask_workers``."""
+    """Choice of workers for repeated computations: ``workers`` processes of this machine, or all workers of the Dask
+    scheduler at the address ``cluster``."""
 
     workers: int
     cluster: str | None = None
@@ -141,17 +142,17 @@ class Crew:
     def given(
         cls, workers: int | None = None, cluster: str | None = None, default_workers: int = DEFAULT_WORKERS
     ) -> "Crew":
-        """The requested pool of workers; without a request, ``default_workers`` processes but at most one per core."""
+        """The requested workers; without a request, ``default_workers`` processes but at most one per core."""
         return cls(workers or min(default_workers, os.cpu_count() or 1), cluster)
 
     @classmethod
     def of(cls, scene: Any, default_workers: int = DEFAULT_WORKERS) -> "Crew":
-        """The crew that a scene asks for, as ``given``."""
+        """The workers that a scene requests: its keys ``workers`` and ``cluster``, or the default."""
         return cls.given(scene.workers, scene.cluster, default_workers)
 
     @contextmanager
     def at_work(self, blocks: int, *paths: Path) -> Iterator[Executor | None]:
-        """The executor for a number of blocks; None where this process computes alone.
+        """Context with the executor for a number of blocks; None where this process computes alone.
 
         paths : files and folders that the workers read or write, too; InputError where those of a cluster do not see
         them, or where ``dask_workers`` has something to refuse.
@@ -166,7 +167,7 @@ class Crew:
             yield None
 
 
-def places_of(scene: Any) -> tuple[Path, ...]:
+def folders_for_workers(scene: Any) -> tuple[Path, ...]:
     """The folder of a scene whose files the workers read; empty if the scene names no file."""
     folder = Path(scene.folder)
     return (folder,) if named_files(scene.table(), folder) else ()
@@ -174,7 +175,8 @@ def places_of(scene: Any) -> tuple[Path, ...]:
 
 @contextmanager
 def dask_workers(address: str, *paths: Path) -> Iterator[Executor]:
-    """The workers of a Dask scheduler, such as ``tcp://host:8786``, where the same twinrig must be installed.
+    """Context with the workers of a Dask scheduler, such as ``tcp://host:8786``, as an executor; the same twinrig must
+    be installed there.
 
     Certificates of a ``tls://`` address are those of Dask's configuration. Raises InputError where the extra
     ``dask_workers`` is not installed, nobody answers, no worker has joined, or one cannot compute the same: with other
@@ -196,14 +198,14 @@ def dask_workers(address: str, *paths: Path) -> Iterator[Executor]:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError("", "cluster", address, f"no Dask scheduler answers there: {reason}") from None
     with client:
-        _require_alike(client, address, paths)
-        from models.ensemble.dask_worker import Plain
+        _check_workers(client, address, paths)
+        from models.ensemble.dask_worker import WorkerSetup
 
-        client.register_plugin(Plain())
-        yield OnCluster(client)
+        client.register_plugin(WorkerSetup())
+        yield ClusterExecutor(client)
 
 
-class OnCluster(Executor):
+class ClusterExecutor(Executor):
     """Executor for a Dask client that sends a job to the cluster only once, and for each block only its path numbers.
 
     A job is the result of a task, so that the scheduler can make it again where the workers that had it are gone.
@@ -215,7 +217,7 @@ class OnCluster(Executor):
         self._jobs: dict[int, tuple[Any, Any]] = {}
 
     def submit(self, function: Callable, /, *args: Any, **options: Any) -> Future:
-        """Submit a function of a job and a block, or any other."""
+        """Submit a function of a job and a block, or any other function; returns its future."""
         if len(args) == 2:
             job, block = args
             if id(job) not in self._jobs:
@@ -225,6 +227,7 @@ class OnCluster(Executor):
 
 
 def _identity(job: Any) -> Any:
+    """The job itself: the task by which a cluster stores it."""
     return job
 
 
@@ -237,13 +240,14 @@ class _WorkerState(NamedTuple):
 
 
 def _worker_state(paths: tuple[Path, ...], dask_worker: Any = None) -> _WorkerState:
-    """State of the worker on which this runs, for paths ``paths``; Dask prescribes the argument's name."""
+    """State of the cluster worker on which this function runs, for these paths; Dask prescribes the name of the second
+    argument."""
     missing = [str(path) for path in paths if not path.exists()]
     return _WorkerState(checksum_of_sources(Path(__file__).parents[1]), dask_worker.state.nthreads, missing)
 
 
-def _require_alike(client: Any, address: str, paths: tuple[Path, ...]) -> None:
-    """Raise InputError if there is no worker, or if one would not compute the same results."""
+def _check_workers(client: Any, address: str, paths: tuple[Path, ...]) -> None:
+    """Raise InputError if a cluster has no worker, or one that would not compute the same results."""
     absolute = tuple(path.resolve() for path in paths)
     try:
         workers = client.run(_worker_state, absolute)

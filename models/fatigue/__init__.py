@@ -1,1 +1,1 @@
-"""Damage: rainflow cycles, pseudo-damage by Miner's rule, level crossings, range pairs."""
+"""Fatigue: rainflow cycles, pseudo-damage by Miner's rule, level crossings, range pairs."""

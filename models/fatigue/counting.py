@@ -13,13 +13,14 @@ from models.core.errors import InputError
 from models.fatigue.damage import checked_load, damage_sum, turning_points
 from models.fatigue.rainflow_cycles import rainflow_cycles
 
-LEVELS_OF_FIGURE, RANGES_OF_FIGURE = 64, 64
-"""Of a figure: equal parts of the way from the smallest to the largest load."""
+LEVEL_COUNT, RANGE_COUNT = 64, 64
+"""Number of levels and of ranges of a counted load: equal parts of the interval from its smallest to its largest
+value."""
 
 
 @dataclass(frozen=True)
 class CountedLoad:
-    """Results of counting one load.
+    """Results of fatigue counting of one load: pseudo-damage, level crossings, range pairs.
 
     damage : by slope, in the load's unit to the slope; levels (l,), crossings (l,); ranges (r,), pairs (r,) with at
     least that range; smallest_load, largest_load : the load's extremes; mean.
@@ -36,13 +37,14 @@ class CountedLoad:
 
 
 def counted_load(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> CountedLoad:
-    """``CountedLoad`` of a load (n,); raises InputError for an empty load, or one that is not finite."""
+    """``CountedLoad`` of a load history (n,), for Woehler exponents ``slopes``; raises InputError for an empty load, or
+    one that is not finite."""
     load = checked_load(load)
     turns = turning_points(load)
     spans, _, counts = rainflow_cycles(turns)
     smallest, greatest = float(load.min()), float(load.max())
-    levels = np.linspace(smallest, greatest, LEVELS_OF_FIGURE + 1)
-    ranges = np.linspace(0.0, greatest - smallest, RANGES_OF_FIGURE + 1)[1:]
+    levels = np.linspace(smallest, greatest, LEVEL_COUNT + 1)
+    ranges = np.linspace(0.0, greatest - smallest, RANGE_COUNT + 1)[1:]
     return CountedLoad(
         {slope: damage_sum(spans, counts, slope) for slope in slopes},
         levels,
@@ -56,8 +58,8 @@ def counted_load(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) 
 
 
 def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
-    """Number of upward crossings of each level (l,) by a load (n,) or its turning points; levels may be in any order.
-    InputError as in ``counted_load``, and for a level that is no number."""
+    """Number of upward crossings of each level (l,), in any order, by a load (n,) or its turning points; raises
+    InputError for a level that is NaN."""
     load, given_levels = checked_load(load), np.asarray(levels, float)
     if np.isnan(given_levels).any():
         raise InputError("", "levels", None, "must be numbers")
@@ -70,7 +72,8 @@ def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
 
 
 def range_pairs(spans: np.ndarray, cycle_counts: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-    """Number of cycles with at least each range (r,), from the ranges ``spans`` and counts of cycles (c,)."""
+    """Number of cycles with at least each range (r,), from the ranges ``spans`` (c,) and counts (c,) of the rainflow
+    cycles."""
     order = np.argsort(spans)
     cycles_above = np.concatenate((np.cumsum(cycle_counts[order][::-1])[::-1], [0.0]))
     return cycles_above[np.searchsorted(spans[order], ranges * (1 - 1e-12), side="left")]

@@ -1,4 +1,4 @@
-"""Pseudo-damage of a load signal: rainflow cycles, each counted with a power of its range.
+"""Pseudo-damage of a load history: the sum over rainflow cycles of a power of their range.
 
 Convention: ASTM E1049-85, section 5.4.4: what is left open at the end, the residue, counts as half cycles. Other
 conventions differ by a third on a drifting signal, so figures are comparable only under the same one. The Woehler
@@ -12,16 +12,18 @@ import numpy as np
 from models.core.errors import InputError
 
 WOEHLER_SLOPE = 5.0
-"""Woehler exponent used where none is named."""
+"""Default Woehler exponent."""
 COUNTING_CONVENTION = "rainflow after ASTM E1049-85, residue as half cycles"
+"""Convention of cycle counting, as text."""
 
 
 REST_RANGE_SHARE = 1e-9
-"""A load that varies by less than this part of its size is at rest: what a run's rounding leaves, a thousandfold."""
+"""Ratio of a load's variation to its magnitude below which it counts as constant: a thousand times the rounding of a
+run."""
 
 
 def turning_points(load: np.ndarray) -> np.ndarray:
-    """The values at which a load (n,) turns, with its first and last value, as rainflow counting needs."""
+    """Turning points of a load history (n,), with its first and last value, as rainflow counting needs them."""
     load = np.asarray(load, dtype=float)
     steps = np.diff(load)
     moving = np.flatnonzero(steps)
@@ -30,7 +32,8 @@ def turning_points(load: np.ndarray) -> np.ndarray:
 
 
 def checked_load(load: np.ndarray) -> np.ndarray:
-    """The load (n,) as doubles; InputError if it is empty, masked, not finite, or not one-dimensional."""
+    """The load history (n,) as doubles; raises InputError if it is empty, masked, not finite, or not
+    one-dimensional."""
     if np.ma.is_masked(load):
         raise InputError(
             "",
@@ -51,8 +54,8 @@ def checked_load(load: np.ndarray) -> np.ndarray:
 
 
 def damage_sum(spans: np.ndarray, cycle_counts: np.ndarray, slope: float) -> float:
-    """Sum of count times range^slope over cycles (c,); InputError for an invalid slope, or a sum too large for a
-    double."""
+    """Pseudo-damage: sum of count times range^slope over cycles (c,); raises InputError for an invalid slope, or a sum
+    too large for a double."""
     if not (math.isfinite(slope) and slope > 0.0):
         raise InputError("", "slope", slope, "must be a Woehler exponent above 0")
     with np.errstate(over="ignore"):
@@ -65,7 +68,8 @@ def damage_sum(spans: np.ndarray, cycle_counts: np.ndarray, slope: float) -> flo
 
 
 def pseudo_damage(load: np.ndarray, slope: float = WOEHLER_SLOPE) -> float:
-    """Sum of count times range^slope over the rainflow cycles of ``load`` (n,); unit: that of the load, to ``slope``.
+    """Pseudo-damage of a load history (n,): sum of count times range^slope over its rainflow cycles, in the load's unit
+    to the power ``slope``.
 
     A load that never turns has none. Raises InputError for a load without a sample, or with one that is not
     finite: damage of a broken run is not a number to compare; for a slope that is not above 0; and where the damage
@@ -78,7 +82,7 @@ def pseudo_damage(load: np.ndarray, slope: float = WOEHLER_SLOPE) -> float:
 
 
 def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = WOEHLER_SLOPE) -> float:
-    """Ratio of a load's pseudo-damage (n,) to that of the true load (m,); raises InputError if the true load never
+    """Pseudo-damage of a load (n,) divided by that of the true load (m,); raises InputError if the true load never
     varies."""
     true_damage = pseudo_damage(truth, slope)
     if true_damage == 0.0 or np.ptp(truth) <= REST_RANGE_SHARE * np.abs(truth).max():

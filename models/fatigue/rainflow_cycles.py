@@ -1,4 +1,4 @@
-"""Rainflow cycles of a load, compiled: ASTM E1049-85, section 5.4.4, by turning points on a stack."""
+"""Compiled rainflow counting of a load's turning points after ASTM E1049-85, section 5.4.4."""
 
 import numpy as np
 
@@ -7,7 +7,8 @@ from models.machine.compiled import njit
 
 @njit(cache=True, error_model="numpy")
 def rainflow_cycles(turning_points):
-    """Ranges (c,), means (c,) and counts (c,) of the cycles of turning points (n,); open ones, the residue, count 0.5.
+    """Ranges (c,), means (c,) and counts (c,) of the rainflow cycles of turning points (n,); open cycles, the residue,
+    count 0.5.
 
     Consecutive points differ and turn; the first and the last point of a load count among them.
     """

@@ -1,1 +1,1 @@
-"""Parameters of a model from a measurement: what the data determine, how well, and how far a prediction may be off."""
+"""Identification of model parameters from a measurement: estimates, their uncertainty, and the error of predictions."""

@@ -1,4 +1,4 @@
-"""Bands of 95 % around a prediction: what the parameters leave open, and what the model itself gets wrong."""
+"""Bands of 95 % around a prediction, from the uncertainty of the parameters and the error of the model."""
 
 from dataclasses import dataclass
 
@@ -7,20 +7,21 @@ import numpy as np
 from models.identification.problem import Problem
 from models.identification.uncertainty import NORMAL_QUANTILE, Uncertainty
 
-HELD_SHARE = 0.95
-"""Of the residuals that the bands hold where they were made."""
+BAND_SHARE = 0.95
+"""Share of the residuals that lie inside the bands where these were fitted."""
 
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """A model's error: sqrt(base^2 + (share x prediction)^2) times ``band_factor`` holds HELD_SHARE of residuals."""
+    """Model of a prediction's error: sqrt(constant_error^2 + (share x prediction)^2) times ``band_factor`` contains
+    BAND_SHARE of the residuals."""
 
     constant_error: float
     share: float
     band_factor: float
 
     def half_width(self, predicted: np.ndarray) -> np.ndarray:
-        """Half-widths (n,) of the band around predictions (n,)."""
+        """Half-widths (n,) of the error band around predictions (n,)."""
         return self.band_factor * np.sqrt(self.constant_error**2 + (self.share * predicted) ** 2)
 
 
@@ -36,13 +37,13 @@ def error_model(residuals: np.ndarray, predicted: np.ndarray) -> ErrorModel:
     size = model.half_width(predicted)
     floor = 1e-12 * float(np.abs(residuals).max() or 1.0)
     return ErrorModel(
-        model.constant_error, model.share, float(np.quantile(np.abs(residuals) / np.maximum(size, floor), HELD_SHARE))
+        model.constant_error, model.share, float(np.quantile(np.abs(residuals) / np.maximum(size, floor), BAND_SHARE))
     )
 
 
 @dataclass(frozen=True, eq=False)
-class Bands:
-    """Predictions with error bands: predicted and half_width (channels, n), on the clock of ``problem``."""
+class ErrorBands:
+    """Predictions with error bands: predicted and half_width (channels, n), at the times of the problem's clock."""
 
     problem: Problem
     predicted: np.ndarray
@@ -53,31 +54,35 @@ class Bands:
         return self._mean_over_samples(np.abs(self._error()) <= self.half_width)
 
     def error_rms(self) -> np.ndarray:
-        """Root mean square (channels,) of prediction less measurement."""
+        """Root mean square (channels,) of the prediction error."""
         return np.sqrt(self._mean_over_samples(self._error() ** 2))
 
     def relative_error(self) -> np.ndarray:
-        """Ratio (channels,) of the rms error to the root mean square of the measurement."""
+        """Ratio (channels,) of the rms prediction error to the root mean square of the measurement."""
         return self.error_rms() / np.array([channel.size for channel in self.problem.channels])
 
     def width(self) -> np.ndarray:
-        """Ratio (channels,) of the mean half-width to the rms error."""
+        """Ratio (channels,) of the band's mean half-width to the rms prediction error."""
         return self._mean_over_samples(self.half_width) / self.error_rms()
 
     def _error(self) -> np.ndarray:
+        """Prediction less measurement (channels, n)."""
         return self.predicted - np.array([channel.values for channel in self.problem.channels])
 
     def _mean_over_samples(self, values: np.ndarray) -> np.ndarray:
+        """Means (channels,) over the measured samples that count."""
         used = [channel.is_used for channel in self.problem.channels]
         return np.array([row[counts_in_channel].mean() for row, counts_in_channel in zip(values, used, strict=True)])
 
 
-def error_bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) -> Bands:
-    """Bands for a stretch of measurement; ``problem`` is the fit's problem with the drive and the measurement of that
-    stretch."""
+def error_bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) -> ErrorBands:
+    """Error bands for a stretch of measurement; ``problem`` is the fit's problem with the inputs and the measurement of
+    that stretch."""
     values = uncertainty.fit.values
     predicted = problem.predicted(values)
     slopes = problem.jacobian(values, problem.predicted)
     variance = np.einsum("cnp,pq,cnq->cn", slopes, uncertainty.covariance, slopes)
     model_half_widths = np.array([model.half_width(row) for model, row in zip(errors, predicted, strict=True)])
-    return Bands(problem, predicted, np.sqrt(model_half_widths**2 + NORMAL_QUANTILE**2 * np.clip(variance, 0.0, None)))
+    return ErrorBands(
+        problem, predicted, np.sqrt(model_half_widths**2 + NORMAL_QUANTILE**2 * np.clip(variance, 0.0, None))
+    )

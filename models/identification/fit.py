@@ -1,4 +1,4 @@
-"""Least squares in stages, each of which can be kept and gone on from: the same bits with and without interruption."""
+"""Least-squares fit in stages, each of which can be stored and resumed with identical bits."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -11,19 +11,20 @@ from models.ensemble.store import Store
 from models.identification.problem import FAILED_RESIDUAL, Problem
 
 TRIALS_OF_STAGE, MOST_STAGES = 4, 20
-"""Trials of a stage, and stages of a fit."""
+"""Most trials of parameter values per stage, and most stages of a fit."""
 COST_DECREASE = 1e-4
-"""Relative decrease of the cost in a stage at which a fit ends: with the residuals of a hundred corners, which count
-once each, estimates then move by a tenth of their standard errors at most."""
+"""Relative decrease of the cost in a stage at which a fit ends: with the residuals of a hundred corners, estimates then
+move by a tenth of their standard errors at most."""
 INSIDE_BOUNDS_STEP = 1e-6
-"""Scales by which a start lies inside its bounds."""
+"""Distance, in the parameter's scale, by which start values lie inside their bounds."""
 StageProgress = Callable[[str, float], None]
+"""Function that is called after each stage with a text and the completed share of the fit."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Result of a fit. values (p,) : estimates; residuals (channels, m); cost : half the sum of their squares; stages;
-    converged."""
+    """Result of a fit. values (p,) : estimates; residuals (channels, m); cost : half the sum of the squared residuals;
+    stages : number of stages; converged : whether the cost settled."""
 
     problem: Problem
     values: np.ndarray
@@ -44,22 +45,22 @@ def fit(
     problem: Problem,
     stage_store: Store | None = None,
     report_stage: StageProgress = lambda text, share: None,
-    first: int = 0,
+    first_block: int = 0,
     executor: Executor | None = None,
 ) -> Fit:
-    """Least-squares estimates by scipy; InputError where the model fails at the start values.
+    """Least-squares estimates of a problem's parameters; InputError where the model fails at the start values.
 
-    stage_store : finished stages, the first of them block ``first``; report_stage : told after each stage; executor :
-    computes the columns of Jacobians.
+    stage_store : finished stages, the first of them block ``first_block``; report_stage : told after each stage;
+    executor : computes the columns of Jacobians.
     """
     values, cost, converged = problem.start, np.inf, False
     for stage in range(MOST_STAGES):
-        if stage_store is not None and stage_store.has(first + stage):
-            block = stage_store.load(first + stage)
+        if stage_store is not None and stage_store.has(first_block + stage):
+            block = stage_store.load(first_block + stage)
         else:
             block = _one_stage(problem, values, executor)
             if stage_store is not None:
-                stage_store.save(first + stage, block)
+                stage_store.save(first_block + stage, block)
         values, cost_before, cost = block["values"], cost, float(block["cost"])
         converged = cost_before - cost <= COST_DECREASE * cost
         size = np.sqrt(2.0 * cost / int((problem.weights > 0.0).sum()))
@@ -70,7 +71,7 @@ def fit(
 
 
 def _done_share(stage_number: int, previous_cost: float, cost: float) -> float:
-    """Estimated share of the fit that is complete, from how little a stage still reduces the cost."""
+    """Estimated completed share of the fit, from how little a stage still reduces the cost."""
     settled = (
         0.0
         if not np.isfinite(previous_cost)
@@ -80,7 +81,7 @@ def _done_share(stage_number: int, previous_cost: float, cost: float) -> float:
 
 
 def _one_stage(problem: Problem, values: np.ndarray, executor: Executor | None) -> dict[str, np.ndarray]:
-    """One stage of the fit: a few iterations that start from ``values``."""
+    """Values and cost after one stage of the fit: a few iterations that start from ``values`` (p,)."""
     from scipy.optimize import least_squares
 
     scale, (low, high), residuals = problem.scale, problem.bounds, problem.residuals
@@ -103,8 +104,8 @@ def _one_stage(problem: Problem, values: np.ndarray, executor: Executor | None) 
     return {"values": solved.x * scale, "cost": np.array(solved.cost)}
 
 
-def fit_with_held(problem: Problem, k: int, fixed_value: float, start_values: np.ndarray) -> Problem:
-    """The fit with parameter ``k`` fixed at a value; the others start from ``start_values`` (p,)."""
+def problem_with_fixed_parameter(problem: Problem, k: int, fixed_value: float, start_values: np.ndarray) -> Problem:
+    """The problem with parameter number ``k`` fixed at a value; the others start from ``start_values`` (p,)."""
     other_parameters = [
         replace(parameter, start=float(start_value))
         for parameter, start_value in zip(problem.parameters, start_values, strict=True)

@@ -1,4 +1,5 @@
-"""A stretch that took no part: a fit on one stretch, its errors between parts of it, and the prediction of another."""
+"""Identification on one stretch of a measurement, with cross-validation on its parts, and prediction of another
+stretch."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -7,19 +8,20 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.identification.bands import Bands, ErrorModel, error_bands, error_model
+from models.identification.bands import ErrorBands, ErrorModel, error_bands, error_model
 from models.identification.fit import Fit, fit
 from models.identification.of_scene import problem_of
 from models.identification.problem import Problem
 from models.identification.uncertainty import Uncertainty, uncertainty
 
 Progress = Callable[[str, float], None]
+"""Function that is called with a text and the completed share."""
 
 
 @dataclass(frozen=True)
-class Search:
-    """parameters : KEY or KEY=LOW:HIGH; channels that are compared; low_pass (Hz); blocks : parts of the first stretch,
-    each predicted from the others."""
+class ParameterSearch:
+    """Settings of an identification. parameters : KEY or KEY=LOW:HIGH; channels : those compared; low_pass (Hz); blocks
+    : number of parts of the first stretch for cross-validation."""
 
     parameters: Sequence[str]
     channels: Sequence[str]
@@ -28,21 +30,24 @@ class Search:
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
-    """Results for one vehicle: the fit, the errors on parts of the data that were not used in the fit, and the
-    prediction."""
+class IdentifiedVehicle:
+    """Results for one vehicle: the fit with its uncertainty, the errors on parts of the data that were not used in the
+    fit, and the prediction."""
 
     uncertainty: Uncertainty
     errors: list[ErrorModel]
     cross_validation_errors: np.ndarray
-    bands: Bands
+    bands: ErrorBands
 
 
 def identified_vehicle(
-    first_stretch: Any, second_stretch: Any, parameter_search: Search, progress: Progress = lambda text, share: None
-) -> Identified:
-    """Fit to the first stretch of a measurement, cross-validation on parts of it, and prediction of the second stretch
-    with bands."""
+    first_stretch: Any,
+    second_stretch: Any,
+    parameter_search: ParameterSearch,
+    progress: Progress = lambda text, share: None,
+) -> IdentifiedVehicle:
+    """Parameters fitted to the first stretch of a measurement, cross-validation on its parts, and prediction of the
+    second stretch with error bands."""
     problem = _fit_problem(first_stretch, parameter_search)
     solved = fit(problem, report_stage=lambda text, share: progress(text, 0.4 * share))
     known = uncertainty(solved)
@@ -53,12 +58,13 @@ def identified_vehicle(
         for row, model, channel in zip(crossed, predicted, problem.channels, strict=True)
     ]
     progress("the prediction", 0.9)
-    return Identified(
+    return IdentifiedVehicle(
         known, errors, crossed, error_bands(_fit_problem(second_stretch, parameter_search), known, errors)
     )
 
 
-def _fit_problem(scene: Any, parameter_search: Search) -> Problem:
+def _fit_problem(scene: Any, parameter_search: ParameterSearch) -> Problem:
+    """Identification problem of a scene with the searched parameters and the compared channels."""
     full_problem = problem_of(
         scene, scene.path(scene.drive.file), parameter_search.parameters, low_pass=parameter_search.low_pass
     )
@@ -88,6 +94,7 @@ def cross_validated(solved: Fit, part_count: int, progress: Progress) -> np.ndar
 
 
 def _inside_bounds(fit: Fit) -> np.ndarray:
+    """Estimates (p,) of a fit, moved slightly inside their bounds."""
     low, high = fit.problem.bounds
     margin = 1e-3 * fit.problem.scale
     return np.clip(fit.values, low + margin, high - margin)

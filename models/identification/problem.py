@@ -1,4 +1,4 @@
-"""A measurement beside a model with parameters: residuals on one clock, scaled, with spikes and gaps left out."""
+"""Identification problem: a model with parameters, a measurement, and the scaled residuals of both on one clock."""
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -14,23 +14,25 @@ from models.ensemble.runner import block_results
 from models.measured.outliers import without_outliers
 
 FAILED_RESIDUAL = 1e3
-"""Residual of every sample where a model fails at trial values, so that a search turns back."""
+"""Residual of every sample where the model fails at trial values, so that a search turns back."""
 SAMPLES_PER_PERIOD = 4.0
-"""Samples that are kept for each period of the low-pass."""
+"""Number of samples kept per period of the low-pass edge."""
 FEWEST_SAMPLES = 32
-"""Samples of a channel that a fit needs."""
+"""Least number of samples of a channel for a fit."""
 SETS_OF_PREDICTIONS = 2
-"""Sets of predictions that are kept, each as many as a base and its derivatives take."""
+"""Number of cached sets of predictions; a set is a base prediction and all its derivatives."""
 
 Curve = tuple[np.ndarray, np.ndarray]
-"""Times (n,) in s and values (n,)."""
+"""Times (n,) in s and values (n,) of a channel."""
 Model = Callable[[np.ndarray], Mapping[str, Curve]]
-"""Parameter values (p,) -> channels; raises RunFailed or InputError where it cannot be run with them."""
+"""Function of parameter values (p,) that gives channels by name; raises RunFailed or InputError where the model
+fails."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """name; start, low, high : values; scale : a change that matters, by which steps and combinations are measured."""
+    """Parameter to be identified, with start value, bounds, and ``scale``: a significant change, in which steps and
+    combinations are measured."""
 
     name: str
     start: float
@@ -46,6 +48,8 @@ class Parameter:
             object.__setattr__(self, "scale", self._default_scale())
 
     def _default_scale(self) -> float:
+        """Default scale: the start value's magnitude, or a quarter of the range if it starts at 0; raises InputError if
+        there is no range."""
         if self.start != 0.0:
             return abs(self.start)
         if np.isfinite(self.high - self.low):
@@ -56,8 +60,8 @@ class Parameter:
 
 @dataclass(frozen=True)
 class FitClock:
-    """times (n,) : s, even; low_pass_edge : of the low-pass on model and measurement (Hz), 0 for none; stride : of the
-    samples that residuals keep."""
+    """Even time grid of a fit: times (n,) in s, and the edge (Hz) of the low-pass on model and measurement, 0 for
+    none."""
 
     times: np.ndarray
     low_pass_edge: float = 0.0
@@ -78,7 +82,7 @@ class FitClock:
         )
 
     def filtered(self, values: np.ndarray) -> np.ndarray:
-        """Values (n,) after the low-pass filter."""
+        """A channel's values (n,) after the low-pass filter."""
         if self.low_pass_edge <= 0.0:
             return values
         return low_passed(values[:, None], self.period, self.low_pass_edge, "", "--low-pass")[:, 0]
@@ -86,8 +90,8 @@ class FitClock:
 
 @dataclass(frozen=True, eq=False)
 class ChannelOnClock:
-    """One channel on the clock: values (n,), low-passed; is_used (n,) : which of them count; left_out : samples of the
-    file that were spikes or not measured."""
+    """One measured channel on the fit's clock: values (n,), low-passed; is_used (n,) : which of them count; left_out :
+    number of samples of the file that were spikes or not measured."""
 
     name: str
     unit: str
@@ -97,12 +101,13 @@ class ChannelOnClock:
 
     @cached_property
     def size(self) -> float:
-        """Root mean square of the used samples, to which residuals are related."""
+        """Root mean square of the used samples, by which residuals are divided."""
         return float(np.sqrt(np.mean(self.values[self.is_used] ** 2)))
 
 
 def measured_channel(name: str, unit: str, curve: Curve, clock: FitClock, source: str = "") -> ChannelOnClock:
-    """A channel of a file, interpolated to the clock; InputError if it has too few samples there, or is constant."""
+    """A channel of a file, interpolated to the fit's clock; InputError if it has too few samples there, or is zero
+    throughout."""
     times, raw = curve
     values = without_outliers(raw)
     known = np.isfinite(values)
@@ -120,19 +125,21 @@ def measured_channel(name: str, unit: str, curve: Curve, clock: FitClock, source
 
 
 def _nearest_sample(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
+    """Indices (m,) of the samples in ``times`` (n,) nearest to the wanted times (m,)."""
     right = np.clip(np.searchsorted(times, wanted_times), 1, len(times) - 1)
     return right - (wanted_times - times[right - 1] < times[right] - wanted_times)
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Model, parameters and channels. taking_part (n,) : times that residuals count, all of them where None."""
+    """Identification problem: model, parameters and measured channels. counted_times (n,) : whether the residuals at
+    each time count; None for all."""
 
     model: Model
     parameters: Sequence[Parameter]
     channels: Sequence[ChannelOnClock]
     clock: FitClock
-    taking_part: np.ndarray | None = None
+    counted_times: np.ndarray | None = None
 
     @property
     def start(self) -> np.ndarray:
@@ -141,19 +148,18 @@ class Problem:
 
     @property
     def scale(self) -> np.ndarray:
-        """Scales (p,) of the parameters."""
+        """Scales (p,) of the parameters: significant changes, in which steps are measured."""
         return np.array([parameter.scale for parameter in self.parameters])
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest values (p,)."""
+        """Lower and upper bounds (p,) of the parameters."""
         return np.array([parameter.low for parameter in self.parameters]), np.array(
             [parameter.high for parameter in self.parameters]
         )
 
     def predicted(self, values: np.ndarray) -> np.ndarray:
-        """Output of the model (channels, n) at all times of the clock, filtered by the same low-pass as the
-        measurement; read-only."""
+        """Channels of the model (channels, n) at all times of the clock, low-passed as the measurement; read-only."""
         key, kept_predictions = values.tobytes(), self._latest_predictions
         if key not in kept_predictions:
             prediction = self._march(values)
@@ -164,8 +170,8 @@ class Problem:
 
     @cached_property
     def _latest_predictions(self) -> dict[bytes, np.ndarray]:
-        """Cache of predictions, keyed by the bytes of the parameter values; a stage of a fit begins with the values
-        that ended the last one."""
+        """Cache of predictions, by the bytes of the parameter values; a stage of a fit begins with the values that
+        ended the last stage."""
         return {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -173,6 +179,7 @@ class Problem:
         return {name: value for name, value in vars(self).items() if name != "_latest_predictions"}
 
     def _march(self, values: np.ndarray) -> np.ndarray:
+        """Low-passed channels (channels, n) of a run of the model with parameter values (p,)."""
         run = self.model(values)
         rows = []
         for channel in self.channels:
@@ -184,14 +191,15 @@ class Problem:
 
     @cached_property
     def weights(self) -> np.ndarray:
-        """Weights (channels, m): 0 for samples that do not count."""
-        sample_stride, taking_part = slice(None, None, self.clock.stride), self.taking_part
-        rows = [channel.is_used & (True if taking_part is None else taking_part) for channel in self.channels]
+        """Weights (channels, m) of the residuals: 0 for samples that do not count, else the inverse of the channel's
+        size."""
+        sample_stride, counted_times = slice(None, None, self.clock.stride), self.counted_times
+        rows = [channel.is_used & (True if counted_times is None else counted_times) for channel in self.channels]
         return np.array([row[sample_stride] / channel.size for row, channel in zip(rows, self.channels, strict=True)])
 
     @cached_property
     def target(self) -> np.ndarray:
-        """Measurement (channels, m) at the times of the residuals."""
+        """Measured channels (channels, m) at the times of the residuals."""
         return np.array([channel.values[:: self.clock.stride] for channel in self.channels])
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
@@ -237,7 +245,7 @@ class Problem:
 
     def _difference_steps(self, values: np.ndarray, k: int) -> list[tuple[np.ndarray, float]]:
         """Steps for difference quotients: values (p,) with parameter ``k`` moved forward, then backward, and the step
-        divided by its scale. Steps stay within the bounds; near the upper one the backward step comes first."""
+        divided by its scale. Steps stay within the bounds; near the upper bound the backward step comes first."""
         parameter, difference_steps = self.parameters[k], list[tuple[np.ndarray, float]]()
         step = (
             DIFFERENCE_STEP
@@ -256,4 +264,4 @@ class Problem:
 
 
 DIFFERENCE_STEP = 1e-4
-"""Of differences, by the scale of a parameter."""
+"""Step of finite differences, in the parameter's scale."""

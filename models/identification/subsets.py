@@ -1,4 +1,4 @@
-"""Which parameters a measurement calls for: every subset fitted, judged by an information criterion.
+"""Choice among subsets of parameters: every subset is fitted to the measurement and ranked by an information criterion.
 
 The deviations that a fit makes small are whitened: standard normal where the model is right. The criterion is that of
 quasi-likelihood (Burnham and Anderson, Model selection, 2002, ch. 2.5): the sum of squares by the inflation that the
@@ -14,14 +14,15 @@ from scipy.optimize import least_squares
 from scipy.stats import f as f_distribution
 
 BLIND_SHARE = 1e-6
-"""Share of the largest singular value of a fit's sensitivities below which a combination is not determined."""
+"""Share of the largest singular value of a fit's sensitivities below which a combination of parameters is not
+determined."""
 DIFFERENCE_STEP, LEAST_VALUE = 1e-4, 0.1
-"""Of differences, by a value, which counts as LEAST_VALUE at least."""
+"""Relative step of finite differences, and the least magnitude of a value for it."""
 HIGH_CORRELATION = 0.9
-"""Correlation of two estimates from which on they are hard to tell apart."""
+"""Correlation of two estimates above which they are hard to tell apart."""
 
 Deviations = Callable[[dict[str, float]], np.ndarray]
-"""Values of some parameters by name, all others absent -> whitened deviations (n,)."""
+"""Function of parameter values by name, all others absent, that gives whitened deviations (n,)."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,11 @@ class Subset:
         k = self.rank + 1
         return self.chi2 / inflation + 2.0 * k + 2.0 * k * (k + 1) / max(self.count - k - 1, 1)
 
-    def spread(self, predict: Callable[[dict[str, float]], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Predictions (m,) of ``predict`` at the fitted values, and their variances (m,) from the covariance."""
+    def prediction_and_variance(
+        self, predict: Callable[[dict[str, float]], np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Predictions (m,) of the function ``predict`` at the fitted values, and their variances (m,) from the
+        parameters' covariance."""
         fitted_predictions = predict(self.named)
         slopes = np.zeros((len(fitted_predictions), len(self.names)))
         for i, (name, value) in enumerate(self.named.items()):
@@ -78,11 +82,11 @@ class Subset:
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
-    """All subsets of parameters in the order of their criterion, their weights (probabilities), and the inflation
-    factor c of chi^2.
+class SubsetChoice:
+    """All subsets of parameters in the order of their information criterion, their weights (probabilities), and the
+    inflation factor c of chi^2.
 
-    calls : of each parameter (F, p) of leaving it out of the fullest subset that can be told apart;
+    removal_tests : (F, p) of each parameter, of leaving it out of the fullest subset that can be told apart;
     undetermined_parameters : parameters on which no measured number depends.
     """
 
@@ -90,16 +94,16 @@ class Choice:
     criteria: np.ndarray
     weights: np.ndarray
     variance_inflation: float
-    calls: dict[str, tuple[float, float]]
+    removal_tests: dict[str, tuple[float, float]]
     undetermined_parameters: tuple[str, ...]
 
     @property
     def best_subset(self) -> Subset:
-        """The subset with the lowest criterion."""
+        """The subset with the lowest information criterion."""
         return self.subset_fits[0]
 
     def importance(self, name: str) -> float:
-        """Sum of the weights of all subsets that contain the parameter."""
+        """Sum of the weights of all subsets that contain a parameter."""
         return float(sum(w for fit, w in zip(self.subset_fits, self.weights, strict=True) if name in fit.names))
 
     def forecast(self, predict: Callable[[dict[str, float]], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -107,7 +111,9 @@ class Choice:
 
         The variance is that within the subsets and that among them (Burnham and Anderson, ch. 4.3).
         """
-        means, variances = map(np.array, zip(*(fit.spread(predict) for fit in self.subset_fits), strict=True))
+        means, variances = map(
+            np.array, zip(*(fit.prediction_and_variance(predict) for fit in self.subset_fits), strict=True)
+        )
         mean = self.weights @ means
         return mean, np.sqrt(self.weights @ (self.variance_inflation * variances + (means - mean) ** 2))
 
@@ -124,7 +130,7 @@ class Choice:
 
 
 def fit_all(deviations: Deviations, candidates: Mapping[str, Candidate]) -> Subset:
-    """``Subset`` of all candidates, fitted together."""
+    """``Subset`` of all candidate parameters, fitted together."""
     names = tuple(candidates)
     if not names:
         left = deviations({})
@@ -145,15 +151,15 @@ def fit_all(deviations: Deviations, candidates: Mapping[str, Candidate]) -> Subs
         @ rows[: len(sizes)][is_determined]
         * np.outer(scale, scale)
     )
-    undetermined = tuple(_combination(names, row) for row in rows[np.count_nonzero(is_determined) :])
+    undetermined = tuple(_combination_text(names, row) for row in rows[np.count_nonzero(is_determined) :])
     return Subset(names, fit.x, covariance, float(np.sum(fit.fun**2)), len(fit.fun), undetermined)
 
 
 def ranked_subsets(
     deviations: Deviations, candidates: Mapping[str, Candidate], together: Mapping[str, Sequence[str]] | None = None
-) -> Choice:
-    """Fits of every subset of the candidates, ranked; together : named sets of candidates whose joint removal is
-    tested, too."""
+) -> SubsetChoice:
+    """Fits of every subset of the candidate parameters, ranked by the information criterion; together : named sets of
+    candidates whose joint removal is tested, too."""
     everything = fit_all(deviations, candidates)
     blind = tuple(name for name in candidates if name in everything.undetermined)
     names_seen = [name for name in candidates if name not in blind]
@@ -165,25 +171,25 @@ def ranked_subsets(
     ranked_fits = sorted(determined, key=lambda fit: fit.criterion(inflation))
     criteria = np.array([fit.criterion(inflation) for fit in ranked_fits])
     weights = np.exp(-0.5 * (criteria - criteria[0]))
-    calls = _removal_tests(fits, fullest, inflation, together or {})
-    return Choice(ranked_fits, criteria, weights / weights.sum(), inflation, calls, blind)
+    removal_tests = _removal_tests(fits, fullest, inflation, together or {})
+    return SubsetChoice(ranked_fits, criteria, weights / weights.sum(), inflation, removal_tests, blind)
 
 
 def _removal_tests(
-    fits: list[Subset], fullest: Subset, inflation: float, together: Mapping[str, Sequence[str]]
+    fits: list[Subset], fullest: Subset, inflation: float, named_sets: Mapping[str, Sequence[str]]
 ) -> dict[str, tuple[float, float]]:
-    """F statistic and p value for removing each parameter, and each named set, from the fullest subset."""
+    """F statistic and p value of removing each parameter, and each named set of parameters, from the fullest subset."""
     by_names = {fit.names: fit for fit in fits}
     leaving: dict[str, Sequence[str]] = {name: (name,) for name in fullest.names}
-    leaving |= {set_name: names for set_name, names in together.items() if {*names} <= {*fullest.names}}
-    calls = {}
+    leaving |= {set_name: names for set_name, names in named_sets.items() if {*names} <= {*fullest.names}}
+    tests = {}
     for set_name, gone in leaving.items():
         reduced_fit = by_names[tuple(name for name in fullest.names if name not in gone)]
         ratio = max(reduced_fit.chi2 - fullest.chi2, 0.0) / inflation / len(gone)
-        calls[set_name] = (ratio, float(f_distribution.sf(ratio, len(gone), fullest.freedoms)))
-    return calls
+        tests[set_name] = (ratio, float(f_distribution.sf(ratio, len(gone), fullest.freedoms)))
+    return tests
 
 
-def _combination(names: tuple[str, ...], row: np.ndarray) -> str:
+def _combination_text(names: tuple[str, ...], row: np.ndarray) -> str:
     """Text on a combination of parameters; those with coefficients below a hundredth are left out."""
     return " with ".join(name for name, coefficient in zip(names, row, strict=True) if abs(coefficient) > 1e-2)

@@ -1,4 +1,5 @@
-"""How well a measurement determines parameters: covariance from the residuals themselves, combinations, profiles.
+"""Uncertainty of identified parameters: covariance from correlated residuals, determined combinations, likelihood
+profiles.
 
 Residuals of a model that was fitted are no white noise: they stay for as long as a corner lasts. The covariance of
 estimates is therefore the sandwich H^-1 S H^-1 with H = J^T J and S the long-run covariance of the scores J_t^T e_t,
@@ -13,28 +14,28 @@ from functools import cached_property
 
 import numpy as np
 
-from models.identification.fit import Fit, fit, fit_with_held
+from models.identification.fit import Fit, fit, problem_with_fixed_parameter
 from models.identification.problem import Problem
 
 LONGEST_LAG_FACTOR = 4.0
-"""Times that residuals stay alike, of the longest lag."""
+"""Ratio of the longest lag to the integral scale of the residuals."""
 MOST_LAGS = 0.1
-"""Share of all samples that the longest lag may be."""
+"""Largest ratio of the longest lag to the number of samples."""
 NORMAL_QUANTILE = 1.96
-"""Standard deviations of 95 %."""
+"""Number of standard deviations of a 95 % interval."""
 SINGULAR_SHARE = 1e-12
-"""Of the largest eigenvalue of the information: what is lower tells nothing."""
+"""Ratio to the largest eigenvalue of the information matrix below which an eigenvalue counts as zero."""
 DETERMINED_HALF_WIDTH = 1.0
-"""Of its scale: the half-width of 95 % from which on a parameter counts as not determined."""
+"""Half-width of the 95 % interval, in the parameter's scale, from which on a parameter counts as not determined."""
 CHI_SQUARE = 3.841
-"""95 % of one degree of freedom."""
+"""95 % quantile of chi-square with one degree of freedom."""
 PROFILE_DEVIATIONS = (-2.0, -1.0, 1.0, 2.0)
-"""Standard deviations at which a profile is computed."""
+"""Distances from the estimate, in standard deviations, at which a likelihood profile is computed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Uncertainty of fitted parameters, each in its scale: covariance (p, p), information matrix H (p, p).
+    """Uncertainty of fitted parameters, in their scales: covariance (p, p), information matrix H (p, p).
 
     at_no_bound (p,) : estimates that lie at no bound; the others have no covariance.
     """
@@ -47,14 +48,14 @@ class Uncertainty:
 
     @cached_property
     def deviations(self) -> np.ndarray:
-        """Standard errors (p,) in the units of the parameters; infinite for parameters that the data do not
-        determine."""
+        """Standard errors (p,) in the units of the parameters; very large for parameters that the data do not
+        determine, NaN for estimates at a bound."""
         spread = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)) * self.fit.problem.scale
         return np.where(self.at_no_bound, spread, np.nan)
 
     @cached_property
     def is_determined(self) -> np.ndarray:
-        """For each parameter (p,): whether its 95 % interval is narrower than its scale, and is not cut off by a
+        """For each parameter (p,): whether its 95 % interval is narrower than its scale, and its estimate lies at no
         bound."""
         with np.errstate(invalid="ignore"):
             narrow = NORMAL_QUANTILE * self.deviations < DETERMINED_HALF_WIDTH * self.fit.problem.scale
@@ -69,7 +70,7 @@ class Uncertainty:
 
     def combinations(self) -> list[tuple[float, np.ndarray]]:
         """Uncorrelated combinations of scaled parameters: standard error and direction (p,) of each, the best
-        determined first."""
+        determined combination first."""
         inner = np.ix_(self.at_no_bound, self.at_no_bound)
         values, vectors = np.linalg.eigh(self.covariance[inner])
         answer = []
@@ -81,7 +82,8 @@ class Uncertainty:
 
 
 def uncertainty(fit: Fit, executor: Executor | None = None) -> Uncertainty:
-    """Covariance of the estimates, from the residuals of the fit; executor : computes the columns of their Jacobian."""
+    """``Uncertainty`` of the estimates, from the residuals of the fit; executor : computes the columns of their
+    Jacobian."""
     problem = fit.problem
     jacobian = problem.jacobian(fit.values, executor=executor)
     free = ~fit.at_bound
@@ -97,18 +99,19 @@ def uncertainty(fit: Fit, executor: Executor | None = None) -> Uncertainty:
             _stationary_covariance(jacobian[:, :, free], fit.residuals, lags),
         )
         covariance[free_block] = inverse @ _larger_covariance(*both_covariances) @ inverse
-        covariance[free_block] += _untold_variance(inner[free_block])
+        covariance[free_block] += _undetermined_variance(inner[free_block])
     return Uncertainty(fit, covariance, inner, free, staying * problem.clock.stride * problem.clock.period)
 
 
 def _information_inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of an information matrix (p, p), without its undetermined directions."""
     values, vectors = np.linalg.eigh(matrix)
     known = values > SINGULAR_SHARE * values[-1]
     return (vectors[:, known] / values[known]) @ vectors[:, known].T
 
 
-def _untold_variance(matrix: np.ndarray) -> np.ndarray:
-    """Very large variance for parameter directions that do not affect the residuals."""
+def _undetermined_variance(matrix: np.ndarray) -> np.ndarray:
+    """Very large variance (p, p) for directions of parameters that do not affect the residuals."""
     values, vectors = np.linalg.eigh(matrix)
     blind = vectors[:, values <= SINGULAR_SHARE * values[-1]]
     return 1e12 * blind @ blind.T
@@ -167,8 +170,9 @@ def _larger_covariance(first_covariance: np.ndarray, second_covariance: np.ndarr
 
 @dataclass(frozen=True, eq=False)
 class LikelihoodProfile:
-    """Profile of one parameter: its values (k,), and the rise of the misfit (k,) at each after all other parameters are
-    refitted, in units in which 3.84 is the 95 % limit; ``parabola`` (k,) : the rise according to the standard error."""
+    """Likelihood profile of one parameter: its values (k,), and the rise of the misfit (k,) at each after all other
+    parameters are refitted, in units in which 3.84 is the 95 % limit; ``parabola`` (k,) : the rise according to the
+    standard error."""
 
     name: str
     values: np.ndarray
@@ -183,7 +187,7 @@ class LikelihoodProfile:
 
 
 def likelihood_profile(uncertainty: Uncertainty, k: int) -> LikelihoodProfile:
-    """Profile likelihood of parameter ``k``. The misfit is weighted as in the covariance, so that correlated residuals
+    """Likelihood profile of parameter ``k``. The misfit is weighted as in the covariance, so that correlated residuals
     do not count as independent ones."""
     solved, problem = uncertainty.fit, uncertainty.fit.problem
     scale, parameter = problem.scale[k], problem.parameters[k]
@@ -194,13 +198,15 @@ def likelihood_profile(uncertainty: Uncertainty, k: int) -> LikelihoodProfile:
     values = [v for v in solved.values[k] + spread * np.array(PROFILE_DEVIATIONS) if parameter.low < v < parameter.high]
     rises = []
     for value in values:
-        held_fit = fit(_held_inside(problem, k, value, solved.values))
+        held_fit = fit(_fixed_parameter_problem(problem, k, value, solved.values))
         rises.append(2.0 * (held_fit.cost - solved.cost) * weight)
     parabola = ((np.array(values) - solved.values[k]) / uncertainty.deviations[k]) ** 2
     return LikelihoodProfile(parameter.name, np.array(values), np.array(rises), parabola)
 
 
-def _held_inside(problem: Problem, k: int, value: float, values: np.ndarray) -> Problem:
+def _fixed_parameter_problem(problem: Problem, k: int, value: float, values: np.ndarray) -> Problem:
+    """The problem with parameter ``k`` fixed at a value; the others start from ``values`` (p,), moved inside their
+    bounds."""
     low, high = problem.bounds
     start_inside = np.clip(values, low + 1e-6 * problem.scale, high - 1e-6 * problem.scale)
-    return fit_with_held(problem, k, value, start_inside)
+    return problem_with_fixed_parameter(problem, k, value, start_inside)

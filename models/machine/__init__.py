@@ -1,1 +1,1 @@
-"""Helpers close to the machine: compilation, room on the stack, threads, the processor's clock."""
+"""Helpers close to the machine: compilation, memory on the stack, threads, processor time."""

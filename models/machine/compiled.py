@@ -1,4 +1,4 @@
-"""Compiling with numba, its machine code kept on disk and never loaded where it does not belong.
+"""Compilation with numba: machine code is cached on disk, and never loaded where it does not belong.
 
 numba numbers the files of a function's signatures from its index. Two processes that compile two signatures at once
 then write the same file, and each later loads the other's machine code. Nor does numba see a change in a function
@@ -25,12 +25,13 @@ ROOT = Path(__file__).parents[2]
 COMMON = tuple(ROOT / "models" / name for name in ("vehicles", "engines", "contact", "machine"))
 """Folders whose functions are compiled into kernels of other folders."""
 SOURCES = (".py", ".csv")
-"""Endings of code, and of tables whose numbers kernels are compiled with."""
+"""Suffixes of source files, and of tables whose numbers are compiled into kernels."""
 IMPORT = re.compile(r"^from ((?:models|validation)[.\w]*) import (?:\(([^)]*)\)|(.*))", re.MULTILINE)
+"""Pattern of an import statement from this project, with the module and the imported names."""
 
 
 def njit(**options: Any) -> Callable[[Callable], Any]:
-    """``numba.njit`` with these options; with ``cache=True`` its files are safe from other processes.
+    """``numba.njit`` with the given options; with ``cache=True`` the cache files are safe from other processes.
 
     What may make arrays says so (``_nrt``), or it would be compiled like whoever calls it first, who may be ``lean``.
     """
@@ -38,7 +39,7 @@ def njit(**options: Any) -> Callable[[Callable], Any]:
 
 
 compiled = njit(cache=True, error_model="numpy")
-"""``njit`` with numpy's rules where a number is divided by zero; kept on disk."""
+"""``njit`` with numpy's rules for division by zero, cached on disk."""
 
 
 def lean(function: Callable) -> Any:
@@ -52,20 +53,20 @@ def lean(function: Callable) -> Any:
 
 
 def inlined(function: Callable) -> Any:
-    """Like ``lean``, and the function is inlined into its callers, because passing an array costs as much as ten
-    numbers."""
+    """``lean``, with the function inlined into its callers, because passing an array costs as much as ten numbers."""
     return njit(cache=True, error_model="numpy", _nrt=False, inline="always")(function)
 
 
 def _kept_apart(compiled: Any) -> Any:
-    """The compiled function, once for all numbers that callers write out, with cache files that are safe."""
+    """The numba function, compiled once for all literal numbers of its callers, with cache files that are safe from
+    other processes."""
     _without_literals(compiled)
     _make_safe(compiled._cache, compiled.py_func)
     return compiled
 
 
 def _make_safe(function_cache: Any, function: Callable) -> None:
-    """Change the cache of a function: names of files that do not depend on a shared counter, and stamps of the
+    """Make the cache of a numba function safe: file names that do not depend on a shared counter, and stamps of the
     sources."""
     file = getattr(function_cache, "_cache_file", None)  # there is none where nothing is kept
     if file is not None:
@@ -76,7 +77,8 @@ def _make_safe(function_cache: Any, function: Callable) -> None:
 
 
 def callback(function: Callable, signature: Any) -> Any:
-    """C callback with this signature, kept on disk as kernels are; a kernel that it calls is one of its globals."""
+    """C callback with a signature, cached on disk as kernels are; a kernel that the function calls is one of its
+    globals."""
     law: Any = CFunc(function, normalize_signature(signature), {}, {})
     law.enable_caching()
     _make_safe(law._cache, function)
@@ -85,7 +87,8 @@ def callback(function: Callable, signature: Any) -> Any:
 
 
 def _without_literals(compiled: Any) -> None:
-    """Compile the function once for all numbers that its callers write out: numba would compile it for each."""
+    """Have the function compiled once for all literal numbers of its callers; numba would compile it for each
+    number."""
     template = compiled.get_call_template
 
     def plain(types: Any, keywords: dict[str, Any]) -> Any:
@@ -97,8 +100,8 @@ def _without_literals(compiled: Any) -> None:
 
 
 def _or_none(load: Callable[[], dict]) -> Callable[[], dict]:
-    """Wrapper of a cache index reader that returns an empty index if older sources wrote it, with classes that no
-    longer exist."""
+    """Wrapper of a cache index reader that returns an empty index if older sources wrote the index, with classes that
+    no longer exist."""
 
     def read() -> dict:
         try:
@@ -118,8 +121,8 @@ def named_closure(function: Any, *parts: Any) -> Any:
 
 @cache
 def checksum(folder: Path) -> int:
-    """Checksum of all sources in this folder, and in those that all kernels share, of which a kernel here may consist,
-    with the tables beside them."""
+    """Checksum of all sources in a folder and in the folders that all kernels share, with the tables beside them:
+    whatever a kernel of this folder may contain."""
     sources = (
         path for place in sorted({folder, *COMMON}) for path in sorted(place.iterdir()) if path.suffix in SOURCES
     )
@@ -127,14 +130,14 @@ def checksum(folder: Path) -> int:
 
 
 def _files(function: Any) -> list[Path]:
-    """Source file of a function, and those of the compiled functions among its globals."""
+    """Source files of a function and of the compiled functions among its globals."""
     called = [function.__globals__.get(name) for name in function.__code__.co_names]
     functions = [function, *(each.py_func for each in called if hasattr(each, "py_func"))]
     return [Path(each.__code__.co_filename) for each in functions]
 
 
 def stamp(file: Path, *others: Path) -> int:
-    """Checksum of all sources that a kernel in this file may contain: those of its folder, and the kernels of
+    """Checksum of all sources that a kernel in ``file`` may contain: the sources of its folder, and the kernels of
     ``others`` and of all files that these import."""
     made_of = {*others, *(path for each in (file, *others) for path in _imported(each))}
     elsewhere = sorted(path for path in made_of if path.parent not in (file.parent, *COMMON))
@@ -142,7 +145,7 @@ def stamp(file: Path, *others: Path) -> int:
 
 
 def _imported(file: Path) -> set[Path]:
-    """Files with compiled kernels that a file imports, directly or through such files."""
+    """Files with compiled kernels that a file imports, directly or through other such files."""
     imported, left = set[Path](), [file]
     while left:
         new = _kernels(left.pop()) - imported
@@ -153,8 +156,7 @@ def _imported(file: Path) -> set[Path]:
 
 @cache
 def _kernels(file: Path) -> frozenset[Path]:
-    """Files with compiled kernels that a file's import statements name, as modules or through names in them; read
-    without importing."""
+    """Files with compiled kernels that a file's import statements name; read from the text, without importing."""
     if not file.is_file():
         return frozenset()
     places = [

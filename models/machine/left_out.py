@@ -1,4 +1,4 @@
-"""Libraries that another one looks for, and that this process does without.
+"""Optional libraries that are hidden from xarray in this process, since importing them takes longer than a short run.
 
 xarray imports dask (with its cluster) and pint where they are installed, to ask whether an array is one of theirs. That
 takes longer than all the rest of a short run, whose arrays are numpy's.
@@ -8,9 +8,10 @@ import sys
 from typing import Any
 
 OF_LABELS = ("dask", "pint")
-"""Array libraries that xarray looks for."""
+"""Optional array libraries that xarray looks for."""
 SEEKER = "xarray"
-"""It keeps what it has seen: what it has looked for before must not be left out afterwards."""
+"""Library that looks for the optional libraries; it remembers the result, so that nothing may be hidden after its
+import."""
 
 
 def leave_out(*names: str) -> None:
@@ -25,7 +26,7 @@ def leave_out(*names: str) -> None:
 
 
 def let_in(*names: str) -> None:
-    """Undo ``leave_out``. Code that needs one of these libraries must call this before it imports it."""
+    """Undo ``leave_out`` for these libraries; must be called before one of them is imported."""
     modules: dict[str, Any] = sys.modules
     for name in names:
         if name in modules and modules[name] is None:

@@ -1,4 +1,4 @@
-"""Records of doubles for compiled functions: numbers of one thing by name, in an array, at a pointer or on the stack.
+"""Records of doubles for compiled functions: numbers by name, in an array, at a pointer or on the stack.
 
 A record lies in memory as its doubles follow, so that a table of doubles is read by name at no cost. Arrays of records
 go to compiled functions as one argument, however many fields they have.
@@ -24,13 +24,13 @@ def record(*names: str) -> np.dtype:
 
 
 def size_of(kind: np.dtype) -> int:
-    """Number of doubles in a record."""
+    """Number of doubles in a record of this type."""
     return kind.itemsize // 8
 
 
 @_intrinsic
 def records(typing_context, pointer, count, kind):
-    """The array (count,) of records of a type that begins at a pointer to doubles, which must outlive it."""
+    """Array (count,) of records of a type that begins at a pointer to doubles, whose memory must outlive the array."""
     made: Any = types.Array(kind.dtype, 1, "C")
 
     def generate(context, builder, signature, arguments):
@@ -63,7 +63,7 @@ def stacked(typing_context, count, kind):
 
 
 def _array(context: Any, builder: Any, made: Any, pointer: Any, count: Any) -> Any:
-    """Array of records that starts at a pointer."""
+    """Array of ``count`` records that starts at a pointer."""
     array, size = make_array(made)(context, builder), context.get_constant(types.intp, made.dtype.size)
     place = builder.bitcast(pointer, array.data.type)
     populate_array(array, place, [count], [size], size, None, None)

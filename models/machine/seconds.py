@@ -1,4 +1,5 @@
-"""Seconds as they are told: of several runs the median with the range, of a single run with the word "once"."""
+"""Computing times as text: the median with the range of several runs, or the time of a single run with the word
+"once"."""
 
 from collections.abc import Sequence
 
@@ -6,7 +7,7 @@ import numpy as np
 
 
 def duration(seconds: float) -> str:
-    """Text of a time (s) in a fitting unit."""
+    """Text of a time (s) in a suitable unit."""
     for factor, unit in ((1.0, "s"), (1e3, "ms")):
         if factor * seconds >= 1.0:
             return f"{factor * seconds:.3g} {unit}"
@@ -14,7 +15,7 @@ def duration(seconds: float) -> str:
 
 
 def cost(seconds: Sequence[float] | np.ndarray) -> str:
-    """Text on the times of repeated runs: "12 ms (11 ms to 15 ms)", or "12 ms once"."""
+    """Text on the computing times (s) of repeated runs: "12 ms (11 ms to 15 ms)", or "12 ms once"."""
     values = np.asarray(seconds, float)
     middle = duration(float(np.median(values)))
     if values.size == 1:

@@ -1,4 +1,5 @@
-"""Pointers to doubles, on the stack of a compiled function or into arrays, for callers that must not allocate."""
+"""Pointers to doubles for compiled functions: on the stack or into arrays, for callers that must not allocate
+memory."""
 
 from typing import Any
 
@@ -10,10 +11,10 @@ from numba.np.arrayobj import get_cfarray_intrinsic, make_array, populate_array
 
 DOUBLES = types.CPointer(types.float64)
 REGISTER = 64
-"""Bytes of the longest vector register."""
+"""Size (bytes) of the longest vector register."""
 _intrinsic: Any = intrinsic
 array = get_cfarray_intrinsic("C", None)
-"""numba's ``carray``, for functions that are ``lean``, too: the array of a shape that lies at a pointer."""
+"""The array of a given shape at a pointer: numba's ``carray``, also for functions that are ``lean``."""
 
 
 @_intrinsic(prefer_literal=True)
@@ -48,7 +49,7 @@ def beyond(typing_context, pointer, count):
 
 @_intrinsic
 def row(typing_context, pointer, size, i):
-    """Row i, as an array (size,), of a table with rows of ``size`` doubles that starts at a pointer."""
+    """Row number i, as an array (size,), of a table with rows of ``size`` doubles that starts at a pointer."""
     kind = types.Array(types.float64, 1, "C")
 
     def generate(context, builder, signature, arguments):
@@ -70,7 +71,7 @@ def row(typing_context, pointer, size, i):
 
 @_intrinsic
 def start(typing_context, array):
-    """Pointer to the first double of a contiguous array of doubles, which must outlive it."""
+    """Pointer to the first double of a contiguous array of doubles; the array must outlive the pointer."""
 
     if array.dtype != types.float64 or array.layout != "C":
         return None
@@ -83,7 +84,7 @@ def start(typing_context, array):
 
 @_intrinsic
 def at(typing_context, address):
-    """Pointer to doubles from an address given as a whole number."""
+    """Pointer to doubles at an address that is given as a whole number."""
 
     def generate(context, builder, signature, arguments):
         return builder.inttoptr(arguments[0], context.get_value_type(DOUBLES))
@@ -93,7 +94,7 @@ def at(typing_context, address):
 
 @_intrinsic
 def ask(typing_context, address, inputs, table, outputs):
-    """Result of calling the compiled function int32(DOUBLES, DOUBLES, DOUBLES) at an address, given as a whole
+    """Result of calling the compiled function int32(DOUBLES, DOUBLES, DOUBLES) at an address that is given as a whole
     number."""
 
     def generate(context, builder, signature, arguments):
@@ -106,7 +107,7 @@ def ask(typing_context, address, inputs, table, outputs):
 
 @_intrinsic
 def double_at(typing_context, base, shift):
-    """Pointer to the double that lies ``shift`` bytes after ``base``, a bare pointer as C callbacks get them."""
+    """Pointer to the double that lies ``shift`` bytes after ``base``, a bare pointer as C callbacks receive."""
 
     def generate(context, builder, signature, arguments):
         place = builder.add(builder.ptrtoint(arguments[0], ir.IntType(64)), arguments[1])
@@ -117,7 +118,7 @@ def double_at(typing_context, base, shift):
 
 @_intrinsic
 def array_at(typing_context, base, shift):
-    """The pointer to doubles that is stored ``shift`` bytes after ``base``, a bare pointer as C callbacks get them."""
+    """The pointer to doubles that is stored ``shift`` bytes after ``base``, a bare pointer as C callbacks receive."""
 
     def generate(context, builder, signature, arguments):
         place = builder.add(builder.ptrtoint(arguments[0], ir.IntType(64)), arguments[1])

@@ -1,4 +1,4 @@
-"""Seconds: interleaved, repeated, and only ever compared within a round.
+"""Timing of computations: interleaved and repeated in rounds, and compared only within a round.
 
 Seconds wander by a fifth on a shared machine. Jobs are therefore timed in rounds, in a random order that
 differs from round to round, and two jobs are compared by the median of their ratios within the rounds.
@@ -12,12 +12,16 @@ from typing import Any
 import numpy as np
 
 SEED = 20
+"""Seed of the random order of jobs and of the bootstrap."""
 RESAMPLES = 1000
+"""Number of bootstrap samples."""
 LONG_JOB_RATIO = 2.0
-"""A job that took so many times the least turn needs no warm-up to tell that it fits in once."""
+"""Ratio of a job's time to the least time of its turn above which no warm-up run is needed to know that it runs once
+per turn."""
 
 
 Clock = Callable[[], float]
+"""Function that returns the time in s."""
 
 
 def interleave(
@@ -28,12 +32,12 @@ def interleave(
     round_interval: Sequence[int] | None = None,
     clock: Clock = time.perf_counter,
 ) -> np.ndarray:
-    """Seconds of every job in every round, shape (jobs, rounds), NaN in those that it is not in; single thread, warmed
-    up.
+    """Computing times (s) of jobs in interleaved rounds, shape (jobs, rounds), NaN in rounds without the job; single
+    thread, warmed up.
 
     minimum_seconds : a job is repeated within its turn until it lasts about this long (s);
-    lasted : seconds of a run of each job that has been, 0 where there was none; every : a job is in one of so many
-    rounds, a run that has been its first; clock : that of the processor leaves out what else the machine does.
+    lasted : seconds of a run of each job that has been, 0 where there was none; round_interval : a job is in one of so
+    many rounds, a run that has been its first; clock : that of the processor leaves out what else the machine does.
     """
     known = [0.0] * len(jobs) if lasted is None else lasted
     repeats = [
@@ -53,14 +57,15 @@ def interleave(
 
 
 def _repeats(job: Callable[[], Any], minimum_seconds: float, clock: Clock) -> int:
-    """Number of repeats of a job that last ``minimum_seconds`` together, from the warm-up run, or from one more run if
-    that was short."""
+    """Number of repeats of a job that last ``minimum_seconds`` (s) together, from the warm-up run, or from one more run
+    if that was short."""
     if _timed(job, 1, clock) >= minimum_seconds:
         return 1
     return max(1, math.ceil(0.9 * minimum_seconds / max(_timed(job, 1, clock), 1e-9)))
 
 
 def _timed(job: Callable[[], Any], repeats: int, clock: Clock) -> float:
+    """Mean time (s) of a run of the job over some repeats."""
     start = clock()
     for _ in range(repeats):
         job()
@@ -68,7 +73,7 @@ def _timed(job: Callable[[], Any], repeats: int, clock: Clock) -> float:
 
 
 def describe(seconds: Sequence[float]) -> dict[str, float]:
-    """Median, median absolute deviation and minimum of timed samples (s)."""
+    """Median, median absolute deviation and minimum of timed samples (s), by name."""
     values = np.asarray(seconds)
     middle = float(np.median(values))
     return {"median": middle, "mad": float(np.median(np.abs(values - middle))), "min": float(values.min())}
@@ -81,25 +86,26 @@ def interval(samples: np.ndarray) -> tuple[float, float, float]:
 
 
 def resamples(rounds: int, count: int = RESAMPLES) -> np.ndarray:
-    """Rounds drawn with replacement, shape (count, rounds): one set for all jobs keeps the pairs together."""
+    """Numbers of rounds drawn with replacement, shape (count, rounds); the same draw for all jobs keeps paired times
+    together."""
     return np.random.default_rng(SEED).integers(rounds, size=(count, rounds))
 
 
 def median(samples: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
-    """The median of the rounds with its bootstrap 95 % interval."""
+    """Median of the samples of all rounds with its bootstrap 95 % interval."""
     values = np.asarray(samples, float)
     _, low, high = interval(np.median(values[resamples(len(values))], axis=1))
     return float(np.median(values)), low, high
 
 
 def spelled(samples: Sequence[float] | np.ndarray, scale: float = 1.0) -> str:
-    """Text of a median with its interval, as used in tables: "12.3 (11.9 to 12.8)"."""
+    """Text of the samples' median with its interval, as used in tables: "12.3 (11.9 to 12.8)"."""
     middle, low, high = (f"{scale * value:.3g}" for value in median(samples))
     return f"{middle} ({low} to {high})"
 
 
 def paired_ratio(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
-    """Ratio a / b: the median over the rounds of the paired log ratios, with its bootstrap 95 % interval."""
+    """Ratio a / b of paired times: the median of the log ratios within the rounds, with its bootstrap 95 % interval."""
     logs = np.log(np.asarray(a) / np.asarray(b))
     _, low, high = interval(np.median(logs[resamples(len(logs))], axis=1))
     return math.exp(float(np.median(logs))), math.exp(low), math.exp(high)

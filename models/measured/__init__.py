@@ -1,4 +1,4 @@
-"""An engineer's own measurements: files in four formats, brought onto one clock, checked, run and handed on.
+"""Measurements: files in four formats, brought onto one clock, checked, and used for runs.
 
 The straight line: files -> ``Source`` (what a file says, in its own words) -> channel map -> ``Recording`` (signals in
 SI on one clock) -> ``Finding`` (what is wrong with it) -> run -> section forces -> files again, and a page.

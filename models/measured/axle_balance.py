@@ -1,4 +1,4 @@
-"""Vertical forces of two axles and the rigid vehicle that they carry: what is left of equilibrium.
+"""Equilibrium of measured vertical axle forces with the rigid vehicle that they carry, and what is left of it.
 
 All forces, integrated once, give the rates of the rigid vehicle: v' = F / M - g upwards, r' = (front F1 - rear F2) /
 (I + J) nose up. A true motion keeps both rates bounded, so that neither rises steadily; an error of the forces' mean
@@ -20,32 +20,34 @@ from models.measured.signal import Signal
 from models.vehicles.pitch_plane import Parameters
 
 FORCE_PLACES = {"front": ("front", "front left", "front right"), "rear": ("rear", "rear left", "rear right")}
-"""Where vertical forces may be measured: at an axle, or at its wheels, whose forces are added."""
+"""Locations at which vertical forces may be measured: at an axle, or at its wheels, whose forces are added."""
 GRAVITY = 9.81
-"""m/s^2, by which shares are told where a vehicle has another one, or none."""
+"""Acceleration (m/s^2) by which shares are computed for a vehicle with another gravity, or none."""
 BLOCKS_OF_RECORD = 16
-"""Means over parts of the record: what is faster than a block says nothing of its slope."""
+"""Number of blocks of a record over which means are taken; motion faster than a block says nothing about the slope."""
 NEGLIGIBLE_SHARE = 0.003
-"""Share of the weight, or of the moment of an axle's load, below which nothing is said: the drift of 0.1 % is what
-studies of trust are about."""
+"""Share of the weight, or of the moment of an axle's load, below which an imbalance is not reported; the drift of 0.1 %
+is the subject of studies of trust."""
 STEADY_SPEED_GAIN, STEADY_RATE_GAIN = 0.5, 0.1
-"""m/s and rad/s that a short record may gain steadily by its motion: entering a grade, or a bend of it."""
+"""Vertical speed (m/s) and pitch rate (rad/s) that a short record may gain steadily by its motion, as when it enters a
+grade."""
 BLOCK_SCATTER_FACTOR = 1.5
-"""Rms of the block means about the slope, gained over the record: a wave as long as the record makes 1.7 of it, and is
-explained by the pitch that makes it."""
+"""Factor on the rms scatter of block means about the fitted line, for the uncertainty of the gain over the record; a
+wave as long as the record makes 1.7 of it."""
 FASTEST_SPEED = 60.0
-"""m/s, speed of a vehicle on a grade."""
+"""Largest speed (m/s) of a vehicle on a grade."""
 STEEPEST_GRADE = 0.35
-"""rad: no road is steeper (36 %)."""
+"""Steepest grade (rad) of a road (36 %)."""
 PITCH_INTEGRATIONS = 3
-"""Repeated integrations of the pitch, each with the arms of the one before."""
+"""Number of repeated integrations of the pitch, each with the lever arms of the one before."""
 LEAST_PITCH_SHARE = 0.05
-"""Part of a pitch that does not rise steadily, at the least."""
+"""Least share of a pitch signal that counts as not rising steadily."""
 
 
 @dataclass(frozen=True)
 class AxleForces:
-    """forces (n, 2) : front and rear, N, up on the wheels, ``period`` (s) apart. signals : of either axle.
+    """Measured vertical forces (n, 2) of the front and rear axle, in N, up on the wheels, ``period`` (s) apart, with
+    their signals and the vehicle's parameters.
 
     duration : s, of the run that they drive. remedies : what to do about a wrong sign, unit or factor, None for those
     of a channel map. starts_at_rest : whether the run starts from the static equilibrium; turn : whether the forces
@@ -59,7 +61,7 @@ class AxleForces:
     duration: float
     remedies: Mapping[WrongFactor, str] | None = None
     starts_at_rest: bool = True
-    turn: bool = False
+    turns_with_chassis: bool = False
 
     @cached_property
     def rigid(self) -> RigidPitch:
@@ -69,15 +71,15 @@ class AxleForces:
     @cached_property
     def loads(self) -> np.ndarray:
         """Static axle loads (2,) in N; computed with 9.81 m/s^2 if the vehicle has no gravity."""
-        return _loads(self.parameters) * (self.parameters.g or GRAVITY)
+        return _axle_masses(self.parameters) * (self.parameters.g or GRAVITY)
 
     @cached_property
     def means(self) -> np.ndarray:
-        """Mean forces (2,) in N."""
+        """Mean forces (2,) of the axles in N."""
         return self.forces.mean(axis=0)
 
     @property
-    def empty(self) -> np.ndarray:
+    def is_unloaded(self) -> np.ndarray:
         """Which axles (2,) have a mean force that is negligible compared with their static load and with their
         variation."""
         return (np.abs(self.means) < NEGLIGIBLE_MEAN_SHARE * self.loads) & (
@@ -91,7 +93,7 @@ class AxleForces:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of all signals."""
+        """Names of all force signals."""
         return tuple(s.name for axle in self.signals for s in axle)
 
     @cached_property
@@ -113,7 +115,7 @@ class AxleForces:
         moments = self.forces @ self.accelerations_per_newton[1]
         rate = self._time_integral(moments)
         pitch = self._time_integral(rate)
-        for _ in range(0 if self.turn else PITCH_INTEGRATIONS):
+        for _ in range(0 if self.turns_with_chassis else PITCH_INTEGRATIONS):
             if abs(pitch).max() > STEEPEST_GRADE:
                 break
             rate = self._time_integral(moments * np.cos(pitch))
@@ -121,27 +123,26 @@ class AxleForces:
         return rate, pitch
 
     @cached_property
-    def rise(self) -> np.ndarray:
+    def vertical_speed(self) -> np.ndarray:
         """Vertical speed (n,) of the centre of mass in m/s, upwards, from integrating the forces, starting at rest."""
         pitch = self.pitch[1]
-        upright = np.cos(pitch) if self.turn and abs(pitch).max() < STEEPEST_GRADE else 1.0
+        upright = np.cos(pitch) if self.turns_with_chassis and abs(pitch).max() < STEEPEST_GRADE else 1.0
         return self._time_integral(self.forces @ self.accelerations_per_newton[0] * upright - self.parameters.g)
 
     def _time_integral(self, values: np.ndarray) -> np.ndarray:
-        """Time integral (n,) of samples (n,), starting at the first one."""
+        """Time integral (n,) of samples (n,) by the trapezoidal rule, starting with 0."""
         return np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * self.period)))
 
 
 def axle_signals(recording: Recording, axle: str) -> list[Signal]:
-    """Signals of the vertical force of an axle: its own signal, or those of both its wheels."""
+    """Signals of the vertical force of an axle: the axle's own signal, or those of its wheels."""
     vertical = [s for at in FORCE_PLACES[axle] for s in recording.find("force", at, "z") if not s.check]
     whole = [signal for signal in vertical if signal.at == axle]
     return whole or vertical
 
 
-def axles(recording: Recording, parameters: Parameters) -> AxleForces | None:
-    """Vertical forces of both axles for the checks, short and long gaps bridged by straight lines; None where one axle
-    lacks a wheel's signal."""
+def axle_forces_of(recording: Recording, parameters: Parameters) -> AxleForces | None:
+    """``AxleForces`` of a recording, gaps bridged by straight lines; None where an axle lacks a wheel's signal."""
     signals = tuple(tuple(axle_signals(recording, axle)) for axle in FORCE_PLACES)
     if not all(
         side and len(side) == (1 if side[0].at == axle else 2) for axle, side in zip(FORCE_PLACES, signals, strict=True)
@@ -155,7 +156,7 @@ def axles(recording: Recording, parameters: Parameters) -> AxleForces | None:
         parameters,
         (signals[0], signals[1]),
         recording.duration,
-        turn=turn,
+        turns_with_chassis=turn,
     )
 
 
@@ -167,27 +168,27 @@ def _bridged_samples(values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class SteadyResidual:
-    """Residual: steady accelerations (2,) that the vehicle's motion cannot explain, m/s^2 upwards and rad/s^2 nose up.
-    known (2,) : their uncertainties; smaller accelerations mean nothing. units (2,) : accelerations by a whole load:
-    gravity, and the pitch acceleration by one axle's load."""
+    """Steady accelerations (2,) that the vehicle's motion cannot explain, m/s^2 upwards and rad/s^2 nose up, with their
+    uncertainties (2,), and the accelerations (2,) that a whole load would cause: gravity, and the pitch acceleration by
+    one axle's load."""
 
     accelerations: np.ndarray
-    known: np.ndarray
-    units: np.ndarray
+    uncertainties: np.ndarray
+    whole_load_accelerations: np.ndarray
 
     @property
     def shares_of_load(self) -> np.ndarray:
         """Ratios (2,) of the unexplained accelerations to those that a whole load would cause."""
-        return self.accelerations / self.units
+        return self.accelerations / self.whole_load_accelerations
 
     @property
     def is_beyond_uncertainty(self) -> np.ndarray:
-        """Which of the two steady accelerations (2,) is beyond its uncertainty."""
-        return np.abs(self.accelerations) > self.known
+        """Which of the two steady accelerations (2,), heave and pitch, exceeds its uncertainty."""
+        return np.abs(self.accelerations) > self.uncertainties
 
 
 def equilibrium_residual(axles: AxleForces) -> SteadyResidual:
-    """Residual of the vertical and the pitch equilibrium over the whole record.
+    """Residual of the vertical and the pitch equilibrium of axle forces over the whole record.
 
     Vertical motion is compared with two explanations: a level road, and a climb with the pitch that the forces give.
     The residual is that of the better explanation.
@@ -197,9 +198,9 @@ def equilibrium_residual(axles: AxleForces) -> SteadyResidual:
     units = np.array(
         [GRAVITY, axles.accelerations_per_newton[1, 0] * axles.loads[0] * GRAVITY / (axles.parameters.g or GRAVITY)]
     )
-    level = _slope_and_scatter(times, _block_means(axles.rise))
+    level = _slope_and_scatter(times, _block_means(axles.vertical_speed))
     climbing = (
-        _slope_and_scatter(times, _block_means(axles.rise), _block_means(pitch))
+        _slope_and_scatter(times, _block_means(axles.vertical_speed), _block_means(pitch))
         if abs(pitch).max() < STEEPEST_GRADE
         else level
     )
@@ -218,13 +219,13 @@ def equilibrium_residual(axles: AxleForces) -> SteadyResidual:
     return SteadyResidual(np.array([risen[0], turned[0]]), np.array([risen[1], turned[1]]), units)
 
 
-def _slope_with_error(estimate: tuple[float, float], unit: float, gained: float, lasted: float) -> tuple[float, float]:
-    """A slope, and its uncertainty from the scatter of the values about the fitted line."""
-    return estimate[0], NEGLIGIBLE_SHARE * unit + (gained + BLOCK_SCATTER_FACTOR * estimate[1]) / lasted
+def _slope_with_error(estimate: tuple[float, float], unit: float, gain: float, duration: float) -> tuple[float, float]:
+    """A fitted slope, and its uncertainty from the scatter of the values about the fitted line."""
+    return estimate[0], NEGLIGIBLE_SHARE * unit + (gain + BLOCK_SCATTER_FACTOR * estimate[1]) / duration
 
 
 def _slope_and_scatter(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = None) -> tuple[float, float]:
-    """Least-squares slope of values (n,) over times (n,), and the scatter of the values about the line.
+    """Least-squares slope of values (n,) over times (n,), and the rms scatter of the values about the line.
 
     What a vehicle climbs with its pitch (n,), at a speed between 0 and the fastest, is fitted beside it; the scatter
     grows where a pitch that rises steadily can hardly be told from it.
@@ -247,6 +248,6 @@ def _block_means(values: np.ndarray) -> np.ndarray:
     return np.array([block.mean(axis=0) for block in blocks])
 
 
-def _loads(p: Parameters) -> np.ndarray:
-    """Mass (2,) in kg carried by each axle."""
+def _axle_masses(p: Parameters) -> np.ndarray:
+    """Mass (2,) in kg carried by each axle, wheels included."""
     return np.array([p.m3 * p.a / (p.a + p.b) + p.m1, p.m3 * p.b / (p.a + p.b) + p.m2])

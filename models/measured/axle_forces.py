@@ -1,4 +1,5 @@
-"""Vertical forces of two axles against the vehicle that they carry: sign, unit, weight, balance, order, start.
+"""Checks of measured vertical axle forces against the vehicle that they carry: sign, unit, weight, balance, order,
+start.
 
 Both kinds of input go through here: a file of wheel forces of a pitch-plane scene, and a recording on that vehicle.
 """
@@ -15,52 +16,60 @@ from models.measured.axle_balance import (
     SteadyResidual,
     equilibrium_residual,
 )
-from models.measured.ratios import WrongFactor, cause_and_sentence, counted_from_load
+from models.measured.ratios import WrongFactor, cause_and_sentence, missing_load_sentence
 
 FINDING_NAMES = ("weight", "balance", "sign", "unit", "swapped", "start", "times", "copied", "spikes", "clipped")
-"""Names of all findings, with those of the samples of a file."""
+"""Names of all findings on axle forces, with those on the samples of a file."""
 LARGE_SHARE = 0.05
-"""Share beyond which the forces are another vehicle's, or of another unit, if they move it far."""
+"""Share of imbalance beyond which the forces belong to another vehicle or have another unit, if they move the vehicle
+far."""
 LARGEST_HEIGHT = 1.0
-"""m: a vehicle that leaves a level road further has no road under it."""
+"""Largest height (m) of a vehicle above or below a level road."""
 IMPOSSIBLE_WEIGHTS = 1e6
-"""Weights of the vehicle that no wheel force is: a mark for no value, or a damaged file."""
+"""Ratio of a wheel force to the vehicle's weight above which the force is a mark for no value, or the file is
+damaged."""
 EXPLAINED_SHARE = 0.02
-"""Share by which a mean may differ from what an explanation predicts."""
+"""Relative difference of a mean force from the prediction of an explanation up to which the explanation holds."""
 START_LOAD_SHARE = 0.05
-"""Share of its static load by which an axle may begin off it."""
+"""Share of the static load by which an axle's first force may differ from the load."""
 COMMON_ROAD_BAND = 1.0, 25.0
-"""Hz, between which both axles feel the same road one after the other."""
+"""Frequency band (Hz) in which both axles feel the same road one after the other."""
 AXLE_LAG_RANGE = 0.02, 2.0
-"""s, between the axles of a vehicle."""
+"""Delays (s) possible between the axles of a vehicle."""
 REPEATED_CORRELATION = 0.3
-"""Correlation from which on one axle is said to repeat the other."""
-COPIED_SHARE = 1e-3
-"""Rms of what is left of an axle's changes without the other's, by their own, up to which they are the same."""
-IN_FILE: dict[WrongFactor, str] = {
+"""Correlation above which one axle's force counts as a repetition of the other's."""
+COPIED_RESIDUAL_SHARE = 1e-3
+"""Relative rms difference of both axles' scaled variations up to which one channel counts as a copy of the other."""
+FILE_REMEDIES: dict[WrongFactor, str] = {
     "sign": "forces up on the wheels are positive; turn its sign",
     "unit": "correct the unit in its header",
     "gain": "check its calibration factor",
     "size": "check its calibration factor and the vehicle's parameters",
 }
-"""Remedies where the column of a file, and no channel map, says what a signal is."""
+"""Remedies for signals whose meaning is given by the column of a file, not by a channel map."""
 
 
-def check(axles: AxleForces) -> list[Finding]:
+def check_axle_forces(axles: AxleForces) -> list[Finding]:
     """Findings on the axles' forces. If one finding explains a fault, no other finding names it."""
     largest = float(np.abs(axles.forces).max())
     if largest > IMPOSSIBLE_WEIGHTS * axles.loads.sum():
         text = f"A wheel force of {largest:.4g} N is none of a vehicle that weighs {axles.loads.sum():.4g} N."
-        return [_error(axles, "weight", text, largest, "N")]
-    for look in (_sparse_finding, _common_mistake_findings, _wrong_means, _imbalance_findings, _forces_begin_in_motion):
+        return [_axle_error(axles, "weight", text, largest, "N")]
+    for look in (
+        _sparse_finding,
+        _common_mistake_findings,
+        _wrong_mean_findings,
+        _imbalance_findings,
+        _start_in_motion_finding,
+    ):
         findings = look(axles)
         if findings:
-            return findings + _constant_axle(axles)
-    return _constant_axle(axles) + _copied_finding(axles) + _order(axles) or [_weights_agree(axles)]
+            return findings + _constant_axle_finding(axles)
+    return _constant_axle_finding(axles) + _copied_finding(axles) + _axle_order_finding(axles) or [_weight_note(axles)]
 
 
 def _sparse_finding(axles: AxleForces) -> list[Finding]:
-    """Finding on a long record of which a run uses very little; its sampling is too coarse for wheel motion."""
+    """Finding on a long record of which a run uses very little, and whose sampling is too coarse for wheel motion."""
     text = sparse_record_warning(len(axles.forces), axles.period, axles.duration)
     if not text:
         return []
@@ -72,13 +81,13 @@ def _common_mistake_findings(axles: AxleForces) -> list[Finding]:
     p = axles.parameters
     if p.g == 0:
         return []
-    if axles.empty.any():
+    if axles.is_unloaded.any():
         text = " ".join(
-            counted_from_load(axle[0].name, mean, load)
-            for axle, mean, load, empty in zip(axles.signals, axles.means, axles.loads, axles.empty, strict=True)
+            missing_load_sentence(axle[0].name, mean, load)
+            for axle, mean, load, empty in zip(axles.signals, axles.means, axles.loads, axles.is_unloaded, strict=True)
             if empty
         )
-        return [_error(axles, "weight", text, 100 * (axles.means.sum() / axles.loads.sum() - 1), "%")]
+        return [_axle_error(axles, "weight", text, 100 * (axles.means.sum() / axles.loads.sum() - 1), "%")]
     wheels = np.array([p.m1, p.m2]) * p.g
     missing, lacks = axles.loads - axles.means, 100 * (axles.means.sum() / axles.loads.sum() - 1)
     if _is_near(missing, wheels, axles.loads) and not _is_near(missing, 0 * wheels, axles.loads):
@@ -87,18 +96,19 @@ def _common_mistake_findings(axles: AxleForces) -> list[Finding]:
             f"weight of the wheels ({wheels[0]:.4g} N and {wheels[1]:.4g} N): they were measured above the wheels. Add "
             "it, with the wheels' inertia force if they move."
         )
-        return [_error(axles, "weight", text, lacks, "%")]
+        return [_axle_error(axles, "weight", text, lacks, "%")]
     if _is_near(axles.means, axles.loads / 2, axles.loads / 2):
         text = (
             f"The wheel forces are half the static loads of the axles "
             f"({axles.loads[0]:.5g} N and {axles.loads[1]:.5g} N): "
             "they are of one wheel of each axle. Add those of the other."
         )
-        return [_error(axles, "weight", text, -50.0, "%")]
+        return [_axle_error(axles, "weight", text, -50.0, "%")]
     return _exchanged_finding(axles)
 
 
 def _is_near(values: np.ndarray, wanted: np.ndarray, scale: np.ndarray) -> bool:
+    """Whether values differ from the wanted ones by less than half of EXPLAINED_SHARE of a scale."""
     return bool((np.abs(values - wanted) < EXPLAINED_SHARE * scale / 2).all())
 
 
@@ -112,10 +122,10 @@ def _exchanged_finding(axles: AxleForces) -> list[Finding]:
         f"average, where {axles.loads[0]:.5g} N and {axles.loads[1]:.5g} N rest. Exchange their columns, or a and b of "
         "the vehicle."
     )
-    return [_error(axles, "swapped", text, 100 * float(as_is), "%")]
+    return [_axle_error(axles, "swapped", text, 100 * float(as_is), "%")]
 
 
-def _wrong_means(axles: AxleForces) -> list[Finding]:
+def _wrong_mean_findings(axles: AxleForces) -> list[Finding]:
     """Findings on axles whose mean force alone shows a wrong sign or unit, or would move the vehicle farther than any
     road does."""
     findings, far = [], _travels_too_far(axles, equilibrium_residual(axles)).any()
@@ -124,17 +134,17 @@ def _wrong_means(axles: AxleForces) -> list[Finding]:
         ratio, names = float(mean / load), tuple(s.name for s in axle)
         kind, text = cause_and_sentence(ratio, axle[0], for_axle, axles.remedies)
         if kind in ("sign", "unit") or (kind == "size" and far):
-            check = "weight" if kind == "size" else kind
-            findings.append(Finding(check, "error", axle[0].at, text, ratio, "1", names))
+            check_axle_forces = "weight" if kind == "size" else kind
+            findings.append(Finding(check_axle_forces, "error", axle[0].at, text, ratio, "1", names))
     return findings
 
 
 def _imbalance_findings(axles: AxleForces) -> list[Finding]:
-    """Findings on accelerations that a vehicle cannot sustain: steady heave, and steady pitch."""
+    """Findings on steady heave and pitch accelerations that a vehicle cannot sustain."""
     motion = equilibrium_residual(axles)
     if not motion.is_beyond_uncertainty.any():
         return []
-    beyond = np.abs(motion.shares_of_load) > LARGE_SHARE + motion.known / motion.units
+    beyond = np.abs(motion.shares_of_load) > LARGE_SHARE + motion.uncertainties / motion.whole_load_accelerations
     weight: Weight = "error" if (beyond & _travels_too_far(axles, motion)).any() else "doubt"
     excess = np.linalg.solve(
         axles.accelerations_per_newton, np.where(motion.is_beyond_uncertainty, motion.accelerations, 0.0)
@@ -164,6 +174,7 @@ def _travels_too_far(axles: AxleForces, motion: SteadyResidual) -> np.ndarray:
 
 
 def _excess_text(name: str, excess: float, share: float) -> str:
+    """Text on the excess of an axle's mean force, in N and as a share of its load."""
     return f"{name} carries {abs(excess):.4g} N ({abs(share):.2%}) too {'much' if excess > 0 else 'little'}"
 
 
@@ -179,7 +190,7 @@ def _motion_text(axles: AxleForces, motion: SteadyResidual) -> str:
     return f"a vehicle free to move {' and '.join(parts)} in {axles.duration:g} s"
 
 
-def _forces_begin_in_motion(axles: AxleForces) -> list[Finding]:
+def _start_in_motion_finding(axles: AxleForces) -> list[Finding]:
     """Finding on forces that begin while the vehicle moves, although the run begins at rest."""
     first = axles.forces[0] / axles.loads - 1
     last = axles.pitch[1][min(len(axles.forces) - 1, round(axles.duration / axles.period))]
@@ -187,7 +198,7 @@ def _forces_begin_in_motion(axles: AxleForces) -> list[Finding]:
         not axles.starts_at_rest
         or axles.parameters.g == 0
         or np.abs(first).max() < START_LOAD_SHARE
-        or abs(last) < max(STEEPEST_GRADE, _noise(axles))
+        or abs(last) < max(STEEPEST_GRADE, _pitch_noise(axles))
     ):
         return []
     text = (
@@ -199,7 +210,7 @@ def _forces_begin_in_motion(axles: AxleForces) -> list[Finding]:
     return [Finding("start", "doubt", "wheel forces", text, float(last), "rad", axles.names)]
 
 
-def _noise(axles: AxleForces) -> float:
+def _pitch_noise(axles: AxleForces) -> float:
     """Four standard deviations (rad) of the pitch that the samples' white noise causes by the end of the run.
 
     The noise is estimated, as an upper bound, from the third differences of the forces, which are small for smooth
@@ -209,7 +220,7 @@ def _noise(axles: AxleForces) -> float:
     return 4 * (axles.rigid.noise_intensity(rough, axles.period) * axles.duration**3 / 3) ** 0.5
 
 
-def _constant_axle(axles: AxleForces) -> list[Finding]:
+def _constant_axle_finding(axles: AxleForces) -> list[Finding]:
     """Finding on an axle whose force never changes while the other one's does."""
     still = np.ptp(axles.forces, axis=0) == 0
     if still.all() or not still.any():
@@ -223,7 +234,7 @@ def _copied_finding(axles: AxleForces) -> list[Finding]:
     """Finding on an axle whose samples equal the other axle's, times a factor."""
     off = axles.forces - axles.means
     size = np.sqrt(np.mean(off**2, axis=0))
-    if not size.all() or np.sqrt(np.mean((off[:, 1] / size[1] - off[:, 0] / size[0]) ** 2)) > COPIED_SHARE:
+    if not size.all() or np.sqrt(np.mean((off[:, 1] / size[1] - off[:, 0] / size[0]) ** 2)) > COPIED_RESIDUAL_SHARE:
         return []
     text = (
         f"The rear axle's force changes as the front axle's does, times {size[1] / size[0]:.4g}, in every sample: one "
@@ -232,7 +243,7 @@ def _copied_finding(axles: AxleForces) -> list[Finding]:
     return [Finding("copied", "doubt", "wheel forces", text, float(size[1] / size[0]), "1", axles.names)]
 
 
-def _order(axles: AxleForces) -> list[Finding]:
+def _axle_order_finding(axles: AxleForces) -> list[Finding]:
     """Finding on axles that meet the road's unevenness in the wrong order."""
     late, alike, other = _axle_delay(axles)
     if alike < REPEATED_CORRELATION or late > 0 or alike < 1.5 * other:
@@ -277,15 +288,17 @@ def unchecked_delay_sentence(axles: AxleForces) -> str:
     return f"not checked: whether an axle is late{seen}; {tells}"
 
 
-def _weights_agree(axles: AxleForces) -> Finding:
+def _weight_note(axles: AxleForces) -> Finding:
+    """Finding that the mean wheel forces carry the vehicle's weight, with the errors that would be seen."""
     motion = equilibrium_residual(axles)
     text = (
         f"The mean wheel forces carry the vehicle to {motion.shares_of_load[0]:+.2%} of its weight; an error of "
-        f"{100 * motion.known[0] / GRAVITY:.2g} % would be seen, of one axle of "
-        f"{100 * abs(motion.known[1] / (axles.accelerations_per_newton[1] * axles.loads)).max():.2g} %."
+        f"{100 * motion.uncertainties[0] / GRAVITY:.2g} % would be seen, of one axle of "
+        f"{100 * abs(motion.uncertainties[1] / (axles.accelerations_per_newton[1] * axles.loads)).max():.2g} %."
     )
     return Finding("weight", "note", "", text, 100 * float(motion.shares_of_load[0]), "%", axles.names)
 
 
-def _error(axles: AxleForces, kind: str, text: str, size: float, unit: str) -> Finding:
+def _axle_error(axles: AxleForces, kind: str, text: str, size: float, unit: str) -> Finding:
+    """A finding of severity "error" on both axles' forces."""
     return Finding(kind, "error", "wheel forces", text, float(size), unit, axles.names)

@@ -1,4 +1,4 @@
-"""A measurement file as its format describes it: channels, their groups of one clock each, and samples block by
+"""A measurement file as its format describes it: channels, groups of channels with one clock, and samples block by
 block."""
 
 from collections.abc import Iterator, Sequence
@@ -12,12 +12,12 @@ import numpy as np
 from models.core.finding import Finding
 
 SAMPLES_PER_BLOCK = 60_000
-"""Samples of a block: a minute at 1 kHz."""
+"""Number of samples per block: a minute at 1 kHz."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel, with names and units as the file gives them."""
+    """One channel of a measurement file, with name and unit as in the file."""
 
     name: str
     unit: str
@@ -43,7 +43,7 @@ class SampleBlock:
 
 
 class Source(Protocol):
-    """An open measurement file; each format in ``models.measured.formats`` has its own implementation."""
+    """Protocol of an open measurement file; each format in ``models.measured.formats`` has its own implementation."""
 
     @property
     def path(self) -> Path:
@@ -51,7 +51,7 @@ class Source(Protocol):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """All channels that hold numbers over time; no two have the same name."""
+        """All channels that hold numbers over time, with distinct names."""
 
     @property
     def start(self) -> datetime | None:
@@ -59,11 +59,11 @@ class Source(Protocol):
 
     @property
     def comment(self) -> str:
-        """Comment in the file; its lines are separated by line ends."""
+        """Comment in the file, with line ends between its lines."""
 
     @property
-    def noticed(self) -> tuple[Finding, ...]:
-        """Findings on opening the file: cut off, repeated names, channels left out, how numbers are written."""
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings from opening the file: cut off, repeated names, channels left out, notation of numbers."""
 
     def blocks(self, names: Sequence[str], length: int = SAMPLES_PER_BLOCK, first: int = 0) -> Iterator[SampleBlock]:
         """Blocks of at most ``length`` samples of channels of one group, from sample ``first`` on.

@@ -1,4 +1,4 @@
-"""Samples of many signals on disk, one signal after another: any signal whole, or all of them block by block.
+"""Samples of many signals in one file on disk: each signal can be read alone, or all signals block by block.
 
 Nothing but the part asked for is in memory. What is written is counted in a journal beside it, written whole or not at
 all, so that whoever is interrupted goes on where the journal says.
@@ -18,11 +18,11 @@ SAMPLE_TYPE = np.dtype("<f8")
 
 
 class Readable(ABC):
-    """Samples of several signals, each of which can be read by its name."""
+    """Interface of the samples of several signals, each of which can be read by its name."""
 
     @abstractmethod
     def read(self, name: str, first: int = 0, count: int | None = None) -> np.ndarray:
-        """Samples (n,) of one signal."""
+        """Samples (n,) of one signal from sample ``first`` on; all that follow if ``count`` is None."""
 
     def block(self, names: tuple[str, ...], first: int, count: int) -> np.ndarray:
         """Samples (n, names) of several signals."""
@@ -30,7 +30,7 @@ class Readable(ABC):
 
 
 class Columns(Readable):
-    """Samples (signals, count) as doubles in one file; NaN marks missing measurements."""
+    """Samples (signals, count) as doubles in one file on disk; NaN marks missing measurements."""
 
     def __init__(self, path: Path, names: tuple[str, ...], count: int) -> None:
         """Continue the file that was begun with the same names and count, or begin a new one; InputError where the file
@@ -49,7 +49,7 @@ class Columns(Readable):
             self.close(0)
 
     def close(self, completed: int) -> None:
-        """Record in the journal that the first ``completed`` samples of every signal are complete."""
+        """Record in the file's journal that the first ``completed`` samples of every signal are complete."""
         self.done = completed
         text = json.dumps({"names": list(self.names), "count": self.count, "done": completed})
         write_whole(self._journal, text)
@@ -70,24 +70,24 @@ class Columns(Readable):
         self.close(first + len(values))
 
     def read(self, name: str, first: int = 0, count: int | None = None) -> np.ndarray:
-        """Samples (n,) of one signal."""
+        """Samples (n,) of one signal from sample ``first`` on; all that follow if ``count`` is None."""
         n = self.count - first if count is None else min(count, self.count - first)
         offset = (self.names.index(name) * self.count + first) * SAMPLE_TYPE.itemsize
         return np.fromfile(self.path, SAMPLE_TYPE, n, offset=offset)
 
     def remove(self) -> None:
-        """Delete the file and its journal."""
+        """Delete the file of samples and its journal."""
         self.path.unlink()
         self._journal.unlink()
 
 
 class MemoryColumns(Readable):
-    """Columns of samples (count, signals) in memory, read only."""
+    """Samples (count, signals) of several signals in memory, read only."""
 
     def __init__(self, names: tuple[str, ...], samples: np.ndarray) -> None:
         self.names, self.count, self._samples = names, len(samples), samples
 
     def read(self, name: str, first: int = 0, count: int | None = None) -> np.ndarray:
-        """Samples (n,) of one signal."""
+        """Samples (n,) of one signal from sample ``first`` on; all that follow if ``count`` is None."""
         last = self.count if count is None else first + count
         return np.array(self._samples[first:last, self.names.index(name)])

@@ -1,4 +1,4 @@
-"""One channel of a measurement as a curve: times and values, in the unit that is wanted."""
+"""Times and values of one channel of a measurement file, in a wanted unit."""
 
 import numpy as np
 

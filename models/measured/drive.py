@@ -1,4 +1,4 @@
-"""A measured drive: steer angle and speed on an even clock, without spikes, low-passed without phase."""
+"""Measured drive of a vehicle: steer angle and speed at even times, without spikes."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,10 +12,11 @@ from models.measured.formats import open_source
 from models.measured.outliers import without_outliers
 
 DRIVE_CHANNELS = {"steer": "rad", "speed": "m/s"}
+"""Channels of a measured drive, with their units."""
 LEAST_SPEED = 2.0
-"""m/s: slip angles are ratios to the speed."""
+"""Least speed (m/s) of a drive, since slip angles are ratios to the speed."""
 FEWEST_SAMPLES = 16
-"""Samples of a drive: a filter without phase needs some."""
+"""Least number of samples of a drive."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +31,13 @@ class MeasuredDrive:
 
 
 def read_drive(path: Path, stretch: tuple[float, ...] = ()) -> MeasuredDrive:
-    """The drive recorded in a file, or in a time interval (s, s) of it; InputError if the file holds no drive."""
+    """The drive in a file, or in a time interval (s, s) of it; raises InputError if the file holds no drive."""
     return _read_drive(path, stretch, path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=8)
 def _read_drive(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredDrive:
+    """The drive in a file, cached until the file changes (``stamp``: time of its last change)."""
     source = open_source(path)
     read = {name: channel_curve(source, name, unit) for name, unit in DRIVE_CHANNELS.items()}
     first = max(times[0] for times, _ in read.values())
@@ -59,8 +61,8 @@ def _read_drive(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredD
 
 
 def on_even_grid(times: np.ndarray, values: np.ndarray, grid: np.ndarray, place: str) -> tuple[np.ndarray, int]:
-    """Values (n,) on an even time grid, with straight lines across spikes and gaps, and the number of samples left out
-    for that."""
+    """Values (n,) on an even time grid, with straight lines across spikes and gaps, and the number of samples left
+    out."""
     cleaned = without_outliers(values)
     known = np.isfinite(cleaned)
     if known.sum() < FEWEST_SAMPLES:

@@ -1,4 +1,4 @@
-"""Errors that a real measurement adds to the truth: gain, bias, delay, noise, quantisation, dropouts, each by its name.
+"""Faults that a virtual measurement adds to the true signals: gain, bias, delay, noise, quantisation, dropouts.
 
 Nothing that is not named acts. An amount is given to a channel, to all channels of a transducer (what a signal is
 ``at``) or to all of a quantity; the closest name counts. Every channel has its own stream of noise, so that a further
@@ -17,10 +17,11 @@ from models.core.strict import Strict, quantity
 from models.measured.signal import Signal
 
 Amounts = dict[str, float]
-"""Name of a channel, a transducer or a quantity -> amount in SI."""
+"""Amounts of a fault in SI units, by name of a channel, a transducer or a quantity."""
 FAULT_AMOUNTS = ("gain", "bias", "delay", "noise")
+"""Names of the faults that have an amount for each signal."""
 FULL_SCALE_RATIO = 1.25
-"""Full scale of a quantised channel by its largest value: an amplifier is not driven to its end."""
+"""Ratio of a quantised channel's full scale to its largest value: an amplifier is not driven to its limit."""
 
 
 class Quantisation(Strict):
@@ -39,7 +40,7 @@ class Dropouts(Strict):
 
 
 class Faults(Strict):
-    """[virtual.faults]: what each channel adds to the truth; an effect that is not named is absent."""
+    """[virtual.faults]: faults that are added to each channel's true signal; a fault that is not named is absent."""
 
     gain: Amounts = Field(default={}, description="relative error of the factor, 0.02 for 2 % too much")
     bias: Amounts = Field(default={}, description="added, in SI")
@@ -55,8 +56,8 @@ def amount_of_fault(amounts: Amounts, signal: Signal) -> float:
     return next((amounts[name] for name in _names_of_signal(signal) if name in amounts), 0.0)
 
 
-def check(faults: Faults, signals: Iterable[Signal], file: str = "", place: str = "virtual.faults") -> None:
-    """Raise InputError for a name that no signal has, a negative noise or a delay out of reach."""
+def check_faults(faults: Faults, signals: Iterable[Signal], file: str = "", place: str = "virtual.faults") -> None:
+    """Raise InputError for a fault with a name that no signal has, a negative noise or a negative delay."""
     known = tuple(dict.fromkeys(name for signal in signals for name in _names_of_signal(signal)))
     amounts, lists = {kind: getattr(faults, kind) for kind in FAULT_AMOUNTS}, (faults.quantisation, faults.dropouts)
     named = [(kind, name) for kind, listed in amounts.items() for name in listed]
@@ -75,8 +76,8 @@ def check(faults: Faults, signals: Iterable[Signal], file: str = "", place: str 
 def measured_samples(
     faults: Faults, signals: tuple[Signal, ...], truth: np.ndarray, step: float, stride: int, seed: int, path: int = 0
 ) -> np.ndarray:
-    """Measured samples (m, signals): every ``stride``-th row of the true values (n, signals), ``step`` (s) apart, with
-    all faults; NaN where a sample is lost.
+    """Measured samples (m, signals): every ``stride``-th row of the true values (n, signals), which are ``step`` (s)
+    apart, with all faults; NaN where a sample is lost.
 
     seed and path name the noise: the same ones give the same samples, whoever asks.
     """
@@ -99,7 +100,7 @@ def measured_samples(
 
 
 def quantised_values(values: np.ndarray, bits: int) -> np.ndarray:
-    """Values (n,) rounded to the steps of a converter with so many bits, whose range is a little larger than the
+    """Values (n,) rounded to the steps of a converter with this number of bits, whose range is a little larger than the
     largest value."""
     largest = float(np.abs(values).max())
     if largest == 0.0:
@@ -120,7 +121,8 @@ def lost_samples(dropouts: Dropouts, location: str, seed: int, path: int, count:
 
 
 def _delayed_samples(true: np.ndarray, step: float, stride: int, delay: float) -> np.ndarray:
-    """Every ``stride``-th sample, delayed by ``delay`` (s); before the start, the value stays at the first sample."""
+    """Every ``stride``-th sample of a true signal, delayed by ``delay`` (s); before the start, the value stays at the
+    first sample."""
     if delay == 0.0:
         return true[::stride].copy()
     late_times = np.maximum(step * stride * np.arange(len(true[::stride])) - delay, 0.0)
@@ -130,13 +132,15 @@ def _delayed_samples(true: np.ndarray, step: float, stride: int, delay: float) -
 
 
 def _random_stream(name: str, seed: int, path: int, count: int, source: int) -> np.ndarray:
-    """Normal random samples (count,) that depend only on seed, path, source and the name."""
+    """Standard normal random samples (count,) that depend only on seed, path, source and the name."""
     return normal_samples(seed, (path << 32) + crc32(name.encode()), count, 1, source=source)[:, 0]
 
 
 def _names_of_signal(signal: Signal) -> tuple[str, ...]:
+    """Names by which a scene can refer to a signal: its channel, its transducer, its quantity."""
     return signal.channel, signal.at, signal.quantity
 
 
 def _is_named(names: list[str], signal: Signal) -> bool:
+    """Whether a list of names includes a signal; an empty list includes all."""
     return not names or not set(names).isdisjoint(_names_of_signal(signal))

@@ -1,4 +1,4 @@
-"""Kind of a file by its first bytes or its extension, and what to do with a kind whose samples cannot be read here."""
+"""Kind of a measurement file by its first bytes or its extension, with advice for kinds that cannot be read."""
 
 import re
 import zipfile
@@ -20,9 +20,9 @@ FORMAT_OF_EXTENSION = {
     ".tim": "RPC III",
     ".tdms": "TDMS",
 }
-"""Extension of a file that can be read -> its usual format."""
+"""Usual format of a readable file, by its extension."""
 FORMAT_OF_FIRST_BYTES = {b"MDF ": "ASAM MDF", b"UnFinMF": "ASAM MDF", b"TDSm": "TDMS", b"FORMAT\0": "RPC III"}
-"""First bytes of a file that can be read -> its format; any other text is read as CSV."""
+"""Format of a readable file, by its first bytes; any other text is read as CSV."""
 KNOWN_FORMATS = "CSV, ASAM MDF (.mf4), MTS RPC III (.rsp) and TDMS can be read"
 AS_CSV = "save its channels as CSV with a column time [s]"
 DESCRIPTION_OF_FORMAT = {
@@ -30,7 +30,7 @@ DESCRIPTION_OF_FORMAT = {
     "TDMS": "TDMS, which begins with TDSm",
     "RPC III": "MTS RPC III (response .rsp, drive .drv, time history .tim), which begins with FORMAT",
 }
-"""Format -> what it is called and how it begins."""
+"""Full name and first bytes of each format."""
 WRITE_ANEW = f"write it anew from the software that has it, or {AS_CSV}"
 DECODE_ADVICE = "decode its messages with their database (.dbc) into MDF 4, with asammdf or the logger's software"
 UNPACK_ADVICE = "unpack it, and name the file inside"
@@ -124,7 +124,7 @@ UNREADABLE_KINDS = (
     UnreadableKind("sound", AS_CSV, rb"RIFF....WAVE", (".wav",)),
     UnreadableKind("an SQLite database", AS_CSV, rb"SQLite format 3", (".db", ".sqlite")),
 )
-"""What measurements come as, beside the formats that can be read; the first that fits is the one."""
+"""Kinds of measurement files that cannot be read here; the first kind that fits a file is reported."""
 WORKBOOK_KIND, ARRAYS_KIND = UNREADABLE_KINDS[0], next(kind for kind in UNREADABLE_KINDS if ".npz" in kind.extensions)
 
 
@@ -145,11 +145,11 @@ def format_of(path: Path, first_bytes: bytes) -> str:
     )
     if kind is not None:
         if kind.extensions == (".zip",):
-            kind = _of_archive(path) or kind
+            kind = _archive_kind(path) or kind
         raise InputError(path, "", None, f"this is {kind.name}: {kind.remedy}; {KNOWN_FORMATS}")
     if is_text(first_bytes):
         return "CSV"
-    allowed = f"this is the beginning of no known format{by_extension(path)}; {KNOWN_FORMATS}"
+    allowed = f"this is the beginning of no known format{extension_phrase(path)}; {KNOWN_FORMATS}"
     raise InputError(path, "byte 0", first_bytes[:8].hex(" "), allowed)
 
 
@@ -158,16 +158,16 @@ def is_text(first_bytes: bytes) -> bool:
     return first_bytes.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" not in first_bytes
 
 
-def usual_of(suffix: str, format_name: str) -> str:
-    """Text on what files with an extension usually are; ``format_name``, this file's own format, for an unknown
-    extension or .asc."""
-    if suffix in FORMAT_OF_EXTENSION or suffix == ".asc":
-        return FORMAT_OF_EXTENSION.get(suffix, format_name)
-    return next((kind.name for kind in UNREADABLE_KINDS if suffix in kind.extensions), format_name)
+def usual_kind_of_extension(extension: str, format_name: str) -> str:
+    """Usual kind of files with an extension; ``format_name``, this file's own format, for an unknown extension or
+    .asc."""
+    if extension in FORMAT_OF_EXTENSION or extension == ".asc":
+        return FORMAT_OF_EXTENSION.get(extension, format_name)
+    return next((kind.name for kind in UNREADABLE_KINDS if extension in kind.extensions), format_name)
 
 
-def by_extension(path: Path) -> str:
-    """Phrase on what files with this extension usually are; empty if the extension is unknown."""
+def extension_phrase(path: Path) -> str:
+    """Phrase on the usual kind of files with this file's extension; empty if the extension is unknown."""
     suffix = path.suffix.lower()
     kind = next((kind for kind in UNREADABLE_KINDS if suffix in kind.extensions), None)
     if kind is not None:
@@ -179,7 +179,7 @@ def by_extension(path: Path) -> str:
 
 
 def is_measurement(path: Path) -> bool:
-    """Whether a file may be a measurement: its extension is one of measurement files, or it is no text."""
+    """Whether a file may be a measurement: it has an extension of measurement files, or is no text."""
     if path.suffix.lower() in (*FORMAT_OF_EXTENSION, *(each for kind in UNREADABLE_KINDS for each in kind.extensions)):
         return True
     if path.suffix.lower() in ("", ".toml") or not path.is_file():
@@ -188,8 +188,8 @@ def is_measurement(path: Path) -> bool:
         return not is_text(file.read(256))
 
 
-def _of_archive(path: Path) -> UnreadableKind | None:
-    """Kind of data in a zip archive: a spreadsheet workbook or numpy arrays."""
+def _archive_kind(path: Path) -> UnreadableKind | None:
+    """Kind of data in a zip archive: a spreadsheet workbook or numpy arrays; None for other contents."""
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()

@@ -1,4 +1,4 @@
-"""Samples that were not measured: short gaps filled by what the channel makes most likely, and marks for no value.
+"""Samples that were not measured: short gaps filled with the most likely values, and exporters' marks for no value.
 
 The samples are taken as a stationary process of the channel's own autocovariance. What was lost has then a normal
 law, given its neighbours (simple kriging): its mean is the filling, its standard deviation the doubt. A straight line
@@ -19,11 +19,13 @@ from models.measured.recording import Recording
 from models.measured.signal import UNIT_OF_QUANTITY, Quantity, Signal
 
 LONGEST_BRIDGED_GAP = 0.1
-"""s: the longest gap in a hub force that is bridged."""
+"""Longest gap (s) in a hub force that is bridged."""
 NEIGHBOUR_SPAN = 0.3
-"""s of neighbours on either side that the filling is drawn from: several waves of wheel hop and the chassis' roll."""
+"""Time (s) on either side of a gap whose samples determine the filling: several waves of wheel hop and of the chassis'
+roll."""
 MOST_NEIGHBOURS = 200
-"""Neighbours, about: those close to the gap all count, those farther away every so many."""
+"""Approximate number of neighbouring samples for a filling: all close to the gap, and a selection of those farther
+away."""
 LARGEST_PLAUSIBLE: dict[Quantity, float] = {
     "force": 1e6,
     "moment": 1e6,
@@ -33,34 +35,35 @@ LARGEST_PLAUSIBLE: dict[Quantity, float] = {
     "travel": 100.0,
     "strain": 1.0,
 }
-"""SI: ten times and more what the transducers of a vehicle measure (a force of 100 t, 1000 g)."""
-FAR_RATIO = 1000.0
-"""Times the departure from the median that half of all samples do not exceed. A wrong unit makes all samples large
-alike, and is the business of the checks of weight and motion."""
+"""Largest plausible value of each quantity in SI units: ten times and more what transducers of a vehicle measure (a
+force of 100 t, 1000 g)."""
+IMPOSSIBLE_DISTANCE_RATIO = 1000.0
+"""Ratio of a sample's distance from the median to the median distance above which it is no measurement. A wrong unit
+makes all samples large alike, and is found by other checks."""
 MISSING_VALUE_MARK = 1e30
-"""What is beyond this is a mark, however many samples have it."""
+"""Magnitude above which a value is an exporter's mark, however many samples have it."""
 
 
 @dataclass(frozen=True)
 class Gap:
-    """A gap: samples from ``first`` to before ``end``. ``largest_deviation`` (in the channel's unit) is the largest
+    """A gap of samples from ``first`` to before ``end``. ``largest_deviation`` (in the channel's unit) is the largest
     standard deviation of the filled values, NaN if the gap is not filled because it is too long or has no
-    neighbours.
-    """
+    neighbours."""
 
     first: int
     end: int
     largest_deviation: float
 
 
-def true_runs(holds: np.ndarray) -> np.ndarray:
-    """First index and end index (r, 2) of each run of true values in an array (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], holds.astype(np.int8), [0]))))
+def true_runs(is_true: np.ndarray) -> np.ndarray:
+    """First index and end index (r, 2) of each run of consecutive true values in an array (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], is_true.astype(np.int8), [0]))))
     return edges.reshape(-1, 2)
 
 
-def filled_samples(values: np.ndarray, period: float, longest: float) -> tuple[np.ndarray, list[Gap]]:
-    """Values (n,), sampled every ``period`` (s), with gaps of up to ``longest`` (s) filled, and all gaps.
+def filled_samples(values: np.ndarray, period: float, longest_gap: float) -> tuple[np.ndarray, list[Gap]]:
+    """Values (n,), sampled every ``period`` (s), with gaps of up to ``longest_gap`` (s) filled, and the list of all
+    gaps.
 
     Wheels hop at 10 to 15 Hz: of a gap of 0.02 s a third to a tenth of the motion is doubtful, of one of 0.05 s most.
     """
@@ -69,12 +72,12 @@ def filled_samples(values: np.ndarray, period: float, longest: float) -> tuple[n
         return values, []
     out, mean, span = values.copy(), float(np.nanmean(values)), max(round(NEIGHBOUR_SPAN / period), 4)
     stride = max(2 * span // MOST_NEIGHBOURS, 1)
-    law = autocovariance(values - mean, 2 * span + round(longest / period) + 2)
+    law = autocovariance(values - mean, 2 * span + round(longest_gap / period) + 2)
     gaps = []
     for first, end in lost:
         doubt = np.nan
         known = _neighbour_samples(values, first, end, span, stride)
-        if len(known) and (end - first) * period <= longest * (1 + 1e-9):
+        if len(known) and (end - first) * period <= longest_gap * (1 + 1e-9):
             guess, doubt = _conditional_mean(law, known, np.arange(first, end), values[known] - mean)
             out[first:end] = mean + guess
         gaps.append(Gap(first, end, doubt))
@@ -82,8 +85,8 @@ def filled_samples(values: np.ndarray, period: float, longest: float) -> tuple[n
 
 
 def bridged_signals(recording: Recording, signal: Signal) -> tuple[np.ndarray, list[Gap], tuple[Finding, ...]]:
-    """All samples (n,) of a signal with short gaps filled, the gaps, and findings on them; InputError where a gap is
-    too long."""
+    """All samples (n,) of a signal with short gaps filled, the gaps, and findings on them; raises InputError where a
+    gap is too long."""
     period = recording.period
     values, gaps = filled_samples(recording.samples(signal), period, LONGEST_BRIDGED_GAP)
     for gap in (gap for gap in gaps if np.isnan(gap.largest_deviation)):
@@ -139,12 +142,14 @@ def _conditional_mean(
     return values @ weights, float(np.sqrt(np.maximum(remaining_variance, 0.0).max()))
 
 
-def without_absurd(signal: Signal, values: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, Finding | None]:
+def without_impossible_values(
+    signal: Signal, values: np.ndarray, times: np.ndarray
+) -> tuple[np.ndarray, Finding | None]:
     """Values (n,) in SI with NaN in place of values that cannot be measurements, and a finding on them; times (n,) in
     s.
 
-    A sample is absurd if it is a mark, or beyond LARGEST_PLAUSIBLE and FAR_RATIO times farther from the median than
-    half of all.
+    A value is impossible if it is a mark, or beyond LARGEST_PLAUSIBLE and IMPOSSIBLE_DISTANCE_RATIO times farther from
+    the median than half of all.
     """
     if not (np.abs(values) > LARGEST_PLAUSIBLE[signal.quantity]).any():
         return values, None
@@ -152,7 +157,7 @@ def without_absurd(signal: Signal, values: np.ndarray, times: np.ndarray) -> tup
     plausible = values[~absurd & ~np.isnan(values)]
     if len(plausible):
         deviations = np.abs(plausible - np.median(plausible))
-        limit = np.maximum(FAR_RATIO * np.median(deviations), LARGEST_PLAUSIBLE[signal.quantity])
+        limit = np.maximum(IMPOSSIBLE_DISTANCE_RATIO * np.median(deviations), LARGEST_PLAUSIBLE[signal.quantity])
         absurd[np.flatnonzero(~absurd & ~np.isnan(values))[deviations > limit]] = True
     if not absurd.any():
         return values, None

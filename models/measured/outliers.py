@@ -1,11 +1,12 @@
-"""Samples that stand far off those around them: spikes of a few samples, which a fit must not see."""
+"""Removal of spikes: a few successive samples far off the samples around them."""
 
 import numpy as np
 
 MEDIAN_SAMPLES = 9
-"""Samples of the running median; up to four that stand off together are seen."""
+"""Number of samples of the running median; up to four successive outliers are detected."""
 FAR_RATIO, USUAL_SHARE = 3.0, 0.99
-"""Times the distance from the running median that 99 % of samples keep: 7.7 deviations of Gaussian noise."""
+"""Ratio of an outlier's distance from the running median to the distance that 99 % of the samples do not exceed: 7.7
+deviations of Gaussian noise."""
 
 
 def without_outliers(values: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Causes of a channel's wrong factor against the true value: its sign, its unit, or its calibration factor."""
+"""Probable cause of a channel's wrong factor: its sign, its unit, or its calibration factor."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -16,17 +16,19 @@ UNIT_FACTORS: dict[Quantity, dict[str, float]] = {
     "travel": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "inch": 0.0254},
     "strain": {"-": 1.0, "um/m": 1e-6, "%": 1e-2},
 }
-"""Units that files are written in, and their factors."""
+"""Usual units in files, by quantity, with their factors to SI."""
 RATIO_DIFFERENCE = 0.2
-"""Part by which a ratio may differ from that of two units; a calibration is not wrong by more than SUSPICIOUS_GAIN."""
+"""Largest difference of logarithms between a measured ratio and the ratio of two units that explains it."""
 SUSPICIOUS_GAIN = 0.25
+"""Largest relative error of a calibration factor; larger errors have another cause."""
 NEGLIGIBLE_MEAN_SHARE = 0.05
-"""Share of the static load below which a mean is none, where the force varies by more."""
+"""Share of the static load below which a mean force counts as zero, where the force varies by more."""
 WrongFactor = Literal["sign", "unit", "gain", "size"]
+"""Causes of a wrong factor; "size" means that no usual unit explains it."""
 
 
 def probable_mistake(ratio: float, signal: Signal) -> tuple[WrongFactor, str]:
-    """Probable mistake behind a ratio of recorded to true value, and, for a unit, which unit was taken for which.
+    """Probable mistake behind a ratio of recorded to true value, and, for a wrong unit, which unit was taken for which.
 
     "size" means that no two usual units explain the ratio. Of several pairs of units, one that contains the map's unit
     is preferred.
@@ -49,7 +51,7 @@ def probable_mistake(ratio: float, signal: Signal) -> tuple[WrongFactor, str]:
 def cause_and_sentence(
     ratio: float, signal: Signal, reference: str, remedies: Mapping[WrongFactor, str] | None = None
 ) -> tuple[WrongFactor, str]:
-    """The cause of a wrong factor and a sentence about it; ``reference`` names the source of the true value.
+    """The cause of a wrong factor and a sentence on it; ``reference`` names the source of the true value.
 
     remedies : what to do about each, None for those of a channel map.
     """
@@ -72,8 +74,9 @@ def cause_and_sentence(
     return kind, f"{texts[kind]}{between}{(remedies or in_map)[kind]}."
 
 
-def counted_from_load(name: str, mean: float, load: float) -> str:
-    """Sentence on a vertical force whose mean (N) is negligible compared with the static load (N)."""
+def missing_load_sentence(name: str, mean: float, load: float) -> str:
+    """Sentence on a vertical force whose mean (N) is negligible compared with the static load (N): the load must be
+    added."""
     return (
         f"{name} reads {mean:.4g} N on average, less than it varies: it counts from the static load; add {load:.5g} N."
     )

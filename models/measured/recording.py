@@ -1,4 +1,4 @@
-"""Signals in SI on one clock: what every check, run and page reads."""
+"""A recording: measured signals in SI units on one clock, which every check, run and page reads."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -13,20 +13,19 @@ from models.measured.columns import Columns, MemoryColumns
 from models.measured.signal import Signal
 
 Progress = Callable[[str, float], None]
-"""Told what is done now, and which part of all is."""
+"""Function that is called with a text on the present work and the completed share."""
 
 
-def no_progress(*told: Any) -> None:
+def no_progress(*arguments: Any) -> None:
     """A progress function that does nothing."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """Measured signals on one clock.
+    """Measured signals on one clock, in SI units.
 
-    period : s; count : samples, the first at t = 0. start : when that was, None if no file says. noticed : what was
-    found while reading and bringing onto one clock (gaps, repeated times, jitter, drift between clocks). comment : of
-    the files.
+    period : s; count : samples, the first at t = 0. start : when that was, None if no file says. findings : from
+    reading and bringing onto one clock (gaps, repeated times, jitter, drift between clocks). comment : of the files.
     """
 
     signals: tuple[Signal, ...]
@@ -34,7 +33,7 @@ class Recording:
     period: float
     start: datetime | None = None
     comment: str = ""
-    noticed: tuple[Finding, ...] = field(default=())
+    findings: tuple[Finding, ...] = field(default=())
 
     @property
     def count(self) -> int:
@@ -43,7 +42,7 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """Time (s) of the last sample."""
+        """Time (s) of the last sample; the first is at 0."""
         return self.period * (self.count - 1)
 
     def find(self, quantity: str, location: str = "", component: str = "") -> tuple[Signal, ...]:
@@ -59,7 +58,7 @@ class Recording:
         return self.columns.read(signal.name)
 
     def blocks(self, signals: tuple[Signal, ...], length: int = SAMPLES_PER_BLOCK) -> Iterator[tuple[int, np.ndarray]]:
-        """Index of the first sample, and samples (n, signals), block by block."""
+        """Index of the first sample, and samples (n, signals), of each block of these signals."""
         names = tuple(s.name for s in signals)
         for first in range(0, self.count, length):
             yield first, self.columns.block(names, first, length)

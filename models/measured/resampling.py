@@ -1,17 +1,18 @@
-"""Samples onto an even clock: linearly where they are slower or as fast, without alias and phase where faster."""
+"""Resampling to an even clock: linear interpolation of slower signals, and a low-pass without phase for faster ones."""
 
 import numpy as np
 
 from models.measured.timing import EVEN_CLOCK_SHARE, GAP_PERIODS
 
 PASS_BAND, STOP_BAND, STOP_ATTENUATION = 0.4, 0.5, 60.0
-"""Of the new rate: kept up to here, gone (dB) from here on."""
+"""Edges of the low-pass in ratio to the new sampling rate: passed up to the first, attenuated (dB) from the second
+on."""
 EQUAL_RATES = 1e-6
-"""Relative difference of two rates that are one."""
+"""Relative difference up to which two sampling rates count as equal."""
 
 
 def resample_to(times: np.ndarray, values: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
-    """Values (n,) resampled to the times of an even grid (n,), s.
+    """Values (n,) of a signal resampled to the times (n,) in s of an even grid.
 
     times (m,) : s, strictly rising, mostly ``source_period`` apart; values (m,) : NaN where nothing was measured. NaN
     wherever two samples more than 1.5 periods apart lie around a point, and outside.
@@ -40,8 +41,8 @@ def _unknown_points(times: np.ndarray, source_period: float, grid: np.ndarray) -
 def _decimated_values(
     times: np.ndarray, values: np.ndarray, source_period: float, new_period: float, grid: np.ndarray
 ) -> np.ndarray:
-    """Values filtered by a symmetric low-pass kernel, which adds no phase, then interpolated by a cubic spline, which
-    is accurate enough at that sampling rate."""
+    """Values at the times of a slower grid: filtered by a symmetric low-pass kernel, which adds no phase, then
+    interpolated by a cubic spline."""
     from scipy.interpolate import CubicSpline
     from scipy.signal import firwin, kaiserord, oaconvolve
 

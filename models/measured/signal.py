@@ -1,4 +1,4 @@
-"""One signal of a recording: which quantity, of what, along which axis of which frame; and where that can be."""
+"""One signal of a recording: its quantity, location, component and frame, and the locations possible in a vehicle."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ UNIT_OF_QUANTITY: dict[Quantity, str] = {
     "travel": "m",
     "strain": "-",
 }
-"""The SI unit of each quantity: that of every recording."""
+"""SI unit of each quantity, as in every recording."""
 HUB_COMPONENTS: tuple[tuple[str, Quantity, str, str], ...] = (
     ("Fx", "force", "x", "N"),
     ("Fy", "force", "y", "N"),
@@ -23,13 +23,13 @@ HUB_COMPONENTS: tuple[tuple[str, Quantity, str, str], ...] = (
     ("My", "moment", "y", "N m"),
     ("Mz", "moment", "z", "N m"),
 )
-"""Components of what acts on a hub or through a guide: name, quantity, axis, unit."""
+"""Components of the force and moment at a hub or guide: name, quantity, axis, unit."""
 Frame = Literal["hub", "body", "inertial", "sensor"]
 
 
 @dataclass(frozen=True)
 class Signal:
-    """A channel of a file, as the channel map reads it.
+    """A channel of a file, as the channel map interprets it.
 
     at : the hub (tyre), body, connector or accelerometer that it belongs to. component : x, y, z; roll, pitch, yaw of
     angles and angular rates; empty for a travel or a strain. frame : whose axes. factor : value in SI = sign * factor *
@@ -69,8 +69,7 @@ class Places:
     sensors: tuple[str, ...] = ()
 
     def of(self, quantity: Quantity) -> Mapping[str, tuple[str, ...]]:
-        """Kinds of places at which a quantity can be measured, with their names; empty if it can be measured
-        anywhere."""
+        """Names at which a quantity can be measured, by kind of place; empty if it can be measured anywhere."""
         connectors = {"springs, mounts and bars": self.connectors}
         if quantity in ("force", "moment"):
             return {"hubs": self.hubs, **connectors}

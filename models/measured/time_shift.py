@@ -1,4 +1,4 @@
-"""By how much a measurement is later than a run: where both are most alike, by cross-correlation, then refined."""
+"""Time shift between a measurement and a run, by cross-correlation."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 LEAST_OVERLAP = 0.5
-"""Share of the shorter of both that must overlap: farther shifts match by chance."""
+"""Least overlap of run and measurement, as a share of the shorter one: larger shifts match by chance."""
 MOST_SAMPLES = 2**18
-"""Samples of the grid on which shifts are searched."""
+"""Most samples of the time grid on which shifts are searched."""
 CONSTANT_VARIANCE = 1e-9
-"""Variance of a channel, by its mean square, below which it is constant and tells no shift."""
+"""Ratio of a channel's variance to its mean square below which it is constant and shows no shift."""
 SHIFT_RESOLUTION = 1e-4
-"""Of a step of the grid: how closely the shift is refined."""
+"""Resolution of the refined shift, in steps of the search grid."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +29,15 @@ class ChannelPair:
 @dataclass(frozen=True)
 class TimeShift:
     """Time shift between run and measurement. seconds : time on the measurement's clock at the run's time 0;
-    correlation : mean at this shift over the channels that move, at best 1, NaN where none moves and the shift is 0."""
+    correlation : mean over the channels that vary, at best 1; NaN where none varies and the shift is 0."""
 
     seconds: float
     correlation: float
 
 
 def time_shift(pairs: Sequence[ChannelPair]) -> TimeShift:
-    """Time shift at which the channels correlate best, with a resolution finer than a sample. Means and scales do not
-    matter."""
+    """Time shift at which the channels of run and measurement correlate best, with a resolution finer than a sample.
+    Means and scales do not matter."""
     moving = [pair for pair in pairs if _signal_varies(pair.run) and _signal_varies(pair.values)]
     if not moving:
         return TimeShift(0.0, np.nan)
@@ -47,6 +47,7 @@ def time_shift(pairs: Sequence[ChannelPair]) -> TimeShift:
 
 
 def _signal_varies(values: np.ndarray) -> bool:
+    """Whether the finite values of a channel are not constant."""
     finite = values[np.isfinite(values)]
     return bool(len(finite) > 2 and np.var(finite) > CONSTANT_VARIANCE * np.mean(finite**2))
 
@@ -71,6 +72,7 @@ def _coarse_shift(pairs: Sequence[ChannelPair], step: float) -> float:
 
 
 def _even_grid(times: np.ndarray, first: float, step: float) -> np.ndarray:
+    """Even time grid (s) from ``first`` to the last of the times."""
     return first + step * np.arange(int((times[-1] - first) / step) + 1)
 
 
@@ -94,39 +96,42 @@ def _on_grid(
 
 
 def _correlations(run: np.ndarray, measured: np.ndarray, is_measured: np.ndarray) -> np.ndarray:
-    """Correlation (n + m - 1,) of run and measurement at every lag, the first being 1 - n; -1 where they overlap too
-    little."""
+    """Correlation (n + m - 1,) of run and measurement at every lag from 1 - n on; -1 where they overlap too little."""
     from scipy.signal import correlate
 
-    def over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    def lagged_sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return correlate(a, b, mode="full", method="fft")
 
     x, mask = (run - run.mean()) / run.std(), is_measured.astype(float)
     y = np.where(is_measured, measured - measured[is_measured].mean(), 0.0) / measured[is_measured].std()
-    ones, count = np.ones(len(x)), over(mask, np.ones(len(x)))
-    sums, means = over(mask, x), over(y, ones)
+    ones, count = np.ones(len(x)), lagged_sums(mask, np.ones(len(x)))
+    sums, means = lagged_sums(mask, x), lagged_sums(y, ones)
     safe = np.maximum(count, 1.0)
-    spread = (over(mask, x**2) - sums**2 / safe) * (over(y**2, ones) - means**2 / safe)
+    spread = (lagged_sums(mask, x**2) - sums**2 / safe) * (lagged_sums(y**2, ones) - means**2 / safe)
     enough = (count >= LEAST_OVERLAP * min(len(x), mask.sum())) & (spread > (1e-6 * safe) ** 2)
-    likeness = (over(y, x) - sums * means / safe) / np.sqrt(np.where(enough, spread, 1.0))
+    likeness = (lagged_sums(y, x) - sums * means / safe) / np.sqrt(np.where(enough, spread, 1.0))
     return np.where(enough, likeness, -1.0)
 
 
 def _refined_shift(pairs: Sequence[ChannelPair], coarse: float, step: float) -> TimeShift:
-    """Shift with the largest mean correlation within one step of a coarse shift; the run is interpolated by splines."""
+    """Time shift with the largest mean correlation within one step of a coarse shift; the run is interpolated by
+    splines."""
     from scipy.interpolate import CubicSpline
     from scipy.optimize import minimize_scalar
 
     curves = [(pair, CubicSpline(pair.run_times, pair.run)) for pair in pairs]
 
-    def apart(seconds: float) -> float:
+    def negative_correlation(seconds: float) -> float:
         return -float(np.mean([_correlation_at_shift(pair, curve, seconds) for pair, curve in curves]))
 
     best = minimize_scalar(
-        apart, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": SHIFT_RESOLUTION * step}
+        negative_correlation,
+        bounds=(coarse - step, coarse + step),
+        method="bounded",
+        options={"xatol": SHIFT_RESOLUTION * step},
     )
-    seconds = float(best.x) if best.fun <= apart(coarse) else coarse
-    return TimeShift(seconds, -apart(seconds))
+    seconds = float(best.x) if best.fun <= negative_correlation(coarse) else coarse
+    return TimeShift(seconds, -negative_correlation(seconds))
 
 
 def _correlation_at_shift(

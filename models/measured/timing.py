@@ -1,4 +1,4 @@
-"""When the samples of one group were taken: sorted, repeated ones dropped, gaps, jitter and rate found."""
+"""Sampling times of one group of channels: sorted, without repetitions, with gaps, jitter and rate determined."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -9,33 +9,37 @@ from models.core.errors import InputError
 from models.core.finding import Finding, Weight
 
 GAP_PERIODS = 1.5
-"""Periods: two samples farther apart have a gap between them."""
+"""Distance of two samples, in periods, above which there is a gap between them."""
 SHUFFLED_PERIODS = 10.0
-"""Periods: a sample that is late by no more was only written late; a clock that goes back farther began anew."""
+"""Lateness of a sample, in periods, up to which it was only written late; a clock that goes back farther began anew."""
 EVEN_CLOCK_SHARE = 0.01
-"""Of a period: samples as near to an even clock are on it; farther off, the clock jitters."""
+"""Deviation from an even clock, in periods, up to which samples lie on it; beyond, the clock jitters."""
 JITTER_SHARE = 0.1
-"""Of a period: a standard deviation of the steps that is worth a doubt."""
+"""Standard deviation of the steps, in periods, above which jitter is a doubt."""
 
 
 ROUNDING_SHARE = 1e-9
-"""Of a period: what double precision may round off a time without a word."""
+"""Rounding of a time by double precision, in periods, that is not reported."""
 LEAST_SLIPS = 5
-"""Repeated times, or steps that are off, from which on rounding may be what makes them: one is a row written twice."""
+"""Number of repeated times, or of steps that deviate, above which rounding may be their cause: one is a row written
+twice."""
 RATE_DIGITS = range(1, 9)
-"""Of the rate of an even clock: the fewest that explain all rounded times."""
+"""Numbers of significant digits tried for the rate of an even clock: the fewest that explain all rounded times are
+taken."""
 LARGEST_TIME_RATIO = 1e4
-"""Lengths of the whole measurement: a time that is farther from the middle one is no time."""
+"""Ratio of a time's distance from the median time to the length of the measurement above which it is no time."""
 REPEATED_TIME_SHARE = 0.01
-"""Part of all samples that may share their time with another one: what is dropped then does no harm."""
+"""Share of the samples that may repeat the time of another one: dropping them then does no harm."""
 
 
 ReportFinding = Callable[[str, Weight, str, float, str, Iterable[float]], None]
+"""Function that records a finding: check, severity, text, size, unit and times."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Times of a group's samples.
+    """Times (n,) in s of the samples of one group, strictly ascending, with their order in the file, the period and
+    findings.
 
     times (n,) : s, strictly rising. order (n,) : which sample of the file each is; None where every one is in its
     place. period : s, the median step. findings : what was found and how it was dealt with.
@@ -48,7 +52,7 @@ class Timing:
 
     @property
     def rate(self) -> float:
-        """Sampling rate, Hz."""
+        """Sampling rate (Hz)."""
         return 1.0 / self.period
 
     @property
@@ -58,9 +62,9 @@ class Timing:
 
 
 def sample_timing(times: np.ndarray, place: str, signal_names: tuple[str, ...] = ()) -> Timing:
-    """``Timing`` of sample times (n,) as the file at ``place`` gives them: rising times, their order in the file, the
-    period, findings. InputError where fewer than two times differ."""
-    has_no_time = _no_times(times)
+    """``Timing`` of sample times (n,) as the file at ``place`` gives them: ascending times, their order in the file,
+    the period, findings. Raises InputError where fewer than two times differ."""
+    has_no_time = _invalid_times(times)
     if has_no_time.any():
         timing, first = sample_timing(times[~has_no_time], place, signal_names), int(np.argmax(has_no_time))
         text = (
@@ -70,11 +74,11 @@ def sample_timing(times: np.ndarray, place: str, signal_names: tuple[str, ...] =
         order = np.flatnonzero(~has_no_time) if timing.order is None else np.flatnonzero(~has_no_time)[timing.order]
         absurd = Finding("time", "doubt", place, text, float(np.count_nonzero(has_no_time)), "samples", signal_names)
         return replace(timing, order=order, findings=(absurd, *timing.findings))
-    return _of_times(times, place, signal_names)
+    return _timing_of_valid_times(times, place, signal_names)
 
 
-def _no_times(times: np.ndarray) -> np.ndarray:
-    """Which of these values (n,) cannot be a time (s): not finite, or far beyond all others."""
+def _invalid_times(times: np.ndarray) -> np.ndarray:
+    """Which of the values (n,) cannot be a time (s): not finite, or far beyond all others."""
     finite = np.isfinite(times)
     if np.count_nonzero(finite) < 3:
         return ~finite
@@ -84,11 +88,11 @@ def _no_times(times: np.ndarray) -> np.ndarray:
     return ~finite | (is_far if length > 0 else False)
 
 
-def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> Timing:
-    """``Timing`` from values that can be times."""
+def _timing_of_valid_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> Timing:
+    """``Timing`` of values (n,) that can be times (s)."""
     findings, sample_count = list[Finding](), len(times)
 
-    def say(check: str, weight: Weight, text: str, size: float, unit: str, times: Iterable[float]) -> None:
+    def report(check: str, weight: Weight, text: str, size: float, unit: str, times: Iterable[float]) -> None:
         findings.append(
             Finding(check, weight, place, f"{place}: {text}.", size, unit, signal_names, tuple(map(float, times)))
         )
@@ -102,7 +106,7 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
     if even is not None:
         repeated_count = sample_count - 1 - len(rising)
         repeated_text = f", so that {repeated_count} of {sample_count} repeat themselves" if repeated_count else ""
-        say(
+        report(
             "time",
             "note",
             f"the times are rounded{repeated_text}: "
@@ -112,12 +116,12 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
             (times[0], times[-1]),
         )
         return Timing(even[0] + even[1] * np.arange(sample_count), None, even[1], tuple(findings))
-    period = float(f"{_step(times, rising):.9g}")
+    period = float(f"{_median_step(times, rising):.9g}")
     if (steps < 0).any():
         deepest, at = -float(steps.min()), int(np.argmax(steps < -SHUFFLED_PERIODS * period))
         if deepest > SHUFFLED_PERIODS * period:
             keep = keep[: at + 1]
-            say(
+            report(
                 "time",
                 "error",
                 f"the clock goes back by {deepest:.6g} s at {times[at]:.6g} s: there are two "
@@ -127,7 +131,7 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
                 (times[at + 1], times[at]),
             )
         else:
-            say(
+            report(
                 "time",
                 "doubt",
                 f"{np.count_nonzero(steps < 0)} times are earlier than the one before them, by up to "
@@ -143,7 +147,7 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
         first, count = float(times[keep][1:][repeated][0]), int(np.count_nonzero(repeated))
         text = f"{count} of {len(keep)} times are there more than once, the first at {first:.6g} s; "
         if count > REPEATED_TIME_SHARE * len(keep):
-            say(
+            report(
                 "time",
                 "error",
                 f"{text}no even clock explains them, and without these samples the forces are others: "
@@ -153,26 +157,26 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
                 (first, first),
             )
         else:
-            say("time", "doubt", f"{text}of each the first sample is taken", float(count), "samples", (first, first))
+            report("time", "doubt", f"{text}of each the first sample is taken", float(count), "samples", (first, first))
         keep = keep[np.concatenate(([True], ~repeated))]
         order = keep
     kept_times = times[keep]
-    _report_gaps(kept_times, period, say)
-    _report_jitter(kept_times, period, say)
+    _report_gaps(kept_times, period, report)
+    _report_jitter(kept_times, period, report)
     return Timing(kept_times, order, period, tuple(findings))
 
 
-def _step(times: np.ndarray, rising: np.ndarray) -> float:
+def _median_step(times: np.ndarray, rising_steps: np.ndarray) -> float:
     """Median of the rising steps (s) of times (n,).
 
     Large times, such as seconds since 1970, are rounded in double precision. Then many steps share the same rounding
     error, and the mean step is taken instead: their sum divided by the number of whole steps in it.
     """
-    middle = float(np.median(rising))
+    middle = float(np.median(rising_steps))
     if np.spacing(np.abs(times).max()) < ROUNDING_SHARE * middle:
         return middle
-    counted = np.rint(rising / middle)
-    return float(rising.sum() / counted.sum()) if counted.sum() else middle
+    counted = np.rint(rising_steps / middle)
+    return float(rising_steps.sum() / counted.sum()) if counted.sum() else middle
 
 
 def even_clock(times: np.ndarray) -> tuple[float, float] | None:
@@ -195,7 +199,7 @@ def even_clock(times: np.ndarray) -> tuple[float, float] | None:
 
 def _rounding_spacing(times: np.ndarray) -> float | None:
     """Spacing (s) to which times (n,) are coarsely rounded: the step between different times, or a power of ten; None
-    if not."""
+    if they are not."""
     steps = np.diff(times)
     if not np.isfinite(times).all() or (steps < 0).any():
         return None
@@ -211,13 +215,14 @@ def _rounding_spacing(times: np.ndarray) -> float | None:
     return None
 
 
-def _report_gaps(times: np.ndarray, period: float, say: ReportFinding) -> None:
+def _report_gaps(times: np.ndarray, period: float, report: ReportFinding) -> None:
+    """Report a finding on the gaps of a clock, with the longest one."""
     steps = np.diff(times)
     wide = np.flatnonzero(steps > GAP_PERIODS * period)
     if len(wide):
         longest = wide[np.argmax(steps[wide])]
         lost = float(np.sum(steps[wide] - period))
-        say(
+        report(
             "clock gaps",
             "note",
             f"{len(wide)} gap(s) in its clock, {lost:.4g} s in all, the longest from "
@@ -228,13 +233,14 @@ def _report_gaps(times: np.ndarray, period: float, say: ReportFinding) -> None:
         )
 
 
-def _report_jitter(times: np.ndarray, period: float, say: ReportFinding) -> None:
+def _report_jitter(times: np.ndarray, period: float, report: ReportFinding) -> None:
+    """Report a finding on the jitter of a clock, if there is any."""
     steps = np.diff(times)
     deviations = steps[steps <= GAP_PERIODS * period] - period
     spread = float(deviations.std())
     if spread > EVEN_CLOCK_SHARE * period:
         weight: Weight = "doubt" if spread > JITTER_SHARE * period else "note"
-        say(
+        report(
             "jitter",
             weight,
             f"the clock jitters: its steps of {1e3 * period:.6g} ms have a standard deviation of "

@@ -1,4 +1,4 @@
-"""Units as measurement systems spell them, turned into SI by pint: strictly, for each quantity."""
+"""Units in the spellings of measurement systems, converted to SI by pint: strictly, for each quantity."""
 
 import re
 from functools import cache
@@ -22,11 +22,12 @@ UNIT_SPELLINGS = {
     "strain": "",
     "ustrain": "microstrain",
 }
-"""Whole spellings that pint does not know or takes for something else: Grad is German for degree, to pint 1e9 rad."""
+"""Spellings that pint does not know or mistakes for something else (Grad is German for degree, to pint 1e9 rad), with
+pint's unit."""
 AMBIGUOUS_UNITS = ("grad",)
-"""Degrees to some, gon to others."""
+"""Refused spellings with two meanings: degrees to some, gon to others."""
 GRAVITY_UNITS = ("g", "G", "gn", "g_n")
-"""In a unit of acceleration; to pint a gram."""
+"""Spellings of standard gravity as a unit of acceleration; pint takes g for a gram."""
 ANGLE_UNITS = {
     "radian",
     "milliradian",
@@ -39,7 +40,8 @@ ANGLE_UNITS = {
     "arcminute",
     "arcsecond",
 }
-"""One of these must be in a unit of an angle: to pint turns, percent and pure numbers are one kind."""
+"""Names of angle units, one of which must occur in a unit of an angle; pint does not distinguish turns, percent and
+pure numbers."""
 UNIT_EXAMPLES: dict[Quantity, tuple[str, ...]] = {
     "force": ("N", "kN", "lbf"),
     "moment": ("N m", "kN m", "lbf ft"),
@@ -49,10 +51,11 @@ UNIT_EXAMPLES: dict[Quantity, tuple[str, ...]] = {
     "travel": ("m", "mm", "in"),
     "strain": ("m/m", "um/m", "microstrain", "%"),
 }
+"""Examples of accepted units of each quantity, for messages."""
 
 
 def factor_to_si(unit: str, quantity: Quantity, file: object, place: str) -> float:
-    """Factor that converts a unit to SI: value in SI = value * factor.
+    """Factor from a unit to SI: value in SI = value * factor.
 
     Raises InputError at ``file`` and ``place`` for a unit that nobody knows or that is of another quantity.
     """
@@ -82,7 +85,7 @@ def factor_to_si(unit: str, quantity: Quantity, file: object, place: str) -> flo
 
 
 def factor_between(unit: str, target_unit: str, file: object, place: str) -> float:
-    """Factor that converts a unit to another one: value in ``target_unit`` = value * factor.
+    """Factor from a unit to another one: value in ``target_unit`` = value * factor.
 
     Raises InputError at ``file`` and ``place`` where the unit is not known or of another quantity; an angle is no pure
     number.
@@ -97,7 +100,7 @@ def factor_between(unit: str, target_unit: str, file: object, place: str) -> flo
 
 
 def _has_angle(unit: Any) -> bool:
-    """Whether an angle occurs in a unit of pint."""
+    """Whether an angle occurs in a pint unit."""
     return bool(ANGLE_UNITS & set(re.split(r"[^a-z_]+", str(unit))))
 
 
@@ -115,6 +118,7 @@ def quantities_of_unit(unit: str) -> tuple[Quantity, ...]:
 
 @cache
 def _unit_registry() -> Any:
+    """pint's registry of units, created once."""
     let_in("pint")
     import pint
 
@@ -122,6 +126,7 @@ def _unit_registry() -> Any:
 
 
 def _si_unit(quantity: Quantity) -> Any:
+    """SI unit of a quantity as a pint unit."""
     return _unit_registry().parse_units(UNIT_OF_QUANTITY[quantity].replace("-", ""))
 
 
@@ -141,7 +146,7 @@ def _parsed_unit(unit: str, quantity: Quantity) -> Any:
 
 
 def _kind_of_quantity(unit: Any) -> str:
-    """The kind of quantity that a unit measures, as an engineer calls it."""
+    """Phrase on the kind of quantity that a pint unit measures, as an engineer calls it."""
     if "volt" in str(unit) or "ampere" in str(unit):
         return f"is the unit of a raw reading ({unit:~P}), which needs the sensor's calibration in the logger"
     same = [name for name in UNIT_OF_QUANTITY if unit.is_compatible_with(_si_unit(name))]
@@ -151,9 +156,11 @@ def _kind_of_quantity(unit: Any) -> str:
 
 
 def _intended_unit(unit: str, quantity: Quantity) -> str:
+    """Phrase that suggests the unit which was probably meant; empty if none is similar."""
     return suggestion_phrase(unit, UNIT_EXAMPLES[quantity])
 
 
 def _units_of_quantity(quantity: Quantity) -> str:
+    """Examples of accepted units of a quantity, as text."""
     *others, last = UNIT_EXAMPLES[quantity]
     return f"{', '.join(others)} or {last}"

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from models.engines.free_vehicle import ENGINES, free_model
-from models.engines.native_parts import SLIDES
+from models.engines.native_parts import FULL_FRICTION_SPEED
 from models.multibody.plain.joint_elements import Acting, PlainTree
 from models.own_model.constraints import Rows, by_differences, constrained_forces, plain_constraints
 from models.own_model.coordinates import MujocoState
@@ -85,7 +85,7 @@ def plain_tree(twin: TwinModel) -> PlainTree:
     """The model's equations of motion in plain numpy."""
     loads = [(spring.body, spring.point, spring.load) for spring in twin.driven.ground_springs]
     lines = [(line.ends, line.stiffness, line.damping, line.length) for line in twin.driven.line_springs]
-    frictions = [(friction.coordinate, friction.force, SLIDES) for friction in twin.driven.frictions]
+    frictions = [(friction.coordinate, friction.force, FULL_FRICTION_SPEED) for friction in twin.driven.frictions]
     turns = [(turn.bodies, turn.axes, turn.stiffness, turn.damping) for turn in twin.driven.turning_springs]
     pushes = [(load.body, load.point, load.force, load.moment) for load in twin.driven.body_loads]
     return PlainTree(twin.driven.vehicle, twin.driven.gravity, Acting(loads, lines, frictions, turns, pushes))
@@ -203,4 +203,4 @@ def sliding_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
 def rubbing_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
     """Those of the states at which every joint with dry friction moves fast enough for Coulomb's law."""
     rubbing = [friction.coordinate for friction in twin.driven.frictions]
-    return [(q, v) for q, v in states if (np.abs(v[rubbing]) >= SLIDES).all()]
+    return [(q, v) for q, v in states if (np.abs(v[rubbing]) >= FULL_FRICTION_SPEED).all()]

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from models.core.scene_file import existing
+from models.core.scene_file import existing_file
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
 
@@ -20,5 +20,5 @@ def scene_vehicle(
     if name.endswith(MJCF_EXTENSION):
         from models.own_model.car import vehicle_of_file
 
-        return vehicle_of_file(existing(name, Path(folder), file, place))
+        return vehicle_of_file(existing_file(name, Path(folder), file, place))
     return load_vehicle(name, folder, file, place, reduced, towing)

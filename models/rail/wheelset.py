@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 
 from models.contact.hertz import Hertz, by_load
 from models.contact.material import STEEL, Material, MaterialPair
-from models.core.strict import Strict, message, quantity
+from models.core.strict import Strict, input_error_from_faults, quantity
 from models.rail.laid_profiles import Profiles
 
 GRAVITY = 9.81
@@ -50,7 +50,7 @@ class Wheelset(Strict):
         try:
             super().__init__(**values)
         except ValidationError as error:
-            raise message(error, type(self), "", "wheelset") from None
+            raise input_error_from_faults(error, type(self), "", "wheelset") from None
 
     @model_validator(mode="after")
     def _check_possible(self) -> "Wheelset":

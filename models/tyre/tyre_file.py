@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.tables import NEWTONS, RADIANS, SHARES, Columns, RowBlock, table_blocks
+from models.core.tables import NEWTONS, RADIANS, SHARES, ColumnUnits, RowBlock, table_blocks
 from models.tyre.magic_formula import product_factors
 from models.tyre.tyre_table import LARGEST_FRICTION, TyreTable
 
-FRICTION_COLUMNS: Columns = {
+FRICTION_COLUMNS: ColumnUnits = {
     "slip angle": {"deg": RADIANS["deg"], "rad": 1.0},
     "slip": SHARES,
     "mu_x": SHARES,
     "mu_y": SHARES,
 }
-COLUMN_SETS: tuple[Columns, ...] = (FRICTION_COLUMNS, {**FRICTION_COLUMNS, "load": {"kN": NEWTONS["kN"], "N": 1.0}})
+COLUMN_SETS: tuple[ColumnUnits, ...] = (FRICTION_COLUMNS, {**FRICTION_COLUMNS, "load": {"kN": NEWTONS["kN"], "N": 1.0}})
 ANY_LOAD = 1e4
 """Load (N) of the only node where a file has none."""
 PRODUCT_TOLERANCE = 0.03

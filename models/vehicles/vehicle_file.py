@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.scene_file import existing, parse
+from models.core.scene_file import existing_file, parse
 from models.core.strict import read
 from models.vehicles.spatial import (
     AntiRollBar,
@@ -81,7 +81,7 @@ def vehicle_path(name: str, folder: str | Path = ".", file: str = "", place: str
         if name not in shipped():
             raise InputError(file, place, name, "no such vehicle; a file of your own ends in .toml or .xml", shipped())
         return SHIPPED / f"{name}.toml"
-    return existing(name, Path(folder), file, place)
+    return existing_file(name, Path(folder), file, place)
 
 
 def build_vehicle(table: Mapping[str, Any], file: str) -> SpatialVehicle:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from models.core.whole_files import write_whole
-from models.ensemble.runner import in_order
+from models.ensemble.runner import values_in_order
 from models.ensemble.store import Store, named_files
-from models.ensemble.workers import Crew, places_of
+from models.ensemble.workers import Crew, folders_for_workers
 from models.identification.fit import Fit, fit
 from models.identification.of_scene import problem_of
 from models.identification.problem import Problem
@@ -44,7 +44,7 @@ def identify(
     The scene's crew computes the columns of Jacobians. Raises InputError and RunFailed.
     """
     problem = problem_of(scene, measurement, parameters, engine, low_pass)
-    with Crew.of(scene, default_workers=1).at_work(1 + len(problem.parameters), *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(1 + len(problem.parameters), *folders_for_workers(scene)) as pool:
         if folder is None:
             return uncertainty(fit(problem, None, report_progress, executor=pool), pool)
         store = Store(folder / STAGES_FOLDER)
@@ -63,9 +63,9 @@ def profiles_of(
     wanted = [
         k for k in range(len(uncertainty.fit.problem.parameters)) if all_profiles or not uncertainty.is_determined[k]
     ]
-    with Crew.of(scene, default_workers=1).at_work(len(wanted), *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(len(wanted), *folders_for_workers(scene)) as pool:
         for completed, (k, drawn_profile) in enumerate(
-            in_order(partial(likelihood_profile, uncertainty), iter(wanted), pool), start=1
+            values_in_order(partial(likelihood_profile, uncertainty), iter(wanted), pool), start=1
         ):
             report_progress(
                 f"profile of {uncertainty.fit.problem.parameters[k].name}", 0.9 + 0.1 * completed / len(wanted)

@@ -24,7 +24,7 @@ from pydantic import BaseModel
 
 from models.core import told
 from models.core.assumptions import broken_of
-from models.core.discretisation import worst_of
+from models.core.discretisation import largest_estimate
 from models.core.errors import InputError, RunFailed
 from models.core.scene_file import changed_tables
 from models.core.whole_files import write_whole
@@ -307,14 +307,14 @@ def _save_sweep(folder: Path, sweep_results: "SweepResults") -> None:
         "numbers": sweep_results.columns,
         "failed": sweep_results.failures,
     }
-    content |= {"results": [told.as_json(results) for results in sweep_results.results]}
+    content |= {"results": [told.errors_and_assumptions(results) for results in sweep_results.results]}
     write_whole(folder / "sweep.json", json.dumps(content, indent=1).encode())
 
 
 def _largest_error(results: told.Results) -> float | None:
     """Largest stated relative error of a point's results (error divided by the channel's standard deviation); None if
     no error was estimated."""
-    return max((error.share for run in results.values() if (error := worst_of(run)) is not None), default=None)
+    return max((error.share for run in results.values() if (error := largest_estimate(run)) is not None), default=None)
 
 
 def _broken_assumptions_text(results: told.Results) -> str:

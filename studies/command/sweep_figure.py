@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.core.assumptions import broken_of
-from models.core.discretisation import WARNED_SHARE, worst_of
+from models.core.discretisation import WARNED_SHARE, largest_estimate
 from models.core.told import Results
 from models.drawing.figures import (
     COLOURS,
@@ -74,7 +74,7 @@ class SweepResults:
     def warned_points(self, engine: str) -> list[int]:
         """Indices of the points at which a result of an engine, or of any engine for "", states an error large enough
         for a warning."""
-        shown = (map(worst_of, _results_of_engine(results, engine).values()) for results in self.results)
+        shown = (map(largest_estimate, _results_of_engine(results, engine).values()) for results in self.results)
         return [i for i, worst in enumerate(shown) if any(error is not None and error.warned for error in worst)]
 
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from models.core.waiting import SHARES_OF_MARCHES
+from models.core.waiting import PROGRESS_FUNCTIONS
 
 BAR_DELAY, BAR_PERIOD = 1.0, 0.1
 """Time (s) until the bar is shown, and between two updates."""
@@ -109,7 +109,7 @@ class ProgressState:
                 _time_left_text(expected_seconds - compilation_seconds if share else None, compilation_seconds),
             )
         worked = time.monotonic() - self.start_time - self.compilations.compilation_seconds()
-        march = SHARES_OF_MARCHES[-1] if SHARES_OF_MARCHES else None
+        march = PROGRESS_FUNCTIONS[-1] if PROGRESS_FUNCTIONS else None
         if march is None:
             return self.text, self.share or None, _time_left_text(_remaining_seconds(self.share, worked), worked)
         if march is not self._march[0]:

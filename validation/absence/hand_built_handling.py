@@ -18,7 +18,7 @@ from models.contact.fastsim_many import forces_within
 from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, Workspace, cells_in, strips_in
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_quiet import installed
-from models.engines.mujoco_tree import principal
+from models.engines.mujoco_tree import principal_inertias
 from models.machine.compiled import lean
 from models.machine.records import records, size_of, stacked
 from models.machine.stack import array, beyond, doubles, row
@@ -277,7 +277,7 @@ def model_of(handling: Handling, step: float) -> mujoco.MjModel:
         )
         for name, kinds in BODIES_ON_CHASSIS.items()
     )
-    inertias, axes = principal(chassis)
+    inertias, axes = principal_inertias(chassis)
     built = mujoco.MjModel.from_xml_string(
         MJCF.format(
             step=repr(step),

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from models.core.errors import InputError
-from models.core.runge_kutta import step_on
+from models.core.runge_kutta import runge_kutta_step
 from validation.adams_joints.mechanism import Mechanism
 from validation.adams_joints.motion import BodyMotion, Reaction, reaction_about_marker
 
@@ -142,7 +142,7 @@ class ConstrainedBody:
         return self._motion_and_reaction(np.array(states_kept), step * stride)
 
     def _after_step(self, state: np.ndarray, step: float) -> np.ndarray:
-        next_state = step_on(lambda _, stage_state: self.rates(stage_state), 0.0, state, step)
+        next_state = runge_kutta_step(lambda _, stage_state: self.rates(stage_state), 0.0, state, step)
         next_state[QUATERNION] /= np.linalg.norm(next_state[QUATERNION])
         return next_state
 

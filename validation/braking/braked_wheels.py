@@ -11,7 +11,7 @@ from models.brake.plane_vehicle import GRAVITY, Plane
 from models.brake.quarter import Quarter
 from models.brake.surfaces import UNIFORM_ROAD, Road, Stretch, road
 from models.core.errors import RunFailed
-from models.engines.braking import CarriedChassis
+from models.engines.braking import EngineChassis
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import TyreTable, stacked_tables
 from validation.braking.braked_truck import RollingTruck, on_road
@@ -47,7 +47,7 @@ class AdvancedVehicle(RollingTruck):
         road: Road = UNIFORM_ROAD,
         steer: float = 0.0,
     ) -> None:
-        go = advance if implementation == "reference" else CarriedChassis(implementation, plane).advance
+        go = advance if implementation == "reference" else EngineChassis(implementation, plane).advance
         super().__init__(on_road(plane, stacked_tables(tyres), road), speed, steer=steer, step_function=go)
         self.implementation = implementation
         if rim_turning is not None:

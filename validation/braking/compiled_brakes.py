@@ -16,7 +16,7 @@ from models.brake.sprung_step import VALUES_PER_WHEEL
 from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road, surfaces
 from models.brake.surfaces import under_wheels as compiled_under_wheels
 from models.brake.wheel_step import StepInput, Wheel
-from models.engines.braking_sprung import driven
+from models.engines.braking_sprung import driven_vehicle
 from models.engines.free_vehicle import FreeModel, free_model
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import (
@@ -91,7 +91,7 @@ def lag_on(
 def engine_model(vehicle: Sprung, engine: str) -> FreeModel:
     """Model of a vehicle on its suspension in an engine that calls the compiled forces. ``wheel_force_views`` of its
     table gives access to the quantities that are constant at each wheel during a step."""
-    return free_model(engine, driven(vehicle, engine))
+    return free_model(engine, driven_vehicle(vehicle, engine))
 
 
 def wheel_force_views(table: np.ndarray, wheels: int = 4) -> WheelForces:

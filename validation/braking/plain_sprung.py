@@ -12,8 +12,8 @@ from models.brake.plain.suspension import Suspension, WheelForces
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, suspended_vehicle
 from models.brake.surfaces import UNIFORM_ROAD, Stretch, road
-from models.engines.braking_sprung import OnSprings
-from models.engines.braking_sprung_plain import PlainOnSprings
+from models.engines.braking_sprung import EngineSprungVehicle
+from models.engines.braking_sprung_plain import PlainSprungVehicle
 from models.systems.braking.march import BrakedVehicle, BrakingPath, on_tyres
 from models.systems.braking.procedures import steady_turn
 from models.tyre.magic_formula import table_of_surface
@@ -158,7 +158,7 @@ def braked_vehicle_on_springs(vehicle: Sprung, engine: str, valves: bool, lags: 
         road([Stretch(0.0, 1, 0), Stretch(3.0, 2, 2)], 0.2),
         steer=np.where(on_front_unit, 0.05, 0.0),
         substeps=2,
-        engine=PlainOnSprings(vehicle) if engine == "reference" else OnSprings(engine, vehicle),
+        engine=PlainSprungVehicle(vehicle) if engine == "reference" else EngineSprungVehicle(engine, vehicle),
         sprung=vehicle,
         relaxation=np.where(on_front_unit, RELAXATION_LENGTHS[0], RELAXATION_LENGTHS[-1]) if lags else None,
     )

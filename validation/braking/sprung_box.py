@@ -11,7 +11,7 @@ from models.brake.plane_records import REPORT_SIZE, PlaneMotion
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, suspended_vehicle
-from models.engines.braking_sprung import OnSprings
+from models.engines.braking_sprung import EngineSprungVehicle
 from models.systems.braking.march import BrakedVehicle, BrakingPath, on_tyres
 from models.tyre.tyre_table import TyreTable
 from models.vehicles.spatial import FREEDOMS, Body, SideForce, SpatialVehicle, SpringDamper, Tyre, Vector
@@ -127,7 +127,7 @@ def braked_vehicle(
         steer=np.where(np.arange(plane.wheels) < 2, steer, 0.0),
         substeps=substeps,
         sample=step,
-        engine=None if engine is None else OnSprings(engine, sprung),
+        engine=None if engine is None else EngineSprungVehicle(engine, sprung),
         sprung=None if engine is None else sprung,
     )
 

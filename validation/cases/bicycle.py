@@ -12,7 +12,7 @@ from models.bicycle.suspects import forecast_deviations, predicted_weave, ranked
 from models.bicycle.weave import Observation, observations
 from models.bicycle.whipple import Control, Whipple, load_bicycle
 from models.core.errors import RunFailed
-from models.identification.subsets import Choice
+from models.identification.subsets import SubsetChoice
 from models.systems.bicycle.run import engine_eigenvalues, run
 from models.systems.bicycle.scene import build
 from validation.common.bicycle_published import CAPSIZE_SPEED, PUBLISHED_EIGENVALUES, PUBLISHED_MATRICES, WEAVE_SPEED
@@ -227,7 +227,7 @@ def _unfitted_rows(bicycle: Whipple, observation: Observation) -> list[Row]:
     return [judged, frequency.beside(0.0, f"{why}; judged after the choice of suspects", "measured")]
 
 
-def _predicted_rows(bicycle: Whipple, choice: Choice, observation: Observation) -> list[Row]:
+def _predicted_rows(bicycle: Whipple, choice: SubsetChoice, observation: Observation) -> list[Row]:
     gaps = forecast_deviations(bicycle, MEASURED_FEEDBACK, choice, observation)
     why = (
         "scatter of the windows and error of the forecast; suspects chosen and fitted on the other speeds, by weights "
@@ -246,7 +246,7 @@ def _predicted_rows(bicycle: Whipple, choice: Choice, observation: Observation) 
     ]
 
 
-def _choice_rows(choice: Choice) -> list[Row]:
+def _choice_rows(choice: SubsetChoice) -> list[Row]:
     """Rows: for each parameter that the experimenters suspected, the p value of the F test of leaving the parameter
     out."""
     parameters_text = ", ".join(
@@ -257,7 +257,7 @@ def _choice_rows(choice: Choice) -> list[Row]:
             f"bicycle.suspects.{key}",
             SYSTEM,
             f"chance of leaving {suspect} out; best subset: {parameters_text}",
-            choice.calls[name][1],
+            choice.removal_tests[name][1],
             "",
         ).at_most(0.05, "F test against the fullest subset that can be told apart", "measured")
         for key, suspect, name in (
@@ -265,11 +265,11 @@ def _choice_rows(choice: Choice) -> list[Row]:
             ("speed_gain", "the speed sensor's gain", "speed_gain"),
             ("speed_bias", "the speed sensor's bias", "speed_bias"),
         )
-        if name in choice.calls
+        if name in choice.removal_tests
     ]
 
 
-def _table_line(bicycle: Whipple, choice: Choice | None, observation: Observation) -> list[str]:
+def _table_line(bicycle: Whipple, choice: SubsetChoice | None, observation: Observation) -> list[str]:
     model, mean, deviation = (
         predicted_weave(bicycle, MEASURED_FEEDBACK, observation),
         observation.mean,

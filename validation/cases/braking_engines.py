@@ -14,7 +14,7 @@ from models.brake.controllers.slip import SlipBangBang
 from models.brake.plane_vehicle import PAPER_TRUCK
 from models.brake.pressure import Chambers
 from models.brake.trailer import CHOSEN_TRAILER, follow_hook, plane_of_trailer
-from models.engines.braking import CarriedChassis
+from models.engines.braking import EngineChassis
 from models.systems.braking.march import on_tyres
 from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 from validation.braking.braked_truck import (
@@ -45,7 +45,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     compiled = braked_truck_turn(until)
     beside = {"written out": braked_turn(PAPER_TRUCK, ICE_TABLE, STEER, BRAKE_TORQUES, SPEED, until)}
     beside |= {
-        name: braked_truck_turn(until, step_function=CarriedChassis(name, PAPER_PLANE).advance)
+        name: braked_truck_turn(until, step_function=EngineChassis(name, PAPER_PLANE).advance)
         for name in ("exudyn", "mujoco")
     }
     rows = [

@@ -404,11 +404,11 @@ def draw(case_data: Saved) -> Drawn:
     """Plot the percentiles of the pitch error over time, and a histogram of the drift-off times."""
     if not case_data:
         return []
-    from models.drawing.drift import draw_fan
+    from models.drawing.drift import draw_quantile_bands
     from models.drawing.figures import BLUE, COLUMN_WIDTH, add_heading, subplots
 
     figure, (fan, histogram) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6), width_ratios=(3, 2))
-    draw_fan(fan, np.array(case_data["times"]), np.array(case_data["fan"]))
+    draw_quantile_bands(fan, np.array(case_data["times"]), np.array(case_data["fan"]))
     fan.legend(loc="lower right")
     histogram.stairs(case_data["counts"], case_data["edges"], fill=True, color=BLUE, alpha=0.6)
     histogram.set_title("Drift-offs: paths per half second [-]")

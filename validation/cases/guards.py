@@ -11,7 +11,7 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.engines.assembly import Assembly
-from models.engines.catalogue import CATALOGUE, MISSING
+from models.engines.catalogue import CATALOGUE, UNAVAILABLE_INTEGRATORS
 from validation.common import full_disk, wrong_engines
 from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaviour_row
 from validation.hard_cases import prescribed_pitch, sampled_input, setups
@@ -43,7 +43,7 @@ def integrators(engine: str, adaptive: bool | None = None) -> list[str]:
     return [
         name
         for name, facts in CATALOGUE[engine].items()
-        if (engine, name) not in MISSING and adaptive in (None, facts.adaptive)
+        if (engine, name) not in UNAVAILABLE_INTEGRATORS and adaptive in (None, facts.adaptive)
     ]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from models.core.noise import normal_samples
-from models.core.runge_kutta import step_on
+from models.core.runge_kutta import runge_kutta_step
 from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
@@ -337,7 +337,7 @@ class IndexOne:
 
         for i in range(count):
             acting |= zip((0.0, 0.5 * step, step), inputs[2 * i : 2 * i + 3], strict=True)
-            y = step_on(rate, 0.0, y, step)
+            y = runge_kutta_step(rate, 0.0, y, step)
             states[i + 1] = y = self._projection(y, acting[step]) if self.projected else y
         return states
 

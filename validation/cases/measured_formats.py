@@ -72,7 +72,7 @@ def preserved_texts(measurement_source: Source) -> dict[str, bool]:
         "comments": tuple(channel.comment for channel in measurement_source.channels) == COMMENTS
         and measurement_source.comment == COMMENT,
         "start": measurement_source.start == START_DATE,
-        "quiet": measurement_source.noticed == (),
+        "quiet": measurement_source.findings == (),
     }
 
 

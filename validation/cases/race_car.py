@@ -10,7 +10,7 @@ import numpy as np
 from models.core.tables import write_table
 from models.identification.bands import error_bands, error_model
 from models.identification.fit import fit
-from models.identification.held_out import Identified, Search, identified_vehicle
+from models.identification.held_out import IdentifiedVehicle, ParameterSearch, identified_vehicle
 from models.identification.of_scene import problem_of
 from models.identification.problem import FitClock, Problem
 from models.identification.uncertainty import Uncertainty, uncertainty
@@ -150,7 +150,7 @@ def _coverage(fits: list[Uncertainty]) -> float:
     return float(np.mean(shares, axis=0).min())
 
 
-def _identified_race_car(file: Path, folder: Path) -> Identified:
+def _identified_race_car(file: Path, folder: Path) -> IdentifiedVehicle:
     path = write_plain_table(file, folder / "race.csv")
     table = {"title": "race car", "system": "single-track", **RACE_CAR, "drive": {"file": path.name, "low_pass": 10.0}}
     times = read_drive(path).times
@@ -158,10 +158,10 @@ def _identified_race_car(file: Path, folder: Path) -> Identified:
     scenes = []
     for ends in ([float(times[0]), middle], [middle, float(times[-1])]):
         scenes.append(build({**table, "drive": {**table["drive"], "stretch": ends}}, "race car", path.parent))  # type: ignore[dict-item]
-    return identified_vehicle(scenes[0], scenes[1], Search(IDENTIFIED_PARAMETERS, list(ERROR_AIMS), 5.0))
+    return identified_vehicle(scenes[0], scenes[1], ParameterSearch(IDENTIFIED_PARAMETERS, list(ERROR_AIMS), 5.0))
 
 
-def _race_car_rows(identified: Identified) -> list[Row]:
+def _race_car_rows(identified: IdentifiedVehicle) -> list[Row]:
     answer, rows = identified.bands, []
     figures = zip(ERROR_AIMS.items(), answer.relative_error(), answer.share_inside(), answer.width(), strict=True)
     for (name, aim), error, inside, width in figures:
@@ -210,7 +210,7 @@ def _rows_not_run(reason: str) -> list[Row]:
     ]
 
 
-def _saved_data(identified: Identified) -> dict[str, Any]:
+def _saved_data(identified: IdentifiedVehicle) -> dict[str, Any]:
     known = identified.uncertainty
     return {
         "estimates": dict(zip([p.name for p in known.fit.problem.parameters], known.fit.values.tolist(), strict=True)),

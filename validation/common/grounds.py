@@ -13,7 +13,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from models.core.assumptions import BrokenAssumption, broken_of, watching
+from models.core.assumptions import BrokenAssumption, broken_of, result_observer
 from models.core.result import Result
 
 ANY_ASSUMPTION = ""
@@ -83,7 +83,7 @@ def measured_rows(measure: Callable[[], CaseResult]) -> tuple[CaseResult, str]:
     grounds = Grounds()
     token = _CURRENT_GROUNDS.set(grounds)
     try:
-        with watching(grounds.record):
+        with result_observer(grounds.record):
             answer = measure()
     finally:
         _CURRENT_GROUNDS.reset(token)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.core.errors import RunFailed
-from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED
+from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES, RECOMMENDED
 from models.engines.outside import register
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.scenes import road_scene
@@ -80,7 +80,7 @@ WRONG_ENGINES = (StandingIntegrator, OverstatedOrderIntegrator, SwappedWheelsInt
 
 def integrators_that_pass(integrator_kinds: tuple[type, ...] = WRONG_ENGINES, duration: float = 0.5) -> list[str]:
     """Names of the integrators whose run on a road ends without an error being raised."""
-    tables: tuple[dict[str, Any], ...] = (CATALOGUE, RECOMMENDED, OUTSIDE)
+    tables: tuple[dict[str, Any], ...] = (CATALOGUE, RECOMMENDED, OUTSIDE_CLASSES)
     saved_tables = [dict(table) for table in tables]
     try:
         return [kind.__name__ for kind in integrator_kinds if _passes_all_checks(kind, duration)]

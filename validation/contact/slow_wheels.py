@@ -8,9 +8,9 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import Refused, RunFailed
-from models.engines.contact_bridge import Wheels, linear
+from models.engines.contact_bridge import Wheels, linearised_wheels
 from models.engines.contact_bridge_exudyn import Forces, Rolling
-from models.engines.stability import LONG_RUN, limit
+from models.engines.stability import LONG_RUN, longest_stable_step
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
 SYSTEM: System = "rolling-vehicle"
@@ -63,7 +63,7 @@ def end_positions(speed: float, method: str, step_count: int, with_slopes: bool 
 
 def longest_step(speed: float) -> float:
     """Longest stable step (s) of the explicit RK44 for a wheel at a speed (m/s)."""
-    return limit("RK44", 1e-3, LONG_RUN * 1e-3, linear(wheel_and_start(speed)[0]))
+    return longest_stable_step("RK44", 1e-3, LONG_RUN * 1e-3, linearised_wheels(wheel_and_start(speed)[0]))
 
 
 def runs(speed: float, implicit_steps: tuple[float, ...]) -> list[SlowWheelsRun]:

@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 from models.core.noise import PITCH_SENSOR, normal_samples
 from models.core.result import Result
 from models.core.time_series import write_time_series
-from models.drift.growth import spring_of
+from models.drift.growth import pitch_spring
 from models.drift.score import SECTION_FORCE_CHANNELS, root_mean_square, section_forces
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
@@ -148,7 +148,7 @@ def closed_loop_covariance(folder: Path, deviation: float) -> tuple[np.ndarray, 
 
     force, angle = deviation, deviation_at_period(ANGLE_DEVIATION, COARSE_PERIOD)
     assembly = assembly_of_scene(force_driven_scene(folder, 1.0, {}, geometry="linear"))
-    stiffness, damping = spring_of(assembly.parameters, PULL_BANDWIDTH, 0.7)
+    stiffness, damping = pitch_spring(assembly.parameters, PULL_BANDWIDTH, 0.7)
     free, pushes = relative_state_matrices(assembly)
     lever = np.zeros((6, 6))
     lever[PITCH_RATE, [PITCH, PITCH_RATE]] = np.array([stiffness, damping]) / assembly.parameters.I

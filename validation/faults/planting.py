@@ -207,12 +207,12 @@ ADAPTER_FAULTS = (
     EngineFault(
         "strut measured along the rotating body",
         MUJOCO_ONLY,
-        patch=attribute_patch("models.engines.mujoco:_suspension", patches.turning_reference),
+        patch=attribute_patch("models.engines.mujoco:_add_suspension", patches.turning_reference),
     ),
     EngineFault(
         "chassis row of eq. (39) with the other sign",
         MUJOCO_ONLY,
-        patch=attribute_patch("models.engines.mujoco:_guidance", patches.reversed_pitch_row),
+        patch=attribute_patch("models.engines.mujoco:_guidance_forces", patches.reversed_pitch_row),
     ),
     EngineFault(
         "callback never installed",

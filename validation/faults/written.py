@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from models.engines.cut_vehicle import PLAIN
+from models.engines.cut_vehicle import PLAIN_ENGINE
 from models.engines.cut_vehicle import build as hub_model
 from models.multibody import cut_kernel as cut_at
 from models.multibody import forces as at
@@ -43,7 +43,10 @@ def _hub_twin_difference(choose: Callable[[list[HubInputs]], HubInputs]) -> floa
     vehicle = cut_cars()["twin"]
     hub_inputs, (q, v) = choose(hub_input_sets(vehicle)), cut_state(vehicle, 3)
     return largest_relative_difference(
-        *(hub_model(engine, vehicle, hub_inputs, STEP, STEP).acceleration(0.0, q, v) for engine in ("mujoco", PLAIN))
+        *(
+            hub_model(engine, vehicle, hub_inputs, STEP, STEP).acceleration(0.0, q, v)
+            for engine in ("mujoco", PLAIN_ENGINE)
+        )
     )
 
 

@@ -8,7 +8,15 @@ import numpy as np
 
 from models.core.result import Result
 from models.drift.growth import drift_off_time
-from models.drift.score import Errors, Limits, RunFigures, blind_verdict, errors_of_run, figures_of_run, verdict_on_run
+from models.drift.score import (
+    Limits,
+    RunErrors,
+    RunFigures,
+    blind_verdict,
+    errors_of_run,
+    figures_of_run,
+    verdict_on_run,
+)
 from models.engines.assembly import Settings
 from models.fatigue.damage import damage_ratio, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
@@ -45,7 +53,7 @@ def scene_on_true_forces(
     return scene.model_copy(update={"start": {"pitch_rate": tilt}} if tilt else {})
 
 
-def figures_and_errors(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, Errors]:
+def figures_and_errors(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, RunErrors]:
     """Figures of a run that can be computed without the true run, and errors of the run against the true run."""
     return figures_of_run(run, scene.vehicle_parameters()), errors_of_run(run, truth)
 

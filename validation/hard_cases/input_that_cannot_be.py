@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
-from models.measured.axle_forces import IN_FILE, AxleForces, check
+from models.measured.axle_forces import FILE_REMEDIES, AxleForces, check_axle_forces
 from models.measured.signal import Signal
 from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters.asymmetric_twin import PARAMETERS as TWIN
@@ -69,7 +69,7 @@ def error_texts(change: ForceChange) -> list[str]:
         Signal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
     )
     forces = np.ascontiguousarray(change(true_forces()))
-    findings = check(AxleForces(forces, SAMPLE_PERIOD, TWIN, ((front,), (rear,)), DURATION, IN_FILE))
+    findings = check_axle_forces(AxleForces(forces, SAMPLE_PERIOD, TWIN, ((front,), (rear,)), DURATION, FILE_REMEDIES))
     errors = [finding.text for finding in findings if finding.weight == "error"]
     if errors:
         raise InputError("forces.csv", "", None, " ".join(errors))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.core.discretisation import Estimate, errors_of, worst_of
+from models.core.discretisation import Estimate, errors_of, largest_estimate
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.signals import SNAP_SHARE, Sampled
@@ -273,7 +273,7 @@ def passed_waves_ratio(engine: str, folder: Path) -> float:
     name, estimate = max(errors_of(stated_run).items(), key=lambda each: each[1].share)
     cured: Estimate | None = estimate
     for _ in range(3):
-        cured = worst_of(_over_waves(engine, cured.step, error=True)) if cured and cured.warned else cured
+        cured = largest_estimate(_over_waves(engine, cured.step, error=True)) if cured and cured.warned else cured
     if not estimate.warned or cured is None or cured.warned:
         return np.inf
     error_of_values = stated_run[name] - _over_waves(engine, 1e-4)[name][::20]

@@ -11,7 +11,7 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Mode, Settings
 from models.engines.catalogue import RECOMMENDED
 from models.engines.protocol import build
-from models.engines.protocol import unchecked as build_unchecked
+from models.engines.protocol import build_unchecked as build_unchecked
 from models.engines.stability import first_order, linearised
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene

@@ -63,16 +63,16 @@ def _kink_truth() -> Trajectory:
 
 def kink_naive(folder: Path) -> str:
     """Result without the remedy, as text: error of Exudyn's limit stops in place of the force law."""
-    with mock.patch.object(exudyn_engine, "_pitch_spring", _limit_stop):
+    with mock.patch.object(exudyn_engine, "_add_pitch_spring", _limit_stop):
         pitch_error = dead_band_edge_error("exudyn", folder)
     return f"Exudyn's limit stops, asked once per step: pitch off by {pitch_error:.1e} rad"
 
 
-def _limit_stop(build: exudyn_engine.Build, spring: PitchSpring) -> None:
+def _limit_stop(build: exudyn_engine.PitchPlaneBuild, spring: PitchSpring) -> None:
     state = build.mbs.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
     build.mbs.AddObject(
         items.CoordinateSpringDamperExt(
-            markerNumbers=[exudyn_engine.ground_marker(build.mbs), build.places[spring.body, "pitch"]],
+            markerNumbers=[exudyn_engine.ground_marker(build.mbs), build.coordinate_markers[spring.body, "pitch"]],
             nodeNumber=state,
             useLimitStops=True,
             limitStopsUpper=spring.dead_band,

@@ -107,7 +107,7 @@ def huge_naive(folder: Path) -> str:
     assembly = vehicle(geometry="linear", initial=_displaced_vehicle().initial)
     model = exudyn_engine.build(assembly, settings("exudyn", 5e-3, 2.0, "ExplicitEuler"))
     flag = not solve(model.built.mbs, model.settings)
-    _, states = model._recorded()
+    _, states = model._recorded_states()
     return f"Exudyn returns {flag} with states of up to {largest_magnitude(states[np.isfinite(states)]):.0e}"
 
 

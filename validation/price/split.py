@@ -14,7 +14,7 @@ from numba import carray
 from models.drawing.figures import LABELS
 from models.engines.assembly import Settings
 from models.engines.contact_bridge import Wheels, forces
-from models.engines.contact_bridge_exudyn import Forces, Rolling, listed
+from models.engines.contact_bridge_exudyn import Forces, Rolling, list_forces
 from models.engines.contact_bridge_mujoco import empty_law, model
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_march import Marcher
@@ -85,7 +85,7 @@ def _road_runs_in_exudyn() -> Runs:
 
     return [
         partial(exudyn_marches(masses, law, [METHODS["exudyn"]])[0], STEPS["road"])
-        for law in (zero_forces, listed(4, np.zeros(0), weak_damper_in_block), forces_of)
+        for law in (zero_forces, list_forces(4, np.zeros(0), weak_damper_in_block), forces_of)
     ]
 
 
@@ -102,7 +102,7 @@ def _wheel_runs_in_exudyn() -> Runs:
     wheels, steps, step = _wheels_steps_and_step()
     return [
         partial(Rolling(wheels, force_function).run, *wheels.state(), steps, step, METHODS["exudyn"])
-        for force_function in (zero_forces, listed(4, np.zeros(0), weak_damper_in_block), Forces(wheels).of)
+        for force_function in (zero_forces, list_forces(4, np.zeros(0), weak_damper_in_block), Forces(wheels).of)
     ]
 
 

@@ -8,7 +8,7 @@ rounding, or for their tolerance.
 import numpy as np
 
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import ENGINES, FIXED, PLAIN, HubModel
+from models.engines.cut_vehicle import ENGINES, FIXED_STEP_METHOD, PLAIN_ENGINE, HubModel
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.multibody.plain.motion import PLACE, Bodies
@@ -71,7 +71,7 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
     ]
 
 
-def settings(integrator: str = FIXED) -> Settings:
+def settings(integrator: str = FIXED_STEP_METHOD) -> Settings:
     """Settings of a run over all force samples with an integrator."""
     return Settings(integrator, STEP, (SAMPLE_COUNT - 1) * STEPS_PER_SAMPLE * STEP, SOLVER_TOLERANCE)
 
@@ -83,7 +83,9 @@ def samples(vehicle: CutVehicle) -> HubForces:
     return HubForces(static_inputs.hubs, STEPS_PER_SAMPLE * STEP, "inertial").noisy(deviations, SEED)
 
 
-def centre_of_mass_error(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED) -> float:
+def centre_of_mass_error(
+    vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED_STEP_METHOD
+) -> float:
     """Largest error (m) of a coordinate of the vehicle's centre of mass at the sample times, against the closed
     form."""
     forces, run_settings = samples(vehicle), settings(integrator)
@@ -120,7 +122,9 @@ def acceleration_difference_between_rows(vehicle: CutVehicle, state_count: int) 
         hubs = static_forces(vehicle, rows).hubs + rng.normal(0.0, 500.0, (rows, WRENCH * len(vehicle.hubs)))
         hub_inputs = HubInputs(hubs, FORCE_FRAMES[i % 3], guide=rng.normal(0.0, 0.1, (rows, 6)))
         run_settings = Settings("DOP853", STEP, (rows // 2) * STEP)
-        compiled, plain = (HubModel(engine, vehicle, hub_inputs, run_settings) for engine in ("reference", PLAIN))
+        compiled, plain = (
+            HubModel(engine, vehicle, hub_inputs, run_settings) for engine in ("reference", PLAIN_ENGINE)
+        )
         state, time = random_states(vehicle, i), rng.uniform(0.0, run_settings.duration)
         expected = plain.acceleration(time, *state)
         gap = np.abs(compiled.acceleration(time, *state) - expected).max() / np.abs(expected).max()
@@ -132,7 +136,7 @@ def trajectory_gap(vehicle: CutVehicle, engine: str, integrator: str) -> float:
     """Largest difference of any coordinate or rate between a run by an adaptive integrator and a run by Runge-Kutta 4
     with an eighth of the step; hub forces are linear between their samples."""
     forces, run_settings = samples(vehicle), settings(integrator)
-    fine = Settings(FIXED, STEP / 8.0, run_settings.duration)
+    fine = Settings(FIXED_STEP_METHOD, STEP / 8.0, run_settings.duration)
     hub_inputs, finer = (
         forces.hub_inputs(settings_of_run.step, settings_of_run.steps) for settings_of_run in (run_settings, fine)
     )

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.engines.cut_vehicle import HubModel, Route, build
+from models.engines.cut_vehicle import ForceRoute, HubModel, build
 from models.engines.spatial_reference import SpatialReference
 from models.multibody.cut_table import HubInputs
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
@@ -36,7 +36,7 @@ def random_hub_input(vehicle: CutVehicle, row_count: int) -> HubInputs:
     )
 
 
-def hub_model(engine: str, vehicle: CutVehicle, route: Route, steps: int = 1) -> HubModel:
+def hub_model(engine: str, vehicle: CutVehicle, route: ForceRoute, steps: int = 1) -> HubModel:
     """A cut vehicle with random hub forces in an engine, with native springs or with compiled forces (``route``)."""
     return build(engine, vehicle, random_hub_input(vehicle, 2 * steps + 1), STEP, steps * STEP, route)
 

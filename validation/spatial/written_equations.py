@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import PLAIN
+from models.engines.cut_vehicle import PLAIN_ENGINE
 from models.engines.cut_vehicle import build as hub_model
 from models.multibody import forces as at
 from models.multibody.cut_table import HubInputs
@@ -153,7 +153,7 @@ def cut_car_acceleration_difference(vehicle: CutVehicle, engine: str, state_coun
     the state."""
     worst, input_sets = 0.0, hub_input_sets(vehicle)
     for i, hub_inputs in enumerate(input_sets):
-        models = [hub_model(name, vehicle, hub_inputs, STEP, STEP) for name in (engine, PLAIN)]
+        models = [hub_model(name, vehicle, hub_inputs, STEP, STEP) for name in (engine, PLAIN_ENGINE)]
         for seed in range(i, state_count, len(input_sets)):
             q, v = cut_state(vehicle, seed)
             time = 0.5 * STEP * (seed % 3)
@@ -166,7 +166,7 @@ def inner_force_difference(vehicle: CutVehicle, state_count: int) -> float:
     each divided by its largest value."""
     worst = 0.0
     for hub_inputs in hub_input_sets(vehicle):
-        models = [hub_model(name, vehicle, hub_inputs, STEP, STEP) for name in ("reference", PLAIN)]
+        models = [hub_model(name, vehicle, hub_inputs, STEP, STEP) for name in ("reference", PLAIN_ENGINE)]
         states = np.array([np.concatenate(cut_state(vehicle, seed)) for seed in range(state_count)])
         ours, theirs = (model.reported(0.5 * STEP * np.arange(state_count), states) for model in models)
         for name in ("elements", "wrenches", "moments"):
@@ -189,7 +189,7 @@ def cut_car_path_difference(vehicle: CutVehicle, engine: str, duration: float, r
             .noisy(deviation, SEED)
             .hub_inputs(STEP, steps)
         )
-    paths = [hub_model(name, vehicle, hub_inputs, STEP, duration).run().states for name in (engine, PLAIN)]
+    paths = [hub_model(name, vehicle, hub_inputs, STEP, duration).run().states for name in (engine, PLAIN_ENGINE)]
     return float(np.abs(paths[0] - paths[1]).max())
 
 

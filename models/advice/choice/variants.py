@@ -13,16 +13,16 @@ from types import ModuleType
 from typing import Any
 
 from models.advice.choice.answer import RunQuantities
-from models.core.assumptions import BrokenAssumption, collected_breaches, watching
+from models.core.assumptions import BrokenAssumption, collected_breaches, result_observer
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
 from models.core.scene_effects import (
     absent_effects,
     module_of,
     named_effects,
-    own_table,
     rebuilt_scene,
     scene_without,
+    table_without_defaults,
     with_effects,
 )
 from models.core.systems import modules_of
@@ -162,7 +162,7 @@ class Variants:
     def results_with_errors(self, omitted_effects: EffectSet, step_factor: int = 1) -> list[Result]:
         """Results of a variant together with their error estimates; its runs are repeated for that."""
         results: list[Result] = []
-        with suppress(RunFailed), watching(results.append):  # raised where an error is as large as what it is of
+        with suppress(RunFailed), result_observer(results.append):  # raised where an error is as large as what it is of
             self.system.computed_quantities(self.changed_scene(omitted_effects, step_factor), self.engine, error=True)
         return results
 
@@ -173,7 +173,7 @@ class Variants:
         scene = scene_without(self.scene, *sorted(omitted_effects)) if omitted_effects else self.scene
         if step_factor == 1:
             return scene
-        table = own_table(scene)
+        table = table_without_defaults(scene)
         self.system.coarsen(table, scene, step_factor)
         return rebuilt_scene(table, scene)
 
@@ -220,7 +220,7 @@ class Variants:
             return Variants(self.scene.with_fewer_copies(steps), self.engine, self.executor)
         count = self.system.steps(self.scene)
         for part_steps in (n for n in range(steps, count) if n % SHORTEST_PART_STEPS == 0 or count % n == 0):
-            table = own_table(self.scene)
+            table = table_without_defaults(self.scene)
             self.system.shorten(table, self.scene, part_steps)
             with suppress(InputError):
                 return Variants(rebuilt_scene(table, self.scene), self.engine, self.executor)

@@ -21,7 +21,7 @@ from models.advice.ride_choice.march import cost
 from models.advice.ride_choice.reduced import FullScene, Reduced
 from models.advice.ride_choice.screen import exact_variances
 from models.core.errors import InputError
-from models.core.runge_kutta import step_on
+from models.core.runge_kutta import runge_kutta_step
 from models.core.scene_effects import absent_effects, effect_sentences, with_effects
 from models.machine.timing import paired_ratio
 from models.systems.ride.of_scene import scene_errors
@@ -112,7 +112,7 @@ def _step_microseconds(A: np.ndarray) -> float:
     x, step = np.ones(len(A)), 1e-6
     start_time = time.process_time()
     for _ in range(TIMED_STEPS):
-        x = step_on(lambda _, state: A @ state, 0.0, x, step)
+        x = runge_kutta_step(lambda _, state: A @ state, 0.0, x, step)
     return 1e6 * (time.process_time() - start_time) / TIMED_STEPS
 
 

@@ -28,7 +28,7 @@ from models.advice.price.truth import ReferenceTruth, reference_truth
 from models.core.errors import InputError, RunFailed
 from models.core.systems import SYSTEMS, modules_of
 from models.ensemble.runner import block_results
-from models.ensemble.workers import Crew, places_of
+from models.ensemble.workers import Crew, folders_for_workers
 from models.machine.timing import interleave, paired_ratio
 
 CLOSE_SECONDS_RATIO = 2.0
@@ -114,7 +114,7 @@ def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str
     if not (plain_number and math.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
     to_price = priced_scene(scene, quantity, engines)
-    with Crew.of(scene, default_workers=1).at_work(UNTIMED_RUNS_AT_ONCE, *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(UNTIMED_RUNS_AT_ONCE, *folders_for_workers(scene)) as pool:
         return recommend(to_price, tolerance, pool)
 
 

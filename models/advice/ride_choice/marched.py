@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
 from models.advice.ride_choice.march import March
-from models.core.runge_kutta import RK4_STAGES, step_on
+from models.core.runge_kutta import RK4_STAGES, runge_kutta_step
 from models.ride.covariance import noise_of
 from models.ride.road_path import RoadPath
 
@@ -116,7 +116,7 @@ def _step_matrices(A: np.ndarray, step: float) -> list[np.ndarray]:
     n = len(A)
     columns = np.eye(n, 4 * n)
     acting = {share * step: np.roll(columns, (i + 1) * n, axis=1) for i, share in enumerate((0.0, 0.5, 1.0))}
-    return np.split(step_on(lambda time, x: A @ x + acting[time], 0.0, columns, step), 4, axis=1)
+    return np.split(runge_kutta_step(lambda time, x: A @ x + acting[time], 0.0, columns, step), 4, axis=1)
 
 
 def _initial_states(march: March, road: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from models.core.scene_effects import own_table
+from models.core.scene_effects import table_without_defaults
 from models.core.scene_file import parse
 from models.systems.ride.of_scene import CLOSED_FORM_STUDY
 from models.systems.ride.reduced_scene import ReducedScene
@@ -17,7 +17,7 @@ QUESTION_KEYS = ("quantities", "tolerance", "options")
 
 def write(reduced_scene: ReducedScene, folder: Path) -> Path:
     """Write the reduced scene and its vehicle into a folder; returns the path of the scene file."""
-    scene = own_table(reduced_scene.ride)
+    scene = table_without_defaults(reduced_scene.ride)
     vehicle_file = scene["vehicle"]["file"]
     vehicle = reduced_tables(parse(vehicle_path(vehicle_file, reduced_scene.ride.folder)), reduced_scene)
     origin = f"Reduced by a choice of effects; the whole vehicle is {vehicle_file}."

@@ -1,4 +1,4 @@
-"""Checks of a recording before anything is run with it: each file one, each finding a sentence with place and size.
+"""Checks of a recording before a run: one file per check, with findings that state place and size.
 
 Errors stop what follows, doubts are carried into the report, notes say what was looked at and found good, or what
 would be needed to look at it.
@@ -29,7 +29,7 @@ CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
     rigid.check,
     noise.check,
 )
-"""In this order: what an earlier one has named, a later one does not name again."""
+"""All checks in their order: a fault that an earlier check has named is not named again by a later one."""
 SUBJECTS_OF_CHECK = defaultdict(
     frozenset[str],
     {
@@ -42,8 +42,9 @@ SUBJECTS_OF_CHECK = defaultdict(
         "rigid": frozenset({"size", "time", "value"}),
     },
 )
-"""What the findings of a check are about: two of one kind about one channel say the same thing twice."""
+"""Subjects of a check's findings; two findings on the same subject of the same channel state the same fault."""
 WEIGHT_ORDER: tuple[Weight, ...] = ("error", "doubt", "note")
+"""Severities of findings, the worst first."""
 
 
 def check(
@@ -52,7 +53,7 @@ def check(
     places: Mapping[str, TransducerPlace] | None = None,
     claimed: Mapping[str, float] | None = None,
 ) -> tuple[Finding, ...]:
-    """All findings, errors first, with what was noticed while reading.
+    """All findings on a recording, errors first, including those from reading the file.
 
     vehicle : None for one that is not in space; places : of accelerometers and gyros by name; claimed : white noise
     (SI) on every sample that is stated, by name of signal.
@@ -61,8 +62,8 @@ def check(
 
 
 def findings_of_all_checks(evidence: Evidence) -> tuple[Finding, ...]:
-    """Findings of all checks on a recording; the caller can use the same evidence for figures."""
-    said = list(evidence.recording.noticed)
+    """Findings of all checks on a recording, errors first; the caller can use the same evidence for figures."""
+    said = list(evidence.recording.findings)
     for look in CHECKS:
         said += [finding for finding in look(evidence) if not _already_named(finding, said)]
     return tuple(sorted(said, key=lambda finding: WEIGHT_ORDER.index(finding.weight)))

@@ -1,4 +1,4 @@
-"""Do hub forces and inertial signals belong to one vehicle? What each channel accounts for, by cross spectra.
+"""Agreement of hub forces with inertial signals through the vehicle's response, by cross spectra.
 
 Expected readings are the vehicle's response to all measured forces. What a channel, or all channels of a hub or a
 file, accounts for is set against what is left of the readings when all others are taken off: where the two correlate
@@ -16,33 +16,34 @@ import numpy as np
 
 from models.measured.signal import Signal
 
-Kind = Literal["late", "factor", "swapped", "crossed", "lever"]
+FaultKind = Literal["late", "factor", "swapped", "crossed", "lever"]
+"""Kinds of measurement faults that the search can find."""
 VEHICLE_ERROR = 0.03
-"""Share of an expected reading by which a vehicle file is taken to be wrong at the least: no one knows a car better."""
+"""Least relative error of an expected reading that is attributed to the vehicle file."""
 LARGEST_DELAY, DELAY_SPACING = 0.25, 5e-4
-"""s: delays looked at, and their spacing before the parabola through the best three."""
+"""Largest delay (s) searched, and spacing (s) of the trial delays before a parabola through the best three."""
 DELAYS_TRIED = DELAY_SPACING * np.arange(
     -round(LARGEST_DELAY / DELAY_SPACING), round(LARGEST_DELAY / DELAY_SPACING) + 1
 )
+"""Trial delays (s)."""
 CHI_SQUARE_FALL = 40.0
-"""Fall of chi square that one more parameter must bring: chance does so once in 10^9."""
+"""Fall of chi square that one more parameter must bring: by chance it occurs once in 10^9."""
 SMALL_DELAY, SMALL_FACTOR, SMALL_LEVER = 5e-4, 0.01, 0.01
-"""s, a share and m: what is smaller does no harm, and no vehicle file is good enough to tell."""
+"""Delay (s), relative error of a factor, and lever (m) below which a fault is harmless and not reported."""
 EXPLAINED_SHARE = 0.35
-"""Part of what is unexplained in some reading that a delay or factor must explain: springs that are 20 % stiffer than
-in the vehicle file, or dampers 30 % weaker, leave a sixth of the readings unexplained, and wrong delays explain up to
-a third of that."""
+"""Share of the unexplained power of some reading that a fault must explain: springs 20 % stiffer than in the file, or
+dampers 30 % weaker, leave a sixth of the readings unexplained, and wrong delays explain up to a third of that."""
 MOST_FAULTS = 8
-"""Faults looked for at the most."""
+"""Most faults that are searched for."""
 SMALLEST_FLOAT = float(np.finfo(float).tiny)
 SMOOTHED_LINES = 9
-"""Lines over which the unexplained spectrum is averaged."""
+"""Number of spectral lines over which the unexplained power is averaged."""
 
 
 @dataclass(frozen=True)
 class SignalGroup:
-    """Signals that share a fault. forces : whether they are hub forces, not readings; members : their indices among the
-    forces or the readings."""
+    """Signals that share a fault. forces : whether they are hub forces rather than readings; members : their indices
+    among the forces or the readings."""
 
     name: str
     forces: bool
@@ -51,16 +52,16 @@ class SignalGroup:
 
 @dataclass(frozen=True)
 class MeasurementFault:
-    """One fault. late : size in s; factor : size is the ratio of recorded to true value; swapped (hubs) and crossed
-    (two channels) : size is the share that only the exchange explains; lever : size is the height (m) above the hub of
-    the point to which moments refer.
+    """One measurement fault with its kind and size. late : delay in s; factor : ratio of recorded to true value;
+    swapped (hubs) and crossed (two channels) : share of the motion left unexplained as mapped; lever : height (m) above
+    the hub of the point to which moments refer.
 
     error : standard error of the size from random errors alone; for swapped and crossed, the unexplained share after
     correction. chi_square_fall : decrease of chi square. exchanged_hubs : hubs, each with the one whose channels it
     has.
     """
 
-    kind: Kind
+    kind: FaultKind
     name: str
     signals: tuple[Signal, ...]
     size: float
@@ -76,9 +77,10 @@ class MeasurementFault:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Measured cross spectra of forces and readings, compared with the vehicle's response, at frequencies (f,) in Hz.
+    """Measured cross spectra of hub forces and inertial readings, compared with the vehicle's response, at frequencies
+    (f,) in Hz.
 
-    between (f, k, c) : mean of reading times conj(force); forces (f, c, c); readings (f, k) : powers. response
+    cross_spectra (f, k, c) : mean of reading times conj(force); forces (f, c, c); readings (f, k) : powers. response
     (f, k, c) : of the vehicle, with every correction so far. independent_averages : independent ones in each mean.
     noise (k,) : power of the readings' white noise in every line.
     """
@@ -87,7 +89,7 @@ class Agreement:
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
     forces: np.ndarray
-    between: np.ndarray
+    cross_spectra: np.ndarray
     readings: np.ndarray
     response: np.ndarray
     independent_averages: float
@@ -111,7 +113,7 @@ class Agreement:
     @property
     def residual_powers(self) -> np.ndarray:
         """Powers (f, k) of the residual: the measured readings less the prediction."""
-        shared = np.einsum("fkc,fkc->fk", self.between, self.response.conj()).real
+        shared = np.einsum("fkc,fkc->fk", self.cross_spectra, self.response.conj()).real
         return np.maximum(self.readings - 2 * shared + self.predicted_powers, 0.0)
 
     @property
@@ -124,18 +126,17 @@ class Agreement:
         return np.sqrt(np.maximum(share, 0.0))
 
     def median_unexplained(self) -> float:
-        """Median over the readings of the unexplained share."""
+        """Median over the readings of the unexplained share of motion."""
         return float(np.median(self.unexplained))
 
     @property
     def rms(self) -> float:
-        """Root mean square of the unexplained motion."""
+        """Root mean square over the readings of the unexplained share of motion."""
         return float(np.sqrt(np.mean(self.unexplained**2)))
 
     @property
     def weights(self) -> np.ndarray:
-        """Weights of the frequencies: inverse of the smoothed unexplained power, so that a line that no force explains
-        counts little."""
+        """Weights (f, k) of the frequencies: inverse of the smoothed unexplained power."""
         kernel = np.ones(SMOOTHED_LINES) / SMOOTHED_LINES
         known = VEHICLE_ERROR**2 * np.maximum(self.predicted_powers, 1e-3 * self.predicted_powers.mean(axis=0))
         padded = np.pad(self.residual_powers + known, ((SMOOTHED_LINES // 2, SMOOTHED_LINES // 2), (0, 0)), mode="edge")
@@ -143,7 +144,7 @@ class Agreement:
         return self.independent_averages / np.maximum(np.stack(smooth, axis=1), SMALLEST_FLOAT)
 
     def search(self) -> tuple["Agreement", tuple[MeasurementFault, ...]]:
-        """The ``Agreement`` after the faults found are corrected, and these faults, the worst one first."""
+        """The ``Agreement`` after correction of all faults that the search finds, and these faults, the worst first."""
         agreement, faults = self, list[MeasurementFault]()
         while len(faults) < MOST_FAULTS:
             worst_fault = max(agreement._explaining_faults(), key=lambda fault: fault.chi_square_fall, default=None)
@@ -154,8 +155,7 @@ class Agreement:
         return agreement, tuple(faults)
 
     def without(self, fault: MeasurementFault) -> "Agreement":
-        """The agreement after a fault is corrected. The response is divided by the fault of a force, or multiplied by
-        the fault of a reading."""
+        """The agreement after correction: the response divided by a force's or multiplied by a reading's fault."""
         response = self.response.copy()
         if fault.kind == "swapped":
             target_hub = dict(fault.exchanged_hubs)
@@ -190,7 +190,7 @@ class Agreement:
         yield from self._moment_point_faults(weights)
 
     def groups(self) -> Iterator[SignalGroup]:
-        """Groups that may share a fault, small ones first: each signal, all of one hub or sensor, of one file, all
+        """Groups of signals that may share a fault, small ones first: each signal, each hub, sensor and file, all
         readings."""
         for forces, signals in ((True, self.inputs), (False, self.outputs)):
             keys = [[s.name for s in signals], [f"all channels of {s.at}" for s in signals]]
@@ -212,26 +212,26 @@ class Agreement:
 
     @cached_property
     def _delay_factors(self) -> np.ndarray:
-        """Phase factors exp(i omega t) (t, f) of all trial delays t."""
+        """Phase factors exp(i omega t), shape (t, f), of all trial delays t."""
         return np.exp(2j * np.pi * np.outer(DELAYS_TRIED, self.frequencies))
 
     def share(self, group: SignalGroup) -> tuple[np.ndarray, np.ndarray]:
-        """Cross power (f, k) of the readings less all other predictions with the group's prediction; power (f, k) of
-        the latter."""
+        """Cross power (f, k) of a group's prediction with the readings less other predictions, and its own power."""
         pick = list(group.members)
         if group.forces:
             response, group_forces = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
-            remainder = self.between[:, :, pick] - self._expected_times_forces[:, :, pick] + response @ group_forces
+            remainder = (
+                self.cross_spectra[:, :, pick] - self._expected_times_forces[:, :, pick] + response @ group_forces
+            )
             return np.einsum("fkc,fkc->fk", remainder, response.conj()), _power_spectrum(response, group_forces)
         cross, power = np.zeros((2, *self.readings.shape), complex)
         response = self.response[:, pick]
-        cross[:, pick] = np.einsum("fkc,fkc->fk", self.between[:, pick], response.conj())
+        cross[:, pick] = np.einsum("fkc,fkc->fk", self.cross_spectra[:, pick], response.conj())
         power[:, pick] = np.einsum("fkc,fkc->fk", self._expected_times_forces[:, pick], response.conj())
         return cross, power.real
 
     def delay_of(self, group: SignalGroup, weights: np.ndarray) -> tuple[float, float, float]:
-        """Delay (s) of a group, its standard error (infinite if the data do not determine it), and the fall of chi
-        square."""
+        """Delay (s) of a group of signals, its standard error (infinite if unknown), and the fall of chi square."""
         cross, power = self.share(group)
         line = (weights * (cross.conj() if group.forces else cross)).sum(axis=1)
         likely = (self._delay_factors @ line).real
@@ -267,7 +267,7 @@ class Agreement:
             power = float((weights * _power_spectrum(levers, self.forces)).sum())
             if not power > 0:
                 continue
-            rest = self.between - self._expected_times_forces
+            rest = self.cross_spectra - self._expected_times_forces
             size = float((weights * np.einsum("fkc,fkc->fk", rest, levers.conj()).real).sum()) / power
             fault = MeasurementFault("lever", " and ".join(some), signals, size, (2 * power) ** -0.5, power * size**2)
             large = fault.chi_square_fall > CHI_SQUARE_FALL and abs(size) > max(SMALL_LEVER, 4 * fault.error)
@@ -275,7 +275,7 @@ class Agreement:
                 yield fault
 
     def _height_derivatives(self, hubs: tuple[str, ...]) -> np.ndarray:
-        """Change of the response (f, k, c) per m of height of the point about which hub moments are given.
+        """Change of the response (f, k, c) per metre of height of the point about which hub moments are given.
 
         About a point r above the hub a force adds (r Fy, -r Fx) to the moments about it, which the response undoes.
         """
@@ -301,7 +301,7 @@ class Agreement:
                     yield replace(fault, size=self.rms, error=corrected.rms, chi_square_fall=fall)
 
     def _exchanged_channel_faults(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
-        """Pairs of channels whose signals may be exchanged with each other."""
+        """Faults in which two channels are exchanged with each other."""
         for pair, other in self._channel_exchanges():
             fall = self._certain_improvement(other, weights)
             if fall:
@@ -326,8 +326,8 @@ class Agreement:
                     yield pair, self._with_channels_exchanged(pair)
 
     def _certain_improvement(self, corrected: "Agreement", weights: np.ndarray) -> float:
-        """Fall of chi square from this agreement to the corrected one; 0 if it is not significant, or too small to be
-        named."""
+        """Fall of chi square from this agreement to the corrected one; 0 if it is not significant or the fault is
+        small."""
         fall = float((weights * (self.residual_powers - corrected.residual_powers)).sum())
         return fall if fall > CHI_SQUARE_FALL and self._is_worth_correcting(corrected, weights) else 0.0
 
@@ -349,8 +349,7 @@ class Agreement:
         )
 
     def detectable_sizes(self) -> dict[str, tuple[float, float]]:
-        """By signal name: the smallest delay (s) and the smallest error of the factor that the search would detect in
-        that signal alone."""
+        """By signal name: smallest detectable delay (s) and smallest detectable relative error of the factor."""
         weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2
         rest, smallest = EXPLAINED_SHARE * self._unexplained_power(weights), {}
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -364,7 +363,7 @@ class Agreement:
         return smallest
 
     def factor(self, signal: Signal) -> tuple[float, float]:
-        """Ratio of a force's recorded to its true value as the motion shows it, and its standard error."""
+        """Ratio of a force's recorded to true value as the vehicle's motion shows it, and its standard error."""
         group = SignalGroup(signal.name, True, (self.inputs.index(signal),))
         cross, power = ((self.weights * part).sum() for part in self.share(group))
         return (float(power / cross.real), float(2 * power) ** -0.5) if power > 0 else (1.0, float("inf"))
@@ -374,8 +373,7 @@ class Agreement:
         return np.maximum((weights * (self.residual_powers - self.noise)).sum(axis=0), 0.0)
 
     def _is_worth_correcting(self, corrected: "Agreement", weights: np.ndarray) -> bool:
-        """Whether a correction removes much of the residual of at least one reading, not merely a little of every
-        one."""
+        """Whether a correction removes much of the residual of at least one reading, not only little of each."""
         return bool(
             np.any(
                 ((self.residual_powers - corrected.residual_powers) * weights).sum(axis=0)
@@ -388,14 +386,14 @@ class Agreement:
 
 
 def _smallest_certain_size(power: np.ndarray, residual: np.ndarray, least_size: float) -> float:
-    """Smallest significant and noteworthy size of a fault, if each reading's residual (k,) falls by ``power`` times
-    size^2."""
+    """Smallest significant size of a fault, if each reading's residual (k,) falls by ``power`` times its square."""
     if not power.sum() > 0:
         return float("inf")
     return max(least_size, float((CHI_SQUARE_FALL / power.sum()) ** 0.5), float(np.nanmin((residual / power) ** 0.5)))
 
 
 def _power_spectrum(response: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Power (f, k) of the readings that forces (f, c, c) cause through a response (f, k, c)."""
     return np.einsum("fkc,fkc->fk", response @ forces, response.conj()).real
 
 

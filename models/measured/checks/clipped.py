@@ -1,4 +1,4 @@
-"""Clipped and dead channels: values that pile up at an extreme, or never change."""
+"""Check for clipped and dead channels: values that accumulate at an extreme, or never change."""
 
 import numpy as np
 
@@ -9,15 +9,17 @@ from models.measured.signal import UNIT_OF_QUANTITY, Signal
 
 NAME = "clipped"
 FEWEST_EXTREME_SAMPLES = 6
-"""Samples at the extreme value below which nothing is said."""
+"""Least number of samples at an extreme value for a finding."""
 PILE_RATIO = 5
-"""Times as many as at the next value below it: the tail of a rounded channel has more of them farther in, not less."""
+"""Least ratio of the number of samples at the extreme to the number at the next value: in the tail of a rounded
+channel, the next value is the more frequent one."""
 STUCK_DURATION = 0.02
-"""s: a channel that gives one value for longer stands still, if this is also USUAL_STUCK_FACTOR times longer than is
-usual. What is not longer than a gap that would be bridged is a doubt."""
+"""Time (s) for which a channel that keeps one value is stuck, if this is also USUAL_STUCK_FACTOR times longer than
+usual. Up to the length of a gap that would be bridged, it is only a doubt."""
 USUAL_STUCK_FACTOR = 20
+"""Ratio of the time at one value to the usual one above which a channel is stuck."""
 ROUNDED_SHARE = 1e-9
-"""Of the largest value of its quantity: a channel that changes by less holds rounding and no measurement."""
+"""Ratio of a channel's variation to the largest value of its quantity below which the channel holds only rounding."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
@@ -28,6 +30,7 @@ def check(evidence: Evidence) -> list[Finding]:
 
 
 def _signal_findings(evidence: Evidence, signal: Signal) -> list[Finding]:
+    """Findings on one signal that is dead, clipped or stuck."""
     values, period = evidence.recording.samples(signal), evidence.recording.period
     good = values[np.isfinite(values)]
     if len(good) and good.min() == good.max():
@@ -51,8 +54,8 @@ def _largest_of_quantity(evidence: Evidence, signal: Signal) -> float:
 
 
 def clipping_extremes(values: np.ndarray) -> list[float]:
-    """Extreme values at which a channel (n,), NaN where not measured, is clipped, because many samples lie exactly
-    there."""
+    """Extreme values at which the samples (n,) of a channel are clipped, because many samples lie exactly there; NaN is
+    ignored."""
     good = values[np.isfinite(values)]
     if not len(good) or good.min() == good.max():
         return []
@@ -60,6 +63,7 @@ def clipping_extremes(values: np.ndarray) -> list[float]:
 
 
 def _is_piled(values: np.ndarray, valid: np.ndarray, end: float) -> bool:
+    """Whether many samples lie exactly at an extreme value, some of them in succession."""
     at, others = int(np.count_nonzero(valid == end)), valid[valid != end]
     next_to = others[np.argmin(np.abs(others - end))]
     if at < FEWEST_EXTREME_SAMPLES or at < PILE_RATIO * np.count_nonzero(valid == next_to):
@@ -69,6 +73,7 @@ def _is_piled(values: np.ndarray, valid: np.ndarray, end: float) -> bool:
 
 
 def _clipped_finding(signal: Signal, values: np.ndarray, valid: np.ndarray, end: float, period: float) -> Finding:
+    """Finding on a channel that is clipped at one extreme value."""
     at, clipped_runs = int(np.count_nonzero(valid == end)), true_runs(values == end)
     share, first = 100 * at / len(valid), float(period * clipped_runs[0, 0])
     text = (

@@ -1,4 +1,5 @@
-"""Clocks of files that run at different speeds: the motion that hub forces should cause comes later and later."""
+"""Check for file clocks that run at different speeds: inertial signals that come later and later than the hub forces
+predict."""
 
 from dataclasses import replace
 
@@ -11,13 +12,13 @@ from models.measured.checks.spectra import SEGMENT_LENGTH, cross_spectra
 
 NAME = "drift"
 WINDOW_LENGTH, MOST_WINDOWS = SEGMENT_LENGTH, 30
-"""s over which a delay is taken, in halves that overlap; windows at the most, spread evenly."""
+"""Length (s) of a window in which a delay is determined, and most windows, spread evenly."""
 FEWEST_WINDOWS = 3
-"""Windows that a slope needs."""
+"""Least number of windows for a slope."""
 SLOPE_STANDARD_ERRORS = 5.0
-"""Standard errors of the slope that must be passed."""
+"""Number of standard errors that the slope of a delay must exceed."""
 LEAST_CLOCK_DRIFT = 1e-3
-"""s by which the clocks must part over the recording."""
+"""Least difference (s) that two clocks must gain over the recording."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
@@ -56,7 +57,7 @@ def _agreement_by_window(evidence: Evidence) -> list[tuple[float, Agreement]]:
                 now,
                 frequencies=part.frequencies,
                 forces=part.cross[:, :c, :c],
-                between=part.cross[:, c:, :c],
+                cross_spectra=part.cross[:, c:, :c],
                 readings=np.einsum("fkk->fk", part.cross[:, c:, c:]).real,
                 response=now.response[lines],
                 independent_averages=part.independent_averages,
@@ -66,6 +67,7 @@ def _agreement_by_window(evidence: Evidence) -> list[tuple[float, Agreement]]:
 
 
 def _drift_finding(evidence: Evidence, windows: list[tuple[float, Agreement]], name: str, clock: str) -> Finding:
+    """Finding on the clock of the file ``name`` compared with the clock of the hub forces."""
     of_file = tuple(i for i, s in enumerate(windows[0][1].outputs) if s.file == name)
     signals = tuple(s.name for s in evidence.inertial if s.file == name)
     late = np.array([part.delay_of(SignalGroup(name, False, of_file), part.weights)[:2] for _, part in windows])

@@ -1,4 +1,4 @@
-"""Data that every check uses: the recording, the vehicle, where sensors sit, and what is worked out once for all."""
+"""Data that all checks of a recording use: the recording, the vehicle, sensor positions, and spectra computed once."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ import numpy as np
 
 from models.measured.checks.agreement import Agreement, MeasurementFault
 from models.measured.checks.response import AXIS_INDEX, SensorResponse, component_index
-from models.measured.checks.spectra import Spectra, cross_spectra, noise, windowed_means
+from models.measured.checks.spectra import Spectra, cross_spectra, white_noise, windowed_means
 from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
 from models.measured.signal import Signal, TransducerPlace
@@ -16,16 +16,18 @@ from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.pitch_plane import Parameters
 
 COMPARED_BAND = 1.0, 25.0
-"""Hz: above the drift of a free vehicle, below the bending of its body."""
+"""Frequency band (Hz) in which forces and motion are compared: above the drift of a free vehicle, below the bending of
+its body."""
 LEAST_MEAN_SHARE = 5e-4
-"""Of a static load or of gravity: a mean that is smaller says nothing of unit and sign."""
+"""Share of a static load or of gravity below which a mean says nothing of unit and sign."""
 INERTIAL_QUANTITIES = ("acceleration", "angular rate", "angle")
+"""Quantities of the inertial signals."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """Data on which the checks work. places : of accelerometers and gyros by name; stated_noise : stated white noise
-    (SI), by name of signal.
+    """Data on which the checks of a recording work. places : of accelerometers and gyros by name; stated_noise : stated
+    white noise (SI), by name of signal.
 
     plane : parameters of the pitch-plane vehicle, if the recording drives one instead of a vehicle in space.
     """
@@ -64,7 +66,7 @@ class Evidence:
 
     @cached_property
     def missing_data_text(self) -> str:
-        """Text on which data are missing for comparing forces with motion; empty if none is."""
+        """Phrase on the data that are missing for comparing forces with motion; empty if none are."""
         if self.vehicle is None:
             return "a vehicle in space"
         bare = [hub for hub in self.vehicle.hubs if hub not in self.vertical()]
@@ -85,7 +87,7 @@ class Evidence:
 
     @cached_property
     def coarse_factors(self) -> dict[Signal, float]:
-        """Ratio of recorded to true value for signals whose mean alone shows a wrong sign or unit.
+        """Ratio of recorded to true value of signals whose mean alone shows a wrong sign or unit.
 
         Means of vertical forces are compared with static loads, and those of vertical accelerometers with gravity.
         """
@@ -99,22 +101,24 @@ class Evidence:
         }
 
     def mean(self, signal: Signal) -> float:
-        """Mean of all samples, weighted by a window."""
+        """Mean of all samples of a signal, weighted by a window."""
         return float(windowed_means([partial(self.recording.samples, signal)])[0][0])
 
     def empty(self, signal: Signal) -> bool:
-        """Whether a force varies more than its mean, which then does not reveal its sign or unit."""
+        """Whether a force varies more than its mean, which then does not reveal the sign or unit."""
         return abs(self.mean(signal)) <= float(np.nanstd(self.recording.samples(signal)))
 
     @cached_property
     def _spectra(self) -> Spectra | None:
+        """Cross spectra of forces and inertial signals in the compared band; None if the recording is too short or has
+        gaps."""
         top = min(COMPARED_BAND[1], 0.4 / self.recording.period)
         return cross_spectra(self.recording, (*self.forces, *self.inertial), (COMPARED_BAND[0], top))
 
     @cached_property
     def agreement(self) -> Agreement | None:
-        """Comparison of recorded forces and motion, after correcting signs and units that means show; None where data
-        are lacking."""
+        """Comparison of recorded forces and motion, after correction of signs and units that means reveal; None where
+        data are lacking."""
         if self.missing_data_text:
             return None
         assert self.vehicle is not None and self._spectra is not None
@@ -134,7 +138,7 @@ class Evidence:
             np.einsum("fkk->fk", measured_spectra.cross[:, c:, c:]).real,
             response[:, :, numbers] / forces * felt[:, None],
             measured_spectra.independent_averages,
-            measured_spectra.white_noise_power * np.square([noise(self.recording, s) for s in self.inertial]),
+            measured_spectra.white_noise_power * np.square([white_noise(self.recording, s) for s in self.inertial]),
         )
 
     @property
@@ -144,7 +148,7 @@ class Evidence:
 
     @cached_property
     def agreement_and_faults(self) -> tuple[Agreement, tuple[MeasurementFault, ...]] | None:
-        """The agreement after correction of its faults, and these faults, the worst one first."""
+        """The agreement of forces and motion after correction of its faults, and these faults, the worst one first."""
         return self.agreement.search() if self.agreement else None
 
     @property
@@ -154,11 +158,12 @@ class Evidence:
 
     @cached_property
     def detectable_sizes(self) -> dict[str, tuple[float, float]]:
-        """By signal name: smallest detectable delay (s) and error of the factor; empty if nothing could be compared."""
+        """By signal name: smallest detectable delay (s) and relative error of the factor; empty if nothing could be
+        compared."""
         return self.agreement_and_faults[0].detectable_sizes() if self.agreement_and_faults else {}
 
     def hub(self, signal: Signal) -> str:
-        """Hub at which a force acts after exchanged hubs are corrected."""
+        """Hub at which a force signal acts after exchanged hubs are corrected."""
         for fault in self.faults:
             if fault.kind == "swapped" and signal.at in dict(fault.exchanged_hubs):
                 return dict(fault.exchanged_hubs)[signal.at]

@@ -1,5 +1,5 @@
-"""Single faults of channels (factors, time shifts, lever arms), found by the disagreement with the vehicle's motion
-that each explains.
+"""Checks for single faults of channels (factors, time shifts, lever arms), found by comparison with the vehicle's
+motion.
 
 A factor is a sign, a unit or a calibration; a shift one in time; a lever moments about another point than the hub:
 about the contact patch, or a plane of the transducer.
@@ -12,11 +12,12 @@ from models.measured.checks.spikes import spike_positions
 from models.measured.ratios import cause_and_sentence
 
 FACTOR_ERRORS = 0.02, 0.1
-"""Errors of a factor of which it is said in how many channels they would be seen."""
+"""Relative errors of a factor for which it is stated in how many channels they would be seen."""
 UNCHECKED_SHIFT = 3e-3
-"""s: a channel in which less would not be seen is named as not checked."""
+"""Time shift (s) below which a shift need not be visible; a channel in which only larger ones would be seen is named as
+not checked."""
 WHEEL_RADIUS_RANGE = 0.2, 0.6
-"""m: radii of wheels; a lever of this size is one of them."""
+"""Range (m) of wheel radii; a lever of this size is explained by the wheel's radius."""
 
 
 def factor_findings(evidence: Evidence) -> list[Finding]:
@@ -33,6 +34,7 @@ def factor_findings(evidence: Evidence) -> list[Finding]:
 
 
 def _factor_finding(evidence: Evidence, fault: MeasurementFault) -> Finding:
+    """Finding on a wrong factor, sign or unit of one or several channels."""
     kind, text = cause_and_sentence(
         fault.size, fault.signals[0], "what the motion of the vehicle and all other channels tell"
     )
@@ -61,6 +63,7 @@ def shift_findings(evidence: Evidence) -> list[Finding]:
 
 
 def _shift_finding(fault: MeasurementFault) -> Finding:
+    """Finding on a time shift of one or several channels."""
     late, single = "late" if fault.size > 0 else "early", len(fault.signals) == 1
     subject = f"{fault.name} is" if single else f"{fault.name[0].upper()}{fault.name[1:]} are"
     text = (
@@ -78,6 +81,7 @@ def lever_findings(evidence: Evidence) -> list[Finding]:
 
 
 def _lever_finding(fault: MeasurementFault) -> Finding:
+    """Finding on hub moments that refer to a point above or below the hub."""
     hubs = tuple(dict.fromkeys(signal.at for signal in fault.signals))
     length, side, wheel = abs(fault.size), "above" if fault.size > 0 else "below", ""
     if WHEEL_RADIUS_RANGE[0] < length < WHEEL_RADIUS_RANGE[1]:

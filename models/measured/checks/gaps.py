@@ -1,4 +1,4 @@
-"""Gaps: samples that were not measured."""
+"""Check for gaps: samples that were not measured."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ NAME = "gaps"
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Findings on missing samples: one for each set of channels that miss the same ones. Its size is the longest gap in
+    """Findings on missing samples, one for each set of channels that miss the same ones; the size is the longest gap in
     s."""
     recording = evidence.recording
     sets: dict[tuple[tuple[int, int], ...], list[Signal]] = {}
@@ -25,6 +25,7 @@ def check(evidence: Evidence) -> list[Finding]:
 
 
 def _gap_finding(evidence: Evidence, lost: np.ndarray, signals: tuple[Signal, ...]) -> Finding:
+    """Finding on the gaps (first index and end index of each) that some signals share."""
     period, lengths, names = evidence.recording.period, lost[:, 1] - lost[:, 0], tuple(s.name for s in signals)
     longest = int(np.argmax(lengths))
     first, end, lasts = (float(period * samples) for samples in (*lost[longest], lengths[longest]))

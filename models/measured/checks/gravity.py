@@ -1,4 +1,4 @@
-"""Accelerometers at rest feel +9.81 m/s^2 upwards: whether they include gravity, their sign, unit and axes."""
+"""Check of accelerometers against gravity, +9.81 m/s^2 upwards at rest: whether it is included, sign, unit and axes."""
 
 from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
@@ -8,9 +8,9 @@ from models.vehicles.cut_vehicle import GRAVITY
 
 NAME = "gravity"
 VERTICAL_BIAS = 0.5
-"""m/s^2 by which a vertical mean may be off before it is named: a car on a grade of 20 % loses 0.2."""
+"""Deviation (m/s^2) of a vertical mean from gravity above which it is named: a car on a grade of 20 % loses 0.2."""
 HORIZONTAL_MEAN_LIMIT = 3.0
-"""m/s^2 that a horizontal one may feel on average: a grade of 30 %."""
+"""Largest mean (m/s^2) of a horizontal accelerometer: a grade of 30 %."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
@@ -25,6 +25,7 @@ def check(evidence: Evidence) -> list[Finding]:
 
 
 def _signal_finding(signal: Signal, average: float) -> Finding | None:
+    """Finding on the mean (m/s^2) of one accelerometer; None if it is right."""
     if signal.component == "z":
         return _vertical_finding(signal, average)
     if not abs(average) > HORIZONTAL_MEAN_LIMIT:
@@ -37,6 +38,7 @@ def _signal_finding(signal: Signal, average: float) -> Finding | None:
 
 
 def _vertical_finding(signal: Signal, average: float) -> Finding | None:
+    """Finding on the mean (m/s^2) of one vertical accelerometer; None if it is right."""
     if not signal.gravity:
         if abs(average) < VERTICAL_BIAS:
             return None

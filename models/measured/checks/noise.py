@@ -1,15 +1,15 @@
-"""White noise of every channel, from the highest frequencies that it has, against what is stated."""
+"""Check of the white noise of every channel, from its highest frequencies, against the stated noise."""
 
 import numpy as np
 
 from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.spectra import noise
+from models.measured.checks.spectra import white_noise
 from models.measured.signal import UNIT_OF_QUANTITY, Quantity
 
 NAME = "noise"
 NOISE_RATIO = 1.5
-"""Times by which what is stated may be wrong."""
+"""Factor by which the stated noise may be wrong."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
@@ -17,7 +17,7 @@ def check(evidence: Evidence) -> list[Finding]:
     doubts, sizes = list[Finding](), dict[Quantity, list[float]]()
     for signal in evidence.recording.signals:
         size, stated, unit = (
-            noise(evidence.recording, signal),
+            white_noise(evidence.recording, signal),
             evidence.stated_noise.get(signal.name),
             UNIT_OF_QUANTITY[signal.quantity],
         )

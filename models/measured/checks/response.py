@@ -16,20 +16,23 @@ from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.kinematics import Kinematics
 
 MODEL_STEP = 1e-3
+"""Step (s) of the model, whose half steps hold the trial forces."""
 STATE_DIFFERENCE = 1e-5
-"""m and rad, m/s and rad/s: of the differences; the equations are smooth over metres."""
+"""Step (m and rad, m/s and rad/s) of the finite differences by the state; the equations are smooth over metres."""
 FORCE_DIFFERENCE = 100.0
-"""N and N m: of the differences by forces, in which the equations are linear."""
+"""Step (N and N m) of the finite differences by forces, in which the equations are linear."""
 AXIS_INDEX = {"x": 0, "y": 1, "z": 2, "roll": 0, "pitch": 1, "yaw": 2}
+"""Index of each component's axis."""
 
 
 def component_index(signal: Signal, hub: int) -> int:
-    """Index of a force's component among the components of all hubs; ``hub`` is the index of its hub."""
+    """Index of a force signal's component among the components of all hubs; ``hub`` is the index of its hub."""
     return WRENCH * hub + 3 * (signal.quantity == "moment") + AXIS_INDEX[signal.component]
 
 
 class SensorResponse:
-    """Linear vehicle q'' = stiff q + damped q' + pushed u with hub forces u (6 h,) in N and N m, given in a frame."""
+    """Linear response of a vehicle's sensors: q'' = stiff q + damped q' + pushed u, with forces u (6 h,) in N and N m
+    at h hubs, given in a frame."""
 
     def __init__(self, vehicle: CutVehicle, frame: str) -> None:
         self.vehicle, self.motion = vehicle, Kinematics(vehicle.tree)
@@ -44,8 +47,8 @@ class SensorResponse:
         )
 
     def at(self, frequencies: np.ndarray, signals: Sequence[Signal], places: Sequence[TransducerPlace]) -> np.ndarray:
-        """Transfer functions (f, signals, 6 h) from hub forces to the signals, each at its place, at frequencies (f,)
-        in Hz."""
+        """Transfer functions (f, signals, 6 h) from the forces at h hubs to the signals, each at its place, at
+        frequencies (f,) in Hz."""
         laplace, n = 2j * np.pi * frequencies[:, None, None], self.vehicle.size
         q = np.linalg.solve(
             laplace**2 * np.eye(n) - laplace * self.damped - self.stiff, self.pushed[None].astype(complex)
@@ -54,7 +57,8 @@ class SensorResponse:
         return np.asarray(rows @ q)
 
     def _row(self, i_omega: np.ndarray, signal: Signal, transducer: TransducerPlace) -> np.ndarray:
-        """Row (f, n) that maps the coordinates to the sensor's reading, at i_omega = i omega (f, 1)."""
+        """Row (f, n) that maps the n coordinates to a sensor's reading, with ``i_omega`` (f, 1) the factor of a time
+        derivative."""
         axis, turn = AXIS_INDEX[signal.component], self.motion.turn(transducer.body)
         if signal.quantity == "angle":
             return np.broadcast_to(turn[axis], (len(i_omega), self.vehicle.size))
@@ -67,8 +71,8 @@ class SensorResponse:
 
 
 def _static_model(vehicle: CutVehicle, frame: str) -> HubModel:
-    """A model with static loads alone at half step 0. At half step i + 1 a push on component i is added to the static
-    loads."""
+    """Model of the vehicle with static loads alone at half step 0; at half step i + 1 a force on component i is
+    added."""
     hubs = WRENCH * len(vehicle.hubs)
     rows = np.zeros((hubs + 1, hubs))
     rows[:, 2::WRENCH] = vehicle.loads

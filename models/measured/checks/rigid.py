@@ -1,4 +1,4 @@
-"""Whether the accelerometers of a body move as a rigid body does."""
+"""Check whether the accelerometers on a body move as on a rigid body."""
 
 from collections.abc import Sequence
 
@@ -7,17 +7,17 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.spectra import noise
+from models.measured.checks.spectra import white_noise
 from models.measured.signal import Signal, TransducerPlace
 
 NAME = "rigid"
 MOST_SAMPLES = 6000
-"""Samples that are looked at, spread evenly: nothing is integrated."""
+"""Most samples that are evaluated, spread evenly."""
 Axes = Sequence[Signal]
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Findings on bodies with three or more tri-axial accelerometers, one per body. Its size is the share of the
+    """Findings on bodies with three or more tri-axial accelerometers, one per body; the size is the share of the
     readings, in %, that no rigid motion explains."""
     findings = [
         _body_finding(evidence, body, sensors) for body, sensors in _bodies(evidence).items() if len(sensors) > 2
@@ -38,6 +38,7 @@ def _bodies(evidence: Evidence) -> dict[str, dict[str, tuple[TransducerPlace, Ax
 
 
 def _body_finding(evidence: Evidence, body: str, sensors: dict[str, tuple[TransducerPlace, Axes]]) -> Finding:
+    """Finding on whether one body with these accelerometers is rigid."""
     from models.sensors.rigid_body_motion import fit_quality
     from models.sensors.sensor_array import sensor_array
 
@@ -49,7 +50,7 @@ def _body_finding(evidence: Evidence, body: str, sensors: dict[str, tuple[Transd
     signals, stride = [s for triple in axes for s in triple], -(-recording.count // MOST_SAMPLES)
     columns = [[recording.samples(s)[::stride] for s in triple] for triple in axes]
     readings = np.moveaxis(np.array(columns), 2, 0)
-    sizes = [noise(recording, s) for s in signals]
+    sizes = [white_noise(recording, s) for s in signals]
     deviation = float(np.sqrt(np.nanmean(np.square(sizes)))) if np.isfinite(sizes).any() else 0.0
     rigidity = fit_quality(array, readings[np.isfinite(readings).all(axis=(1, 2))], deviation)
     if rigidity.rigid is None:

@@ -1,4 +1,4 @@
-"""Spectra of signals of a recording: means, noise floors and cross spectra, piece by piece.
+"""Spectra of signals of a recording, computed segment by segment: means, noise floors and cross spectra.
 
 An hour costs no more memory than a minute.
 """
@@ -12,26 +12,28 @@ from models.measured.recording import Recording
 from models.measured.signal import Signal
 
 SEGMENT_LENGTH = 4.0
-"""s: resolves the modes of a car; shorter where the recording is."""
+"""Length (s) of a segment, which resolves the modes of a car; shorter in a short recording."""
 FEWEST_SEGMENTS = 3
-"""Segments in a recording at the least, half overlapping."""
+"""Least number of half-overlapping segments in a recording."""
 FEWEST_FREQUENCIES = 2
-"""Frequencies in the band at the least."""
+"""Least number of frequencies in the band."""
 MOST_SEGMENTS = 300
-"""Segments looked at, spread evenly: ten minutes."""
+"""Most segments that are evaluated, spread evenly: ten minutes."""
 OVERLAP_FACTOR = 0.75
-"""Independent averages that a half overlapping segment under a Hann window counts for, about."""
+"""Number of independent averages per half-overlapping segment under a Hann window, about."""
 TOP_BAND = 0.7, 0.95
-"""Part of the highest frequency: above what vehicles do, below what filters and converters do at the end."""
+"""Band of the noise estimate as shares of the highest frequency: above what vehicles do, below the edge of filters and
+converters."""
 PIECE_LENGTH, MOST_PIECES = 1024, 40
-"""Samples of a piece whose noise is looked at, and pieces at the most, spread evenly."""
+"""Number of samples of a piece for the noise estimate, and most pieces, spread evenly."""
 SIDE_LINES = range(2, 5)
-"""Spectral lines beside the main lobe of the window, whose power stands for that at 0."""
+"""Spectral lines beside the main lobe of the window, whose power is taken for that at 0 Hz."""
 
 
 @dataclass(frozen=True)
 class Spectra:
-    """Cross spectra averaged over segments: cross (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz.
+    """Cross spectra averaged over segments: cross (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz, for n
+    signals.
 
     independent_averages : how many independent ones; segments with a sample that is missing are left out.
     white_noise_power : power in every line of white noise of variance 1.
@@ -46,8 +48,8 @@ class Spectra:
 def cross_spectra(
     recording: Recording, signals: tuple[Signal, ...], band: Sequence[float], stretch: tuple[int, int] | None = None
 ) -> Spectra | None:
-    """Cross spectra in a band (Hz), in SI units squared by window sums squared; None if too few segments are complete,
-    or if the band contains no frequency line.
+    """Cross spectra of signals in a band (Hz), in SI units squared by window sums squared; None if too few segments are
+    complete, or if the band contains too few frequency lines.
 
     stretch : first sample and number of samples that are looked at; else all.
     """
@@ -71,8 +73,8 @@ def cross_spectra(
     )
 
 
-def noise(recording: Recording, signal: Signal) -> float:
-    """Standard deviation (SI) of white noise on every sample; NaN if no segment is complete.
+def white_noise(recording: Recording, signal: Signal) -> float:
+    """Standard deviation (SI) of the white noise on every sample of a signal; NaN if no piece is complete.
 
     By the median power of the highest lines, whose mean exponential noise makes 1 / log 2 times as large. Of filtered
     channels it is too small: what was there is gone.

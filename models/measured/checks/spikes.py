@@ -1,4 +1,4 @@
-"""Spikes: one or two samples that stand out from those before and after them, of a transducer or of a sharp edge."""
+"""Check for spikes: one or two samples that stand out from those before and after."""
 
 import numpy as np
 
@@ -8,15 +8,16 @@ from models.measured.signal import UNIT_OF_QUANTITY, Signal
 
 NAME = "spikes"
 SPIKE_WIDTHS = 1, 2
-"""Samples of a spike: one of a transducer or a converter, two where a jittering clock was put right."""
+"""Widths of spikes in samples: one from a transducer or a converter, two where a jittering clock was corrected."""
 STEEP_RATIO, HIGH_RATIO = 6.0, 3.0
-"""Times the step from sample to sample that 99 % do not exceed, and times the channel's standard deviation: both sides
-of a spike are higher. Gaussian noise comes to a third of the first; what is lower than the second adds no damage."""
+"""Least height of both sides of a spike: ratio to the step from sample to sample that 99 % do not exceed (Gaussian
+noise reaches a third of it), and ratio to the channel's standard deviation (lower spikes add no damage)."""
 USUAL_SHARE = 0.99
+"""Share of the steps that defines the usual step."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Findings on spikes of single samples. The size is the height of the highest spike, in the channel's unit."""
+    """Findings on spikes of one or two samples; the size is the height of the highest spike, in the channel's unit."""
     recording = evidence.recording
     findings = [_spike_finding(signal, recording.samples(signal), recording.period) for signal in recording.signals]
     return [finding for finding in findings if finding] or [
@@ -41,6 +42,7 @@ def spike_positions(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _spike_finding(signal: Signal, values: np.ndarray, period: float) -> Finding | None:
+    """Finding on the spikes of one signal; None if there are none."""
     at, heights = spike_positions(values)
     if not len(at):
         return None

@@ -1,16 +1,16 @@
-"""Hubs whose channels are exchanged: left and right, front and rear, across; and two channels that are."""
+"""Check for exchanged channels: those of hubs (left and right, front and rear, diagonally), or two single channels."""
 
 from models.core.finding import Finding
 from models.measured.checks.agreement import MeasurementFault
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import SEGMENT_LENGTH
 
-NAME, PAIR = "swapped", "exchanged"
+NAME, PAIR_NAME = "swapped", "exchanged"
 LARGEST_UNEXPLAINED = 0.3
-"""Share of the readings that may stay unexplained on average before vehicle and recording are called strangers: of
-segments of SEGMENT_LENGTH s. Shorter ones begin and end in the middle of the vehicle's vibrations, and leave as much
-more
-unexplained: typically a half of right recordings of 1.5 s (angles and rates alone), a fifth of 6 s."""
+"""Largest median share of the readings that may stay unexplained before vehicle and recording are said not to belong
+together, for segments of SEGMENT_LENGTH (s). Shorter segments begin and end within the vehicle's vibrations, and leave
+correspondingly more unexplained: typically a half of correct recordings of 1.5 s (angles and rates alone), a fifth of 6
+s."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
@@ -26,6 +26,7 @@ def check(evidence: Evidence) -> list[Finding]:
 
 
 def _hub_finding(fault: MeasurementFault) -> Finding:
+    """Finding on hubs whose channels are exchanged."""
     text = (
         f"The channels of {fault.name} are exchanged: as mapped, the forces leave {100 * fault.size:.0f} % of the "
         f"measured motion unexplained, exchanged {100 * fault.error:.0f} %; exchange their names in the channel "
@@ -35,11 +36,12 @@ def _hub_finding(fault: MeasurementFault) -> Finding:
 
 
 def _channel_pair_finding(fault: MeasurementFault) -> Finding:
+    """Finding on two channels that are exchanged."""
     text = (
         f"{fault.name} are exchanged: as mapped, {100 * fault.size:.0f} % of the measured motion stays unexplained, "
         f"exchanged {100 * fault.error:.0f} %; exchange their names in the channel map."
     )
-    return Finding(PAIR, "doubt", fault.name, text, 100 * fault.size, "%", fault.names)
+    return Finding(PAIR_NAME, "doubt", fault.name, text, 100 * fault.size, "%", fault.names)
 
 
 def _indistinguishable_hubs(evidence: Evidence) -> Finding:
@@ -47,12 +49,12 @@ def _indistinguishable_hubs(evidence: Evidence) -> Finding:
     assert evidence.agreement_and_faults is not None
     pairs = [" with ".join(s.name for s in pair) for pair in evidence.agreement_and_faults[0].undetectable_exchanges()]
     if not pairs:
-        return Finding(PAIR, "note", "", "Any two channels of hub forces that were exchanged would be seen.")
+        return Finding(PAIR_NAME, "note", "", "Any two channels of hub forces that were exchanged would be seen.")
     text = (
         f"Two channels of hub forces that were exchanged would be seen by the motion of the vehicle, but not "
         f"{', '.join(pairs)}: check their names."
     )
-    return Finding(PAIR, "note", "", text, float(len(pairs)), "pairs")
+    return Finding(PAIR_NAME, "note", "", text, float(len(pairs)), "pairs")
 
 
 def _remaining_disagreement(evidence: Evidence) -> Finding:

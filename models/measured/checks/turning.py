@@ -1,4 +1,5 @@
-"""Angles against rates of the same body: the derivative of one is the other, in sign, unit and time."""
+"""Check of angles against angular rates of the same body: whether the rate is the angle's derivative in sign, unit and
+time."""
 
 import numpy as np
 
@@ -10,13 +11,14 @@ from models.measured.signal import Signal
 
 NAME = "turning"
 COMPARED_BAND = 0.5, 12.0
-"""Hz."""
+"""Frequency band (Hz) in which angles and rates are compared."""
 LEAST_COHERENCE = 0.8
-"""Squared coherence of lines that are used; below it noise speaks."""
+"""Least squared coherence of spectral lines that are used; below it, noise dominates."""
 IN_PHASE_SHARE = 0.25
-"""Part of a rate in phase with the angle's derivative from which on a factor between them means anything."""
+"""Least share of a rate in phase with the angle's derivative for which a factor between them has a meaning."""
 LEAST_SHIFT, FEWEST_LINES = 1e-3, 8
-"""s, and coherent lines: smaller shifts, or shifts by fewer, are not named; nor any where hub forces tell better."""
+"""Least time shift (s), and least number of coherent lines, for a finding; shifts are named only where hub forces
+cannot tell them better."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
@@ -36,11 +38,13 @@ def check(evidence: Evidence) -> list[Finding]:
 
 
 def _body_of_signal(evidence: Evidence, signal: Signal) -> str:
+    """Body that carries a signal's sensor, or the signal's location where the body is not known."""
     place = evidence.place(signal)
     return place.body if place else signal.at
 
 
 def _pair_finding(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
+    """Finding on one angle compared with one angular rate."""
     recording, names, both = evidence.recording, f"{rate.name} and {angle.name}", (rate.name, angle.name)
     pair_spectra = cross_spectra(
         recording, (angle, rate), (COMPARED_BAND[0], min(COMPARED_BAND[1], 0.4 / recording.period))
@@ -59,7 +63,7 @@ def _pair_finding(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
     ratio = float((weight @ transfer).real / weight.sum())
     late, error = _delay_by_phase(transfer, omega, weight * pair_spectra.independent_averages, ratio)
     wrong, text = cause_and_sentence(ratio, rate, f"the derivative of {angle.name}")
-    if wrong in ("sign", "unit") and _rate_ratio(transfer, weight) < IN_PHASE_SHARE:
+    if wrong in ("sign", "unit") and _explained_rate_share(transfer, weight) < IN_PHASE_SHARE:
         text = (
             f"{rate.name} is not the derivative of {angle.name}, whatever its sign and unit: one of them belongs to "
             "another axis or body; check their names."
@@ -85,7 +89,7 @@ def _pair_finding(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
     return Finding(NAME, "note", names, text, ratio, "1", both)
 
 
-def _rate_ratio(transfer: np.ndarray, weight: np.ndarray) -> float:
+def _explained_rate_share(transfer: np.ndarray, weight: np.ndarray) -> float:
     """Share of the rate's power at coherent lines that the derivative of the angle explains, scaled by one real
     factor."""
     whole = float(weight.sum() * (weight @ np.abs(transfer) ** 2))

@@ -1,4 +1,4 @@
-"""Mean vertical forces against the static load of every hub and against the weight: sign, unit and calibration."""
+"""Check of mean vertical forces against the static loads and the weight: sign, unit and calibration."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,40 +9,41 @@ from scipy.linalg import null_space
 
 from models.core.finding import Finding
 from models.measured import axle_forces
-from models.measured.axle_balance import axles
+from models.measured.axle_balance import axle_forces_of
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.response import component_index
 from models.measured.checks.spectra import windowed_means
-from models.measured.ratios import NEGLIGIBLE_MEAN_SHARE, cause_and_sentence, counted_from_load
+from models.measured.ratios import NEGLIGIBLE_MEAN_SHARE, cause_and_sentence, missing_load_sentence
 from models.measured.signal import Signal
 from models.multibody.cut_kernel import WRENCH
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, rigid
 
 NAME = "weight"
 LOAD_ERROR = 1e-3
-"""Part of each hub's load by which a vehicle that is not wrong may differ from its file: tilt alone takes 0.1 %."""
+"""Relative difference of a hub's load from the vehicle file that a correct vehicle may have: tilt alone takes 0.1 %."""
 NEGLIGIBLE_SHARE = 0.005
-"""Part of a load below which nothing is said."""
+"""Share of a load below which an error is not reported."""
 MOTION_SHARE = 0.35
-"""Part of an excess of the mean by which a factor may differ from 1 by the motion, for the excess to be an offset."""
+"""Largest ratio of a factor's error, as the motion shows it, to the excess of the mean for which the excess is an
+offset."""
 MOMENT_STANDARD_DEVIATIONS = 4.0
-"""Standard deviations by which a mean moment must differ from what the motion asks for."""
+"""Number of standard deviations by which a mean moment must differ from the one that the motion requires."""
 CHI_SQUARE_FALL = 25.0
 """Fall of chi square that a wrong channel must bring."""
 
 
 @dataclass(frozen=True)
-class Balance:
-    """Residual of the equilibrium, (e,): vertical force (N), moments about x and y (N m), and conditions from
-    elasticity alone. columns (e, h) : residual that an excess of one whole load at a hub would cause. inverse (e, e) :
-    of the covariance of the residual."""
+class EquilibriumResidual:
+    """Residual (e,) of the equilibrium of mean forces: vertical force (N), moments about x and y (N m), and conditions
+    from elasticity alone. columns (e, h) : residual that an excess of one whole load at each hub would cause. inverse
+    (e, e) : of the residual's covariance."""
 
     residual: np.ndarray
     columns: np.ndarray
     inverse: np.ndarray
 
     def fit(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Fit columns (e, p) to the residual by generalised least squares: their shares (p,), the covariance of these,
+        """Generalised least-squares fit of columns (e, p) to the residual: their factors (p,), the covariance of these,
         and the fall of chi square."""
         normal = columns.T @ self.inverse @ columns
         share = np.linalg.solve(normal, columns.T @ self.inverse @ self.residual)
@@ -50,11 +51,11 @@ class Balance:
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Findings on vertical forces compared with the weight. Sizes are shares of the load in %, or the ratio of recorded
-    to true value where sign or unit is wrong."""
+    """Findings on mean vertical forces compared with the weight. Sizes are shares of the load in %, or the ratio of
+    recorded to true value where sign or unit is wrong."""
     if evidence.plane is not None:
-        forces = axles(evidence.recording, evidence.plane)
-        return axle_forces.check(forces) if forces else []
+        forces = axle_forces_of(evidence.recording, evidence.plane)
+        return axle_forces.check_axle_forces(forces) if forces else []
     vehicle, of_hub = evidence.vehicle, {evidence.hub(s): s for s in evidence.vertical().values()}
     if vehicle is None or set(of_hub) != set(vehicle.hubs):
         text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."
@@ -106,8 +107,9 @@ def _component_numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
 
 
 def _wrong_sign_or_unit(evidence: Evidence, signal: Signal, load: float, static: float) -> Finding | None:
+    """Finding on a vertical force whose mean shows a wrong sign or unit; None if it shows none."""
     kind, text = (
-        ("size", counted_from_load(signal.name, load, static))
+        ("size", missing_load_sentence(signal.name, load, static))
         if abs(load) < NEGLIGIBLE_MEAN_SHARE * static and evidence.empty(signal)
         else cause_and_sentence(load / static, signal, f"the {static:.0f} N that rest on {signal.at} on average")
     )
@@ -116,7 +118,9 @@ def _wrong_sign_or_unit(evidence: Evidence, signal: Signal, load: float, static:
     return Finding(NAME if kind == "size" else kind, "error", signal.name, text, load / static, "1", (signal.name,))
 
 
-def _balance_of_means(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread: np.ndarray) -> Balance:
+def _balance_of_means(
+    vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread: np.ndarray
+) -> EquilibriumResidual:
     """Equilibrium from mean signals (k,), or (k + 2,) with the mean angular accelerations of roll and pitch, whose
     inertia moments are then taken into account."""
     whole, hubs = rigid(vehicle), len(vehicle.hubs)
@@ -133,11 +137,11 @@ def _balance_of_means(vehicle: CutVehicle, numbers: list[int], centre: np.ndarra
     rest = np.concatenate([[whole.mass * GRAVITY, 0.0, 0.0], elastic @ vehicle.loads])
     columns = np.vstack([lift, elastic]) * vehicle.loads
     covariance = np.diag(np.diag(rows @ spread @ rows.T)) + LOAD_ERROR**2 * columns @ columns.T
-    return Balance(rows @ centre - rest, columns, np.linalg.inv(covariance))
+    return EquilibriumResidual(rows @ centre - rest, columns, np.linalg.inv(covariance))
 
 
 def _single_channel_error(
-    evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loads: np.ndarray
+    evidence: Evidence, balance: EquilibriumResidual, signals: tuple[Signal, ...], loads: np.ndarray
 ) -> Finding:
     """Finding on an offset or a wrong factor of one channel, or on a weight that differs from the vehicle file."""
     names, weight = tuple(s.name for s in signals), float(loads.sum())

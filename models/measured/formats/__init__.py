@@ -1,4 +1,4 @@
-"""Measurement files, opened by what is in them: CSV, ASAM MDF, MTS RPC III, TDMS."""
+"""Measurement files of four formats, recognised by their content: CSV, ASAM MDF, MTS RPC III, TDMS."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -8,13 +8,13 @@ from pathlib import Path
 from models.core.errors import InputError, similar_file
 from models.core.finding import Finding
 from models.measured.channel import Source
-from models.measured.file_kinds import KNOWN_FORMATS, by_extension, format_of, usual_of
+from models.measured.file_kinds import KNOWN_FORMATS, extension_phrase, format_of, usual_kind_of_extension
 from models.measured.formats.csv import open_csv
 from models.measured.formats.mdf4 import open_mdf
 from models.measured.formats.opened import OpenFile, flaw_finding
 from models.measured.formats.rpc3 import open_rpc
 from models.measured.formats.tdms import open_tdms
-from models.measured.formats.writing import WRITER_OF_EXTENSION, ChannelGroup, check, new_file
+from models.measured.formats.writing import WRITER_OF_EXTENSION, ChannelGroup, check_groups, new_file
 
 READER_OF_FORMAT: dict[str, Callable[[Path], OpenFile]] = {
     "CSV": open_csv,
@@ -22,14 +22,16 @@ READER_OF_FORMAT: dict[str, Callable[[Path], OpenFile]] = {
     "RPC III": open_rpc,
     "TDMS": open_tdms,
 }
+"""Function that opens a file, by format."""
 DRIVE_FILE_ADVICE = (
     "a .drv file usually holds what drives the actuators of a rig, not what was measured: name the response "
     "(.rsp) of the same run"
 )
+"""Advice on drive files of a test rig."""
 
 
 def open_source(path: str | Path) -> Source:
-    """Open a measurement file for reading.
+    """The open measurement file at a path, for reading.
 
     Parameters
     ----------
@@ -44,16 +46,16 @@ def open_source(path: str | Path) -> Source:
     try:
         source = READER_OF_FORMAT[form](path)
     except InputError as error:  # what is said of text that is no CSV knows the extension
-        if form != "CSV" or not by_extension(path):
+        if form != "CSV" or not extension_phrase(path):
             raise
-        raise InputError(path, error.place, error.value, error.allowed + by_extension(path)) from None
-    usual, said = usual_of(path.suffix.lower(), form), list[Finding]()
+        raise InputError(path, error.place, error.value, error.allowed + extension_phrase(path)) from None
+    usual, said = usual_kind_of_extension(path.suffix.lower(), form), list[Finding]()
     if usual != form:
         text = f"the extension {path.suffix} is that of {usual}, but the file is read as {form}"
         said.append(flaw_finding(path, "doubt", text))
     if form == "RPC III" and path.suffix.lower() == ".drv":
         said.append(flaw_finding(path, "doubt", DRIVE_FILE_ADVICE))
-    return replace(source, noticed=(*said, *source.noticed))
+    return replace(source, findings=(*said, *source.findings))
 
 
 def write(path: str | Path, groups: Sequence[ChannelGroup], start: datetime | None = None, comment: str = "") -> Path:
@@ -78,14 +80,14 @@ def write(path: str | Path, groups: Sequence[ChannelGroup], start: datetime | No
         raise InputError(
             path, "extension", path.suffix, "a format that can be written is needed", tuple(WRITER_OF_EXTENSION)
         )
-    check(path, groups, start)
+    check_groups(path, groups, start)
     with new_file(path) as part:
         WRITER_OF_EXTENSION[path.suffix.lower()](path, part, groups, start, comment)
     return path
 
 
 def _first_bytes(path: Path) -> bytes:
-    """First bytes of a file."""
+    """First bytes of a file; raises InputError if it is missing, empty or unreadable."""
     if not path.exists():
         raise InputError(path, "", None, f"the file does not exist{similar_file(path)}")
     if not path.is_file():

@@ -1,4 +1,5 @@
-"""CSV as engineers and their loggers write it: headings ``name [unit]``, a column ``time [s]``, one row per sample.
+"""Reader of CSV files as engineers and loggers write them: headings ``name [unit]``, a column of time, one row per
+sample.
 
 Lines that begin with ``#`` stand before the header and are kept as the comment, but for ``# start:`` (ISO 8601 with its
 zone), ``# samples:`` (how many rows there must be) and ``# channel "name": text`` (a channel's comment); so are titles
@@ -27,7 +28,7 @@ from models.measured.formats.csv_layout import (
     TIME_UNITS,
     Remarks,
     clock_heading,
-    find_headings_of,
+    find_headings_and_clock,
     find_layout,
     find_units,
     read_first_lines,
@@ -35,7 +36,7 @@ from models.measured.formats.csv_layout import (
 from models.measured.formats.csv_rows import ROWS_PER_MARK, Layout, find_rows, numbers_of_rows, one_byte_text
 from models.measured.formats.opened import (
     OpenFile,
-    Span,
+    SampleSpan,
     distinct_names,
     flaw_finding,
     library_errors_as_input,
@@ -45,7 +46,8 @@ from models.measured.formats.opened import (
 
 @dataclass(frozen=True)
 class CsvFile(OpenFile):
-    """Reader of a CSV file; ``rows[k]`` is the byte where row 1000 k begins, its last element the end of the used rows.
+    """Reader of a CSV file; ``rows[k]`` is the byte where row 1000 k begins, and its last element is the end of the
+    used rows.
 
     clock : column of time among those of numbers, None where times are those of the clock. factor : to s. columns :
     of the channels, among those of numbers.
@@ -57,8 +59,10 @@ class CsvFile(OpenFile):
     factor: float
     columns: tuple[int, ...]
 
-    def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Read the rows of each span and split them into times and channels."""
+    def pieces(
+        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Times and values of the rows of each span."""
         columns = [self.columns[i] for i in channel_indices]
         with self.path.open("rb") as file:
             for first, count in spans:
@@ -78,14 +82,14 @@ class CsvFile(OpenFile):
 
 
 def open_csv(path: Path) -> CsvFile:
-    """Read the header, count the rows and find out how they are written; raises InputError."""
+    """``CsvFile`` of a path: headings read, rows counted, notation determined; raises InputError."""
     with library_errors_as_input(path):
-        top = read_first_lines(path)
-        head, clock, remarks, findings = find_headings_of(path, top)
-        units, more = find_units(path, top, head, clock)
-        layout, notes = find_layout(path, top, head, clock, units)
+        first_lines = read_first_lines(path)
+        head, clock, remarks, findings = find_headings_and_clock(path, first_lines)
+        units, unit_findings = find_units(path, first_lines, head, clock)
+        layout, notes = find_layout(path, first_lines, head, clock, units)
         rows, count, left = find_rows(path, layout)
-        findings += notes + more + _findings_on_end(path, layout, remarks, count, left)
+        findings += notes + unit_findings + _findings_on_end(path, layout, remarks, count, left)
         factor = 1.0 if layout.time_stamps else _factor_to_seconds(path, head, clock, units[clock])
         start, notes = start_with_zone(path, remarks.start) if remarks.start else (layout.start, [])
         columns = [i for i in layout.numbers if i != clock]
@@ -127,7 +131,7 @@ def open_csv(path: Path) -> CsvFile:
 
 
 def unit_of(text: str) -> str:
-    """Unit in a heading: in brackets, or in parentheses if the text there is a unit of a quantity that can be
+    """Unit in a column heading: in brackets, or in parentheses if the text there is a unit of a quantity that can be
     mapped."""
     unit = name_and_unit(text)[1]
     bracketed = re.fullmatch(r".*\(([^()]*[A-Za-z%°µ][^()]*)\)\s*", text) if "[" not in text else None
@@ -139,7 +143,7 @@ def unit_of(text: str) -> str:
 
 
 def _findings_on_end(path: Path, layout: Layout, remarks: Remarks, count: int, byte_count_left: int) -> list[Finding]:
-    """Findings on whether the file ends as a complete file does."""
+    """Findings on a file that does not end as a complete file does."""
     if count == 0:
         raise InputError(path, f"line {layout.line + 1}", None, "rows of numbers are needed, and there is none")
     findings, samples = list[Finding](), remarks.samples
@@ -159,7 +163,7 @@ def _findings_on_end(path: Path, layout: Layout, remarks: Remarks, count: int, b
 
 
 def _factor_to_seconds(path: Path, header: TableHead, clock: int, unit: str) -> float:
-    """Factor that converts the column of times to seconds."""
+    """Factor from the unit of the column of times to seconds."""
     name, given = clock_heading(header.names[clock])
     if (given or unit).casefold() not in TIME_UNITS:
         place = f"line {header.header.number} (header), column {name!r}, unit"

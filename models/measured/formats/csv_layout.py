@@ -1,4 +1,4 @@
-"""How a CSV file is written, from its first lines: comments, headings, units, separator, decimal sign, clock."""
+"""Layout of a CSV file, determined from its first lines: comments, headings, units, separator, decimal sign, clock."""
 
 import json
 import re
@@ -29,10 +29,11 @@ from models.measured.formats.csv_times import find_stamps
 from models.measured.formats.opened import flaw_finding
 
 FIRST_ROWS_BYTES = 1 << 20
-"""Bytes among which the first rows of numbers must be."""
+"""Number of bytes at the beginning of a file that must contain the first rows of numbers."""
 FIRST_ROWS_LINES = 2000
-"""Lines among which they must be."""
+"""Number of lines at the beginning of a file that must contain the first rows of numbers."""
 TIME_COLUMN_NAMES = ("time", "zeit", "t")
+"""Usual names of the column of time."""
 OTHER_CLOCKS = (
     "timestamp",
     "timestamps",
@@ -57,7 +58,7 @@ OTHER_CLOCKS = (
     "zeitachse",
     "x value",
 )
-"""Names of the column of time, and those that are it where none is called so."""
+"""Headings that mean the column of time in a file where no heading is a usual name of it."""
 TIME_UNITS = {
     "s": 1.0,
     "sec": 1.0,
@@ -73,20 +74,20 @@ TIME_UNITS = {
     "μs": 1e-6,
     "ns": 1e-9,
 }
-"""In small letters -> s."""
+"""Units of time in lower case, with their factors to seconds."""
 _RATE_PATTERN = re.compile(
     r"\d\s*k?hz\b|(rate|freq|abtast|sampl|interval|period|increment|delta[ _]?t)\D*\d", re.IGNORECASE
 )
 _DATE_PATTERN = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
 _NUMBER_START_PATTERN = re.compile(r"[+-]?[.,]?\d")
 BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be", b"\xef\xbb\xbf": "utf-8"}
-"""Marks that text begins with, and how it is then written."""
+"""Byte-order marks with which text begins, and the encoding that each shows."""
 NEEDED_HEADER_TEXT = "a CSV file needs a header line name [unit], ... and rows of numbers, as text"
 
 
 @dataclass
 class FirstLines:
-    """Facts about the format of a file from its first lines.
+    """First lines of a CSV file, and facts on its format.
 
     lines : those that are neither empty nor comments. comment_lines : comments that begin with ``#``. separator : as a
     line ``sep=`` says. undecodable_lines : numbers of lines that are no UTF-8. unit : of characters. unreadable_line :
@@ -103,7 +104,7 @@ class FirstLines:
 
 @dataclass
 class Remarks:
-    """Facts that the comments of a file state."""
+    """Facts that the comment lines of a CSV file state."""
 
     comments: list[str] = field(default_factory=list)
     start: str = ""
@@ -120,13 +121,13 @@ class Remarks:
                 raise InputError(path, f"line {line_number}, samples", value.strip(), "a number of rows is needed")
             self.samples = int(value)
         elif (remark := re.fullmatch(r'channel ("(?:[^"\\]|\\.)*"): ?(.*)', text)) is not None:
-            self.of_channels.setdefault(_text(path, line_number, remark[1]), []).append(remark[2])
+            self.of_channels.setdefault(_name_in_quotes(path, line_number, remark[1]), []).append(remark[2])
         else:
             self.comments.append(value.removeprefix(" ") if key == "comment" else text)
 
 
-def _text(path: Path, line_number: int, quoted: str) -> str:
-    """A name read from a JSON string in quotes."""
+def _name_in_quotes(path: Path, line_number: int, quoted: str) -> str:
+    """A channel's name from a JSON string in quotes."""
     try:
         return str(json.loads(quoted))
     except ValueError:
@@ -134,55 +135,60 @@ def _text(path: Path, line_number: int, quoted: str) -> str:
 
 
 def read_first_lines(path: Path) -> FirstLines:
-    """First lines of a file; InputError where no line is text."""
+    """``FirstLines`` of a file; raises InputError where no line is text."""
     with path.open("rb") as file:
         data = file.read(FIRST_ROWS_BYTES)
     codec, mark = next(
         ((codec, mark) for mark, codec in BYTE_ORDER_MARKS.items() if data.startswith(mark)), ("utf-8", b"")
     )
-    top = FirstLines(np.dtype({"utf-16-le": "<u2", "utf-16-be": ">u2"}.get(codec, "u1")))
-    for line in _complete_lines(data, len(mark), codec, top):
+    first_lines = FirstLines(np.dtype({"utf-16-le": "<u2", "utf-16-be": ">u2"}.get(codec, "u1")))
+    for line in _complete_lines(data, len(mark), codec, first_lines):
         shown = line.text.strip()
         if line.number == 1 and separator_line(line.text):
-            top.separator = separator_line(line.text)
+            first_lines.separator = separator_line(line.text)
         elif shown.startswith("#"):
-            top.comment_lines.append(line)
+            first_lines.comment_lines.append(line)
         elif shown:
-            top.lines.append(line)
-    if top.separator and top.separator not in SEPARATORS:
-        raise InputError(path, "line 1", top.separator, f"{', '.join(SEPARATORS.values())} can part the columns")
-    if not top.lines and not (top.comment_lines and not top.unreadable_line):
+            first_lines.lines.append(line)
+    if first_lines.separator and first_lines.separator not in SEPARATORS:
+        raise InputError(
+            path, "line 1", first_lines.separator, f"{', '.join(SEPARATORS.values())} can part the columns"
+        )
+    if not first_lines.lines and not (first_lines.comment_lines and not first_lines.unreadable_line):
         old = b"\r" in data and b"\n" not in data
         hint = ": lines end as on an old Macintosh, and have to be saved with line ends of today" if old else ""
         raise InputError(
-            path, f"line {top.unreadable_line or len(top.comment_lines) + 1}", None, NEEDED_HEADER_TEXT + hint
+            path,
+            f"line {first_lines.unreadable_line or len(first_lines.comment_lines) + 1}",
+            None,
+            NEEDED_HEADER_TEXT + hint,
         )
-    return top
+    return first_lines
 
 
-def _complete_lines(data: bytes, begin: int, codec: str, top: FirstLines) -> Iterator[FileLine]:
+def _complete_lines(data: bytes, begin: int, codec: str, first_lines: FirstLines) -> Iterator[FileLine]:
     """Complete lines of text, up to the first one that contains a zero character or has no line end."""
-    size = top.unit.itemsize
-    ends = (np.flatnonzero(np.frombuffer(data[: len(data) // size * size], top.unit) == ord("\n")) + 1) * size
+    size = first_lines.unit.itemsize
+    ends = (np.flatnonzero(np.frombuffer(data[: len(data) // size * size], first_lines.unit) == ord("\n")) + 1) * size
     for number, end in enumerate(ends[:FIRST_ROWS_LINES].tolist(), start=1):
         try:
             text, foreign = data[begin:end].decode(codec), False
         except UnicodeDecodeError:
             text, foreign = data[begin:end].decode("cp1252", errors="replace"), True
         if "\0" in text:
-            top.unreadable_line = number
+            first_lines.unreadable_line = number
             return
         line = FileLine(number, text.rstrip("\r\n"), begin, end)
         if foreign:
-            top.undecodable_lines.append(line)
+            first_lines.undecodable_lines.append(line)
         yield line
         begin = end
-    top.unreadable_line = len(ends) + 1 if len(ends) < FIRST_ROWS_LINES else 0
+    first_lines.unreadable_line = len(ends) + 1 if len(ends) < FIRST_ROWS_LINES else 0
 
 
-def find_headings_of(path: Path, top: FirstLines) -> tuple[TableHead, int, Remarks, list[Finding]]:
-    """Headings above the numbers, column of time, and facts in the comments; findings on these lines are included."""
-    head, known = _table_head(path, top)
+def find_headings_and_clock(path: Path, first_lines: FirstLines) -> tuple[TableHead, int, Remarks, list[Finding]]:
+    """Headings above the numbers, index of the column of time, facts in the comments, and findings on these lines."""
+    head, known = _table_head(path, first_lines)
     clocks = [i for i, name in enumerate(head.names) if known(name)]
     if len(clocks) != 1:
         raise InputError(
@@ -192,18 +198,24 @@ def find_headings_of(path: Path, top: FirstLines) -> tuple[TableHead, int, Remar
             f"one column time [s] is needed, found {len(clocks)}",
         )
     remarks = Remarks()
-    above = [line for line in (*top.comment_lines, *head.titles) if line.number <= head.line and line != head.header]
+    above = [
+        line
+        for line in (*first_lines.comment_lines, *head.titles)
+        if line.number <= head.line_before_numbers and line != head.header
+    ]
     for line in sorted(above):
-        if line in top.comment_lines:
+        if line in first_lines.comment_lines:
             remarks.add(path, line.number, line.text.strip()[1:].strip())
         else:
             remarks.comments.append(line.text.strip(' ",;\t'))
     foreign = {
-        passage.number: passage.text.strip()[:60] for passage in top.undecodable_lines if passage.number <= head.line
+        passage.number: passage.text.strip()[:60]
+        for passage in first_lines.undecodable_lines
+        if passage.number <= head.line_before_numbers
     }
     odd = "is not UTF-8 and is read as Windows-1252"
     said = [flaw_finding(path, "doubt", f"line {number} {odd}: {text!r}") for number, text in foreign.items()]
-    if top.unit.itemsize > 1:
+    if first_lines.unit.itemsize > 1:
         said.append(flaw_finding(path, "note", "the text is UTF-16"))
     if head.titles:
         text = f"{len(head.titles)} line(s) above the headings in line {head.header.number} are kept as the comment"
@@ -211,16 +223,17 @@ def find_headings_of(path: Path, top: FirstLines) -> tuple[TableHead, int, Remar
     return head, clocks[0], remarks, said
 
 
-Known = Callable[[str], bool]
+IsClock = Callable[[str], bool]
+"""Function that tells whether a heading means the column of time."""
 
 
-def _table_head(path: Path, top: FirstLines) -> tuple[TableHead, Known]:
-    """Headings above the numbers, found by the first method that gives exactly one result. Lines behind # count too,
-    since numpy writes headings there."""
-    signs = (top.separator,) if top.separator else tuple(SEPARATORS)
-    bare = [line._replace(text=line.text.strip().lstrip("# ")) for line in top.comment_lines]
-    every = sorted((*top.lines, *bare))
-    for find, lines in ((find_head, top.lines), (find_head, every), (find_headings, top.lines)):
+def _table_head(path: Path, first_lines: FirstLines) -> tuple[TableHead, IsClock]:
+    """Headings above the numbers, determined by the first method that gives exactly one result. Lines behind # count
+    too, since numpy writes headings there."""
+    signs = (first_lines.separator,) if first_lines.separator else tuple(SEPARATORS)
+    bare = [line._replace(text=line.text.strip().lstrip("# ")) for line in first_lines.comment_lines]
+    every = sorted((*first_lines.lines, *bare))
+    for find, lines in ((find_head, first_lines.lines), (find_head, every), (find_headings, first_lines.lines)):
         for known in (is_clock, is_other_clock):
             heads = find(lines, known, signs)
             if len(heads) == 1:
@@ -231,15 +244,17 @@ def _table_head(path: Path, top: FirstLines) -> tuple[TableHead, Known]:
                 raise InputError(
                     path, place, text, f"commas alone (or semicolons, or tabs) must part the columns, found {what}"
                 )
-    raise _without_clock(path, top, signs)
+    raise _no_clock_error(path, first_lines, signs)
 
 
-def _without_clock(path: Path, top: FirstLines, signs: tuple[str, ...]) -> InputError:
-    """Error that says why no line can be the headings, and what the user has to write."""
-    lines = top.lines or top.comment_lines
+def _no_clock_error(path: Path, first_lines: FirstLines, signs: tuple[str, ...]) -> InputError:
+    """InputError that says why no line can be the headings, and what the user has to write."""
+    lines = first_lines.lines or first_lines.comment_lines
     first = next((line for line in lines if any(sign in line.text for sign in signs)), lines[0])
     place, text = f"line {first.number} (header)", first.text.strip()
-    rate = next((line for line in (*top.lines, *top.comment_lines) if _RATE_PATTERN.search(line.text)), None)
+    rate = next(
+        (line for line in (*first_lines.lines, *first_lines.comment_lines) if _RATE_PATTERN.search(line.text)), None
+    )
     if rate is not None:
         needed = (
             f"one column time [s] is needed, found 0: line {rate.number} ({rate.text.strip()[:40]!r}) speaks of the "
@@ -257,7 +272,8 @@ def _without_clock(path: Path, top: FirstLines, signs: tuple[str, ...]) -> Input
 
 
 def clock_heading(text: str) -> tuple[str, str]:
-    """Name and unit of the heading of a clock: in brackets, or as ``time (s)``, ``time / s``, ``time_s``."""
+    """Name and unit in the heading of a column of time; the unit is in brackets, or as in ``time (s)``, ``time / s``,
+    ``time_s``."""
     name, unit = name_and_unit(text)
     in_name = re.fullmatch(r"(.*?)\s*(?:\(([^()]*)\)|[/_,]\s*([^\W\d]+))", name) if not unit else None
     if in_name is not None and (in_name[2] is not None or in_name[3].casefold() in TIME_UNITS):
@@ -266,7 +282,7 @@ def clock_heading(text: str) -> tuple[str, str]:
 
 
 def is_clock(text: str) -> bool:
-    """Whether a heading is that of the column of time."""
+    """Whether a heading is a usual name of the column of time."""
     return clock_heading(text)[0].casefold() in TIME_COLUMN_NAMES
 
 
@@ -277,28 +293,37 @@ def is_other_clock(text: str) -> bool:
     return any(" ".join(re.findall(r"[^\W_]+", words.casefold())) in OTHER_CLOCKS for words in parted)
 
 
-def first_rows(top: FirstLines, header: TableHead) -> list[list[str]]:
+def first_cells(first_lines: FirstLines, header: TableHead) -> list[list[str]]:
     """Cells of each column in the first rows of numbers; rows of another width are skipped here and reported later."""
-    lines = [line for line in top.lines if line.number > header.line]
+    lines = [line for line in first_lines.lines if line.number > header.line_before_numbers]
     rows = [cells for line in lines if len(cells := split_cells(line.text, header.separator)) == header.width]
     return [[row[i] for row in rows] for i in range(len(header.names))]
 
 
 def find_layout(
-    path: Path, top: FirstLines, header: TableHead, clock: int, units: tuple[str, ...]
+    path: Path, first_lines: FirstLines, header: TableHead, clock: int, units: tuple[str, ...]
 ) -> tuple[Layout, list[Finding]]:
-    """How the rows of a CSV file are written, from the first rows; InputError where two interpretations are
-    possible."""
-    columns = first_rows(top, header)
+    """``Layout`` of the rows of a CSV file, from the first rows, and findings; raises InputError where two
+    interpretations are possible."""
+    columns = first_cells(first_lines, header)
     first = next(iter(columns[clock]), "")
-    stamps = find_stamps(path, first, header.line + 1, header.names[clock]) if is_stamp(first) else None
+    stamps = find_stamps(path, first, header.line_before_numbers + 1, header.names[clock]) if is_stamp(first) else None
     nameless = tuple(i for i, name in enumerate(header.names) if not name_and_unit(name)[0])
     texts = tuple(i for i, cells in enumerate(columns) if i not in (clock, *nameless) and _is_text(cells))
     taken = tuple(sorted({*texts, *nameless, *((clock,) if stamps else ())}))
     numbers = {cell: None for i, cells in enumerate(columns) if i not in taken for cell in cells}
-    decimal = decimal_sign(path, header.line + 1, header.separator, list(numbers))
+    decimal = decimal_sign(path, header.line_before_numbers + 1, header.separator, list(numbers))
     layout = Layout(
-        header.separator, decimal, header.begin, header.line, header.names, header.width, taken, clock, stamps, top.unit
+        header.separator,
+        decimal,
+        header.numbers_begin,
+        header.line_before_numbers,
+        header.names,
+        header.width,
+        taken,
+        clock,
+        stamps,
+        first_lines.unit,
     )
     said = list[Finding]()
     for i in texts:
@@ -313,7 +338,7 @@ def find_layout(
 
 
 def _layout_remarks(layout: Layout, cells: list[str]) -> Iterator[str]:
-    """Sentences on every deviation from the usual form: commas between columns of numbers with decimal points."""
+    """Sentences on deviations from the usual form: commas between columns of numbers with decimal points."""
     stamps = layout.time_stamps
     if stamps is not None:
         wraps = "; they go on past midnight" if stamps.notation == "hh:mm:ss.fff" else ""
@@ -346,10 +371,12 @@ def _is_text(cells: list[str]) -> bool:
     )
 
 
-def find_units(path: Path, top: FirstLines, header: TableHead, clock: int) -> tuple[tuple[str, ...], list[Finding]]:
-    """Units of the columns from a row below the headings; empty if there is no such row."""
-    stamped = any(map(is_stamp, first_rows(top, header)[clock][:1]))
-    rows = [(line, [_bare_unit(cell) for cell in header.cells(line)]) for line in header.between]
+def find_units(
+    path: Path, first_lines: FirstLines, header: TableHead, clock: int
+) -> tuple[tuple[str, ...], list[Finding]]:
+    """Units of the columns from a row below the headings, empty texts if there is no such row, and findings."""
+    stamped = any(map(is_stamp, first_cells(first_lines, header)[clock][:1]))
+    rows = [(line, [_bare_unit(cell) for cell in header.cells(line)]) for line in header.rows_between]
     known = {*TIME_UNITS, "", "-"} if clock_heading(header.names[clock])[1] else set(TIME_UNITS)
     unit_row = next((row for row in rows if row[1][clock].casefold() in known or stamped), None)
     if unit_row is None:
@@ -368,6 +395,6 @@ def find_units(path: Path, top: FirstLines, header: TableHead, clock: int) -> tu
 
 
 def _bare_unit(cell: str) -> str:
-    """A unit without its surrounding brackets."""
+    """A unit without surrounding brackets."""
     brackets = re.fullmatch(r"\s*[\[(](.*)[\])]\s*", cell)
     return (brackets[1] if brackets else cell).strip()

@@ -1,4 +1,4 @@
-"""Rows of a CSV file: where they begin, and the numbers in some of them, by pandas.
+"""Rows of a CSV file: their positions in the file, and the numbers in some of them, read by pandas.
 
 What is no number, no mark for nothing measured and no cell of a column of text is refused with its line, its column and
 what to write.
@@ -17,26 +17,26 @@ import numpy as np
 
 from models.core.csv_header import MISSING_VALUE_PATTERN
 from models.core.errors import InputError
-from models.measured.formats.csv_times import Stamps
+from models.measured.formats.csv_times import TimeStamps
 
 ROWS_PER_MARK = 1000
-"""Rows from one place of the table of rows to the next."""
+"""Number of rows between two entries in the table of row positions."""
 BYTES_PER_READ = 1 << 22
-"""Bytes read at once while rows are counted."""
+"""Number of bytes read at once while rows are counted."""
 TAIL_CHARACTERS = 1000
-"""Characters at the end of a file among which empty lines are looked for."""
+"""Number of characters at the end of a file among which empty lines are looked for."""
 _GAP_CELLS = ["", "nan", "NaN", "NAN", "NA", "na", "-", "--", "---"]
-"""Usual cells that say that nothing was measured; others are looked for where these do not do."""
+"""Usual cells that mark a missing measured value; others are looked for where these do not suffice."""
 _PLAIN_BYTES = bytes(range(32, 127)) + b"\n"
-"""Bytes of which numbers and marks are made; where there are others, every cell is looked at."""
+"""Bytes of which numbers and marks consist; where there are others, every cell is checked."""
 _QUOTED_SEPARATOR = "\x1a"
-"""What stands for a separator within quotes: never a part of a number."""
+"""Replacement for a separator within quotes: never a part of a number."""
 _THOUSANDS_PATTERN = re.compile(r"\s*[+-]?\d{1,3}([., '’\u00a0\u202f]\d{3})+([.,]\d+)?\s*")
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How the rows of a CSV file are written: separators, columns, clock.
+    """Layout of the rows of a CSV file: separators, columns, clock.
 
     separator, decimal : signs. begin : byte where the rows begin. line : number of the line before them. names :
     headings of all columns. width : cells of a row, which may have empty ones beyond the last heading. text_columns :
@@ -52,7 +52,7 @@ class Layout:
     width: int
     text_columns: tuple[int, ...]
     clock: int
-    time_stamps: Stamps | None
+    time_stamps: TimeStamps | None
     unit: np.dtype
 
     @property
@@ -62,12 +62,12 @@ class Layout:
 
     @property
     def numbers(self) -> list[int]:
-        """Columns that hold numbers."""
+        """Indices of the columns that hold numbers."""
         return [i for i in range(len(self.names)) if i not in self.text_columns]
 
 
 def one_byte_text(data: bytes, unit: np.dtype) -> bytes:
-    """Recode text to one byte per character; a wide character becomes a byte that no number can contain."""
+    """Text recoded to one byte per character; a wide character becomes a byte that no number can contain."""
     if unit.itemsize == 1:
         return data
     codes = np.frombuffer(data[: len(data) // unit.itemsize * unit.itemsize], unit)
@@ -108,8 +108,8 @@ def _empty_lines(path: Path, layout: Layout, last: int) -> list[int]:
 
 
 def numbers_of_rows(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.ndarray, np.ndarray | None]:
-    """Table (rows, columns of numbers) of some rows, from row ``first`` on; also the seconds (rows,) since the first
-    stamp, if times are clock times."""
+    """Table (rows, columns) of the numbers in some rows, from row ``first`` on, and the seconds (rows,) since the first
+    time stamp; None if times are numbers."""
     line = layout.line + 1 + first
     text = _without_quotes(path, layout, one_byte_text(data, layout.unit).replace(b"\r\n", b"\n"), line)
     _refuse_uneven_row(path, layout, text, line)
@@ -120,7 +120,7 @@ def numbers_of_rows(path: Path, layout: Layout, data: bytes, first: int) -> tupl
             for cell in _read_columns(layout, text, [layout.clock], str)[:, 0]
         ]
         times = layout.time_stamps.seconds(path, stamps, line, layout.names[layout.clock])
-    table, used = _table(path, layout, text, line), len(layout.numbers)
+    table, used = _number_table(path, layout, text, line), len(layout.numbers)
     beyond = np.isfinite(table[:, used:]).any(axis=1)
     if beyond.any():
         wrong = f"a value stands beyond the last heading: {len(layout.names)} values are needed"
@@ -128,9 +128,9 @@ def numbers_of_rows(path: Path, layout: Layout, data: bytes, first: int) -> tupl
     return table[:, :used], times
 
 
-def _table(path: Path, layout: Layout, text: bytes, line_number: int) -> np.ndarray:
-    """Numbers (rows, columns) of the columns of numbers and of any beyond the last heading; NaN where a mark means "no
-    value"."""
+def _number_table(path: Path, layout: Layout, text: bytes, line_number: int) -> np.ndarray:
+    """Numbers (rows, columns) in the columns of numbers and in any beyond the last heading; NaN where a cell marks a
+    missing value."""
     columns, wrong = [*layout.numbers, *range(len(layout.names), layout.width)], None
     if text.translate(None, _PLAIN_BYTES + layout.separator.encode()):
         wrong = _first_wrong_cell(path, layout, text, line_number)
@@ -168,7 +168,7 @@ def _read_columns(layout: Layout, text: bytes, columns: list[int], kind: type, m
 
 
 def _without_quotes(path: Path, layout: Layout, text: bytes, line_number: int) -> bytes:
-    """Text of rows with quotes removed; a comma inside quotes is a decimal sign where numbers are written so."""
+    """Text of rows with quotes removed; a comma inside quotes becomes a decimal point where numbers are written so."""
     if b'"' not in text:
         return text
     codes = np.frombuffer(text, np.uint8).copy()
@@ -184,7 +184,7 @@ def _without_quotes(path: Path, layout: Layout, text: bytes, line_number: int) -
 
 
 def _refuse_uneven_row(path: Path, layout: Layout, text: bytes, line_number: int) -> None:
-    """Refuse a row that has more or fewer columns than the header."""
+    """Raise InputError for a row that has more or fewer columns than the header."""
     data = np.frombuffer(text, np.uint8)
     ends = np.flatnonzero(data == ord("\n"))
     signs = np.searchsorted(np.flatnonzero(data == ord(layout.separator)), ends)
@@ -200,7 +200,7 @@ def _refuse_uneven_row(path: Path, layout: Layout, text: bytes, line_number: int
 
 
 def _first_wrong_cell(path: Path, layout: Layout, text: bytes, line_number: int) -> InputError | None:
-    """Error at the first cell that is not a number, or has a tab in a time; None where there is none such."""
+    """InputError for the first cell that is no number, or has a tab in a time; None if there is none."""
     comma = layout.decimal == ","
     for i, row in enumerate(text.split(b"\n")):
         cells = row.decode("utf-8", errors="backslashreplace").split(layout.separator)
@@ -239,7 +239,7 @@ def _cell_advice(layout: Layout, cell: str) -> str:
 
 
 def _error_at_byte(path: Path, line_number: int, text: bytes, offset: int, allowed: str) -> InputError:
-    """Error at one byte within some rows."""
+    """InputError at one byte within some rows."""
     begin, end = text.rfind(b"\n", 0, offset) + 1, text.find(b"\n", offset)
     row = text[begin : len(text) if end < 0 else end].decode("utf-8", errors="backslashreplace")
     return InputError(path, f"line {line_number + text[:offset].count(10)}", row, allowed)

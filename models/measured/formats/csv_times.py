@@ -1,4 +1,4 @@
-"""Times of the clock in a CSV file, turned into seconds since the first one."""
+"""Dates and times of day in a CSV file, converted to seconds since the first one."""
 
 import re
 from dataclasses import dataclass
@@ -10,7 +10,9 @@ import numpy as np
 from models.core.errors import InputError
 
 CLOCK_PATTERN = r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2})(?:[.,:](?P<f>\d{1,9}))?"
+"""Pattern of a time of day."""
 ZONE_PATTERN = r"(?P<zone>Z|[+-]\d{2}:?\d{2})?"
+"""Pattern of a time zone."""
 TIME_NOTATIONS = {
     "hh:mm:ss.fff": re.compile(CLOCK_PATTERN),
     "ISO 8601": re.compile(
@@ -18,14 +20,14 @@ TIME_NOTATIONS = {
     ),
     "dd.mm.yyyy hh:mm:ss.fff": re.compile(rf"(?P<d>\d{{1,2}})\.(?P<o>\d{{1,2}})\.(?P<y>\d{{4}})[ T]+{CLOCK_PATTERN}"),
 }
-"""Notations that have one meaning."""
+"""Notations of time that have one meaning, with their patterns."""
 DAY_IN_NANOSECONDS = 86_400_000_000_000
-"""ns."""
+"""Length of a day (ns)."""
 
 
 @dataclass(frozen=True)
-class Stamps:
-    """Times of the clock, all in one notation; ``first_time`` is the first time, in ns since 1970 or since midnight."""
+class TimeStamps:
+    """Notation of the time stamps in a column; ``first_time`` is the first one, in ns since 1970 or since midnight."""
 
     notation: str
     zone: str
@@ -41,7 +43,8 @@ class Stamps:
         return datetime.fromisoformat(text + self.zone.replace("Z", "+00:00"))
 
     def seconds(self, path: Path, cells: list[str], line_number: int, name: str) -> np.ndarray:
-        """Seconds (n,) since the first stamp, for the cells of some rows, of which the first is line ``line_number``.
+        """Seconds (n,) since the first time stamp, for the cells of some rows, of which the first is line
+        ``line_number``.
 
         Times of the day go on past midnight, for a day at most. Raises InputError at the first one that is none.
         """
@@ -53,14 +56,14 @@ class Stamps:
         return np.asarray((passed % DAY_IN_NANOSECONDS if self.notation == "hh:mm:ss.fff" else passed) / 1e9)
 
     def _cell_for_numpy(self, cell: str) -> str:
-        """A cell as numpy reads a time; ValueError where it is of another notation or zone."""
+        """A cell in the form in which numpy reads a time; ValueError where it has another notation or zone."""
         matched = TIME_NOTATIONS[self.notation].fullmatch(cell.strip())
         if matched is None or (matched.groupdict().get("zone") or "") != self.zone:
             raise ValueError(cell)
         return _iso_text(matched)
 
     def _first_wrong_cell(self, path: Path, cells: list[str], line_number: int, name: str) -> InputError:
-        """Error at the first cell that is no time in this notation."""
+        """InputError for the first cell that is no time in this notation."""
         for i, cell in enumerate(cells):
             try:
                 np.datetime64(self._cell_for_numpy(cell), "ns")
@@ -75,19 +78,19 @@ class Stamps:
         return InputError(path, f"line {line_number} and after, column {name!r}", None, "times of the clock are needed")
 
 
-def find_stamps(path: Path, cell: str, line_number: int, name: str) -> Stamps:
-    """Notation of a column of times, from its first cell; InputError, with advice, where the cell can be read in two
-    ways."""
+def find_stamps(path: Path, cell: str, line_number: int, name: str) -> TimeStamps:
+    """``TimeStamps`` of a column, from its first cell; raises InputError, with advice, where the cell can be read in
+    two ways."""
     cell = cell.strip()
     for form, pattern in TIME_NOTATIONS.items():
         matched = pattern.fullmatch(cell)
         if matched is not None:
-            plain = Stamps(form, matched.groupdict().get("zone") or "", 0, cell)
+            plain = TimeStamps(form, matched.groupdict().get("zone") or "", 0, cell)
             try:
                 zero = int(np.datetime64(_iso_text(matched), "ns").astype(np.int64))
             except ValueError:
                 raise plain._first_wrong_cell(path, [cell], line_number, name) from None
-            return Stamps(form, plain.zone, zero, cell)
+            return TimeStamps(form, plain.zone, zero, cell)
     raise InputError(
         path,
         f"line {line_number}, column {name!r}",
@@ -98,6 +101,7 @@ def find_stamps(path: Path, cell: str, line_number: int, name: str) -> Stamps:
 
 
 def _iso_text(matched: re.Match[str]) -> str:
+    """ISO 8601 text of a matched time stamp."""
     part = matched.groupdict()
     year, month, day = (part.get("y") or "1970", part.get("o") or "01", part.get("d") or "01")
     return f"{year}-{month:0>2}-{day:0>2}T{part['h']:0>2}:{part['m']}:{part['s']}.{part['f'] or '0'}"

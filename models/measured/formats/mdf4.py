@@ -1,4 +1,4 @@
-"""ASAM MDF, versions 3 and 4, read by asammdf: one group of channels per channel group of the file.
+"""Reader of ASAM MDF files, versions 3 and 4, by asammdf: one group of channels per channel group of the file.
 
 Times are those of each group's master channel; a group without a master in seconds is left out, and that is said.
 Values are the physical ones, after the file's own conversion; samples that the file marks as invalid are NaN. Channels
@@ -27,9 +27,9 @@ from models.core.finding import Finding
 from models.measured.channel import Channel
 from models.measured.formats.mdf4_blocks import VARIABLE_LENGTH_FLAG, check_blocks
 from models.measured.formats.opened import (
-    LeftOut,
     OpenFile,
-    Span,
+    SampleSpan,
+    SkippedChannels,
     distinct_names,
     flaw_finding,
     library_errors_as_input,
@@ -39,26 +39,31 @@ from models.measured.formats.opened import (
 SECONDS_SYNCHRONISATION = 1
 """Synchronisation type of a master channel that counts seconds (MDF 4; that of MDF 3 always does)."""
 SECONDS_OF_UNIT = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
-"""s, of the units of a master channel that some exporters write beside the standard's own."""
+"""Factors to seconds of the units that some exporters write for a master channel besides the standard's own."""
 ALL_INVALID, INVALIDATION_FLAGS, VIRTUAL_MASTER = 1, 2, 3
-"""Flags of a channel of MDF 4 that was never measured, and of one with marks; kind of a clock without samples."""
+"""Channel flags of MDF 4 (never measured; has invalidation bits), and channel type of a clock without samples."""
 LOCAL_TIME_FLAG, OFFSET_VALID_FLAG = 1, 2
-"""Flags of the start in MDF 4: local time of an unknown zone, offset to UTC is valid."""
+"""Flags of the start time in MDF 4: local time of an unknown zone; offset to UTC is valid."""
 NUMBER_TYPES = {3: {0, 1, 2, 3, 9, 10, 11, 12, 13, 14, 15, 16}, 4: {0, 1, 2, 3, 4, 5}}
+"""By MDF version: data types of numbers."""
 WHOLE_NUMBER_TYPES = {3: {0, 1, 9, 10, 13, 14}, 4: {0, 1, 2, 3}}
+"""By MDF version: data types of whole numbers."""
 NUMERIC_CONVERSIONS = {3: {0, 1, 2, 6, 7, 8, 9, 10, 65535}, 4: {0, 1, 2, 3, 4, 5, 6}}
+"""By MDF version: conversions that give numbers."""
 LINEAR_CONVERSION = {3: 0, 4: 1}
-"""By version: data types of numbers, those of whole numbers, conversions that end in numbers, the linear one."""
+"""By MDF version: the linear conversion."""
 
 
 @dataclass(frozen=True)
 class MdfFile(OpenFile):
-    """A reader of an MDF file; ``places`` holds the group and index of every channel in the file."""
+    """Reader of an MDF file; ``places`` holds the group and the index of every channel in the file."""
 
     places: tuple[tuple[int, int], ...]
 
-    def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Load the records of each span once, and take every channel from them."""
+    def pieces(
+        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Times and values of the records of each span, loaded once for all channels."""
         with opened_mdf(self.path) as mdf:
             group = self.places[channel_indices[0]][0]
             for first, count in spans:
@@ -69,8 +74,8 @@ class MdfFile(OpenFile):
 
 @contextmanager
 def opened_mdf(path: Path) -> Iterator[Any]:
-    """asammdf's open file, with its terminal output suppressed; InputError where the file is damaged or the package
-    missing."""
+    """Context with asammdf's open file, its terminal output suppressed; InputError where the file is damaged or the
+    package missing."""
     try:
         from asammdf import MDF
     except ImportError:
@@ -96,7 +101,7 @@ def opened_mdf(path: Path) -> Iterator[Any]:
 
 @contextmanager
 def suppressed_output() -> Iterator[None]:
-    """Suppress what asammdf prints, also while it cleans up a file that it could not open."""
+    """Context in which asammdf prints nothing, also while it cleans up a file that it could not open."""
     kept, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         with redirect_stdout(io.StringIO()):
@@ -106,7 +111,7 @@ def suppressed_output() -> Iterator[None]:
 
 
 def _record_block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values of some records, loaded only once; the library's public functions would load them again for each
+    """Times and values of some records, loaded only once; asammdf's public functions would load them again for each
     channel."""
     getattr(mdf._mdf, "_invalidation_cache", {}).clear()  # it knows a block by its length, and takes the one before
     data_blocks = list(mdf._mdf._load_data(mdf.groups[group], record_offset=first, record_count=count))
@@ -131,7 +136,7 @@ def _physical_values(mdf: Any, group: int, index: int, records: Any) -> np.ndarr
 
 
 def open_mdf(path: Path) -> MdfFile:
-    """List the channels of a file; raises InputError where it is damaged."""
+    """``MdfFile`` of a path with its list of channels; raises InputError where the file is damaged."""
     with library_errors_as_input(path):
         with path.open("rb") as file:
             identification = re.match(rb"(?:MDF|UnFinMF) +([34])\.\d\d", file.read(64))
@@ -144,8 +149,8 @@ def open_mdf(path: Path) -> MdfFile:
 
 
 def _file_with_channels(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfFile:
-    """Channels that hold numbers over time."""
-    left_out, locations, channels = LeftOut(), [], []
+    """``MdfFile`` with the channels that hold numbers over time."""
+    left_out, locations, channels = SkippedChannels(), [], []
     for g, group in enumerate(mdf.groups):
         records = group.channel_group
         if version == 3 and records.cycles_nr * records.samples_byte_nr > path.stat().st_size:
@@ -203,7 +208,7 @@ def _group_names(group: Any, channel: Any) -> tuple[str, str, str, str]:
 
 
 def _why_group_unusable(mdf: Any, g: int, version: int) -> str:
-    """Reason why a group cannot be used; empty if it can."""
+    """Reason why a channel group cannot be used; empty if it can."""
     group, master = mdf.groups[g], mdf.masters_db.get(g)
     if group.channel_group.cycles_nr == 0:
         return "no samples"
@@ -233,7 +238,7 @@ def _why_channel_unusable(group: Any, i: int, version: int) -> str:
 
 
 def _bits_within_record(group: Any, channel: Any, version: int) -> bool:
-    """Whether a channel's bits lie inside its records. The library copies without this check and could crash the
+    """Whether a channel's bits lie inside its records. asammdf copies without this check and could crash the
     process."""
     records, whole = group.channel_group, channel.data_type in WHOLE_NUMBER_TYPES[version]
     if version == 4 and channel.channel_type == VIRTUAL_MASTER:

@@ -1,4 +1,5 @@
-"""Follows every link of an MDF 4 file before a library does: blocks are whole, chains end, records have their bytes.
+"""Check of the links and blocks of an MDF 4 file before asammdf reads it: blocks complete, chains finite, records
+present.
 
 A library that follows damaged links may loop, ask for memory that no machine has, or return what is not there. Block
 layouts: ASAM MDF 4.1.
@@ -15,7 +16,7 @@ from models.core.finding import Finding
 from models.measured.formats.opened import flaw_finding
 
 HEAD_BYTES, FIRST_BLOCK_OFFSET = 24, 64
-"""Bytes of a block's head; where the first block, HD, begins."""
+"""Length (bytes) of a block's head, and position of the first block, HD."""
 CHAINED_BLOCKS = (
     b"##DG",
     b"##CG",
@@ -30,16 +31,16 @@ CHAINED_BLOCKS = (
     b"##CC",
     b"##HL",
 )
-"""Blocks whose first link leads on to the next of their kind, or into their list."""
+"""Kinds of blocks whose first link leads to the next block of the chain, or into its list."""
 LARGEST_COMPRESSION = 1100
-"""Times that packed data may grow: beyond what deflate can do."""
+"""Ratio of unpacked to packed size beyond what deflate can reach."""
 VARIABLE_LENGTH_FLAG = 1
-"""Flag of a channel group whose records have lengths of their own."""
+"""Flag of a channel group whose records have individual lengths."""
 
 
 @dataclass(frozen=True)
 class MdfBlock:
-    """A block of the file: kind, links, and up to a hundred bytes after the links."""
+    """A block of an MDF file: kind, length, links, and up to a hundred bytes after the links."""
 
     kind: bytes
     length: int
@@ -48,8 +49,8 @@ class MdfBlock:
 
 
 def check_blocks(path: Path) -> list[Finding]:
-    """Raise InputError at the byte where the structure of an MDF 4 file is inconsistent. Return findings where it has
-    more records than it announces."""
+    """Findings on an MDF 4 file with more records than it announces; raises InputError at the byte where its structure
+    is inconsistent."""
     size = path.stat().st_size
     if size < FIRST_BLOCK_OFFSET + HEAD_BYTES:
         raise InputError(path, f"byte {size}", None, "the file ends in its header")
@@ -89,7 +90,7 @@ def _linked_blocks(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int
 
 
 def _check_chains(path: Path, blocks: dict[int, MdfBlock]) -> None:
-    """Refuse a chain of links that leads back to one of its own blocks."""
+    """Raise InputError for a chain of links that leads back to one of its own blocks."""
     ended: set[int] = set()
     for place in blocks:
         chain: dict[int, None] = {}
@@ -102,9 +103,9 @@ def _check_chains(path: Path, blocks: dict[int, MdfBlock]) -> None:
 
 
 def _check_records(path: Path, place: int, group: MdfBlock, blocks: dict[int, MdfBlock]) -> list[Finding]:
-    """Refuse channel groups that announce more records than their data group has bytes for; return findings where it
-    has more bytes."""
-    there = sum(_length(path, at, blocks) for at in _data_positions(path, group.links[2], blocks))
+    """Findings on a data group with more bytes than its records need; raises InputError if channel groups announce more
+    records than it has bytes for."""
+    there = sum(_unpacked_length(path, at, blocks) for at in _data_positions(path, group.links[2], blocks))
     id_size = group.data[0]
     needed, loose, at = 0, False, group.links[1]
     while at:
@@ -137,7 +138,7 @@ def _data_positions(path: Path, place: int, blocks: dict[int, MdfBlock]) -> list
     return places
 
 
-def _length(path: Path, place: int, blocks: dict[int, MdfBlock]) -> int:
+def _unpacked_length(path: Path, place: int, blocks: dict[int, MdfBlock]) -> int:
     """Number of bytes of records in a data block after unpacking."""
     block = blocks[place]
     if block.kind != b"##DZ":

@@ -1,5 +1,4 @@
-"""Functions that the readers of all formats share: channels chosen by name, blocks cut and checked, one kind of
-error."""
+"""Functions that the readers of all formats share: channels by name, checked blocks, one kind of error."""
 
 from abc import ABC, abstractmethod
 from collections import Counter, defaultdict
@@ -16,37 +15,40 @@ from models.core.errors import InputError
 from models.core.finding import Finding, Weight
 from models.measured.channel import SAMPLES_PER_BLOCK, Channel, SampleBlock
 
-Span = tuple[int, int]
+SampleSpan = tuple[int, int]
 """First sample and number of samples."""
-SHOWN_NAMES = 5
-"""Names of what is left out that are told."""
+MOST_SHOWN_NAMES = 5
+"""Most names of skipped channels that a finding lists."""
 START_EXAMPLE = "2026-11-21T08:00:00+00:00"
-"""How a start is to be written."""
+"""Example of a start time, for messages."""
 
 
 @dataclass(frozen=True)
 class OpenFile(ABC):
-    """An open file with known channels. Samples are read on demand, and no file handle stays open between reads."""
+    """An open measurement file with known channels. Samples are read on demand, and no file handle stays open between
+    reads."""
 
     path: Path
     channels: tuple[Channel, ...]
     start: datetime | None
     comment: str
-    noticed: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
 
     def blocks(self, names: Sequence[str], length: int = SAMPLES_PER_BLOCK, first: int = 0) -> Iterator[SampleBlock]:
         """Blocks of channels of one group, as specified in ``models.measured.channel.Source``."""
-        chosen = self._chosen(names)
+        chosen = self._channel_indices(names)
         count = self.channels[chosen[0]].count
         spans = ((i, min(length, count - i)) for i in range(first, count, length))  # a damaged file may claim billions
-        return self._checked(chosen, spans)
+        return self._checked_blocks(chosen, spans)
 
     @abstractmethod
-    def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Times (n,) in s and values (n, chosen) of each span, read by the format's own method; fewer where the file
+    def pieces(
+        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Times (n,) in s and values (n, channels) of each span, read by the format's own method; fewer where the file
         ends."""
 
-    def _chosen(self, names: Sequence[str]) -> list[int]:
+    def _channel_indices(self, names: Sequence[str]) -> list[int]:
         """Indices of the named channels, which must belong to one group."""
         place = {channel.name: i for i, channel in enumerate(self.channels)}
         for name in names:
@@ -57,20 +59,20 @@ class OpenFile(ABC):
             raise InputError(self.path, "channels", list(names), "one or more channels of one sampling rate are needed")
         return chosen
 
-    def _checked(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[SampleBlock]:
-        """Blocks that are complete, with times and values that are numbers or NaN."""
+    def _checked_blocks(self, channel_indices: list[int], spans: Iterable[SampleSpan]) -> Iterator[SampleBlock]:
+        """Complete blocks, with times that are finite and values that are finite or NaN."""
         names, (mine, theirs) = [self.channels[i].name for i in channel_indices], tee(spans)
         with library_errors_as_input(self.path):
             for (first, count), (times, values) in zip(mine, self.pieces(channel_indices, theirs), strict=True):
                 if len(times) != count:
                     ends = f"the data end here, although {first + count} samples or more are announced"
                     raise InputError(self.path, f"sample {first + len(times)}", None, ends)
-                self._finite(first, ["time"], times[:, None], np.isfinite(times[:, None]))
-                self._finite(first, names, values, ~np.isinf(values))
+                self._check_finite(first, ["time"], times[:, None], np.isfinite(times[:, None]))
+                self._check_finite(first, names, values, ~np.isinf(values))
                 yield SampleBlock(first, times, values)
 
-    def _finite(self, first: int, names: list[str], values: np.ndarray, valid: np.ndarray) -> None:
-        """Refuse the first value that is not valid: infinite, or a time that is not finite.
+    def _check_finite(self, first: int, names: list[str], values: np.ndarray, valid: np.ndarray) -> None:
+        """Raise InputError at the first value that is not valid: infinite, or a time that is not finite.
 
         NaN in a channel means that nothing was measured.
         """
@@ -83,7 +85,7 @@ class OpenFile(ABC):
 
 @contextmanager
 def library_errors_as_input(path: Path) -> Iterator[None]:
-    """Convert any exception that a library raises on a damaged file into an InputError with one message."""
+    """Context in which any exception that a library raises on a damaged file becomes an InputError."""
     try:
         yield
     except InputError:
@@ -101,7 +103,7 @@ def flaw_finding(path: Path, weight: Weight, text: str, place: str = "") -> Find
 
 
 @dataclass
-class LeftOut:
+class SkippedChannels:
     """Names of channels that a reader skips, grouped by reason; each reason gives a single finding."""
 
     names: defaultdict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
@@ -113,22 +115,22 @@ class LeftOut:
     def findings(self, path: Path) -> list[Finding]:
         """One finding per reason, with the names of the skipped channels."""
         more = {
-            why: f" and {len(names) - SHOWN_NAMES} more"
+            why: f" and {len(names) - MOST_SHOWN_NAMES} more"
             for why, names in self.names.items()
-            if len(names) > SHOWN_NAMES
+            if len(names) > MOST_SHOWN_NAMES
         }
-        texts = {why: f"{', '.join(names[:SHOWN_NAMES])}{more.get(why, '')}" for why, names in self.names.items()}
+        texts = {why: f"{', '.join(names[:MOST_SHOWN_NAMES])}{more.get(why, '')}" for why, names in self.names.items()}
         return [flaw_finding(path, "note", f"left out, {why}: {text}") for why, text in texts.items()]
 
 
 def without_numbers(path: Path, findings: Sequence[Finding]) -> InputError:
-    """Error for a file without a readable channel; it includes the findings made so far."""
+    """InputError for a file without a readable channel; it includes the findings made so far."""
     reasons = ["no channel of numbers over time is in the file", *(finding.text for finding in findings)]
     return InputError(path, "channels", None, "; ".join(reasons))
 
 
 def distinct_names(path: Path, names: Sequence[str], *groups: Sequence[str]) -> tuple[list[str], list[Finding]]:
-    """Names made unique, and findings on the names that occurred more than once.
+    """Channel names made unique, and findings on the names that occurred more than once.
 
     A repeated ``Fz`` becomes ``WFT VL/Fz``, ``WFT VR/Fz`` by the first of ``groups`` (one text per name each) that
     tells all its channels apart, and ``Fz (1)``, ``Fz (2)`` where none does.
@@ -150,7 +152,7 @@ def distinct_names(path: Path, names: Sequence[str], *groups: Sequence[str]) -> 
 
 
 def _number_repeated(names: Sequence[str]) -> list[str]:
-    """Names of which repeated ones have a number appended."""
+    """Channel names, with a number appended to repeated ones."""
     uses, taken, unique = Counter(names), set(names), []
     for name in names:
         if uses[name] > 1:

@@ -1,4 +1,5 @@
-"""MTS RPC III time histories: a header of named parameters, then groups of samples, channel after channel in each.
+"""Reader of MTS RPC III time histories: a header of named parameters, then groups of samples, channel after channel in
+each.
 
 The header is of 512-byte blocks, each of four parameters: 32 bytes of name, 96 of value, ended by a zero byte (source:
 MTS, RPC III file formats, as rpc3-file lays it out). One sampling period holds for all channels. Samples are whole
@@ -19,7 +20,7 @@ from models.core.finding import Finding
 from models.measured.channel import Channel
 from models.measured.formats.opened import (
     OpenFile,
-    Span,
+    SampleSpan,
     distinct_names,
     flaw_finding,
     library_errors_as_input,
@@ -27,18 +28,23 @@ from models.measured.formats.opened import (
 )
 
 HEADER_BLOCK, KEY_LENGTH, RECORD_LENGTH = 512, 32, 128
+"""Lengths (bytes) of a header block, of a parameter's name, and of a parameter."""
 MOST_BLOCKS = 1024
-"""Header blocks: four times what the format allows, as there are files that need them."""
+"""Most header blocks: four times what the format allows, as there are files that need them."""
 SAMPLE_TYPES: dict[str, np.dtype] = {"SHORT_INTEGER": np.dtype("<i2"), "FLOATING_POINT": np.dtype("<f4")}
+"""numpy types of the samples, by the format's names."""
 LITTLE_ENDIAN = ("BINARY", "BINARY_IEEE_LITTLE_END")
+"""Names of the byte orders that can be read."""
 FIRST_PARAMETERS = ["FORMAT", "NUM_HEADER_BLOCKS", "NUM_PARAMS"]
+"""Names of the first three parameters of a header, in order."""
 HISTORY_TYPES = ("DRIVE", "RESPONSE", "MULT_DRIVE", "MULT_RESP", "1", "2", "3", "4")
+"""Accepted types of time histories."""
 
 
 @dataclass(frozen=True)
-class Layout:
-    """Where the samples are: byte of the first group, points in a group, number of channels, data type, factor of each
-    channel."""
+class SampleLayout:
+    """Layout of the samples in an RPC III file: byte of the first group, points in a group, number of channels, data
+    type, factor of each channel, period (s)."""
 
     begin: int
     points: int
@@ -50,12 +56,14 @@ class Layout:
 
 @dataclass(frozen=True)
 class RpcFile(OpenFile):
-    """Groups of equal length, read through a memory window of the file."""
+    """Reader of an RPC III file, whose samples lie in groups of equal length."""
 
-    layout: Layout
+    layout: SampleLayout
 
-    def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Read the groups that hold each span."""
+    def pieces(
+        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Times and values of each span, from the groups that hold it."""
         layout = self.layout
         size = layout.points * layout.width * layout.dtype.itemsize
         with self.path.open("rb") as file:
@@ -73,7 +81,7 @@ class RpcFile(OpenFile):
 
 
 def open_rpc(path: Path) -> RpcFile:
-    """Read the header, and compare it with the length of the file; raises InputError."""
+    """``RpcFile`` of a path: header read and compared with the length of the file; raises InputError."""
     with library_errors_as_input(path):
         parameters = read_parameters(path)
         layout = _sample_layout(path, parameters)
@@ -102,7 +110,8 @@ def open_rpc(path: Path) -> RpcFile:
 
 
 def read_parameters(path: Path) -> dict[str, str]:
-    """Parameters of the header by name; the first three have fixed positions and give the number of the others."""
+    """Parameters of an RPC III header by name; the first three have fixed positions and give the number of the
+    others."""
     with path.open("rb") as file:
         head = file.read(HEADER_BLOCK)
         if len(head) < HEADER_BLOCK:
@@ -122,7 +131,7 @@ def read_parameters(path: Path) -> dict[str, str]:
 
 
 def _header_record(record_bytes: bytes, i: int) -> tuple[str, str]:
-    """Name and value of one header parameter; both are ended by a zero byte."""
+    """Name and value of header parameter number ``i``; both are ended by a zero byte."""
     record = record_bytes[i * RECORD_LENGTH : (i + 1) * RECORD_LENGTH]
     key, value = (part.split(b"\0")[0] for part in (record[:KEY_LENGTH], record[KEY_LENGTH:]))
     try:
@@ -132,7 +141,7 @@ def _header_record(record_bytes: bytes, i: int) -> tuple[str, str]:
 
 
 def whole_number(path: Path, parameters: dict[str, str], name: str, maximum: int) -> int:
-    """A parameter that must be a whole number from 1 to ``maximum``."""
+    """Value of a header parameter that must be a whole number from 1 to ``maximum``; raises InputError otherwise."""
     text = parameters.get(name, "").strip()
     if not re.fullmatch(r"\d{1,18}(\.0*)?", text) or not 1 <= int(float(text)) <= maximum:
         raise InputError(path, f"header, {name}", text, f"a whole number from 1 to {maximum} is needed")
@@ -140,7 +149,7 @@ def whole_number(path: Path, parameters: dict[str, str], name: str, maximum: int
 
 
 def _real_parameter(path: Path, parameters: dict[str, str], name: str, positive: bool) -> float:
-    """A parameter that must be a finite number."""
+    """Value of a header parameter that must be a finite number; raises InputError otherwise."""
     try:
         value = float(parameters.get(name, ""))
     except ValueError:
@@ -151,8 +160,8 @@ def _real_parameter(path: Path, parameters: dict[str, str], name: str, positive:
     return value
 
 
-def _sample_layout(path: Path, parameters: dict[str, str]) -> Layout:
-    """Layout of the samples in the file: blocks, channels, bytes."""
+def _sample_layout(path: Path, parameters: dict[str, str]) -> SampleLayout:
+    """``SampleLayout`` from the header parameters."""
     for name, allowed in (
         ("FILE_TYPE", ("TIME_HISTORY",)),
         ("TIME_TYPE", HISTORY_TYPES),
@@ -172,10 +181,12 @@ def _sample_layout(path: Path, parameters: dict[str, str]) -> Layout:
     scales = np.ones(width)
     if dtype == SAMPLE_TYPES["SHORT_INTEGER"]:
         scales = np.array([_real_parameter(path, parameters, f"SCALE.CHAN_{i}", False) for i in range(1, width + 1)])
-    return Layout(HEADER_BLOCK * int(float(parameters["NUM_HEADER_BLOCKS"])), points, width, dtype, scales, period)
+    return SampleLayout(
+        HEADER_BLOCK * int(float(parameters["NUM_HEADER_BLOCKS"])), points, width, dtype, scales, period
+    )
 
 
-def _usable_samples(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int, list[Finding]]:
+def _usable_samples(path: Path, parameters: dict[str, str], layout: SampleLayout) -> tuple[int, list[Finding]]:
     """Number of usable samples, and findings on missing or surplus ones."""
     frame = whole_number(path, parameters, "PTS_PER_FRAME", layout.points)
     announced = frame * whole_number(path, parameters, "FRAMES", 10**12)
@@ -203,7 +214,7 @@ def _usable_samples(path: Path, parameters: dict[str, str], layout: Layout) -> t
 
 
 def _numbers_of_names(path: Path, parameters: dict[str, str], width: int) -> list[Finding]:
-    """Refuse names with a number above that of the channels; findings on channels without a name."""
+    """Findings on channels without a name; raises InputError for a name with a number above that of the channels."""
     numbers = {int(matched[1]) for key in parameters if (matched := re.fullmatch(r"DESC\.CHAN_(\d{1,9})", key))}
     if numbers and max(numbers) > width:
         raise InputError(path, "header, CHANNELS", width, f"a channel {max(numbers)} is described as well")
@@ -212,7 +223,7 @@ def _numbers_of_names(path: Path, parameters: dict[str, str], width: int) -> lis
 
 
 def _join_long_text(parameters: dict[str, str], name: str) -> str:
-    """Text that is spread over several parameters, NAME_1, NAME_2, ... with line ends written as ``\\n``."""
+    """Text that is spread over several header parameters, NAME_1, NAME_2, ... with line ends written as ``\\n``."""
     parts: list[str] = []
     while (key := f"{name}_{len(parts) + 1}") in parameters:
         parts.append(parameters[key])

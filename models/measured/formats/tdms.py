@@ -1,4 +1,4 @@
-"""TDMS, as LabVIEW and DIAdem write it, read by npTDMS: channels in groups, each with a clock of its own.
+"""Reader of TDMS files, as LabVIEW and DIAdem write them, by npTDMS: channels in groups, each with a clock of its own.
 
 A channel's times are wf_start_offset + i wf_increment after its wf_start_time; without an increment they are those of
 the one channel of its group that is called time and counts seconds. Time 0 of the file is the earliest wf_start_time.
@@ -20,9 +20,9 @@ from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.channel import Channel
 from models.measured.formats.opened import (
-    LeftOut,
     OpenFile,
-    Span,
+    SampleSpan,
+    SkippedChannels,
     distinct_names,
     flaw_finding,
     library_errors_as_input,
@@ -30,17 +30,20 @@ from models.measured.formats.opened import (
 )
 
 UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")
+"""Properties of a channel that may hold its unit."""
 TIME_CHANNEL_NAMES = ("time", "zeit", "t")
+"""Names of a channel that holds times."""
 SECOND_SPELLINGS = ("", "s", "sec", "seconds")
+"""Accepted spellings of the unit second."""
 LEAD_IN_LENGTH, OPEN_END = 28, 2**64 - 1
-"""Bytes that lead in a segment, and the length of a segment that its writer never finished."""
+"""Length (bytes) of a segment's lead-in, and the length stated for a segment that its writer never finished."""
 TDMS_EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
-"""Where TDMS counts from: a start on this day is one that nobody set."""
+"""Zero of the TDMS time scale: a start on this day was never set."""
 
 
 @dataclass(frozen=True)
 class ChannelLocation:
-    """Where a channel's data are: group and name in the file, and either the name of its time channel, or first time
+    """Location of a channel's data: group and name in the file, and either the name of its time channel, or first time
     and increment (s)."""
 
     group: str
@@ -56,8 +59,10 @@ class TdmsData(OpenFile):
 
     places: tuple[ChannelLocation, ...]
 
-    def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Read the samples of each span, separately for each channel."""
+    def pieces(
+        self, channel_indices: list[int], spans: Iterable[SampleSpan]
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Times and values of each span, read separately for each channel."""
         places = [self.places[i] for i in channel_indices]
         with BoundedFile(self.path) as file:
             data = opened_tdms(self.path, file)
@@ -96,7 +101,7 @@ def opened_tdms(path: Path, file: BoundedFile) -> Any:
 
 
 def open_tdms(path: Path) -> TdmsData:
-    """List the channels of a file; raises InputError where it is damaged."""
+    """``TdmsData`` of a path with its list of channels; raises InputError where the file is damaged."""
     with library_errors_as_input(path):
         cut = check_segments(path)
         with BoundedFile(path) as file:
@@ -104,7 +109,8 @@ def open_tdms(path: Path) -> TdmsData:
 
 
 def check_segments(path: Path) -> list[Finding]:
-    """Follow the chain of segments. An incomplete last one gives a finding, any other damage an error."""
+    """Findings on an incomplete last segment of a TDMS file; raises InputError for any other damage to the chain of
+    segments."""
     size, place = path.stat().st_size, 0
     with path.open("rb") as file:
         while place < size:
@@ -127,14 +133,15 @@ def check_segments(path: Path) -> list[Finding]:
 
 
 def _cut_off_finding(path: Path, offset: int) -> Finding:
+    """Finding on a segment that is not complete."""
     return flaw_finding(
         path, "doubt", f"the segment at byte {offset} is not complete: the file is cut off, and what is whole is read"
     )
 
 
 def _file_with_channels(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
-    """Channels that hold numbers over time; channels with the same time axis form a group."""
-    left_out = LeftOut()
+    """``TdmsData`` with the channels that hold numbers over time; channels with the same time axis form a group."""
+    left_out = SkippedChannels()
     usable = [
         (group, channel) for group in data.groups() for channel in group.channels() if _is_numeric(channel, left_out)
     ]
@@ -160,8 +167,8 @@ def _file_with_channels(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     channels = tuple(
         Channel(
             name,
-            _text(channel, *UNIT_PROPERTIES),
-            _text(channel, "description"),
+            _property_text(channel, *UNIT_PROPERTIES),
+            _property_text(channel, "description"),
             keys.index(key),
             key[1],
             None if place.clock else place.increment,
@@ -174,7 +181,7 @@ def _file_with_channels(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     return TdmsData(path, channels, zero, comment, (*findings, *repeated), tuple(place for _, place in with_clock))
 
 
-def _is_numeric(channel: Any, skipped_channels: LeftOut) -> bool:
+def _is_numeric(channel: Any, skipped_channels: SkippedChannels) -> bool:
     """Whether a channel holds real numbers, one or more."""
     if len(channel) and channel.data_type is not None and channel.dtype.kind in "iuf":
         return True
@@ -183,7 +190,7 @@ def _is_numeric(channel: Any, skipped_channels: LeftOut) -> bool:
 
 
 def _channel_location(
-    group: Any, channel: Any, zero: datetime | None, skipped_channels: LeftOut
+    group: Any, channel: Any, zero: datetime | None, skipped_channels: SkippedChannels
 ) -> ChannelLocation | None:
     """Location of a channel's samples and times; None where it has no time axis, or is a time axis itself."""
     properties, start = channel.properties, _start_in_utc(channel)
@@ -201,7 +208,7 @@ def _channel_location(
         for clock in group.channels()
         if clock.name.casefold() in TIME_CHANNEL_NAMES
         and len(clock) == len(channel)
-        and _text(clock, *UNIT_PROPERTIES).casefold() in SECOND_SPELLINGS
+        and _property_text(clock, *UNIT_PROPERTIES).casefold() in SECOND_SPELLINGS
     ]
     if channel.name.casefold() in TIME_CHANNEL_NAMES and clocks:
         return None
@@ -224,8 +231,8 @@ def _start_in_utc(channel: Any) -> datetime | None:
     return None if start - TDMS_EPOCH < timedelta(days=1) else start
 
 
-def _text(channel: Any, *names: str) -> str:
-    """Value of the first of some properties that the channel has."""
+def _property_text(channel: Any, *names: str) -> str:
+    """Value of the first of the named properties that a channel has, as text."""
     return next((str(channel.properties[name]).strip() for name in names if name in channel.properties), "")
 
 

@@ -1,4 +1,5 @@
-"""Measurement files written: groups of channels, checked beforehand, block by block; whole or not at all.
+"""Writers of measurement files: groups of channels, checked beforehand, written block by block; completely or not at
+all.
 
 CSV is read back to the last bit by ``models.measured.formats.csv``. ASAM MDF 4.10 is written by asammdf: one channel
 group per clock; it takes spaces away from the ends of the lines of a file's comment, all else comes back as it was
@@ -31,11 +32,11 @@ from models.measured.formats.mdf4 import suppressed_output
 from models.measured.formats.rpc3 import HEADER_BLOCK, KEY_LENGTH, RECORD_LENGTH
 
 POINTS_PER_GROUP = 2048
-"""Samples of a group of RPC III, which is also a frame."""
+"""Number of samples of an RPC III group, which is also a frame."""
 LONGEST_VALUE = RECORD_LENGTH - KEY_LENGTH - 1
-"""Bytes of a value of RPC III before the zero that ends it."""
+"""Longest value (bytes) of an RPC III parameter before the zero that ends it."""
 MOST_PARAMETERS = 1024
-"""Parameters of a header of RPC III."""
+"""Most parameters of an RPC III header."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,8 @@ class ChannelGroup:
     blocks: Iterable[np.ndarray]
 
     def rows(self, path: Path) -> Iterator[tuple[int, np.ndarray]]:
-        """First sample and values of every block; InputError where a value is infinite, ValueError for wrong shapes."""
+        """Index of the first sample and values (n, channels) of every block; InputError where a value is infinite,
+        ValueError for wrong shapes."""
         first = 0
         for block in self.blocks:
             values = np.asarray(block, float)
@@ -70,8 +72,9 @@ class ChannelGroup:
             raise ValueError(f"{first} samples instead of {self.count}")
 
 
-def check(path: Path, groups: Sequence[ChannelGroup], start: datetime | None) -> None:
-    """Refuse channels that a reader could not tell apart or a header could not hold, and a start without its zone."""
+def check_groups(path: Path, groups: Sequence[ChannelGroup], start: datetime | None) -> None:
+    """Raise InputError for channels that a reader could not tell apart or a header could not hold, and for a start
+    without time zone."""
     names = [name for group in groups for name in group.names]
     for name in names:
         if not name.strip() or name != name.strip() or not name.isprintable():
@@ -128,7 +131,7 @@ def new_file(path: Path) -> Iterator[Path]:
 def write_csv(
     path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
 ) -> None:
-    """Write the header to the file ``temporary``, then rows of shortest numbers, block by block."""
+    """Write a CSV file, as the file ``temporary``: header, then rows of shortest numbers, block by block."""
     group = _only_group(path, groups, "CSV")
     for name, unit in zip(group.names, group.units, strict=True):
         if is_clock(name):
@@ -161,7 +164,7 @@ def _csv_header(group: ChannelGroup, start: datetime | None, comment: str) -> st
 def write_mdf(
     path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
 ) -> None:
-    """Append the blocks to a second temporary file, then save it as the complete file ``temporary``."""
+    """Write an MDF file, as the file ``temporary``: blocks are first appended to a second temporary file."""
     try:
         from asammdf import MDF
     except ImportError:
@@ -200,7 +203,7 @@ def _append_block(mdf: Any, index: int, group: ChannelGroup, times: np.ndarray, 
 def write_tdms(
     path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
 ) -> None:
-    """Write the groups one after the other, with one segment per block."""
+    """Write a TDMS file, as the file ``temporary``: one group after the other, with one segment per block."""
     try:
         from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
     except ImportError:
@@ -234,7 +237,8 @@ def write_tdms(
 def write_rpc(
     path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
 ) -> None:
-    """Write the header, groups of samples, and the header again with the limits of every channel."""
+    """Write an RPC III file, as the file ``temporary``: header, groups of samples, and the header again with the limits
+    of every channel."""
     group = _only_group(path, groups, "RPC III")
     limits = np.tile([[np.inf], [-np.inf]], len(group.names))
     with temporary.open("wb") as file:
@@ -303,7 +307,7 @@ def _rpc_header(path: Path, group: ChannelGroup, limits: np.ndarray, start: date
 
 
 def _header_record(path: Path, key: str, value: str) -> bytes:
-    """One header parameter as bytes."""
+    """One RPC III header parameter as bytes."""
     try:
         text = value.encode("latin-1")
     except UnicodeEncodeError as error:
@@ -315,7 +319,7 @@ def _header_record(path: Path, key: str, value: str) -> bytes:
 
 
 def _spread_long_text(name: str, text: str) -> dict[str, object]:
-    """Spread a text over several parameters, with line ends written as ``\\n``."""
+    """A text spread over several header parameters, with line ends written as ``\\n``."""
     plain = text.replace("\\", "\\\\").replace("\n", "\\n")
     return {
         f"{name}_{i // LONGEST_VALUE + 1}": plain[i : i + LONGEST_VALUE] for i in range(0, len(plain), LONGEST_VALUE)
@@ -328,4 +332,4 @@ WRITER_OF_EXTENSION: dict[str, Callable[[Path, Path, Sequence[ChannelGroup], dat
     ".rsp": write_rpc,
     ".tdms": write_tdms,
 }
-"""By extension: write groups to a part file, whose name the path will be, with the start and the file's comment."""
+"""Writer of each extension: function of path, temporary file, groups, start and the file's comment."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from models.core.runge_kutta import step_on
+from models.core.runge_kutta import runge_kutta_step
 
 Acceleration = Callable[[float, np.ndarray, np.ndarray], np.ndarray]
 """Accelerations (n,) at a time (s), positions and rates (n,)."""
@@ -22,7 +22,7 @@ def march(acceleration: Acceleration, q: np.ndarray, v: np.ndarray, steps: int, 
 
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for i in range(steps):
-            states[i + 1] = step_on(rate, i * step, states[i], step)
+            states[i + 1] = runge_kutta_step(rate, i * step, states[i], step)
             if not np.isfinite(states[i + 1]).all():
                 states[i + 1 :] = np.nan
                 break

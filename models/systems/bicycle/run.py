@@ -9,7 +9,7 @@ from models.bicycle.four_bodies import FALLEN_LEAN, LEAN, STEER, YAW, Ride, Y, s
 from models.bicycle.ideal_rolling import IdealBicycle
 from models.bicycle.rolling_tyres import RollingBicycle
 from models.core.assumptions import Assumption, with_assumptions
-from models.core.discretisation import Series, by_steps, not_estimated, with_stated_errors
+from models.core.discretisation import Series, not_estimated, step_errors, with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.engines.assembly import Settings
@@ -143,7 +143,7 @@ def _with_step_error(run: Result, scene: BicycleScene) -> Result:
         steps = max(steps, 2 * stride)
         return series(ride_on_tyres(scene, engine, step, steps * step, stride))
 
-    estimates, method_text = by_steps(series(ride), rerun, 4.0, scene.run.step)
+    estimates, method_text = step_errors(series(ride), rerun, 4.0, scene.run.step)
     return with_stated_errors(run, estimates, method_text)
 
 

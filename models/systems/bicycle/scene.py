@@ -10,9 +10,9 @@ from pydantic import Field
 from models.bicycle.rolling_tyres import UNCHANGED_TYRE, BicycleTyre, RollingBicycle
 from models.bicycle.whipple import HIGHEST_SPEED, Control, Whipple, load_bicycle
 from models.core.errors import InputError
-from models.core.scene_effects import extended_by_effects, with_own
+from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
-from models.core.steps import MOST_STEPS, divides, fitting
+from models.core.steps import MOST_STEPS, divides, dividing_step
 from models.core.strict import Strict, quantity
 
 FASTEST_LEAN = 3.0
@@ -81,6 +81,8 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Bi
     if run.duration / run.step > MOST_STEPS:
         raise InputError(file, "run.duration", run.duration, f"needs more than {MOST_STEPS:,} steps")
     if not divides(run.step, run.duration):
-        allowed = f"must divide run.duration = {run.duration:g} s; use for example {fitting(run.step, run.duration)}"
+        allowed = (
+            f"must divide run.duration = {run.duration:g} s; use for example {dividing_step(run.step, run.duration)}"
+        )
         raise InputError(file, "run.step", run.step, allowed)
-    return with_own(scene)
+    return with_effect_tables(scene)

@@ -20,7 +20,7 @@ from models.core.discretisation import (
     Estimate,
     estimate_rescaled,
     not_estimated,
-    size_of,
+    reference_size,
     with_stated_errors,
 )
 from models.core.errors import InputError, RunFailed
@@ -123,7 +123,7 @@ def same_commands(path: BrakingPath, other_path: BrakingPath) -> bool:
     EQUAL_PRESSURE_SHARE.
     """
     pressures = _columns_at(path.times, other_path, other_path.pressures)
-    return _rms(pressures - path.pressures) <= EQUAL_PRESSURE_SHARE * size_of(path.pressures)
+    return _rms(pressures - path.pressures) <= EQUAL_PRESSURE_SHARE * reference_size(path.pressures)
 
 
 def other_command_nearby(path: BrakingPath, longer: BrakingPath, repeats: OtherRuns) -> bool:
@@ -140,7 +140,7 @@ def other_command_nearby(path: BrakingPath, longer: BrakingPath, repeats: OtherR
     )
     if plain_commands.dtype.kind == "i":
         return not np.array_equal(plain_commands, shifted_commands)
-    return _rms(plain_commands - shifted_commands) > EQUAL_PRESSURE_SHARE * size_of(plain_commands)
+    return _rms(plain_commands - shifted_commands) > EQUAL_PRESSURE_SHARE * reference_size(plain_commands)
 
 
 def motion_channels(path: BrakingPath, times: np.ndarray) -> Channels:
@@ -236,7 +236,7 @@ def _size_of_channel(name: str, values: np.ndarray, share: float = 1.0) -> float
     """Size of a channel by which its error is divided, at least LEAST_SIZES; ``share`` reduces LEAST_SIZES for a part
     of a run.
     """
-    return max(size_of(values), share * LEAST_SIZES.get(name, 0.0))
+    return max(reference_size(values), share * LEAST_SIZES.get(name, 0.0))
 
 
 def _estimate_of_channel(name: str, values: np.ndarray, error: float, order: float, step: float) -> Estimate:

@@ -59,7 +59,7 @@ class BrakedVehicle:
     """A vehicle on a road with brakes, ready to run.
 
     kind (W,) : which tyre each wheel has; steer (W,) : rad, or in its place steering : such angles by time (s), those
-    in the middle of each sample; engine : ``models.engines.braking.CarriedChassis`` if an engine is to carry the
+    in the middle of each sample; engine : ``models.engines.braking.EngineChassis`` if an engine is to carry the
     chassis.
     sprung : ``models.brake.sprung.Sprung`` of a vehicle on its suspension, which its engine then marches.
     """

@@ -116,12 +116,12 @@ def sprung_of(scene: BrakingScene) -> Any:
 def on_springs(engine: str, vehicle: Any) -> Any:
     """A vehicle on its suspension in an engine, or by the independent reference."""
     if engine == "reference":
-        from models.engines.braking_sprung_plain import PlainOnSprings
+        from models.engines.braking_sprung_plain import PlainSprungVehicle
 
-        return PlainOnSprings(vehicle)
-    from models.engines.braking_sprung import OnSprings
+        return PlainSprungVehicle(vehicle)
+    from models.engines.braking_sprung import EngineSprungVehicle
 
-    return OnSprings(engine, vehicle)
+    return EngineSprungVehicle(engine, vehicle)
 
 
 def vehicle_of(scene: BrakingScene) -> Truck:

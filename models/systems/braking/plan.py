@@ -137,10 +137,10 @@ def _native_and_other_forces(scene: BrakingScene) -> list[tuple[str, str]]:
     share, and those that the reference computes independently.
     """
     from models.engines.free_vehicle import ENGINES, native_share
-    from models.engines.towed_springs import divided
+    from models.engines.towed_springs import towed_division
 
     handling = sprung_of(scene).handling
-    divisions = {engine: divided(handling, engine) for engine in ENGINES}
+    divisions = {engine: towed_division(handling, engine) for engine in ENGINES}
     reasons_beside = [
         (engine, *name_and_reason)
         for engine, division in divisions.items()

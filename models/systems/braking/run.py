@@ -51,9 +51,9 @@ def marched_by(vehicle: BrakedVehicle, engine: str) -> BrakedVehicle:
         return replace(vehicle, engine=on_springs(engine, vehicle.sprung))
     if engine == "reference":
         return vehicle
-    from models.engines.braking import CarriedChassis
+    from models.engines.braking import EngineChassis
 
-    return replace(vehicle, engine=CarriedChassis(engine, vehicle.plane))
+    return replace(vehicle, engine=EngineChassis(engine, vehicle.plane))
 
 
 def _other_runs(scene: BrakingScene, name: str, vehicle: BrakedVehicle, start: StartState, engine: str) -> OtherRuns:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.discretisation import Estimate, by_chance
+from models.core.discretisation import Estimate, sampling_error
 from models.core.errors import RunFailed
 from models.core.noise import SPEED, normal_samples
 from models.ensemble.runner import PathFailed
@@ -96,7 +96,9 @@ def statistical_errors(scatters: Mapping[str, Scatter]) -> dict[str, Estimate]:
     """
     units = {key: label.partition("[")[2][:-1] for key, label in KEPT_QUANTITIES.items()}
     return {
-        key: by_chance(scatter.error, max(abs(scatter.mean), COURSE_SIZES.get(key, 0.0)), units[key], scatter.count)
+        key: sampling_error(
+            scatter.error, max(abs(scatter.mean), COURSE_SIZES.get(key, 0.0)), units[key], scatter.count
+        )
         for key, scatter in scatters.items()
         if key in units
     }

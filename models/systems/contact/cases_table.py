@@ -30,7 +30,7 @@ from models.contact.inputs import Array
 from models.core.errors import InputError
 from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES, RowBlock, table_blocks
 from models.core.whole_files import whole_file
-from models.ensemble.runner import in_order
+from models.ensemble.runner import values_in_order
 from models.ensemble.store import Arrays, Store
 from models.systems.contact.scene import Method
 
@@ -95,7 +95,7 @@ def answer_table(
             else tuple(head for head in ANSWER_HEADINGS if head not in ANSWER_HEADINGS[ERROR_COLUMNS])
         )
         file.write(",".join(heads) + "\n")
-        for block, answers in in_order(solve, chain(first, reading), executor, store, BLOCKS_IN_ADVANCE):
+        for block, answers in values_in_order(solve, chain(first, reading), executor, store, BLOCKS_IN_ADVANCE):
             wrong = dict(zip(answers["wrong"].tolist(), answers["why"].tolist(), strict=True))
             rows = enumerate(zip(block.lines, answers["forces"].tolist(), strict=True))
             file.writelines(_line(line, row, wrong.get(i)) for i, (line, row) in rows)

@@ -37,7 +37,7 @@ from models.core.result import Channel, Result, result
 from models.core.scene_effects import extended_by_effects
 from models.core.tables import ROWS_PER_BLOCK as TABLE_BLOCK
 from models.ensemble.store import Store, named_files
-from models.ensemble.workers import Crew, places_of
+from models.ensemble.workers import Crew, folders_for_workers
 from models.systems.contact.assumptions import assumptions
 from models.systems.contact.assumptions import table_assumptions as assumptions_of_rows
 from models.systems.contact.cases_table import answer_table, column_sizes, compile_first, kept_rows
@@ -212,7 +212,10 @@ def _answered(scene: ContactScene, answers_path: Path, built: Any, progress: Pro
         return answer_table(file, answers_path, built, scene.method, count, errors=error)
     store = Store(answers_path.parent / BLOCKS_FOLDER)
     facts = {"scene": scene.table(), "error": error, "files": named_files(scene.table(), Path(scene.folder))}
-    with store.reserved_folder(facts), Crew.of(scene).at_work(rows // TABLE_BLOCK + 1, *places_of(scene)) as pool:
+    with (
+        store.reserved_folder(facts),
+        Crew.of(scene).at_work(rows // TABLE_BLOCK + 1, *folders_for_workers(scene)) as pool,
+    ):
         return answer_table(file, answers_path, built, scene.method, count, errors=error, executor=pool, store=store)
 
 

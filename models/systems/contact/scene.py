@@ -12,7 +12,7 @@ from pydantic import Field
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN
 from models.contact.material import STEEL, Falling, Material, MaterialPair
 from models.core.errors import InputError
-from models.core.scene_effects import check, with_own
+from models.core.scene_effects import check, with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
 
@@ -197,7 +197,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Co
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(ContactScene, table, file, folder)
     _refuse_places(scene, _geometry_refusals, _contact_refusals, _size_refusals, _sweep_refusals, _method)
-    complete = with_own(scene)
+    complete = with_effect_tables(scene)
     check(complete)
     _refuse_places(scene, _friction)
     return complete

@@ -6,7 +6,14 @@ import numpy as np
 
 from models.contact.accuracy import Error
 from models.contact.theories import LinearTheory, RollingContact
-from models.core.discretisation import Estimate, by_cells, finite_rms, not_estimated, of_theory, with_stated_errors
+from models.core.discretisation import (
+    Estimate,
+    finite_rms,
+    grid_error,
+    not_estimated,
+    with_stated_errors,
+    with_theory_error,
+)
 from models.core.result import Result
 from models.systems.contact.scene import ContactScene
 
@@ -26,14 +33,14 @@ def with_error(run: Result, scene: ContactScene, body: RollingContact, errors: S
     likely = {"force": [e.likely for e in errors], "mz": [e.moment_likely for e in errors]}
     cells, order = scene.method.cells, min(body.order, 1.5)
     estimates = {
-        name: by_cells(finite_rms(np.array(likely[name])), *sizes[name], cells, order, MOST_CELLS) for name in likely
+        name: grid_error(finite_rms(np.array(likely[name])), *sizes[name], cells, order, MOST_CELLS) for name in likely
     }
     if isinstance(body, LinearTheory):
         not_estimated(run, "the linear theory has no cells")
     else:
         with_stated_errors(run, estimates, HALVED_CELLS)
     theory = finite_rms(run["error_of_theory"])
-    return of_theory(run, {"force": _of_theory(theory, force)}, BAND_TEXT) if theory > 0.0 else run
+    return with_theory_error(run, {"force": _of_theory(theory, force)}, BAND_TEXT) if theory > 0.0 else run
 
 
 def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
@@ -44,10 +51,10 @@ def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
     cells, order = scene.method.cells, min(scene.method.order, 1.5)
     with_stated_errors(
         table,
-        {"force": by_cells(finite_rms(table["error_of_cells"]), force, "N", cells, order, MOST_CELLS)},
+        {"force": grid_error(finite_rms(table["error_of_cells"]), force, "N", cells, order, MOST_CELLS)},
         HALVED_CELLS,
     )
-    return of_theory(table, {"force": _of_theory(finite_rms(table["error_of_theory"]), force)}, BAND_TEXT)
+    return with_theory_error(table, {"force": _of_theory(finite_rms(table["error_of_theory"]), force)}, BAND_TEXT)
 
 
 def _of_theory(error: float, force: float) -> Estimate:

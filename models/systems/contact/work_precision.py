@@ -20,7 +20,7 @@ from models.contact.linear_theory import coefficients
 from models.contact.material import MaterialPair
 from models.contact.theories import ExactOnEllipse, LinearTheory, Motion, OnEllipse, Simplified
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import by_cells, finite_rms, with_stated_errors
+from models.core.discretisation import finite_rms, grid_error, with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.machine.seconds import cost
@@ -291,7 +291,7 @@ def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], pro
     }
     price = result(scene, channels, {}, a=float(hertz.a), b=float(hertz.b), detail=points)
     with_assumptions(price, of_pressing(scene, cases[0].contact(ExactOnEllipse)))
-    left = by_cells(finite_rms(price["uncertainty"]), 1.0, "mu N", max(EXACT_GRID_CELLS), 1.0, MOST_CELLS)
+    left = grid_error(finite_rms(price["uncertainty"]), 1.0, "mu N", max(EXACT_GRID_CELLS), 1.0, MOST_CELLS)
     return with_stated_errors(price, {"exact force": left}, "three grids of the exact theory")
 
 

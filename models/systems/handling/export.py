@@ -1,6 +1,6 @@
 """The vehicle of a scene of handling as a file of its engine: bodies and joints."""
 
-from models.engines.export import Exported, ExportSubject, export_free_vehicle, parts_left_out
+from models.engines.export import Exported, ExportSubject, elements_left_out, export_free_vehicle
 from models.multibody.numbers import Handling
 from models.systems.handling.run import driven_by
 from models.systems.handling.scene import HandlingScene
@@ -22,5 +22,5 @@ def of_handling(
     """Export a vehicle of the handling system; ``further_omissions`` lists what the model leaves out besides the
     vehicle's own parts.
     """
-    left_out = [*parts_left_out(handling.vehicle), *further_omissions]
+    left_out = [*elements_left_out(handling.vehicle), *further_omissions]
     return export_free_vehicle(engine, driven_by(handling), export_subject, left_out)

@@ -5,7 +5,7 @@ from models.core.finding import Finding
 from models.core.scene_effects import effect_lines as effect_lines
 from models.engines.error_control import plan_lines
 from models.engines.free_vehicle import ENGINES, native_share
-from models.engines.towed_springs import divided
+from models.engines.towed_springs import towed_division
 from models.multibody.numbers import Handling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import CONTROL_LIMITS, HandlingScene
@@ -61,7 +61,7 @@ def _native_shares(handling: Handling) -> list[tuple[str, str]]:
     """Lines, head and text, on the springs that each engine computes by native elements, and on why it does not compute
     the others.
     """
-    divisions = {engine: divided(handling, engine) for engine in ENGINES}
+    divisions = {engine: towed_division(handling, engine) for engine in ENGINES}
     native = {engine: division.native for engine, division in divisions.items()}
     reasons = [
         ("shared", f"{engine}: {name}: {why}")

@@ -13,10 +13,10 @@ from models.core.assumptions import with_assumptions
 from models.core.discretisation import (
     Estimate,
     Series,
-    by_cells,
-    by_steps,
+    grid_error,
     not_estimated,
-    size_of,
+    reference_size,
+    step_errors,
     summed_error,
     with_stated_errors,
 )
@@ -28,7 +28,7 @@ from models.engines.assembly import Settings
 from models.engines.error_control import NO_ESTIMATE
 from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
 from models.engines.native_parts import joint_parts
-from models.engines.towed_springs import divided, numbers_beside
+from models.engines.towed_springs import shared_numbers, towed_division
 from models.multibody import forces as at
 from models.multibody.numbers import Control, Handling
 from models.systems.handling.assumptions import assumptions
@@ -196,7 +196,7 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
         for name, values in fine.channels.items()
         if np.abs(values).max() > still.get(UNIT_OF_CHANNEL[name], STANDSTILL_SHARE * speed)
     }
-    by_step, method_text = by_steps(Series(fine.times, moving), rerun, TOLD_ORDERS, rerun.step)
+    by_step, method_text = step_errors(Series(fine.times, moving), rerun, TOLD_ORDERS, rerun.step)
     by_net = rerun.by_cells(list(moving))
     estimates = {
         name: replace(summed_error(by_step[name], by_net[name]), unit=UNIT_OF_CHANNEL[name]) for name in moving
@@ -268,7 +268,7 @@ class ManoeuvreRerun:
         for name in names:
             values = base.channels[name]
             gap = share * float(np.sqrt(np.mean((values - coarse.channels[name]) ** 2)))
-            net = by_cells(gap, size_of(values), UNIT_OF_CHANNEL[name], cells, NET_ORDER, MOST_CELLS)
+            net = grid_error(gap, reference_size(values), UNIT_OF_CHANNEL[name], cells, NET_ORDER, MOST_CELLS)
             estimates[name] = replace(net, of=CELLS_KEY)
         return estimates
 
@@ -314,9 +314,9 @@ def build(engine: str, handling: Handling, settings: Settings | None = None) -> 
     """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : needed for runs."""
     if engine == REFERENCE:
         return Plain(engine, _plain_equations(handling).acceleration, len(handling.vehicle.coordinates()), settings)
-    division, full_forces = divided(handling, engine), driven_by(handling)
+    division, full_forces = towed_division(handling, engine), driven_by(handling)
     parts = (*full_forces.parts, *division.native)
-    return free_model(engine, replace(full_forces, numbers=numbers_beside(handling, division), parts=parts), settings)
+    return free_model(engine, replace(full_forces, numbers=shared_numbers(handling, division), parts=parts), settings)
 
 
 def _plain_equations(handling: Handling) -> "PlainRolling":

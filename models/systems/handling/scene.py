@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import Field, PrivateAttr
 
 from models.core.errors import InputError
-from models.core.scene_effects import extended_by_effects, with_own
+from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
-from models.core.steps import MOST_STEPS, divides, fitting
+from models.core.steps import MOST_STEPS, divides, dividing_step
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.engines.assembly import Settings
 from models.engines.error_control import Adaptive, check_engines
@@ -191,7 +191,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
         for control, limits in CONTROL_LIMITS.items():
             _check_knots(scene, f"{key_path}.{control}", getattr(manoeuvre, control), *limits)
     check_engines(scene.file, scene.engines)
-    return with_own(scene)
+    return with_effect_tables(scene)
 
 
 def _with_measured(scene: HandlingScene) -> HandlingScene:
@@ -232,7 +232,7 @@ def _check_times(scene: HandlingScene, key_path: str, manoeuvre: Manoeuvre) -> N
         allowed = f"needs {duration / step:.3g} steps; at most {MOST_STEPS:,} are possible"
         raise InputError(scene.file, f"{key_path}.duration", duration, allowed)
     if not divides(step, duration):
-        allowed = f"must divide {key_path}.duration = {duration:g} s; use for example {fitting(step, duration)}"
+        allowed = f"must divide {key_path}.duration = {duration:g} s; use for example {dividing_step(step, duration)}"
         raise InputError(scene.file, "run.step", step, allowed)
 
 

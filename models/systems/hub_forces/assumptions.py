@@ -6,7 +6,7 @@ import numpy as np
 
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
-from models.engines.cut_vehicle import UPRIGHT
+from models.engines.cut_vehicle import TUMBLED_PITCH
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.measurement import Angles, element_travels
 from models.systems.hub_forces.scene import HubScene, Road
@@ -121,8 +121,8 @@ def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles
             "name the effect kalman_filter or prescribed_angles, or end the run before",
             lambda run: {name: run[name] for name in ("roll", "pitch")},
             "rad",
-            -UPRIGHT,
-            UPRIGHT,
+            -TUMBLED_PITCH,
+            TUMBLED_PITCH,
         )
     ]
     if method == "none" and scene.forces.frame == "inertial":

@@ -6,7 +6,7 @@ import numpy as np
 
 from models.core.noise import FORCES, PITCH_SENSOR, normal_samples
 from models.core.signals import Interpolation, signal_from_samples
-from models.engines.cut_vehicle import HubModel, HubRun, build, reported
+from models.engines.cut_vehicle import HubModel, HubRun, build, run_with_forces
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs, table
 from models.road.profile import RoadProfile
@@ -80,7 +80,7 @@ def element_travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
     gauges = tuple(element.gauge() for element in vehicle.elements)
     still = HubInputs(np.zeros((2 * len(run.times) - 1, WRENCH * len(vehicle.hubs))))
     gauged = replace(vehicle, elements=gauges)
-    values = reported(gauged, table(gauged, still, float(run.times[1])), run.times, run.states).elements
+    values = run_with_forces(gauged, table(gauged, still, float(run.times[1])), run.times, run.states).elements
     return {element.name: column for element, column in zip(vehicle.elements, values.T, strict=True)}
 
 

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import Estimate, Series, by_steps, not_estimated, summed_error, with_stated_errors
+from models.core.discretisation import Estimate, Series, not_estimated, step_errors, summed_error, with_stated_errors
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.signals import Smooth
 from models.core.smoothing import low_passed
 from models.core.steps import divides
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import HubModel, HubRun, Route, build
+from models.engines.cut_vehicle import ForceRoute, HubModel, HubRun, build
 from models.engines.error_control import NO_ESTIMATE
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
@@ -129,7 +129,7 @@ def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
 
 
 def on_road(
-    vehicle: CutVehicle, road: Road, frame: Frame, march_choice: tuple[str, Settings, Route], error: bool = False
+    vehicle: CutVehicle, road: Road, frame: Frame, march_choice: tuple[str, Settings, ForceRoute], error: bool = False
 ) -> tuple[HubRun, dict[str, Estimate]]:
     """Run the vehicle on its tyres over a road. Returns the run, with hub forces in a frame, and its errors if they are
     requested.
@@ -153,7 +153,7 @@ def errors_of_steps(
     run: HubRun,
     hub_inputs: Callable[[float, int], HubInputs],
     sample_period: float = 0.0,
-    forces: Route = "compiled",
+    forces: ForceRoute = "compiled",
 ) -> tuple[dict[str, Estimate], str]:
     """Estimated errors of the channels that ``principal_series`` lists, by name, and the method of the estimate.
 
@@ -182,7 +182,7 @@ def errors_of_steps(
     fine, units = principal_series(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
     units |= {element.name: element.unit for element in vehicle.elements}
     order = LIFTING_ORDER if vehicle.uncut.lifts else TOLD_ORDERS
-    estimates, method_text = by_steps(
+    estimates, method_text = step_errors(
         fine._replace(channels=_moving_channels(fine.channels, units)), rerun, order, step
     )
     return {

@@ -8,15 +8,15 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.scene_effects import extended_by_effects, with_own
+from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.signals import Interpolation
-from models.core.steps import divides, fitting
+from models.core.steps import divides, dividing_step
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
-from models.core.time_series import CHASSIS_SAMPLE_TIME, other_unit, read_time_series
+from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, wrong_time_unit_hint
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import FIXED, Route
+from models.engines.cut_vehicle import FIXED_STEP_METHOD, ForceRoute
 from models.engines.error_control import Adaptive, check_engines
 from models.own_model.scene_vehicle import scene_vehicle
 from models.systems.hub_forces.measurement import Angles, HubForces
@@ -59,7 +59,7 @@ class Run(Strict):
     step: float = quantity(
         "s", "of Runge-Kutta 4 in every engine, or from row to row and the longest of [engines.NAME]", default=1e-3
     )
-    forces: Route = Field(
+    forces: ForceRoute = Field(
         default="native", description="springs, mounts and bars of the engine's own, or all in its one callback"
     )
 
@@ -136,10 +136,10 @@ class HubScene(SceneFile):
         """Settings of an engine's march: Runge-Kutta 4, or an integrator that picks its own steps."""
         step, duration, adaptive = self.run.step, self.run.duration, self.engines.get(engine)
         if adaptive is None:
-            return Settings(FIXED, step, duration)
+            return Settings(FIXED_STEP_METHOD, step, duration)
         return Settings(adaptive.integrator, step, duration, adaptive.tolerance)
 
-    def forces_with(self, method: Method) -> Route:
+    def forces_with(self, method: Method) -> ForceRoute:
         """Route by which a run computes spring forces. Enforced roll and pitch need compiled forces, whatever the scene
         says.
         """
@@ -177,7 +177,7 @@ class HubScene(SceneFile):
             )
         last_time = period * (min(len(forces), len(angles)) - 1)
         if last_time < self.run.duration * (1 - 1e-9):
-            allowed = f"the files end at {last_time:g} s{other_unit(last_time, self.run.duration)}"
+            allowed = f"the files end at {last_time:g} s{wrong_time_unit_hint(last_time, self.run.duration)}"
             raise InputError(self.file, "run.duration", self.run.duration, allowed)
         if self.forces.interpolation == "held" and not divides(self.run.step, period):
             allowed = f"must divide the period of {period:g} s over which samples are held"
@@ -203,7 +203,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
         raise InputError(file, "run.forces", scene.run.forces, allowed)
     _check_steps(file, scene)
     check_engines(file, scene.engines)
-    return with_own(scene)
+    return with_effect_tables(scene)
 
 
 def _check_file_only(file: str, scene: HubScene) -> None:
@@ -217,7 +217,7 @@ def _check_file_only(file: str, scene: HubScene) -> None:
 def _check_steps(file: str, scene: HubScene) -> None:
     step, duration = scene.run.step, scene.run.duration
     if not divides(step, duration):
-        allowed = f"must divide run.duration = {duration:g} s, as {fitting(step, duration)} s does"
+        allowed = f"must divide run.duration = {duration:g} s, as {dividing_step(step, duration)} s does"
         raise InputError(file, "run.step", step, allowed)
     period = 1.0 / scene.forces.sampling_rate
     if scene.road is not None and not (divides(step, period) and divides(period, duration)):

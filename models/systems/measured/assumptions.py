@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.core.assumptions import Assumption, Watched
-from models.engines.cut_vehicle import UPRIGHT
+from models.engines.cut_vehicle import TUMBLED_PITCH
 from models.measured.checks.clipped import clipping_extremes
 from models.systems.hub_forces.assumptions import (
     LARGEST_IMBALANCE,
@@ -84,7 +84,7 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examinati
         else 'use stabilise.method = "kalman" or "prescribed", or end the run before by clock.duration'
     )
     says = "the filter takes angles for turns about the body's axes" if filtered else "the vehicle stays upright"
-    most = SMALL_ANGLE if filtered else UPRIGHT
+    most = SMALL_ANGLE if filtered else TUMBLED_PITCH
     listed = [
         Assumption("small tilt" if filtered else "upright", says, remedy, lambda run: tilt(), "rad", -most, most),
         Assumption(

@@ -21,7 +21,7 @@ from models.core.scene_effects import extended_by_effects
 from models.core.whole_files import write_whole
 from models.measured.channel import SAMPLES_PER_BLOCK, Source
 from models.measured.columns import Columns
-from models.measured.gaps import without_absurd
+from models.measured.gaps import without_impossible_values
 from models.measured.recording import Progress, Recording, no_progress
 from models.measured.resampling import EQUAL_RATES, resample_to
 from models.measured.signal import Signal
@@ -121,7 +121,7 @@ def record_on_clock(
         noticed.append(Finding(**row | {key: tuple(row[key]) for key in ("signals", "times")}))
     began = start + timedelta(seconds=grid.start) if start else None
     comment = "\n".join(source.comment for source in sources if source.comment)
-    findings = [finding for source in sources for finding in source.noticed]
+    findings = [finding for source in sources for finding in source.findings]
     findings += [*noticed, _clock_finding(scene, groups, grid)]
     return extended_by_effects(Recording(tuple(signals), columns, grid.period, began, comment, tuple(findings)), scene)
 
@@ -300,7 +300,7 @@ def _write_unchanged(group: ClockGroup, grid: ClockGrid, columns: Columns, folde
             done = last
     put(grid.count, np.empty(0, np.int64), np.empty((0, len(names))))
     for signal in group.signals:
-        values, finding = without_absurd(signal, columns.read(signal.name), grid.times - grid.start)
+        values, finding = without_impossible_values(signal, columns.read(signal.name), grid.times - grid.start)
         if finding:
             columns.put((signal.name,), 0, values[:, None])
             absurd.append(finding)
@@ -318,7 +318,7 @@ def _write_resampled(group: ClockGroup, grid: ClockGrid, columns: Columns, folde
         raw.put(group.names, block.first, group.si(block.values))
     for signal in group.signals:
         values = raw.read(signal.channel)[slice(None) if clock.order is None else clock.order]
-        values, finding = without_absurd(signal, values, clock.times - grid.start)
+        values, finding = without_impossible_values(signal, values, clock.times - grid.start)
         absurd += [finding] if finding else []
         columns.put((signal.name,), 0, resample_to(clock.times, values, clock.period, grid.times)[:, None])
     raw.remove()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.discretisation import Estimate, estimate, estimate_rescaled, size_of, summed_error
+from models.core.discretisation import Estimate, estimate, estimate_rescaled, reference_size, summed_error
 from models.systems.hub_forces.run import LEAST_CHANGE_SHARE, TOLD_ORDERS
 from models.systems.measured.consequences import samples_as_recording
 from models.systems.measured.section_run import SectionOutcome, SectionRun
@@ -43,7 +43,7 @@ def errors_of_steps(
         scaled = replace(
             error, error=error.error * 2.0**error.order, unit="rad" if not element else _unit(job, element)
         )
-        errors[name] = estimate_rescaled(scaled, size_of(outcome.samples(name)), grid.step)
+        errors[name] = estimate_rescaled(scaled, reference_size(outcome.samples(name)), grid.step)
         if element in earlier_errors:
             errors[name] = summed_error(errors[name], earlier_errors[element])
     shutil.rmtree(folder, ignore_errors=True)

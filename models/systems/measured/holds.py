@@ -3,7 +3,7 @@ noise."""
 
 import numpy as np
 
-from models.measured.checks.spectra import noise
+from models.measured.checks.spectra import white_noise
 from models.measured.recording import Recording
 from models.measured.signal import Quantity
 from models.systems.measured.scene import Deviations, MeasuredScene
@@ -17,7 +17,7 @@ QUANTITY_OF_NOISE_KEY: dict[str, Quantity] = {
     "angle": "angle",
     "rate": "angular rate",
 }
-"""Keys of the scene's table ``noise``, and the quantities that they are of."""
+"""Keys of the scene's table ``white_noise``, and the quantities that they are of."""
 
 
 def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHold]:
@@ -39,7 +39,7 @@ def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
     """
     deviations = dict[str, float]()
     for key, quantity in QUANTITY_OF_NOISE_KEY.items():
-        sizes = np.array([noise(recording, s) for s in recording.find(quantity) if not s.check])
+        sizes = np.array([white_noise(recording, s) for s in recording.find(quantity) if not s.check])
         known = sizes[np.isfinite(sizes)]  # none of a channel with too many gaps
         least = float(getattr(AttitudeHold, key))
         deviations[key] = getattr(stated, key) or max(least, float(np.median(known)) if len(known) else least)

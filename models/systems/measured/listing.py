@@ -172,7 +172,7 @@ def describe(path: Path) -> str:
         groups.setdefault(channel.group, []).append(channel.name)
     ranges = {name: text for names in groups.values() for name, text in _range_texts(source, names).items()}
     lines += [f"  {c.name:<{width}} {c.unit:<9}{ranges[c.name]}" for c in source.channels]
-    lines += [f"  {finding.weight}: {finding.text}" for finding in merged_findings(source.noticed)]
+    lines += [f"  {finding.weight}: {finding.text}" for finding in merged_findings(source.findings)]
     lines += ["", "A scene to begin with, its map guessed from names and units; check every line."]
     return "\n".join([*(f"# {line}".rstrip() for line in lines), "", scene_text(source)])
 

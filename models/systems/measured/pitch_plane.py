@@ -20,7 +20,7 @@ from models.core.time_series import write_time_series
 from models.drift import score
 from models.drift.score import Limits, Verdict, section_forces
 from models.measured import axle_forces
-from models.measured.axle_balance import FORCE_PLACES, axle_signals, axles
+from models.measured.axle_balance import FORCE_PLACES, axle_forces_of, axle_signals
 from models.measured.columns import Columns
 from models.measured.gaps import bridged_signals
 from models.measured.recording import Recording
@@ -143,8 +143,10 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
         "run": {"duration": job.recording.duration, "step": step},
     }
     scene = build(table, job.file, folder)
-    recorded = axles(job.recording, scene.vehicle_parameters())
-    errors = [each.text for each in axle_forces.check(recorded) if each.weight == "error"] if recorded else []
+    recorded = axle_forces_of(job.recording, scene.vehicle_parameters())
+    errors = (
+        [each.text for each in axle_forces.check_axle_forces(recorded) if each.weight == "error"] if recorded else []
+    )
     if errors:  # doubts are told by the checks of the recording
         raise InputError(job.file, "vehicle.parameters", job.parameters, " ".join(errors))
     return scene, tuple(said)

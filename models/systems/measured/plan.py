@@ -122,7 +122,7 @@ def _file_lines(scene: MeasuredScene, rig: Rig) -> list[str]:
             lines.append(
                 _line("", f"{s.channel:<24} {what} at {s.at}, axes {s.frame}, {sign}{s.factor:g} x [{s.unit}]{use}")
             )
-        lines += told_of(source.noticed)
+        lines += told_of(source.findings)
     return lines
 
 

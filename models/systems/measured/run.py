@@ -25,7 +25,7 @@ from models.drift.score import Verdict
 from models.fatigue.counting import CountedLoad, counted_load
 from models.measured.checks import findings_of_all_checks
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.spectra import noise
+from models.measured.checks.spectra import white_noise
 from models.measured.checks.weight import mean_hub_moments
 from models.measured.recording import Progress, Recording, no_progress
 from models.measured.signal import Signal
@@ -362,7 +362,7 @@ def _with_verdicts(examination: Examination) -> None:
             examination.scene.limits,
             examination.drift.passing_time(examination.drift.angle) or recording.duration,
             [compared for compared in comparisons if compared.signal.check],
-            {s.name: noise(recording, s) for s in recording.signals if s.check},
+            {s.name: white_noise(recording, s) for s in recording.signals if s.check},
         )
         if name == examination.chosen_run:
             examination.channel_comparisons = comparisons

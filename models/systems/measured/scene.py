@@ -8,7 +8,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.scene_effects import with_own
+from models.core.scene_effects import with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.drift.score import Limits
@@ -197,4 +197,4 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Me
     for i, name in enumerate(names):
         if name in names[:i]:
             raise InputError(file, f"files.{i}.file", name, "is named twice: put all its channels into one [[files]]")
-    return with_own(scene)
+    return with_effect_tables(scene)

@@ -19,7 +19,7 @@ import numpy as np
 from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
 from models.core.whole_files import write_whole
-from models.engines.cut_vehicle import UPRIGHT, HubModel, build, check_step
+from models.engines.cut_vehicle import TUMBLED_PITCH, HubModel, build, check_step
 from models.engines.protocol import SIZE_BOUND
 from models.machine.compiled import checksum
 from models.measured.columns import Columns
@@ -253,13 +253,13 @@ class _March:
         except RunFailed:
             states = self._march_until_failure(model)
         bounded_states = states[:, 4:]  # where it is and where it heads may be anything
-        toppled = np.abs(states[:, [ROLL, PITCH]]).max(axis=1) > UPRIGHT
+        toppled = np.abs(states[:, [ROLL, PITCH]]).max(axis=1) > TUMBLED_PITCH
         is_invalid = toppled | ~np.isfinite(states).all(axis=1) | (np.abs(bounded_states) > SIZE_BOUND).any(axis=1)
         if not is_invalid.any() and len(states) == steps + 1:
             return states, None
         first_invalid = int(np.argmax(is_invalid)) if is_invalid.any() else len(states)
         reason = (
-            f"the vehicle topples: roll or pitch beyond {UPRIGHT} rad"
+            f"the vehicle topples: roll or pitch beyond {TUMBLED_PITCH} rad"
             if first_invalid < len(states) and toppled[first_invalid]
             else "the state became infinite or not a number"
         )

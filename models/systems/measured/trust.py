@@ -21,7 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.engines.cut_vehicle import UPRIGHT
+from models.engines.cut_vehicle import TUMBLED_PITCH
 from models.multibody.cut_kernel import WRENCH
 from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, Trust
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, Rigid, rigid
@@ -83,7 +83,7 @@ class Drift:
     @property
     def angle(self) -> float:
         """Error (rad) of roll or pitch beyond which the section forces of a free run are not trusted."""
-        return UNTRUSTED_PITCH if self.frame == "inertial" else UPRIGHT
+        return UNTRUSTED_PITCH if self.frame == "inertial" else TUMBLED_PITCH
 
     @property
     def trusted_time(self) -> float:

@@ -19,8 +19,8 @@ from models.core.finding import Finding
 from models.drift import score
 from models.drift.score import (
     DOUBTFUL_INNOVATION_LIMIT,
-    Errors,
     Limits,
+    RunErrors,
     RunFigures,
     Verdict,
     low_pass,
@@ -292,7 +292,7 @@ def uncertainty(vehicle: CutVehicle, hold: AttitudeHold, period: float) -> float
     return 2.0 * math.sqrt(period * each)
 
 
-def errors_of_run(run: SectionOutcome, true: VirtualMeasurement, slope: float = WOEHLER_SLOPE) -> Errors:
+def errors_of_run(run: SectionOutcome, true: VirtualMeasurement, slope: float = WOEHLER_SLOPE) -> RunErrors:
     """Errors of a run relative to the true run, at the times of the run's answers: of section forces in springs, mounts
     and bars, and of angles.
     """
@@ -308,7 +308,7 @@ def errors_of_run(run: SectionOutcome, true: VirtualMeasurement, slope: float = 
         for name, i in (("roll", ROLL), ("pitch", PITCH), ("z", Z))
     )
     tilt = np.maximum(roll, pitch)
-    return Errors(damage, force, {}, float(tilt.max()), root_mean_square(tilt), float(height.max()))
+    return RunErrors(damage, force, {}, float(tilt.max()), root_mean_square(tilt), float(height.max()))
 
 
 def disagreement(compared_channel: ChannelComparison, noise: float = 0.0) -> float:

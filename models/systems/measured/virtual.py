@@ -11,15 +11,15 @@ from pydantic import Field
 
 from models.core.discretisation import Estimate
 from models.core.errors import InputError
-from models.core.steps import divides, fitting
+from models.core.steps import divides, dividing_step
 from models.core.strict import Strict, quantity
 from models.core.whole_files import write_whole
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import FIXED, HubRun
+from models.engines.cut_vehicle import FIXED_STEP_METHOD, HubRun
 from models.measured.channel import SAMPLES_PER_BLOCK
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults, measured_samples
-from models.measured.faults_of_measurement import check as check_faults
+from models.measured.faults_of_measurement import check_faults as check_faults
 from models.measured.formats import write
 from models.measured.formats.writing import ChannelGroup
 from models.measured.recording import Recording
@@ -111,7 +111,7 @@ def virtual_measurement(
         vehicle,
         virtual.road,
         virtual.frame,
-        (engine, Settings(FIXED, virtual.step, virtual.duration), "compiled"),
+        (engine, Settings(FIXED_STEP_METHOD, virtual.step, virtual.duration), "compiled"),
         error,
     )
     hubs = run.wrenches.reshape(len(run.times), -1)
@@ -129,7 +129,7 @@ def check(vehicle: CutVehicle, virtual: VirtualTable, file: str = "") -> tuple[S
     """
     period, divides_text = 1.0 / virtual.sampling_rate, f"divide virtual.duration = {virtual.duration:g} s"
     if not divides(virtual.step, virtual.duration):
-        allowed = f"must {divides_text}, as {fitting(virtual.step, virtual.duration)} s does"
+        allowed = f"must {divides_text}, as {dividing_step(virtual.step, virtual.duration)} s does"
         raise InputError(file, "virtual.step", virtual.step, allowed)
     if not (divides(virtual.step, period) and divides(period, virtual.duration)):
         allowed = f"its period must be a multiple of virtual.step = {virtual.step:g} s and {divides_text}"

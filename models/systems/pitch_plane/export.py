@@ -1,7 +1,7 @@
 """The pitch-plane vehicle as a file of its engine: bodies, struts, tyres and pitch springs, without what drives it."""
 
 from models.engines.assembly import Assembly, Settings
-from models.engines.export import Exported, ExportSubject, of_exudyn, of_mujoco
+from models.engines.export import Exported, ExportSubject, exported_exudyn_system, exported_mujoco_model
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 
 AXES = {
@@ -51,13 +51,15 @@ def _in_mujoco(assembly: Assembly, settings: Settings, export_subject: ExportSub
 
     spec = specification(assembly.vehicle, settings)
     add_shapes(spec, {body.name: body.mass for body in assembly.vehicle.bodies})
-    return of_mujoco(spec, spec.compile(), {}, export_subject, omissions)
+    return exported_mujoco_model(spec, spec.compile(), {}, export_subject, omissions)
 
 
 def _in_exudyn(assembly: Assembly, export_subject: ExportSubject, omissions: list[str]) -> Exported:
-    from models.engines.exudyn import columns, native
+    from models.engines.exudyn import coordinate_indices, native_elements
 
-    built, vehicle = native(assembly), assembly.vehicle
+    built, vehicle = native_elements(assembly), assembly.vehicle
     built.mbs.Assemble()
     names = [" ".join(coordinate) for coordinate in vehicle.coordinates()]
-    return of_exudyn(built.mbs, dict(zip(names, columns(built, vehicle), strict=True)), export_subject, omissions)
+    return exported_exudyn_system(
+        built.mbs, dict(zip(names, coordinate_indices(built, vehicle), strict=True)), export_subject, omissions
+    )

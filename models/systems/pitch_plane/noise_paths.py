@@ -197,7 +197,7 @@ class MujocoThreads(NoisePaths):
         """States (paths, steps + 1, 8) of all models, and whether MuJoCo warned of anything."""
         from mujoco import rollout
 
-        from models.engines.mujoco_march import warnings
+        from models.engines.mujoco_march import warning_text
         from models.engines.mujoco_quiet import installed, without_warnings
 
         start = np.concatenate(([0.0], self.base.initial))
@@ -213,7 +213,7 @@ class MujocoThreads(NoisePaths):
                 nstep=self.settings.steps,
             )
         states = np.concatenate((np.tile(self.base.initial, (len(models), 1, 1)), sensed[:, :, 1:9]), axis=1)
-        return states, any(warnings(model.data) for model in working)
+        return states, any(warning_text(model.data) for model in working)
 
     def facts(self) -> dict[str, Any]:
         """Facts that identify the job's saved blocks: those of ``NoisePaths``, and that threads computed them."""

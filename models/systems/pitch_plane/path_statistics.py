@@ -7,7 +7,7 @@ import numpy as np
 
 from models.ensemble.statistics import FAN_PERCENTILES
 from models.ensemble.store import Arrays
-from models.ensemble.streamed import Moments, Spread, StreamedCovariance, Tally
+from models.ensemble.streamed import MagnitudeQuantiles, StreamedCovariance, StreamedMoments, ValueCounts
 
 PITCH_STATE = 3
 """Place of the pitch among the states."""
@@ -23,7 +23,12 @@ class PathStatistics:
 
     def __init__(self, true_states: np.ndarray, saved_paths: int) -> None:
         self._true, self._saved, self._blocks = true_states, saved_paths, list[Arrays]()
-        self.moments, self.covariance, self._spread, self.drift_off = Moments(), StreamedCovariance(), Spread(), Tally()
+        self.moments, self.covariance, self._spread, self.drift_off = (
+            StreamedMoments(),
+            StreamedCovariance(),
+            MagnitudeQuantiles(),
+            ValueCounts(),
+        )
         self.lost, self.steepest = 0, np.full(len(true_states), np.nan)
 
     def add(self, block: Arrays) -> None:

@@ -27,7 +27,7 @@ from numba.extending import register_jitable
 
 from models.core.errors import RunFailed
 from models.engines.assembly import Assembly
-from models.engines.reference import compiled, march_of
+from models.engines.reference import compiled_closure, march_of
 from models.engines.stability import first_order, linearised
 
 KEPT_STATES = np.array([0, 1, 3, 4, 5, 7])
@@ -111,7 +111,7 @@ def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
         transition[6, 0], transition[6, 7] = x[6], 1.0
         return transition
 
-    return compiled(respond, ("pitch_step", drive_mode, geometry))
+    return compiled_closure(respond, ("pitch_step", drive_mode, geometry))
 
 
 PITCH, PITCH_RATE, INERTIA_SHARE, FILTER_STATES = 2, 5, 6, 7

@@ -9,7 +9,7 @@ from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build
-from models.engines.protocol import check as check_engine
+from models.engines.protocol import check_assembly as check_engine
 from models.systems.pitch_plane.assumptions import assumptions
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 from models.vehicles.pitch_plane import STATE_NAMES

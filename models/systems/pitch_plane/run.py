@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import FINE_WINDOW, Series, estimated, of_tolerance, size_of
+from models.core.discretisation import FINE_WINDOW, Series, reference_size, with_estimated_errors, with_tolerance_error
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Channels, Settings
-from models.engines.catalogue import CATALOGUE, OUTSIDE
+from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES
 from models.engines.model import Model
 from models.engines.protocol import build
 from models.systems.pitch_plane.assumptions import assumptions, principal_channels
@@ -46,7 +46,7 @@ def run(
     trajectory = model.run()
     seconds = time.perf_counter() - start
     channels, comparison_texts = output_channels(assembly, trajectory, model), dict[str, str]()
-    if engine in OUTSIDE:
+    if engine in OUTSIDE_CLASSES:
         from models.engines.outside import beside_reference
 
         comparison_texts["beside reference"] = beside_reference(engine, assembly, settings, trajectory)
@@ -95,12 +95,12 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
 
     if method.adaptive:
         looser = _with_longer_engine_step(rerun, replace(settings, tolerance=TOLERANCE_FACTOR * settings.tolerance))
-        return of_tolerance(run, fine, looser, TOLERANCE_FACTOR, settings.tolerance, sizes)
+        return with_tolerance_error(run, fine, looser, TOLERANCE_FACTOR, settings.tolerance, sizes)
 
     def longer(step_factor: float, share: float) -> Series:
         return rerun(_settings_of_longer_step(settings, step_factor, share))
 
-    return estimated(
+    return with_estimated_errors(
         run, fine, longer, method.order, settings.step, growth=_pitch_error_growth(assembly), channel_sizes=sizes
     )
 
@@ -125,9 +125,9 @@ def _enforced_sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
     """
     sizes = {}
     if "enforced_moment" in channels:
-        sizes["enforced_moment"] = size_of(channels["inertia_term"][2])
+        sizes["enforced_moment"] = reference_size(channels["inertia_term"][2])
     if "enforced_force" in channels:
-        sizes["enforced_force"] = size_of(channels["f3"][2] + channels["f4"][2])
+        sizes["enforced_force"] = reference_size(channels["f3"][2] + channels["f4"][2])
     return sizes
 
 

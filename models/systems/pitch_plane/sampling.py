@@ -12,7 +12,7 @@ from models.core.assumptions import Assumption
 from models.core.errors import InputError
 from models.core.noise import normal_samples
 from models.core.result import Result
-from models.core.steps import divides, fitting
+from models.core.steps import divides, dividing_step
 from models.core.time_series import write_time_series
 from models.engines.catalogue import CATALOGUE
 from models.systems.pitch_plane.assumptions import watch_function
@@ -34,7 +34,7 @@ def check_rate(scene: Scene, key_path: str, rate: float) -> None:
         if not divides(step, 1 / rate):
             allowed = (
                 f"its period {1 / rate:g} s must be a multiple of {engine}'s step {step:g} s; use a step of "
-                f"{fitting(step, 1 / rate)} s or another rate"
+                f"{dividing_step(step, 1 / rate)} s or another rate"
             )
             raise InputError(scene.file, key_path, rate, allowed)
 
@@ -43,9 +43,9 @@ def check_end(scene: Scene, key_path: str, file: str, end_time: float) -> None:
     """Refuse a file whose data end at a time ``end_time`` (s) before the run does."""
     length = scene.run.duration
     if end_time < length * (1 - 1e-9):
-        from models.core.time_series import other_unit
+        from models.core.time_series import wrong_time_unit_hint
 
-        remedy = f"shorten run.duration{other_unit(end_time, length)}"
+        remedy = f"shorten run.duration{wrong_time_unit_hint(end_time, length)}"
         allowed = f"ends at {end_time:g} s, but the run lasts {length:g} s: {remedy}"
         raise InputError(scene.file, key_path, file, allowed)
 

@@ -10,12 +10,12 @@ from pydantic import Field
 
 from models.core.errors import InputError
 from models.core.scene_effects import check_combination, module_of, read_tables
-from models.core.scene_file import SceneFile, checked, existing, parse
-from models.core.steps import MOST_STEPS, divides, fitting
+from models.core.scene_file import SceneFile, checked, existing_file, parse
+from models.core.steps import MOST_STEPS, divides, dividing_step
 from models.core.strict import Query, Strict, accepted_queries_field, quantity, read
 from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly, Settings
-from models.engines.catalogue import CATALOGUE, MISSING, RECOMMENDED
+from models.engines.catalogue import CATALOGUE, RECOMMENDED, UNAVAILABLE_INTEGRATORS
 from models.vehicles import pitch_plane
 from models.vehicles.description import Geometry
 from models.vehicles.pitch_plane import STATE_NAMES
@@ -93,7 +93,7 @@ class Scene(SceneFile):
 def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
     """A published parameter set by its name, or the user's own from a TOML file."""
     if name.endswith(".toml"):
-        return read(pitch_plane.Parameters, parse(existing(name, folder, file, "vehicle.parameters")), name)
+        return read(pitch_plane.Parameters, parse(existing_file(name, folder, file, "vehicle.parameters")), name)
     if name not in parameter_sets():
         allowed = "must be a TOML file with all parameters, or a published set"
         raise InputError(file, "vehicle.parameters", name, allowed, parameter_sets())
@@ -147,14 +147,18 @@ def _check_engine(name: str, scene: Scene) -> None:
     engine_settings, key_path = scene.engines[name], f"engines.{name}"
     integrator = str(scene.settings(name).integrator)
     if integrator not in CATALOGUE[name]:
-        names = tuple(key for key in CATALOGUE[name] if (name, key) not in MISSING)
+        names = tuple(key for key in CATALOGUE[name] if (name, key) not in UNAVAILABLE_INTEGRATORS)
         raise InputError(scene.file, f"{key_path}.integrator", integrator, "no such integrator", names)
     if "spectral_radius" in engine_settings.model_fields_set and integrator != "GeneralizedAlpha":
         allowed = f"has no meaning for {integrator}: it belongs to exudyn's GeneralizedAlpha"
         raise InputError(scene.file, f"{key_path}.spectral_radius", engine_settings.spectral_radius, allowed)
     if "tolerance" in engine_settings.model_fields_set and not CATALOGUE[name][integrator].adaptive:
         adaptive = (
-            " or ".join(key for key, value in CATALOGUE[name].items() if value.adaptive and (name, key) not in MISSING)
+            " or ".join(
+                key
+                for key, value in CATALOGUE[name].items()
+                if value.adaptive and (name, key) not in UNAVAILABLE_INTEGRATORS
+            )
             or "other engines"
         )
         allowed = f"has no meaning for {integrator}, which takes steps of fixed length: it belongs to {adaptive}"
@@ -184,7 +188,7 @@ def _check_step(scene: Scene, key_path: str, step: float) -> None:
         allowed = f"needs {length / step:.3g} steps of {key_path} = {step:g} s; at most {MOST_STEPS:,} are possible"
         raise InputError(scene.file, "run.duration", length, allowed)
     if not divides(step, length):
-        allowed = f"must divide run.duration = {length:g} s; use for example {fitting(step, length)}"
+        allowed = f"must divide run.duration = {length:g} s; use for example {dividing_step(step, length)}"
         raise InputError(scene.file, key_path, step, allowed)
     if wanted is not None and not divides(step, wanted):
         allowed = f"must be a multiple of {key_path} = {step:g} s"

@@ -22,7 +22,7 @@ from numba.extending import register_jitable
 
 from models.core.signals import Sampled, Smooth
 from models.engines.assembly import Assembly
-from models.engines.reference import compiled
+from models.engines.reference import compiled_closure
 from models.machine.compiled import named_closure
 from models.vehicles.pitch_plane import STATES, Parameters
 from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension
@@ -129,7 +129,7 @@ def compile_carry(one_step, key):
             one_step(y, x, step_inputs, i, 3 * i, p, wrong_parameters)
             states[i + 1], error_columns[i + 1] = y, x
 
-    return compiled(carry, key)
+    return compiled_closure(carry, key)
 
 
 @cache
@@ -320,4 +320,4 @@ def _compile_covariance(one_step, key):
             matrices[i + 1] += cross + cross.T
             last_end_response[:] = ended
 
-    return compiled(covariance_march, key)
+    return compiled_closure(covariance_march, key)

@@ -243,7 +243,7 @@ def _axles(assembly: Assembly) -> "AxleForces":
 
     path, turn = path_of(assembly), assembly.mode == "force-body"
     forces, lasts = _covering_samples(path), assembly.scene.run.duration
-    return AxleForces(forces, path.forces.period, assembly.parameters, ((), ()), lasts, turn=turn)
+    return AxleForces(forces, path.forces.period, assembly.parameters, ((), ()), lasts, turns_with_chassis=turn)
 
 
 def _unchecked_sentence(assembly: Assembly) -> str:

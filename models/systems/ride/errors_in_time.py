@@ -7,12 +7,12 @@ import numpy as np
 from models.core.discretisation import (
     Estimate,
     Series,
-    by_chance,
-    estimated,
     not_estimated,
     observed_order,
-    of_chance,
     root_mean_square,
+    sampling_error,
+    with_estimated_errors,
+    with_sampling_error,
     with_stated_errors,
 )
 from models.core.errors import RunFailed
@@ -85,7 +85,7 @@ def with_error_of_drive(
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
     units |= {f"{name}{SPEED_BY_SPEED}": unit for name, unit in units.items()}
     fine = series(drive.time, drive.deviation, run["quasi_stationary"])._replace(units=units)
-    return estimated(
+    return with_estimated_errors(
         run,
         fine,
         rerun,
@@ -134,11 +134,11 @@ def with_error_of_copies(
         estimates |= _of_gains(equivalents, copies, units)
     with_stated_errors(run, estimates, "the copies in longer steps, and gains beside copies")
     scatter = {
-        f"{name}, copies": by_chance(float(chance[i]), float(size[i]), units[name], len(first.moments[0]))
+        f"{name}, copies": sampling_error(float(chance[i]), float(size[i]), units[name], len(first.moments[0]))
         for i, name in enumerate(first.names)
         if size[i] > 0.0
     }
-    return of_chance(run, scatter, len(first.moments[0]))
+    return with_sampling_error(run, scatter, len(first.moments[0]))
 
 
 def _over_speeds(rows: Sequence[np.ndarray]) -> np.ndarray:

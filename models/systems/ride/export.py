@@ -8,13 +8,13 @@ from models.engines.export import (
     Exported,
     ExportSubject,
     coordinate_names,
+    elements_left_out,
+    exported_exudyn_system,
+    exported_mujoco_model,
+    exported_names,
     masses_of_shown_bodies,
-    names_of,
-    of_exudyn,
-    of_mujoco,
-    parts_left_out,
 )
-from models.engines.spatial_protocol import check_whole
+from models.engines.spatial_protocol import check_buildable
 from models.systems.ride.of_scene import vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle
@@ -27,7 +27,7 @@ def exported(scene: RideScene, engine: str) -> Exported:
     reduced vehicles.
     """
     vehicle = vehicle_of(scene)
-    check_whole(engine, vehicle)
+    check_buildable(engine, vehicle)
     by_speed = [
         *(f"side force {force.name!r}" for force in vehicle.side_forces),
         *(f"drag of {drag.body!r}" for drag in vehicle.drags),
@@ -38,16 +38,16 @@ def exported(scene: RideScene, engine: str) -> Exported:
 
 
 def _in_exudyn(vehicle: SpatialVehicle, export_subject: ExportSubject, by_speed: list[str]) -> Exported:
-    from models.engines.exudyn_export import functions
+    from models.engines.exudyn_export import items_with_functions
     from models.engines.spatial_exudyn_build import RoadRows, assemble
 
     built = assemble(vehicle, None, RoadRows(np.zeros((1, 2 * len(vehicle.tyres))), 0.0))
     mbs = built.mbs
     mbs.Assemble()
-    node_indices = [built.places[coordinate] for coordinate in vehicle.coordinates()]
+    node_indices = [built.coordinate_nodes[coordinate] for coordinate in vehicle.coordinates()]
     columns = [mbs.GetNodeODE2Index(node) + index for node, index in node_indices]
     names = dict(zip(coordinate_names(vehicle), columns, strict=True))
-    return of_exudyn(mbs, names, export_subject, [*functions(mbs), *by_speed])
+    return exported_exudyn_system(mbs, names, export_subject, [*items_with_functions(mbs), *by_speed])
 
 
 def _in_mujoco(vehicle: SpatialVehicle, export_subject: ExportSubject, by_speed: list[str]) -> Exported:
@@ -55,10 +55,10 @@ def _in_mujoco(vehicle: SpatialVehicle, export_subject: ExportSubject, by_speed:
     from models.engines.mujoco_inertia import realisable
     from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
 
-    left_out = [*parts_left_out(vehicle), *by_speed]
+    left_out = [*elements_left_out(vehicle), *by_speed]
     vehicle, lowered = realisable(vehicle)
     spec = spec_of(vehicle, 1e-3)
     add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))
     model = spec.compile()
     set_masses(model, MujocoIndices(vehicle, model), vehicle.bodies)
-    return of_mujoco(spec, model, names_of(vehicle), export_subject, [*left_out, *lowered])
+    return exported_mujoco_model(spec, model, exported_names(vehicle), export_subject, [*left_out, *lowered])

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import Series, estimated
+from models.core.discretisation import Series, with_estimated_errors
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity
 from models.core.trajectory import Trajectory
@@ -282,7 +282,7 @@ def _with_error_of_steps(
 
     outputs = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, ROWS_APART))
     fine = series(outputs, first * path.step)._replace(units=dict(zip(names, units, strict=True)))
-    return estimated(run, fine, rerun, RUNGE_KUTTA_ORDER, path.step)
+    return with_estimated_errors(run, fine, rerun, RUNGE_KUTTA_ORDER, path.step)
 
 
 def _road_at_half_spacing(table: np.ndarray) -> np.ndarray:

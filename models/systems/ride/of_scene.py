@@ -104,9 +104,9 @@ def in_time_only(vehicle: SpatialVehicle) -> bool:
 def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear:
     """Function that gives the vehicle at a speed (m/s), linearised by an engine or from its equations."""
     if engine != "reference":
-        from models.engines.spatial_protocol import at_speeds
+        from models.engines.spatial_protocol import linear_vehicle_at_speeds
 
-        return at_speeds(engine, vehicle)
+        return linear_vehicle_at_speeds(engine, vehicle)
     if vehicle.side_forces or vehicle.drags:
         return lambda speed: linearise(vehicle, speed)
     only = linearise(vehicle)

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.scene_effects import with_own
+from models.core.scene_effects import with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.speeds import Speeds, check_speeds
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
@@ -94,7 +94,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ri
     if scene.drive is not None:
         scene.drive.profile(file)
     _check_road(file, scene.road)
-    return with_own(scene)
+    return with_effect_tables(scene)
 
 
 OF_FILE = ("track_width", "first", "last")

@@ -9,8 +9,8 @@ from models.core.discretisation import (
     Estimate,
     estimate_rescaled,
     observed_order,
+    reference_size,
     root_mean_square,
-    size_of,
     with_stated_errors,
 )
 from models.core.errors import RunFailed
@@ -80,7 +80,7 @@ def _with_step_error(
         order = observed_order(root_mean_square(finer - fine), root_mean_square(fine - values), HEUN_ORDER)
         error = root_mean_square(fine - values) / (1.0 - 0.5**order)
         estimates[name] = estimate_rescaled(
-            Estimate(error, run.data[name].attrs["units"], 0.0, order, period), size_of(values), period
+            Estimate(error, run.data[name].attrs["units"], 0.0, order, period), reference_size(values), period
         )
     return with_stated_errors(
         run, estimates, "steps of a half and a quarter of the drive's sampling period", "s between samples"

@@ -10,7 +10,7 @@ import numpy as np
 
 from models.contact.wheel_on_rail import SURROUNDINGS_DISTANCE
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import by_cells, not_estimated, with_stated_errors
+from models.core.discretisation import grid_error, not_estimated, with_stated_errors
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.rail.contact_table import PatchReport, WheelsetContact, WheelsetPlacement, rolling_radius_difference
@@ -118,7 +118,7 @@ def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) ->
     of_fine, of_coarse = (np.array([wheel_sums(placed) for placed in placements]) for placements in (fine, coarse))
     errors, sizes = (np.sqrt(np.mean(values**2, axis=(0, 1))) for values in (of_fine - of_coarse, of_fine))
     estimates = {
-        name: by_cells(float(error), float(size), unit, scene.method.cells, 1.0, MOST_CELLS)
+        name: grid_error(float(error), float(size), unit, scene.method.cells, 1.0, MOST_CELLS)
         for (name, unit), error, size in zip(WHEEL_QUANTITIES.items(), errors, sizes, strict=True)
     }
     return with_stated_errors(run, estimates, f"half the cells at {len(fine)} of {len(run.detail.placed)} positions")

@@ -1,7 +1,7 @@
 """The wheelset of a scene as a file of its engine: body, joints, and the suspension."""
 
 from models.engines.export import Exported, ExportSubject, export_free_vehicle
-from models.engines.wheelset import driven_by
+from models.engines.wheelset import driven_wheelset
 from models.systems.wheelset.of_scene import equations_of, path_speeds
 from models.systems.wheelset.scene import WheelsetScene
 
@@ -12,4 +12,6 @@ LEFT_OUT = ("normal and creep forces of the right rail", "normal and creep force
 def exported(scene: WheelsetScene, engine: str) -> Exported:
     """Export the wheelset without the rails to "mujoco" or "exudyn"."""
     equations = equations_of(scene, engine, path_speeds(scene)[0])
-    return export_free_vehicle(engine, driven_by(equations), ExportSubject(scene.title, scene.file, AXES), LEFT_OUT)
+    return export_free_vehicle(
+        engine, driven_wheelset(equations), ExportSubject(scene.title, scene.file, AXES), LEFT_OUT
+    )

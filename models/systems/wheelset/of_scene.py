@@ -9,7 +9,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects
-from models.core.scene_file import existing, parse
+from models.core.scene_file import existing_file, parse
 from models.rail.equations import YAW, Equations
 from models.rail.linear import critical_or_why
 from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
@@ -35,7 +35,7 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
         allowed = "must be a TOML file with all parameters, or a parameter set"
         raise InputError(scene.file, "wheelset.parameters", name, allowed, tuple(PARAMETER_SETS))
     if base is None:
-        path = existing(name, Path(scene.folder), scene.file, "wheelset.parameters")
+        path = existing_file(name, Path(scene.folder), scene.file, "wheelset.parameters")
         base = _checked_wheelset(parse(path), path.name, "")
     profiles = base.profiles if scene.profiles is None else scene.profiles.located(scene)
     if profiles is not None and FLANGE_KEY in override:

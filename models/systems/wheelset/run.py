@@ -16,7 +16,7 @@ from models.core.errors import RunFailed
 from models.core.result import Channel, Result, join_results, result
 from models.core.told import joined_result
 from models.ensemble.runner import block_results
-from models.ensemble.workers import Crew, places_of
+from models.ensemble.workers import Crew, folders_for_workers
 from models.rail.eigenvalues import hunting_eigenvalue, largest_growth, root_locus, uncertainty, wavelength
 from models.rail.equations import ROLL, SPIN, YAW, WheelsetPath, Y, Z
 from models.rail.limit_cycle import (
@@ -169,7 +169,7 @@ def branch_result(
     """
     speeds, orbits, why, unknown = scene.speeds.all(), list[Orbit](), list[str](), SPEED
     equations = equations_of(scene, "reference", float(speeds[-1]))
-    with Crew.of(scene, default_workers=1).at_work(PAIRS_OF_MARCHES, *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(PAIRS_OF_MARCHES, *folders_for_workers(scene)) as pool:
         try:
             for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step, pool):
                 orbits.append(orbit)

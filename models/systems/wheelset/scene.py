@@ -7,10 +7,10 @@ from typing import Any, Literal
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.scene_effects import with_own
+from models.core.scene_effects import with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.speeds import Speeds, check_speeds
-from models.core.steps import MOST_STEPS, divides, fitting
+from models.core.steps import MOST_STEPS, divides, dividing_step
 from models.core.strict import Strict, quantity
 from models.rail.laid_profiles import Profiles
 
@@ -102,7 +102,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Wh
     _check_conicity(scene)
     if scene.contact.law == "linear" and "cells" in scene.contact.model_fields_set:
         raise InputError(file, "contact.cells", scene.contact.cells, "has no meaning for the linear law: drop it")
-    return with_own(scene)
+    return with_effect_tables(scene)
 
 
 def _check_speeds(scene: WheelsetScene) -> None:
@@ -164,5 +164,7 @@ def _check_run(scene: WheelsetScene) -> None:
     if run.duration / run.step > MOST_STEPS:
         raise InputError(scene.file, "run.duration", run.duration, f"needs more than {MOST_STEPS:,} steps")
     if not divides(run.step, run.duration):
-        allowed = f"must divide run.duration = {run.duration:g} s; use for example {fitting(run.step, run.duration)}"
+        allowed = (
+            f"must divide run.duration = {run.duration:g} s; use for example {dividing_step(run.step, run.duration)}"
+        )
         raise InputError(scene.file, "run.step", run.step, allowed)

@@ -16,11 +16,11 @@ from models.core.discretisation import (
     FINE_WINDOW,
     Estimate,
     Series,
-    by_cells,
-    estimated,
+    grid_error,
+    nearest_rows,
     not_estimated,
-    rows_at,
-    size_of,
+    reference_size,
+    with_estimated_errors,
     with_stated_errors,
 )
 from models.core.errors import InputError, RunFailed
@@ -53,7 +53,7 @@ def with_error(run: Result, scene: WheelsetScene, march_scene: March) -> Result:
     fine, step = principal_series(run.detail), scene.run.step
     sizes = _sizes(fine, float(np.abs(run.detail.contacts["load"]).max()))
     if scene.contact.law == "linear":
-        return estimated(
+        return with_estimated_errors(
             run,
             fine,
             lambda step_factor, share: principal_series(march_scene(with_step_factor(scene, step_factor, share))),
@@ -70,7 +70,7 @@ def with_error(run: Result, scene: WheelsetScene, march_scene: March) -> Result:
     estimates = _of_steps(scene, march_scene, fine, coarse, sizes)
     for name, unit in UNIT_OF_CHANNEL.items():
         gap = _rms_difference(fine, coarse, name)
-        estimates[f"{name} of cells"] = by_cells(gap, sizes[name], unit, cells, OF_CELLS, MOST_CELLS)
+        estimates[f"{name} of cells"] = grid_error(gap, sizes[name], unit, cells, OF_CELLS, MOST_CELLS)
     return with_stated_errors(run, estimates, f"a path on {other_cells} cells and some steps of other length")
 
 
@@ -85,7 +85,7 @@ def principal_series(path: WheelsetPath) -> Series:
 def _sizes(fine_series: Series, load: float) -> dict[str, float]:
     """Sizes of the channels by which errors are divided; ``load`` : the largest of a patch (N)."""
     return {
-        name: max(size_of(values), STILL * (load if UNIT_OF_CHANNEL[name] == "N" else 1.0))
+        name: max(reference_size(values), STILL * (load if UNIT_OF_CHANNEL[name] == "N" else 1.0))
         for name, values in fine_series.channels.items()
     }
 
@@ -148,7 +148,7 @@ def _rms_difference(fine_series: Series, other_series: Series, name: str, end_ti
     """
     long, short = sorted((fine_series, other_series), key=lambda series: -series.times[min(1, len(series.times) - 1)])
     shared_times = long.times[long.times <= min(end_time, short.times[-1]) * (1.0 + 1e-9)]
-    gap = long.channels[name][: len(shared_times)] - short.channels[name][rows_at(short.times, shared_times)]
+    gap = long.channels[name][: len(shared_times)] - short.channels[name][nearest_rows(short.times, shared_times)]
     return float(np.sqrt(np.mean(gap**2)))
 
 
@@ -165,7 +165,7 @@ def with_error_of_cycles(
         dict[str, Estimate](),
     )
     for name, unit in units.items():
-        size = size_of(np.array([getattr(orbit, name) for orbit in orbits]))
+        size = reference_size(np.array([getattr(orbit, name) for orbit in orbits]))
         changes = [orbit.frequency_error if name == "frequency" else orbit.error for orbit in orbits]
         error = float(np.sqrt(np.mean(np.square(changes)))) / (2.0**KINKED_ORDER - 1.0)
         steps = [orbit.period / orbit.steps for orbit in orbits]
@@ -173,7 +173,7 @@ def with_error_of_cycles(
         if coarse_orbits:
             gaps = [getattr(orbits[k], name) - getattr(coarse_orbit, name) for k, coarse_orbit in coarse_orbits.items()]
             left = LIKELY_SHARE * float(np.sqrt(np.mean(np.square(gaps))))
-            estimates[f"{name} of cells"] = by_cells(left, size, unit, cells, OF_CELLS, MOST_CELLS)
+            estimates[f"{name} of cells"] = grid_error(left, size, unit, cells, OF_CELLS, MOST_CELLS)
     cells_text = (
         f", and half the cells at {len(coarse_orbits)} of {len(orbits)} cycles"
         if coarse_orbits

@@ -157,7 +157,7 @@ def reading_error(measurement_source: Source, truth: Truth, expected_text: str) 
     the reader's message is missing."""
     channels, finding_texts = (
         read_channels(measurement_source),
-        [finding.text for finding in measurement_source.noticed if finding.weight != "note" or expected_text],
+        [finding.text for finding in measurement_source.findings if finding.weight != "note" or expected_text],
     )
     if set(channels) != set(truth) or not (
         any(expected_text in text for text in finding_texts) if expected_text else not finding_texts

@@ -18,15 +18,15 @@ from scipy.integrate import solve_ivp
 from models.advice.price.problem import Setting
 from models.contact.inputs import Array
 from models.core.errors import Refused, RunFailed
-from models.engines.catalogue import MISSING
-from models.engines.contact_bridge import FREEDOMS, Wheels, add_forces, check_step, forces, linear
+from models.engines.catalogue import UNAVAILABLE_INTEGRATORS
+from models.engines.contact_bridge import FREEDOMS, Wheels, add_forces, check_step, forces, linearised_wheels
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import model
 from models.engines.exudyn_system import solver_counts
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_march import Marcher
 from models.engines.mujoco_quiet import installed
-from models.engines.stability import LONG_RUN, limit
+from models.engines.stability import LONG_RUN, longest_stable_step
 from models.machine.compiled import njit
 from models.machine.stack import start
 from validation.contact.slow_wheels import counting_calls
@@ -171,7 +171,9 @@ class RollingWheels:
         for engine, method in ((engine, method) for engine, methods in EXPLICIT_METHODS.items() for method in methods):
             like = "Euler" if method == "discrete" else method
             fewest = math.ceil(
-                1.02 * DURATION / limit(like, 10 * MILLISECOND, LONG_RUN * MILLISECOND, linear(self.wheels))
+                1.02
+                * DURATION
+                / longest_stable_step(like, 10 * MILLISECOND, LONG_RUN * MILLISECOND, linearised_wheels(self.wheels))
             )
             curves.append(
                 ((engine, method), tuple(DURATION / round(step_ratio * fewest) for step_ratio in STEP_RATIOS))
@@ -189,8 +191,8 @@ class RollingWheels:
         """The wheel in the engine of a setting, ready to run; raises Refused for an unstable step or a missing
         method."""
         method = setting.method.split()[0]
-        if (setting.engine, method) in MISSING:
-            raise Refused(setting.engine, MISSING[setting.engine, method])
+        if (setting.engine, method) in UNAVAILABLE_INTEGRATORS:
+            raise Refused(setting.engine, UNAVAILABLE_INTEGRATORS[setting.engine, method])
         if setting.engine == "exudyn":
             return self._solver_in_exudyn(setting, method)
         steps = round(DURATION / setting.value)

@@ -18,7 +18,7 @@ from models.core.result import Result
 from models.core.steps import divides
 from models.core.time_series import write_time_series
 from models.engines.assembly import Settings
-from models.engines.catalogue import CATALOGUE, MISSING
+from models.engines.catalogue import CATALOGUE, UNAVAILABLE_INTEGRATORS
 from models.systems.pitch_plane import run as single
 from models.systems.pitch_plane.scene import Scene, build, parameter_set, settings_of
 from models.systems.pitch_plane.virtual_measurement import measure, write_measurement
@@ -41,7 +41,7 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
 def _sample_of_run(generator: np.random.Generator, folder: Path) -> Sample:
     """Sample from a random run; raises for an unstable step, and for an interpolation that the method cannot use."""
     engine = str(generator.choice(["reference", "exudyn", "mujoco"]))
-    known = [name for name in CATALOGUE[engine] if (engine, name) not in MISSING]
+    known = [name for name in CATALOGUE[engine] if (engine, name) not in UNAVAILABLE_INTEGRATORS]
     integrator = str(generator.choice(known))
     scene = _random_scene(generator, folder, engine, integrator)
     with _count_force_calls() as calls:

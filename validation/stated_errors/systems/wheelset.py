@@ -11,7 +11,7 @@ from unittest import mock
 
 import numpy as np
 
-from models.core.discretisation import Series, errors_of, rows_at
+from models.core.discretisation import Series, errors_of, nearest_rows
 from models.core.result import Result
 from models.rail.equations import WheelsetPath
 from models.systems.wheelset import run as system
@@ -100,7 +100,7 @@ def _true_errors(
 
 
 def _rms_differences(fine_series: Series, truth: Series) -> dict[str, float]:
-    rows = rows_at(truth.times, fine_series.times)
+    rows = nearest_rows(truth.times, fine_series.times)
     return {
         name: float(np.sqrt(np.mean((values - truth.channels[name][rows]) ** 2)))
         for name, values in fine_series.channels.items()

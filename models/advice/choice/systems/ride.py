@@ -10,7 +10,7 @@ import numpy as np
 from models.advice.choice.answer import Quantity, RunQuantities
 from models.advice.ride_choice.in_time import STEP_MULTIPLE, CopiesInTime, in_time
 from models.core.errors import InputError
-from models.engines.spatial_protocol import curves
+from models.engines.spatial_protocol import curve_count
 from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import RideScene
@@ -47,7 +47,7 @@ def computed_quantities(scene: CopiesInTime, engine: str, error: bool = False) -
         "steps": scene.steps,
         "calls": 4 * scene.steps,
         "states": 2 * len(vehicle.coordinates()),
-        "terms": curves(vehicle) + sum(tyre.pushes_only for tyre in vehicle.tyres),
+        "terms": curve_count(vehicle) + sum(tyre.pushes_only for tyre in vehicle.tyres),
     }
     quantities = {name: Quantity(units[name], tuple(cases), True) for name, cases in squares_of.items()}
     return RunQuantities(quantities, counts, seconds)

@@ -11,7 +11,7 @@ from models.core.errors import InputError
 from models.core.result import Result
 from models.core.steps import divides
 from models.engines.assembly import Assembly, Settings
-from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE
+from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES, UNAVAILABLE_INTEGRATORS
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 
@@ -108,12 +108,12 @@ class PricedPitchPlane:
         ladders = []
         for engine in self.engines:
             for name, known in CATALOGUE[engine].items():
-                adaptive = known.adaptive or getattr(OUTSIDE.get(engine), "adaptive", False)
-                if known.adaptive and self.sampled and (engine, name) not in MISSING:
+                adaptive = known.adaptive or getattr(OUTSIDE_CLASSES.get(engine), "adaptive", False)
+                if known.adaptive and self.sampled and (engine, name) not in UNAVAILABLE_INTEGRATORS:
                     continue
                 for method in [m for m in SPECTRAL_RADII if m.startswith(name)] or [name]:
                     values = TOLERANCES_TRIED if adaptive else self._steps()
-                    values = values[:1] if (engine, name) in MISSING else values
+                    values = values[:1] if (engine, name) in UNAVAILABLE_INTEGRATORS else values
                     order = 0 if adaptive else known.order
                     default = DEFAULT_OF_METHOD.get((engine, method), 0.0)
                     ladders.append(SettingLadder(engine, method, values, order, adaptive, default))
@@ -145,7 +145,7 @@ class PricedPitchPlane:
 
     def lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that select the solver setting."""
-        if setting.engine in OUTSIDE:
+        if setting.engine in OUTSIDE_CLASSES:
             return _outside_engine_lines(setting)
         name, (_, _, radius) = setting.method.split()[0], setting.method.partition(" ")
         setting_line = f"tolerance = {setting.value:.4g}" if setting.adaptive else f"step = {setting.value!r}"

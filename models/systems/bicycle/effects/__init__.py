@@ -19,7 +19,7 @@ def _of_control(key: str, neutral: float, usual_value: float, description: str, 
 
     cost = "a product per call"
     return Entry(
-        description, f"control.{key}", cost, there=is_present, leave_out=leave_out, put_in=put_in, **entry_fields
+        description, f"control.{key}", cost, is_present=is_present, leave_out=leave_out, put_in=put_in, **entry_fields
     )
 
 

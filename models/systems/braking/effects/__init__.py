@@ -38,7 +38,9 @@ def _of_sensor(
 
     counts = {"asked": 1, count_name: 4}
     key_path = f"port.{signal_kind}.{keys[0]}"
-    return Entry(description, key_path, cost, counts, ("port",), there=is_present, leave_out=leave_out, put_in=put_in)
+    return Entry(
+        description, key_path, cost, counts, ("port",), is_present=is_present, leave_out=leave_out, put_in=put_in
+    )
 
 
 def _of_brakes(
@@ -68,7 +70,9 @@ def _of_brakes(
             brake = table.setdefault("brakes", {}).setdefault(axle, plain)
             brake.update(usual_value(axle, brake))
 
-    return Entry(description, key_path, cost, {count_name: 4}, there=is_present, leave_out=leave_out, put_in=put_in)
+    return Entry(
+        description, key_path, cost, {count_name: 4}, is_present=is_present, leave_out=leave_out, put_in=put_in
+    )
 
 
 def _without_reservoir(table: Table, scene: Any) -> None:
@@ -152,7 +156,7 @@ TABLE = {
         excludes=MEASURED_PRESSURES_KEY,
         why="which leaves a controller nothing to control",
         usual_value={"kind": "slip_bang_bang"},
-        there=lambda scene: scene.controller.kind != "none",
+        is_present=lambda scene: scene.controller.kind != "none",
     ),
     "faults": Entry(
         "Lost, delayed or wrong samples, and valves that are stuck, on demand",
@@ -161,7 +165,7 @@ TABLE = {
         {"asked": 1},
         ("port",),
         usual_value=[{"kind": "lost", "start": 0.1, "end": 0.2}],
-        there=lambda scene: scene.port is not None and bool(scene.port.faults),
+        is_present=lambda scene: scene.port is not None and bool(scene.port.faults),
     ),
     "hysteresis": _of_brakes(
         ("release", "falling"),
@@ -267,7 +271,7 @@ TABLE = {
         "road.stretches",
         "the surface under each wheel is looked up at every step",
         {"surfaces": 1, "tables": 1},
-        there=_of_two_surfaces,
+        is_present=_of_two_surfaces,
         leave_out=_on_one_surface,
         put_in=_on_another_surface,
     ),
@@ -324,7 +328,7 @@ TABLE = {
         "vehicle.file",
         "the coordinates of its hitch and wheels, and a tyre, a brake and a chamber per wheel",
         needs=SUSPENSION_KEY,
-        there=_tows_bodies,
+        is_present=_tows_bodies,
         leave_out=without_trailer,
     ),
     "trailer": Entry(

@@ -28,7 +28,7 @@ def _of_theory(
         cost,
         {count_name: 1},
         **BOUND_BY_CONSTANT_FRICTION,
-        there=lambda scene: scene.method.name == theory,
+        is_present=lambda scene: scene.method.name == theory,
         leave_out=leave_out,
         put_in=_method(theory),
     )
@@ -89,7 +89,7 @@ TABLE = {
         "method.name",
         "some microseconds per contact, where the linear theory multiplies by a matrix",
         {"bounded": 1},
-        there=lambda scene: scene.method.name != "linear",
+        is_present=lambda scene: scene.method.name != "linear",
         leave_out=_without_slip,
         put_in=_method("fastsim"),
     ),
@@ -130,7 +130,7 @@ TABLE = {
         "nothing: the third column of the same creepages",
         {"motions with spin": 1},
         usual_value=0.3,  # 1/m, as of a wheel of usual conicity
-        there=lambda scene: bool(scene.creepage.spin) or _spin_is_swept(scene),
+        is_present=lambda scene: bool(scene.creepage.spin) or _spin_is_swept(scene),
         leave_out=_without_spin,
     ),
 }

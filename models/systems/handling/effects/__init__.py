@@ -29,7 +29,7 @@ def _of_manoeuvres(key: str, description: str, cost: str, work_counts: dict[str,
             manoeuvre[key] = usual_value
 
     key_path = f"manoeuvres.NAME.{key}"
-    return Entry(description, key_path, cost, work_counts, there=is_present, leave_out=leave_out, put_in=put_in)
+    return Entry(description, key_path, cost, work_counts, is_present=is_present, leave_out=leave_out, put_in=put_in)
 
 
 CAR_ALONE, CAR_WITH_CARAVAN = "r19_free", "r19_caravan"
@@ -88,7 +88,7 @@ TABLE = {
         "The steer angle and the speed of a measured drive, with the torques that this speed takes",
         "manoeuvres.NAME.measured",
         "about four marches of the manoeuvre in MuJoCo, once, that seek the torques",
-        there=_is_measured_drive,
+        is_present=_is_measured_drive,
         leave_out=_without_measured,
         modules=("models.measured.drive", "models.systems.handling.following"),
     ),
@@ -104,7 +104,7 @@ TABLE = {
         "vehicle.file",
         "the coordinates of its hitch, wheels and spins, and a tyre per wheel",
         {"coordinates": 7, "towed bodies": 1, "wheels": 2},
-        there=lambda scene: bool(scene.given().towed),
+        is_present=lambda scene: bool(scene.given().towed),
         leave_out=without_trailer,
         put_in=with_trailer,
     ),

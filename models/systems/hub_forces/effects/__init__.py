@@ -38,7 +38,14 @@ def _selected_effect(
         table.setdefault(name, {})[key] = usual_value
 
     return Entry(
-        description, key_path, cost, work_counts, there=is_present, leave_out=leave_out, put_in=put_in, **entry_fields
+        description,
+        key_path,
+        cost,
+        work_counts,
+        is_present=is_present,
+        leave_out=leave_out,
+        put_in=put_in,
+        **entry_fields,
     )
 
 

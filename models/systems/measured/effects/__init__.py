@@ -24,7 +24,7 @@ def _of_transducers(key: str, says: str, cost: str, usual: dict[str, Any], **cou
 
     faulty = {name.replace("_", " "): count for name, count in counts.items()}
     needs = ("virtual_measurement",)
-    return Entry(says, f"virtual.faults.{key}", cost, faulty, needs, why=why, there=there, put_in=put_in)
+    return Entry(says, f"virtual.faults.{key}", cost, faulty, needs, why=why, is_present=there, put_in=put_in)
 
 
 def _of_stabiliser(method: str, says: str, cost: str, count: str, modules: tuple[str, ...] = ()) -> Entry:
@@ -42,7 +42,7 @@ def _of_stabiliser(method: str, says: str, cost: str, count: str, modules: tuple
         {count: 2},
         modules=modules,
         usual_value=method,
-        there=lambda scene: scene.stabilise.method == method,
+        is_present=lambda scene: scene.stabilise.method == method,
         leave_out=leave_out,
     )
 
@@ -94,7 +94,7 @@ TABLE = {
         "files.0.offset",
         "signals are moved to one clock by interpolation",
         {"moved clocks": 1},
-        there=lambda scene: any(file.offset or file.drift for file in scene.files),
+        is_present=lambda scene: any(file.offset or file.drift for file in scene.files),
         leave_out=_count_alike,
     ),
     "prescribed_angles": _of_stabiliser(

@@ -8,7 +8,7 @@ chassis with the wheels on its arms, I + J (``models.drift.growth.rigid_pitch``)
 from typing import Any
 
 from models.core.strict import Strict, quantity
-from models.drift.growth import spring_of
+from models.drift.growth import pitch_spring
 from models.engines.assembly import Assembly
 from models.vehicles.description import PitchSpring
 
@@ -28,4 +28,4 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The force-excited vehicle with a spring and damper to the ground that hold back slow pitch."""
-    return assembly.with_spring(PitchSpring("chassis", *spring_of(assembly.parameters, p.cut_off, p.damping_ratio)))
+    return assembly.with_spring(PitchSpring("chassis", *pitch_spring(assembly.parameters, p.cut_off, p.damping_ratio)))

@@ -24,7 +24,7 @@ from models.core.signals import Sampled, Smooth
 from models.core.steps import divides
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS, RADIANS_PER_SECOND
-from models.drift.growth import rigid_pitch, spring_of
+from models.drift.growth import pitch_spring, rigid_pitch
 from models.drift.innovations import Consistency, consistency
 from models.engines.assembly import Assembly, Channels
 from models.systems.pitch_plane.sampling import check_end
@@ -96,7 +96,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     guide = guide_of(assembly, p)
     _check_surprise(assembly, p, guide)
     _check_bandwidth(assembly, p, guide)
-    stiffness, damping = spring_of(assembly.parameters, p.bandwidth, p.damping_ratio)
+    stiffness, damping = pitch_spring(assembly.parameters, p.bandwidth, p.damping_ratio)
     moment = guide.values @ np.array([[stiffness], [damping]]) + guide.inertia_moment[:, None]
     sprung = assembly.with_spring(PitchSpring("chassis", stiffness, damping))
     guided = sprung.with_moment(Sampled(moment, guide.period, held=False))

@@ -15,7 +15,7 @@ from models.core.signals import Smooth, Stacked
 from models.core.smoothing import low_passed
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS
-from models.engines.assembly import GUIDED, Assembly, Mode
+from models.engines.assembly import PRESCRIBED_COORDINATES, Assembly, Mode
 from models.systems.pitch_plane.sampling import check_end
 
 NEEDS = ("wheel_forces",)
@@ -64,7 +64,9 @@ def prescribe(
     check_end(scene, f"effects.{effect}.file", p.file, motion.end)
     assert assembly.input is not None
     guided = assembly.with_input(drive_mode, Stacked((assembly.input, motion)))
-    guided.initial[[*GUIDED[drive_mode], *(4 + i for i in GUIDED[drive_mode])]] = motion.at(0.0)[: 2 * len(columns)]
+    guided.initial[[*PRESCRIBED_COORDINATES[drive_mode], *(4 + i for i in PRESCRIBED_COORDINATES[drive_mode])]] = (
+        motion.at(0.0)[: 2 * len(columns)]
+    )
     doubt = sparse_record_warning(len(values), period, scene.run.duration, CHASSIS_SAMPLE_TIME)
     return replace(guided, doubts=(*guided.doubts, doubt)) if doubt else guided
 

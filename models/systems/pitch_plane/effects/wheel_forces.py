@@ -61,7 +61,7 @@ def _doubts_about_forces(
     """Doubts about wheel forces (n, 2) in N that do not suit this vehicle, and assumptions that they carry its weight;
     InputError for impossible forces.
     """
-    from models.measured.axle_forces import IN_FILE, AxleForces, check
+    from models.measured.axle_forces import FILE_REMEDIES, AxleForces, check_axle_forces
     from models.measured.signal import Signal
 
     front, rear = (
@@ -75,11 +75,11 @@ def _doubts_about_forces(
         assembly.parameters,
         ((front,), (rear,)),
         scene.run.duration,
-        IN_FILE,
+        FILE_REMEDIES,
         starts_at_rest=not scene.start,
-        turn=assembly.mode == "force-body",
+        turns_with_chassis=assembly.mode == "force-body",
     )
-    looked = (*check(axles), *_samples((front, rear), values, sample_period))
+    looked = (*check_axle_forces(axles), *_samples((front, rear), values, sample_period))
     findings = tuple(
         finding for finding in looked if finding.weight != "note" and finding.check not in parameters.accept
     )
@@ -112,8 +112,8 @@ def _balance_assumptions(axles: "AxleForces", parameters: Parameters) -> tuple[A
             f'if it is meant so: effects.wheel_forces.accept = ["{name}"]',
             partial(_steady_accelerations, float(means.accelerations[i])),
             unit,
-            -float(means.known[i]),
-            float(means.known[i]),
+            -float(means.uncertainties[i]),
+            float(means.uncertainties[i]),
         )
         for i, (name, says, unit, symbols) in enumerate(balance_rows)
         if name not in parameters.accept and axles.parameters.g > 0

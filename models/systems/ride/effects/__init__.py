@@ -9,7 +9,7 @@ from models.core.scene_effects import Entry, Table
 
 def _of_vehicle(description: str, cost: str, is_present: Callable[[Any], bool]) -> Entry:
     """An effect that belongs to the vehicle file and not to a table of the scene."""
-    return Entry(description, "vehicle.file", cost, there=is_present, leave_out=_keep_vehicle)
+    return Entry(description, "vehicle.file", cost, is_present=is_present, leave_out=_keep_vehicle)
 
 
 def _keep_vehicle(table: Table, scene: Any) -> None:
@@ -90,7 +90,7 @@ TABLE = {
         "runs in time by an engine in place of one covariance",
         {"bent springs": 1},
         modules=("models.ride.statistical_linearisation",),
-        there=_omissions_of_sort("curves"),
+        is_present=_omissions_of_sort("curves"),
         leave_out=_straighten_curves,
     ),
     "delay": Entry(
@@ -99,7 +99,7 @@ TABLE = {
         "a filter of the road per axle",
         {"delays": 1},
         usual_value="delayed",
-        there=_omissions_of_sort("delay"),
+        is_present=_omissions_of_sort("delay"),
         leave_out=_equal_heights_edit("front_rear"),
     ),
     "drag": _of_vehicle(
@@ -116,7 +116,7 @@ TABLE = {
         "a stiffness per preloaded spring",
         {"preloads": 1},
         usual_value="loaded",
-        there=lambda scene: scene.vehicle.operating_point == "loaded",
+        is_present=lambda scene: scene.vehicle.operating_point == "loaded",
     ),
     "measured_road": Entry(
         "A road that is fitted to a measured one",
@@ -144,7 +144,7 @@ TABLE = {
         "a second filter of the road per axle",
         {"heights": 2},
         usual_value="modelled",
-        there=_omissions_of_sort("second_track"),
+        is_present=_omissions_of_sort("second_track"),
         leave_out=_equal_heights_edit("left_right"),
     ),
     "side_forces": _of_vehicle(
@@ -168,7 +168,7 @@ TABLE = {
         "weighting",
         "eight states per weighted output by Wk, six by Wd",
         {"states": 8},
-        there=lambda scene: bool(scene.weighting),
+        is_present=lambda scene: bool(scene.weighting),
         put_in=_weight_first_output,
     ),
 }
