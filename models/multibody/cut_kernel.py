@@ -1,4 +1,5 @@
-"""Forces of a vehicle cut at its wheels as forces of its joints, compiled: the one callback of both engines.
+"""Compiled joint forces of a vehicle without its wheels, loaded at its wheel hubs; both engines call them as their one
+callback.
 
 Springs, mounts and bars inside; at every hub the six measured components, or, in the virtual measurement, the tyre on
 its road; and what stabilises roll and pitch. All numbers lie in one table, see ``table``: a head, joints, bodies,
@@ -55,12 +56,14 @@ from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL
     ANY_TIME,
     HEADER,
 ) = range(21)
-"""Head: counts; whether tyres on a road act; frame of the hub forces; what stabilises; rows of inputs per second, rows,
-columns; m/s^2; the chassis' last joint; m/s; the pull's N m/rad, N m s/rad; 1/s of the held motion; count of all;
-whether inputs are read at any time, or at half steps alone."""
+"""Indices in the head of the table. Counts of joints, bodies, elements and hubs; whether tyres on a road act; frame of
+the hub forces; kind of stabiliser; rows of inputs per second, rows, columns; gravity (m/s^2); the chassis' last joint;
+speed (m/s); stiffness (N m/rad) and damping (N m s/rad) that pull roll and pitch; rate (1/s) at which an enforced angle
+comes back to its file; count of all numbers; whether inputs are read at any time, or at half steps alone."""
 FRAMES = ("hub", "body", "inertial")
 NONE, PULLED, HELD = range(3)
-"""Stabilisers: none; a moment towards an angle and its rate; a moment that enforces the acceleration of the angle."""
+"""Kinds of stabiliser of roll and pitch: none; a moment towards a given angle and its rate; a moment that enforces the
+given angular acceleration."""
 FIRST_BODY, FIRST_POINT, SECOND_BODY, SECOND_POINT, AXIS, DESIGN, FORCE, STIFFNESS, DAMPING = (
     0,
     1,
@@ -73,15 +76,17 @@ FIRST_BODY, FIRST_POINT, SECOND_BODY, SECOND_POINT, AXIS, DESIGN, FORCE, STIFFNE
     14,
 )
 AXIS_JOINT, FRICTION, FRICTION_RATE, ON_TRAVEL, ON_RATE, PER_ELEMENT = range(15, 21)
-"""Numbers of an element: last joint and point of both ends, axis, travel at rest, preload, N/m, N s/m; the last joint
-of the body in which the axis is fixed, N, m/s, and where the table has its curves (0: nowhere)."""
+"""Further indices of the numbers of a spring, mount or bar: the last joint of the body in which its axis is fixed,
+friction force (N), friction speed (m/s), and where the table has its curves of force over travel and over rate (0:
+nowhere)."""
 LAST, ARM, HEIGHT, LOAD, TYRE, TYRE_DAMPING, CORNERING, ROLL_STEER, ONE_SIDED, PER_HUB = 0, 1, 4, 5, 6, 7, 8, 9, 10, 11
 WRENCH, GUIDING = 6, 6
-"""Columns of inputs: force (N) and moment (N m) of each hub; roll, pitch, their rates and their accelerations."""
+"""Number of columns of the inputs: force (N) and moment (N m) of each hub; roll, pitch, their rates and their
+accelerations."""
 
 
 class JointMotion(NamedTuple):
-    """Joints and how they move.
+    """Joint table of a cut vehicle, with its coordinates, rates and the motion of its bodies.
 
     joints (n, PER_JOINT) : as in the table; q, v (n,) : coordinates and rates; m (n + 1, PER_MOTION) : what is behind
     each joint, see ``cut_mechanics``.
@@ -94,7 +99,7 @@ class JointMotion(NamedTuple):
 
 
 class ForceReport(NamedTuple):
-    """Forces that ``forces`` reports of a state: forces of the elements (e,), N or N m; wrenches (hubs, WRENCH) in the
+    """Forces of a cut vehicle at one state: forces of the elements (e,), N or N m; wrenches (hubs, WRENCH) in the
     declared frame; moments (2,) of the stabiliser on roll and pitch (N m)."""
 
     elements: np.ndarray
@@ -104,8 +109,8 @@ class ForceReport(NamedTuple):
 
 @lean
 def _element(e, numbers, motion, chassis, row):
-    """Force of an element. ``row`` (n,) receives the derivative of its travel with respect to the joints behind the
-    chassis."""
+    """Force of a spring, mount or bar, N or N m. Fills ``row`` (n,) with the derivatives of its travel with respect to
+    the joint coordinates behind the chassis."""
     joints, m = motion.joints, motion.m
     axis, travel, rate = turned(m[int(e[AXIS_JOINT]) + 1], three(e, AXIS)), -e[DESIGN], 0.0
     row[:] = 0.0
@@ -133,8 +138,8 @@ def _element(e, numbers, motion, chassis, row):
 
 @lean
 def _read_inputs(head, inputs, t, row):
-    """Fill ``row`` with the inputs at a time (s): those of the nearest half step; for methods with variable steps, of a
-    parabola through the three rows of a step."""
+    """Fill ``row`` with the inputs at a time (s): those of the nearest half step or, for methods with variable steps,
+    of a parabola through the three rows of a step."""
     last, place = len(inputs) - 1, t * head[PER_TIME]
     if head[ANY_TIME] == 0.0:
         nearest = min(max(int(np.rint(place)), 0), last)
@@ -150,7 +155,7 @@ def _read_inputs(head, inputs, t, row):
 
 @lean
 def ends_apart(e, m):
-    """Vector from the first to the second point of an element."""
+    """Vector (m, in space) from the first to the second attachment point of a spring, mount or bar."""
     return plus(
         locate(m[int(e[SECOND_BODY]) + 1], e, SECOND_POINT),
         times(locate(m[int(e[FIRST_BODY]) + 1], e, FIRST_POINT), -1.0),
@@ -159,8 +164,8 @@ def ends_apart(e, m):
 
 @lean
 def _turn_axis(e, motion, chassis, axis, row):
-    """Add to ``row`` the change of an element's travel by the rotation of its axis relative to the chassis; returns the
-    rate of this change."""
+    """Add to ``row`` the derivatives of an element's travel that come from the rotation of its axis relative to the
+    chassis. Returns this part of the rate of travel."""
     joints, m = motion.joints, motion.m
     moved, rate, j = cross(axis, ends_apart(e, m)), 0.0, int(e[AXIS_JOINT])
     while j > chassis:
@@ -173,7 +178,8 @@ def _turn_axis(e, motion, chassis, axis, row):
 
 @lean
 def _tyre(hub, motion, place, road, speed):
-    """Force and moment (in space) on the hub, at ``place``, from a tyre on a road with height (m) and rate (m/s).
+    """Force (N) and moment (N m), in space, on a wheel hub at ``place`` from its tyre on a road with height (m) and
+    vertical velocity (m/s).
 
     The side force of a tyre that only pushes goes with its load: in the air it has none.
     """
@@ -196,13 +202,13 @@ def _tyre(hub, motion, place, road, speed):
 
 @lean
 def frame(head, hub):
-    """Index of the row of ``m`` whose axes are used for a hub's wrench."""
+    """Index of the row of ``m`` in whose axes the force and moment of a hub are given."""
     return 0 if head[FRAME] == 2.0 else int(head[CHASSIS] if head[FRAME] == 1.0 else hub[LAST]) + 1
 
 
 @lean
 def _enforce(head, wanted, bodies, motion, out, moments):
-    """Write the moments (roll, pitch), N m, that produce the wanted angular accelerations in both."""
+    """Write the moments (roll, pitch), N m, that make the roll and pitch accelerations follow the given motion."""
     n, w, q, v = len(motion.joints), head[HOLDING], motion.q, motion.v
     mass, sides = array(doubles(n * n), (n, n)), array(doubles(3 * n), (3, n))
     sides[:] = 0.0
@@ -220,7 +226,7 @@ def _enforce(head, wanted, bodies, motion, out, moments):
 
 @njit(cache=True, error_model="numpy")
 def parts(numbers):
-    """Views of the parts of the table: head, joints, bodies, elements, hubs, inputs."""
+    """Views of the sections of the table of numbers: head, joints, bodies, elements, hubs, inputs."""
     head = numbers[:HEADER]
     n, b, e, h = int(head[JOINTS]), int(head[BODIES]), int(head[ELEMENTS]), int(head[HUBS])
     joints_end = HEADER + PER_JOINT * n
@@ -239,8 +245,8 @@ def parts(numbers):
 
 @njit(cache=True, error_model="numpy")
 def forces(numbers, t, q, v, m, out, told):
-    """Add the forces of all elements and hubs to the joint forces ``out`` (n,) at a time (s), coordinates and rates
-    (n,).
+    """Add the forces of all elements, hubs and stabilisers to the joint forces ``out`` (n,) at a time (s), coordinates
+    and rates (n,).
 
     Also fills ``m`` and the ``ForceReport``.
     """
@@ -280,7 +286,7 @@ def forces(numbers, t, q, v, m, out, told):
 
 @njit(cache=True, error_model="numpy")
 def report(numbers, times, states, inside, wrenches, moments):
-    """Fill the quantities of ``ForceReport`` for states (m, 2 n) at times (m,), one row per state."""
+    """Fill the arrays of a ``ForceReport`` for states (m, 2 n) at times (m,), one row per state."""
     n = states.shape[1] // 2
     m, out = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n), (n,))
     for i in range(len(times)):
@@ -291,7 +297,8 @@ def report(numbers, times, states, inside, wrenches, moments):
 
 @njit(cache=True, error_model="numpy")
 def accelerate(numbers, t, q, v, out):
-    """Write the accelerations (n,) of the written-out equations at a time (s), coordinates and rates (n,)."""
+    """Write the accelerations (n,) from the hand-written equations of motion at a time (s), coordinates and rates
+    (n,)."""
     head, joints, bodies, elements, hubs, _ = parts(numbers)
     n, e, h = len(joints), len(elements), len(hubs)
     m, mass = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n * n), (n, n))
@@ -304,7 +311,8 @@ def accelerate(numbers, t, q, v, out):
 
 @njit(cache=True, error_model="numpy")
 def march(numbers, states, step):
-    """Fill the states (m, 2 n) from the first row on, by the classical Runge-Kutta method with steps (s)."""
+    """Integrate the equations of motion from the first row of the states (m, 2 n), by the classical Runge-Kutta method
+    with a fixed step (s)."""
     size = states.shape[1]
     n = size // 2
     rate, total, here = array(doubles(size), (size,)), array(doubles(size), (size,)), array(doubles(size), (size,))
@@ -324,7 +332,8 @@ def march(numbers, states, step):
 
 @njit(cache=True, error_model="numpy")
 def joint_forces(numbers, t, q, v, f):
-    """Add the joints' forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
+    """Add the forces on all joints of a cut vehicle to ``f``. For callbacks: all arguments but the time (s) are
+    pointers to doubles."""
     head = array(numbers, (HEADER,))
     n, e, h = int(head[JOINTS]), int(head[ELEMENTS]), int(head[HUBS])
     m = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION))
@@ -334,8 +343,8 @@ def joint_forces(numbers, t, q, v, f):
 
 @njit(cache=True, error_model="numpy")
 def set_joint_forces(block, t, n):
-    """Set ``f`` to the forces of ``joint_forces``. All data are in one block of doubles at an address: f, q and v (n,),
-    then the table."""
+    """Set ``f`` to the forces of ``joint_forces``. All data lie in one block of doubles at a memory address: f, q and v
+    (n,), then the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

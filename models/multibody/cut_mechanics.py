@@ -1,4 +1,4 @@
-"""Bodies on joints in space, compiled: where they are, their mass matrix and what they lack for free motion.
+"""Kinematics and mass matrix of bodies on joints in space, compiled, with the accelerations that remain when q'' = 0.
 
 Row j + 1 of ``m`` describes what is behind joint j, row 0 the ground: rotation (rows), place of its origin, axis of
 the joint, angular velocity, and of acceleration and angular acceleration what is there without any q''. Jourdain's
@@ -12,16 +12,19 @@ from models.machine.stack import array, doubles
 from models.multibody.tree import add, cross, dot, plus, put, three, times
 
 PARENT, TURNS, AXIS, OFFSET, PER_JOINT = 0, 1, 2, 3, 6
-"""Numbers of a joint: the one below it (-1: the ground), whether it turns, its axis, where it is on what is below."""
+"""Indices of the numbers of a joint: its parent joint (-1: the ground), whether it rotates, its axis, its position on
+the parent body."""
 LAST, MASS, ARM, INERTIA, PER_BODY = 0, 1, 2, 5, 14
-"""Numbers of a body: the joint that carries it, kg, its centre (m) from there, its inertia about that (kg m^2)."""
+"""Indices of the numbers of a body: the joint that carries it, mass (kg), position of its centre (m) from that joint,
+inertia about its centre (kg m^2)."""
 TURNED, PLACE, ALONG, OMEGA, REST, TURN_REST, PER_MOTION = 0, 9, 12, 15, 18, 21, 24
-"""Of a row of ``m``; its rotation comes first, as the rows of ``turned`` do."""
+"""Indices of the numbers in a row of ``m``: rotation matrix, position, joint axis, angular velocity, and linear and
+angular acceleration without the q'' terms."""
 
 
 @lean
 def turned(matrix, vector):
-    """Product of a matrix and a vector; the matrix is the first nine numbers of ``matrix``, row by row.
+    """Product of a matrix (3, 3) and a vector (3,); the matrix is the first nine numbers of ``matrix``, row by row.
 
     With a row of ``m`` it turns a vector from the body's axes to those of space.
     """
@@ -30,7 +33,8 @@ def turned(matrix, vector):
 
 @lean
 def move(joints, q, v, m):
-    """Fill ``m`` (n + 1, PER_MOTION) with the motion behind each joint, from coordinates and rates (n,)."""
+    """Fill ``m`` (n + 1, PER_MOTION) with the motion of the body behind each joint, from joint coordinates and rates
+    (n,)."""
     m[0, :] = 0.0
     m[0, TURNED] = m[0, TURNED + 4] = m[0, TURNED + 8] = 1.0
     for j in range(len(joints)):
@@ -76,7 +80,7 @@ def locate(link, arms, i):
 
 @lean
 def column(turns, link, place):
-    """Velocity of a point at ``place`` per unit rate of a joint that carries the point (a row of ``m``)."""
+    """Velocity of a point at ``place`` per unit rate of a joint below it; ``link`` is the joint's row of ``m``."""
     along = three(link, ALONG)
     if turns == 0.0:
         return along
@@ -98,16 +102,16 @@ def add_wrench(joints, m, last, place, force, moment, out):
 
 @lean
 def accelerated(link, arm, gravity):
-    """Acceleration without the q'' terms of a point, less that of free fall; ``arm`` : from the origin of a row of
-    ``m``."""
+    """Acceleration of a body's point without the q'' terms, minus that of free fall; ``arm`` : from the origin of a row
+    of ``m``."""
     omega, rest = three(link, OMEGA), (link[REST], link[REST + 1], link[REST + 2] + gravity)
     return plus(plus(rest, cross(omega, cross(omega, arm))), cross(three(link, TURN_REST), arm))
 
 
 @lean
 def resting(link, body, gravity, tensor):
-    """A body's arm in space, and its acceleration and rate of angular momentum without the q'' terms; its inertia in
-    space is written to ``tensor``."""
+    """Arm to a body's centre in space, and the centre's acceleration and the rate of angular momentum, both without the
+    q'' terms. Writes the body's inertia in space to ``tensor``."""
     for i in range(3):
         for j in range(3):
             tensor[3 * i + j] = 0.0  # R T R^T
@@ -120,7 +124,7 @@ def resting(link, body, gravity, tensor):
 
 @lean
 def inertia(joints, bodies, m, gravity, mass, force):
-    """Write the mass matrix (n, n), and add weights and inertia forces without the q'' terms to ``force`` (n,)."""
+    """Write the mass matrix (n, n), and add weights, and inertia forces without the q'' terms, to ``force`` (n,)."""
     n = len(joints)
     mass[:] = 0.0
     chain, rows, tensor = array(doubles(n), (n,)), array(doubles(9 * n), (n, 9)), array(doubles(9), (9,))
@@ -149,8 +153,8 @@ def inertia(joints, bodies, m, gravity, mass, force):
 
 @lean
 def solve(matrix, sides):
-    """Solve the linear system for each row of ``sides`` (k, n) in place; the positive definite matrix is replaced by
-    its Cholesky factor."""
+    """Solve the linear system in place for each right-hand side, a row of ``sides`` (k, n). The positive definite
+    matrix is replaced by its Cholesky factor."""
     n = len(matrix)
     for i in range(n):
         for j in range(i + 1):

@@ -1,4 +1,4 @@
-"""Section forces and motion inside a cut vehicle along a run, compiled: springs, guides of bodies, hubs, points.
+"""Section forces and accelerations inside a vehicle loaded at its wheel hubs, evaluated along a run, compiled.
 
 A row of answers, in this order: force and travel of every element; position, heading, pitch, roll of the chassis and
 its angular velocity in its own axes; the stabiliser's moments; force and moment that each guide exerts on its body;
@@ -51,14 +51,16 @@ from models.multibody.tree import out as into
 from models.vehicles.cut_vehicle import ROLL
 
 ELEMENT, CHASSIS_ROW, MOMENTS, POINT = 2, 9, 2, 3
-"""Numbers of an element, the chassis, the stabiliser and a point in a row of answers; a guide and a hub have WRENCH."""
+"""Count of numbers that each element, the chassis, the stabiliser and each point has in a row of section results; a
+guide and a hub have WRENCH."""
 JOINT, POINT_ARM, WEIGHT, PER_POINT = 0, 1, 4, 5
-"""Of a point: the joint that carries it, where it is from there (m), how much of gravity is felt."""
+"""Indices of the numbers of a point: the joint that carries it, its position from there (m), the share of gravity that
+a sensor there measures."""
 
 
 class FeltPlaces(NamedTuple):
-    """Places inside a vehicle of b bodies, h hubs and e elements at which section forces or accelerations are
-    evaluated.
+    """Guided bodies, hubs and points of a vehicle (b bodies, h hubs, e elements) at which section forces or
+    accelerations are evaluated.
 
     guides (g,) : last joint of each guided body; carried (g, b + h + 3 e) : whether what acts on bodies, hubs, both
     ends and the frame of elements acts behind it; points (p, PER_POINT).
@@ -71,8 +73,8 @@ class FeltPlaces(NamedTuple):
 
 @lean
 def _accelerate(joints, m, last, qdd, place, a):
-    """Acceleration of a point at ``place``, carried by joint ``last``, and the angular acceleration there. ``a`` is its
-    acceleration without the q'' terms."""
+    """Acceleration of a point at ``place`` on the body of joint ``last``, and that body's angular acceleration. ``a``
+    is the point's acceleration without the q'' terms."""
     j, turning = last, (0.0, 0.0, 0.0)
     while j >= 0:
         link, turns = m[j + 1], joints[j, TURNS]
@@ -84,7 +86,7 @@ def _accelerate(joints, m, last, qdd, place, a):
 
 @lean
 def _move_bodies(joints, bodies, m, gravity, qdd, acting):
-    """Write, for each body, the force and moment (9 numbers in all) that accelerate it and carry its weight.
+    """Write, for each body, the force and moment that accelerate it and carry its weight (9 numbers in all).
 
     These are the point of action, the force, and the moment about that point.
     """
@@ -101,7 +103,7 @@ def _move_bodies(joints, bodies, m, gravity, qdd, acting):
 
 @lean
 def _load_hubs(head, hubs, m, wrenches, acting):
-    """Write position, force and moment of each hub's load, with negative sign because it acts from outside."""
+    """Write position, force and moment of each hub's load, with negative sign because the load acts from outside."""
     for i in range(len(hubs)):
         hub, row, body_frame = hubs[i], acting[i], m[frame(head, hubs[i])]
         put(row, 0, locate(m[int(hub[LAST]) + 1], hub, ARM))
@@ -111,8 +113,8 @@ def _load_hubs(head, hubs, m, wrenches, acting):
 
 @lean
 def _load_elements(elements, m, inside, acting, travels):
-    """Write for every element the positions and forces at both ends, and the couple on the body of its axis, with
-    negative sign; also its travel."""
+    """Write for every element the positions and forces at both ends, and the couple on the body in which its axis is
+    fixed, all with negative sign. Also writes its travel."""
     for i in range(len(elements)):
         e = elements[i]
         axis = turned(m[int(e[AXIS_JOINT]) + 1], three(e, AXIS))
@@ -132,7 +134,8 @@ def _load_elements(elements, m, inside, acting, travels):
 
 @lean
 def _sum_up(acting, carried, point):
-    """Resultant force, and moment about a point, of all loads on the carried bodies."""
+    """Resultant force, and moment about ``point``, of all loads on the bodies behind a guide (nonzero in
+    ``carried``)."""
     force = moment = 0.0, 0.0, 0.0
     for i in range(len(acting)):
         if carried[i] != 0.0:
@@ -145,7 +148,7 @@ def _sum_up(acting, carried, point):
 
 @lean
 def _feel_point(joints, m, point, gravity, qdd):
-    """Acceleration of a point, in the axes of the body that carries it."""
+    """Acceleration (3,) that an accelerometer at a point measures, in the axes of the body that carries the point."""
     last = int(point[JOINT])
     link = m[last + 1]
     arm = turned(link, three(point, POINT_ARM))
@@ -155,7 +158,7 @@ def _feel_point(joints, m, point, gravity, qdd):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def section_answers(numbers, every, states, places, own_axes, out):
-    """Write answers (n, all) of states (n, 2 c), ``every`` half steps apart from time 0 on.
+    """Write the section results (n, all) of states (n, 2 c) that are ``every`` half steps apart from time 0 on.
 
     places : ``FeltPlaces``; own_axes : whether guides and hubs are given in the axes of what they carry instead of the
     chassis'.
@@ -197,7 +200,7 @@ def section_answers(numbers, every, states, places, own_axes, out):
 
 @lean
 def _written(frame, force, moment, row, at):
-    """Write force and moment, given in space, in the axes of a row of ``m``; returns the index for the next values."""
+    """Write force and moment, given in space, in the axes of a row of ``m``. Returns the index after them."""
     put(row, at, into(frame, force, 0))
     put(row, at + 3, into(frame, moment, 0))
     return at + WRENCH

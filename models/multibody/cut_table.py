@@ -1,4 +1,5 @@
-"""The table that the compiled forces of a cut vehicle read: its bodies, springs and hubs, and the inputs over time."""
+"""Table of numbers that the compiled forces of a cut vehicle read: its bodies, springs and hubs, and the inputs over
+time."""
 
 import itertools
 from dataclasses import dataclass, replace
@@ -15,7 +16,8 @@ from models.vehicles.spatial import Vector
 
 @dataclass(frozen=True)
 class HubInputs:
-    """Inputs at the hubs of a cut vehicle and of its stabiliser, at half steps: rows i at the time i step / 2.
+    """Measured loads at the wheel hubs of a cut vehicle, and its prescribed roll and pitch, at half steps: row i is at
+    the time of i / 2 steps.
 
     hubs : (m, 6 h), force (N) and moment (N m) of each hub in ``frame``, "hub", "body" or "inertial"; or, on a road,
         (m, 2 h), heights (m) under the hubs, then their rates (m/s), for a vehicle that travels at ``speed`` (m/s)
@@ -44,21 +46,21 @@ class HubInputs:
         return self.hubs if self.guide is None else np.hstack([self.hubs, self.guide])
 
     def spans(self) -> list[tuple[int, int]]:
-        """First and last step of each time span in which the hubs' forces are constant, in order."""
+        """First and last step of each time span in which the hub forces are constant, in order of time."""
         begins = self.hubs[:-1:2]
         changes = np.flatnonzero((begins[1:] != begins[:-1]).any(axis=1)) + 1
         ends = [0, *changes.tolist(), len(begins)]
         return list(itertools.pairwise(ends))
 
     def during(self, first: int, last_step: int) -> "HubInputs":
-        """The hub inputs of one span of steps; its time starts at 0."""
+        """Hub inputs of the steps from ``first`` to ``last_step`` alone; their time starts at 0."""
         hubs = np.repeat(self.hubs[2 * first : 2 * first + 1], 2 * (last_step - first) + 1, axis=0)
         return replace(self, hubs=hubs, guide=None if self.guide is None else self.guide[2 * first : 2 * last_step + 1])
 
 
 @dataclass(frozen=True)
 class Joints:
-    """Table of the joints of a cut vehicle, and for every body the index of its ``last`` joint and the position (m) of
+    """Joint table of a cut vehicle. For every body by name: the index of its ``last`` joint, and the position (m) of
     that joint."""
 
     rows: np.ndarray
@@ -67,7 +69,8 @@ class Joints:
 
 
 def joints(vehicle: CutVehicle) -> Joints:
-    """Joints in the order of the coordinates; all joints of a body have the same position, that of the first."""
+    """Joint table of a cut vehicle, in the order of its coordinates. All joints of a body have the same position, that
+    of the first."""
     kind, below, *arm = free_joints(vehicle.tree).T
     anchors = {body.name: anchor(vehicle.tree, body.name) for body in vehicle.tree.bodies}
     rows = np.column_stack([below, kind >= 3, kind % 3, *arm])
@@ -76,7 +79,7 @@ def joints(vehicle: CutVehicle) -> Joints:
 
 
 def table(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> np.ndarray:
-    """Table of all numbers for a run with a step (s)."""
+    """Table of all numbers that the compiled forces of a cut vehicle read, for a run with a step (s)."""
     joined = joints(vehicle)
     bodies = []
     for body in (body for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)):
@@ -107,7 +110,8 @@ def table(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> np.ndarray
 
 
 def _put_curves(vehicle: CutVehicle, rows: np.ndarray, first: int) -> np.ndarray:
-    """Numbers of all curves. The position of each, counted from ``first``, is also written into its element's row."""
+    """Numbers of all force curves. The position of each curve, counted from ``first``, is also written into its
+    element's row."""
     placed = list[float]()
     for row, element in zip(rows, vehicle.elements, strict=True):
         for column, curve in ((kernel.ON_TRAVEL, element.travel_force), (kernel.ON_RATE, element.rate_force)):
@@ -127,7 +131,7 @@ def _element(e: Element, joined: Joints) -> list[float]:
 
 
 def _hub(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
-    """Numbers of a hub, including its former tyre."""
+    """Numbers of a wheel hub, including those of the tyre that was on it."""
     tyre = vehicle.uncut.tyres[i]
     side = next((force for force in vehicle.uncut.side_forces if force.name == tyre.name), None)
     law = (tyre.stiffness, tyre.damping, side.stiffness if side else 0.0, side.roll_steer if side else 0.0)

@@ -1,4 +1,4 @@
-"""Compiled forces on every coordinate of a free vehicle: springs, bars, tyres, drag and the torques on its wheels.
+"""Compiled generalised forces of a free vehicle: springs, bars, tyres, drag and the torques on its wheels.
 
 Weights and inertia are the engine's. A vehicle's numbers are one table of doubles, as ``numbers`` packs them: head,
 coordinates, points, spring-dampers and bars, tyres, controls, waves of the road, net of the patch, curves. What is
@@ -72,13 +72,13 @@ from models.tyre.bristles import FIRST_FLEXIBILITY, tyre_forces
     OF_STRIPS,
     HEADER,
 ) = range(23)
-"""Head: count of all numbers; how many coordinates, points, parts, tyres, knots of a control (three), waves; the
-chassis' last coordinate; drag (N s^2/m^2) and its place from there; cells, strips and middle of the net; where each
-begins."""
+"""Indices in the head of the table: count of all numbers; counts of coordinates, points, springs and bars, tyres, knots
+of a control (three controls), road waves; the chassis' last coordinate; drag (N s^2/m^2) and its point of action from
+there; cells, strips and middle of the tyre patch's grid; where each section of the table begins."""
 STEER, BRAKE, DRIVE, FIRST_PUSH = range(4)
 PUSHED_BY, PUSHED_AT, PUSH_AXIS, PER_PUSH = 0, 1, 4, 7
-"""Of a push from outside: the coordinate that moves its body last, its place from there (m), its axis in the frame of
-the carrier. These rows, and then their count, stand before the controls, the last of which are their forces (N)."""
+"""Indices of the numbers of an external push: the last coordinate of the pushed body, the point of action from there
+(m), the direction in the axes of the carrier."""
 (
     KNUCKLE,
     ROTOR,
@@ -100,26 +100,27 @@ the carrier. These rows, and then their count, stand before the controls, the la
     TOWED,
     PER_TYRE,
 ) = range(19)
-"""Numbers of a tyre: coordinates of its wheel and of its spin (-1: fixed); its point; height of that at rest (m); F0
-(N), k_z, c_z; R, b (m), k (N/m^3), mu; shares of steering, brake and drive; inclination (rad); spin (rad/s) at which
-the brake's torque is whole; last coordinate of what carries it, the chassis or a towed body, and whether it is towed:
-then the wheel keeps to the heading of that body's x axis, else to the carrier's."""
+"""Indices of the numbers of a tyre: coordinates of its wheel and of its spin (-1: fixed); its point; height of that at
+rest (m); F0 (N), k_z, c_z; R, b (m), k (N/m^3), mu; shares of steering, brake and drive; inclination (rad); spin
+(rad/s) at which the brake's torque is fully developed; last coordinate of the chassis or towed body that carries the
+wheel, and whether that is a towed body: then the wheel keeps to the heading of that body's x axis, else to the
+carrier's."""
 (PRESS, FX, FY, MZ, SLIP_X, SLIP_Y, TREAD, TURN, POWER, STEER_MOMENT, ANGLE, SPIN_TORQUE, REPORTED) = range(13)
-"""Columns of a tyre's report: load (N), creep forces and moment on it in its own axes, slip velocities along and
-across (m/s), speed of the tread (m/s), turning (1/s), their power (W), moment about the steering axis (N m), steer
-angle (rad), torque on the wheel by brake and drive (N m)."""
+"""Columns of a tyre's report: load (N), creep forces and moment on it in its own axes, slip velocities along and across
+(m/s), speed of the tread (m/s), rate of turning (1/s), power of the creep forces (W), moment about the steering axis (N
+m), steer angle (rad), torque on the wheel by brake and drive (N m)."""
 POTENTIAL, DISSIPATED, TORQUE_POWER, STEER_POWER, LEDGER = range(5)
-"""Columns of the ledger: energy of springs and tyres (J); power (W) of dampers, friction, tyres' dampers, drag and
-pushes; of brakes and drive on wheels; of the steering on the wheels."""
+"""Columns of the energy ledger: energy of springs and tyres (J); power (W) of dampers, friction, tyres' dampers, drag
+and pushes; of brakes and drive on wheels; of the steering on the wheels."""
 CENTRE, DOWN, ROLLING, ACROSS, NORMAL, AXLE, LOADING, PASSING, WAY = *range(0, 24, 3), 24
-"""Of a wheel's way: its centre, the arm from there to the contact, axes along, across and normal to the road, axle,
-force of its load, velocity of its centre (3 each)."""
+"""Indices of the geometry of a wheel's contact: its centre, the arm from there to the contact, axes along, across and
+normal to the road, axle, force of its load, velocity of its centre (3 each)."""
 
 
 @lean
 def control(numbers, first, which, count, t):
-    """Value and rate of a control at a time (s). Its rate is 0 at every knot; between knots it follows the smoothest
-    polynomial of degree 5."""
+    """Value and rate (per s) of a steering, brake, drive or push control at a time (s). Its rate is 0 at every knot;
+    between knots it follows the smoothest polynomial of degree 5."""
     knots = numbers[first + 2 * which * count :]
     if t <= knots[0]:
         return knots[count], 0.0
@@ -134,7 +135,7 @@ def control(numbers, first, which, count, t):
 
 @lean
 def height(waves, count, x, y):
-    """Height (m) of the road at a place (m) and its slopes along x and y: a sum of plane waves."""
+    """Height (m) of the road at x, y (m), and its slopes along x and y: a sum of plane waves."""
     z = along = across = 0.0
     for i in range(0, 4 * count, 4):
         phase = waves[i] * x + waves[i + 1] * y
@@ -148,7 +149,8 @@ def height(waves, count, x, y):
 
 @lean
 def _axle(steer, inclined):
-    """Unit vector along the axle, to the left, of a wheel that is steered and inclined."""
+    """Unit vector along the axle, to the left, of a wheel at steer angle ``steer`` and inclination ``inclined``
+    (rad)."""
     cosine, sine, level, lean_of = 1.0, 0.0, 1.0, 0.0
     if steer != 0.0:
         cosine, sine = math.cos(steer), math.sin(steer)
@@ -159,7 +161,8 @@ def _axle(steer, inclined):
 
 @lean
 def _turned_to(link, axle):
-    """Rotate an axle in the road's plane, from the carrier's heading to the heading of a link's x axis."""
+    """Axle of a towed body's wheel, rotated in the road's plane from the carrier's heading to the heading of the x axis
+    of ``link``."""
     x, y, _ = three(link, TURNED)
     level = math.sqrt(x * x + y * y)
     return (x * axle[0] - y * axle[1]) / level, (y * axle[0] + x * axle[1]) / level, axle[2]
@@ -167,7 +170,8 @@ def _turned_to(link, axle):
 
 @lean
 def _road_under(waves, count, frame, place):
-    """Height (m) of the road, and the vector (-dz/dx, -dz/dy, 1), at a position (m) given in the carrier's axes."""
+    """Height (m) of the road, and its upward normal (-dz/dx, -dz/dy, 1), under a position (m) given in the carrier's
+    axes."""
     x, y = in_space(frame, place)
     zeta, dx, dy = height(waves, count, x, y)
     return zeta, (-(frame.cosine * dx + frame.sine * dy), frame.sine * dx - frame.cosine * dy, 1.0)
@@ -175,8 +179,8 @@ def _road_under(waves, count, frame, place):
 
 @lean
 def _load(tyre, deflection, rising, ledger):
-    """Load (N) of a tyre whose deflection (m) counts from rest, and which rises (m/s); its energy is added to the
-    ledger."""
+    """Vertical load (N) of a tyre whose deflection (m) counts from rest and whose centre rises from the road at
+    ``rising`` (m/s). Adds its energy and power to the ledger."""
     elastic = max(tyre[STATIC] + tyre[VERTICAL] * deflection, 0.0)
     load = max(elastic - tyre[VISCOUS] * rising, 0.0) if elastic > 0.0 else 0.0
     ledger[POTENTIAL] += 0.5 * elastic * elastic / tyre[VERTICAL]
@@ -186,7 +190,7 @@ def _load(tyre, deflection, rising, ledger):
 
 @lean
 def touch(tyre, waves, count, steer, steering, vehicle, wheel):
-    """Contact of a tyre with a road of ``count`` waves: fills load, position and sliding velocity of the
+    """Contact of a tyre with a road of ``count`` waves: fills load, position and sliding velocity in the
     ``WheelContact``.
 
     steer, steering : the wheel's angle (rad) and its rate; vehicle : ``MovingVehicle``.
@@ -232,7 +236,8 @@ def touch(tyre, waves, count, steer, steering, vehicle, wheel):
 
 @lean
 def creep(tyre, creeping, vehicle, wheel):
-    """Add a tyre's load, creep forces and moment (3,) to its wheel; the moment about the axle accelerates the spin."""
+    """Add a tyre's load, creep forces and creep moment (3,) to its wheel; the moment about the axle accelerates the
+    spin."""
     way, report, ground = wheel.way, wheel.report, vehicle.tree.ground
     knuckle, rotor, axle = row(vehicle.tree.links, PER_LINK, int(tyre[KNUCKLE])), int(tyre[ROTOR]), three(way, AXLE)
     force = plus(times(three(way, ROLLING), creeping[0]), times(three(way, ACROSS), creeping[1]))
@@ -251,7 +256,8 @@ def creep(tyre, creeping, vehicle, wheel):
 
 @lean
 def turn_wheel(tyre, braking, driving, vehicle, wheel):
-    """Torque (N m) of brake and drive on one wheel; the opposite torque acts on the body that carries the wheel."""
+    """Add the torque (N m) of brake and drive to a wheel's spin, and the opposite torque to the body that carries the
+    wheel."""
     rotor, axle, report = int(tyre[ROTOR]), three(wheel.way, AXLE), wheel.report
     report[SPIN_TORQUE] = 0.0
     if rotor < 0 or (braking == 0.0 and driving == 0.0):
@@ -269,20 +275,20 @@ def turn_wheel(tyre, braking, driving, vehicle, wheel):
 
 @lean
 def _hold(torque, axle, link, carrying):
-    """Transfer a torque about the axle from the link of a wheel's knuckle to the link that carries the wheel."""
+    """Transfer a torque (N m) about the axle from the link of a wheel's knuckle to the link that carries the wheel."""
     add(link, TWISTED, times(axle, -torque))
     add(carrying, TWISTED, times(axle, torque))
 
 
 @lean
 def room(head):
-    """Number of doubles that the workspace for a vehicle's tree needs."""
+    """Number of doubles that the workspace for a vehicle's motion and forces needs."""
     return PER_LINK * int(head[JOINTS]) + PER_SPOT * int(head[POINTS]) + GROUND
 
 
 @lean
 def enter(numbers, q, v, f, room, ledger):
-    """Add the forces of all springs, dampers and bars to ``f`` or to the tree. Returns the ``MovingVehicle``, whose
+    """Start the force evaluation: add the forces of all springs, dampers and bars. Returns the ``MovingVehicle``, whose
     tree lies in ``room``.
 
     numbers : array; q, v, f (n,) and ledger (LEDGER,) : arrays; room : pointer to as many doubles as needed.
@@ -304,8 +310,8 @@ def enter(numbers, q, v, f, room, ledger):
 
 @lean
 def leave(numbers, vehicle):
-    """Add drag, and all forces gathered in the tree, to the vehicle's generalised forces; the power of drag goes into
-    the ledger."""
+    """Finish the force evaluation: add drag, and all forces gathered on bodies and points, to the vehicle's generalised
+    forces. The power of drag goes into the ledger."""
     table, frame, f = start(numbers), vehicle.frame, vehicle.forces
     if numbers[DRAG] != 0.0:
         _drag(numbers, vehicle)
@@ -325,7 +331,7 @@ def leave(numbers, vehicle):
 
 @lean
 def _drag(numbers, vehicle):
-    """Add aerodynamic drag at the chassis' centre, opposite to its motion along the vehicle."""
+    """Add aerodynamic drag (N) at the chassis' centre, against its forward motion."""
     chassis, frame = vehicle.chassis, vehicle.frame
     place = plus(three(chassis, PLACE), out(chassis, numbers, DRAG_X))
     speed = plus(three(chassis, SPEED), cross(three(chassis, TURNING), place))
@@ -337,7 +343,8 @@ def _drag(numbers, vehicle):
 
 @lean
 def _push_from_outside(numbers, t, vehicle):
-    """Add the pushes, whose directions turn with the vehicle's heading."""
+    """Add the forces of all external pushes, whose directions turn with the vehicle's heading, and their power to the
+    ledger."""
     controls, knots, table = int(numbers[OF_KNOTS]), int(numbers[KNOTS]), start(numbers)
     count = int(numbers[controls - 1])
     for i in range(count):
@@ -354,7 +361,8 @@ def _push_from_outside(numbers, t, vehicle):
 
 @lean
 def all_forces(numbers, t, q, v, f, report, ledger):
-    """Add the generalised forces (N, N m) to ``f``; all are arrays, report (tyres, REPORTED), ledger (LEDGER,).
+    """Add the generalised forces (N, N m) of a vehicle on its tyres to ``f``, and fill the tyres' report (tyres,
+    REPORTED) and the energy ledger (LEDGER,).
 
     t : s; q, v : positions and rates of the coordinates (m, rad; m/s, rad/s) in the vehicle's order.
     """
@@ -382,7 +390,8 @@ def all_forces(numbers, t, q, v, f, report, ledger):
 
 @lean
 def forces(numbers, t, q, v, f):
-    """Add the vehicle's forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
+    """Add the generalised forces of a vehicle on its tyres to ``f``. For callbacks: all arguments but the time (s) are
+    pointers to doubles."""
     head = array(numbers, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
     report, ledger = array(doubles(REPORTED * w), (w, REPORTED)), array(doubles(LEDGER), (LEDGER,))
@@ -391,8 +400,8 @@ def forces(numbers, t, q, v, f):
 
 @lean
 def set_forces(block, t, n):
-    """Set ``f`` to the forces of ``forces``. All data are in one block of doubles at an address: f, q and v (n,), then
-    the table."""
+    """Set ``f`` to the forces of ``forces``. All data lie in one block of doubles at a memory address: f, q and v (n,),
+    then the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
@@ -400,7 +409,8 @@ def set_forces(block, t, n):
 
 @lean
 def reports(numbers, times, q, v, forces, ledgers):
-    """Fill reports (m, tyres, REPORTED) and ledgers (m, LEDGER) of states (m, n) at ``times`` (m,)."""
+    """Fill the tyres' reports (m, tyres, REPORTED) and energy ledgers (m, LEDGER) of states (m, n) at ``times``
+    (m,)."""
     f = array(doubles(q.shape[1]), (q.shape[1],))
     f[:] = 0.0
     for i in range(len(times)):

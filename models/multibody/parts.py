@@ -45,15 +45,15 @@ from models.vehicles.spatial import Curve
     FRAME,
     PER_PART,
 ) = (*range(11), 13, 14, 15, 16)
-"""Numbers of a part, as ``SpringDamper`` has them; its travel at rest; a coordinate that adds to it (-1: none), and by
-how much; its points; its axis; where the table has its curves (0: nowhere), count, offset, slope, corners and bends;
-the last coordinate of the body in which its axis is fixed (0: the carrier)."""
+"""Indices of the numbers of a spring or bar, as ``SpringDamper`` has them; its travel at rest; a coordinate that adds
+to its travel (-1: none), and by how much; its points; its axis; where the table has its curves (0: nowhere), count,
+offset, slope, corners and bends; the last coordinate of the body in which its axis is fixed (0: the carrier)."""
 
 
 @lean
 def press(numbers, first, count, links, spots, q, v, f):
-    """Add the forces of all springs, bars and other parts to the spots, or to ``f`` for their own coordinates; returns
-    their energy (J) and power (W).
+    """Add the forces of all springs, dampers and bars to the points they act on, or to ``f`` for a coordinate that adds
+    to a travel. Returns their energy (J) and power (W).
 
     numbers : pointer to the table; first, count : of the parts there. What keeps a part's axis takes up the couple of
     its two forces: a towed body by its link.
@@ -97,8 +97,8 @@ def press(numbers, first, count, links, spots, q, v, f):
 
 @lean
 def on_curve(numbers, argument):
-    """Force of a piecewise linear curve. A pointer leads to its numbers: count, offset, slope, then corners and changes
-    of slope."""
+    """Force of a piecewise linear curve at an argument. ``numbers`` points to the curve: count, offset, slope, then
+    corners and changes of slope."""
     head = row(numbers, 3, 0)
     hinges, force = row(numbers, int(head[0]), 0), head[1] + head[2] * argument
     for i in range(3, len(hinges), 2):
@@ -107,7 +107,7 @@ def on_curve(numbers, argument):
 
 
 def curve_numbers(curve: Curve) -> np.ndarray:
-    """Numbers of a curve, in the order in which ``on_curve`` reads them."""
+    """Numbers of a piecewise linear force curve, in the order in which ``on_curve`` reads them."""
     offset, slope, corners, bends = curve.hinges()
     pairs = [value for pair in zip(corners, bends, strict=True) for value in pair]
     return np.array([3 + len(pairs), offset, slope, *pairs])

@@ -1,4 +1,5 @@
-"""An elliptic patch of bristles that roll through it, in plain numpy: tractions as complex numbers, strip by strip.
+"""Creep forces of a tyre as an elliptic patch of bristles, in plain numpy: tractions as complex numbers, strip by
+strip.
 
 The law of ``models.tyre.bristles`` (Kalker's simplified theory, marched to second order) on a net that is made anew
 here. Pressure is parabolic. In a strip's own scale, tractions by the bound in its middle, a bristle runs from 1 to -1;
@@ -13,11 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 FADING_SPEED = 0.1
-"""Speed (m/s) of the tread below which slip is relative to it, and forces of both directions are mixed."""
+"""Speed (m/s) of the tread below which slip is taken relative to this speed, and the forces of both rolling directions
+are mixed."""
 MARGIN = 1.0 + 2e-15
-"""A bound is a little more than itself where a traction on it is projected."""
+"""Factor by which a traction bound is enlarged where a traction is projected onto it."""
 NEGLIGIBLE_SLIP = 1e-60
-"""Square of a rigid slip that is too small to change the direction of a traction."""
+"""Square of a rigid slip below which it does not change the direction of a traction."""
 LARGEST_EXPONENT = 50.0
 
 
@@ -38,7 +40,8 @@ class Net(NamedTuple):
 
 @cache
 def net(cells: int) -> Net:
-    """Grid with an even number of strips, at least ``cells``, of equal width, and ``cells`` cells in each."""
+    """Grid of a contact patch with an even number of strips of equal width, at least ``cells``, and ``cells`` cells in
+    each."""
     count = cells + cells % 2
     y = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     centre = 1.0 - (2.0 * np.arange(cells) + 1.0) / cells
@@ -51,7 +54,8 @@ def net(cells: int) -> Net:
 
 
 class Patch(NamedTuple):
-    """Patches of tyres, (w,) each: half length and half width (m), load (N), mu, bristles' stiffness (N/m^3)."""
+    """Contact patches of w tyres, each (w,): half length and half width (m), load (N), friction coefficient, stiffness
+    of the bristles (N/m^3)."""
 
     half_length: np.ndarray
     half_width: np.ndarray
@@ -61,7 +65,7 @@ class Patch(NamedTuple):
 
 
 def tyre_forces(patch: Patch, slides: np.ndarray, cells: int) -> np.ndarray:
-    """fx, fy (N) and mz (N m) on tyres (w, 3).
+    """Creep forces fx, fy (N) and moments mz (N m) on w tyres, (w, 3).
 
     slides (w, 4) : velocity on the road along and across (m/s), turning (1/s), speed of the tread (m/s).
     """
@@ -77,13 +81,14 @@ def tyre_forces(patch: Patch, slides: np.ndarray, cells: int) -> np.ndarray:
 
 
 def cornering_factor(cells: int) -> float:
-    """Ratio, near 8/3, of the cornering stiffness without sliding to a^2 b k, as the grid of cells sums it up."""
+    """Ratio, near 8/3, of the cornering stiffness without sliding to a^2 b k (half length a, half width b, bristle
+    stiffness k) on the grid of cells."""
     ones = np.ones(1)
     return -float(tyre_forces(Patch(ones, ones, ones, 1e9 * ones, ones), np.array([[0.0, 1.0, 0.0, 1.0]]), cells)[0, 1])
 
 
 def _rolling(patch: Patch, slides: np.ndarray, speed: np.ndarray, cells: int) -> np.ndarray:
-    """Forces fx, fy and moments mz (w, 3) of tyres that roll forwards."""
+    """Creep forces fx, fy (N) and moments mz (N m), (w, 3), of tyres that roll forwards."""
     of = net(cells)
     a, b = patch.half_length[:, None], patch.half_width[:, None]
     grip, area = patch.mu * patch.load, patch.half_length * patch.half_width
@@ -100,7 +105,8 @@ def _rolling(patch: Patch, slides: np.ndarray, speed: np.ndarray, cells: int) ->
 
 
 def _march(net: Net, slip: np.ndarray, turning: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sums over the cells of each strip: of tractions (complex), and of position times lateral traction.
+    """Sums over the cells of each strip, from the leading edge on: of tractions (complex), and of position times
+    lateral traction.
 
     slip, turning : rigid slip per cell in a strip's middle, along + i across, and its change by the place.
     """
@@ -115,7 +121,7 @@ def _march(net: Net, slip: np.ndarray, turning: np.ndarray) -> tuple[np.ndarray,
 
 
 def _cut(traction: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
-    """Tractions limited to a bound, and flags of those that exceeded it."""
+    """Tractions limited to the friction bound, and flags of those that exceeded it."""
     size = np.abs(traction)
     beyond = size > bound
     return np.where(beyond, bound * traction / np.where(beyond, size, 1.0), traction), beyond
@@ -128,8 +134,8 @@ def _advance(
     turn: np.ndarray,
     bounds: tuple[float, float, float],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Tractions in the next cell, and which bristles slide there; bounds: in that cell, in the one before, and between
-    them."""
+    """Tractions in the next cell, and flags of the bristles that slide there. bounds: in that cell, in the one before,
+    and between them."""
     bound, last, between = bounds
     stuck = tractions_before - w
     after, beyond = _cut(stuck, bound)

@@ -1,4 +1,4 @@
-"""Rigid constraints of a tree of bodies in plain numpy: what they ask of its coordinates, at a state.
+"""Rigid constraints of a tree of bodies in plain numpy: their Jacobian, acceleration terms and violation at a state.
 
 A constraint g(q) = 0 has rows J = dg/dq, and asks J q'' + J' q' = 0 of accelerations. Points kept together: g is the
 vector between them. Axes kept parallel: g are the products of three pairs of axes of both bodies, which must be square
@@ -15,22 +15,24 @@ from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, REST, Bodi
 from models.vehicles.spatial import Vector
 
 Axes = tuple[np.ndarray, np.ndarray]
-"""(3, 3) each: axes of two bodies as columns, as they lie in the design position."""
+"""Axes of two bodies as columns in the design position, (3, 3) each."""
 Joint = tuple[tuple[tuple[str | None, Vector], ...], Axes | None]
-"""Two points of bodies (None: the ground) in the design position, m, and axes that must be parallel."""
+"""Two points of bodies (None: the ground) in the design position, m, that must coincide; and axes that must be
+parallel, or None."""
 SQUARE = ((2, 1), (2, 0), (0, 1))
-"""Axes of the first and of the second body that are square to each other where both turn alike."""
+"""Pairs of axes, one of the first and one of the second body, that are perpendicular where both bodies are oriented
+alike."""
 
 
 class ConstraintTerms(NamedTuple):
-    """Acceleration-level terms of constraints at a state: Jacobian J (c, n), and J' q' (c,)."""
+    """Acceleration-level terms of constraints at a state, J q'' = -J' q': Jacobian J (c, n), and J' q' (c,)."""
 
     rows: np.ndarray
     rest: np.ndarray
 
 
 class Gap(NamedTuple):
-    """Violation (c,) of constraints in m and rad at some coordinates, and its derivative (c, n)."""
+    """Violation (c,) of constraints in m and rad at given coordinates, and its derivative (c, n)."""
 
     size: np.ndarray
     rows: np.ndarray
@@ -46,29 +48,30 @@ class PlainConstraints:
         self._turns = [([bodies.row[name] if name else GROUND for name, _ in ends], axes) for ends, axes in turns]
 
     def asked(self, q: np.ndarray, v: np.ndarray) -> ConstraintTerms:
-        """``ConstraintTerms`` at coordinates and rates (n,)."""
+        """``ConstraintTerms`` of all constraints at coordinates and rates (n,)."""
         motion = self._bodies.move(q, v)
         terms = np.hstack((self._apart(motion), *(_products(*each).T for each in self._turned(motion))))
         rest = np.concatenate((np.zeros(len(self._rows)), terms[REST]))
         return ConstraintTerms(np.vstack((self._rows, terms[FIRST:].T)), rest)
 
     def gap(self, q: np.ndarray) -> Gap:
-        """``Gap`` at coordinates (n,). Between axes it is the rotation vector, which vanishes only where the axes
-        coincide."""
+        """Violation of all constraints at coordinates (n,). Between axes it is the rotation vector, which vanishes only
+        where the axes coincide."""
         motion = self._bodies.move(q, np.zeros_like(q))
         apart, turned = self._apart(motion), [rotation(*each) for each in self._turned(motion)]
         size = np.concatenate((self._rows @ q - self._offsets, apart[PLACE], *(each.size for each in turned)))
         return Gap(size, np.vstack((self._rows, apart[FIRST:].T, *(each.rows for each in turned))))
 
     def _apart(self, motion: PlainMotion) -> np.ndarray:
-        """Vectors between the points of p constraints, with their rates and derivatives, (3 + n, 3 p), rows as in a
-        ``PlainMotion``."""
+        """Vectors between the two points of each of p constraints, with their rates and derivatives, (3 + n, 3 p), rows
+        as in a ``PlainMotion``."""
         ends = motion.at(self._ends)
         apart: np.ndarray = (ends[1::2] - ends[::2]).transpose(1, 0, 2).reshape(len(motion.matrices[0]), -1)
         return apart
 
     def _turned(self, motion: PlainMotion) -> Iterator[list[np.ndarray]]:
-        """Axes of both bodies of each joint as columns, with their rates and derivatives, (3 + n, 3, 3) each."""
+        """Axes of both bodies of each joint as columns, with their rates and derivatives, (3 + n, 3, 3) for each
+        body."""
         for rows, axes in self._turns:
             yield [motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True)]
 
@@ -93,8 +96,8 @@ def rotation(first: np.ndarray, second: np.ndarray) -> Gap:
 
 
 def turning_rows(axes: np.ndarray) -> np.ndarray:
-    """Jacobian (3, n) from the coordinates' rates to a body's angular velocity in space, from the body's axes in a
-    motion."""
+    """Jacobian (3, n) from the coordinates' rates to a body's angular velocity in space; ``axes`` : the body's axes in
+    a ``PlainMotion``."""
     return _spins(axes[FIRST:] @ axes[PLACE].T)
 
 

@@ -1,4 +1,4 @@
-"""A vehicle that is cut at its wheels, driven by hub forces or by its tyres on a road, in plain numpy.
+"""A vehicle without its wheels, loaded by hub forces or by its tyres on a road, in plain numpy.
 
 The laws of ``models.multibody.cut_kernel`` anew: springs and bars from the vehicle that was cut, not from its
 elements; preloads from ``statics``; moments as couples; what enforces roll and pitch from one linear system.
@@ -22,8 +22,8 @@ REPORTED = ("inside", "wrenches", "moments")
 
 
 class HubState(NamedTuple):
-    """Accelerations (n,), forces of springs and bars (p,), wrenches (h, 6) in the frame of the hub inputs, moments (2,)
-    that hold roll and pitch, at one state."""
+    """Accelerations (n,), forces of springs and bars (p,), wrenches (h, 6) in the frame of the hub inputs and moments
+    (2,) that stabilise roll and pitch, at one state."""
 
     acceleration: np.ndarray
     inside: np.ndarray
@@ -32,8 +32,8 @@ class HubState(NamedTuple):
 
 
 class PlainHubs:
-    """A cut vehicle driven by its hub inputs, in plain numpy. ``step`` (s) covers two intervals between rows of the
-    inputs.
+    """Equations of motion of a vehicle loaded at its wheel hubs, in plain numpy. ``step`` (s) covers two intervals
+    between rows of the inputs.
 
     any_time : whether the hub inputs are read between its rows, too, for methods that pick their own steps.
     """
@@ -55,7 +55,7 @@ class PlainHubs:
         self._frames = frames.get(hub_inputs.frame, np.full(len(tyres), GROUND))
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray) -> HubState:
-        """State, forces and accelerations at a time (s), coordinates and rates (n,)."""
+        """Accelerations, forces and moments at a time (s), coordinates and rates (n,)."""
         hubs, guide = self._inputs(t)
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self._weight)
@@ -68,8 +68,8 @@ class PlainHubs:
         return HubState(acceleration, inside, wrenches, moments)
 
     def _inputs(self, t: float) -> tuple[np.ndarray, np.ndarray | None]:
-        """Inputs of the hubs and of the guide at a time (s): the nearest rows, or a parabola through the three rows of
-        a step."""
+        """Rows of the hub inputs and of the prescribed roll and pitch at a time (s): the nearest rows, or a parabola
+        through the three rows of a step."""
         last, place = len(self.hub_inputs.hubs) - 1, 2.0 * t / self.step
         if not self.any_time:
             nearest = min(max(round(place), 0), last)
@@ -96,7 +96,7 @@ class PlainHubs:
         return tuple(np.array([getattr(row, name) for row in rows]) for name in REPORTED)  # type: ignore[return-value]
 
     def _act(self, motion: PlainMotion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Generalised forces (n,) of all hubs for one row of the inputs, and the hubs' wrenches (h, 6)."""
+        """Generalised forces (n,) of all hubs for one row of the hub inputs, and the hubs' wrenches (h, 6)."""
         points, total, wrenches = motion.at(self._hubs), np.zeros(self.bodies.size), np.empty((len(self.loads), WRENCH))
         for i, (point, frame) in enumerate(zip(points, self._frames, strict=True)):
             axes = motion.axes(int(frame))[PLACE]
@@ -112,7 +112,8 @@ class PlainHubs:
     def _tyre(
         self, i: int, hub: np.ndarray, motion: PlainMotion, road: tuple[float, float], q: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Force (N) and moment (N m) in space on a hub from its tyre, on a road with height (m) and rate (m/s)."""
+        """Force (N) and moment (N m), in space, on hub i from its tyre, on a road with height (m) and vertical velocity
+        (m/s)."""
         tyre, (cornering, roll_steer), speed = self.vehicle.uncut.tyres[i], self._sides[i], self.hub_inputs.speed
         height, rising = road
         down = -tyre.point[2] * motion.axes(self._chassis)[PLACE][:, 2]
@@ -129,8 +130,8 @@ class PlainHubs:
     def _guide_accelerations(
         self, mass: np.ndarray, force: np.ndarray, guide: np.ndarray | None, q: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,), and moments (2,) on roll and pitch in N m that pull the vehicle towards its guide or hold
-        it there."""
+        """Accelerations (n,), and moments (2,) on roll and pitch in N m that pull the vehicle towards its prescribed
+        angles or enforce them."""
         hub_inputs, moments = self.hub_inputs, np.zeros(2)
         if guide is None:
             return np.linalg.solve(mass, force), moments

@@ -1,4 +1,4 @@
-"""A tree of bodies under weights, loads and what acts along its coordinates: mass matrix and forces in plain numpy.
+"""A tree of bodies under gravity, loads, springs, friction and joint elements: mass matrix and forces in plain numpy.
 
 Nothing here is shared with an engine or with the compiled kernels: bodies move by products of matrices (``motion``).
 """
@@ -13,19 +13,24 @@ from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, Bodies, Pl
 from models.vehicles.spatial import SpatialVehicle, Vector
 
 Line = tuple[tuple[tuple[str | None, Vector], ...], float, float, float]
-"""Two points of bodies (None: the ground) in the design position; N/m, N s/m and m of a spring along their line."""
+"""Spring-damper along the line between two points: points on bodies (None: the ground) in the design position, N/m, N
+s/m, length at rest (m)."""
 Follower = tuple[str, Vector, np.ndarray, np.ndarray]
-"""A body, a point (m) on it in the design position, a force and a moment (3,) in N and N m that turn with it."""
+"""Force and moment (3,) in N and N m that turn with a body: the body, a point (m) on it in the design position, force,
+moment."""
 Turn = tuple[tuple[str | None, str], Axes, float, float]
-"""Two bodies (None: the ground), their axes that are parallel at rest, N m/rad and N m s/rad about all axes."""
+"""Rotational spring-damper: two bodies (None: the ground), their axes that are parallel at rest, N m/rad and N m s/rad
+about all axes."""
 Friction = tuple[int, float, float]
-"""A coordinate's number, its dry friction (N, N m), and the speed (m/s, rad/s) from which it has that force."""
+"""Dry friction of a coordinate: its index, its force (N, N m), and the speed (m/s, rad/s) from which it has that
+force."""
 Load = tuple[str, Vector, np.ndarray]
-"""A body, a point (m) on it in the design position, a force (3,) in N along the axes of space."""
+"""Force on a body with a fixed direction: the body, a point (m) on it in the design position, the force (3,) in N along
+the axes of space."""
 
 
 class Acting(NamedTuple):
-    """Forces on bodies besides gravity and joint elements; any of the lists may be empty."""
+    """Forces on bodies besides gravity and joint elements, by kind; any of the lists may be empty."""
 
     loads: Sequence[Load] = ()
     lines: Sequence[Line] = ()
@@ -38,7 +43,7 @@ NOTHING_ACTS = Acting()
 
 
 def joint_rows(bodies: Bodies, vehicle: SpatialVehicle) -> np.ndarray:
-    """Rows (e, n) of factors of the coordinates in the displacement of each joint element."""
+    """Factors (e, n) of the coordinates in the displacement of each joint element."""
     rows = np.zeros((len(vehicle.joint_elements), bodies.size))
     for row, element in zip(rows, vehicle.joint_elements, strict=True):
         for place, factor in zip(element.coordinates, element.factors, strict=True):
@@ -53,7 +58,7 @@ def joint_numbers(vehicle: SpatialVehicle) -> np.ndarray:
 
 
 class PlainTree:
-    """The bodies and joint elements of a vehicle; gravity (3,) in m/s^2."""
+    """Equations of motion of the bodies and joint elements of a vehicle; gravity (3,) in m/s^2."""
 
     def __init__(self, vehicle: SpatialVehicle, gravity: np.ndarray, elements: Acting = NOTHING_ACTS) -> None:
         self.bodies, self.gravity = Bodies(vehicle), gravity
@@ -90,7 +95,7 @@ class PlainTree:
         return mass + self._rows.T * self._inertia @ self._rows, force
 
     def _line_spring_forces(self, motion: PlainMotion) -> np.ndarray:
-        """Generalised forces (n,) of springs along straight lines: -F dl/dq, with l the distance between their ends."""
+        """Generalised forces (n,) of springs between two points: -F dl/dq, with l the distance between the points."""
         total, ends = np.zeros(self.size), motion.at(self._ends)
         for (_, stiffness, damping, length), first, second in zip(self._lines, ends[::2], ends[1::2], strict=True):
             apart = second - first
@@ -101,8 +106,8 @@ class PlainTree:
         return total
 
     def _turning_resistance(self, turn: Turn, motion: PlainMotion, v: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) against which the relative rotation of two bodies works, from a spring and damper
-        between them."""
+        """Generalised forces (n,) of a rotational spring-damper between two bodies, positive against the direction in
+        which they act."""
         bodies, axes, stiffness, damping = turn
         rows = [self.bodies.row[name] if name else GROUND for name in bodies]
         first, second = (motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True))
@@ -111,7 +116,7 @@ class PlainTree:
         return resistance
 
     def applied(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Applied forces (n,), without inertia forces; their power is the rate of change of kinetic energy."""
+        """Applied forces (n,) without inertia forces; their power is the rate of change of kinetic energy."""
         _, inertia = self.bodies.inertia(self.bodies.move(q, v), np.zeros(3))
         return self.mass_and_force(0.0, q, v)[1] - inertia
 

@@ -1,4 +1,5 @@
-"""A car on brush tyres in plain numpy: what ``models.multibody.forces`` computes, all in the axes of space.
+"""A car on brush tyres in plain numpy, the independent reference to ``models.multibody.forces``; all vectors in the
+axes of space.
 
 Vectors of tyres are rows (w, 3). Everything comes from the vehicle, its tyres, controls, road and pushes; no table of
 numbers is read. The laws are those of the compiled forces, written down anew; the motion is that of ``motion``.
@@ -25,9 +26,9 @@ NEXT, LAST = [1, 2, 0], [2, 0, 1]
 
 
 class TyreReport(NamedTuple):
-    """Report of every tyre (w,): load (N), creep forces (N) and moment (N m) in its axes, slip along and across (m/s),
-    speed of the tread (m/s), turning (1/s), power (W), moment about the steering axis (N m), steer angle (rad), torque
-    on the wheel by brake and drive (N m)."""
+    """Report of all w tyres, each (w,): load (N), creep forces (N) and moment (N m) in the tyre's axes, slip along and
+    across (m/s), speed of the tread (m/s), rate of turning (1/s), power (W), moment about the steering axis (N m),
+    steer angle (rad), torque on the wheel by brake and drive (N m)."""
 
     press: np.ndarray
     fx: np.ndarray
@@ -44,8 +45,8 @@ class TyreReport(NamedTuple):
 
 
 class Ledger(NamedTuple):
-    """Energy of springs and tyres (J); powers (W) of dampers, friction, drag and pushes; of brakes and drive; of the
-    steering on the wheels."""
+    """Energy ledger of a car on tyres: energy of springs and tyres (J); powers (W) of dampers, friction, drag and
+    pushes; of brakes and drive; of the steering on the wheels."""
 
     potential: float
     dissipated: float
@@ -54,7 +55,7 @@ class Ledger(NamedTuple):
 
 
 class State(NamedTuple):
-    """Accelerations (n,) at one state, with the report of the tyres and the ledger of energy."""
+    """Accelerations (n,) of a car on tyres at one state, with the report of the tyres and the energy ledger."""
 
     acceleration: np.ndarray
     tyres: TyreReport
@@ -62,7 +63,7 @@ class State(NamedTuple):
 
 
 class TyreContact(NamedTuple):
-    """Where tyres touch the road, and how they press on it.
+    """Contact points, axes and loads of w tyres on the road.
 
     down (w, 3) : arms from the wheels' centres to the contacts (m); along, across, normal (w, 3) : axes on the road;
     axle (w, 3); loading (w, 3) : forces of the loads; load (w,) along the normal, N; elastic (w,) : its spring's part
@@ -81,7 +82,7 @@ class TyreContact(NamedTuple):
 
 
 class PlainRolling:
-    """A car on the road, driven by its controls."""
+    """Equations of motion of a car on brush tyres, with steering, brake and drive over time."""
 
     def __init__(self, handling: "Handling") -> None:
         self.handling, vehicle = handling, handling.vehicle
@@ -127,7 +128,7 @@ class PlainRolling:
         self._driven = np.where(self._towed, 0.0, driven)
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
-        """State, forces and accelerations at a time (s), positions and rates (n,)."""
+        """Accelerations, tyre report and energy ledger at a time (s), coordinates and rates (n,)."""
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self.handling.gravity)
         travels = self.parts.travels(motion, q, v)
@@ -146,17 +147,19 @@ class PlainRolling:
         return State(np.linalg.solve(mass, force), report, whole)
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) at a time (s), positions and rates (n,)."""
+        """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
         return self.at(t, q, v).acceleration
 
     def report(self, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Reports (m, w, 12) of tyres and ledgers (m, 4), fields in their order, of states (m, n) at times (m,)."""
+        """Reports (m, w, 12) of the tyres and energy ledgers (m, 4), fields in their order, of states (m, n) at times
+        (m,)."""
         states = [self.at(float(t), *state) for t, *state in zip(times, q, v, strict=True)]
         tyres = np.array([np.column_stack(state.tyres) for state in states])
         return tyres, np.array([state.ledger for state in states])
 
     def _roll(self, t: float, motion: PlainMotion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
-        """Generalised forces (n,) of tyres, brakes and drive; the tyres' report, and their part of the ledger."""
+        """Generalised forces (n,) of tyres, brakes and drive; the tyres' report; and the energy ledger of these
+        forces."""
         steer, steering = driven(self.handling.controls.steer, t)
         points, angle = motion.at(self._points), self._steered * steer
         contact = self._loads_and_points(motion, points, angle)
@@ -186,7 +189,7 @@ class PlainRolling:
         return force, report, ledger
 
     def _loads_and_points(self, motion: PlainMotion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
-        """``TyreContact`` with the tyres' loads and contact points on the road; steer (w,), rad."""
+        """Loads, contact points and axes of all tyres on the road; steer (w,), rad."""
         place, speed = points[:, PLACE], points[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
         upwards = np.column_stack([-slope_x, -slope_y, np.ones(len(height))])
@@ -207,7 +210,7 @@ class PlainRolling:
     def _slide(
         self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, steering: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Sliding velocities (w, 4) as ``bristles`` takes them, and spin rates (w,) of the wheels relative to the
+        """Sliding velocities (w, 4), as ``bristles`` takes them, and spin rates (w,) of the wheels relative to the
         bodies that carry them, rad/s.
 
         steering (w,) : rates of steering, rad/s.
@@ -232,7 +235,8 @@ class PlainRolling:
         return axles
 
     def _creep(self, contact: TyreContact, slides: np.ndarray) -> np.ndarray:
-        """Creep forces along and across (N) and moments (N m), (w, 3), from sliding velocities ``slides`` (w, 4)."""
+        """Creep forces along and across (N) and moments (N m), (w, 3), of all tyres from sliding velocities ``slides``
+        (w, 4)."""
         of, ones = self.handling.tyres, np.ones(len(slides))
         half = np.sqrt(self._radius * contact.load / self._stiffness)
         patch = Patch(half, of.half_width * ones, contact.load, of.friction * ones, self._bristles)
@@ -241,8 +245,8 @@ class PlainRolling:
     def _tyre_forces(
         self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Generalised forces (n,) of tyre loads and creep forces, and the moments (w, 3) of creep about the wheels'
-        centres."""
+        """Generalised forces (n,) of tyre loads and creep forces, and the moments (w, 3) of the creep forces about the
+        wheels' centres."""
         force = contact.along * creep[:, [0]] + contact.across * creep[:, [1]]
         moments = _cross(contact.down, force) + contact.normal * creep[:, [2]]
         total = np.tensordot(points[:, FIRST:], force + contact.loading, ((0, 2), (0, 1)))
@@ -256,7 +260,8 @@ class PlainRolling:
         return total, moments
 
     def _hold(self, motion: PlainMotion, i: int, moment: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) when the body that carries wheel i takes over a moment from the wheel's body."""
+        """Generalised forces (n,) when the body that carries wheel i takes over a moment (N m) from the wheel's own
+        body."""
         return motion.by_moment(self._carrying[i], moment) - motion.by_moment(int(self._points.rows[i]), moment)
 
     def _torques(self, t: float, relative_spin: np.ndarray) -> np.ndarray:
@@ -279,7 +284,7 @@ class PlainRolling:
         return total
 
     def _drag_and_pushes(self, t: float, motion: PlainMotion) -> tuple[np.ndarray, float]:
-        """Generalised forces (n,) of drag and pushes, and their power (W)."""
+        """Generalised forces (n,) of aerodynamic drag and external pushes, and their power (W)."""
         heading = motion.axes(self._carrier)[PLACE]
         total, power = np.zeros(self.bodies.size), 0.0
         if self._drag:

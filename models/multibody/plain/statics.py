@@ -14,8 +14,8 @@ from models.vehicles.spatial import SpatialVehicle, SpringDamper
 
 
 def held_at_rest(vehicle: SpatialVehicle, frame: str | None) -> tuple[np.ndarray, np.ndarray]:
-    """Preloads (p,) of springs, then bars, then joint elements (N, N m; positive in compression), and loads (w,) of
-    tyres (N)."""
+    """Preloads (p,) of springs, then bars, then joint elements (N, N m; positive in compression), and static loads (w,)
+    of tyres (N)."""
     bodies = Bodies(vehicle)
     still = np.zeros(bodies.size)
     motion, parts = bodies.move(still, still), PlainParts(bodies, vehicle, frame)
