@@ -39,9 +39,9 @@ def test_held_forces_move_the_centre_of_mass_along_parabolas():
 
 def test_spans_end_where_samples_change_and_the_guide_goes_on():
     hubs = np.repeat([[1.0], [1.0], [2.0], [2.0], [2.0]], 2, axis=0)[:-1]
-    hub_inputs = HubInputs(hubs, guide=np.arange(9.0)[:, None] * np.ones(6), held=True)
-    assert hub_inputs.spans() == [(0, 2), (2, 4)]
-    part = hub_inputs.during(2, 4)
+    hub_inputs = HubInputs(hubs, guide=np.arange(9.0)[:, None] * np.ones(6), constant_in_step=True)
+    assert hub_inputs.constant_force_spans() == [(0, 2), (2, 4)]
+    part = hub_inputs.in_steps(2, 4)
     assert part.hubs.ravel().tolist() == [2.0] * 5 and part.guide[:, 0].tolist() == [4.0, 5.0, 6.0, 7.0, 8.0]
 
 

@@ -20,9 +20,9 @@ class CarrierFrame(NamedTuple):
     sine: float
     x: float
     y: float
-    ahead: float
-    aside: float
-    yawing: float
+    forward_speed: float
+    lateral_speed: float
+    yaw_rate: float
 
 
 class Tree(NamedTuple):
@@ -69,15 +69,15 @@ def carrier_frame(q, v):
 
 
 @lean
-def carried_velocity(frame, place):
+def carried_velocity(frame, position):
     """Velocity (m/s) that the carrier's motion gives to a point at a position (m), both in the carrier's axes."""
-    return frame.ahead - frame.yawing * place[1], frame.aside + frame.yawing * place[0], 0.0
+    return frame.forward_speed - frame.yaw_rate * position[1], frame.lateral_speed + frame.yaw_rate * position[0], 0.0
 
 
 @lean
-def in_space(frame, place):
+def ground_position(frame, position):
     """Position x, y (m) on the ground of a point at a position (m) in the carrier's axes."""
     return (
-        frame.x + frame.cosine * place[0] - frame.sine * place[1],
-        frame.y + frame.sine * place[0] + frame.cosine * place[1],
+        frame.x + frame.cosine * position[0] - frame.sine * position[1],
+        frame.y + frame.sine * position[0] + frame.cosine * position[1],
     )

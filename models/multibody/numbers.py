@@ -151,7 +151,7 @@ def table(handling: Handling) -> np.ndarray:
     ]
     begins = at.HEADER + np.cumsum([0, *(section.size for section in sections)])
     curves = _put_curves(parts, sections[2], int(begins[-1]))
-    joint, place = _place(free, chassis.name, chassis.position)
+    joint, place = _point_position(free, chassis.name, chassis.position)
     drag = handling.given.drags[0].coefficient / 2.0 if handling.given.drags else 0.0
     counts = [
         begins[-1] + curves.size,
@@ -176,37 +176,37 @@ class _Points:
     def number(self, body: str, point: Vector) -> int:
         """Index of a point on a body, given by its position (m) in the design position; a new point is added to the
         list."""
-        joint, place = _place(self.vehicle, body, point)
+        joint, place = _point_position(self.vehicle, body, point)
         row = (float(joint), *place.tolist())
         if row not in self.rows:
             self.rows.append(row)
         return self.rows.index(row)
 
 
-def _joints(vehicle: SpatialVehicle, held: set[float]) -> np.ndarray:
+def _joints(vehicle: SpatialVehicle, loaded_coordinates: set[float]) -> np.ndarray:
     """Table rows of all coordinates, each with the number of coordinates of its body. The rotation of a body that
     carries nothing is marked ``LOOSE``.
 
-    held : coordinates that are the last to move a point where something acts.
+    loaded_coordinates : coordinates that are the last to move a point where something acts.
     """
     rows, counts = joints(vehicle), [len(body.freedoms) for body in vehicle.bodies for _ in body.freedoms]
-    bears = {*rows[:, tree.BELOW], *held}
+    bears = {*rows[:, tree.BELOW], *loaded_coordinates}
     loose = [counts[j] == 1 and row[tree.KIND] >= 3.0 and j not in bears for j, row in enumerate(rows)]
     rows[loose, tree.KIND] = tree.LOOSE
     return np.column_stack([rows, counts]).ravel()
 
 
-def _place(vehicle: SpatialVehicle, body: str, point: Vector) -> tuple[int, np.ndarray]:
+def _point_position(vehicle: SpatialVehicle, body: str, point: Vector) -> tuple[int, np.ndarray]:
     """Index of the last coordinate that moves a point, and the point's position (m) relative to that joint."""
     joint, origin = anchor(vehicle, body)
     return joint, np.subtract(point, origin)
 
 
-_Part = tuple[list[float], tuple[Curve | None, ...]]
+_PartRow = tuple[list[float], tuple[Curve | None, ...]]
 """Numbers of a spring or bar, as ``parts`` reads them, and its curves of force over travel and over rate."""
 
 
-def _springs(handling: Handling, points: _Points) -> Iterator[_Part]:
+def _springs(handling: Handling, points: _Points) -> Iterator[_PartRow]:
     for s in handling.vehicle.springs:
         if s.second_body is None:
             raise InputError(
@@ -219,7 +219,7 @@ def _springs(handling: Handling, points: _Points) -> Iterator[_Part]:
         yield [*law, -1.0, 0.0, *ends, *s.axis, 0.0, 0.0, frame], (s.travel_force, s.rate_force)
 
 
-def _bars(handling: Handling, points: _Points) -> Iterator[_Part]:
+def _bars(handling: Handling, points: _Points) -> Iterator[_PartRow]:
     for bar in handling.vehicle.bars:
         ends = points.number(bar.left, bar.point_left), points.number(bar.right, bar.point_right)
         rest, frame = (
@@ -231,17 +231,17 @@ def _bars(handling: Handling, points: _Points) -> Iterator[_Part]:
         yield [*law, *turns, *ends, 0.0, 0.0, 1.0 / bar.track, 0.0, 0.0, frame], (None, None)
 
 
-def _frame(vehicle: SpatialVehicle, place: str, frame: str | None) -> float:
+def _frame(vehicle: SpatialVehicle, key_path: str, frame: str | None) -> float:
     """Last coordinate of the body in which the axis of a spring or bar is fixed; 0 for the carrier."""
     if frame == CARRIER:
         return 0.0
     if frame not in vehicle.towed:
         allowed = "must be left out, or be a towed body: in handling axes are fixed in the carrier, which only yaws"
-        raise InputError(vehicle.name, f"{place}.frame", frame, allowed, vehicle.towed)
+        raise InputError(vehicle.name, f"{key_path}.frame", frame, allowed, vehicle.towed)
     return float(anchor(vehicle, frame)[0])
 
 
-def _put_curves(parts: list[_Part], rows: np.ndarray, first: int) -> np.ndarray:
+def _put_curves(parts: list[_PartRow], rows: np.ndarray, first: int) -> np.ndarray:
     """Numbers of all force curves. The position of each curve, counted from ``first``, is also written into the row of
     its spring."""
     laid_curves = np.empty(0)
@@ -258,7 +258,7 @@ def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
     stiffness."""
     free, of = handling.vehicle, handling.tyres
     tyre, places = free.tyres[i], free.coordinates()
-    joint, _ = _place(free, tyre.body, tyre.point)
+    joint, _ = _point_position(free, tyre.body, tyre.point)
     load = handling.held.tyres[tyre.name]
     if not load > 0.0:
         raise InputError(free.name, f"tyres[{tyre.name}]", load, "carries no weight: it must press on the road at rest")
@@ -306,7 +306,7 @@ def _pushes(handling: Handling) -> np.ndarray:
     rows = [
         [joint, *place, *push.axis]
         for push in handling.pushes
-        for joint, place in [_place(handling.vehicle, push.body, push.point)]
+        for joint, place in [_point_position(handling.vehicle, push.body, push.point)]
     ]
     return np.array([*np.ravel(rows), len(rows)])
 

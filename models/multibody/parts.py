@@ -51,16 +51,15 @@ offset, slope, corners and bends; the last coordinate of the body in which its a
 
 
 @lean
-def press(numbers, first, count, links, spots, q, v, f):
+def add_part_forces(numbers, offset, part_count, links, spots, q, v, f):
     """Add the forces of all springs, dampers and bars to the points they act on, or to ``f`` for a coordinate that adds
     to a travel. Returns their energy (J) and power (W).
 
-    numbers : pointer to the table; first, count : of the parts there. What keeps a part's axis takes up the couple of
-    its two forces: a towed body by its link.
-    """
+    numbers : pointer to the table; offset, part_count : of the parts there. What keeps a part's axis takes up the
+    couple of its two forces: a towed body by its link."""
     energy = power = 0.0
-    for i in range(count):
-        e = row(beyond(numbers, first), PER_PART, i)
+    for i in range(part_count):
+        e = row(beyond(numbers, offset), PER_PART, i)
         from_spot, to_spot, axis = (
             row(spots, PER_SPOT, int(e[FIRST_POINT])),
             row(spots, PER_SPOT, int(e[SECOND_POINT])),

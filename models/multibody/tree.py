@@ -85,12 +85,12 @@ def outwards(joints, n, q, v, links):
         of = row(joints, PER_JOINT, j)
         count = int(of[COUNT])
         if of[KIND] != LOOSE:
-            _follow(joints, j, j + count, row(links, PER_LINK, int(of[BELOW])), q, v, links)
+            _fill_link(joints, j, j + count, row(links, PER_LINK, int(of[BELOW])), q, v, links)
         j += count
 
 
 @lean
-def _follow(joints, first, end, below, q, v, links):
+def _fill_link(joints, first, end, below, q, v, links):
     """Fill a body's link from its parent's link, and the axes of its coordinates, translations first."""
     x, y, z = three(below, TURNED), three(below, TURNED + 3), three(below, TURNED + 6)
     place, speed = plus(three(below, PLACE), out(below, row(joints, PER_JOINT, first), ARM)), three(below, SPEED)
@@ -104,7 +104,7 @@ def _follow(joints, first, end, below, q, v, links):
             place, speed = plus(place, times(axis, q[j])), plus(speed, times(axis, v[j]))
         else:
             turning, speed = plus(turning, times(axis, v[j])), plus(speed, times(cross(place, axis), v[j]))
-            x, y, z = _turned(along, x, y, z, math.cos(q[j]), math.sin(q[j]))
+            x, y, z = _rotated_axes(along, x, y, z, math.cos(q[j]), math.sin(q[j]))
     link = row(links, PER_LINK, end - 1)
     put(link, TURNED, x)
     put(link, TURNED + 3, y)
@@ -117,7 +117,7 @@ def _follow(joints, first, end, below, q, v, links):
 
 
 @lean
-def _turned(along, x, y, z, cosine, sine):
+def _rotated_axes(along, x, y, z, cosine, sine):
     """Three axes x, y, z after a rotation about the axis with index ``along``."""
     if along == 0.0:
         return x, plus(times(y, cosine), times(z, sine)), plus(times(z, cosine), times(y, -sine))

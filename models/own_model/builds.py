@@ -9,7 +9,7 @@ import numpy as np
 
 from models.engines.free_vehicle import ENGINES, free_model
 from models.engines.native_parts import SLIDES
-from models.multibody.plain.joint_elements import Acting, PlainTree
+from models.multibody.plain.joint_elements import AppliedForces, PlainTree
 from models.own_model.constraints import Rows, by_differences, constrained_forces, plain_constraints
 from models.own_model.coordinates import MujocoState
 from models.own_model.reading import TwinModel, constant_controls
@@ -41,12 +41,12 @@ def equations_of_build(twin: TwinModel, build: str) -> Equations:
     MuJoCo, else rigid."""
     built: Any = plain_tree(twin) if build == PLAIN_BUILD else free_model(build, twin.driven)
     rigid = twin.driven.tied and build != SOFT_BUILD
-    asked = _constraint_rows(twin, built.ties if build != PLAIN_BUILD else None) if rigid else None
+    terms = _constraint_rows(twin, built.ties if build != PLAIN_BUILD else None) if rigid else None
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
         mass, force = built.mass_and_force(0.0, q, v)
-        if asked is not None:
-            force = constrained_forces(mass, force, *asked(q, v))
+        if terms is not None:
+            force = constrained_forces(mass, force, *terms(q, v))
         return Moved(mass, force, np.linalg.solve(mass, force))
 
     return move
@@ -70,7 +70,7 @@ def _constraint_rows(
     """Function that gives the constraint rows J (c, n) and J' q' (c,) at a state, from plain equations, or by
     differences of an engine's J."""
     if rows_at is None:
-        return plain_constraints(twin).asked
+        return plain_constraints(twin).terms
     if twin.driven.connections:
         return partial(by_differences, rows_at)
 
@@ -88,7 +88,7 @@ def plain_tree(twin: TwinModel) -> PlainTree:
     frictions = [(friction.coordinate, friction.force, SLIDES) for friction in twin.driven.frictions]
     turns = [(turn.bodies, turn.axes, turn.stiffness, turn.damping) for turn in twin.driven.turning_springs]
     pushes = [(load.body, load.point, load.force, load.moment) for load in twin.driven.body_loads]
-    return PlainTree(twin.driven.vehicle, twin.driven.gravity, Acting(loads, lines, frictions, turns, pushes))
+    return PlainTree(twin.driven.vehicle, twin.driven.gravity, AppliedForces(loads, lines, frictions, turns, pushes))
 
 
 def expected_equations(twin: TwinModel, build: str) -> Equations:
@@ -119,10 +119,10 @@ def as_parsed(twin: TwinModel) -> Equations:
 def rigid_equations(twin: TwinModel) -> Equations:
     """The file's own model as MuJoCo parsed it, its equality constraints made rigid."""
     data = mujoco.MjData(twin.model)
-    asked = _constraint_rows(twin, lambda places: [_rows_of_file(twin, data, q) for q in places])
+    terms = _constraint_rows(twin, lambda places: [_rows_of_file(twin, data, q) for q in places])
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
-        rows, rest = asked(q, v)
+        rows, rest = terms(q, v)
         mass, force = _sliding_forces_of_file(twin, data, q, v)
         force = constrained_forces(mass, force, rows, rest)
         return Moved(mass, force, np.linalg.solve(mass, force))

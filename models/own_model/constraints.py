@@ -63,8 +63,8 @@ def satisfying_state(
     for _ in range(MOST_CORRECTIONS):
         gap = constraints.gap(q)
         if np.abs(gap.size).max() <= SATISFIED_GAP:
-            return q, v - np.linalg.pinv(gap.rows, REDUNDANT_SHARE) @ (gap.rows @ v)
-        step = _correction(gap.rows, gap.size, q, ranges)
+            return q, v - np.linalg.pinv(gap.jacobian, REDUNDANT_SHARE) @ (gap.jacobian @ v)
+        step = _correction(gap.jacobian, gap.size, q, ranges)
         q = np.clip(q - step * min(1.0, LONGEST_CORRECTION / max(float(np.abs(step).max()), SATISFIED_GAP)), *ranges)
     return None
 

@@ -335,4 +335,4 @@ def _energy_imbalance(legs: Sequence[PathSection], path: np.ndarray, step: float
 def _energy_and_power(plain: PlainTree, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
     """Kinetic energy (J), and power of all forces (W)."""
     mass, _ = plain.mass_and_force(0.0, q, v)
-    return 0.5 * float(v @ mass @ v), float(v @ plain.applied(q, v))
+    return 0.5 * float(v @ mass @ v), float(v @ plain.applied_forces(q, v))

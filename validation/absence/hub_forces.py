@@ -66,8 +66,8 @@ def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes
         "noisy forces": noisy_forces,
         "noisy angles": noisy_angles,
         "held forces": hub_inputs.held * WRENCH * int(head[kernel.HUBS]),
-        "pulled angles": 2 * int(head[kernel.GUIDE] == kernel.PULLED),
-        "enforced angles": 2 * int(head[kernel.GUIDE] == kernel.HELD),
+        "pulled angles": 2 * int(head[kernel.STABILISER] == kernel.PULLED),
+        "enforced angles": 2 * int(head[kernel.STABILISER] == kernel.ENFORCED),
         "turning hubs": int(head[kernel.HUBS] * (head[kernel.FRAME] != kernel.FRAMES.index("inertial"))),
         "curves between samples": int(curved),
     }

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from models.multibody.plain.statics import held_at_rest
+from models.multibody.plain.statics import preloads_at_rest
 from models.vehicles.free_vehicle import CARRIER
 from models.vehicles.spatial_linear import preloads
 from validation.common.checks import largest_relative_difference
@@ -55,7 +55,7 @@ def _laws(states: int) -> list[Row]:
     ]
     for name, car in rolling_cars().items():
         preloads_of = preloads(car.vehicle)
-        plain = held_at_rest(car.vehicle, CARRIER)
+        plain = preloads_at_rest(car.vehicle, CARRIER)
         gap = max(
             largest_relative_difference(other, list(known.values()))
             for known, other in zip(preloads_of, plain, strict=True)

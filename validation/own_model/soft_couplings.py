@@ -10,7 +10,7 @@ bodies' means over three directions, of their centres' shifts or of their turns.
 import numpy as np
 
 from models.multibody.plain.constraints import turning_rows
-from models.multibody.plain.motion import FIRST
+from models.multibody.plain.motion import FIRST_DERIVATIVE
 from models.own_model.builds import Equations, Moved, plain_tree
 from models.own_model.constraints import plain_constraints
 from models.own_model.equalities import tie_rows
@@ -28,7 +28,7 @@ def softly_coupled(twin: TwinModel) -> Equations:
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
         mass, force = tree.mass_and_force(0.0, q, v)
-        rows, rest = constraints.asked(q, v)
+        rows, rest = constraints.terms(q, v)
         rows, rest = scale[:, None] * rows, scale * rest
         acceleration = np.linalg.solve(mass + rows.T / give @ rows, force - rows.T / give @ rest)
         return Moved(mass, mass @ acceleration, acceleration)
@@ -69,6 +69,6 @@ def _mean_inverse_inertia(twin: TwinModel, inverse: np.ndarray, ends: tuple) -> 
     motion = bodies.move(*np.zeros((2, twin.size)))
     for name in (name for name, _ in ends if name is not None):
         (shift,) = motion.at(bodies.points([(name, bodies.position[name])]))
-        for i, rows in enumerate((shift[FIRST:].T, turning_rows(motion.axes(bodies.row[name])))):
+        for i, rows in enumerate((shift[FIRST_DERIVATIVE:].T, turning_rows(motion.axes(bodies.row[name])))):
             total[i] += np.trace(rows @ inverse @ rows.T) / 3.0
     return total

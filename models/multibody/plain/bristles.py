@@ -64,17 +64,19 @@ class Patch(NamedTuple):
     stiffness: np.ndarray
 
 
-def tyre_forces(patch: Patch, slides: np.ndarray, cells: int) -> np.ndarray:
+def tyre_forces(patch: Patch, sliding: np.ndarray, cells: int) -> np.ndarray:
     """Creep forces fx, fy (N) and moments mz (N m) on w tyres, (w, 3).
 
-    slides (w, 4) : velocity on the road along and across (m/s), turning (1/s), speed of the tread (m/s).
+    sliding (w, 4) : velocity on the road along and across (m/s), turning (1/s), speed of the tread (m/s).
     """
-    tread = slides[:, 3]
-    ahead = _rolling(patch, slides[:, :3], np.maximum(np.abs(tread), FADING_SPEED), cells)
+    tread = sliding[:, 3]
+    ahead = _forward_rolling_forces(patch, sliding[:, :3], np.maximum(np.abs(tread), FADING_SPEED), cells)
     if (tread >= FADING_SPEED).all():
         return ahead
-    mirrored = slides[:, :3] * np.array([-1.0, 1.0, -1.0])
-    behind = _rolling(patch, mirrored, np.maximum(np.abs(tread), FADING_SPEED), cells) * np.array([-1.0, 1.0, -1.0])
+    mirrored = sliding[:, :3] * np.array([-1.0, 1.0, -1.0])
+    behind = _forward_rolling_forces(patch, mirrored, np.maximum(np.abs(tread), FADING_SPEED), cells) * np.array(
+        [-1.0, 1.0, -1.0]
+    )
     part = np.clip(0.5 + 0.5 * tread / FADING_SPEED, 0.0, 1.0)[:, None]
     mixed: np.ndarray = part * ahead + (1.0 - part) * behind
     return mixed
@@ -87,14 +89,14 @@ def cornering_factor(cells: int) -> float:
     return -float(tyre_forces(Patch(ones, ones, ones, 1e9 * ones, ones), np.array([[0.0, 1.0, 0.0, 1.0]]), cells)[0, 1])
 
 
-def _rolling(patch: Patch, slides: np.ndarray, speed: np.ndarray, cells: int) -> np.ndarray:
+def _forward_rolling_forces(patch: Patch, sliding: np.ndarray, speed: np.ndarray, cells: int) -> np.ndarray:
     """Creep forces fx, fy (N) and moments mz (N m), (w, 3), of tyres that roll forwards."""
     of = net(cells)
     a, b = patch.half_length[:, None], patch.half_width[:, None]
     grip, area = patch.mu * patch.load, patch.half_length * patch.half_width
     stretch = 2.0 / cells * patch.stiffness * patch.half_length * area
     gain = np.divide(stretch, of.peak * grip, out=np.zeros(len(a)), where=grip > 0.0)  # of a slip per bound and cell
-    x, y, spin = (slides / speed[:, None] * gain[:, None]).T[:, :, None]
+    x, y, spin = (sliding / speed[:, None] * gain[:, None]).T[:, :, None]
     across = of.half / (1.0 - of.y**2)
     slip = (across * (x - spin * b * of.y) + 1j * across * y).ravel()
     turning = 1j * (across * spin * a * of.half).ravel()
@@ -104,51 +106,53 @@ def _rolling(patch: Patch, slides: np.ndarray, speed: np.ndarray, cells: int) ->
     return np.column_stack([(force * pulled.real).sum(1), (force * pulled.imag).sum(1), moment.sum(1)])
 
 
-def _march(net: Net, slip: np.ndarray, turning: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _march(net: Net, slip: np.ndarray, slip_slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sums over the cells of each strip, from the leading edge on: of tractions (complex), and of position times
     lateral traction.
 
-    slip, turning : rigid slip per cell in a strip's middle, along + i across, and its change by the place.
+    slip, slip_slope : rigid slip per cell in a strip's middle, along + i across, and its change by the place.
     """
-    traction, slides = _cut(-0.5 * (slip + turning * net.middle[0]), net.bound[0])
-    pulled, twisted, turn = traction.copy(), net.centre[0] * traction.imag, -2.0 * turning / len(net.centre)
+    traction, slides = _limited(-0.5 * (slip + slip_slope * net.middle[0]), net.bound[0])
+    pulled, twisted, turn = traction.copy(), net.centre[0] * traction.imag, -2.0 * slip_slope / len(net.centre)
     for i in range(1, len(net.centre)):
-        w = slip + turning * net.middle[i]
-        traction, slides = _advance(traction, slides, w, turn, (net.bound[i], net.bound[i - 1], net.bound_between[i]))
+        w = slip + slip_slope * net.middle[i]
+        traction, slides = _next_tractions(
+            traction, slides, w, turn, (net.bound[i], net.bound[i - 1], net.bound_between[i])
+        )
         pulled += traction
         twisted += net.centre[i] * traction.imag
     return pulled, twisted
 
 
-def _cut(traction: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
+def _limited(traction: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
     """Tractions limited to the friction bound, and flags of those that exceeded it."""
     size = np.abs(traction)
     beyond = size > bound
     return np.where(beyond, bound * traction / np.where(beyond, size, 1.0), traction), beyond
 
 
-def _advance(
+def _next_tractions(
     tractions_before: np.ndarray,
     slides: np.ndarray,
-    w: np.ndarray,
-    turn: np.ndarray,
+    slip: np.ndarray,
+    slip_change: np.ndarray,
     bounds: tuple[float, float, float],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tractions in the next cell, and flags of the bristles that slide there. bounds: in that cell, in the one before,
     and between them."""
     bound, last, between = bounds
-    stuck = tractions_before - w
-    after, beyond = _cut(stuck, bound)
+    stuck = tractions_before - slip
+    after, beyond = _limited(stuck, bound)
     if not (slides & beyond).any():
         return after, beyond
-    z = (np.abs(w.real) + np.abs(w.imag)) / (8.0 * between)
-    w = w + turn * np.minimum(np.minimum(0.5 * z, 0.12 + 0.2 * z), 0.47)
-    size = np.abs(w)
+    z = (np.abs(slip.real) + np.abs(slip.imag)) / (8.0 * between)
+    slip = slip + slip_change * np.minimum(np.minimum(0.5 * z, 0.12 + 0.2 * z), 0.47)
+    size = np.abs(slip)
     turns = slides & beyond & (size * size > NEGLIGIBLE_SLIP)
     size = np.where(turns, size, 1.0)
     h = np.minimum(size / (8.0 * between), LARGEST_EXPONENT)
     grown = (1.0 + h * (1.0 + h * (0.5 + h / 6.0))) ** 8
-    angle = tractions_before * np.conj(-w)
+    angle = tractions_before * np.conj(-slip)
     half = grown * (last * MARGIN * size + angle.real) + 1j * angle.imag
-    turned = bound * (-w / size) * half * half / np.maximum(np.abs(half) ** 2, 1e-300)
+    turned = bound * (-slip / size) * half * half / np.maximum(np.abs(half) ** 2, 1e-300)
     return np.where(turns, turned, after), beyond

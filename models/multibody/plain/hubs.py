@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, Bodies, PlainMotion
+from models.multibody.plain.motion import FIRST_DERIVATIVE, GROUND, PLACE, RATE, Bodies, PlainMotion
 from models.multibody.plain.parts import PlainParts
-from models.multibody.plain.statics import held_at_rest
+from models.multibody.plain.statics import preloads_at_rest
 from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL, CutVehicle
 
 if TYPE_CHECKING:
     from models.multibody.cut_table import HubInputs
 
-LEANS = [ROLL, PITCH]
+ROLL_AND_PITCH = [ROLL, PITCH]
 WRENCH = 6
 REPORTED = ("inside", "wrenches", "moments")
 
@@ -42,7 +42,7 @@ class PlainHubs:
         self.vehicle, self.hub_inputs, self.step, self.any_time = vehicle, hub_inputs, step, any_time
         self.bodies = Bodies(vehicle.tree)
         self.parts = PlainParts(self.bodies, vehicle.uncut, vehicle.chassis)
-        self.held, self.loads = held_at_rest(vehicle.uncut, vehicle.chassis)
+        self.held, self.loads = preloads_at_rest(vehicle.uncut, vehicle.chassis)
         self._weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
         tyres = vehicle.uncut.tyres
         self._hubs = self.bodies.points([(tyre.body, tyre.point) for tyre in tyres])
@@ -62,7 +62,7 @@ class PlainHubs:
         travels = self.parts.travels(motion, q, v)
         spring, other = self.parts.forces(travels, self.held)
         inside = spring + other
-        by_hubs, wrenches = self._act(motion, hubs, q)
+        by_hubs, wrenches = self._hub_forces(motion, hubs, q)
         force += by_hubs - inside @ travels.gradient
         acceleration, moments = self._guide_accelerations(mass, force, guide, q, v)
         return HubState(acceleration, inside, wrenches, moments)
@@ -95,21 +95,21 @@ class PlainHubs:
         rows = [self.at(float(t), *np.split(state, 2)) for t, state in zip(times, states, strict=True)]
         return tuple(np.array([getattr(row, name) for row in rows]) for name in REPORTED)  # type: ignore[return-value]
 
-    def _act(self, motion: PlainMotion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _hub_forces(self, motion: PlainMotion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces (n,) of all hubs for one row of the hub inputs, and the hubs' wrenches (h, 6)."""
         points, total, wrenches = motion.at(self._hubs), np.zeros(self.bodies.size), np.empty((len(self.loads), WRENCH))
         for i, (point, frame) in enumerate(zip(points, self._frames, strict=True)):
             axes = motion.axes(int(frame))[PLACE]
             if self.hub_inputs.road:
-                force, moment = self._tyre(i, point, motion, (hubs[i], hubs[len(points) + i]), q)
+                force, moment = self._tyre_wrench(i, point, motion, (hubs[i], hubs[len(points) + i]), q)
                 wrenches[i] = np.concatenate((force @ axes, moment @ axes))
             else:
                 wrenches[i] = hubs[WRENCH * i : WRENCH * (i + 1)]
                 force, moment = axes @ wrenches[i, :3], axes @ wrenches[i, 3:]
-            total += point[FIRST:] @ force + motion.by_moment(int(self._hubs.rows[i]), moment)
+            total += point[FIRST_DERIVATIVE:] @ force + motion.moment_forces(int(self._hubs.rows[i]), moment)
         return total, wrenches
 
-    def _tyre(
+    def _tyre_wrench(
         self, i: int, hub: np.ndarray, motion: PlainMotion, road: tuple[float, float], q: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Force (N) and moment (N m), in space, on hub i from its tyre, on a road with height (m) and vertical velocity
@@ -136,13 +136,13 @@ class PlainHubs:
         if guide is None:
             return np.linalg.solve(mass, force), moments
         wanted, rates, accelerations = guide.reshape(3, 2)
-        off, late = wanted - q[LEANS], rates - v[LEANS]
+        off, late = wanted - q[ROLL_AND_PITCH], rates - v[ROLL_AND_PITCH]
         if hub_inputs.pull:
             moments = np.array(hub_inputs.pull[0::2]) * off + np.array(hub_inputs.pull[1::2]) * late
-            force[LEANS] += moments
+            force[ROLL_AND_PITCH] += moments
             return np.linalg.solve(mass, force), moments
         wanted = accelerations + 2.0 * hub_inputs.holding * late + hub_inputs.holding**2 * off
-        picks = np.eye(len(force))[LEANS]
+        picks = np.eye(len(force))[ROLL_AND_PITCH]
         system = np.block([[mass, -picks.T], [picks, np.zeros((2, 2))]])
         both = np.linalg.solve(system, np.concatenate((force, wanted)))
         return both[:-2], both[-2:]

@@ -8,17 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.multibody.plain.constraints import Axes, rotation
-from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, Bodies, PlainMotion
+from models.multibody.plain.constraints import Axes, rotation_gap
+from models.multibody.plain.motion import FIRST_DERIVATIVE, GROUND, PLACE, RATE, Bodies, PlainMotion
 from models.vehicles.spatial import SpatialVehicle, Vector
 
-Line = tuple[tuple[tuple[str | None, Vector], ...], float, float, float]
+LineSpring = tuple[tuple[tuple[str | None, Vector], ...], float, float, float]
 """Spring-damper along the line between two points: points on bodies (None: the ground) in the design position, N/m, N
 s/m, length at rest (m)."""
-Follower = tuple[str, Vector, np.ndarray, np.ndarray]
+FollowerLoad = tuple[str, Vector, np.ndarray, np.ndarray]
 """Force and moment (3,) in N and N m that turn with a body: the body, a point (m) on it in the design position, force,
 moment."""
-Turn = tuple[tuple[str | None, str], Axes, float, float]
+TurningSpring = tuple[tuple[str | None, str], Axes, float, float]
 """Rotational spring-damper: two bodies (None: the ground), their axes that are parallel at rest, N m/rad and N m s/rad
 about all axes."""
 Friction = tuple[int, float, float]
@@ -29,17 +29,17 @@ Load = tuple[str, Vector, np.ndarray]
 the axes of space."""
 
 
-class Acting(NamedTuple):
+class AppliedForces(NamedTuple):
     """Forces on bodies besides gravity and joint elements, by kind; any of the lists may be empty."""
 
     loads: Sequence[Load] = ()
-    lines: Sequence[Line] = ()
+    lines: Sequence[LineSpring] = ()
     frictions: Sequence[Friction] = ()
-    turns: Sequence[Turn] = ()
-    followers: Sequence[Follower] = ()
+    turns: Sequence[TurningSpring] = ()
+    followers: Sequence[FollowerLoad] = ()
 
 
-NOTHING_ACTS = Acting()
+NO_APPLIED_FORCES = AppliedForces()
 
 
 def joint_rows(bodies: Bodies, vehicle: SpatialVehicle) -> np.ndarray:
@@ -60,9 +60,11 @@ def joint_numbers(vehicle: SpatialVehicle) -> np.ndarray:
 class PlainTree:
     """Equations of motion of the bodies and joint elements of a vehicle; gravity (3,) in m/s^2."""
 
-    def __init__(self, vehicle: SpatialVehicle, gravity: np.ndarray, elements: Acting = NOTHING_ACTS) -> None:
+    def __init__(
+        self, vehicle: SpatialVehicle, gravity: np.ndarray, applied_forces: AppliedForces = NO_APPLIED_FORCES
+    ) -> None:
         self.bodies, self.gravity = Bodies(vehicle), gravity
-        loads, lines, frictions, turns, followers = elements
+        loads, lines, frictions, turns, followers = applied_forces
         self.size = self.bodies.size
         self._loads = np.array([force for _, _, force in loads]).reshape(-1, 3)
         self._points = self.bodies.points([(body, point) for body, point, _ in loads])
@@ -82,13 +84,13 @@ class PlainTree:
         along = self._held + self._stiffness * (self._rows @ q) + self._damping * (self._rows @ v)
         force -= self._rows.T @ along
         if len(self._loads):
-            force += np.einsum("pnk,pk->n", motion.at(self._points)[:, FIRST:], self._loads)
+            force += np.einsum("pnk,pk->n", motion.at(self._points)[:, FIRST_DERIVATIVE:], self._loads)
         if self._lines:
             force += self._line_spring_forces(motion)
         for (body, _, push, moment), point in zip(self._followers, motion.at(self._pushed), strict=True):
             row = self.bodies.row[body]
             axes = motion.axes(row)[PLACE]
-            force += point[FIRST:] @ (axes @ push) + motion.by_moment(row, axes @ moment)
+            force += point[FIRST_DERIVATIVE:] @ (axes @ push) + motion.moment_forces(row, axes @ moment)
         for turn in self._turns:
             force -= self._turning_resistance(turn, motion, v)
         force[self._rubbing] -= self._friction * np.clip(v[self._rubbing] / self._slides, -1.0, 1.0)
@@ -100,22 +102,22 @@ class PlainTree:
         for (_, stiffness, damping, length), first, second in zip(self._lines, ends[::2], ends[1::2], strict=True):
             apart = second - first
             distance = float(np.linalg.norm(apart[PLACE]))
-            gradient = apart[FIRST:] @ (apart[PLACE] / distance)
+            gradient = apart[FIRST_DERIVATIVE:] @ (apart[PLACE] / distance)
             rate = float(apart[RATE] @ apart[PLACE]) / distance
             total -= (stiffness * (distance - length) + damping * rate) * gradient
         return total
 
-    def _turning_resistance(self, turn: Turn, motion: PlainMotion, v: np.ndarray) -> np.ndarray:
+    def _turning_resistance(self, turn: TurningSpring, motion: PlainMotion, v: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) of a rotational spring-damper between two bodies, positive against the direction in
         which they act."""
         bodies, axes, stiffness, damping = turn
         rows = [self.bodies.row[name] if name else GROUND for name in bodies]
         first, second = (motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True))
-        size, gains = rotation(first, second)
+        size, gains = rotation_gap(first, second)
         resistance: np.ndarray = gains.T @ (stiffness * size + damping * (gains @ v))
         return resistance
 
-    def applied(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def applied_forces(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Applied forces (n,) without inertia forces; their power is the rate of change of kinetic energy."""
         _, inertia = self.bodies.inertia(self.bodies.move(q, v), np.zeros(3))
         return self.mass_and_force(0.0, q, v)[1] - inertia

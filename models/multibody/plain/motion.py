@@ -19,7 +19,7 @@ from models.vehicles.spatial import FREEDOMS, PARALLEL, Freedom, SpatialVehicle,
 
 GROUND = 0
 """Index of the ground, which is at rest in space, among the bodies."""
-PLACE, RATE, REST, FIRST = range(4)
+PLACE, RATE, BIAS, FIRST_DERIVATIVE = range(4)
 """Row indices of a body's matrices: T, T', T'' without q'', and the first of the derivatives dT/dq_i."""
 
 
@@ -63,19 +63,19 @@ class PlainMotion:
         axes: np.ndarray = self.matrices[row, :, :, :3]
         return axes
 
-    def turning(self, row: int) -> np.ndarray:
+    def angular_velocity(self, row: int) -> np.ndarray:
         """Angular velocity (3,) in rad/s of a body in space: half the sum of the products axis x rate of axis."""
         axes = self.axes(row)
         spin = axes[RATE] @ axes[PLACE].T
         return np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2.0
 
-    def by_moment(self, row: int, moment: np.ndarray) -> np.ndarray:
+    def moment_forces(self, row: int, moment: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) of a moment M (N m, in space) on a body, applied as couples of forces M x axis / 2 at
         the body's axes."""
         axes = self.axes(row)
         x, y, z = moment.tolist()
         couples = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))) @ axes[PLACE] / 2.0
-        return axes[FIRST:].reshape(-1, 9) @ couples.ravel()
+        return axes[FIRST_DERIVATIVE:].reshape(-1, 9) @ couples.ravel()
 
 
 class Bodies:
@@ -116,7 +116,7 @@ class Bodies:
 
     def move(self, q: np.ndarray, v: np.ndarray) -> PlainMotion:
         """Motion of all bodies at coordinates (m, rad) and rates (per s), (n,)."""
-        matrices = np.zeros((len(self._parent) + 1, FIRST + self.size, 3, 4))
+        matrices = np.zeros((len(self._parent) + 1, FIRST_DERIVATIVE + self.size, 3, 4))
         matrices[GROUND, PLACE, :, :3] = np.eye(3)
         first, second = np.where(self._turns, np.sin(q), q), np.where(self._turns, 1.0 - np.cos(q), 0.0)
         steps = np.eye(4) + first[:, None, None] * self._generators + second[:, None, None] * self._squares
@@ -130,22 +130,22 @@ class Bodies:
     def _joint(self, below: np.ndarray, j: int, step: np.ndarray, rate: float) -> np.ndarray:
         """Rows of the matrices of the body behind joint j, from those before the joint, by the product rule."""
         rows = (below.reshape(-1, 4) @ step).reshape(-1, 3, 4)
-        turned = (rows[:REST].reshape(-1, 4) @ self._generators[j]).reshape(-1, 3, 4)
-        rows[FIRST + j] = turned[PLACE]
+        turned = (rows[:BIAS].reshape(-1, 4) @ self._generators[j]).reshape(-1, 3, 4)
+        rows[FIRST_DERIVATIVE + j] = turned[PLACE]
         rows[RATE] += rate * turned[PLACE]
-        rows[REST] += 2.0 * rate * turned[RATE] + rate * rate * (rows[PLACE] @ self._squares[j])
+        rows[BIAS] += 2.0 * rate * turned[RATE] + rate * rate * (rows[PLACE] @ self._squares[j])
         return rows
 
     def inertia(self, motion: PlainMotion, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mass matrix (n, n), and forces (n,): weights by gravity (3,) in m/s^2, less inertia forces without the q''
         terms."""
-        columns = motion.matrices[1:, FIRST:]
+        columns = motion.matrices[1:, FIRST_DERIVATIVE:]
         count = self.size
         weighted = (columns.reshape(len(columns), -1, 4) @ self._inertia).reshape(columns.shape)
         flat = weighted.transpose(1, 0, 2, 3).reshape(count, -1)
         mass = flat @ columns.transpose(1, 0, 2, 3).reshape(count, -1).T
         weights = np.tensordot(self._mass, columns[:, :, :, 3], 1) @ gravity
-        return mass, weights - flat @ motion.matrices[1:, REST].ravel()
+        return mass, weights - flat @ motion.matrices[1:, BIAS].ravel()
 
 
 def _pseudo_inertia(mass: float, inertia: np.ndarray) -> np.ndarray:

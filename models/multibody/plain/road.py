@@ -19,7 +19,7 @@ def surface(waves: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray
     return each.real.sum(1), (1j * each).real @ waves[:, 0], (1j * each).real @ waves[:, 1]
 
 
-def driven(knots: Knots, t: float) -> tuple[float, float]:
+def control_value(knots: Knots, t: float) -> tuple[float, float]:
     """Value and rate (per s) of a control at a time (s): at rest at knots; between knots it changes by the fraction 6
     u^5 - 15 u^4 + 10 u^3 of its rise."""
     for (start, low), (end, high) in pairwise(knots):

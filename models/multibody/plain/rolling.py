@@ -11,10 +11,10 @@ import numpy as np
 
 from models.multibody.plain.bristles import Patch, cornering_factor, tyre_forces
 from models.multibody.plain.joint_elements import joint_numbers, joint_rows
-from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, PlainMotion
+from models.multibody.plain.motion import FIRST_DERIVATIVE, PLACE, RATE, Bodies, PlainMotion
 from models.multibody.plain.parts import PlainParts
-from models.multibody.plain.road import driven, surface
-from models.multibody.plain.statics import held_at_rest
+from models.multibody.plain.road import control_value, surface
+from models.multibody.plain.statics import preloads_at_rest
 from models.vehicles.free_vehicle import CARRIER, chassis_of, rotor
 from models.vehicles.spatial import Tyre
 
@@ -88,7 +88,7 @@ class PlainRolling:
         self.handling, vehicle = handling, handling.vehicle
         self.bodies = Bodies(vehicle)
         self.parts = PlainParts(self.bodies, vehicle, CARRIER)
-        held, self.loads = held_at_rest(vehicle, CARRIER)
+        held, self.loads = preloads_at_rest(vehicle, CARRIER)
         self.held, self._joint_held = np.split(held, [len(self.parts.names)])
         self._joints = joint_rows(self.bodies, vehicle)
         self._joint_stiffness, self._joint_damping, _, self._joint_inertia = joint_numbers(vehicle)
@@ -124,8 +124,8 @@ class PlainRolling:
         self._steered = front.astype(float)
         self._braked = np.where(front, controls.front_brake, (1.0 - controls.front_brake) / behind) / beside
         behind = max(axles[~self._towed].max(), 1)
-        driven = np.where(front, controls.front_drive, (1.0 - controls.front_drive) / behind) / beside
-        self._driven = np.where(self._towed, 0.0, driven)
+        drive_share = np.where(front, controls.front_drive, (1.0 - controls.front_drive) / behind) / beside
+        self._driven = np.where(self._towed, 0.0, drive_share)
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
         """Accelerations, tyre report and energy ledger at a time (s), coordinates and rates (n,)."""
@@ -133,7 +133,7 @@ class PlainRolling:
         mass, force = self.bodies.inertia(motion, self.handling.gravity)
         travels = self.parts.travels(motion, q, v)
         spring, other = self.parts.forces(travels, self.held)
-        by_tyres, report, ledger = self._roll(t, motion, v)
+        by_tyres, report, ledger = self._wheel_forces(t, motion, v)
         outside, power = self._drag_and_pushes(t, motion)
         travel, rate = self._joints @ q, self._joints @ v
         along, damped = self._joint_held + self._joint_stiffness * travel, self._joint_damping * rate
@@ -157,14 +157,14 @@ class PlainRolling:
         tyres = np.array([np.column_stack(state.tyres) for state in states])
         return tyres, np.array([state.ledger for state in states])
 
-    def _roll(self, t: float, motion: PlainMotion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
+    def _wheel_forces(self, t: float, motion: PlainMotion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
         """Generalised forces (n,) of tyres, brakes and drive; the tyres' report; and the energy ledger of these
         forces."""
-        steer, steering = driven(self.handling.controls.steer, t)
+        steer, steering = control_value(self.handling.controls.steer, t)
         points, angle = motion.at(self._points), self._steered * steer
         contact = self._loads_and_points(motion, points, angle)
-        slides, beside = self._slide(motion, points, contact, self._steered * steering, v)
-        creep = self._creep(contact, slides)
+        slides, beside = self._sliding_velocities(motion, points, contact, self._steered * steering, v)
+        creep = self._creep_forces(contact, slides)
         force, moments = self._tyre_forces(motion, points, contact, creep)
         torques = self._torques(t, beside)
         force += self._turn_wheels(motion, contact.axle, torques)
@@ -207,18 +207,18 @@ class PlainRolling:
         across = _cross(normal, along)
         return TyreContact(down, along, across, normal, axle, pressing, load * long, elastic, (load - elastic) * rising)
 
-    def _slide(
-        self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, steering: np.ndarray, v: np.ndarray
+    def _sliding_velocities(
+        self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, steer_rates: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Sliding velocities (w, 4), as ``bristles`` takes them, and spin rates (w,) of the wheels relative to the
         bodies that carry them, rad/s.
 
-        steering (w,) : rates of steering, rad/s.
+        steer_rates (w,) : rates of steering, rad/s.
         """
-        axle, turning = contact.axle, np.array([motion.turning(row) for row in self._points.rows])
-        locked = ((np.array([motion.turning(row) for row in self._carrying]) - turning) * axle).sum(1)
+        axle, angular_velocity = contact.axle, np.array([motion.angular_velocity(row) for row in self._points.rows])
+        locked = ((np.array([motion.angular_velocity(row) for row in self._carrying]) - angular_velocity) * axle).sum(1)
         spin = np.where(self._rotors >= 0, v[self._rotors], locked)
-        whole = turning + axle * spin[:, None] + np.multiply.outer(steering, UP)
+        whole = angular_velocity + axle * spin[:, None] + np.multiply.outer(steer_rates, UP)
         sliding = points[:, RATE] + _cross(whole, contact.down)
         tread = -spin * (_cross(axle, contact.down) * contact.along).sum(1)
         on_road = (sliding * contact.along).sum(1), (sliding * contact.across).sum(1)
@@ -234,13 +234,13 @@ class PlainRolling:
         axles: np.ndarray = level * sideways + np.multiply.outer(np.sin(self._leans), UP)
         return axles
 
-    def _creep(self, contact: TyreContact, slides: np.ndarray) -> np.ndarray:
-        """Creep forces along and across (N) and moments (N m), (w, 3), of all tyres from sliding velocities ``slides``
+    def _creep_forces(self, contact: TyreContact, sliding: np.ndarray) -> np.ndarray:
+        """Creep forces along and across (N) and moments (N m), (w, 3), of all tyres from sliding velocities ``sliding``
         (w, 4)."""
-        of, ones = self.handling.tyres, np.ones(len(slides))
+        of, ones = self.handling.tyres, np.ones(len(sliding))
         half = np.sqrt(self._radius * contact.load / self._stiffness)
         patch = Patch(half, of.half_width * ones, contact.load, of.friction * ones, self._bristles)
-        return tyre_forces(patch, slides, of.cells)
+        return tyre_forces(patch, sliding, of.cells)
 
     def _tyre_forces(
         self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
@@ -249,20 +249,20 @@ class PlainRolling:
         wheels' centres."""
         force = contact.along * creep[:, [0]] + contact.across * creep[:, [1]]
         moments = _cross(contact.down, force) + contact.normal * creep[:, [2]]
-        total = np.tensordot(points[:, FIRST:], force + contact.loading, ((0, 2), (0, 1)))
+        total = np.tensordot(points[:, FIRST_DERIVATIVE:], force + contact.loading, ((0, 2), (0, 1)))
         for row, moment in zip(self._points.rows, moments, strict=True):
-            total += motion.by_moment(int(row), moment)
+            total += motion.moment_forces(int(row), moment)
         about = (moments * contact.axle).sum(1)
         fixed = self._rotors < 0
         np.add.at(total, self._rotors[~fixed], about[~fixed])
         for i in np.flatnonzero(fixed).tolist():
-            total += self._hold(motion, i, about[i] * contact.axle[i])
+            total += self._transferred_moment(motion, i, about[i] * contact.axle[i])
         return total, moments
 
-    def _hold(self, motion: PlainMotion, i: int, moment: np.ndarray) -> np.ndarray:
+    def _transferred_moment(self, motion: PlainMotion, i: int, moment: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) when the body that carries wheel i takes over a moment (N m) from the wheel's own
         body."""
-        return motion.by_moment(self._carrying[i], moment) - motion.by_moment(int(self._points.rows[i]), moment)
+        return motion.moment_forces(self._carrying[i], moment) - motion.moment_forces(int(self._points.rows[i]), moment)
 
     def _torques(self, t: float, relative_spin: np.ndarray) -> np.ndarray:
         """Torques (w,) of brake and drive on wheels (N m).
@@ -270,7 +270,7 @@ class PlainRolling:
         relative_spin (w,) : beside what carries each wheel, rad/s.
         """
         controls, of = self.handling.controls, self.handling.tyres
-        braking, driving = driven(controls.brake, t)[0], driven(controls.drive, t)[0]
+        braking, driving = control_value(controls.brake, t)[0], control_value(controls.drive, t)[0]
         torque = self._driven * driving - self._braked * braking * np.tanh(relative_spin / of.brake_rate)
         return np.where(self._rotors >= 0, torque, 0.0)
 
@@ -280,7 +280,7 @@ class PlainRolling:
         total = np.zeros(self.bodies.size)
         for i in np.flatnonzero(torques).tolist():
             total[self._rotors[i]] += torques[i]
-            total -= self._hold(motion, i, torques[i] * axles[i])
+            total -= self._transferred_moment(motion, i, torques[i] * axles[i])
         return total
 
     def _drag_and_pushes(self, t: float, motion: PlainMotion) -> tuple[np.ndarray, float]:
@@ -291,11 +291,11 @@ class PlainRolling:
             (middle,) = motion.at(self._middle)
             ahead = float(middle[RATE] @ heading[:, 0])
             force = -self._drag * abs(ahead) * ahead
-            total += middle[FIRST:] @ (force * heading[:, 0])
+            total += middle[FIRST_DERIVATIVE:] @ (force * heading[:, 0])
             power += force * ahead
         for push, point in zip(self.handling.pushes, motion.at(self._pushed), strict=True):
-            pushed = heading @ (driven(push.size, t)[0] * np.array(push.axis))
-            total += point[FIRST:] @ pushed
+            pushed = heading @ (control_value(push.size, t)[0] * np.array(push.axis))
+            total += point[FIRST_DERIVATIVE:] @ pushed
             power += float(point[RATE] @ pushed)
         return total, power
 

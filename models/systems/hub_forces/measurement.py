@@ -29,7 +29,7 @@ class HubForces:
     def hub_inputs(self, step: float, steps: int, interpolation: Interpolation = "linear") -> HubInputs:
         """Hub forces as a run's inputs, sampled at half steps."""
         signal = signal_from_samples(self.samples, self.period, interpolation)
-        return HubInputs(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, held=signal.held)
+        return HubInputs(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, constant_in_step=signal.held)
 
     def noisy(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
         """The hub forces with white noise of standard deviations (6 h,), N and N m, on every sample."""
