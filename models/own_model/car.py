@@ -1,4 +1,4 @@
-"""An MJCF file as the vehicle of a scene: the description that vehicle files in TOML make, by another reading.
+"""Vehicle of a scene from an MJCF file: the same description as a vehicle file in TOML gives.
 
 The chassis is the body with a free joint, or with three slides and three hinges. What rides on it keeps its hinges,
 slides, springs, dampers and fixed tendons. Tyres, road, steering, brakes and drive are twinrig's: joints that spin or
@@ -39,14 +39,14 @@ from models.vehicles.spatial_linear import preloads
 from models.vehicles.vehicle_checks import check
 
 CONTACT_CONTENT = "contact"
-"""The content that a car may have beside twinrig's tyres: it is left out."""
+"""The kind of content that a car's file may have beside twinrig's tyres: contacts, which are left out."""
 GRAVITY = 9.81
 PRELOAD_DIFFERENCE = 0.01
-"""Relative difference from which a preload is told that the file has otherwise."""
+"""Relative difference of a preload from the file's from which a note reports it."""
 
 
 def vehicle_of_file(path: Path) -> SpatialVehicle:
-    """The vehicle of an MJCF file, unloaded; InputError for features that vehicles of a scene cannot have."""
+    """The unloaded vehicle of an MJCF file. Raises InputError for features that vehicles of a scene cannot have."""
     document = checked_document(path)
     if document.kind != "MJCF":
         raise InputError(path.name, "", document.kind, "has no sites, by which wheels are known: save it as MJCF")
@@ -57,7 +57,7 @@ def vehicle_of_file(path: Path) -> SpatialVehicle:
 
 @dataclass
 class _Reader:
-    """Reader of one file: collects the parts of the vehicle."""
+    """Reader of one MJCF file, which collects the parts of the vehicle and notes about it."""
 
     model: mujoco.MjModel
     document: Document
@@ -65,7 +65,7 @@ class _Reader:
     design: mujoco.MjData = field(init=False)
 
     def vehicle(self) -> SpatialVehicle:
-        """All parts, checked as a whole."""
+        """The complete vehicle of the file, after checks."""
         model, file = self.model, self.document.path.name
         design = self.design = mujoco.MjData(model)
         design.qpos[:] = model.qpos0
@@ -117,7 +117,7 @@ class _Reader:
             self.notes.append(f"stops are not built, and handling says where a run passes them: {', '.join(limited)}")
 
     def _check_gravity(self) -> None:
-        """Refuse gravity that does not act downwards; add a note if it differs from that of scenes."""
+        """Refuse gravity that does not act downwards; add a note if it differs from the gravity of scenes."""
         gravity, name = np.array(self.model.opt.gravity), "option gravity"
         if np.any(gravity[:2]) or gravity[2] > 0.0:
             self._refuse(name, gravity.tolist(), "must be along -z: z is up from the road of a vehicle")
@@ -128,7 +128,7 @@ class _Reader:
                 self._refuse(f"{label(self.model, 'body', b)} gravcomp", None, "must be 0: a vehicle has its weight")
 
     def _elements(self, parts: CarBodies) -> Iterator[JointElement]:
-        """Springs, dampers and rotors along the suspension's coordinates, with the signs of their axes."""
+        """Springs, dampers and rotor inertias along the coordinates of the suspension, with the signs of their axes."""
         joints = {place_of(self.model, j)[0]: j for j in range(self.model.njnt)}
         for element in joint_elements(self.model):
             numbers = [joints[body] for body, _ in element.coordinates]
@@ -149,7 +149,7 @@ class _Reader:
                 yield at, float(low), float(high)
 
     def _points(self, design: mujoco.MjData, parts: CarBodies, wheels: tuple[WheelSite, ...]) -> Iterator[PointOutput]:
-        """Outputs of vertical acceleration at every named site that is not a wheel."""
+        """Outputs of vertical acceleration at every named site that does not mark a wheel."""
         taken = {wheel.site for wheel in wheels}
         for s in range(self.model.nsite):
             name, body = self.model.site(s).name, int(self.model.site_bodyid[s])
@@ -159,8 +159,8 @@ class _Reader:
                 )
 
     def _at_rest(self, vehicle: SpatialVehicle) -> SpatialVehicle:
-        """The vehicle without preloads, since its springs will get those that hold it at rest. A note lists where the
-        file's preloads differ."""
+        """The vehicle without preloads, since its springs will get the preloads that balance its weight. A note lists
+        where the file's preloads differ."""
         held = preloads(replace(vehicle, gravity=GRAVITY)).parts
         changed = [
             f"{e.name} {held[e.name]:.4g} for {e.held:.4g}"

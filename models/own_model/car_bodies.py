@@ -1,4 +1,4 @@
-"""Bodies of an MJCF car in the description of a vehicle: what does not move against another body is one with it.
+"""Bodies of an MJCF car in the description of a vehicle; bodies that do not move relative to each other are merged.
 
 A body with slides alone, or with hinges through its centre of mass, has them itself; hinges elsewhere are a body
 without mass at their place, and so are joints in another order than that of the freedoms.
@@ -19,9 +19,9 @@ from models.own_model.xml_guard import Document
 from models.vehicles.spatial import FREEDOMS, Body, Freedom, Vector, steiner
 
 REVOLUTION_TOLERANCE = 1e-9
-"""Share of a wheel's inertia by which it may differ from that of a body of revolution about its axle."""
+"""Share of a wheel's inertia by which it may differ from the inertia of a body of revolution about its axle."""
 CENTRE_TOLERANCE = 1e-12
-"""m: a hinge so near to a centre of mass is in it."""
+"""Distance (m) up to which a hinge counts as being in a body's centre of mass."""
 
 
 class Mass(NamedTuple):
@@ -35,9 +35,7 @@ class Mass(NamedTuple):
 
 @dataclass(frozen=True)
 class CarBodies:
-    """Bodies of the car. bodies : parents before children; chassis : its name; of : for each body of the file, the name
-    of the body that contains it; coordinates : of the suspension's joints, with the sign of their axes; spin : inertia
-    about the axle (kg m^2) of every spinning wheel, by the name of its tyre."""
+    """Bodies of a car in the description of a vehicle, and where the file's bodies and joints are in it."""
 
     bodies: tuple[Body, ...]
     chassis: str
@@ -48,14 +46,15 @@ class CarBodies:
 
 @dataclass
 class _Segment:
-    """Consecutive freedoms of a body that one joint can have; anchor : common point of the hinges among them."""
+    """Consecutive freedoms of a body that one joint of the description can have; anchor : common point of the hinges
+    among them."""
 
     freedoms: list[Freedom] = field(default_factory=list)
     joints: list[tuple[int, Freedom, float]] = field(default_factory=list)
     anchor: np.ndarray | None = None
 
     def takes(self, freedom: Freedom, anchor: np.ndarray) -> bool:
-        """Whether the body's next joint can belong to this segment."""
+        """Whether the body's next joint in the file can belong to this segment."""
         order = FREEDOMS.index
         if self.freedoms and order(freedom) <= order(self.freedoms[-1]):
             return False
@@ -72,7 +71,8 @@ class _Segment:
 def car_bodies(
     model: mujoco.MjModel, design: mujoco.MjData, roles: Roles, document: Document, reserved: Collection[str]
 ) -> CarBodies:
-    """Bodies of the car; InputError for joints with oblique axes, and for wheels with imbalance.
+    """Bodies of a car from an MJCF model. Raises InputError for joints with oblique axes, and for wheels with
+    imbalance.
 
     design : data of the model in the design position, with kinematics computed; reserved : names for other bodies.
     """
@@ -80,7 +80,7 @@ def car_bodies(
 
 
 class _Builder:
-    """Combines bodies of one file into those of the description."""
+    """Merges the bodies of one MJCF file into the bodies of the description."""
 
     def __init__(
         self, model: mujoco.MjModel, design: mujoco.MjData, roles: Roles, document: Document, reserved: Collection[str]
@@ -99,7 +99,7 @@ class _Builder:
                 self.masses[leader].append(self._mass(b))
 
     def built(self) -> CarBodies:
-        """All bodies."""
+        """All bodies of the car."""
         bodies, coordinates, names = list[Body](), dict[int, tuple[tuple[str, Freedom], float]](), dict[int, str]()
         for leader, masses in self.masses.items():
             names[leader] = self._name(leader)
@@ -114,7 +114,7 @@ class _Builder:
         return CarBodies(tuple(bodies), names[self.roles.chassis[0]], named, coordinates, self.spin)
 
     def _kept(self, body: int) -> list[int]:
-        """Joints of a body that belong to the suspension."""
+        """Joints of a body that belong to the suspension, by number."""
         left_out = {*self.roles.spin, *self.roles.steer}
         return [j for j in joints_of(self.model, body) if j not in left_out] if body not in self.roles.chassis else []
 
@@ -130,8 +130,8 @@ class _Builder:
         return Mass(float(self.model.body_mass[body]), self.design.xipos[body].copy(), inertia)
 
     def _spinning(self) -> set[int]:
-        """Bodies that spin with the wheels. Their inertia about the axle is removed from the masses, because it counts
-        as the wheel's spin inertia."""
+        """Bodies that spin with the wheels, by number. Their inertia about the axle is removed from the masses, because
+        it counts as the wheel's spin inertia."""
         spinning = set[int]()
         for joint, wheel in self.roles.spin.items():
             body = int(self.model.jnt_bodyid[joint])
@@ -182,7 +182,7 @@ class _Builder:
 
 
 def combined_mass(masses: list[Mass]) -> Mass:
-    """One rigid body that has the mass, centre and inertia of all the given ones."""
+    """Mass, centre and inertia of a rigid body that consists of all the given ones."""
     if len(masses) == 1:
         return masses[0]
     total = sum(each.mass for each in masses)
@@ -199,8 +199,8 @@ def _links_of_body(
     whole: Mass,
     coordinates: dict[int, tuple[tuple[str, Freedom], float]],
 ) -> Iterator[Body]:
-    """Bodies of the description for one body of the file and its joints; fills ``coordinates`` with the joints' new
-    names."""
+    """Bodies of the description for one body of the file and its joints; fills ``coordinates`` with the names that the
+    joints have in the description."""
     for number, segment in enumerate(segments):
         last, at = number == len(segments) - 1, segment.anchor
         itself = last and (at is None or np.abs(at - whole.centre).max() <= CENTRE_TOLERANCE)

@@ -1,4 +1,4 @@
-"""Rigid constraints of a description: what they ask of accelerations, and which states satisfy them."""
+"""Rigid constraints of a user's model: the constraint forces, and states that satisfy the constraints."""
 
 from collections.abc import Callable, Sequence
 
@@ -10,22 +10,24 @@ from models.own_model.equalities import tie_rows
 from models.own_model.reading import TwinModel
 
 REDUNDANT_SHARE = 1e-9
-"""Share of the largest singular value of the constraints' rows up to which they repeat others."""
+"""Share of the largest singular value of the constraint Jacobian below which a combination of its rows counts as
+redundant."""
 DIFFERENCE_STRIDE = 0.02
-"""rad, m: how far all coordinates move together from one row of differences to the next."""
+"""Distance (rad, m), summed over all coordinates, between neighbouring states of finite differences."""
 DIFFERENCE_WEIGHTS = (45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0)
-"""Differences of order 6 over one, two and three strides to either side."""
+"""Weights of central differences of order 6, over one, two and three strides to either side."""
 SATISFIED_GAP, MOST_CORRECTIONS, LONGEST_CORRECTION = 1e-12, 60, 0.5
-"""m, rad: gap of constraints that are satisfied; steps of Newton's method to get there; m, rad: the longest of them."""
+"""Violation (m, rad) below which constraints are satisfied; largest count of Newton steps to get there; the longest of
+these steps (m, rad)."""
 
 Rows = Callable[[Sequence[np.ndarray]], Sequence[np.ndarray]]
-"""J (c, n) of constraints at each of some coordinates (n,)."""
+"""Function that returns the constraint Jacobian J (c, n) at each of some coordinates (n,)."""
 Ranges = tuple[np.ndarray | float, np.ndarray | float]
-"""Lowest and highest coordinates (n,), or of all."""
+"""Lowest and highest coordinates, (n,) or the same for all."""
 
 
 def plain_constraints(twin: TwinModel) -> PlainConstraints:
-    """The constraints of a model in plain numpy."""
+    """The constraints of a user's model in plain numpy."""
     driven = twin.driven
     joints = [(connection.ends, connection.axes) for connection in driven.connections]
     return PlainConstraints(Bodies(driven.vehicle), *tie_rows(driven.couplings, twin.size), joints)
@@ -43,7 +45,8 @@ def constrained_forces(mass: np.ndarray, force: np.ndarray, rows: np.ndarray, re
 
 
 def by_differences(rows_at: Rows, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Jacobian J (c, n), and J' q' (c,) by differences of J along the motion, at coordinates and rates (n,)."""
+    """Constraint Jacobian J (c, n), and J' q' (c,) by differences of J along the motion, at coordinates and rates
+    (n,)."""
     stride = DIFFERENCE_STRIDE / max(float(np.abs(v).sum()), 1e-9)
     steps = [k * stride * v for k in range(1, len(DIFFERENCE_WEIGHTS) + 1)]
     rows, *others = rows_at([q, *(place for s in steps for place in (q + s, q - s))])
@@ -70,8 +73,8 @@ def satisfying_state(
 
 
 def _correction(rows: np.ndarray, size: np.ndarray, q: np.ndarray, ranges: Ranges) -> np.ndarray:
-    """Smallest correction (n,) that closes gaps (c,) to first order, of those coordinates that it does not press
-    against an end of their ranges."""
+    """Smallest correction (n,) of the coordinates that closes gaps (c,) to first order; coordinates that it would push
+    out of their ranges are left unchanged."""
     (low, high), held = ranges, np.zeros(len(q), bool)
     while True:
         step: np.ndarray = np.linalg.pinv(np.where(held, 0.0, rows), REDUNDANT_SHARE) @ size

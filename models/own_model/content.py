@@ -1,4 +1,5 @@
-"""What a file holds beside a tree with linear laws: refused by name and line where it has no equal, left out if asked.
+"""Content of a file beyond a tree of bodies with linear force laws: refused by name and line where twinrig has no
+equivalent, left out on request.
 
 Limits of joints are the exception: as long as no coordinate leaves its range they do nothing, so states are drawn
 inside the ranges, limits are switched off in the file's own model, and that is said.
@@ -38,7 +39,7 @@ TAGS_OF_ELEMENT = {
     "equality": ("connect", "weld", "joint", "tendon", "flex"),
     "flex": ("flex", "flexcomp"),
 }
-"""Elements of MJCF and URDF that have a name, by what MuJoCo calls the thing."""
+"""Tags of the elements of MJCF and URDF that have a name, by MuJoCo's name for the kind of object."""
 AFFINE_GAINS = (int(GAIN.mjGAIN_FIXED), int(GAIN.mjGAIN_AFFINE))
 AFFINE_BIASES = (int(BIAS.mjBIAS_NONE), int(BIAS.mjBIAS_AFFINE))
 
@@ -53,17 +54,17 @@ class Content:
     why: str
 
     def line(self) -> str:
-        """One line of text with kind, names and reason."""
+        """Text of one line with kind, names and reason."""
         return f"{self.kind}: {some_names(self.names)}: {self.why}"
 
 
 def contents_of_model(model: mujoco.MjModel, document: Document) -> list[Content]:
-    """All parts of the model beyond a tree with linear laws, one entry for each kind that occurs."""
+    """All content of the model beyond a tree with linear force laws, one item for each kind that occurs."""
     return _contents_of_kind(model, document, lambda kind, what, number: True)
 
 
 def without_equal(model: mujoco.MjModel, document: Document) -> list[Content]:
-    """The entries of ``contents_of_model`` that other builds cannot represent."""
+    """The content of ``contents_of_model`` that other builds cannot represent."""
     return _contents_of_kind(model, document, lambda kind, what, number: not _has_equal(model, kind, what, number))
 
 
@@ -78,8 +79,8 @@ def _contents_of_kind(
 
 
 def _has_equal(model: mujoco.MjModel, kind: str, what: str, number: int) -> bool:
-    """Whether other builds can represent it: a ball joint without rotor, dry friction of a hinge or slide, or an
-    equality constraint between bodies or of one or two hinges or slides."""
+    """Whether other builds can represent an object of the file: a ball joint without rotor, dry friction of a hinge or
+    slide, or an equality constraint between bodies or of one or two hinges or slides."""
     if kind == "friction_loss":
         return what == "joint" and has_dry_friction(model, number)
     if kind == "turning_law":
@@ -88,8 +89,8 @@ def _has_equal(model: mujoco.MjModel, kind: str, what: str, number: int) -> bool
 
 
 def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Collection[str]) -> list[Content]:
-    """Remove the parts named in ``without`` from the model, and return what was removed. InputError where another part
-    cannot be represented."""
+    """Remove the kinds of content named in ``without`` from the model, and return what was removed. Raises InputError
+    where other content cannot be represented."""
     for kind in without:
         if kind not in CONTENT_KINDS:
             raise InputError("--without", "", kind, "no such content", tuple(CONTENT_KINDS))
@@ -109,7 +110,8 @@ def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Coll
 
 
 def _refusal(rows: Sequence[Content], without: Collection[str]) -> str:
-    """What has no equal, and the option that leaves all of it out; without : what is left out already."""
+    """Text of a refusal: the content without an equivalent, and the option that leaves all of it out; without : kinds
+    left out already."""
     told = ". ".join(row.line() for row in rows)
     if any(row.kind == "flex" for row in rows):
         return (
@@ -129,12 +131,12 @@ def _with_line(model: mujoco.MjModel, document: Document, what: str, number: int
 
 
 Listed = Iterator[tuple[str, int]]
-"""What MuJoCo calls a thing, and its number there."""
+"""Objects of a model: MuJoCo's name for the kind of object, and its number."""
 NAMELESS_INDEX = -1
 
 
 def _touching_geoms(model: mujoco.MjModel) -> Listed:
-    """Geoms that could come into contact with another one, and explicit contact pairs."""
+    """Geoms that could come into contact with another geom, and explicit contact pairs."""
     if feature_is_disabled(model, "CONTACT"):
         return
     weld, above = model.body_weldid, model.body_weldid[model.body_parentid]
@@ -165,7 +167,7 @@ def _unbuilt_equalities(model: mujoco.MjModel) -> Listed:
 
 
 def _odd_actuators(model: mujoco.MjModel) -> Listed:
-    """Actuators that have a state, act along a spatial tendon, or follow a law that is not affine."""
+    """Actuators that have a state, act along a spatial tendon, or follow a force law that is not affine."""
     for i in range(model.nu):
         target = int(model.actuator_trnid[i, 0])
         kind = int(model.actuator_trntype[i])
@@ -200,7 +202,7 @@ def _spatial_tendons(model: mujoco.MjModel) -> Listed:
 
 
 def _turning_laws(model: mujoco.MjModel) -> Listed:
-    """Joints with springs, dampers or rotors that act about all three axes at once."""
+    """Ball and free joints with springs, dampers or rotors that act about all three axes at once."""
     for j in np.flatnonzero((model.jnt_type == BALL_JOINT) | (model.jnt_type == FREE_JOINT)):
         first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE_JOINT else 0)
         if model.jnt_stiffness[j] or model.dof_damping[first] or _has_rotor(model, int(j)):
@@ -293,7 +295,7 @@ def _forget_medium(model: mujoco.MjModel) -> None:
 
 
 def _keep_flexes(model: mujoco.MjModel) -> None:
-    """Nothing: a model with flexes has been refused."""
+    """Does nothing: a model with flexes has been refused before."""
 
 
 CONTENT_KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco.MjModel], None]]] = {
@@ -331,10 +333,11 @@ CONTENT_KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable
     "fluid": (_medium_elements, "forces of a medium", _forget_medium),
     "flex": (_flexible_elements, "a deformable body", _keep_flexes),
 }
-"""Kinds of content without an equal: what of it a model has, why it has none, and how it is left out."""
+"""Kinds of content without an equivalent: function that lists it in a model, reason why other builds lack it, function
+that removes it."""
 
 
 def limits_switched_off(model: mujoco.MjModel) -> list[str]:
-    """Joints and tendons whose limits were switched off."""
+    """Names of the joints and tendons whose limits were switched off."""
     joints = [label(model, "joint", int(j)) for j in np.flatnonzero(model.jnt_limited)]
     return joints + [label(model, "tendon", int(t)) for t in np.flatnonzero(model.tendon_limited)]

@@ -1,4 +1,4 @@
-"""Controls of a model's actuators over time, from a CSV: those of a row hold until the next row's time.
+"""Controls of a model's actuators over time, from a CSV file; the controls of a row apply until the next row's time.
 
 MuJoCo holds controls over each of its steps; so do all builds here, and every row lies on a step.
 """
@@ -17,14 +17,14 @@ from models.core.tables import SECONDS, read_table
 from models.own_model.reading import TwinModel, affine_law, constant_controls, described_model
 
 CONTROL_UNITS = dict.fromkeys(("-", "N", "N m", "m", "rad", "m/s", "rad/s"), 1.0)
-"""Units that a control may have: SI, as MuJoCo takes it."""
+"""Units that a control in a CSV file may have, with their factors: SI, as MuJoCo takes it."""
 ON_STEP = 1e-6
-"""Share of a step by which a row's time may miss it."""
+"""Share of a step by which a row's time may differ from a multiple of the step."""
 
 
 class PathSection(NamedTuple):
-    """A section of a path with constant controls (nu,), ``steps`` long; ``twin`` contains their forces as constants of
-    its actuators."""
+    """Section of a path with constant controls (nu,) over a number of steps; ``twin`` is the model with these controls
+    as constants of its actuators."""
 
     twin: TwinModel
     steps: int
@@ -33,15 +33,16 @@ class PathSection(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ControlTable:
-    """path : of the file; times (rows,) in s from 0, rising; values (rows, nu) in the order of the actuators."""
+    """Table of controls over time. path : of its file; times (rows,) in s from 0, rising; values (rows, nu) in the
+    order of the actuators."""
 
     path: Path
     times: np.ndarray
     values: np.ndarray
 
     def path_sections(self, twin: TwinModel, steps: int, step: float) -> list[PathSection]:
-        """Sections of a path of ``steps`` steps of ``step`` seconds; InputError where a row's time lies between two
-        steps."""
+        """Sections of a path of ``steps`` steps of ``step`` seconds, each with constant controls. Raises InputError
+        where a row's time lies between two steps."""
         first = self.times / step
         off = np.flatnonzero(abs(first - np.round(first)) > ON_STEP)
         if len(off):
@@ -53,7 +54,7 @@ class ControlTable:
 
 
 def constant_leg(twin: TwinModel, steps: int) -> list[PathSection]:
-    """The whole path as one section with the model's constant controls."""
+    """Sections of a path that has the model's constant controls throughout: a single one."""
     return [PathSection(twin, steps, constant_controls(twin.model))]
 
 
@@ -81,7 +82,7 @@ def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
 
 
 def held_at(twin: TwinModel, constant: np.ndarray) -> TwinModel:
-    """A model whose actuators ignore their control and act as with the constant controls (nu,)."""
+    """Model whose actuators ignore their control and act as they do with the constant controls (nu,)."""
     model = copy.copy(twin.model)
     for i in range(model.nu):
         model.actuator_biasprm[i, :3] = affine_law(twin.model, i, float(constant[i]))

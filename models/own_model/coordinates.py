@@ -1,4 +1,4 @@
-"""Between the coordinates of a description and those of MuJoCo.
+"""Conversion between the coordinates of twinrig's description and those of MuJoCo.
 
 Hinges and slides are the same in both but for the zero: here it is the design position, MuJoCo's ``qpos0``. Turning
 without a limit (free and ball joints) has the angles rx, ry, rz here, R = Rx Ry Rz, and a quaternion with angular
@@ -18,8 +18,8 @@ SLIDE_JOINT, BALL_JOINT, FREE_JOINT = (
 
 
 class MujocoState(NamedTuple):
-    """MuJoCo's state qpos (nq,), qvel (n,), the Jacobian J (n, n) from the coordinates' rates to qvel, and J' v
-    (n,)."""
+    """MuJoCo's state: qpos (nq,), qvel (n,), the Jacobian J (n, n) from the rates of the description's coordinates to
+    qvel, and J' v (n,) with these rates v."""
 
     qpos: np.ndarray
     qvel: np.ndarray
@@ -29,9 +29,9 @@ class MujocoState(NamedTuple):
 
 @dataclass(frozen=True)
 class Turning:
-    """Three angles in place of a quaternion: index of their first coordinate, index of the quaternion in qpos, axes (3,
-    3) of the body's frame in the design position as columns, and whether the quaternion is the attitude in space (free
-    joint) or relative (ball joint)."""
+    """Three angles of the description in place of MuJoCo's quaternion: index of their first coordinate, index of the
+    quaternion in qpos, axes (3, 3) of the body's frame in the design position as columns, and whether the quaternion is
+    the attitude in space (free joint) or relative to the parent (ball joint)."""
 
     first: int
     place: int
@@ -85,8 +85,8 @@ class Coordinates:
 
 
 def several_at_once(model: mujoco.MjModel) -> tuple[slice, ...]:
-    """For every coordinate (n,), the slice of its joint's coordinates that together turn or shift a body along three
-    axes."""
+    """For every coordinate (n,), the slice of its joint's coordinates that together rotate or translate a body along
+    three axes."""
     groups = list[slice]()
     for j in range(model.njnt):
         first = int(model.jnt_dofadr[j])
@@ -96,8 +96,8 @@ def several_at_once(model: mujoco.MjModel) -> tuple[slice, ...]:
 
 
 def turned_by_angles(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rotation matrix R = Rx Ry Rz (3, 3), G (3, 3) with the angular velocity G rates in the rotated axes, and G' rates
-    (3,)."""
+    """Rotation matrix R = Rx Ry Rz (3, 3) of three angles; G (3, 3), such that G rates is the angular velocity in the
+    rotated axes; and G' rates (3,)."""
     (sa, sb, sc), (ca, cb, cc) = np.sin(angles), np.cos(angles)
     first = np.array(((1.0, 0.0, 0.0), (0.0, ca, -sa), (0.0, sa, ca)))
     second = np.array(((cb, 0.0, sb), (0.0, 1.0, 0.0), (-sb, 0.0, cb)))

@@ -1,4 +1,4 @@
-"""Elements of a model that are no numbers: what is switched off, and what is joined to what.
+"""Properties of a model that are words, not numbers: what is switched off, and which parts are connected.
 
 Each has a reader, which gives one word or none, and a writer, which raises ValueError where a model cannot have that
 word without being another tree.
@@ -35,7 +35,7 @@ def _word_value(text: str) -> np.ndarray:
 
 
 def _refusing_writer(what: str) -> Writer:
-    """A writer that raises ValueError, for properties that belong to the structure of the tree."""
+    """Writer that raises ValueError, for properties that belong to the structure of the tree."""
 
     def write(model: mujoco.MjModel, number: int, value: np.ndarray) -> None:
         raise ValueError(f"{what} cannot be changed in a compiled model")
@@ -53,7 +53,7 @@ def _index_of_name(model: mujoco.MjModel, sort: str, owner: str) -> int:
 
 
 def _feature_switch(flag: str) -> tuple[Reader, Writer]:
-    """Reader and writer of a switch by which a file turns off a feature of MuJoCo."""
+    """Reader and writer of the switch by which a file turns off a feature of MuJoCo."""
     bit = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}"))
 
     def write(model: mujoco.MjModel, _: int, value: np.ndarray) -> None:
@@ -64,7 +64,7 @@ def _feature_switch(flag: str) -> tuple[Reader, Writer]:
 
 
 def _read_acts(model: mujoco.MjModel, i: int) -> np.ndarray:
-    """Whether an actuator acts, or belongs to a group that is switched off."""
+    """ "on" or "off": whether an actuator acts, or belongs to a group that is switched off."""
     return _word_value("on" if actuator_is_on(model, i) else SWITCHED_OFF)
 
 
@@ -90,7 +90,7 @@ def _write_type(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
 
 
 def _read_parent(model: mujoco.MjModel, j: int) -> np.ndarray:
-    """The joint before a joint on the path from the world."""
+    """Name of the joint before a joint on the path from the world."""
     body = int(model.jnt_bodyid[j])
     if j > model.body_jntadr[body]:
         return _word_value(label(model, "joint", j - 1))
@@ -98,7 +98,7 @@ def _read_parent(model: mujoco.MjModel, j: int) -> np.ndarray:
 
 
 def _moved_by(model: mujoco.MjModel, body: int) -> np.ndarray:
-    """The last joint on the path from the world to a body."""
+    """Name of the last joint on the path from the world to a body."""
     while body and not model.body_jntnum[body]:
         body = int(model.body_parentid[body])
     last = int(model.body_jntadr[body] + model.body_jntnum[body] - 1)
@@ -106,7 +106,7 @@ def _moved_by(model: mujoco.MjModel, body: int) -> np.ndarray:
 
 
 def _read_held(model: mujoco.MjModel, t: int) -> np.ndarray:
-    """Joints of a fixed tendon, or bodies at both ends of a straight one."""
+    """Names of the joints of a fixed tendon, or of the bodies at both ends of a straight one."""
     if is_fixed(model, t):
         return _word_value(", ".join(label(model, "joint", j) for j in tendon_travel(model, t)[0]))
     if is_line(model, t):
@@ -127,7 +127,7 @@ def _body_of(model: mujoco.MjModel, site: int) -> str:
 
 
 def _read_target(model: mujoco.MjModel, i: int) -> np.ndarray:
-    """What an actuator drives: a joint, a tendon, the body of a site."""
+    """Name of what an actuator drives: a joint, a tendon, the body of a site."""
     target = int(model.actuator_trnid[i, 0])
     if pushes_site(model, i):
         return _word_value(f"a site of {_body_of(model, target)}")
@@ -145,7 +145,7 @@ def _write_target(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
 
 
 def _read_between(model: mujoco.MjModel, e: int) -> np.ndarray:
-    """Joints or bodies that an equality constraint connects."""
+    """Names of the joints or bodies that an equality constraint connects."""
     things = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
     if is_tie(model, e):
         return _word_value(" and ".join(label(model, "joint", j) for j in things if j >= 0))
@@ -180,4 +180,4 @@ WORD_ELEMENTS: tuple[tuple[str, str, Reader, Writer], ...] = (
     ("actuator", "target", _read_target, _write_target),
     ("equality", "partners", _read_between, _write_between),
 )
-"""What has it, its name, its reader and its writer."""
+"""Properties that are words: kind of owner, name of the property, its reader and its writer."""

@@ -1,4 +1,5 @@
-"""The numbers of a compiled model by name: what is compared between two files, and left out to find what matters.
+"""The numbers of a compiled model by name: they are compared between two files, and set to zero to see which ones
+matter.
 
 An element is one property of one thing: "armature of joint 'hip'". Values are those of MuJoCo's compiled model, in SI
 units; an inertia is the tensor in the axes of its body, whichever principal axes a file has.
@@ -17,16 +18,17 @@ from models.own_model.names import feature_is_disabled, label
 from models.own_model.reading import is_line, pushes_site, sites_of
 
 AFFINE_LAW, CONSTANT_LAW = int(mujoco.mjtGain.mjGAIN_AFFINE), int(mujoco.mjtGain.mjGAIN_FIXED)
-"""Laws of actuators, whose numbers are the same for gain and bias."""
+"""MuJoCo's numbers of the kinds of actuator laws, which are the same for gain and bias."""
 EQUALITY_TOLERANCE = 1e-12
 """Relative difference up to which two values of an element are equal."""
 SHOWN_DIGITS, EXACT_DIGITS = 6, 17
-"""Digits in which values are shown, and those in which every two numbers differ."""
+"""Digits in which values are shown, and digits in which any two different numbers differ."""
 
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """kind, owner : as in "armature of joint 'hip'"; unit; value : its numbers (k,), or one word."""
+    """Property of a part of a model. kind, owner : as in "armature of joint 'hip'"; unit; value : its numbers (k,), or
+    one word."""
 
     kind: str
     owner: str
@@ -49,7 +51,7 @@ class Element:
         return value_text(self.value, self.unit)
 
     def has_same_value(self, other: "Element") -> bool:
-        """Whether both have the same value."""
+        """Whether this and another property have the same value."""
         if is_word(self.value) or is_word(other.value):
             return bool(np.array_equal(self.value, other.value))
         if self.value.shape != other.value.shape:
@@ -80,7 +82,7 @@ def value_text(value: np.ndarray, unit: str = "", digits: int = SHOWN_DIGITS) ->
 
 
 def told_apart(first: np.ndarray, second: np.ndarray, unit: str) -> tuple[str, str]:
-    """Two different values as text, with as few digits as show the difference."""
+    """Two different values as texts, with as few digits as show the difference."""
     texts = value_text(first, unit), value_text(second, unit)
     for digits in range(SHOWN_DIGITS + 1, EXACT_DIGITS + 1):
         if texts[0] != texts[1]:
@@ -96,7 +98,7 @@ def two_digit_text(number: float) -> str:
 
 @dataclass(frozen=True)
 class _Kind:
-    """One kind of property, for all parts of a sort: how it is read and written."""
+    """A kind of property of all parts of a sort, such as all joints: its name, its unit, its reader and its writer."""
 
     sort: str
     kind: str
@@ -106,13 +108,13 @@ class _Kind:
 
 
 def elements_of_model(model: mujoco.MjModel) -> dict[tuple[str, str], Element]:
-    """All elements of a model, in the order of the model."""
+    """All properties of a model, by kind and owner, in the order of the model."""
     return {each.key: each for each in _elements_of_kind(model)}
 
 
 def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
-    """Write a value of an element into a model for ``described_model``; KeyError if the model has no such element,
-    ValueError if the element cannot have this value."""
+    """Write the value of a property into a model for ``described_model``. Raises KeyError if the model has no such
+    property, ValueError if the property cannot have this value."""
     kind, number = _kind_and_index(model, key)
     if kind.read(model, number).shape != value.shape:
         raise ValueError(f"{kind.kind} has another number of values")
@@ -121,7 +123,7 @@ def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
 
 
 def drop(model: mujoco.MjModel, key: tuple[str, str]) -> bool:
-    """Set an element to zero in a model, if its kind allows this; returns whether it does."""
+    """Set a property to zero in a model, if its kind allows this; returns whether it does."""
     kind, number = _kind_and_index(model, key)
     if kind.kind not in REMOVABLE_KINDS:
         return False
@@ -156,7 +158,7 @@ def _owner_name(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
 
 
 def _unit(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
-    """Unit of this element; of two, that of translation for slides and free joints, else that of rotation."""
+    """Unit of a property; of two units, that of translation for slides and free joints, else that of rotation."""
     turning, _, shifting = kind.unit.partition(" | ")
     slides = kind.sort == "joint" and model.jnt_type[number] in (SLIDE_JOINT, FREE_JOINT)
     return shifting if shifting and slides else turning
@@ -167,7 +169,7 @@ def _body_accessors(field: str) -> tuple[Callable, Callable]:
 
 
 def _number_accessors(field: str, at: Callable[[mujoco.MjModel, int], object]) -> tuple[Callable, Callable]:
-    """Reader and writer of numbers of a compiled model."""
+    """Reader and writer of a field of a compiled model, at the index that ``at`` returns."""
 
     def write(model: mujoco.MjModel, number: int, value: np.ndarray) -> None:
         numbers = getattr(model, field)
@@ -220,7 +222,7 @@ def _read_axis(model: mujoco.MjModel, j: int) -> np.ndarray:
 
 
 def _read_inertia(model: mujoco.MjModel, b: int) -> np.ndarray:
-    """The six entries xx, yy, zz, xy, xz, yz of the tensor in the body's axes."""
+    """The six components xx, yy, zz, xy, xz, yz (kg m^2) of a body's inertia tensor in the body's axes."""
     numbers = np.empty(9)
     mujoco.mju_quat2Mat(numbers, model.body_iquat[b])
     axes = numbers.reshape(3, 3)
@@ -229,7 +231,7 @@ def _read_inertia(model: mujoco.MjModel, b: int) -> np.ndarray:
 
 
 def tensor_of(entries: np.ndarray) -> np.ndarray:
-    """Inertia tensor (3, 3) from its six entries."""
+    """Inertia tensor (3, 3) from its six components xx, yy, zz, xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = entries
     return np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
 
@@ -274,8 +276,8 @@ def _range_accessors(range_field: str, limited_field: str) -> tuple[Callable, Ca
 
 
 def _actuator_law_accessors(numbers: str, kinds: str, first: int) -> tuple[Callable, Callable]:
-    """Reader and writer of an actuator's three numbers of gain or bias. Numbers from index ``first`` on count only for
-    an affine law."""
+    """Reader and writer of the three numbers of an actuator's gain or bias. Numbers from index ``first`` on count only
+    for an affine law."""
 
     def read(model: mujoco.MjModel, i: int) -> np.ndarray:
         law = np.array(getattr(model, numbers)[i, :3])
@@ -307,7 +309,7 @@ def _write_ends(model: mujoco.MjModel, t: int, value: np.ndarray) -> None:
 
 
 def _read_tie(model: mujoco.MjModel, e: int) -> np.ndarray:
-    """Numbers of a coupling: 1 if it is active, its offset and ratio; zeros if it is not."""
+    """Numbers of a coupling of joints: 1 if it is active, its offset and ratio; zeros if it is not."""
     return np.array([1.0, *model.eq_data[e, :2]]) * model.eq_active0[e] if is_tie(model, e) else np.zeros(0)
 
 
@@ -340,7 +342,7 @@ def _write_joint(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
 
 
 def _read_softness(model: mujoco.MjModel, e: int) -> np.ndarray:
-    """solref and solimp of a constraint."""
+    """MuJoCo's softness parameters solref and solimp of a constraint."""
     built = is_tie(model, e) or joins_bodies(model, e)
     return np.concatenate((model.eq_solref[e], model.eq_solimp[e])) if built else np.zeros(0)
 
@@ -405,4 +407,4 @@ REMOVABLE_KINDS = (
     "gain",
     "bias",
 )
-"""Kinds that a model can be without, as zero."""
+"""Kinds of properties that can be removed from a model by setting them to zero."""

@@ -1,4 +1,5 @@
-"""Equality constraints of a file as the description has them: couplings of joints, and joints between bodies."""
+"""Equality constraints of a file in twinrig's description: couplings of joint coordinates, and joints between
+bodies."""
 
 from collections.abc import Iterator, Sequence
 
@@ -13,7 +14,7 @@ CONNECT_EQUALITY, WELD_EQUALITY = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjt
 
 
 def is_tie(model: mujoco.MjModel, equality: int) -> bool:
-    """Whether an equality constraint couples a hinge or slide linearly to another one, or fixes it."""
+    """Whether an equality constraint couples a hinge or slide linearly to another joint, or fixes it."""
     if model.eq_type[equality] != mujoco.mjtEq.mjEQ_JOINT or model.eq_data[equality, 2:5].any():
         return False
     joints = [j for j in (model.eq_obj1id[equality], model.eq_obj2id[equality]) if j >= 0]
@@ -21,7 +22,7 @@ def is_tie(model: mujoco.MjModel, equality: int) -> bool:
 
 
 def joint_couplings(model: mujoco.MjModel) -> Iterator[Coupling]:
-    """Active equality constraints of one or two joints."""
+    """Couplings of the description from the active equality constraints of one or two joints."""
     if feature_is_disabled(model, "EQUALITY"):
         return
     for e in (e for e in range(model.neq) if model.eq_active0[e] and is_tie(model, e)):
@@ -55,7 +56,8 @@ def by_sites(model: mujoco.MjModel, equality: int) -> bool:
 
 
 def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connection]:
-    """Active equality constraints between points of two bodies, or between points and axes."""
+    """Connections of the description from the active equality constraints between points, or between points and axes,
+    of two bodies."""
     if feature_is_disabled(model, "EQUALITY"):
         return
     numbers = moving_bodies(model)
@@ -74,7 +76,7 @@ def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connec
 
 
 def _frames_of_ends(model: mujoco.MjModel, design: mujoco.MjData, equality: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Points (3,) and axes (3, 3) at both ends of a constraint in the design position; they coincide where the
+    """Points (3,) in m and axes (3, 3) at both ends of a constraint in the design position; they coincide where the
     constraint is satisfied.
 
     A weld between bodies gives its point on the second body first.
@@ -91,7 +93,7 @@ def _frames_of_ends(model: mujoco.MjModel, design: mujoco.MjData, equality: int)
 
 
 def tie_rows(ties: Sequence[Coupling], size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Linear equations rows q = offsets that couplings impose on n coordinates: rows (c, n) and offsets (c,)."""
+    """Linear equations rows q = offsets that couplings impose on n coordinates q: rows (c, n) and offsets (c,)."""
     rows = np.zeros((len(ties), size))
     for row, coupling in zip(rows, ties, strict=True):
         row[coupling.driven] = 1.0

@@ -1,4 +1,4 @@
-"""Which elements of two files make their accelerations differ, by building with each of them as the other file has it.
+"""Which properties of two model files make their accelerations differ, by building each file with values of the other.
 
 The builds are the plain equations of the description, which the certificate holds to both files. First all elements
 that differ are taken over together: what is left then has no element. Then each alone: what it changes is its
@@ -37,22 +37,22 @@ from models.own_model.elements import (
 from models.own_model.reading import TwinModel, described_model
 
 STATE_COUNT = 20
-"""States at which elements are tried."""
+"""Count of random states at which properties are tried."""
 UNCOMPARED_KINDS = ("range", "softness")
-"""Kinds of elements that are off, or that MuJoCo alone has: a difference in them is listed, and not compared."""
+"""Kinds of properties that are off, or that only MuJoCo has: a difference in them is listed, and not compared."""
 NO_EFFECT_SHARE = 1e-11
-"""Relative change of accelerations and of the mass matrix below which an element has no influence: a tenth of what
-counts as different, and above the 7e-12 that rounding alone was seen to make of a coordinate near 0."""
+"""Relative change of accelerations and of the mass matrix below which a property has no influence: a tenth of what
+counts as different, and above the 7e-12 that rounding alone was seen to cause in a coordinate near 0."""
 Key = tuple[str, str]
 States = list[tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """An element that differs: what it is, its values in both files (None: it has none), its unit, and its influence,
-    the largest relative change of accelerations when it alone is as in the other file, or of the mass matrix where
-    no acceleration changes (None where it has no try); off : it is listed, and not compared; said : its kind in words,
-    where that says more."""
+    """A property that differs between two files: what it is, its values in both files (None: it has none), its unit,
+    and its influence, the largest relative change of accelerations when it alone is as in the other file, or of the
+    mass matrix where no acceleration changes (None where it cannot be tried); off : it is listed, and not compared;
+    said : its kind in words, where that says more."""
 
     kind: str
     owner: str
@@ -65,7 +65,7 @@ class Difference:
 
     @property
     def key(self) -> Key:
-        """Identification of the element that differs: its kind and owner."""
+        """Identification of the property that differs: its kind and owner."""
         return self.kind, self.owner
 
     def sentence(self, files: Sequence[str]) -> str:
@@ -77,8 +77,9 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Comparison of two files: agreement of their accelerations; different elements, the most influential first; the
-    remaining disagreement when all of these are taken over; and coordinates that only one file has."""
+    """Comparison of two files: agreement of their accelerations; properties that differ, the most influential first;
+    the disagreement that remains when the second file's values are taken for all of these; and coordinates that only
+    one file has."""
 
     acceleration_agreement: Agreement | None
     differences: tuple[Difference, ...]
@@ -87,7 +88,7 @@ class Comparison:
 
     @property
     def alike(self) -> bool:
-        """Whether both move alike."""
+        """Whether both files move alike."""
         return self.acceleration_agreement is not None and self.acceleration_agreement.alike
 
     @property
@@ -99,7 +100,7 @@ class Comparison:
 
     @property
     def not_compared(self) -> tuple[Difference, ...]:
-        """Differences in features that are switched off in both files."""
+        """Differences in properties that are off, or that only MuJoCo has: they are listed and not compared."""
         return tuple(each for each in self.differences if each.off)
 
     @property
@@ -108,7 +109,7 @@ class Comparison:
         return tuple(each for each in self.differences if each not in (*self.influential, *self.not_compared))
 
     def rest(self) -> str:
-        """Text on the disagreement that remains when all possible elements are taken over."""
+        """Text on the disagreement that remains when all possible values of the second file are taken over."""
         if self.unexplained <= EQUAL_ACCELERATION_SHARE:
             return f"with these taken over, both move alike: {two_digit_text(self.unexplained)} is left"
         untried = any(each.influence is None for each in self.influential)
@@ -120,7 +121,7 @@ class Comparison:
 
 
 def compare(first: TwinModel, second: TwinModel, count: int = STATE_COUNT) -> Comparison:
-    """Comparison of two files, at random states within the ranges of the first file."""
+    """Comparison of two model files, at random states within the ranges of the first file."""
     unmatched = _unmatched_coordinates(first, second)
     if unmatched:
         return Comparison(None, tuple(_differences(first, second, None)), np.inf, tuple(unmatched))
@@ -151,7 +152,7 @@ def _importance_key(difference: Difference) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """The first file, changed so that some elements have the second file's values."""
+    """A model file whose properties can be given the other file's values, to see how its motion changes."""
 
     twin: TwinModel
     states: States
@@ -169,8 +170,8 @@ class _Trial:
     def with_all(
         self, values: dict[Key, Element], differences: Sequence[Difference]
     ) -> tuple[mujoco.MjModel, list[Key]]:
-        """The file with all elements changed to the other file's values where possible, and the elements that were
-        changed."""
+        """The model with all differing properties changed to the other file's values where possible, and the properties
+        that were changed."""
         model, taken = copy(self.twin.model), list[Key]()
         for each in sorted(differences, key=lambda each: each.kind == "spring reference"):
             value = values[each.key].value if each.key in values else np.zeros_like(each.first)
@@ -180,20 +181,20 @@ class _Trial:
         return model, taken
 
     def with_one(self, key: Key, value: np.ndarray) -> mujoco.MjModel:
-        """The file with one element set to another value."""
+        """The model with one property set to another value."""
         model = copy(self.twin.model)
         put(model, key, value)
         return model
 
     def without(self, keys: Sequence[Key]) -> mujoco.MjModel:
-        """The file without those of the elements that it can do without."""
+        """The model with the given properties removed, where they can be."""
         model = copy(self.twin.model)
         for key in keys:
             drop(model, key)
         return model
 
     def moved(self, model: mujoco.MjModel) -> list[Moved]:
-        """Motion of a changed model at the states."""
+        """Motion of a changed model at the states of the trial."""
         return moved_at(equations_of_build(described_model(model, self.twin.name), PLAIN_BUILD), self.states)
 
 
@@ -215,7 +216,7 @@ def _rounded_as_both(here: Reference, there: Reference, order: list[int]) -> Ref
 
 
 def _unmatched_coordinates(first: TwinModel, second: TwinModel) -> list[str]:
-    """Coordinates of one file that do not exist in the other."""
+    """Sentences on the coordinates of each file that do not exist in the other."""
     names = [(twin.name, twin.names) for twin in (first, second)]
     rows = list[str]()
     for (file, listed), (_, others) in (names, names[::-1]):
@@ -224,8 +225,8 @@ def _unmatched_coordinates(first: TwinModel, second: TwinModel) -> list[str]:
 
 
 def _differences(first: TwinModel, second: TwinModel, trials: tuple[_Trial, _Trial] | None) -> list[Difference]:
-    """Elements that differ between the files; trials : one for the first and one for the second file, None if they have
-    no common states."""
+    """Properties that differ between the files; trials : one for the first and one for the second file, None if they
+    have no common states."""
     rows, listed, others = list[Difference](), elements_of_model(first.model), elements_of_model(second.model)
     rubbing = first.driven.frictions or second.driven.frictions
     for key in dict.fromkeys((*listed, *others)):
@@ -246,7 +247,7 @@ def _differences(first: TwinModel, second: TwinModel, trials: tuple[_Trial, _Tri
 def _influence_of_difference(
     trials: tuple[_Trial, _Trial], key: Key, element: Element | None, other: Element | None
 ) -> float | None:
-    """Influence of one difference: the first file takes over the other's value, or the second file loses an element
+    """Influence of one difference: the first file takes over the other's value, or the second file loses a property
     that only it has. None if the first file cannot have that value."""
     first, second = trials
     if element is None:
@@ -267,12 +268,12 @@ def _only_turned(kind: str, element: Element | None, other: Element | None) -> b
 
 
 def _says_nothing(there: Element, element: Element | None, other: Element | None) -> bool:
-    """Whether an element that only one file has is insignificant: zero, or a word that repeats other elements."""
+    """Whether a property that only one file has is insignificant: zero, or a word that repeats other properties."""
     return (element is None or other is None) and (is_word(there.value) or not there.is_nonzero)
 
 
 def removals_that_agree(twin: TwinModel, build: str, count: int = STATE_COUNT) -> list[tuple[Element, float]]:
-    """Elements whose removal makes a build agree with the file's own model; each is removed from both.
+    """Properties whose removal makes a build agree with the file's model in MuJoCo; each is removed from both.
 
     With each its relative difference of accelerations without it, the smallest first; empty where none explains it.
     """

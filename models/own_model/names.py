@@ -1,4 +1,5 @@
-"""Names of what a compiled model has, of the bodies that stand for its joints, and small readers of its numbers."""
+"""Names of the objects of a compiled MuJoCo model and of the bodies that represent its joints, and small readers of its
+numbers."""
 
 from collections.abc import Sequence
 
@@ -10,26 +11,26 @@ from models.vehicles.spatial import FREEDOMS, Freedom, Vector
 
 ROTATION_NAMES: tuple[Freedom, ...] = ("rx", "ry", "rz")
 OF_KIND: dict[int, tuple[Freedom, ...]] = {BALL_JOINT: ROTATION_NAMES, FREE_JOINT: FREEDOMS}
-"""Freedoms of joints that have several."""
+"""Freedoms of the joint types that have several."""
 NAMES_SHOWN = 3
-"""Names in a message."""
+"""Largest count of names in a message."""
 CONSTRAINT_FEATURES = ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT")
 
 
 def some_names(names: Sequence[str]) -> str:
-    """The first names, and how many more there are."""
+    """Text with the first names, and how many more there are."""
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
     return ", ".join(names[:NAMES_SHOWN]) + more
 
 
 def label(model: mujoco.MjModel, kind: str, number: int) -> str:
-    """Name of a joint, body, tendon, actuator or the like of a file; its number if it has no name."""
+    """Text that names a joint, body, tendon, actuator or the like of a file; its number if it has no name."""
     name = name_of(model, kind, number)
     return f"{kind} {name!r}" if name else f"{kind} {number}"
 
 
 def name_of(model: mujoco.MjModel, kind: str, number: int) -> str:
-    """Name alone; "" if there is none."""
+    """Name of an object in the file; "" if there is none."""
     return mujoco.mj_id2name(model, int(getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")), number) or ""
 
 
@@ -43,7 +44,7 @@ def coordinate_names(model: mujoco.MjModel) -> tuple[str, ...]:
 
 
 def place_of(model: mujoco.MjModel, joint: int) -> tuple[str, Freedom]:
-    """Index of the coordinate of a hinge or slide."""
+    """Coordinate of a hinge or slide in the description: body and freedom."""
     return moved_by(joint), "x" if model.jnt_type[joint] == SLIDE_JOINT else "rx"
 
 
@@ -57,7 +58,7 @@ def moving_bodies(model: mujoco.MjModel) -> dict[int, None]:
 
 
 def joints_above(model: mujoco.MjModel, body: int) -> list[int]:
-    """All joints that move a body."""
+    """Numbers of all joints that move a body, from the body to the world."""
     joints = list[int]()
     while body:
         first = int(model.body_jntadr[body])
@@ -73,30 +74,30 @@ def feature_is_disabled(model: mujoco.MjModel, what: str) -> bool:
 
 
 def moved_by(joint: int) -> str:
-    """Name of the massless body that a joint moves. It contains the joint's number, because joints in a file may have
-    no names."""
+    """Name of the massless body that represents a joint. It contains the joint's number, because joints in a file may
+    have no names."""
     return f"joint {joint}"
 
 
 def body_with_mass(body: int) -> str:
-    """Name of the body that has the mass of a file's body and follows its last joint."""
+    """Name of the description's body that has the mass of a file's body and follows its last joint."""
     return f"body {body}"
 
 
 def three_numbers(numbers: np.ndarray) -> Vector:
-    """Three numbers as a tuple, the form used in descriptions."""
+    """Three numbers as a tuple, the form of vectors in descriptions."""
     x, y, z = np.asarray(numbers, float).tolist()
     return x, y, z
 
 
 def matrix_rows(matrix: np.ndarray) -> tuple[Vector, Vector, Vector]:
-    """Matrix (3, 3) as a tuple of rows, the form used in descriptions."""
+    """Matrix (3, 3) as a tuple of rows, the form of matrices in descriptions."""
     x, y, z = map(three_numbers, matrix)
     return x, y, z
 
 
 def rotation_of(quaternion: np.ndarray) -> np.ndarray:
-    """Rotation matrix (3, 3) of a quaternion."""
+    """Rotation matrix (3, 3) of a unit quaternion (w, x, y, z)."""
     numbers = np.empty(9)
     mujoco.mju_quat2Mat(numbers, quaternion)
     return numbers.reshape(3, 3)

@@ -1,4 +1,5 @@
-"""Paths of all builds at the same tableau (classical Runge-Kutta) and step, from the same state.
+"""Motion over time of all builds of a model, with the same integration method (classical Runge-Kutta) and step, from
+the same state.
 
 Builds have the same coordinates, so they agree to rounding as long as the motion does not magnify it: a disturbance of
 1e-14 tells how long. The file's own model has quaternions where something turns without limit: there one step of the
@@ -27,32 +28,24 @@ from models.own_model.reading import TwinModel, constant_controls
 from models.own_model.states import random_states
 
 PATH_DURATION = 1.0
-"""s"""
+"""Duration (s) of a path."""
 EQUAL_PATH_SHARE, DISTURBANCE = 1e-10, 1e-14
-"""Relative distance up to which paths are the same, and the disturbance that must stay below it."""
+"""Relative distance up to which paths count as equal, and the disturbance of the start whose effect must stay below
+it."""
 MOST_STEPS = 100_000
-"""Steps of a path: the plain equations take about a minute for these."""
+"""Largest step count of a path: the plain equations take about a minute for it."""
 LARGEST_STATE = 1e6
-"""m, rad, m/s, rad/s: what lies beyond has blown up."""
+"""Size (m, rad, m/s, rad/s) of a coordinate or rate beyond which a motion has diverged."""
 FILE_BUILD_NAME = "the file's own model"
 PIECES = (1.0 / 16.0, 1.0 / 4.0, 1.0)
-"""Shares of a path up to which it is marched at once."""
+"""Shares of a path after which integration pauses to check whether the comparison must stop."""
 STARTS = 20
-"""Random states from which the start of a path is chosen."""
+"""Count of random states from which the start of a path is chosen."""
 
 
 @dataclass(frozen=True)
 class PathReport:
-    """step (s); comparison_horizon : until when (s) a disturbance of 1e-14 stays below 1e-10; distances : of each other
-    build from the first one up to there, relative; failed : what stopped a build; has_quaternions : whether the file's
-    has them;
-    energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy;
-    has_soft_constraints : whether MuJoCo has soft constraints, or dry friction that sticks at the start, so that its
-    path is another one: from it the file's is counted then;
-    has_dry_friction : whether there is dry friction: paths are compared as long as it slides; struck_limit : whose
-    limit, which is not built, ends the comparison, empty if none's; controls : name of their file, empty where they are
-    constant.
-    """
+    """Comparison of the paths of all builds over time."""
 
     step: float
     comparison_horizon: float
@@ -67,7 +60,8 @@ class PathReport:
 
     @property
     def alike(self) -> bool:
-        """Whether all builds have the same path; the file's own path counts only if it has the same coordinates."""
+        """Whether all builds have the same path; the path of MuJoCo's model of the file counts only if it has the same
+        coordinates."""
         others = {FILE_BUILD_NAME: self.has_quaternions, SOFT_BUILD: self.has_soft_constraints}
         held = [size for name, size in self.distances.items() if not others.get(name)]
         return bool(held) and max(held) <= EQUAL_PATH_SHARE
@@ -110,7 +104,7 @@ class PathReport:
 
 
 def steps_of_path(twin: TwinModel) -> int:
-    """Number of steps of a path at the file's own step; InputError if there are too many."""
+    """Number of steps of a path at the step of the file. Raises InputError if there are too many."""
     step = float(twin.model.opt.timestep)
     if PATH_DURATION / step > MOST_STEPS:
         allowed = (
@@ -128,8 +122,8 @@ def compare_paths(
     table: ControlTable | None = None,
     told: Callable[[float], object] = lambda share: None,
 ) -> PathReport:
-    """Paths over 1 s; step (s): the file's unless given; table : of controls, which are constant without; told : the
-    share that is done. InputError for too many steps."""
+    """Comparison of the paths of all builds over 1 s. step (s) : that of the file if None; table : of controls, which
+    are constant without it; told : receives the share that is done. Raises InputError for too many steps."""
     steps = int(np.ceil(PATH_DURATION / step - 1e-9)) if step else steps_of_path(twin)
     step, start = PATH_DURATION / steps, start_of_path(twin)
     legs = table.path_sections(twin, steps, step) if table else constant_leg(twin, steps)
@@ -162,7 +156,7 @@ def _march_others(
     built: dict[str, np.ndarray],
     failed: dict[str, str],
 ) -> None:
-    """Store the paths of all builds but the first, and of the file's own model."""
+    """Store the paths of all builds but the first, and of MuJoCo's model of the file."""
     for build in (*ENGINES[1:], PLAIN_BUILD):
         _march_build(build, partial(path_by, legs, build, start, step), built, failed)
     held = np.concatenate([np.tile(leg.controls, (leg.steps, 1)) for leg in legs])
@@ -170,7 +164,8 @@ def _march_others(
 
 
 def _path_until_stopped(twin: TwinModel, legs: Sequence[PathSection], start: State, step: float) -> np.ndarray:
-    """The path of the first build; at constant controls in a few pieces, up to that in which comparison must stop."""
+    """The path of the first build; with constant controls in a few pieces, up to the piece in which the comparison must
+    stop."""
     steps, path = sum(leg.steps for leg in legs), np.concatenate(start)[None]
     for share in PIECES if len(legs) == 1 else (1.0,):
         q, v = np.split(path[-1], 2)
@@ -182,7 +177,8 @@ def _path_until_stopped(twin: TwinModel, legs: Sequence[PathSection], start: Sta
 
 
 def _rows_before_stop(twin: TwinModel, legs: Sequence[PathSection], path: np.ndarray) -> tuple[int, str]:
-    """Number of states of a path before dry friction sticks or a limit is reached, and whose limit that is."""
+    """Number of states of a path before dry friction sticks or a limit is reached, and the name of the joint with this
+    limit."""
     return _unlimited_rows(twin, path[: _sliding_rows(legs, path)])
 
 
@@ -197,7 +193,7 @@ def _sections_between(legs: Sequence[PathSection], first: int, last: int) -> lis
 
 
 def _rows_undisturbed(legs: Sequence[PathSection], build: str, start: State, step: float) -> int:
-    """Number of states of a build's path that a small disturbance of its start leaves alike."""
+    """Number of states of a build's path before a small disturbance of its start makes a difference."""
     steps, (q, v) = sum(leg.steps for leg in legs), start
     try:
         with np.errstate(all="ignore"):  # what blows up differs
@@ -208,7 +204,8 @@ def _rows_undisturbed(legs: Sequence[PathSection], build: str, start: State, ste
 
 
 def start_of_path(twin: TwinModel) -> tuple[np.ndarray, np.ndarray]:
-    """The first random state at which no limit acts and all dry friction slides; if there is none, the first of all."""
+    """The first random state at which no limit acts and all dry friction slides; if there is none, the first random
+    state."""
     struck = limits_struck(twin) if limits_switched_off(twin.model) else lambda q: ()
     first, *more = [*zip(*random_states(twin, 1), strict=True), *zip(*random_states(twin, STARTS), strict=True)]
     good = (state for state in (first, *more) if not struck(state[0]) and sliding_states(twin, [state]))
@@ -278,14 +275,14 @@ def file_path(
 
 
 def rows_alike(first: np.ndarray, disturbed: np.ndarray, steps: int) -> int:
-    """Number of states before a small disturbance grows so much that two paths count as different."""
+    """Number of states before a small disturbance grows so much that the two paths count as different."""
     size = np.maximum.accumulate(np.abs(first).max(axis=1))
     grown = np.flatnonzero(~(np.abs(disturbed - first).max(axis=1) <= EQUAL_PATH_SHARE * np.maximum(size, 1.0)))
     return max(2, int(grown[0])) if len(grown) else steps + 1
 
 
 def _sliding_rows(legs: Sequence[PathSection], path: np.ndarray) -> int:
-    """Number of states of a path before dry friction sticks in MuJoCo; one less, since the step before may already be
+    """Number of states of a path before dry friction sticks in MuJoCo, minus one, since the step before may already be
     affected."""
     acting = (leg.twin for leg in legs for _ in range(leg.steps))
     for i, (twin, row) in enumerate(zip(acting, path, strict=False)):
@@ -296,8 +293,8 @@ def _sliding_rows(legs: Sequence[PathSection], path: np.ndarray) -> int:
 
 
 def _unlimited_rows(twin: TwinModel, path: np.ndarray) -> tuple[int, str]:
-    """Number of states of a path before it reaches a joint limit, and the joint's name; one less, since the step before
-    may already be affected."""
+    """Number of states of a path before it reaches a joint limit, minus one, since the step before may already be
+    affected; and the joint's name."""
     struck = limits_struck(twin) if limits_switched_off(twin.model) else lambda q: ()
     for i, row in enumerate(path):
         if names := struck(row[: twin.size]):

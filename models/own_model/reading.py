@@ -1,4 +1,4 @@
-"""From MuJoCo's compiled model to the description of a vehicle, in the design position ``qpos0``.
+"""Conversion of MuJoCo's compiled model to twinrig's description of a vehicle, in the design position ``qpos0``.
 
 Every joint is a body without mass that moves along its axis, at its anchor; behind the last one of a body of the file
 is a body with its mass, at its centre. What stands still with the world is left out: it moves nothing.
@@ -31,14 +31,14 @@ from models.own_model.names import (
 from models.vehicles.spatial import PARALLEL, Body, Freedom, JointElement, SpatialVehicle, Vector
 
 JOINT_TARGETS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-"""Kinds of targets of actuators that are the same for a hinge or slide."""
+"""MuJoCo's kinds of actuator targets that mean the same for a hinge or slide."""
 LAST_GROUP = 30
 
 
 @dataclass(frozen=True, eq=False)
 class TwinModel:
-    """A file as MuJoCo parsed it (``model``), without the parts that were left out, and the same model as a description
-    (``driven``)."""
+    """A user's model twice: as MuJoCo parsed it (``model``), without the parts that were left out, and as twinrig's
+    description (``driven``)."""
 
     name: str
     model: mujoco.MjModel
@@ -47,7 +47,7 @@ class TwinModel:
 
     @property
     def size(self) -> int:
-        """Number of coordinates."""
+        """Number of coordinates of the model."""
         return self.coordinates.size
 
     @property
@@ -57,7 +57,8 @@ class TwinModel:
 
 
 def described_model(model: mujoco.MjModel, name: str) -> TwinModel:
-    """The model as a description; parts without an equivalent (see ``content``) must have been removed before."""
+    """A MuJoCo model with twinrig's description of it; parts without an equivalent (see ``content``) must have been
+    removed before."""
     design = mujoco.MjData(model)
     design.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, design)
@@ -94,7 +95,7 @@ def _bodies(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Body]:
 
 
 def _joint_body(model: mujoco.MjModel, design: mujoco.MjData, j: int, behind: str | None) -> Body:
-    """A body without mass that moves as a joint does."""
+    """Massless body that moves as a joint of the file does."""
     kind, body = int(model.jnt_type[j]), int(model.jnt_bodyid[j])
     if kind in OF_KIND:
         anchor = design.xpos[body] if kind == FREE_JOINT else design.xanchor[j]
@@ -138,7 +139,7 @@ def _joint_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
 
 
 def tendon_travel(model: mujoco.MjModel, tendon: int) -> tuple[list[int], list[float]]:
-    """Joints of a fixed tendon, and their coefficients."""
+    """Numbers of the joints of a fixed tendon, and their coefficients."""
     of = range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
     return [int(model.wrap_objid[w]) for w in of], [float(model.wrap_prm[w]) for w in of]
 
@@ -161,7 +162,7 @@ def sites_of(model: mujoco.MjModel, tendon: int) -> list[int]:
 
 
 def line_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[LineSpring]:
-    """Springs and dampers of tendons between two sites."""
+    """Springs and dampers of the tendons that run straight between two sites."""
     springs, dampers, numbers = (
         not feature_is_disabled(model, "SPRING"),
         not feature_is_disabled(model, "DAMPER"),
@@ -178,7 +179,7 @@ def line_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[LineS
 
 
 def turning_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[TurningSpring]:
-    """Springs and dampers of the rotation of ball and free joints; those of translation are in ``joint_elements``."""
+    """Rotational springs and dampers of ball and free joints; those of translation are in ``joint_elements``."""
     springs, dampers = not feature_is_disabled(model, "SPRING"), not feature_is_disabled(model, "DAMPER")
     for j in (j for j in range(model.njnt) if model.jnt_type[j] in (BALL_JOINT, FREE_JOINT)):
         body, free = int(model.jnt_bodyid[j]), model.jnt_type[j] == FREE_JOINT
@@ -223,7 +224,7 @@ def dry_frictions(model: mujoco.MjModel) -> Iterator[DryFriction]:
 
 
 def _along_tendon(model: mujoco.MjModel, tendon: int) -> tuple[tuple, tuple[float, ...], float]:
-    """Coordinates and factors of a fixed tendon, and its length in the design position."""
+    """Coordinates and factors of a fixed tendon, and its length (m) in the design position."""
     joints, factors = tendon_travel(model, tendon)
     length = sum(k * float(model.qpos0[model.jnt_qposadr[j]]) for j, k in zip(joints, factors, strict=True))
     return tuple(place_of(model, j) for j in joints), tuple(factors), length
@@ -255,8 +256,7 @@ def pushes_site(model: mujoco.MjModel, actuator: int) -> bool:
 
 
 def affine_law(model: mujoco.MjModel, actuator: int, control: float) -> np.ndarray:
-    """Three numbers (3,) of an actuator at a control: its constant force, and its coefficients of length and of
-    speed."""
+    """Force law of an actuator at a control, (3,): its constant force, and its coefficients of length and of speed."""
     gain = np.array(model.actuator_gainprm[actuator, :3])
     gain[1:] *= model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_AFFINE
     affine = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
@@ -271,7 +271,7 @@ def actuator_is_on(model: mujoco.MjModel, actuator: int) -> bool:
 
 
 def _active_actuators(model: mujoco.MjModel) -> list[int]:
-    """Actuators that are not switched off."""
+    """Numbers of the actuators that are not switched off."""
     return [i for i in range(model.nu) if actuator_is_on(model, i) and not feature_is_disabled(model, "ACTUATION")]
 
 
@@ -306,8 +306,8 @@ def _actuator_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
 
 
 def compensation(model: mujoco.MjModel, body: int) -> float:
-    """Share of a body's weight that is compensated, as the share of the joints above it that transmit the compensation;
-    0 for none.
+    """Share of a body's weight that MuJoCo compensates, as the share of the joints above it that transmit the
+    compensation; 0 for none.
 
     MuJoCo has it among the passive forces, which are none at all without springs and dampers, or among the forces of
     actuators where a joint says so (``actuatorgravcomp``), which are none without actuators.

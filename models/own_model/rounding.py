@@ -1,4 +1,4 @@
-"""What rounding makes of mass matrices, forces and accelerations, measured on the file's own model.
+"""Effect of floating-point rounding on mass matrices, forces and accelerations, measured on the file's model in MuJoCo.
 
 A computation in floating point is at best the exact answer for numbers that are changed by their rounding (backward
 stability). So the model is computed again with every number of it, and the state, changed at random by a small share
@@ -30,9 +30,11 @@ from models.own_model.names import moving_bodies
 from models.own_model.reading import TwinModel
 
 CHANGED_SHARE = 1e-9
-"""Changes of numbers: far above their rounding, and small enough for the answer to change in proportion."""
+"""Relative size of the random changes of numbers: far above rounding, and small enough for results to change in
+proportion."""
 RANDOM_CHANGES, SEED = 8, 27
-"""Random changes, of whose effects the root mean square is taken: by one alone, effects may cancel."""
+"""Count of random changes, whose effects are averaged as root mean square because those of a single change may cancel;
+seed of the random numbers."""
 RELATIVE_NUMBERS = (
     *("body_mass", "body_inertia", "body_gravcomp", "jnt_stiffness", "dof_damping", "dof_armature"),
     *("dof_frictionloss", "tendon_stiffness", "tendon_damping", "tendon_armature", "tendon_lengthspring", "wrap_prm"),
@@ -42,12 +44,12 @@ LENGTH_NUMBERS = ("body_pos", "body_ipos", "jnt_pos", "site_pos")
 DIRECTION_NUMBERS = ("body_quat", "body_iquat", "site_quat", "jnt_axis")
 """Numbers of a compiled model: changed by a share of themselves, of the reach, and unit vectors."""
 Law = Callable[[TwinModel], Equations]
-"""The file's own model as a function of coordinates and rates: with soft constraints, or with rigid ones."""
+"""Function from a model to its equations of motion: with soft constraints, or with rigid ones."""
 
 
 def sensitivities(twin: TwinModel, law: Law, states: Sequence[State], moved: Sequence[Moved]) -> list[Moved]:
-    """Sensitivities of mass (n, n), force (n,) and acceleration (n,) at each state: rms change per relative random
-    change of all input numbers.
+    """Rounding sensitivities of mass (n, n), force (n,) and acceleration (n,) at each state: rms change per relative
+    random change of all input numbers.
 
     law, moved : the file's own model, and what it does at the states.
     """
@@ -69,14 +71,15 @@ def sensitivities(twin: TwinModel, law: Law, states: Sequence[State], moved: Seq
 
 
 def _summed(sensitive: Moved, moved: Moved, sums: np.ndarray) -> Moved:
-    """Sensitivities with that of summing forces of the sizes (n,) ``sums``, whatever remains of them."""
+    """Rounding sensitivities, with the rounding of summing forces of the sizes (n,) ``sums`` added; these forces may
+    cancel."""
     by_sums = np.abs(np.linalg.pinv(moved.mass)) @ sums
     return sensitive._replace(force=sensitive.force + sums, acceleration=sensitive.acceleration + by_sums)
 
 
 def _sums_of_rates(twin: TwinModel, states: Sequence[State]) -> Iterator[np.ndarray]:
-    """For each state, sums (n,) over the bodies of the sizes of what their rates alone take on each coordinate: mass
-    times centripetal acceleration by lever, and gyroscopic moments."""
+    """For each state, the sums (n,) over the bodies of the sizes of the velocity-dependent forces on each coordinate:
+    mass times centripetal acceleration by lever, and gyroscopic moments."""
     model, data = twin.model, mujoco.MjData(twin.model)
     shifts, turns, shifting, turning = (np.empty((3, twin.size)) for _ in range(4))
     for q, v in states:
@@ -94,8 +97,8 @@ def _sums_of_rates(twin: TwinModel, states: Sequence[State]) -> Iterator[np.ndar
 
 
 def _with_solver_rounding(sensitive: Moved, moved: Moved) -> Moved:
-    """Sensitivities to rounding, those of accelerations increased by that of solving M a = f, in which every entry of M
-    is rounded.
+    """Rounding sensitivities, with that of solving M a = f for the accelerations a added, where every entry of the mass
+    matrix M is rounded.
 
     This is Skeel's componentwise condition, |M^-1| |M| |a| (Higham 2002, Accuracy and Stability of Numerical
     Algorithms, section 7.2; recalled). A light seat on a car takes its share of the rounding of wheels that spin up a
@@ -107,7 +110,7 @@ def _with_solver_rounding(sensitive: Moved, moved: Moved) -> Moved:
 
 
 def _unconstrained_motion(twin: TwinModel, states: Sequence[State]) -> list[Moved]:
-    """Motion of the file's own model at the states, without its equality constraints."""
+    """Motion of the file's model in MuJoCo at the states, without its equality constraints."""
     model = copy(twin.model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
     move = as_parsed(replace(twin, model=model))
@@ -115,8 +118,8 @@ def _unconstrained_motion(twin: TwinModel, states: Sequence[State]) -> list[Move
 
 
 def _constrained(sensitive: Moved, free: Moved) -> Moved:
-    """Sensitivities that include the motion suppressed by constraints. Rounding errors of all other coordinates remain
-    in a stopped coordinate, weighted with the root of inertia."""
+    """Rounding sensitivities, with the motion that constraints suppress added. Rounding errors of all other coordinates
+    remain in a stopped coordinate, weighted with the root of inertia."""
     weight = np.sqrt(free.mass.diagonal())
     taken = float((weight * np.abs(free.acceleration)).max())
     return sensitive._replace(
@@ -168,8 +171,8 @@ def _equality_magnitudes(model: mujoco.MjModel, reach: float) -> Iterator[tuple[
 
 
 def _changed_state(twin: TwinModel, draw: np.random.Generator, q: np.ndarray, v: np.ndarray) -> State:
-    """A state changed by a small relative amount; coordinates are changed including the offset that the file gives
-    them."""
+    """State changed at random by a small relative amount; coordinates are changed including the offset that the file
+    gives them."""
     model, size = twin.model, np.abs(q)
     for j in range(model.njnt):
         first, several = int(model.jnt_dofadr[j]), int(model.jnt_type[j] in (BALL_JOINT, FREE_JOINT))

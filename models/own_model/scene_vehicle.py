@@ -1,4 +1,4 @@
-"""The vehicle that a scene names: one that comes with twinrig, a vehicle file in TOML, or a car in MJCF_EXTENSION."""
+"""The vehicle that a scene names: a vehicle that comes with twinrig, a vehicle file in TOML, or a car in MJCF."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ MJCF_EXTENSION = ".xml"
 def scene_vehicle(
     name: str, folder: str | Path = ".", file: str = "", place: str = "", reduced: bool = False, towing: bool = False
 ) -> SpatialVehicle:
-    """The vehicle by its name or by a file relative to ``folder``; unloaded.
+    """The unloaded vehicle of a scene, by its name or by a file relative to ``folder``.
 
     ``file`` and ``place`` say who asked for it, for the message if there is none. reduced, towing : may a vehicle file
     have [reduced], and may it tow? Raises InputError.

@@ -1,4 +1,4 @@
-"""Paths of two files from one state, by the same build, tableau and step."""
+"""Comparison of the paths of two model files from the same state, by the same build, integration method and step."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ from models.own_model.states import random_states
 class PathGap:
     """Difference of two files' paths. horizon : time (s) up to which paths are compared, as in ``PathReport``; distance
     : largest difference of a coordinate or rate, relative to the largest value in the first file, at least 1; worst :
-    which coordinate; failed : why there is no comparison."""
+    name of the coordinate with this difference; failed : why there is no comparison."""
 
     horizon: float
     distance: float
@@ -25,7 +25,7 @@ class PathGap:
     failed: str = ""
 
     def line(self) -> str:
-        """One line of text for the terminal."""
+        """Text of one line for the terminal."""
         if self.failed:
             return f"paths of both files from one state are not compared: {self.failed}"
         until = (
@@ -39,8 +39,8 @@ class PathGap:
 
 
 def paths_apart(first: TwinModel, second: TwinModel) -> PathGap:
-    """Difference between two files' paths over 1 s, at the step of the first file; both must have the same names of
-    coordinates."""
+    """Difference between two files' paths over 1 s, at the step of the first file; both files must have coordinates of
+    the same names."""
     steps, (q,), (v,) = steps_of_path(first), *random_states(first, 1)
     step, order = PATH_DURATION / steps, [first.names.index(name) for name in second.names]
     legs = [constant_leg(twin, steps) for twin in (first, second)]

@@ -1,4 +1,5 @@
-"""A URDF read without MuJoCo, and held to what MuJoCo's parser made of it: masses, inertias, origins and axes.
+"""Masses, inertias, origins and axes of a URDF, read without MuJoCo and compared with the model that MuJoCo's parser
+makes of it.
 
 Links that are fixed to one another are one body in MuJoCo: masses, centres and inertias are summed over them. All is
 compared in the design position, in the axes of space. After the specification of URDF (ROS): rpy turns about the fixed
@@ -18,7 +19,8 @@ from models.own_model.urdf_text import parsed_root
 from models.vehicles.spatial import steiner
 
 PARSER_TOLERANCE = 1e-6
-"""Relative: MuJoCo's parser keeps all digits, yet principal axes cost some."""
+"""Relative difference allowed between file and parser: the parser keeps all digits, yet computing principal axes costs
+some."""
 MOVING_JOINT_TYPES = ("revolute", "continuous", "prismatic", "floating", "planar")
 
 
@@ -33,14 +35,15 @@ class Misread:
     parsed: np.ndarray
 
     def sentence(self) -> str:
-        """A sentence on the two values."""
+        """Sentence that states the number in the file and as MuJoCo parsed it."""
         said = [", ".join(f"{number:.6g}" for number in np.ravel(each)) for each in (self.in_file, self.parsed)]
         return f"{self.kind} of {self.owner}: ({said[0]}) {self.unit} in the file, ({said[1]}) as MuJoCo parsed it"
 
 
 @dataclass
 class _Link:
-    """A link in the design position: its position and axes, the moving link to which it is fixed, and its joint."""
+    """Link of a URDF in the design position: its position and axes in space, and the name of the moving link to which
+    it is fixed."""
 
     place: np.ndarray
     axes: np.ndarray
@@ -49,7 +52,7 @@ class _Link:
 
 @dataclass
 class _Mass:
-    """Mass (kg), centre (m) and inertia about it (kg m^2), in space."""
+    """Mass properties of rigidly connected links: mass (kg), centre (m) and inertia about it (kg m^2), in space."""
 
     mass: float = 0.0
     centre: np.ndarray | None = None
@@ -67,7 +70,7 @@ class _Mass:
 
 
 def misread_numbers(file: ModelFile) -> list[Misread]:
-    """Numbers of a URDF that differ in MuJoCo's compiled model, each with both values."""
+    """Numbers of a URDF that differ in MuJoCo's compiled model, each with the file's and the parser's value."""
     root = parsed_root(file.document.path.read_bytes())
     model, design = file.twin.model, mujoco.MjData(file.twin.model)
     design.qpos[:] = model.qpos0
@@ -116,7 +119,7 @@ def _equal_numbers(expected: np.ndarray, parsed: np.ndarray, kind: str) -> bool:
 def _links_in_place(
     root: ElementTree.Element, file: str
 ) -> tuple[dict[str, _Link], dict[str, tuple[np.ndarray, np.ndarray]]]:
-    """Links by name in the design position; for hinges and slides by name, anchors and axes in space."""
+    """Links by name in the design position; and for hinges and slides by name, their anchors and axes in space."""
     joints = list(root.iter("joint"))
     children = {_end(joint, "child") for joint in joints}
     links = {
@@ -168,7 +171,7 @@ def _end(joint: ElementTree.Element, which: str) -> str:
 
 
 def _origin_of(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.ndarray]:
-    """Translation (3,) and rotation (3, 3) of an <origin>."""
+    """Translation (3,) in m and rotation (3, 3) of the <origin> in an element."""
     origin = element.find("origin")
     roll, pitch, yaw = _numbers_in_attribute(origin, "rpy", (0.0, 0.0, 0.0), file)
     (sa, sb, sc), (ca, cb, cc) = np.sin((roll, pitch, yaw)), np.cos((roll, pitch, yaw))
@@ -181,7 +184,7 @@ def _origin_of(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.
 def _numbers_in_attribute(
     element: ElementTree.Element | None, name: str, default: tuple[float, ...], file: str
 ) -> np.ndarray:
-    """Numbers in an attribute; InputError where they are not numbers, or not as many as wanted."""
+    """Numbers in an attribute of an element. Raises InputError where they are not numbers, or not as many as wanted."""
     text = None if element is None else element.get(name)
     if text is None:
         return np.array(default)

@@ -1,4 +1,5 @@
-"""The text of a URDF that MuJoCo gets: links and joints without what does not move them, every element on its line.
+"""Text of a URDF for MuJoCo's parser: links and joints without the elements that do not affect motion, every element on
+its original line.
 
 Left away is what other programs read (<gazebo> and its plugins, <transmission>), shapes that are only drawn, those of
 links with masses of their own, which only contact would need and whose files are often missing, and all of links that
@@ -15,13 +16,13 @@ from xml.sax.saxutils import quoteattr
 READ_TAGS = ("link", "joint", "material", "mujoco")
 """Elements below <robot> that MuJoCo reads."""
 PARTS_OF_LINKS = ("visual", "collision", "inertial")
-"""Elements of links, of which those that move nothing are left away."""
+"""Elements of links; those that do not affect motion are left out."""
 
 
 @dataclass(frozen=True)
 class UrdfText:
-    """text : for MuJoCo's parser, with every element on the line that it has in the file; notes : sentences on what was
-    left away, and on what MuJoCo makes of the rest."""
+    """Text of a URDF for MuJoCo's parser, with every element on the line that it has in the file; notes : sentences on
+    what was left out, and on what MuJoCo makes of the rest."""
 
     text: str
     notes: tuple[str, ...]
@@ -29,7 +30,7 @@ class UrdfText:
 
 @dataclass
 class _Writer:
-    """Writes the elements of a URDF that are wanted, on their lines.
+    """Writer of the wanted elements of a URDF, each on its original line.
 
     standing, massive : names of links that stand on the world, and that have masses; left : counts of elements that are
     left away, by tag; around : the tags around, and the name of the link; inside : depth within an unwanted element.
@@ -81,7 +82,7 @@ class _Writer:
 
 
 def text_for_mujoco(content: bytes) -> UrdfText:
-    """The text of a well-formed URDF for MuJoCo's parser."""
+    """Text of a well-formed URDF for MuJoCo's parser."""
     root = parsed_root(content)
     links = root.findall("link")
     massive = frozenset(link.get("name", "") for link in links if link.find("inertial") is not None)
@@ -92,7 +93,7 @@ def text_for_mujoco(content: bytes) -> UrdfText:
 
 
 def parsed_root(content: bytes) -> ElementTree.Element:
-    """The root of a well-formed URDF, the tags without a namespace."""
+    """Root element of a well-formed URDF, with the tags freed of namespaces."""
     root = ElementTree.fromstring(content)
     for element in root.iter():
         if isinstance(element.tag, str):
@@ -101,7 +102,7 @@ def parsed_root(content: bytes) -> ElementTree.Element:
 
 
 def standing_links(root: ElementTree.Element) -> list[str]:
-    """Names of the links that stand on the world in MuJoCo: the first ones, and all that are fixed to them."""
+    """Names of the links that do not move in MuJoCo: the root links, and all that are fixed to them."""
     joints = [(joint.get("type"), _link(joint, "parent"), _link(joint, "child")) for joint in root.findall("joint")]
     children = {child for _, _, child in joints}
     standing = [name for name in (link.get("name", "") for link in root.findall("link")) if name not in children]
@@ -120,7 +121,7 @@ def _link(joint: ElementTree.Element, which: str) -> str:
 def _notes(
     root: ElementTree.Element, standing: Sequence[str], massive: frozenset[str], left: Counter[str]
 ) -> list[str]:
-    """Sentences on a URDF whose links have the given names."""
+    """Notes on a URDF: what was left out, and what MuJoCo makes of links without joints or masses."""
     notes = list[str]()
     if left["collision"]:
         notes.append(f"{left['collision']} shapes of links with masses of their own were not read")
