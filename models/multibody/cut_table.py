@@ -133,7 +133,7 @@ def _element_numbers(element: Element, joined: Joints) -> list[float]:
         np.subtract(element.second_point, joined.joint_position[element.second_body]),
     )
     law = (
-        element.constant_in_step,
+        element.held,
         element.stiffness,
         element.damping,
         joined.last_joint[element.frame],

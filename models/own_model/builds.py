@@ -11,7 +11,7 @@ import numpy as np
 from models.engines.free_vehicle import ENGINES, free_model
 from models.engines.native_parts import SLIDES
 from models.multibody.plain.joint_elements import AppliedForces, PlainTree
-from models.own_model.constraints import Rows, by_differences, constrained_forces, plain_constraints
+from models.own_model.constraints import JacobianAt, constrained_forces, jacobian_by_differences, plain_constraints
 from models.own_model.coordinates import MujocoState
 from models.own_model.reading import TwinModel, constant_controls
 
@@ -22,7 +22,7 @@ SOFT_BUILD = "mujoco"
 rigid."""
 
 
-class Moved(NamedTuple):
+class Motion(NamedTuple):
     """Mass matrix (n, n), forces (n,) and accelerations (n,) of a model at one state."""
 
     mass: np.ndarray
@@ -34,7 +34,7 @@ State = tuple[np.ndarray, np.ndarray]
 """Coordinates and rates (n,) of a model."""
 WHOLE_FRICTION_SHARE = 1.0 - 1e-12
 """Share of its full force from which a dry friction counts as sliding."""
-Equations = Callable[[np.ndarray, np.ndarray], Moved]
+Equations = Callable[[np.ndarray, np.ndarray], Motion]
 """Function that returns the motion (``Moved``) at coordinates and rates (n,)."""
 
 
@@ -45,11 +45,11 @@ def equations_of_build(twin: TwinModel, build: str) -> Equations:
     rigid = twin.driven.tied and build != SOFT_BUILD
     terms = _constraint_rows(twin, built.ties if build != PLAIN_BUILD else None) if rigid else None
 
-    def move(q: np.ndarray, v: np.ndarray) -> Moved:
+    def move(q: np.ndarray, v: np.ndarray) -> Motion:
         mass, force = built.mass_and_force(0.0, q, v)
         if terms is not None:
             force = constrained_forces(mass, force, *terms(q, v))
-        return Moved(mass, force, np.linalg.solve(mass, force))
+        return Motion(mass, force, np.linalg.solve(mass, force))
 
     return move
 
@@ -67,17 +67,17 @@ def largest_gap(twin: TwinModel, build: str, states: Sequence[State]) -> float:
 
 
 def _constraint_rows(
-    twin: TwinModel, rows_at: Rows | None
+    twin: TwinModel, jacobian_at: JacobianAt | None
 ) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """Function that returns the constraint Jacobian J (c, n) and J' q' (c,) at a state, from plain equations or by
     differences of an engine's J."""
-    if rows_at is None:
+    if jacobian_at is None:
         return plain_constraints(twin).terms
     if twin.driven.connections:
-        return partial(by_differences, rows_at)
+        return partial(jacobian_by_differences, jacobian_at)
 
     def constant(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        (rows,) = rows_at([q])
+        (rows,) = jacobian_at([q])
         return rows, np.zeros(len(rows))
 
     return constant
@@ -97,7 +97,7 @@ def expected_equations(twin: TwinModel, build: str) -> Equations:
     """Equations of motion with which a build must agree: MuJoCo's model of the file, with rigid constraints and Coulomb
     friction unless the build is MuJoCo's."""
     if build == SOFT_BUILD or not is_soft_in_mujoco(twin):
-        return as_parsed(twin)
+        return equations_of_file(twin)
     return rigid_equations(twin) if twin.driven.tied else sliding_equations(twin)
 
 
@@ -106,14 +106,14 @@ def is_soft_in_mujoco(twin: TwinModel) -> bool:
     return twin.driven.tied or bool(twin.driven.frictions)
 
 
-def as_parsed(twin: TwinModel) -> Equations:
+def equations_of_file(twin: TwinModel) -> Equations:
     """Equations of motion of the file's model as MuJoCo parsed it."""
     data = mujoco.MjData(twin.model)
 
-    def move(q: np.ndarray, v: np.ndarray) -> Moved:
+    def move(q: np.ndarray, v: np.ndarray) -> Motion:
         state = forward_state(twin, data, q, v)
         mass, force = _mass_and_forces_of_file(twin, data, state, data.qfrc_constraint)
-        return Moved(mass, force, np.linalg.solve(state.jacobian, data.qacc - state.rest))
+        return Motion(mass, force, np.linalg.solve(state.jacobian, data.qacc - state.bias))
 
     return move
 
@@ -121,13 +121,13 @@ def as_parsed(twin: TwinModel) -> Equations:
 def rigid_equations(twin: TwinModel) -> Equations:
     """Equations of motion of the file's model as MuJoCo parsed it, with its equality constraints made rigid."""
     data = mujoco.MjData(twin.model)
-    terms = _constraint_rows(twin, lambda places: [_rows_of_file(twin, data, q) for q in places])
+    terms = _constraint_rows(twin, lambda places: [_constraint_jacobian_of_file(twin, data, q) for q in places])
 
-    def move(q: np.ndarray, v: np.ndarray) -> Moved:
+    def move(q: np.ndarray, v: np.ndarray) -> Motion:
         rows, rest = terms(q, v)
         mass, force = _sliding_forces_of_file(twin, data, q, v)
         force = constrained_forces(mass, force, rows, rest)
-        return Moved(mass, force, np.linalg.solve(mass, force))
+        return Motion(mass, force, np.linalg.solve(mass, force))
 
     return move
 
@@ -136,9 +136,9 @@ def sliding_equations(twin: TwinModel) -> Equations:
     """Equations of motion of the file's model as MuJoCo parsed it, with dry friction by Coulomb's law."""
     data = mujoco.MjData(twin.model)
 
-    def move(q: np.ndarray, v: np.ndarray) -> Moved:
+    def move(q: np.ndarray, v: np.ndarray) -> Motion:
         mass, force = _sliding_forces_of_file(twin, data, q, v)
-        return Moved(mass, force, np.linalg.solve(mass, force))
+        return Motion(mass, force, np.linalg.solve(mass, force))
 
     return move
 
@@ -155,7 +155,7 @@ def _sliding_forces_of_file(
     return _mass_and_forces_of_file(twin, data, state, sliding)
 
 
-def _rows_of_file(twin: TwinModel, data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
+def _constraint_jacobian_of_file(twin: TwinModel, data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
     """Jacobian (c, n) of the file's equality constraints in MuJoCo, with respect to the coordinates of the
     description."""
     state = forward_state(twin, data, q, np.zeros(twin.size))
@@ -181,7 +181,7 @@ def _mass_and_forces_of_file(
     """Mass matrix (n, n) and forces (n,) of MuJoCo's model in the coordinates of the description."""
     own_mass, j = np.empty((twin.size, twin.size)), state.jacobian
     mujoco.mj_fullM(twin.model, data, own_mass)
-    return j.T @ own_mass @ j, j.T @ (data.qfrc_smooth + constraint - own_mass @ state.rest)
+    return j.T @ own_mass @ j, j.T @ (data.qfrc_smooth + constraint - own_mass @ state.bias)
 
 
 def sliding_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
@@ -200,10 +200,10 @@ def sliding_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
         against = data.efc_force[of] * v[data.efc_id[of]] < 0.0
         return bool((whole & against).all())
 
-    return [(q, v) for q, v in rubbing_states(twin, states) if slides(q, v)]
+    return [(q, v) for q, v in moving_friction_states(twin, states) if slides(q, v)]
 
 
-def rubbing_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
+def moving_friction_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
     """The given states at which every joint with dry friction moves fast enough for Coulomb's law."""
     rubbing = [friction.coordinate for friction in twin.driven.frictions]
     return [(q, v) for q, v in states if (np.abs(v[rubbing]) >= SLIDES).all()]

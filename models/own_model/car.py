@@ -15,10 +15,10 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.car_bodies import CarBodies, car_bodies
-from models.own_model.car_joints import Roles, forget, roles_of
+from models.own_model.car_joints import Roles, remove_elements_on, roles_of
 from models.own_model.content import CONTENT_KINDS, contents_of_model, limits_switched_off
 from models.own_model.file import check_sane, compiled_model
-from models.own_model.names import label, moving_bodies, place_of
+from models.own_model.names import coordinate_of, label, moving_bodies
 from models.own_model.reading import body_loads, joint_elements, line_springs
 from models.own_model.wheel_sites import WheelSite, wheel_sites
 from models.own_model.xml_guard import Document, checked_document
@@ -78,7 +78,7 @@ class _Reader:
         elements = tuple(self._elements(parts))
         tyres = tuple(_tyre(wheel, parts) for wheel in wheels)
         axles = tuple(float(next(w.point[0] for w in wheels if w.axle == i)) for i in range(wheels[-1].axle + 1))
-        outputs = (*_spatial_outputs(parts, elements, tyres), *self._points(design, parts, wheels))
+        outputs = (*_spatial_outputs(parts, elements, tyres), *self._point_outputs(design, parts, wheels))
         vehicle = SpatialVehicle(
             name=file,
             bodies=parts.bodies,
@@ -91,14 +91,14 @@ class _Reader:
             ranges=tuple(self._ranges(parts)),
         )
         check(vehicle, file)
-        return self._at_rest(vehicle)
+        return self._without_preloads(vehicle)
 
-    def _refuse(self, place: str, value: object, said: str) -> NoReturn:
-        raise InputError(self.document.path.name, place, value, said)
+    def _refuse(self, part: str, value: object, reason: str) -> NoReturn:
+        raise InputError(self.document.path.name, part, value, reason)
 
     def _leave_out(self, roles: Roles) -> None:
         """Remove parts of the file that twinrig models in another way; refuse other parts without an equivalent."""
-        acted = forget(self.model, roles)
+        acted = remove_elements_on(self.model, roles)
         joints = [label(self.model, "joint", j) for j in (*roles.spin, *roles.steer)]
         for row in contents_of_model(self.model, self.document):
             if row.kind != CONTACT_CONTENT:
@@ -129,7 +129,7 @@ class _Reader:
 
     def _elements(self, parts: CarBodies) -> Iterator[JointElement]:
         """Springs, dampers and rotor inertias along the coordinates of the suspension, with the signs of their axes."""
-        joints = {place_of(self.model, j)[0]: j for j in range(self.model.njnt)}
+        joints = {coordinate_of(self.model, j)[0]: j for j in range(self.model.njnt)}
         for element in joint_elements(self.model):
             numbers = [joints[body] for body, _ in element.coordinates]
             for j in numbers:
@@ -148,17 +148,19 @@ class _Reader:
                 low, high = sorted(sign * (model.jnt_range[j] - model.qpos0[model.jnt_qposadr[j]]))
                 yield at, float(low), float(high)
 
-    def _points(self, design: mujoco.MjData, parts: CarBodies, wheels: tuple[WheelSite, ...]) -> Iterator[PointOutput]:
+    def _point_outputs(
+        self, design: mujoco.MjData, parts: CarBodies, wheels: tuple[WheelSite, ...]
+    ) -> Iterator[PointOutput]:
         """Outputs of vertical acceleration at every named site that does not mark a wheel."""
         taken = {wheel.site for wheel in wheels}
         for s in range(self.model.nsite):
             name, body = self.model.site(s).name, int(self.model.site_bodyid[s])
-            if name and s not in taken and body in parts.of:
+            if name and s not in taken and body in parts.body_names:
                 yield PointOutput(
-                    name, "acceleration", parts.of[body], _vector_of(design.site_xpos[s]), (0.0, 0.0, 1.0)
+                    name, "acceleration", parts.body_names[body], _vector_of(design.site_xpos[s]), (0.0, 0.0, 1.0)
                 )
 
-    def _at_rest(self, vehicle: SpatialVehicle) -> SpatialVehicle:
+    def _without_preloads(self, vehicle: SpatialVehicle) -> SpatialVehicle:
         """The vehicle without preloads, since its springs will get the preloads that balance its weight. A note lists
         where the file's preloads differ."""
         held = preloads(replace(vehicle, gravity=GRAVITY)).parts
@@ -180,8 +182,10 @@ def _reserved_names(wheels: tuple[WheelSite, ...]) -> set[str]:
 
 
 def _tyre(wheel: WheelSite, parts: CarBodies) -> Tyre:
-    at, spin = _vector_of(wheel.point), parts.spin.get(wheel.name)
-    return Tyre(wheel.name, parts.of[wheel.body], at, wheel.axle, wheel.stiffness, wheel.damping, spin_inertia=spin)
+    at, spin = _vector_of(wheel.point), parts.spin_inertia.get(wheel.name)
+    return Tyre(
+        wheel.name, parts.body_names[wheel.body], at, wheel.axle, wheel.stiffness, wheel.damping, spin_inertia=spin
+    )
 
 
 def _side_force(wheel: WheelSite, parts: CarBodies) -> SideForce:

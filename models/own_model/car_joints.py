@@ -13,7 +13,7 @@ from models.own_model.content import BIAS, DSBL, GAIN, JOINT_TARGETS, TRN
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
 from models.own_model.names import label, moving_bodies
 from models.own_model.reading import is_fixed, tendon_travel
-from models.own_model.wheel_sites import SAME_AXLE_DISTANCE, WheelSite, place
+from models.own_model.wheel_sites import SAME_AXLE_DISTANCE, WheelSite, site_text
 from models.own_model.xml_guard import Document
 from models.vehicles.spatial import FREEDOMS, Freedom
 
@@ -94,7 +94,7 @@ def _chassis_bodies(model: mujoco.MjModel, design: mujoco.MjData, document: Docu
     if sorted(freedoms) != sorted(FREEDOMS):
         said = "the chassis must be free: give it a <freejoint/>, or three slides and three hinges along x, y and z"
         raise InputError(name, label(model, "body", body), None, said)
-    _check_bare(model, [j for b in bodies for j in joints_of(model, b)], document, "the chassis")
+    _check_without_forces(model, [j for b in bodies for j in joints_of(model, b)], document, "the chassis")
     return tuple(bodies)
 
 
@@ -118,12 +118,14 @@ def _spin_hinge(model: mujoco.MjModel, design: mujoco.MjData, wheel: WheelSite, 
             spins.append(joint)
     if len(spins) > 1:
         names = [model.joint(j).name for j in spins]
-        raise InputError(document.path.name, place(model, document, wheel.site), names, "two joints spin this wheel")
-    _check_bare(model, spins, document, "a wheel's spin")
+        raise InputError(
+            document.path.name, site_text(model, document, wheel.site), names, "two joints spin this wheel"
+        )
+    _check_without_forces(model, spins, document, "a wheel's spin")
     return spins[0] if spins else None
 
 
-def _check_bare(model: mujoco.MjModel, joints: list[int], document: Document, of: str) -> None:
+def _check_without_forces(model: mujoco.MjModel, joints: list[int], document: Document, owner: str) -> None:
     """Refuse springs, dampers, rotors and dry friction on joints that twinrig models in another way."""
     for joint in joints:
         first = int(model.jnt_dofadr[joint])
@@ -137,7 +139,7 @@ def _check_bare(model: mujoco.MjModel, joints: list[int], document: Document, of
         for law, value in laws.items():
             if value:
                 where = f"{joint_text(model, document, joint)} {law}"
-                raise InputError(document.path.name, where, float(value), f"must be 0: {of} has none in a vehicle")
+                raise InputError(document.path.name, where, float(value), f"must be 0: {owner} has none in a vehicle")
 
 
 def _check_steering(
@@ -153,7 +155,7 @@ def _check_steering(
         raise InputError(document.path.name, where, beside, said)
 
 
-def forget(model: mujoco.MjModel, roles: Roles) -> list[str]:
+def remove_elements_on(model: mujoco.MjModel, roles: Roles) -> list[str]:
     """Remove from the model all elements that act on the joints for spin or steering; returns their names."""
     moved, names = {*roles.spin, *roles.steer}, list[str]()
     for joint in roles.steer:

@@ -6,7 +6,7 @@ import numpy as np
 
 from models.multibody.plain.constraints import PlainConstraints
 from models.multibody.plain.motion import Bodies
-from models.own_model.equalities import tie_rows
+from models.own_model.equalities import coupling_rows
 from models.own_model.reading import TwinModel
 
 REDUNDANT_SHARE = 1e-9
@@ -20,7 +20,7 @@ SATISFIED_GAP, MOST_CORRECTIONS, LONGEST_CORRECTION = 1e-12, 60, 0.5
 """Violation (m, rad) below which constraints are satisfied; largest count of Newton steps to get there; the longest of
 these steps (m, rad)."""
 
-Rows = Callable[[Sequence[np.ndarray]], Sequence[np.ndarray]]
+JacobianAt = Callable[[Sequence[np.ndarray]], Sequence[np.ndarray]]
 """Function that returns the constraint Jacobian J (c, n) at each of some coordinates (n,)."""
 Ranges = tuple[np.ndarray | float, np.ndarray | float]
 """Lowest and highest coordinates, (n,) or the same for all."""
@@ -30,26 +30,26 @@ def plain_constraints(twin: TwinModel) -> PlainConstraints:
     """The constraints of a user's model in plain numpy."""
     driven = twin.driven
     joints = [(connection.ends, connection.axes) for connection in driven.connections]
-    return PlainConstraints(Bodies(driven.vehicle), *tie_rows(driven.couplings, twin.size), joints)
+    return PlainConstraints(Bodies(driven.vehicle), *coupling_rows(driven.couplings, twin.size), joints)
 
 
-def constrained_forces(mass: np.ndarray, force: np.ndarray, rows: np.ndarray, rest: np.ndarray) -> np.ndarray:
+def constrained_forces(mass: np.ndarray, force: np.ndarray, jacobian: np.ndarray, bias: np.ndarray) -> np.ndarray:
     """Forces (n,) including constraint forces, for rigid constraints rows q'' + rest = 0 with rows (c, n) and rest
     (c,); rows may be linearly dependent."""
-    turned, sizes, rows = np.linalg.svd(rows, full_matrices=False)
+    turned, sizes, jacobian = np.linalg.svd(jacobian, full_matrices=False)
     kept = sizes > REDUNDANT_SHARE * sizes[0]
-    rows, rest = rows[kept], (rest @ turned)[kept] / sizes[kept]
-    free, compliance = np.linalg.solve(mass, force), np.linalg.solve(mass, rows.T)
-    answer: np.ndarray = force - rows.T @ np.linalg.solve(rows @ compliance, rows @ free + rest)
+    jacobian, bias = jacobian[kept], (bias @ turned)[kept] / sizes[kept]
+    free, compliance = np.linalg.solve(mass, force), np.linalg.solve(mass, jacobian.T)
+    answer: np.ndarray = force - jacobian.T @ np.linalg.solve(jacobian @ compliance, jacobian @ free + bias)
     return answer
 
 
-def by_differences(rows_at: Rows, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def jacobian_by_differences(jacobian_at: JacobianAt, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Constraint Jacobian J (c, n), and J' q' (c,) by differences of J along the motion, at coordinates and rates
     (n,)."""
     stride = DIFFERENCE_STRIDE / max(float(np.abs(v).sum()), 1e-9)
     steps = [k * stride * v for k in range(1, len(DIFFERENCE_WEIGHTS) + 1)]
-    rows, *others = rows_at([q, *(place for s in steps for place in (q + s, q - s))])
+    rows, *others = jacobian_at([q, *(place for s in steps for place in (q + s, q - s))])
     changes = [
         weight * (there - back)
         for weight, there, back in zip(DIFFERENCE_WEIGHTS, others[::2], others[1::2], strict=True)
@@ -72,12 +72,12 @@ def satisfying_state(
     return None
 
 
-def _correction(rows: np.ndarray, size: np.ndarray, q: np.ndarray, ranges: Ranges) -> np.ndarray:
+def _correction(jacobian: np.ndarray, gap: np.ndarray, q: np.ndarray, ranges: Ranges) -> np.ndarray:
     """Smallest correction (n,) of the coordinates that closes gaps (c,) to first order; coordinates that it would push
     out of their ranges are left unchanged."""
     (low, high), held = ranges, np.zeros(len(q), bool)
     while True:
-        step: np.ndarray = np.linalg.pinv(np.where(held, 0.0, rows), REDUNDANT_SHARE) @ size
+        step: np.ndarray = np.linalg.pinv(np.where(held, 0.0, jacobian), REDUNDANT_SHARE) @ gap
         pressed = ~held & (((q <= low) & (step > 0.0)) | ((q >= high) & (step < 0.0)))
         if not pressed.any():
             return step

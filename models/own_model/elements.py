@@ -13,7 +13,7 @@ import numpy as np
 
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
 from models.own_model.element_words import WORD_ELEMENTS
-from models.own_model.equalities import CONNECT_EQUALITY, by_sites, is_tie, joins_bodies
+from models.own_model.equalities import CONNECT_EQUALITY, couples_joints, is_between_sites, joins_bodies
 from models.own_model.names import feature_is_disabled, label
 from models.own_model.reading import is_line, pushes_site, sites_of
 
@@ -81,7 +81,7 @@ def value_text(value: np.ndarray, unit: str = "", digits: int = SHOWN_DIGITS) ->
     return f"{text if numbers.size == 1 else f'({text})'} {unit}".rstrip()
 
 
-def told_apart(first: np.ndarray, second: np.ndarray, unit: str) -> tuple[str, str]:
+def distinct_texts(first: np.ndarray, second: np.ndarray, unit: str) -> tuple[str, str]:
     """Two different values as texts, with as few digits as show the difference."""
     texts = value_text(first, unit), value_text(second, unit)
     for digits in range(SHOWN_DIGITS + 1, EXACT_DIGITS + 1):
@@ -97,7 +97,7 @@ def two_digit_text(number: float) -> str:
 
 
 @dataclass(frozen=True)
-class _Kind:
+class _PropertyKind:
     """A kind of property of all parts of a sort, such as all joints: its name, its unit, its reader and its writer."""
 
     sort: str
@@ -112,7 +112,7 @@ def elements_of_model(model: mujoco.MjModel) -> dict[tuple[str, str], Element]:
     return {each.key: each for each in _elements_of_kind(model)}
 
 
-def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
+def set_value(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
     """Write the value of a property into a model for ``described_model``. Raises KeyError if the model has no such
     property, ValueError if the property cannot have this value."""
     kind, number = _kind_and_index(model, key)
@@ -122,7 +122,7 @@ def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
     model.body_sameframe[:] = 0
 
 
-def drop(model: mujoco.MjModel, key: tuple[str, str]) -> bool:
+def remove(model: mujoco.MjModel, key: tuple[str, str]) -> bool:
     """Set a property to zero in a model, if its kind allows this; returns whether it does."""
     kind, number = _kind_and_index(model, key)
     if kind.kind not in REMOVABLE_KINDS:
@@ -136,10 +136,10 @@ def _elements_of_kind(model: mujoco.MjModel) -> Iterator[Element]:
         for number in range(_count_of_sort(model, kind.sort)):
             value = np.atleast_1d(kind.read(model, number))
             if value.size:
-                yield Element(kind.kind, _owner_name(model, kind, number), _unit(model, kind, number), value)
+                yield Element(kind.kind, _owner_name(model, kind, number), _unit_text(model, kind, number), value)
 
 
-def _kind_and_index(model: mujoco.MjModel, key: tuple[str, str]) -> tuple[_Kind, int]:
+def _kind_and_index(model: mujoco.MjModel, key: tuple[str, str]) -> tuple[_PropertyKind, int]:
     for kind in ELEMENT_KINDS:
         if kind.kind == key[0]:
             for number in range(_count_of_sort(model, kind.sort)):
@@ -153,11 +153,11 @@ def _count_of_sort(model: mujoco.MjModel, sort: str) -> int:
     return {**counts, "equality": model.neq, "model": 1}[sort]
 
 
-def _owner_name(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
+def _owner_name(model: mujoco.MjModel, kind: _PropertyKind, number: int) -> str:
     return "the model" if kind.sort == "model" else label(model, kind.sort, number)
 
 
-def _unit(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
+def _unit_text(model: mujoco.MjModel, kind: _PropertyKind, number: int) -> str:
     """Unit of a property; of two units, that of translation for slides and free joints, else that of rotation."""
     turning, _, shifting = kind.unit.partition(" | ")
     slides = kind.sort == "joint" and model.jnt_type[number] in (SLIDE_JOINT, FREE_JOINT)
@@ -168,21 +168,21 @@ def _body_accessors(field: str) -> tuple[Callable, Callable]:
     return _number_accessors(field, lambda model, b: b)
 
 
-def _number_accessors(field: str, at: Callable[[mujoco.MjModel, int], object]) -> tuple[Callable, Callable]:
-    """Reader and writer of a field of a compiled model, at the index that ``at`` returns."""
+def _number_accessors(field: str, index_of: Callable[[mujoco.MjModel, int], object]) -> tuple[Callable, Callable]:
+    """Reader and writer of a field of a compiled model, at the index that ``index_of`` returns."""
 
     def write(model: mujoco.MjModel, number: int, value: np.ndarray) -> None:
         numbers = getattr(model, field)
-        numbers[at(model, number)] = np.reshape(value, np.shape(numbers[at(model, number)]))
+        numbers[index_of(model, number)] = np.reshape(value, np.shape(numbers[index_of(model, number)]))
 
-    return lambda model, number: np.ravel(getattr(model, field)[at(model, number)]).copy(), write
+    return lambda model, number: np.ravel(getattr(model, field)[index_of(model, number)]).copy(), write
 
 
-def _of_joint(field: str) -> tuple[Callable, Callable]:
+def _joint_accessors(field: str) -> tuple[Callable, Callable]:
     return _number_accessors(field, lambda model, j: j)
 
 
-def _of_freedoms(field: str) -> tuple[Callable, Callable]:
+def _freedom_accessors(field: str) -> tuple[Callable, Callable]:
     """Reader and writer of a field's numbers for all degrees of freedom of a joint: 6, 3 or 1."""
 
     def places(model: mujoco.MjModel, j: int) -> slice:
@@ -192,14 +192,14 @@ def _of_freedoms(field: str) -> tuple[Callable, Callable]:
     return _number_accessors(field, places)
 
 
-def _read_spring(model: mujoco.MjModel, j: int) -> np.ndarray:
+def _read_spring_reference(model: mujoco.MjModel, j: int) -> np.ndarray:
     """Rest position of a joint's spring relative to the design position; empty if there is no spring."""
     at = int(model.jnt_qposadr[j])
     several = int(model.jnt_type[j]) in (BALL_JOINT, FREE_JOINT)
     return np.zeros(0) if several or not model.jnt_stiffness[j] else model.qpos_spring[at : at + 1] - model.qpos0[at]
 
 
-def _write_spring(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
+def _write_spring_reference(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
     at = int(model.jnt_qposadr[j])
     if value.size:
         model.qpos_spring[at] = model.qpos0[at] + value[0]
@@ -275,23 +275,23 @@ def _range_accessors(range_field: str, limited_field: str) -> tuple[Callable, Ca
     return read_limited, write_limited
 
 
-def _actuator_law_accessors(numbers: str, kinds: str, first: int) -> tuple[Callable, Callable]:
-    """Reader and writer of the three numbers of an actuator's gain or bias. Numbers from index ``first`` on count only
-    for an affine law."""
+def _actuator_law_accessors(numbers: str, kinds: str, first_affine: int) -> tuple[Callable, Callable]:
+    """Reader and writer of the three numbers of an actuator's gain or bias. Numbers from index ``first_affine`` on
+    count only for an affine law."""
 
     def read(model: mujoco.MjModel, i: int) -> np.ndarray:
         law = np.array(getattr(model, numbers)[i, :3])
-        law[first:] *= getattr(model, kinds)[i] == AFFINE_LAW
+        law[first_affine:] *= getattr(model, kinds)[i] == AFFINE_LAW
         return law
 
     def write(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
-        getattr(model, kinds)[i] = AFFINE_LAW if value[first:].any() else CONSTANT_LAW
+        getattr(model, kinds)[i] = AFFINE_LAW if value[first_affine:].any() else CONSTANT_LAW
         getattr(model, numbers)[i, :3] = value
 
     return read, write
 
 
-def _coefficients() -> tuple[Callable, Callable]:
+def _tendon_coefficient_accessors() -> tuple[Callable, Callable]:
     def places(model: mujoco.MjModel, t: int) -> slice:
         return slice(int(model.tendon_adr[t]), int(model.tendon_adr[t] + model.tendon_num[t]))
 
@@ -308,20 +308,20 @@ def _write_ends(model: mujoco.MjModel, t: int, value: np.ndarray) -> None:
     model.site_sameframe[sites_of(model, t)] = 0
 
 
-def _read_tie(model: mujoco.MjModel, e: int) -> np.ndarray:
+def _read_coupling(model: mujoco.MjModel, e: int) -> np.ndarray:
     """Numbers of a coupling of joints: 1 if it is active, its offset and ratio; zeros if it is not."""
-    return np.array([1.0, *model.eq_data[e, :2]]) * model.eq_active0[e] if is_tie(model, e) else np.zeros(0)
+    return np.array([1.0, *model.eq_data[e, :2]]) * model.eq_active0[e] if couples_joints(model, e) else np.zeros(0)
 
 
-def _write_tie(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
+def _write_coupling(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
     model.eq_active0[e], model.eq_data[e, :2] = value[0] != 0.0, value[1:]
 
 
-def _read_joint(model: mujoco.MjModel, e: int) -> np.ndarray:
+def _read_connection(model: mujoco.MjModel, e: int) -> np.ndarray:
     """Numbers of a constraint between bodies: 1 if it is active, and the positions of both ends; zeros if it is not."""
     if not joins_bodies(model, e):
         return np.zeros(0)
-    if by_sites(model, e):
+    if is_between_sites(model, e):
         sites = [model.eq_obj1id[e], model.eq_obj2id[e]]
         ends = np.concatenate((model.site_pos[sites].ravel(), model.site_quat[sites].ravel()))
     else:
@@ -329,11 +329,11 @@ def _read_joint(model: mujoco.MjModel, e: int) -> np.ndarray:
     return np.array([1.0, *ends]) * model.eq_active0[e]
 
 
-def _write_joint(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
+def _write_connection(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
     model.eq_active0[e] = value[0] != 0.0
     if not value[0]:
         return
-    if by_sites(model, e):
+    if is_between_sites(model, e):
         sites = [model.eq_obj1id[e], model.eq_obj2id[e]]
         model.site_pos[sites], model.site_quat[sites] = value[1:7].reshape(2, 3), value[7:].reshape(2, 4)
         model.site_sameframe[sites] = 0
@@ -343,7 +343,7 @@ def _write_joint(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
 
 def _read_softness(model: mujoco.MjModel, e: int) -> np.ndarray:
     """MuJoCo's softness parameters solref and solimp of a constraint."""
-    built = is_tie(model, e) or joins_bodies(model, e)
+    built = couples_joints(model, e) or joins_bodies(model, e)
     return np.concatenate((model.eq_solref[e], model.eq_solimp[e])) if built else np.zeros(0)
 
 
@@ -363,37 +363,37 @@ def _write_site(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
 
 
 ELEMENT_KINDS = (
-    _Kind("model", "gravity", "m/s^2", _read_gravity, _write_gravity),
-    _Kind("body", "mass", "kg", *_body_accessors("body_mass")),
-    _Kind("body", "centre of mass", "m", *_body_accessors("body_ipos")),
-    _Kind("body", "inertia", "kg m^2", _read_inertia, _write_inertia),
-    _Kind("body", "place", "m", *_body_accessors("body_pos")),
-    _Kind("body", "orientation", "quaternion", *_body_accessors("body_quat")),
-    _Kind("body", "gravity compensation", "", *_body_accessors("body_gravcomp")),
-    _Kind("joint", "axis", "", _read_axis, _of_joint("jnt_axis")[1]),
-    _Kind("joint", "anchor", "m", *_of_joint("jnt_pos")),
-    _Kind("joint", "zero", "rad | m", _read_zero, _write_zero),
-    _Kind("joint", "stiffness", "N m/rad | N/m", *_of_joint("jnt_stiffness")),
-    _Kind("joint", "spring reference", "rad | m", _read_spring, _write_spring),
-    _Kind("joint", "damping", "N m s/rad | N s/m", *_of_freedoms("dof_damping")),
-    _Kind("joint", "armature", "kg m^2 | kg", *_of_freedoms("dof_armature")),
-    _Kind("joint", "friction loss", "N m | N", *_of_freedoms("dof_frictionloss")),
-    _Kind("joint", "range", "rad | m", *_range_accessors("jnt_range", "jnt_limited")),
-    _Kind("tendon", "coefficients", "", *_coefficients()),
-    _Kind("tendon", "ends", "m", _read_ends, _write_ends),
-    _Kind("tendon", "stiffness", "N/m", *_number_accessors("tendon_stiffness", lambda model, t: t)),
-    _Kind("tendon", "damping", "N s/m", *_number_accessors("tendon_damping", lambda model, t: t)),
-    _Kind("tendon", "spring length", "m", *_number_accessors("tendon_lengthspring", lambda model, t: t)),
-    _Kind("tendon", "armature", "kg", *_number_accessors("tendon_armature", lambda model, t: t)),
-    _Kind("equality", "coupling", "(acts, offset, ratio)", _read_tie, _write_tie),
-    _Kind("equality", "joint", "(acts, ends)", _read_joint, _write_joint),
-    _Kind("equality", "softness", "(solref, solimp)", _read_softness, _write_softness),
-    _Kind("actuator", "gear", "", _read_gear, _write_gear),
-    _Kind("actuator", "gain", "", *_actuator_law_accessors("actuator_gainprm", "actuator_gaintype", 1)),
-    _Kind("actuator", "bias", "", *_actuator_law_accessors("actuator_biasprm", "actuator_biastype", 0)),
-    _Kind("actuator", "control range", "", *_range_accessors("actuator_ctrlrange", "actuator_ctrllimited")),
-    _Kind("actuator", "place of the site", "(m, quaternion)", _read_site, _write_site),
-    *(_Kind(sort, kind, "", read, write) for sort, kind, read, write in WORD_ELEMENTS),
+    _PropertyKind("model", "gravity", "m/s^2", _read_gravity, _write_gravity),
+    _PropertyKind("body", "mass", "kg", *_body_accessors("body_mass")),
+    _PropertyKind("body", "centre of mass", "m", *_body_accessors("body_ipos")),
+    _PropertyKind("body", "inertia", "kg m^2", _read_inertia, _write_inertia),
+    _PropertyKind("body", "place", "m", *_body_accessors("body_pos")),
+    _PropertyKind("body", "orientation", "quaternion", *_body_accessors("body_quat")),
+    _PropertyKind("body", "gravity compensation", "", *_body_accessors("body_gravcomp")),
+    _PropertyKind("joint", "axis", "", _read_axis, _joint_accessors("jnt_axis")[1]),
+    _PropertyKind("joint", "anchor", "m", *_joint_accessors("jnt_pos")),
+    _PropertyKind("joint", "zero", "rad | m", _read_zero, _write_zero),
+    _PropertyKind("joint", "stiffness", "N m/rad | N/m", *_joint_accessors("jnt_stiffness")),
+    _PropertyKind("joint", "spring reference", "rad | m", _read_spring_reference, _write_spring_reference),
+    _PropertyKind("joint", "damping", "N m s/rad | N s/m", *_freedom_accessors("dof_damping")),
+    _PropertyKind("joint", "armature", "kg m^2 | kg", *_freedom_accessors("dof_armature")),
+    _PropertyKind("joint", "friction loss", "N m | N", *_freedom_accessors("dof_frictionloss")),
+    _PropertyKind("joint", "range", "rad | m", *_range_accessors("jnt_range", "jnt_limited")),
+    _PropertyKind("tendon", "coefficients", "", *_tendon_coefficient_accessors()),
+    _PropertyKind("tendon", "ends", "m", _read_ends, _write_ends),
+    _PropertyKind("tendon", "stiffness", "N/m", *_number_accessors("tendon_stiffness", lambda model, t: t)),
+    _PropertyKind("tendon", "damping", "N s/m", *_number_accessors("tendon_damping", lambda model, t: t)),
+    _PropertyKind("tendon", "spring length", "m", *_number_accessors("tendon_lengthspring", lambda model, t: t)),
+    _PropertyKind("tendon", "armature", "kg", *_number_accessors("tendon_armature", lambda model, t: t)),
+    _PropertyKind("equality", "coupling", "(acts, offset, ratio)", _read_coupling, _write_coupling),
+    _PropertyKind("equality", "joint", "(acts, ends)", _read_connection, _write_connection),
+    _PropertyKind("equality", "softness", "(solref, solimp)", _read_softness, _write_softness),
+    _PropertyKind("actuator", "gear", "", _read_gear, _write_gear),
+    _PropertyKind("actuator", "gain", "", *_actuator_law_accessors("actuator_gainprm", "actuator_gaintype", 1)),
+    _PropertyKind("actuator", "bias", "", *_actuator_law_accessors("actuator_biasprm", "actuator_biastype", 0)),
+    _PropertyKind("actuator", "control range", "", *_range_accessors("actuator_ctrlrange", "actuator_ctrllimited")),
+    _PropertyKind("actuator", "place of the site", "(m, quaternion)", _read_site, _write_site),
+    *(_PropertyKind(sort, kind, "", read, write) for sort, kind, read, write in WORD_ELEMENTS),
 )
 REMOVABLE_KINDS = (
     "gravity",

@@ -55,7 +55,7 @@ class ModelFile:
 
     document: Document
     twin: TwinModel
-    left_out: tuple[Content, ...]
+    removed_contents: tuple[Content, ...]
     ignored_limits: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -89,11 +89,11 @@ def compiled_model(document: Document) -> tuple[mujoco.MjModel, list[str]]:
             return spec.compile(), list(urdf.notes)
     except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         reason = " ".join(str(error).split()).removesuffix(FUSED_REMARK).rstrip()
-        told = f"MuJoCo's parser refuses it: {reason}{_place(document, reason)}{_remedy(document, reason)}"
+        told = f"MuJoCo's parser refuses it: {reason}{_place_text(document, reason)}{_remedy_text(document, reason)}"
         raise InputError(path.name, "", None, told) from None
 
 
-def _place(document: Document, reason: str) -> str:
+def _place_text(document: Document, reason: str) -> str:
     """Text " (FILE:LINE)" of the element that a message of MuJoCo's parser names without its line, or with line 0 for
     an include; "" if unknown."""
     if named := re.search(r"Element name '([^']+)', id \d+(?!.*line)", reason):
@@ -104,7 +104,7 @@ def _place(document: Document, reason: str) -> str:
     return f" ({place})" if place else ""
 
 
-def _remedy(document: Document, reason: str) -> str:
+def _remedy_text(document: Document, reason: str) -> str:
     """Text on how to correct a mistake that a message of MuJoCo's parser reports; "" where that is plain."""
     said = next((remedy for part, remedy in REMEDIES.items() if part in reason), "")
     return f". {said.format(place=COMPILER_PLACES[document.kind])}" if said else ""
@@ -127,12 +127,12 @@ def check_sane(model: mujoco.MjModel, name: str, kind: str = "MJCF") -> None:
         raise InputError(name, "frictionloss", float(model.dof_frictionloss.min()), "must be 0 or more")
 
 
-def _check_numbers(model: mujoco.MjModel, name: str, numbers: str) -> None:
+def _check_numbers(model: mujoco.MjModel, name: str, array_name: str) -> None:
     """Raise InputError, naming the part of the model, if one of its numbers is not finite or too large."""
-    values = np.asarray(getattr(model, numbers))
+    values = np.asarray(getattr(model, array_name))
     rows = np.array([np.abs(each).max(initial=0.0) for each in values])
     for row in np.flatnonzero(~(rows <= LARGEST_NUMBER)):
-        place = ": ".join(filter(None, (_owner(model, numbers, int(row)), numbers)))
+        place = ": ".join(filter(None, (_owner_name(model, array_name, int(row)), array_name)))
         if not np.isfinite(rows[row]):
             raise InputError(name, place, None, "must be finite numbers")
         raise InputError(name, place, float(rows[row]), f"must be {LARGEST_NUMBER:g} or less")
@@ -142,9 +142,9 @@ OWNERS = {"jnt": "joint", "eq": "equality", "body": "body", "site": "site", "ten
 """Kinds of parts of a model by the prefix of the names of their numbers."""
 
 
-def _owner(model: mujoco.MjModel, numbers: str, row: int) -> str:
+def _owner_name(model: mujoco.MjModel, array_name: str, row: int) -> str:
     """Name of the part of the model to which a row of the numbers belongs; "" where it belongs to none."""
-    prefix = numbers.partition("_")[0]
+    prefix = array_name.partition("_")[0]
     if prefix == "dof":
         return label(model, "joint", int(model.dof_jntid[row]))
     if prefix.startswith("qpos"):

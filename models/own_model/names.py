@@ -10,14 +10,14 @@ from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
 from models.vehicles.spatial import FREEDOMS, Freedom, Vector
 
 ROTATION_NAMES: tuple[Freedom, ...] = ("rx", "ry", "rz")
-OF_KIND: dict[int, tuple[Freedom, ...]] = {BALL_JOINT: ROTATION_NAMES, FREE_JOINT: FREEDOMS}
+FREEDOMS_OF_JOINT: dict[int, tuple[Freedom, ...]] = {BALL_JOINT: ROTATION_NAMES, FREE_JOINT: FREEDOMS}
 """Freedoms of the joint types that have several."""
 NAMES_SHOWN = 3
 """Largest count of names in a message."""
 CONSTRAINT_FEATURES = ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT")
 
 
-def some_names(names: Sequence[str]) -> str:
+def first_names_text(names: Sequence[str]) -> str:
     """Text with the first names, and how many more there are."""
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
     return ", ".join(names[:NAMES_SHOWN]) + more
@@ -38,14 +38,14 @@ def coordinate_names(model: mujoco.MjModel) -> tuple[str, ...]:
     """Name of every coordinate: its joint and, where the joint has several freedoms, which freedom."""
     names = list[str]()
     for j in range(model.njnt):
-        of = OF_KIND.get(int(model.jnt_type[j]), ())
+        of = FREEDOMS_OF_JOINT.get(int(model.jnt_type[j]), ())
         names += [f"{label(model, 'joint', j)} {freedom}" for freedom in of] or [label(model, "joint", j)]
     return tuple(names)
 
 
-def place_of(model: mujoco.MjModel, joint: int) -> tuple[str, Freedom]:
+def coordinate_of(model: mujoco.MjModel, joint: int) -> tuple[str, Freedom]:
     """Coordinate of a hinge or slide in the description: body and freedom."""
-    return moved_by(joint), "x" if model.jnt_type[joint] == SLIDE_JOINT else "rx"
+    return joint_body_name(joint), "x" if model.jnt_type[joint] == SLIDE_JOINT else "rx"
 
 
 def moving_bodies(model: mujoco.MjModel) -> dict[int, None]:
@@ -67,24 +67,24 @@ def joints_above(model: mujoco.MjModel, body: int) -> list[int]:
     return joints
 
 
-def feature_is_disabled(model: mujoco.MjModel, what: str) -> bool:
+def feature_is_disabled(model: mujoco.MjModel, feature: str) -> bool:
     """Whether a file switches off a feature, such as "GRAVITY", or all constraints at once."""
-    kinds = (what, "CONSTRAINT") if what in CONSTRAINT_FEATURES else (what,)
+    kinds = (feature, "CONSTRAINT") if feature in CONSTRAINT_FEATURES else (feature,)
     return any(model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}") for kind in kinds)
 
 
-def moved_by(joint: int) -> str:
+def joint_body_name(joint: int) -> str:
     """Name of the massless body that represents a joint. It contains the joint's number, because joints in a file may
     have no names."""
     return f"joint {joint}"
 
 
-def body_with_mass(body: int) -> str:
+def mass_body_name(body: int) -> str:
     """Name of the description's body that has the mass of a file's body and follows its last joint."""
     return f"body {body}"
 
 
-def three_numbers(numbers: np.ndarray) -> Vector:
+def vector_of(numbers: np.ndarray) -> Vector:
     """Three numbers as a tuple, the form of vectors in descriptions."""
     x, y, z = np.asarray(numbers, float).tolist()
     return x, y, z
@@ -92,11 +92,11 @@ def three_numbers(numbers: np.ndarray) -> Vector:
 
 def matrix_rows(matrix: np.ndarray) -> tuple[Vector, Vector, Vector]:
     """Matrix (3, 3) as a tuple of rows, the form of matrices in descriptions."""
-    x, y, z = map(three_numbers, matrix)
+    x, y, z = map(vector_of, matrix)
     return x, y, z
 
 
-def rotation_of(quaternion: np.ndarray) -> np.ndarray:
+def rotation_matrix(quaternion: np.ndarray) -> np.ndarray:
     """Rotation matrix (3, 3) of a unit quaternion (w, x, y, z)."""
     numbers = np.empty(9)
     mujoco.mju_quat2Mat(numbers, quaternion)

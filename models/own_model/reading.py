@@ -15,18 +15,18 @@ from models.engines.native_parts import BodyLoad, DryFriction, GroundSpring, Lin
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, Coordinates
 from models.own_model.equalities import connections, joint_couplings, stiffness_and_damping
 from models.own_model.names import (
-    OF_KIND,
-    body_with_mass,
+    FREEDOMS_OF_JOINT,
     coordinate_names,
+    coordinate_of,
     feature_is_disabled,
+    joint_body_name,
     joints_above,
     label,
+    mass_body_name,
     matrix_rows,
-    moved_by,
     moving_bodies,
-    place_of,
-    rotation_of,
-    three_numbers,
+    rotation_matrix,
+    vector_of,
 )
 from models.vehicles.spatial import PARALLEL, Body, Freedom, JointElement, SpatialVehicle, Vector
 
@@ -85,24 +85,29 @@ def _bodies(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Body]:
     numbers = moving_bodies(model)
     for b in numbers:
         above = int(model.body_parentid[b])
-        behind = body_with_mass(above) if above in numbers else None
+        behind = mass_body_name(above) if above in numbers else None
         for j in range(model.body_jntadr[b], model.body_jntadr[b] + model.body_jntnum[b]):
             yield _joint_body(model, design, j, behind)
-            behind = moved_by(j)
+            behind = joint_body_name(j)
         axes = design.ximat[b].reshape(3, 3)
         inertia = matrix_rows(axes * model.body_inertia[b] @ axes.T + _armature_inertia(model, b))
-        yield Body(body_with_mass(b), float(model.body_mass[b]), three_numbers(design.xipos[b]), (), inertia, behind)
+        yield Body(mass_body_name(b), float(model.body_mass[b]), vector_of(design.xipos[b]), (), inertia, behind)
 
 
 def _joint_body(model: mujoco.MjModel, design: mujoco.MjData, j: int, behind: str | None) -> Body:
     """Massless body that moves as a joint of the file does."""
     kind, body = int(model.jnt_type[j]), int(model.jnt_bodyid[j])
-    if kind in OF_KIND:
+    if kind in FREEDOMS_OF_JOINT:
         anchor = design.xpos[body] if kind == FREE_JOINT else design.xanchor[j]
-        return Body(moved_by(j), 0.0, three_numbers(anchor), OF_KIND[kind], parent=behind)
-    freedoms: tuple[Freedom, ...] = (place_of(model, j)[1],)
+        return Body(joint_body_name(j), 0.0, vector_of(anchor), FREEDOMS_OF_JOINT[kind], parent=behind)
+    freedoms: tuple[Freedom, ...] = (coordinate_of(model, j)[1],)
     return Body(
-        moved_by(j), 0.0, three_numbers(design.xanchor[j]), freedoms, parent=behind, axes=_axes_along(design.xaxis[j])
+        joint_body_name(j),
+        0.0,
+        vector_of(design.xanchor[j]),
+        freedoms,
+        parent=behind,
+        axes=_axes_along(design.xaxis[j]),
     )
 
 
@@ -127,7 +132,7 @@ def _joint_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
     for j in range(model.njnt):
         first, place = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
         free, ball = model.jnt_type[j] == FREE_JOINT, model.jnt_type[j] == BALL_JOINT
-        freedoms: tuple[Freedom, ...] = ("x", "y", "z") if free else () if ball else (place_of(model, j)[1],)
+        freedoms: tuple[Freedom, ...] = ("x", "y", "z") if free else () if ball else (coordinate_of(model, j)[1],)
         for i, freedom in enumerate(freedoms):
             stiffness = float(model.jnt_stiffness[j]) * springs
             damping, inertia = float(model.dof_damping[first + i]) * dampers, float(model.dof_armature[first + i])
@@ -135,7 +140,7 @@ def _joint_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
             if stiffness or damping or inertia:
                 numbers = (stiffness, damping, held, inertia)
                 name = f"{label(model, 'joint', j)} {freedom if free else ''}".rstrip()
-                yield JointElement(name, ((moved_by(j), freedom),), (1.0,), *numbers)
+                yield JointElement(name, ((joint_body_name(j), freedom),), (1.0,), *numbers)
 
 
 def tendon_travel(model: mujoco.MjModel, tendon: int) -> tuple[list[int], list[float]]:
@@ -172,8 +177,8 @@ def line_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[LineS
         stiffness, damping = float(model.tendon_stiffness[t]) * springs, float(model.tendon_damping[t]) * dampers
         bodies = [int(model.site_bodyid[s]) for s in sites_of(model, t)]
         if (stiffness or damping) and bodies[0] != bodies[1]:
-            first, second = (body_with_mass(b) if b in numbers else None for b in bodies)
-            start, end = (three_numbers(design.site_xpos[s]) for s in sites_of(model, t))
+            first, second = (mass_body_name(b) if b in numbers else None for b in bodies)
+            start, end = (vector_of(design.site_xpos[s]) for s in sites_of(model, t))
             length = float(model.tendon_lengthspring[t, 0])
             yield LineSpring(label(model, "tendon", t), first, second, start, end, stiffness, damping, length)
 
@@ -188,7 +193,7 @@ def turning_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Tu
         if not (stiffness or damping):
             continue
         place, axes = int(model.jnt_qposadr[j]) + 3 * free, design.xmat[body].reshape(3, 3).copy()
-        rest = rotation_of(model.qpos_spring[place : place + 4])
+        rest = rotation_matrix(model.qpos_spring[place : place + 4])
         yield TurningSpring(
             label(model, "joint", j),
             _bodies_beside(model, j),
@@ -203,8 +208,14 @@ def _bodies_beside(model: mujoco.MjModel, joint: int) -> tuple[str | None, str]:
     body = int(model.jnt_bodyid[joint])
     first, above = int(model.body_jntadr[body]), int(model.body_parentid[body])
     last = first + int(model.body_jntnum[body]) - 1
-    before = moved_by(joint - 1) if joint > first else body_with_mass(above) if above in moving_bodies(model) else None
-    return before, moved_by(joint) if joint < last else body_with_mass(body)
+    before = (
+        joint_body_name(joint - 1)
+        if joint > first
+        else mass_body_name(above)
+        if above in moving_bodies(model)
+        else None
+    )
+    return before, joint_body_name(joint) if joint < last else mass_body_name(body)
 
 
 def has_dry_friction(model: mujoco.MjModel, joint: int) -> bool:
@@ -227,7 +238,7 @@ def _along_tendon(model: mujoco.MjModel, tendon: int) -> tuple[tuple, tuple[floa
     """Coordinates and factors of a fixed tendon, and its length (m) in the design position."""
     joints, factors = tendon_travel(model, tendon)
     length = sum(k * float(model.qpos0[model.jnt_qposadr[j]]) for j, k in zip(joints, factors, strict=True))
-    return tuple(place_of(model, j) for j in joints), tuple(factors), length
+    return tuple(coordinate_of(model, j) for j in joints), tuple(factors), length
 
 
 def _tendon_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
@@ -285,7 +296,7 @@ def body_loads(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[BodyLoa
         wrench = force * model.actuator_gear[i].reshape(2, 3) @ axes.T
         if wrench.any() and body in numbers:
             yield BodyLoad(
-                label(model, "actuator", i), body_with_mass(body), three_numbers(design.site_xpos[site]), *wrench
+                label(model, "actuator", i), mass_body_name(body), vector_of(design.site_xpos[site]), *wrench
             )
 
 
@@ -297,7 +308,7 @@ def _actuator_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
         if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON:
             places, factors, start = _along_tendon(model, target)
         else:
-            places, factors = (place_of(model, target),), (1.0,)
+            places, factors = (coordinate_of(model, target),), (1.0,)
             start = float(model.qpos0[model.jnt_qposadr[target]])
         offset, slope, rate = affine_law(model, i, float(constant[i]))
         if offset or slope or rate:
@@ -325,5 +336,5 @@ def _compensated_loads(model: mujoco.MjModel, design: mujoco.MjData, gravity: np
     for b in moving_bodies(model):
         if model.body_mass[b] and gravity.any() and compensation(model, b) == 1.0:
             load, still = -gravity * float(model.body_gravcomp[b] * model.body_mass[b]), np.zeros(3)
-            point = three_numbers(design.xipos[b])
-            yield GroundSpring(body_with_mass(b), point, point, still, still, load)  # type: ignore[arg-type]
+            point = vector_of(design.xipos[b])
+            yield GroundSpring(mass_body_name(b), point, point, still, still, load)  # type: ignore[arg-type]

@@ -23,7 +23,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from models.own_model.builds import Equations, Moved, State, as_parsed, forward_state
+from models.own_model.builds import Equations, Motion, State, equations_of_file, forward_state
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
 from models.own_model.equalities import joins_bodies
 from models.own_model.names import moving_bodies
@@ -42,39 +42,44 @@ RELATIVE_NUMBERS = (
 )
 LENGTH_NUMBERS = ("body_pos", "body_ipos", "jnt_pos", "site_pos")
 DIRECTION_NUMBERS = ("body_quat", "body_iquat", "site_quat", "jnt_axis")
-"""Numbers of a compiled model: changed by a share of themselves, of the reach, and unit vectors."""
-Law = Callable[[TwinModel], Equations]
+"""Names of the numbers of a compiled model that are changed at random: by a share of themselves, by a share of the
+model's reach (m), and as unit vectors."""
+EquationsOfModel = Callable[[TwinModel], Equations]
 """Function from a model to its equations of motion: with soft constraints, or with rigid ones."""
 
 
-def sensitivities(twin: TwinModel, law: Law, states: Sequence[State], moved: Sequence[Moved]) -> list[Moved]:
+def sensitivities(
+    twin: TwinModel, equations_of: EquationsOfModel, states: Sequence[State], motions: Sequence[Motion]
+) -> list[Motion]:
     """Rounding sensitivities of mass (n, n), force (n,) and acceleration (n,) at each state: rms change per relative
     random change of all input numbers.
 
-    law, moved : the file's own model, and what it does at the states.
+    law, motions : the file's own model, and what it does at the states.
     """
     draw, reach = np.random.default_rng(SEED), reach_of(twin)
-    squares = [Moved(*map(np.zeros_like, each)) for each in moved]
+    squares = [Motion(*map(np.zeros_like, each)) for each in motions]
     for _ in range(RANDOM_CHANGES):
-        move = law(replace(twin, model=changed_model(twin.model, draw, reach)))
-        for square, exact, (q, v) in zip(squares, moved, states, strict=True):
+        move = equations_of(replace(twin, model=changed_model(twin.model, draw, reach)))
+        for square, exact, (q, v) in zip(squares, motions, states, strict=True):
             other = move(*_changed_state(twin, draw, q, v))
             for total, there, here in zip(square, other, exact, strict=True):
                 total += ((there - here) / CHANGED_SHARE) ** 2 / RANDOM_CHANGES
     by_numbers = [
-        _with_solver_rounding(_summed(Moved(*map(np.sqrt, square)), exact, sums), exact)
-        for square, exact, sums in zip(squares, moved, _sums_of_rates(twin, states), strict=True)
+        _with_solver_rounding(_with_summation_rounding(Motion(*map(np.sqrt, square)), exact, sums), exact)
+        for square, exact, sums in zip(squares, motions, _sums_of_rates(twin, states), strict=True)
     ]
     return (
-        by_numbers if not twin.driven.tied else list(map(_constrained, by_numbers, _unconstrained_motion(twin, states)))
+        by_numbers
+        if not twin.driven.tied
+        else list(map(_with_constraint_rounding, by_numbers, _unconstrained_motion(twin, states)))
     )
 
 
-def _summed(sensitive: Moved, moved: Moved, sums: np.ndarray) -> Moved:
+def _with_summation_rounding(sensitivity: Motion, motion: Motion, sums: np.ndarray) -> Motion:
     """Rounding sensitivities, with the rounding of summing forces of the sizes (n,) ``sums`` added; these forces may
     cancel."""
-    by_sums = np.abs(np.linalg.pinv(moved.mass)) @ sums
-    return sensitive._replace(force=sensitive.force + sums, acceleration=sensitive.acceleration + by_sums)
+    by_sums = np.abs(np.linalg.pinv(motion.mass)) @ sums
+    return sensitivity._replace(force=sensitivity.force + sums, acceleration=sensitivity.acceleration + by_sums)
 
 
 def _sums_of_rates(twin: TwinModel, states: Sequence[State]) -> Iterator[np.ndarray]:
@@ -96,7 +101,7 @@ def _sums_of_rates(twin: TwinModel, states: Sequence[State]) -> Iterator[np.ndar
         yield np.abs(state.jacobian).T @ sums
 
 
-def _with_solver_rounding(sensitive: Moved, moved: Moved) -> Moved:
+def _with_solver_rounding(sensitivity: Motion, motion: Motion) -> Motion:
     """Rounding sensitivities, with that of solving M a = f for the accelerations a added, where every entry of the mass
     matrix M is rounded.
 
@@ -104,26 +109,26 @@ def _with_solver_rounding(sensitive: Moved, moved: Moved) -> Moved:
     Algorithms, section 7.2; recalled). A light seat on a car takes its share of the rounding of wheels that spin up a
     million times as fast; a coordinate that the mass matrix does not couple with others takes none.
     """
-    inverse = np.abs(np.linalg.pinv(moved.mass))
-    solution = inverse @ np.abs(moved.mass) @ np.abs(moved.acceleration)
-    return sensitive._replace(acceleration=sensitive.acceleration + solution)
+    inverse = np.abs(np.linalg.pinv(motion.mass))
+    solution = inverse @ np.abs(motion.mass) @ np.abs(motion.acceleration)
+    return sensitivity._replace(acceleration=sensitivity.acceleration + solution)
 
 
-def _unconstrained_motion(twin: TwinModel, states: Sequence[State]) -> list[Moved]:
+def _unconstrained_motion(twin: TwinModel, states: Sequence[State]) -> list[Motion]:
     """Motion of the file's model in MuJoCo at the states, without its equality constraints."""
     model = copy(twin.model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
-    move = as_parsed(replace(twin, model=model))
+    move = equations_of_file(replace(twin, model=model))
     return [move(q, v) for q, v in states]
 
 
-def _constrained(sensitive: Moved, free: Moved) -> Moved:
+def _with_constraint_rounding(sensitivity: Motion, unconstrained: Motion) -> Motion:
     """Rounding sensitivities, with the motion that constraints suppress added. Rounding errors of all other coordinates
     remain in a stopped coordinate, weighted with the root of inertia."""
-    weight = np.sqrt(free.mass.diagonal())
-    taken = float((weight * np.abs(free.acceleration)).max())
-    return sensitive._replace(
-        force=sensitive.force + taken * weight, acceleration=sensitive.acceleration + taken / weight
+    weight = np.sqrt(unconstrained.mass.diagonal())
+    taken = float((weight * np.abs(unconstrained.acceleration)).max())
+    return sensitivity._replace(
+        force=sensitivity.force + taken * weight, acceleration=sensitivity.acceleration + taken / weight
     )
 
 

@@ -10,15 +10,19 @@ MJCF_EXTENSION = ".xml"
 
 
 def scene_vehicle(
-    name: str, folder: str | Path = ".", file: str = "", place: str = "", reduced: bool = False, towing: bool = False
+    name: str,
+    folder: str | Path = ".",
+    file: str = "",
+    place: str = "",
+    allows_reduced: bool = False,
+    allows_towing: bool = False,
 ) -> SpatialVehicle:
     """The unloaded vehicle of a scene, by its name or by a file relative to ``folder``.
 
-    ``file`` and ``place`` say who asked for it, for the message if there is none. reduced, towing : may a vehicle file
-    have [reduced], and may it tow? Raises InputError.
-    """
+    ``file`` and ``place`` say who asked for it, for the message if there is none. allows_reduced, allows_towing : may a
+    vehicle file have [reduced], and may it tow? Raises InputError."""
     if name.endswith(MJCF_EXTENSION):
         from models.own_model.car import vehicle_of_file
 
         return vehicle_of_file(existing(name, Path(folder), file, place))
-    return load_vehicle(name, folder, file, place, reduced, towing)
+    return load_vehicle(name, folder, file, place, allows_reduced, allows_towing)

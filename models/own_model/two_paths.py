@@ -6,9 +6,16 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.engines.free_vehicle import ENGINES
-from models.own_model.control_table import constant_leg
+from models.own_model.control_table import constant_sections
 from models.own_model.elements import two_digit_text
-from models.own_model.path import DISTURBANCE, PATH_DURATION, blown_up, path_by, rows_alike, steps_of_path
+from models.own_model.path import (
+    DISTURBANCE,
+    PATH_DURATION,
+    count_of_equal_states,
+    has_diverged,
+    path_of_build,
+    step_count_of_path,
+)
 from models.own_model.reading import TwinModel
 from models.own_model.states import random_states
 
@@ -38,22 +45,22 @@ class PathGap:
         )
 
 
-def paths_apart(first: TwinModel, second: TwinModel) -> PathGap:
+def compare_two_paths(first: TwinModel, second: TwinModel) -> PathGap:
     """Difference between two files' paths over 1 s, at the step of the first file; both files must have coordinates of
     the same names."""
-    steps, (q,), (v,) = steps_of_path(first), *random_states(first, 1)
+    steps, (q,), (v,) = step_count_of_path(first), *random_states(first, 1)
     step, order = PATH_DURATION / steps, [first.names.index(name) for name in second.names]
-    legs = [constant_leg(twin, steps) for twin in (first, second)]
+    legs = [constant_sections(twin, steps) for twin in (first, second)]
     try:
         with np.errstate(all="ignore"):  # what blows up is told
-            path = path_by(legs[0], ENGINES[0], (q, v), step)
-            disturbed = path_by(legs[0], ENGINES[0], (q + DISTURBANCE, v), step)
-            other = path_by(legs[1], ENGINES[0], (q[order], v[order]), step)
+            path = path_of_build(legs[0], ENGINES[0], (q, v), step)
+            disturbed = path_of_build(legs[0], ENGINES[0], (q + DISTURBANCE, v), step)
+            other = path_of_build(legs[1], ENGINES[0], (q[order], v[order]), step)
     except RunFailed as error:
         return PathGap(0.0, np.nan, "", error.reason)
-    if blown_up(path) or blown_up(other):
+    if has_diverged(path) or has_diverged(other):
         return PathGap(0.0, np.nan, "", "the motion blows up at this step")
-    rows, places = rows_alike(path, disturbed, steps), np.argsort(order)
+    rows, places = count_of_equal_states(path, disturbed, steps), np.argsort(order)
     there = other[:rows, np.concatenate((places, first.size + places))]
     apart = np.abs(there - path[:rows]).max(axis=0)
     at, size = int(apart.argmax()), max(1.0, float(np.abs(path[:rows]).max()))

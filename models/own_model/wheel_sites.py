@@ -63,23 +63,23 @@ def wheel_sites(model: mujoco.MjModel, design: mujoco.MjData, document: Document
     )
 
 
-def place(model: mujoco.MjModel, document: Document, site: int) -> str:
+def site_text(model: mujoco.MjModel, document: Document, site: int) -> str:
     """Text by which messages name a site."""
     name = model.site(site).name
     line = document.line(("site",), name)
     return f"site {name!r}" + (f" ({line})" if line else "")
 
 
-def _refuse(model: mujoco.MjModel, document: Document, site: int, value: object, said: str) -> NoReturn:
-    raise InputError(document.path.name, place(model, document, site), value, said)
+def _refuse(model: mujoco.MjModel, document: Document, site: int, value: object, reason: str) -> NoReturn:
+    raise InputError(document.path.name, site_text(model, document, site), value, reason)
 
 
 def _check_site(
-    model: mujoco.MjModel, design: mujoco.MjData, document: Document, site: int, name: str, twice: bool
+    model: mujoco.MjModel, design: mujoco.MjData, document: Document, site: int, name: str, is_repeated: bool
 ) -> None:
     if not name:
         _refuse(model, document, site, None, 'needs the name of its tyre behind "tyre" or "hub", as "tyre front_left"')
-    if twice:
+    if is_repeated:
         _refuse(model, document, site, name, "two sites have this name behind their first word")
     if not model.site_bodyid[site]:
         _refuse(model, document, site, None, "lies in the world: it must be in the body of its wheel")

@@ -18,14 +18,14 @@ LARGEST_FILE = 20_000_000
 """Largest size of a file in bytes."""
 DEEPEST_INCLUDE = 8
 """Largest depth of includes within includes."""
-MOST_COPIES = 2000
+LARGEST_COPY_COUNT = 2000
 """Largest count of copies that one element may ask for (replicate, composite, flexcomp): more is a mistake, or an
 attack."""
 FORMAT_OF_ROOT = {"mujoco": "MJCF", "robot": "URDF"}
 PART_ROOT = "mujocoinclude"
 """Root tag of a file that other models include, and that is no model itself."""
 PLUGIN_TAGS = ("plugin", "extension")
-ASSETS = {"mesh": "meshdir", "hfield": "meshdir", "texture": "texturedir", "skin": "meshdir"}
+ASSET_FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "texture": "texturedir", "skin": "meshdir"}
 """Elements that name files, by the attribute of <compiler> with the folder of these files."""
 
 
@@ -68,7 +68,7 @@ class Document:
 class _Reader:
     path: Path
     elements: list[XmlElement] = field(default_factory=list)
-    around: list[str] = field(default_factory=list)
+    enclosing_tags: list[str] = field(default_factory=list)
 
     def read(self, content: bytes) -> list[XmlElement]:
         parser = self._parser = expat.ParserCreate()
@@ -85,11 +85,11 @@ class _Reader:
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         line = self._parser.CurrentLineNumber
-        self.elements.append(XmlElement(tag, attributes, self.path.name, line, tuple(self.around)))
-        self.around.append(tag)
+        self.elements.append(XmlElement(tag, attributes, self.path.name, line, tuple(self.enclosing_tags)))
+        self.enclosing_tags.append(tag)
 
     def _end(self, tag: str) -> None:
-        self.around.pop()
+        self.enclosing_tags.pop()
 
     def _refuse_types(self, *_: Any) -> None:
         place = f"line {self._parser.CurrentLineNumber}"
@@ -101,8 +101,8 @@ class _Folders(NamedTuple):
     for them, that of the model file, not of the including file (an attached model has its own); elements : of the files
     with this base."""
 
-    allowed: Path
-    base: Path
+    allowed_folder: Path
+    model_folder: Path
     elements: list[XmlElement]
 
 
@@ -158,22 +158,22 @@ def _read_elements(path: Path, content: bytes, folders: _Folders, elements: list
 def _read_included(path: Path, folders: _Folders, element: XmlElement, elements: list[XmlElement], depth: int) -> None:
     """Read a file that an element includes or attaches. Raises InputError if it lies outside the allowed folder."""
     name, place = element.attributes["file"], f"line {element.line}"
-    target = (folders.base / name).resolve()
-    if not target.is_relative_to(folders.allowed):
+    target = (folders.model_folder / name).resolve()
+    if not target.is_relative_to(folders.allowed_folder):
         raise InputError(path.name, place, name, _outside_text(element, folders, target))
     if not target.is_file():
         raise InputError(path.name, place, name, f"<{element.tag}> names a file that is not there: {target}")
     if depth >= DEEPEST_INCLUDE:
         raise InputError(path.name, place, name, f"includes go {DEEPEST_INCLUDE} deep at the most")
     if element.tag == "model":
-        _read_model(target, _Folders(folders.allowed, target.parent, []), elements, depth + 1)
+        _read_model(target, _Folders(folders.allowed_folder, target.parent, []), elements, depth + 1)
     else:
         _read_elements(target, _file_content(target), folders, elements, depth + 1)
 
 
 def _outside_text(element: XmlElement, folders: _Folders, target: Path) -> str:
     """Text on the folder that is allowed in place of an outside file, and the option that allows this file."""
-    both = Path(os.path.commonpath((folders.allowed, target.parent)))
+    both = Path(os.path.commonpath((folders.allowed_folder, target.parent)))
     option = f"; if all below {both} may be read: `--folder {both}`" if both != Path(both.anchor) else ""
     return f"<{element.tag}> must name a file in the folder of the model{option}"
 
@@ -183,14 +183,14 @@ def _check_assets(folders: _Folders) -> None:
     compilers = [element.attributes for element in folders.elements if element.tag == "compiler"]
     urdf = folders.elements[0].tag == "robot"
     strips = any(_strips_paths(compiler, urdf) for compiler in compilers or [{}])
-    for element in (element for element in folders.elements if element.tag in ASSETS):
-        keys = (ASSETS[element.tag], "assetdir")
+    for element in (element for element in folders.elements if element.tag in ASSET_FOLDERS):
+        keys = (ASSET_FOLDERS[element.tag], "assetdir")
         within = {compiler[key] for compiler in compilers for key in keys if key in compiler} or {""}
         names = [name for key, name in element.attributes.items() if key.startswith("file")]
         names = [Path(name).name for name in names] if strips else names
         for path in (Path(folder) / name for name in names for folder in within):
-            target = (folders.base / path).resolve()
-            if not target.is_relative_to(folders.allowed):
+            target = (folders.model_folder / path).resolve()
+            if not target.is_relative_to(folders.allowed_folder):
                 told = _outside_text(element, folders, target)
                 raise InputError(element.file, f"line {element.line}", str(path), told)
 
@@ -214,8 +214,10 @@ def _check_counts(path: Path, element: XmlElement, place: str) -> None:
             product *= max(1.0, abs(float(text)))
         except ValueError:
             raise InputError(path.name, place, text, "count must be whole numbers") from None
-    if not product <= MOST_COPIES:
-        raise InputError(path.name, place, element.attributes["count"], f"asks for more than {MOST_COPIES} copies")
+    if not product <= LARGEST_COPY_COUNT:
+        raise InputError(
+            path.name, place, element.attributes["count"], f"asks for more than {LARGEST_COPY_COUNT} copies"
+        )
 
 
 def _memory_is_modest(text: str) -> bool:

@@ -58,14 +58,16 @@ def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes
     model = build(engine, measurement.vehicle, hub_inputs, step, scene.run.duration)
     head = model.numbers
     period = hub_inputs.hubs[: round(2 * measurement.forces.period / step) + 1]  # of the samples, at half steps
-    curved = not hub_inputs.held and np.abs(np.diff(period, n=2, axis=0)).max() > 1e-9 * np.abs(period).max()
+    curved = (
+        not hub_inputs.constant_in_step and np.abs(np.diff(period, n=2, axis=0)).max() > 1e-9 * np.abs(period).max()
+    )
     noisy_forces, noisy_angles = _noisy_columns(measurement)
     counts = {
         "runs on tyres": int(measurement.truth is not None),
         "tyres that lift": sum(tyre.pushes_only for tyre in measurement.vehicle.uncut.tyres),
         "noisy forces": noisy_forces,
         "noisy angles": noisy_angles,
-        "held forces": hub_inputs.held * WRENCH * int(head[kernel.HUBS]),
+        "held forces": hub_inputs.constant_in_step * WRENCH * int(head[kernel.HUBS]),
         "pulled angles": 2 * int(head[kernel.STABILISER] == kernel.PULLED),
         "enforced angles": 2 * int(head[kernel.STABILISER] == kernel.ENFORCED),
         "turning hubs": int(head[kernel.HUBS] * (head[kernel.FRAME] != kernel.FRAMES.index("inertial"))),

@@ -10,9 +10,9 @@ from models.own_model.certificate import (
     Agreement,
     agreement_of_build,
     certificate,
-    moved_at,
+    comparison_states,
+    motion_at,
     reference_of_file,
-    states_of,
 )
 from models.own_model.content import CONTENT_KINDS
 from models.own_model.explain import compare
@@ -93,8 +93,8 @@ def _soft(folder: Path, name: str, text: str) -> Row:
     """Row: accelerations with MuJoCo's soft constraints, compared with the law in MuJoCo's documentation applied to the
     plain equations."""
     twin = _read(folder, name, text).twin
-    states = states_of(twin, QUICK_STATES)
-    apart = agreement_of_build("", reference_of_file(twin, states, SOFT_BUILD), moved_at(softly_coupled(twin), states))
+    states = comparison_states(twin, QUICK_STATES)
+    apart = agreement_of_build("", reference_of_file(twin, states, SOFT_BUILD), motion_at(softly_coupled(twin), states))
     return Observed(
         f"twin_files.soft_{name}",
         SYSTEM,

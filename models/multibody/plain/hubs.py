@@ -141,7 +141,7 @@ class PlainHubs:
             moments = np.array(hub_inputs.pull[0::2]) * off + np.array(hub_inputs.pull[1::2]) * late
             force[ROLL_AND_PITCH] += moments
             return np.linalg.solve(mass, force), moments
-        wanted = accelerations + 2.0 * hub_inputs.holding * late + hub_inputs.holding**2 * off
+        wanted = accelerations + 2.0 * hub_inputs.enforcing_rate * late + hub_inputs.enforcing_rate**2 * off
         picks = np.eye(len(force))[ROLL_AND_PITCH]
         system = np.block([[mass, -picks.T], [picks, np.zeros((2, 2))]])
         both = np.linalg.solve(system, np.concatenate((force, wanted)))

@@ -101,7 +101,7 @@ def spatial_vehicle_of(scene: BrakingScene) -> Any:
     from models.own_model.scene_vehicle import scene_vehicle
 
     name = scene.vehicle.file
-    return None if name is None else scene_vehicle(name, scene.folder, scene.file, "vehicle.file", towing=True)
+    return None if name is None else scene_vehicle(name, scene.folder, scene.file, "vehicle.file", allows_towing=True)
 
 
 def sprung_of(scene: BrakingScene) -> Any:

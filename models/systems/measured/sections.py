@@ -104,7 +104,7 @@ class Sections:
         """Values (n, answers) of the channels at states (n, 2 c), ``stride`` half steps apart; ``numbers`` as in
         ``HubModel``.
         """
-        wrenches, points = len(self._places.guides) + len(self.vehicle.hubs), len(self._places.points)
+        wrenches, points = len(self._places.guide_joints) + len(self.vehicle.hubs), len(self._places.points)
         count = 2 * len(self.vehicle.elements) + CHASSIS_ROW + MOMENTS + POINT * points + WRENCH * wrenches
         out = np.empty((len(states), count))
         section_results(numbers, float(stride), np.ascontiguousarray(states), self._places, self.frame == "hub", out)
