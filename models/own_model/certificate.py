@@ -182,7 +182,7 @@ def motion_at(equations: Equations, states: Sequence[tuple[np.ndarray, np.ndarra
 
 
 def agreement_of_build(build: str, expected: Reference, motions: Sequence[Motion]) -> Agreement:
-    """Largest differences between a build (``motions``) and the reference over all states."""
+    """Largest differences between the motions of a build and the reference over all states."""
     rows = [_scales_at_state(expected, i) for i in range(len(motions))]
     magnitudes, rounding = (Motion(*map(np.array, zip(*each, strict=True))) for each in zip(*rows, strict=True))
     apart = Motion(
@@ -216,7 +216,8 @@ def _may_be_rounding(magnitudes: Motion, rounding: np.ndarray) -> float:
 
 
 def _paired_values(motions: Sequence[Motion], expected: Sequence[Motion]) -> Iterator[tuple[tuple, tuple]]:
-    """Pairs of seen and expected values over all states: first mass matrices, then forces, then accelerations."""
+    """Pairs of a build's and the expected values over all states: first mass matrices, then forces, then
+    accelerations."""
     return zip(zip(*motions, strict=True), zip(*expected, strict=True), strict=True)
 
 

@@ -34,8 +34,8 @@ def plain_constraints(twin: TwinModel) -> PlainConstraints:
 
 
 def constrained_forces(mass: np.ndarray, force: np.ndarray, jacobian: np.ndarray, bias: np.ndarray) -> np.ndarray:
-    """Forces (n,) including constraint forces, for rigid constraints rows q'' + rest = 0 with rows (c, n) and rest
-    (c,); rows may be linearly dependent."""
+    """Forces (n,) including the constraint forces of rigid constraints J q'' + bias = 0, with Jacobian J (c, n) and
+    bias (c,); rows may be linearly dependent."""
     turned, sizes, jacobian = np.linalg.svd(jacobian, full_matrices=False)
     kept = sizes > REDUNDANT_SHARE * sizes[0]
     jacobian, bias = jacobian[kept], (bias @ turned)[kept] / sizes[kept]

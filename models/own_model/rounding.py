@@ -54,7 +54,7 @@ def sensitivities(
     """Rounding sensitivities of mass (n, n), force (n,) and acceleration (n,) at each state: rms change per relative
     random change of all input numbers.
 
-    law, motions : the file's own model, and what it does at the states.
+    equations_of, motions : the equations of MuJoCo's model of the file, and its motion at the states.
     """
     draw, reach = np.random.default_rng(SEED), reach_of(twin)
     squares = [Motion(*map(np.zeros_like, each)) for each in motions]

@@ -1,4 +1,5 @@
-"""Contact of a wheelset with profiles, over its lateral displacement and yaw: the Manchester contact benchmark.
+"""Wheel-rail contact of a wheelset with measured or standard profiles, over lateral displacement and yaw: the
+Manchester contact benchmark.
 
 The wheelset is held at a lateral displacement and a yaw angle. Its roll and the approach of each wheel follow from the
 vertical load of each wheel; both wheels carry the same. Without friction the vertical parts of the normal forces make
@@ -30,25 +31,25 @@ from models.rail.joined_patches import Share, press_exactly
 
 Triple = tuple[float, float, float]
 SIDE_SIGNS = (1.0, -1.0)
-"""Of the right wheel, and of the left one seen in a mirror."""
+"""Factors of lateral displacement, yaw and roll for the right wheel, and for the left wheel seen in a mirror."""
 ROLL_ITERATIONS = 3
-"""Times that the roll angle is found anew with the approaches of both wheels."""
+"""Count of iterations for the roll angle with the approaches of both wheels."""
 SPIN_ITERATIONS = 2
-"""Times that the speed of spin is found anew with the exact loads of the patches."""
+"""Count of iterations for the speed of spin with the exact loads of the patches."""
 ITERATIONS = 60
 SPIN_SEARCH_SHARE = 0.05
-"""Share of the nominal speed of spin within which the one without moment is looked for."""
+"""Share of the nominal speed of spin within which the speed without moment about the axle is searched."""
 CELLS_PER_STRIP = 31
-"""Strips of a patch, and cells along each."""
+"""Count of strips of a patch, and of cells along each."""
 LOAD_PRECISION = 1e-7
-"""Relative, of the load that a wheel carries."""
+"""Relative precision of the load that a wheel carries."""
 CLIMBING_DEPTH = 2e-3
-"""Distance (m) of a touch below the flange's tip from which on a wheel has left its rail's side."""
+"""Distance (m) from the flange's tip to the first touch below which a wheel counts as having climbed the rail."""
 
 
 @dataclass(frozen=True)
 class PatchReport:
-    """One piece of a wheel's contact area: a patch, or several that have grown together.
+    """Report of one connected piece of a wheel's contact area: a patch, or several that have grown together.
 
     The left wheel as in a mirror, so that y and fy point away from the track's middle.
 
@@ -98,19 +99,19 @@ class PatchReport:
 
     @property
     def on_rail(self) -> float:
-        """Centre of pressure on the rail, y from the rail's highest point (m)."""
+        """Position of the centre of pressure on the rail, y from the rail's highest point (m)."""
         return self.y - self.top
 
     @property
     def touch_on_rail(self) -> float:
-        """Point of first touch on the rail, y from the rail's highest point (m)."""
+        """Position of first touch on the rail, y from the rail's highest point (m)."""
         return self.touch_y - self.top
 
 
 @dataclass(frozen=True)
 class WheelsetPlacement:
-    """Contact at one lateral displacement (m) and yaw (rad): the wheelset's roll (rad), its speed of spin (rad/s), and
-    reports of the patches."""
+    """Contact at a lateral displacement (m) and yaw (rad): the wheelset's roll (rad), its speed of spin (rad/s), and
+    reports of the patches of both wheels."""
 
     shift: float
     yaw: float
@@ -122,7 +123,7 @@ class WheelsetPlacement:
 
 @dataclass(frozen=True, eq=False)
 class LoadedWheel:
-    """One wheel under its load: pressure of each patch, and creep forces and moment (N, N, N m); mirrored for the left
+    """A wheel under its load: pressure of each patch, and creep forces and moment (N, N, N m); mirrored for the left
     wheel.
 
     pose : lowered until the wheel touches. shares : what the patches carry by the exact normal contact, if that is
@@ -151,7 +152,7 @@ class LoadedWheel:
         ]
 
     def part(self, touch: TouchingPlace) -> PatchPressure | None:
-        """Pressure of one patch by the simplified theory; None if the theory finds no contact there."""
+        """Pressure of the patch at a touch by the simplified theory; None if the theory finds no contact there."""
         return next(
             (patch_pressure for patch_pressure in self.normal_contact.patches if patch_pressure.patch is touch.patch),
             None,
@@ -160,8 +161,9 @@ class LoadedWheel:
 
 @dataclass(frozen=True, eq=False)
 class WheelsetContact:
-    """Wheelset and track in touch. side : the right wheel on its rail. load : N on each wheel. speed : m/s. friction :
-    0 for a smooth contact. cell_factor : how many times as large as usual cells are, which tells their error."""
+    """Contact problem of a wheelset on its track. side : the right wheel on its rail. load : N on each wheel. speed :
+    m/s. friction : coefficient, 0 for a smooth contact. cell_factor : size of the cells divided by the usual size, to
+    estimate their error."""
 
     side: WheelAndRail
     load: float
@@ -230,7 +232,7 @@ class WheelsetContact:
         return self._balanced(by_normal, approximate.normal)
 
     def _balanced(self, by_normal: Callable[[float], LoadedWheel], normal: float) -> LoadedWheel:
-        """The wheel in vertical equilibrium: normal and creep forces together carry the load. ``by_normal`` gives the
+        """The wheel in vertical equilibrium: normal and creep forces together carry the load. ``by_normal`` returns the
         wheel for a vertical part (N) of the normal forces, which is iterated from ``normal``."""
         for _ in range(ITERATIONS):
             wheel = self._rolled(by_normal(normal))
@@ -240,8 +242,8 @@ class WheelsetContact:
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
     def _free_spin(self, wheels: Sequence[LoadedWheel]) -> float:
-        """Speed of spin (rad/s) of a freely rolling wheelset: its creep forces have no moment about the axle, under the
-        present normal forces."""
+        """Speed of spin (rad/s) of a freely rolling wheelset, whose creep forces have no moment about the axle under
+        the present normal forces."""
 
         def moment(spin: float) -> float:
             return sum(self._at_other_spin(wheel, spin).moment for wheel in wheels)
@@ -273,7 +275,7 @@ class WheelsetContact:
         return replace(wheel, forces=forces, creep_lift=lifted, moment=moment)
 
     def _creepage(self, pose: Pose, touch: TouchingPlace, spin: float) -> Triple:
-        """Creepages and spin (1/m) at a point of first touch."""
+        """Longitudinal and lateral creepage, and spin (1/m), at a point of first touch."""
         if self.friction == 0.0:
             return 0.0, 0.0, 0.0
         axle, arm = pose.turn[:, 1], self._arm(pose, touch)
@@ -303,8 +305,8 @@ class WheelsetContact:
     def _joined_report(
         self, wheel: LoadedWheel, rows: list[tuple[TouchingPlace, Triple, Triple, Share]]
     ) -> PatchReport:
-        """Report of one piece of the contact area; its first touch and creepages are those of the patch with the
-        largest load."""
+        """Report of one connected piece of the contact area; its first touch and creepages are those of the patch with
+        the largest load."""
         side, (touch, creepage, _, _) = self.side, max(rows, key=lambda row: row[-1].load)
         top, start = float(side.rail.y[np.argmin(side.rail.z)]), self._arm(wheel.pose, touch)
         loads = np.array([share.load for *_, share in rows])
@@ -346,7 +348,7 @@ class WheelsetContact:
 
 
 def _standing_placement(placement: WheelsetPlacement) -> WheelsetPlacement:
-    """The contact unchanged; an error if a wheel stands on the tip of its flange."""
+    """The placement unchanged; RunFailed if a wheel stands on the tip of its flange."""
     for name, patches_of_wheel in (("right", placement.right), ("left", placement.left)):
         least_depth = min(patch.below_tip for patch in patches_of_wheel)
         if least_depth < CLIMBING_DEPTH:
@@ -359,7 +361,7 @@ def _standing_placement(placement: WheelsetPlacement) -> WheelsetPlacement:
 
 
 def rolling_radius_difference(placed_at: WheelsetPlacement) -> float:
-    """Rolling radius of the right wheel less that of the left one (m), each at the patch with the largest load."""
+    """Rolling radius of the right wheel minus that of the left one (m), each at the patch with the largest load."""
     right, left = (
         max(patches_of_wheel, key=lambda patch: patch.normal) for patches_of_wheel in (placed_at.right, placed_at.left)
     )

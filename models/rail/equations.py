@@ -1,4 +1,5 @@
-"""A wheelset on straight track, nonlinear: equations written out, rest, linearisation, fixed-step RK4.
+"""Nonlinear equations of motion of a wheelset on straight track: rest position, linearisation, integration by RK4 with
+fixed steps.
 
 States (10): y, z, roll, yaw, angle of spin; their rates but for the last, which is the spin about the axle itself,
 the body's whole angular velocity along it. The frame of the coordinates moves with the speed of travel. Its angular
@@ -49,27 +50,28 @@ from models.rail.wheelset import GRAVITY, Wheelset
 STATE_COUNT = 10
 Y, Z, ROLL, YAW, ANGLE, Y_RATE, Z_RATE, ROLL_RATE, YAW_RATE, SPIN = range(STATE_COUNT)
 ALLOWED_STEP_RATE, LIMIT_OF_RK4 = 2.5, 2.785
-"""Steps times the fastest motion's rate up to which a step is allowed, with a margin, and up to which RK4 is stable."""
+"""Largest product of step and rate of the fastest motion: the allowed one, with a margin, and the stability limit of
+RK4."""
 DIFFERENCE_STEPS = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
-"""Steps of the differences that linearise: small against penetration (7e-5 m) and creepage."""
+"""Steps (10,) of the finite differences that linearise the rates: small against penetration (7e-5 m) and creepage."""
 LARGEST_SPEED = 200.0
-"""m/s"""
+"""Largest speed (m/s) of a wheelset."""
 DERAILED_LIMIT = 0.3
-"""Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
+"""Sum of yaw and roll (rad) and displacements (m) from which the wheelset counts as derailed."""
 DEEPEST_POSITION = 5e-3
-"""Height (m) above which the rails carry every load that is allowed."""
+"""Lowest position z (m, down) searched at which the rails carry the load."""
 NO_REPORT = np.empty(0, REPORT)
-"""Contacts of which nobody asks; to make those that are asked for takes longer than the rates."""
+"""Report without rows, for rates without contact reports, which take longer to compute than the rates."""
 
 
 Along = tuple[float, float, float]
-"""Of the track's axes."""
+"""Values along the track's axes x, y, z."""
 
 
 class Body(NamedTuple):
-    """The wheelset's body and suspension (SI): inertia along and across the axle; half spacing of the springs, springs
-    and dampers of one side, weight on each side, height at which the springs carry exactly that weight; lean of the
-    track; whether there is a spring or a damper."""
+    """Body and suspension of a wheelset (SI): mass; inertia along and across the axle; half spacing of the springs;
+    springs and dampers of one side; weight of the vehicle on each side; height z at which the springs carry exactly
+    that weight; lean of the track; whether there is a spring or a damper."""
 
     mass: float
     along: float
@@ -84,7 +86,7 @@ class Body(NamedTuple):
 
 
 class Stages(NamedTuple):
-    """Arrays for a Runge-Kutta step: sum of the rates, rates and state of a stage (10,); a report without rows."""
+    """Work arrays for a Runge-Kutta step: sum of the rates, rates and state of a stage (10,); a report without rows."""
 
     summed_rate: Array
     rate: Array
@@ -105,9 +107,8 @@ def rates(state, speed, body, rails, state_rate, report):
 
 @lean
 def set_rates(state, speed, body, rails, state_rate, report, workspace):
-    """Fill ``state_rate`` with the time derivative of a state. workspace : ``Workspace``, written over; report : has no
-    rows where nobody asks for contacts.
-    """
+    """Fill ``state_rate`` with the time derivative of a state (10,). workspace : ``Workspace``, written over; report :
+    has no rows where no contact report is wanted."""
     y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
     roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
@@ -176,8 +177,8 @@ def march(state, parameters, steps, path, reports):
 
 @lean
 def _march_with_arrays(state, parameters, steps, path, reports, workspace, stages):
-    """March the state over all steps with arrays allocated by the caller; holding no references to them saves 5 % of
-    the time of a bare wheelset."""
+    """Integrate the state over all steps with arrays allocated by the caller. Holding no references to them saves 5 %
+    of the time of a bare wheelset."""
     (speed, body, rails), (step, count, stride), (total, rate, stage_state, no_report) = parameters, steps, stages
     for i in range(count + 1):
         row = i // stride
@@ -204,22 +205,22 @@ def _march_with_arrays(state, parameters, steps, path, reports, workspace, stage
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WheelsetPath(Trajectory):
-    """Path of a run: states (n, 10) as above; contacts, REPORT (n, patches) of ``wheel_forces``, the right wheel's
-    first."""
+    """Motion of a wheelset over time: states (n, 10) as above; contacts, REPORT (n, patches) of ``wheel_forces``, the
+    right wheel's first."""
 
     contacts: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """Equations of motion of a wheelset that travels at a speed (m/s), or stands. law : "linear" or "fastsim"; cells :
-    of FASTSIM's strips.
+    """Equations of motion of a wheelset that travels at a speed (m/s), or stands. law : creep law, "linear" or
+    "fastsim"; cells : of FASTSIM's strips.
 
     lean : of the track to the right, the weight across the track as a share of that square to it.
     """
 
     ENGINE: ClassVar[str] = "wheelset"
-    """Who says that a run failed."""
+    """Name of the engine in messages of failed runs."""
 
     wheelset: Wheelset
     speed: float
@@ -235,7 +236,7 @@ class Equations:
 
     @cached_property
     def body(self) -> Body:
-        """The body and its suspension."""
+        """Body and suspension of the wheelset."""
         w = self.wheelset
         carried = (w.load - w.mass * GRAVITY) / 2.0
         sunk = float(w.ellipse.approach) / w.slant[1]
@@ -249,7 +250,7 @@ class Equations:
 
     @cached_property
     def rails(self) -> Rails:
-        """The compiled record of the rails or profiles that the wheels roll on."""
+        """Compiled record of the rails or profiles that the wheels roll on."""
         return rails_of(self.wheelset, self.law, self.cells)
 
     @cached_property
@@ -266,14 +267,14 @@ class Equations:
         return int(count_of_patches(self.rails.profile))
 
     def empty_contacts(self, *record_shape: int) -> Array:
-        """Records REPORT (*shape, patches) for contacts that are not yet known.
+        """Contact records REPORT (*shape, patches) filled with NaN.
 
         Filled as doubles: as records numpy fills them in four times the time, which is that of the rates at two states.
         """
         return np.full((*record_shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
 
     def rates(self, state: Array) -> Array:
-        """Time derivative (10,) of a state (10,)."""
+        """Time derivative (10,) of a wheelset's state (10,)."""
         state_rate = np.empty(STATE_COUNT)
         rates(np.asarray(state, float), *self.parameters, state_rate, NO_REPORT)
         return state_rate
@@ -307,7 +308,7 @@ class Equations:
     def _state_in_balance(
         self, start_state: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]
     ) -> Array:
-        """State in which two values, ``coordinates``, are solved for so that two accelerations vanish."""
+        """State in which two coordinates are solved for so that two accelerations vanish."""
         state_indices = list(coordinates)
         scale = np.maximum(np.abs(start_state[state_indices]), self.body.sunk)
 
@@ -328,16 +329,16 @@ class Equations:
 
     @cached_property
     def state_matrix(self) -> Array:
-        """State matrix A (9, 9), linearised about rest; the angle of spin is left out."""
+        """State matrix A (9, 9) of the equations linearised about rest; the angle of spin is left out."""
         return rate_jacobian(self.rates, self.rest)
 
     @cached_property
     def _fastest_rate(self) -> float:
-        """Largest eigenvalue magnitude (1/s) of the motions about rest."""
+        """Largest magnitude (1/s) of the eigenvalues of the motion about rest."""
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
     def run(self, state: Array, duration: float, step: float, stride: int = 1) -> WheelsetPath:
-        """Integrate by RK4 from a state (10,) over a duration (s) with a step (s); every ``stride``-th step is kept.
+        """Integrate by RK4 from a state (10,) over a duration (s) with a step (s); every ``stride``-th step is stored.
 
         Raises InputError for a state that is no wheelset's, a step too large for the fastest motion, or a duration that
         is no whole number of steps; RunFailed if the wheelset leaves the track, or if the step was too large for the
@@ -359,7 +360,7 @@ class Equations:
         return states, contacts
 
     def check(self, path: WheelsetPath, step: float, stride: int) -> None:
-        """Raise RunFailed if the step was too large for the contact loads or, where every step is kept, for the
+        """Raise RunFailed if the step was too large for the contact loads or, where every step is stored, for the
         motion."""
         self.check_loads(path, step)
         if stride == 1:
@@ -401,7 +402,7 @@ class Equations:
 
 
 def rate_jacobian(rates: Callable[[Array], Array], state: Array, step_factor: float = 1.0) -> Array:
-    """Jacobian (9, 9) of the rates about a state without the angle of spin, by fourth-order central differences over
+    """Jacobian (9, 9) of the rates at a state, without the angle of spin, by fourth-order central differences over
     ``step_factor`` times the usual distance."""
     columns, steps = [], step_factor * DIFFERENCE_STEPS
     for k in range(STATE_COUNT):

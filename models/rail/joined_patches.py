@@ -1,4 +1,4 @@
-"""Exact normal contact of one wheel: all its patches on one half-space, joined along the rail's contour.
+"""Exact normal contact of one wheel with all its contact patches on a common half-space, laid along the rail's contour.
 
 Each patch approaches along its own normal by the cosine of its lean times the vertical approach, which all have in
 common. Heights are those over each patch's own plane; lengths along the contour keep the patches apart. That bends one
@@ -19,18 +19,18 @@ from models.contact.simplified_theory import PatchPressure
 from models.core.errors import InputError, RunFailed
 
 CELLS_X, CELLS_Y, MOST_CELLS_Y = 36, 24, 180
-"""Cells along x, and along y over the narrowest patch; along y at most."""
+"""Count of cells along x, along y over the narrowest patch, and largest count along y."""
 GRID_MARGINS = (1.4, 2.0, 3.0)
-"""Sides of the grid divided by those of the areas that the simplified theory finds."""
+"""Ratios of the sides of the grid to those of the areas that the simplified theory finds, tried in turn."""
 UNKNOWN_HEIGHT = 1e-3
-"""Height (m) where a distance is not known."""
+"""Height (m) of the undeformed surfaces over each other where it is not known."""
 SOLUTION_PRECISION, MOST_ITERATIONS = 1e-6, 30
-"""Relative, of the vertical load and of the approach."""
+"""Relative precision of the vertical load and of the approach; largest count of iterations."""
 
 
 @dataclass(frozen=True)
 class Share:
-    """Load that one patch carries, and the position of that load.
+    """Load that one patch carries, and where it acts.
 
     load : N, along its normal. x, y : centre of pressure from its place (m). area : m^2. box : sides x0, x1, y0, y1 of
     the rectangle about the area, along the rail and along its contour (m). peak : Pa. piece : number of the piece of
@@ -54,7 +54,7 @@ def press_exactly(
     material_pair: MaterialPair,
     coarser: float = 1.0,
 ) -> tuple[list[Share], float]:
-    """Loads and areas of the patches under a total vertical load (N), and the vertical approach (m).
+    """Loads and areas of the patches of a wheel under a total vertical load (N), and the vertical approach (m).
 
     approximate_patches : the patches in contact by the simplified theory, whose areas place the grid; approach : theirs
     (m); coarser : how many times as large as usual the cells are. Raises InputError if the contact reaches the edge of
@@ -127,7 +127,7 @@ def _height(patch: Patch, x: Array, y: Array) -> Array:
 def _pressure_share(
     pressure: Array, x: Array, y: Array, contour_position: float, cell: float, piece_labels: Array
 ) -> Share:
-    """``Share`` of a patch whose origin is at a position on the contour (m); ``pressure`` is zero outside this
+    """``Share`` of a patch whose origin is at a position on the contour (m); ``pressure`` (Pa) is zero outside this
     patch."""
     total = float(pressure.sum())
     if total == 0.0:

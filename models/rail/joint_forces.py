@@ -1,4 +1,4 @@
-"""Forces of both rails as forces of a wheelset's joints, for engines that count coordinates joint by joint.
+"""Forces of both rails as joint forces of a wheelset, for engines whose coordinates are those of joints.
 
 Joints, from the track to the wheelset: sliding along y and along z, yaw about z, roll about the axle's own x, spin
 about the axle. The rate of the last is the wheelset's spin against axes that do not spin: the spin of ``equations`` is
@@ -40,12 +40,12 @@ IN_HEAD, IN_WHEELS, IN_PROFILE, IN_NODE, IN_KNOT = (
     size_of(kind) for kind in (TABLE_HEAD, WHEELS, PROFILE_COUNTS, WHEEL_NODE, RAIL_KNOT)
 )
 PER_STRIP, PER_CELL = 4, 5
-"""Rows of the strips and of the cells, see ``fastsim_grid``."""
+"""Count of numbers of a strip and of a cell, see ``fastsim_grid``."""
 _POSITIONS, _RATES = [Y, Z, YAW, ROLL, ANGLE], [Y_RATE, Z_RATE, YAW_RATE, ROLL_RATE, SPIN]
 
 
 def table(speed: float, rails: Rails) -> Array:
-    """Table of the numbers that the compiled joint forces read."""
+    """Table of the numbers that the compiled joint forces of a wheelset read."""
     strips, cells, (profile, nodes, knots) = rails.strips, rails.cells, rails.profile
     head = [speed, rails.law, rails.middle, nodes.size, knots.size, strips.shape[1], cells.shape[1]]
     parts = (rails.wheels, profile, nodes, knots)
@@ -54,7 +54,7 @@ def table(speed: float, rails: Rails) -> Array:
 
 @inlined
 def rails_at(table_pointer):
-    """``Rails`` as views of a table at a pointer to doubles."""
+    """``Rails`` as views of the table at a pointer to doubles."""
     head = records(table_pointer, 1, TABLE_HEAD)[0]
     nodes, knots, strips, cells = int(head.nodes), int(head.knots), int(head.strips), int(head.cells)
     wheels = beyond(table_pointer, IN_HEAD)
@@ -78,14 +78,14 @@ def rails_at(table_pointer):
 
 
 def to_joints(states: Array) -> Array:
-    """Joint positions and rates (..., 10) from states (..., 10)."""
+    """Joint positions and rates (..., 10) from a wheelset's states (..., 10)."""
     of_joints = states[..., _POSITIONS + _RATES]
     of_joints[..., -1] -= states[..., YAW_RATE] * np.sin(states[..., ROLL])
     return of_joints
 
 
 def from_joints(joints: Array) -> Array:
-    """States (..., 10) from joint positions and rates (..., 10)."""
+    """States (..., 10) of a wheelset from joint positions and rates (..., 10)."""
     states = np.empty(joints.shape)
     states[..., _POSITIONS + _RATES] = joints
     states[..., SPIN] += states[..., YAW_RATE] * np.sin(states[..., ROLL])
@@ -93,7 +93,8 @@ def from_joints(joints: Array) -> Array:
 
 
 def rates_of(joints: Array, accelerations: Array) -> Array:
-    """Time derivative (10,) of the state, from positions and rates (10,) and accelerations (5,) of the joints."""
+    """Time derivative (10,) of a wheelset's state, from positions and rates (10,) and accelerations (5,) of the
+    joints."""
     state_rate = np.empty(STATE_COUNT)
     state_rate[_POSITIONS], state_rate[_RATES] = joints[JOINTS:], accelerations
     roll, yaw_rate, roll_rate = joints[3], joints[JOINTS + 2], joints[JOINTS + 3]
@@ -103,8 +104,8 @@ def rates_of(joints: Array, accelerations: Array) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def joint_forces(table_pointer, t, q, v, forces_out):
-    """Add the joints' forces (N, N m) to ``forces_out`` (5,). For callbacks: all arguments but the time are pointers to
-    doubles.
+    """Add the rails' forces on the joints (N, N m) to ``forces_out`` (5,). For callbacks: all arguments but the time
+    are pointers to doubles.
 
     The forces are NaN where the wheelset has left the track, because engines do not check before they continue.
     """
@@ -135,8 +136,8 @@ def joint_forces(table_pointer, t, q, v, forces_out):
 
 @njit(cache=True, error_model="numpy")
 def set_joint_forces(block, t, n):
-    """Set ``f`` to the forces of ``joint_forces``. All data are in one block of doubles at an address: f, q and v (n,),
-    then the table."""
+    """Set ``f`` to the forces of ``joint_forces``. All data lie in one block of doubles at a memory address: f, q and v
+    (n,), then the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

@@ -1,4 +1,4 @@
-"""Profiles of wheels and rails as a wheelset has them, prepared for ``profile_contact``."""
+"""Wheel and rail profiles as a wheelset has them, prepared for the compiled contact of ``profile_contact``."""
 
 from functools import cache
 from itertools import pairwise
@@ -20,15 +20,16 @@ from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, L
 
 BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
 NODE_SPACING, KNOT_SPACING = 1e-4, 2.5e-4
-"""Distance (m) of nodes along the wheel's contour and of knots along the rail's."""
+"""Spacing (m) of the nodes along the wheel's contour and of the knots along the rail's."""
 LATERAL_SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
-"""Lateral displacements (m) at which first contact is looked for."""
+"""Lateral displacements (m) at which the first contact is computed."""
 CONTACT_JUMP, DISPLACEMENT_STEP = 3e-3, 1e-6
-"""Way (m) on the wheel that first contact must jump between displacements that are so close (m)."""
+"""Distance (m) on the wheel that first contact must jump; difference (m) of the two displacements between which it
+jumps."""
 RIDGE_HEIGHT = 1e-5
-"""Height (m) of the gap between both places of a jump from which on the patches are two."""
+"""Height (m) of the gap between both positions of a jump above which the patches count as two."""
 BLEND_HALF_LENGTH = 1e-3
-"""Half the length (m) over which one zone passes into the next."""
+"""Half the length (m) of the transition from one zone of the contour to the next."""
 
 
 class Profiles(Strict):
@@ -49,7 +50,8 @@ class Profiles(Strict):
     taping: float = quantity("m", "from a flange's back to the taping line", default=0.070)
 
     def located(self, scene: SceneFile) -> "Profiles":
-        """These profiles with full paths of the files; InputError for a name that is neither a file nor built in."""
+        """These profiles with full paths of the files. Raises InputError for a name that is neither a file nor built
+        in."""
         files = {}
         for kind, known in BUILT_IN.items():
             name = getattr(self, kind)
@@ -60,7 +62,7 @@ class Profiles(Strict):
         return self.model_copy(update=files)
 
     def side(self, radius: float) -> WheelAndRail:
-        """The right wheel with a radius (m) on its rail; raises InputError for files that contain no profile."""
+        """The right wheel with a radius (m) on its rail. Raises InputError for files that contain no profile."""
         rail = _contact_profile(self.rail, "rail", self.smoothing)
         return WheelAndRail(
             _contact_profile(self.wheel, "wheel", self.smoothing),
@@ -69,8 +71,8 @@ class Profiles(Strict):
         )
 
     def touching(self, radius: float, lateral_shift: float) -> tuple[float, float]:
-        """Rise of the wheelset (m) from its height at the track's middle, and roll (rad), at which both wheels just
-        touch; InputError if they cannot."""
+        """Rise (m) of the wheelset from its height in the middle of the track, and roll (rad), at which both wheels
+        just touch at a lateral displacement (m). Raises InputError if they cannot."""
         side = self.side(radius)
         pose = touching_pose(side, lateral_shift, 0.0)
         return pose.fall - side.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
@@ -128,8 +130,8 @@ def _evenly_spaced(y: Array, z: Array, spacing: float) -> Array:
 
 
 def _first_contact(wheel_and_rail: WheelAndRail, lateral_shift: float) -> tuple[float, Array, Array] | None:
-    """Position of first contact on the wheel (m from the taping line), all positions of the outline and their gaps (m).
-    None where the profiles do not meet."""
+    """Position of first contact on the wheel (m from the taping line), all positions of the outline, and their gaps
+    (m). None where the profiles do not meet."""
     try:
         pose = touching_pose(wheel_and_rail, lateral_shift, 0.0)
     except InputError:
@@ -142,8 +144,8 @@ def _first_contact(wheel_and_rail: WheelAndRail, lateral_shift: float) -> tuple[
 def _ridge_position(
     wheel_and_rail: WheelAndRail, touch_before: tuple[float, float], touch_after: tuple[float, float]
 ) -> float | None:
-    """Position of the largest gap between the two contact positions of a jump. ``touch_before`` and ``touch_after`` are
-    pairs (shift, position). None if contact does not jump between them."""
+    """Position (m) of the largest gap between the two contact positions of a jump. ``touch_before`` and ``touch_after``
+    are pairs (shift, position). None if contact does not jump between them."""
     while abs(touch_after[1] - touch_before[1]) > CONTACT_JUMP:
         middle = (touch_before[0] + touch_after[0]) / 2.0
         touch = _first_contact(wheel_and_rail, middle)

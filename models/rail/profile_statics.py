@@ -1,4 +1,5 @@
-"""A wheelset on profiles at rest on smooth rails, held sideways: heights, loads, and the cones that steer alike."""
+"""Static equilibrium of a wheelset with profiles on smooth rails at a lateral displacement, and the cones that steer
+like the profiles."""
 
 from dataclasses import dataclass
 
@@ -13,17 +14,17 @@ from models.rail.wheel_forces import contact_points, count_of_patches, rails_of
 from models.rail.wheelset import Wheelset
 
 CHANGE_SIZE = 1e-5
-"""Size (m, rad) of the changes that contact yields."""
+"""Scale (m, rad) of the changes of height and roll that the search makes."""
 LOAD_PRECISION = 1e-9
-"""Share of the load to which each wheel's is found."""
+"""Relative precision of each wheel's load."""
 SHIFT_COUNT = 16
-"""Lateral displacements up to the amplitude at which the rolling radii are found."""
+"""Count of lateral displacements up to the amplitude at which rolling radii are computed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """Static position of a wheelset: height z (m) and roll (rad), its touches, TOUCH (patches,), and their loads
-    (patches,) in N, those of the right wheel first."""
+    """Static position of a wheelset: height z (m) and roll (rad), its contact patches, TOUCH (patches,), and their
+    loads (patches,) in N, those of the right wheel first."""
 
     z: float
     roll: float
